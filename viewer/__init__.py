@@ -1,0 +1,89 @@
+"""See, check and produce skinned characters.
+
+>>> import viewer
+>>> scene = viewer.load()                                  # the bundled figure
+>>> picture = viewer.render(scene, size=(320, 240))
+>>> picture.shape
+(240, 320, 4)
+
+Importing this module imports nothing heavy: each name loads its own module on first use.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from viewer.app.window import show
+    from viewer.errors import ViewerError
+    from viewer.formats import write
+    from viewer.loading import load
+    from viewer.render.camera import Camera
+    from viewer.render.offscreen import render
+    from viewer.render.options import DisplayOptions, Light, Lights
+    from viewer.rig.figure import Figure
+    from viewer.rig.mesh import Material, Mesh
+    from viewer.rig.pose import Pose, rest_pose
+    from viewer.rig.scene import Actor, Scene
+    from viewer.rig.skeleton import Skeleton
+    from viewer.rig.skin import Skin
+    from viewer.rig.skinning import deform
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "Actor",
+    "Camera",
+    "DisplayOptions",
+    "Figure",
+    "Light",
+    "Lights",
+    "Material",
+    "Mesh",
+    "Pose",
+    "Scene",
+    "Skeleton",
+    "Skin",
+    "ViewerError",
+    "deform",
+    "load",
+    "render",
+    "rest_pose",
+    "show",
+    "write",
+]
+
+_HOMES = {
+    "Actor": "rig.scene",
+    "Camera": "render.camera",
+    "DisplayOptions": "render.options",
+    "Figure": "rig.figure",
+    "Light": "render.options",
+    "Lights": "render.options",
+    "Material": "rig.mesh",
+    "Mesh": "rig.mesh",
+    "Pose": "rig.pose",
+    "Scene": "rig.scene",
+    "Skeleton": "rig.skeleton",
+    "Skin": "rig.skin",
+    "ViewerError": "errors",
+    "deform": "rig.skinning",
+    "load": "loading",
+    "render": "render.offscreen",
+    "rest_pose": "rig.pose",
+    "show": "app.window",
+    "write": "formats",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

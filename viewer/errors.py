@@ -1,0 +1,86 @@
+"""What can go wrong, as one tree that callers catch at the height they need.
+
+::
+
+    ViewerError                 exit 2   anything a person can act on; one line, no traceback
+    ├── FormatError             exit 2   a file is not what it says: path:line: expected, found
+    ├── UnsupportedFormatError  exit 2   no reader or writer knows this kind of file
+    ├── RigError                exit 2   parts that do not fit each other
+    ├── RenderError             exit 4   no usable OpenGL, or the driver refused
+    └── OutputError             exit 5   a result could not be written
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+__all__ = [
+    "FormatError",
+    "OutputError",
+    "RenderError",
+    "RigError",
+    "UnsupportedFormatError",
+    "ViewerError",
+    "printable",
+]
+
+
+def printable(text: object, limit: int = 200) -> str:
+    r"""Return ``text`` on one line: control characters escaped, cut after ``limit`` characters.
+
+    >>> printable("two\nlines")
+    'two\\nlines'
+    """
+    shown = "".join(
+        letter
+        if letter.isprintable()
+        else letter.encode("unicode_escape", "surrogatepass").decode()
+        for letter in str(text)
+    )
+    return shown if len(shown) <= limit else shown[: limit - 1] + "…"
+
+
+class ViewerError(Exception):
+    """Something a person can act on; ``str()`` is the one line to show."""
+
+    exit_code = 2
+
+
+class FormatError(ViewerError):
+    """A file breaks its own format.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file at fault.
+    message : str
+        What was expected and what was found.
+    line : int, optional
+        Line of the fault, counted from 1, if the format has lines.
+    """
+
+    def __init__(self, path: str | Path, message: str, line: int | None = None) -> None:
+        self.path = Path(path)
+        self.line = line
+        where = printable(path, 300) if line is None else f"{printable(path, 300)}:{line}"
+        super().__init__(f"{where}: {message}")
+
+
+class UnsupportedFormatError(ViewerError):
+    """No reader or writer knows this kind of file."""
+
+
+class RigError(ViewerError):
+    """Parts of a figure that do not fit each other, or a name that it does not have."""
+
+
+class RenderError(ViewerError):
+    """OpenGL is missing, too old, or refused what was asked."""
+
+    exit_code = 4
+
+
+class OutputError(ViewerError):
+    """A result could not be written; what was there before is untouched."""
+
+    exit_code = 5

@@ -1,0 +1,113 @@
+"""What a ``.skin`` file may get wrong beyond its grammar: indices, weights, bindings."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.formats._skin_sections import Sections
+from viewer.formats._source import Source
+from viewer.rig.mesh import Mesh
+from viewer.rig.skin import Skin, has_influence, influence_counts, weight_sums
+
+__all__ = ["check_bindings", "check_mesh", "check_triangles", "check_weights"]
+
+WEIGHT_TOLERANCE = 0.01  # the format's own: a sum further from 1 is worth a warning
+_SINGULAR = 1e-12  # determinant relative to the product of the column lengths
+_NEARLY_SINGULAR = 1e6  # condition number
+_FAR = 1e6  # a vertex this many times the median distance away is no part of the figure
+
+
+def check_mesh(source: Source, sections: Sections, mesh: Mesh) -> None:
+    """Warn of textures that cannot be drawn and of vertices that are far from all others."""
+    has_texture = any(material.texture for material in mesh.materials)
+    if mesh.uvs is not None and not has_texture:
+        source.warn("texcoords without a texture: drawn untextured", sections.offsets["texcoords"])
+    if mesh.uvs is None and has_texture:
+        source.warn("a texture without texcoords: drawn untextured", sections.offsets["material"])
+    distance = np.abs(mesh.positions - np.median(mesh.positions, axis=0)).max(axis=1)
+    typical = float(np.median(distance))
+    if typical > 0 and distance.max() > _FAR * typical:
+        source.warn(
+            f"vertex {distance.argmax()} is {distance.max():.2g} units away from the others",
+            sections.offsets["positions"],
+        )
+
+
+def check_triangles(source: Source, sections: Sections, n_vertices: int) -> None:
+    """Refuse indices of vertices that do not exist."""
+    for run in sections.triangles:
+        corners = run.triangles.ravel()
+        wrong = np.flatnonzero((corners < 0) | (corners >= n_vertices))
+        if len(wrong):
+            place = int(wrong[0])
+            raise source.error(
+                f"triangle {place // 3}: expected a vertex index below {n_vertices}, "
+                f"found {corners[place]}",
+                source.word_offset(run.block.start, place),
+            )
+
+
+def check_bindings(source: Source, sections: Sections) -> None:
+    """Refuse bindings that cannot be inverted and indices of joints that are not bound."""
+    assert sections.bindings is not None  # the caller looked
+    linear = sections.bindings[:, :3, :3]
+    lengths = np.linalg.norm(linear, axis=1).prod(axis=1)
+    determinants = np.linalg.det(linear)
+    flat = np.abs(determinants) <= _SINGULAR * lengths
+    if flat.any():
+        index = int(flat.argmax())
+        raise source.error(
+            f"bindings: expected matrices that can be inverted, found matrix {index} "
+            f"with determinant {determinants[index]:.3g}",
+            sections.offsets["bindings"],
+        )
+    if len(linear):
+        conditions = np.linalg.cond(linear)
+        if conditions.max() > _NEARLY_SINGULAR:
+            source.warn(
+                f"matrix {conditions.argmax()} of bindings can hardly be inverted "
+                f"(condition number {conditions.max():.2g})",
+                sections.offsets["bindings"],
+            )
+    n_joints = len(linear)
+    wrong = np.flatnonzero((sections.joints < 0) | (sections.joints >= n_joints))
+    if len(wrong):
+        assert sections.starts is not None  # the caller looked
+        influence = int(wrong[0])
+        vertex = int(np.searchsorted(sections.starts, influence, side="right")) - 1
+        # Words before it: a count for each vertex up to this one, and two for each influence.
+        place = vertex + 1 + 2 * influence
+        raise source.error(
+            f"skinweights of vertex {vertex}: expected a joint index below {n_joints}, "
+            f"found {sections.joints[influence]}",
+            source.word_offset(sections.blocks["skinweights"].start, place),
+        )
+
+
+def check_weights(source: Source, sections: Sections, skin: Skin) -> None:
+    """Warn, once each, of weights that are negative, missing, or do not add up to 1."""
+    offset = sections.offsets["skinweights"]
+    moved = has_influence(skin)
+    if not moved.all():
+        source.warn(
+            f"{(~moved).sum()} vertices without influence stay where they were bound, "
+            f"first vertex {(~moved).argmax()}",
+            offset,
+        )
+    negative = skin.weights < 0
+    if negative.any():
+        owners = np.repeat(np.arange(skin.n_vertices), influence_counts(skin))
+        source.warn(
+            f"{negative.sum()} negative weights are used as stored, first "
+            f"{skin.weights[negative][0]:g} of vertex {owners[negative.argmax()]}",
+            offset,
+        )
+    errors = np.where(moved, np.abs(weight_sums(skin) - 1.0), 0.0)
+    off = errors > WEIGHT_TOLERANCE
+    if off.any():
+        worst = int(errors.argmax())
+        source.warn(
+            f"the weights of {off.sum()} vertices do not add up to 1 and are used as stored, "
+            f"worst vertex {worst} with {weight_sums(skin)[worst]:.6g}",
+            offset,
+        )

@@ -1,0 +1,141 @@
+"""A file that is being read: its bytes, its warnings, and line numbers when an error needs one."""
+
+from __future__ import annotations
+
+import re
+import stat
+from collections.abc import Iterator
+from pathlib import Path
+
+from viewer.errors import FormatError, printable
+
+__all__ = ["MAX_SIZE", "Source", "shown"]
+
+MAX_SIZE = 2 << 30
+"""Largest file that is read, in bytes, unless the caller says otherwise."""
+
+_WORD = re.compile(rb"[{}]|[^{} \t\n\r\v\f]+")
+# CR CR LF, seen in real files, is one line end; so is a CR alone.
+_LINE_END = re.compile(rb"\r*\n|\r")
+_MAGIC = (
+    (b"\x1f\x8b", "gzip data"),
+    (b"\x7fELF", "a program (ELF)"),
+    (b"\x89PNG", "a PNG picture"),
+    (b"\xff\xd8\xff", "a JPEG picture"),
+    (b"BM", "a BMP picture"),
+    (b"GIF8", "a GIF picture"),
+    (b"PK\x03\x04", "a ZIP archive"),
+    (b"%PDF", "a PDF document"),
+    (b"glTF", "a binary glTF file"),
+    (b"\xff\xfe", "UTF-16 text"),
+    (b"\xfe\xff", "UTF-16 text"),
+    (b"\x93NUMPY", "a numpy array"),
+)
+_KINDS = {
+    stat.S_IFDIR: "a folder",
+    stat.S_IFIFO: "a pipe",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+    stat.S_IFSOCK: "a socket",
+}
+
+
+class Source:
+    """The bytes of one file with the warnings that its reader adds.
+
+    Attributes
+    ----------
+    path : Path
+        Where the bytes came from; texture names are relative to its folder.
+    data : bytes
+        The whole file, without a UTF-8 byte order mark.
+    warnings : list of str
+        One line each.
+    """
+
+    def __init__(self, path: str | Path, data: bytes) -> None:
+        self.path = Path(path)
+        self.data = data.removeprefix(b"\xef\xbb\xbf")
+        self.warnings: list[str] = []
+
+    @classmethod
+    def open(cls, path: str | Path, max_size: int = MAX_SIZE) -> Source:
+        """Read a regular file.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file.
+        max_size : int
+            Larger files are refused before they are read.
+
+        Raises
+        ------
+        FormatError
+            If the file is missing, unreadable, not a regular file, or too large.
+        """
+        path = Path(path)
+        try:
+            # A pipe would block on opening, so look before.
+            status = path.stat()
+            if not stat.S_ISREG(status.st_mode):
+                kind = _KINDS.get(stat.S_IFMT(status.st_mode), "something else")
+                raise FormatError(path, f"expected a file, found {kind}")
+            if status.st_size > max_size:
+                raise FormatError(
+                    path, f"expected at most {max_size} bytes, found {status.st_size} (--max-size)"
+                )
+            return cls(path, path.read_bytes())
+        except (OSError, ValueError) as problem:
+            reason = getattr(problem, "strerror", None) or problem
+            raise FormatError(path, f"cannot be read: {reason}") from None
+
+    def words(self, start: int = 0, end: int | None = None) -> Iterator[re.Match[bytes]]:
+        """Yield words and braces, braces always on their own, with their offsets."""
+        return _WORD.finditer(self.data, start, len(self.data) if end is None else end)
+
+    def next_word(self, start: int) -> re.Match[bytes] | None:
+        """Return the first word at or after an offset, or None at the end of the file."""
+        return _WORD.search(self.data, start)
+
+    def word_offset(self, start: int, index: int) -> int:
+        """Return the offset of the index-th word after ``start``; slow, for errors only."""
+        for number, word in enumerate(self.words(start)):
+            if number == index:
+                return word.start()
+        return len(self.data)
+
+    def line(self, offset: int) -> int:
+        """Return the line of an offset, counted from 1; looked for only when it is needed."""
+        return 1 + sum(1 for _ in _LINE_END.finditer(self.data, 0, offset))
+
+    def error(self, message: str, offset: int | None = None) -> FormatError:
+        """Return an error that names the file, and the line of ``offset``."""
+        return FormatError(self.path, message, None if offset is None else self.line(offset))
+
+    def warn(self, message: str, offset: int | None = None) -> None:
+        """Add a warning that names the file, and the line of ``offset``."""
+        self.warnings.append(str(self.error(message, offset)))
+
+    def looks_like(self) -> str | None:
+        """Return what the bytes look like if they are no text of ours, e.g. ``"gzip data"``."""
+        head = self.data[:4096].lstrip()
+        if not head:
+            return "an empty file" if len(self.data) < 4096 else "only white space"
+        for magic, kind in _MAGIC:
+            if self.data.startswith(magic):
+                return kind
+        if re.match(rb"<(!doctype|html|\?xml)", head, re.IGNORECASE):
+            return "HTML or XML (a failed download?)"
+        if head.count(0) * 3 > len(head):
+            return "zeros" if not head.strip(b"\0") else "binary data"
+        return None
+
+
+def shown(word: bytes) -> str:
+    r"""Return a word of a file in quotes, on one line and not too long.
+
+    >>> shown(b"up\x00")
+    '"up\\x00"'
+    """
+    return f'"{printable(word[:200].decode("utf-8", "replace"), 40)}"'

@@ -1,0 +1,243 @@
+r"""Read and write ``.skin`` meshes with weights (UCSD course CSE169, with texture extension).
+
+::
+
+    skin    = section*                                    in any order
+    section = "positions"   N "{" (x y z)*N "}"
+            | "normals"     N "{" (x y z)*N "}"
+            | "texcoords"   N "{" (u v)*N "}"
+            | "skinweights" N "{"? (k (joint weight)*k)*N "}"
+            | "material" name? "{" ("texture" file)? "}"
+            | "triangles"   M "{" (i j k)*M "}"
+            | "bindings"    B "{"? ("matrix" "{" 12 numbers "}")*B "}"
+
+A binding's four rows of three are the columns a, b, c, d of B = [a b c d; 0 0 0 1]. A material
+applies to the triangles sections after it. Weights are used as stored.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from viewer.errors import UnsupportedFormatError
+from viewer.formats._image import save_image
+from viewer.formats._save import save_text
+from viewer.formats._skin_checks import (
+    check_bindings,
+    check_mesh,
+    check_triangles,
+    check_weights,
+)
+from viewer.formats._skin_sections import Sections, read_sections
+from viewer.formats._source import Source
+from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import Material, Mesh, vertex_normals
+from viewer.rig.skin import Skin
+
+__all__ = ["read", "write"]
+
+
+def read(source: Source) -> Figure:
+    """Read a mesh with its weights and bindings.
+
+    Parameters
+    ----------
+    source : Source
+        The file; what is odd but readable is added to its warnings.
+
+    Returns
+    -------
+    Figure
+        Without skeleton; without skin if the file has neither weights nor bindings.
+
+    Raises
+    ------
+    FormatError
+        With file and line, if the text breaks the grammar or its sections do not fit.
+    """
+    sections = read_sections(source)
+    mesh = _mesh(source, sections)
+    check_mesh(source, sections, mesh)
+    return Figure(name=source.path.stem, mesh=mesh, skin=_skin(source, sections))
+
+
+def _mesh(source: Source, sections: Sections) -> Mesh:
+    positions = _required(source, sections, "positions")
+    _require_equal_counts(source, sections)
+    if not sections.triangles:
+        raise source.error("expected triangles, found no `triangles` section")
+    check_triangles(source, sections, len(positions))
+    triangles = np.concatenate([run.triangles for run in sections.triangles])
+    if len(triangles) == 0:
+        raise source.error("expected at least one triangle, found none")
+    materials = np.repeat(
+        [run.material for run in sections.triangles],
+        [len(run.triangles) for run in sections.triangles],
+    )
+    return Mesh(
+        positions=positions,
+        normals=_normals(source, sections, positions, triangles),
+        triangles=triangles,
+        uvs=sections.tables.get("texcoords"),
+        materials=tuple(sections.materials),
+        triangle_materials=materials.astype(np.int32),
+    )
+
+
+def _required(source: Source, sections: Sections, name: str) -> Floats:
+    table = sections.tables.get(name)
+    if table is None:
+        looks = source.looks_like()
+        raise source.error(
+            f"expected a skin, found no `{name}` section{f' ({looks})' * bool(looks)}"
+        )
+    if len(table) == 0:
+        raise source.error(f"expected at least one vertex, found {name} 0")
+    return table
+
+
+def _require_equal_counts(source: Source, sections: Sections) -> None:
+    wanted = len(sections.tables["positions"])
+    counts = {name: len(table) for name, table in sections.tables.items()}
+    if sections.starts is not None:
+        counts["skinweights"] = len(sections.starts) - 1
+    for name, count in counts.items():
+        if count != wanted:
+            raise source.error(
+                f"{name}: expected {wanted} entries as in positions, found {count}",
+                sections.offsets[name],
+            )
+
+
+def _normals(source: Source, sections: Sections, positions: Floats, triangles: Ints) -> Floats:
+    normals = sections.tables.get("normals")
+    if normals is None:
+        source.warn("no `normals` section: computed them from the triangles")
+        return vertex_normals(positions, triangles)
+    zero: Bools = np.all(normals == 0.0, axis=1)
+    if zero.any():
+        source.warn(
+            f"{zero.sum()} normals of length 0, first of vertex {zero.argmax()}: "
+            "computed from the triangles",
+            sections.offsets["normals"],
+        )
+        normals = np.where(zero[:, None], vertex_normals(positions, triangles), normals)
+    return normals
+
+
+def _skin(source: Source, sections: Sections) -> Skin | None:
+    if sections.starts is None and sections.bindings is None:
+        source.warn("no `skinweights` and no `bindings`: the mesh cannot follow a skeleton")
+        return None
+    if sections.starts is None or sections.bindings is None:
+        missing = "skinweights" if sections.starts is None else "bindings"
+        present = "bindings" if sections.starts is None else "skinweights"
+        raise source.error(f"expected a `{missing}` section beside `{present}`, found none")
+    check_bindings(source, sections)
+    inverse_bind = np.linalg.inv(sections.bindings).astype(np.float64, copy=False)
+    skin = Skin(
+        starts=sections.starts,
+        joints=sections.joints,
+        weights=sections.weights,
+        inverse_bind=inverse_bind,
+    )
+    check_weights(source, sections, skin)
+    return skin
+
+
+def write(figure: Figure, path: str | Path) -> None:
+    """Write a figure's mesh, weights and bindings; its texture pictures too if they are missing.
+
+    Parameters
+    ----------
+    figure : Figure
+        With a mesh; without a skin, weights and bindings are left out.
+    path : str or Path
+        Replaced only when the whole text has been written.
+
+    Raises
+    ------
+    UnsupportedFormatError
+        If there is no mesh, or a name does not fit the grammar.
+    OutputError
+        If a file cannot be written.
+    """
+    if figure.mesh is None:
+        raise UnsupportedFormatError(f"figure {figure.name} has no mesh to write as .skin")
+    mesh = figure.mesh
+    parts = [_table("positions", mesh.positions), _table("normals", mesh.normals)]
+    if mesh.uvs is not None:
+        parts.append(_table("texcoords", mesh.uvs))
+    if figure.skin is not None:
+        parts.append(_weights_text(figure.skin))
+    parts.extend(_triangle_runs(mesh))
+    if figure.skin is not None:
+        parts.append(_bindings_text(figure.skin))
+    for material in mesh.materials:
+        _save_texture(material, Path(path).parent)
+    save_text(path, "".join(parts))
+
+
+def _table(name: str, rows: Floats | Ints) -> str:
+    lines = [f"  {' '.join(map(repr, row))}\n" for row in rows.tolist()]
+    return f"{name} {len(rows)} {{\n{''.join(lines)}}}\n"
+
+
+def _weights_text(skin: Skin) -> str:
+    pairs = [f"{j} {w!r}" for j, w in zip(skin.joints.tolist(), skin.weights.tolist(), strict=True)]
+    starts = skin.starts.tolist()
+    lines = [
+        f"  {' '.join([str(end - start), *pairs[start:end]])}\n" for start, end in pairwise(starts)
+    ]
+    return f"skinweights {skin.n_vertices} {{\n{''.join(lines)}}}\n"
+
+
+def _triangle_runs(mesh: Mesh) -> list[str]:
+    """Write a material before the triangles that follow it, as the reader assigns them."""
+    indices = mesh.material_indices
+    edges = np.flatnonzero(np.diff(indices)) + 1
+    parts: list[str] = []
+    written = 0
+    for first, last in zip([0, *edges], [*edges, len(indices)], strict=True):
+        material = int(indices[first])
+        if written and material != written - 1 and material < written:
+            raise UnsupportedFormatError(".skin cannot return to an earlier material")
+        for index in range(written, material + 1):
+            parts.append(_material_text(mesh.materials[index]))
+            written = index + 1
+        parts.append(_table("triangles", mesh.triangles[first:last]))
+    parts.extend(map(_material_text, mesh.materials[written:]))
+    return parts
+
+
+def _material_text(material: Material) -> str:
+    words = f"{material.name} {material.texture or ''}"
+    if set(words) & set("{}\r\n"):
+        raise UnsupportedFormatError(f'.skin cannot hold the material "{words.strip()}"')
+    head = " ".join(filter(None, ["material", material.name, "{\n"]))
+    return head + (f"  texture {material.texture}\n" if material.texture else "") + "}\n"
+
+
+def _bindings_text(skin: Skin) -> str:
+    bindings = np.linalg.inv(skin.inverse_bind) + 0.0  # +0.0 turns -0.0 into 0.0
+    # The rows of the text are the matrix's columns.
+    blocks = [_matrix_text(columns) for columns in bindings[:, :3, :].transpose(0, 2, 1)]
+    return f"bindings {len(bindings)} {{\n{''.join(blocks)}}}\n"
+
+
+def _matrix_text(rows: Floats) -> str:
+    lines = "".join(f"    {' '.join(map(repr, row))}\n" for row in rows.tolist())
+    return f"  matrix {{\n{lines}  }}\n"
+
+
+def _save_texture(material: Material, folder: Path) -> None:
+    """Put a picture beside the file that names it, unless one is there already."""
+    if material.texture is None or material.image is None:
+        return
+    if Path(material.texture).name != material.texture or (folder / material.texture).exists():
+        return
+    save_image(folder / material.texture, material.image)

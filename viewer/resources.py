@@ -1,0 +1,35 @@
+"""Find the folders ``shaders/`` and ``assets/``, in a checkout and in an installed wheel."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from viewer.errors import ViewerError
+
+__all__ = ["resource"]
+
+_PACKAGE = Path(__file__).resolve().parent
+
+
+def resource(kind: str, *parts: str) -> Path:
+    """Return the path of a file or folder that ships with the viewer.
+
+    Parameters
+    ----------
+    kind : str
+        ``"shaders"`` or ``"assets"``.
+    *parts : str
+        Path inside that folder.
+
+    Raises
+    ------
+    ViewerError
+        If the installation lacks it.
+    """
+    # A wheel puts the folders inside the package; a checkout has them beside it.
+    for base in (_PACKAGE, _PACKAGE.parent):
+        path = base.joinpath(kind, *parts)
+        if path.exists():
+            return path
+    wanted = Path(kind, *parts)
+    raise ViewerError(f"the installation lacks {wanted}: install skinning-viewer again")

@@ -1,0 +1,1 @@
+"""The mathematics of skinned characters: numpy, float64, no files, no OpenGL."""

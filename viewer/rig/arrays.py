@@ -1,0 +1,64 @@
+"""Array types, and the check that every array of a rig passes once."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from viewer.errors import RigError
+
+__all__ = ["Bools", "Bytes", "Floats", "Ints", "frozen"]
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Bools = NDArray[np.bool_]
+Bytes = NDArray[np.uint8]
+
+
+def frozen(
+    name: str, values: Any, shape: tuple[int | None, ...], dtype: DTypeLike = np.float64
+) -> NDArray[Any]:
+    """Return a read-only copy of ``values`` of the given shape and type.
+
+    Parameters
+    ----------
+    name : str
+        What the array is called in the error message.
+    values : array-like of ``shape``
+        The numbers; an array that is read-only and owns its memory is taken as it is.
+    shape : tuple
+        Wanted shape; ``None`` leaves an axis free.
+    dtype : dtype
+        Wanted element type.
+
+    Raises
+    ------
+    RigError
+        If the shape differs or a number is not finite.
+
+    >>> frozen("offset", [1, 2, 3], (3,)).flags.writeable
+    False
+    """
+    array = np.asarray(values, dtype=dtype)
+    fits = array.ndim == len(shape) and all(
+        wanted is None or wanted == found for wanted, found in zip(shape, array.shape, strict=True)
+    )
+    if not fits:
+        wanted_text = " x ".join("any" if wanted is None else str(wanted) for wanted in shape)
+        found_text = " x ".join(map(str, array.shape)) or "a single number"
+        raise RigError(f"{name}: expected shape {wanted_text}, found {found_text}")
+    if array.dtype.kind == "f" and not np.isfinite(array).all():
+        raise RigError(f"{name}: expected finite numbers, found {_first_odd(array)}")
+    shared = array is values or array.base is not None
+    if shared and (array.flags.writeable or not array.flags.owndata):
+        array = array.copy()
+    array.flags.writeable = False
+    return array
+
+
+def _first_odd(array: NDArray[Any]) -> str:
+    index = tuple(int(axis[0]) for axis in np.nonzero(~np.isfinite(array)))
+    place = ", ".join(map(str, index))
+    return f"{array[index]} at index {place}"

@@ -1,0 +1,83 @@
+"""Forward kinematics: from local matrices to world matrices to skinning matrices."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.pose import Pose, local_matrices
+from viewer.rig.skeleton import Skeleton
+
+__all__ = ["forward_kinematics", "skinning_matrices", "world_matrices"]
+
+
+def forward_kinematics(parents: Ints, local: Floats, root: Floats | None = None) -> Floats:
+    """Concatenate local matrices down the hierarchy: W[j] = W[parent[j]] @ L[j].
+
+    Every pass multiplies each joint by what its ancestor pointer has gathered so far and then
+    doubles the pointer, so a chain of n joints takes log2(n) passes (Hillis and Steele 1986).
+
+    Parameters
+    ----------
+    parents : (J,)
+        Index of each joint's parent, smaller than its own; -1 for a root.
+    local : (J, 4, 4)
+        Joint-to-parent matrices.
+    root : (4, 4), optional
+        Placement of the whole figure in the world; identity if omitted.
+
+    Returns
+    -------
+    (J, 4, 4)
+        Joint-to-world matrices, lengths in the unit of ``local``.
+
+    >>> local = np.stack([np.eye(4)] * 2)
+    >>> local[:, 0, 3] = 2.0, 1.0
+    >>> float(forward_kinematics(np.array([-1, 0]), local)[1, 0, 3])
+    3.0
+    """
+    world = local.copy()
+    ancestors = parents.copy()
+    below = np.flatnonzero(ancestors >= 0)
+    while len(below):
+        above = ancestors[below]
+        world[below] = world[above] @ world[below]
+        ancestors[below] = ancestors[above]
+        below = below[ancestors[below] >= 0]
+    return world if root is None else root @ world
+
+
+def world_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
+    """Return where a pose puts every joint.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Gives hierarchy and DOF table.
+    pose : Pose
+        DOFs in lengths and radians.
+
+    Returns
+    -------
+    (J, 4, 4)
+        Joint-to-figure matrices.
+    """
+    return forward_kinematics(skeleton.parents, local_matrices(skeleton, pose))
+
+
+def skinning_matrices(world: Floats, inverse_bind: Floats) -> Floats:
+    """Return what carries a bound vertex with each joint: M[j] = W[j] inverse(B[j]).
+
+    Parameters
+    ----------
+    world : (J, 4, 4)
+        Joint-to-world matrices.
+    inverse_bind : (J, 4, 4)
+        World-to-joint matrices at bind time.
+
+    Returns
+    -------
+    (J, 4, 4)
+        Bind-to-posed matrices.
+    """
+    return world @ inverse_bind

@@ -1,0 +1,192 @@
+"""A triangle mesh with normals, texture coordinates and materials."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.rig.arrays import Bools, Bytes, Floats, Ints, frozen
+
+__all__ = ["Material", "Mesh", "bounding_box", "box_size", "triangle_areas", "vertex_normals"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Material:
+    """What a run of triangles is covered with.
+
+    Attributes
+    ----------
+    name : str
+        As in the file; nothing refers to it.
+    texture : str or None
+        File name of the picture, relative to the figure's folder.
+    image : (H, W, 4) uint8 or None
+        Its pixels, sRGB with alpha, first row at v = 1; None if it could not be read.
+    """
+
+    name: str = ""
+    texture: str | None = None
+    image: Bytes | None = None
+
+    def __post_init__(self) -> None:
+        if self.image is not None:
+            object.__setattr__(
+                self, "image", frozen("image", self.image, (None, None, 4), np.uint8)
+            )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mesh:
+    """Triangles over vertices, in the space where the skin was bound.
+
+    Attributes
+    ----------
+    positions, normals : (V, 3)
+        Figure units; normals as stored, not necessarily of unit length.
+    triangles : (T, 3) int32
+        Vertex indices; counter-clockwise from outside in most files, never relied upon.
+    uvs : (V, 2) or None
+        Texture coordinates, v = 0 at the bottom row of the picture.
+    materials : tuple of Material
+        In file order.
+    triangle_materials : (T,) int32
+        Index into ``materials``, -1 for none.
+    """
+
+    positions: Floats
+    normals: Floats
+    triangles: Ints
+    uvs: Floats | None = None
+    materials: tuple[Material, ...] = ()
+    triangle_materials: Ints | None = None
+
+    def __post_init__(self) -> None:
+        def put(name: str, values: object) -> None:
+            object.__setattr__(self, name, values)
+
+        put("positions", frozen("positions", self.positions, (None, 3)))
+        put("normals", frozen("normals", self.normals, (self.n_vertices, 3)))
+        put("triangles", frozen("triangles", self.triangles, (None, 3), np.int32))
+        if self.uvs is not None:
+            put("uvs", frozen("uvs", self.uvs, (self.n_vertices, 2)))
+        if self.triangle_materials is None:
+            put("triangle_materials", np.full(self.n_triangles, -1, dtype=np.int32))
+        put(
+            "triangle_materials",
+            frozen("triangle_materials", self.triangle_materials, (self.n_triangles,), np.int32),
+        )
+        self._check_indices()
+
+    def _check_indices(self) -> None:
+        if self.n_triangles == 0:
+            return
+        if self.triangles.min() < 0 or self.triangles.max() >= self.n_vertices:
+            raise RigError(
+                f"triangles: expected vertex indices 0 to {self.n_vertices - 1}, "
+                f"found {self.triangles.min()} to {self.triangles.max()}"
+            )
+        if self.material_indices.max() >= len(self.materials):
+            raise RigError(
+                f"triangle_materials: expected at most {len(self.materials) - 1}, "
+                f"found {self.material_indices.max()}"
+            )
+
+    @property
+    def n_vertices(self) -> int:
+        """Number of vertices, V."""
+        return len(self.positions)
+
+    @property
+    def n_triangles(self) -> int:
+        """Number of triangles, T."""
+        return len(self.triangles)
+
+    @property
+    def material_indices(self) -> Ints:
+        """``triangle_materials``, never None: (T,) int32."""
+        assert self.triangle_materials is not None  # set by __post_init__
+        return self.triangle_materials
+
+
+def bounding_box(points: Floats) -> Floats:
+    """Return the lowest and highest corner of the points.
+
+    Parameters
+    ----------
+    points : (N, 3)
+        Any points; none at all give a box of size 0 at the origin.
+
+    Returns
+    -------
+    (2, 3)
+        Corners, in the unit of ``points``.
+
+    >>> bounding_box(np.array([[0.0, 1.0, 2.0], [3.0, 0.0, 1.0]])).tolist()
+    [[0.0, 0.0, 1.0], [3.0, 1.0, 2.0]]
+    """
+    if len(points) == 0:
+        return np.zeros((2, 3))
+    return np.stack([points.min(axis=0), points.max(axis=0)])
+
+
+def box_size(box: Floats) -> float:
+    """Return the length of a box's diagonal: the "size" that tolerances refer to.
+
+    >>> box_size(np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 2.0]]))
+    3.0
+    """
+    return float(np.linalg.norm(box[1] - box[0]))
+
+
+def triangle_areas(positions: Floats, triangles: Ints) -> Floats:
+    """Return each triangle's area, |(b - a) x (c - a)| / 2.
+
+    Parameters
+    ----------
+    positions : (V, 3)
+        Figure units.
+    triangles : (T, 3)
+        Vertex indices.
+
+    Returns
+    -------
+    (T,)
+        Areas, squared units.
+    """
+    return 0.5 * np.linalg.norm(_area_vectors(positions, triangles), axis=1)
+
+
+def vertex_normals(positions: Floats, triangles: Ints) -> Floats:
+    """Return unit normals averaged over each vertex's triangles, weighted by area.
+
+    Parameters
+    ----------
+    positions : (V, 3)
+        Figure units.
+    triangles : (T, 3)
+        Vertex indices, counter-clockwise from outside.
+
+    Returns
+    -------
+    (V, 3)
+        Unit normals; +y for a vertex whose triangles have no area or that has none.
+
+    >>> square = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    >>> vertex_normals(square, np.array([[0, 1, 2]]))[0].tolist()
+    [0.0, 0.0, 1.0]
+    """
+    vectors = _area_vectors(positions, triangles)
+    normals = np.zeros_like(positions)
+    for corner in range(3):
+        np.add.at(normals, triangles[:, corner], vectors)
+    lengths = np.linalg.norm(normals, axis=1)
+    flat: Bools = lengths == 0.0
+    normals[flat] = 0.0, 1.0, 0.0
+    return normals / np.where(flat, 1.0, lengths)[:, None]
+
+
+def _area_vectors(positions: Floats, triangles: Ints) -> Floats:
+    a, b, c = (positions[triangles[:, corner]] for corner in range(3))
+    return np.cross(b - a, c - a)

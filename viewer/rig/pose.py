@@ -1,0 +1,116 @@
+"""The state that moves: one figure's DOFs and local transforms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.rotation import axis_rotations, quaternion_to_matrix
+from viewer.rig.skeleton import Skeleton, clamp_dofs
+
+__all__ = ["Pose", "local_matrices", "rest_pose"]
+
+_FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
+
+
+@dataclass(slots=True, eq=False)
+class Pose:
+    """What a skeleton's joints do right now; arrays are changed in place.
+
+    Attributes
+    ----------
+    dofs : (D,)
+        Lengths or radians.
+    translations, rotations, scales : (J, 3), (J, 4), (J, 3)
+        Local transforms beneath the DOFs: lengths, quaternions (x, y, z, w), factors.
+    """
+
+    dofs: Floats
+    translations: Floats
+    rotations: Floats
+    scales: Floats
+
+    def copy(self) -> Pose:
+        """Return a pose that shares no array with this one."""
+        return Pose(
+            self.dofs.copy(), self.translations.copy(), self.rotations.copy(), self.scales.copy()
+        )
+
+
+def rest_pose(skeleton: Skeleton) -> Pose:
+    """Return a new pose that holds the file's own values, clamped to the limits.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Gives the rest transforms and DOF values.
+
+    Returns
+    -------
+    Pose
+        Free to change.
+    """
+    return Pose(
+        dofs=clamp_dofs(skeleton, skeleton.rest_dofs),
+        translations=skeleton.rest_translations.copy(),
+        rotations=skeleton.rest_rotations.copy(),
+        scales=skeleton.rest_scales.copy(),
+    )
+
+
+def local_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
+    """Build each joint's matrix: L = T(translation + DOFs) R(quaternion) R(DOFs) S(scale).
+
+    The rows of the DOF table multiply so that the first is applied first: rows x, y, z give
+    R(DOFs) = Rz Ry Rx (CSE169 course notes, "rotation about x first, then y, then z").
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Gives the DOF table.
+    pose : Pose
+        DOFs in lengths and radians.
+
+    Returns
+    -------
+    (J, 4, 4)
+        Joint-to-parent matrices.
+    """
+    local = np.zeros((skeleton.n_joints, 4, 4))
+    local[:, 3, 3] = 1.0
+    local[:, :3, 3] = pose.translations
+    moves = skeleton.dof_kinds < _FIRST_ROTATION
+    np.add.at(
+        local[:, :3, 3], (skeleton.dof_joints[moves], skeleton.dof_kinds[moves]), pose.dofs[moves]
+    )
+    rotations = quaternion_to_matrix(pose.rotations) @ _dof_rotations(skeleton, pose.dofs)
+    local[:, :3, :3] = rotations * pose.scales[:, None, :]
+    return local
+
+
+def _dof_rotations(skeleton: Skeleton, dofs: Floats) -> Floats:
+    """Multiply every joint's rotation DOFs, k-th rows of all joints at once: (J, 3, 3)."""
+    rotations = np.broadcast_to(np.eye(3), (skeleton.n_joints, 3, 3)).copy()
+    rows = np.flatnonzero(skeleton.dof_kinds >= _FIRST_ROTATION)
+    for rank_rows in _rows_by_rank(skeleton.dof_joints[rows], rows):
+        joints = skeleton.dof_joints[rank_rows]
+        axes = skeleton.dof_kinds[rank_rows] - _FIRST_ROTATION
+        for axis in range(3):
+            chosen = axes == axis
+            turn = axis_rotations(axis, dofs[rank_rows[chosen]])
+            rotations[joints[chosen]] = turn @ rotations[joints[chosen]]
+    return rotations
+
+
+def _rows_by_rank(joints: Ints, rows: NDArray[np.intp]) -> list[NDArray[np.intp]]:
+    """Split rows into the first row of every joint, the second rows, and so on."""
+    order = np.argsort(joints, kind="stable")
+    ordered = joints[order]
+    first = np.concatenate([[True], ordered[1:] != ordered[:-1]]) if len(rows) else np.zeros(0)
+    group_start = np.maximum.accumulate(np.where(first, np.arange(len(rows)), 0))
+    rank = np.arange(len(rows)) - group_start
+    sorted_rows = rows[order]
+    return [sorted_rows[rank == k] for k in range(int(rank.max(initial=-1)) + 1)]

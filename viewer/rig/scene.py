@@ -1,0 +1,114 @@
+"""Scene: what is shown together; an actor is a figure with its own pose and placement."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from viewer.rig.arrays import Floats
+from viewer.rig.figure import Figure, skeleton_points
+from viewer.rig.mesh import bounding_box, box_size
+from viewer.rig.pose import Pose, rest_pose
+from viewer.rig.skinning import deform
+from viewer.rig.transform import apply_transform
+
+__all__ = ["Actor", "Scene", "scene_box"]
+
+_OUTLIER_SHARE = 0.001  # the camera fits the box of the other 99.9 % of the points
+_OUTLIER_RATIO = 100.0  # ... if the whole box is this much larger
+
+
+@dataclass(slots=True, eq=False)
+class Actor:
+    """A figure that takes part in a scene.
+
+    Attributes
+    ----------
+    figure : Figure
+        Shared, never changed.
+    pose : Pose or None
+        This actor's own; None if the figure has no skeleton.
+    placement : (4, 4)
+        Figure space to scene.
+    visible : bool
+        Whether it is drawn.
+    """
+
+    figure: Figure
+    pose: Pose | None = None
+    placement: Floats = field(default_factory=lambda: np.eye(4))
+    visible: bool = True
+
+    def __post_init__(self) -> None:
+        if self.pose is None and self.figure.skeleton is not None:
+            self.pose = rest_pose(self.figure.skeleton)
+
+
+@dataclass(slots=True, eq=False)
+class Scene:
+    """Everything that is shown together.
+
+    Attributes
+    ----------
+    actors : list of Actor
+        In drawing order.
+    warnings : tuple of str
+        What the readers noticed, one line each.
+    """
+
+    actors: list[Actor]
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def up(self) -> str:
+        """The first figure's up axis, ``"y"`` or ``"z"``."""
+        return self.actors[0].figure.up if self.actors else "y"
+
+
+def scene_box(scene: Scene) -> Floats:
+    """Return the box that a camera should fit: posed meshes and skeletons of visible actors.
+
+    A few stray points far outside do not count: the box then holds 99.9 % of the points.
+
+    Parameters
+    ----------
+    scene : Scene
+        With any number of actors.
+
+    Returns
+    -------
+    (2, 3)
+        Lowest and highest corner, scene space.
+    """
+    clouds = [actor_points(actor) for actor in scene.actors if actor.visible]
+    points = np.concatenate(clouds) if clouds else np.zeros((0, 3))
+    box = bounding_box(points)
+    if len(points) < 1.0 / _OUTLIER_SHARE:
+        return box
+    share = _OUTLIER_SHARE / 2
+    inner = np.quantile(points, [share, 1.0 - share], axis=0)
+    inner_size = box_size(inner)
+    return inner if inner_size > 0 and box_size(box) > _OUTLIER_RATIO * inner_size else box
+
+
+def actor_points(actor: Actor) -> Floats:
+    """Return an actor's posed vertices, or its skeleton's points if it has no mesh.
+
+    Parameters
+    ----------
+    actor : Actor
+        Placed and posed.
+
+    Returns
+    -------
+    (N, 3)
+        Scene space.
+    """
+    figure = actor.figure
+    if figure.mesh is not None:
+        points = deform(figure, actor.pose)[0]
+    else:
+        assert figure.skeleton is not None and actor.pose is not None  # a figure has one of both
+        points = skeleton_points(figure.skeleton, actor.pose)
+    return apply_transform(actor.placement, points)

@@ -1,0 +1,197 @@
+"""A hierarchy of joints with a table of degrees of freedom (DOFs)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.rig.arrays import Bools, Floats, Ints, frozen
+
+__all__ = ["DOF_KINDS", "Skeleton", "clamp_dofs", "dof_label", "find_dof", "joint_label"]
+
+DOF_KINDS = ("tx", "ty", "tz", "x", "y", "z")
+"""Kinds of DOF by code: translations along x, y, z, then rotations about x, y, z."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Skeleton:
+    """Joints as parallel arrays, parents before children.
+
+    Attributes
+    ----------
+    names : tuple of J str
+        May repeat or be empty: joints are told apart by index.
+    parents : (J,) int32
+        Index of the parent, smaller than the joint's own; -1 for a root.
+    rest_translations, rest_rotations, rest_scales : (J, 3), (J, 4), (J, 3)
+        Local transform before any DOF: lengths, quaternions (x, y, z, w), factors.
+    dof_joints, dof_kinds : (D,) int32
+        The joint each DOF moves, and its index into ``DOF_KINDS``. Of one joint's rotations
+        the first row is applied first.
+    rest_dofs : (D,)
+        Values of the file's own pose: lengths or radians, within the limits.
+    dof_limits : (D, 2)
+        Smallest and largest value; -inf and inf where there is none.
+    boxes : (J, 2, 3) or None
+        Lowest and highest corner of the box drawn for each joint, in joint space.
+    """
+
+    names: tuple[str, ...]
+    parents: Ints
+    rest_translations: Floats
+    rest_rotations: Floats
+    rest_scales: Floats
+    dof_joints: Ints
+    dof_kinds: Ints
+    rest_dofs: Floats
+    dof_limits: Floats
+    boxes: Floats | None = None
+
+    def __post_init__(self) -> None:
+        def put(name: str, shape: tuple[int | None, ...], dtype: type = np.float64) -> None:
+            object.__setattr__(self, name, frozen(name, getattr(self, name), shape, dtype))
+
+        joints = len(self.names)
+        put("parents", (joints,), np.int32)
+        put("rest_translations", (joints, 3))
+        put("rest_rotations", (joints, 4))
+        put("rest_scales", (joints, 3))
+        put("dof_joints", (None,), np.int32)
+        put("dof_kinds", (self.n_dofs,), np.int32)
+        put("rest_dofs", (self.n_dofs,))
+        if self.boxes is not None:
+            put("boxes", (joints, 2, 3))
+        limits = np.array(self.dof_limits, dtype=np.float64)
+        if limits.shape != (self.n_dofs, 2) or np.isnan(limits).any():
+            raise RigError(f"dof_limits: expected shape {self.n_dofs} x 2 without NaN")
+        limits.flags.writeable = False
+        object.__setattr__(self, "dof_limits", limits)
+        self._check_order()
+
+    def _check_order(self) -> None:
+        if len(self.names) == 0:
+            raise RigError("a skeleton needs at least one joint")
+        late = np.flatnonzero(self.parents >= np.arange(self.n_joints))
+        if len(late) or self.parents.min() < -1:
+            joint = int(late[0]) if len(late) else int(self.parents.argmin())
+            raise RigError(
+                f"joint {joint_label(self, joint)}: expected a parent before it, "
+                f"found {self.parents[joint]}"
+            )
+
+    @property
+    def n_joints(self) -> int:
+        """Number of joints, J."""
+        return len(self.names)
+
+    @property
+    def n_dofs(self) -> int:
+        """Number of degrees of freedom, D."""
+        return len(self.dof_joints)
+
+    @property
+    def locked(self) -> Bools:
+        """Which DOFs have equal limits and so never move: (D,) bool."""
+        return self.dof_limits[:, 0] == self.dof_limits[:, 1]
+
+
+def clamp_dofs(skeleton: Skeleton, dofs: Floats) -> Floats:
+    """Return DOF values brought within their limits.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Gives the limits.
+    dofs : (..., D)
+        Lengths or radians.
+
+    Returns
+    -------
+    (..., D)
+        The nearest allowed values.
+    """
+    return np.clip(dofs, skeleton.dof_limits[:, 0], skeleton.dof_limits[:, 1])
+
+
+def joint_label(skeleton: Skeleton, joint: int) -> str:
+    """Return a joint's name, with its index if the name is missing or repeated.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Holds the names.
+    joint : int
+        Index of the joint.
+
+    Returns
+    -------
+    str
+        ``"knee"``, ``"knee#5"`` if several joints are called so, ``"#5"`` without a name.
+    """
+    name = skeleton.names[joint]
+    if name and skeleton.names.count(name) == 1:
+        return name
+    return f"{name}#{joint}"
+
+
+def dof_label(skeleton: Skeleton, dof: int) -> str:
+    """Return a DOF's name as the command line takes it: ``"knee.x"``, ``"root.ty"``.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Holds the DOF table.
+    dof : int
+        Row of the DOF.
+
+    Returns
+    -------
+    str
+        Joint label, a dot, and the kind from ``DOF_KINDS``.
+    """
+    return f"{joint_label(skeleton, skeleton.dof_joints[dof])}.{DOF_KINDS[skeleton.dof_kinds[dof]]}"
+
+
+def find_dof(skeleton: Skeleton, label: str) -> int:
+    """Return the row of the DOF called ``label``.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Holds the DOF table.
+    label : str
+        ``"NAME.KIND"``, or ``"#INDEX.KIND"`` with a joint's index, in any case of letters.
+
+    Raises
+    ------
+    RigError
+        If there is none, or several joints have that name.
+    """
+    joint_text, dot, kind = label.rpartition(".")
+    if not dot or kind.lower() not in DOF_KINDS:
+        raise RigError(f'"{label}": expected JOINT.KIND with KIND one of {", ".join(DOF_KINDS)}')
+    joint = _find_joint(skeleton, joint_text)
+    code = DOF_KINDS.index(kind.lower())
+    rows = np.flatnonzero((skeleton.dof_joints == joint) & (skeleton.dof_kinds == code))
+    if len(rows) == 0:
+        raise RigError(f"joint {joint_label(skeleton, joint)} has no DOF {kind.lower()}")
+    return int(rows[0])
+
+
+def _find_joint(skeleton: Skeleton, text: str) -> int:
+    name, hash_sign, index = text.rpartition("#")
+    if hash_sign and index.isdecimal() and int(index) < skeleton.n_joints:
+        joint = int(index)
+        if skeleton.names[joint].lower() == name.lower() or not name:
+            return joint
+    found = [joint for joint, name in enumerate(skeleton.names) if name == text]
+    found = found or [j for j, name in enumerate(skeleton.names) if name.lower() == text.lower()]
+    if len(found) == 1:
+        return found[0]
+    if found:
+        labels = ", ".join(joint_label(skeleton, joint) for joint in found[:4])
+        raise RigError(f'"{text}" names {len(found)} joints: say which one, {labels}')
+    shown = ", ".join(joint_label(skeleton, joint) for joint in range(min(6, skeleton.n_joints)))
+    raise RigError(f'no joint is called "{text}"; there are {skeleton.n_joints}: {shown}, …')
