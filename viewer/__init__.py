@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from viewer.errors import ViewerError
     from viewer.formats import write
     from viewer.loading import load
-    from viewer.render.camera import Camera
-    from viewer.render.offscreen import render
-    from viewer.render.options import DisplayOptions, Light, Lights
+    from viewer.rendering.camera import Camera
+    from viewer.rendering.offscreen import render
+    from viewer.rendering.options import DisplayOptions, Light, Lights
     from viewer.rig.figure import Figure
     from viewer.rig.mesh import Material, Mesh
     from viewer.rig.pose import Pose, rest_pose
@@ -56,11 +56,11 @@ __all__ = [
 
 _HOMES = {
     "Actor": "rig.scene",
-    "Camera": "render.camera",
-    "DisplayOptions": "render.options",
+    "Camera": "rendering.camera",
+    "DisplayOptions": "rendering.options",
     "Figure": "rig.figure",
-    "Light": "render.options",
-    "Lights": "render.options",
+    "Light": "rendering.options",
+    "Lights": "rendering.options",
     "Material": "rig.mesh",
     "Mesh": "rig.mesh",
     "Pose": "rig.pose",
@@ -70,7 +70,7 @@ _HOMES = {
     "ViewerError": "errors",
     "deform": "rig.skinning",
     "load": "loading",
-    "render": "render.offscreen",
+    "render": "rendering.offscreen",
     "rest_pose": "rig.pose",
     "show": "app.window",
     "write": "formats",

@@ -15,8 +15,7 @@ MAX_SIZE = 2 << 30
 """Largest file that is read, in bytes, unless the caller says otherwise."""
 
 _WORD = re.compile(rb"[{}]|[^{} \t\n\r\v\f]+")
-# CR CR LF, seen in real files, is one line end; so is a CR alone.
-_LINE_END = re.compile(rb"\r*\n|\r")
+_CARRIAGE_RETURNS = re.compile(rb"\r+\n?")
 _MAGIC = (
     (b"\x1f\x8b", "gzip data"),
     (b"\x7fELF", "a program (ELF)"),
@@ -57,6 +56,7 @@ class Source:
         self.path = Path(path)
         self.data = data.removeprefix(b"\xef\xbb\xbf")
         self.warnings: list[str] = []
+        self._counted = (0, 1)  # an offset whose line is known, and that line
 
     @classmethod
     def open(cls, path: str | Path, max_size: int = MAX_SIZE) -> Source:
@@ -106,8 +106,19 @@ class Source:
         return len(self.data)
 
     def line(self, offset: int) -> int:
-        """Return the line of an offset, counted from 1; looked for only when it is needed."""
-        return 1 + sum(1 for _ in _LINE_END.finditer(self.data, 0, offset))
+        """Return the line of an offset, counted from 1; looked for only when it is needed.
+
+        CR CR LF, seen in real files, is one line end; so is a CR alone.
+        """
+        start, line = self._counted
+        if offset < start:
+            start, line = 0, 1
+        line += self.data.count(b"\n", start, offset)
+        if self.data.find(b"\r", start, offset) >= 0:
+            runs = (run.group() for run in _CARRIAGE_RETURNS.finditer(self.data, start, offset))
+            line += sum(len(run) for run in runs if not run.endswith(b"\n"))
+        self._counted = offset, line
+        return line
 
     def error(self, message: str, offset: int | None = None) -> FormatError:
         """Return an error that names the file, and the line of ``offset``."""

@@ -1,0 +1,14 @@
+#version 330
+// A vertical gradient with half a step of noise, so that 8 bits show no bands.
+
+in float v_height;
+
+uniform vec3 u_bottom;  // sRGB
+uniform vec3 u_top;     // sRGB
+
+out vec4 f_color;
+
+void main() {
+    float noise = fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(0.06711056, 0.00583715))));
+    f_color = vec4(mix(u_bottom, u_top, v_height) + (noise - 0.5) / 255.0, 1.0);
+}

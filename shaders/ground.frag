@@ -1,0 +1,27 @@
+#version 330
+// Grid lines one pixel wide whatever the distance; every tenth is stronger; all fade far away.
+
+in vec2 v_ground;
+
+uniform float u_step;       // between lines, scene units
+uniform vec2 u_origin;      // of the scene, in grid steps from v_ground's zero
+uniform float u_fade;       // distance at which nothing is left, scene units
+uniform vec3 u_line_color;  // sRGB
+
+out vec4 f_color;           // sRGB, multiplied by alpha
+
+// Coverage of lines at whole numbers, and 0 where they are closer than pixels.
+float lines(vec2 place) {
+    vec2 width = max(fwidth(place), vec2(1e-6));
+    vec2 distance = abs(fract(place - 0.5) - 0.5) / width;
+    vec2 line = clamp(1.0 - distance, 0.0, 1.0) * clamp(1.0 - 2.0 * width, 0.0, 1.0);
+    return max(line.x, line.y);
+}
+
+void main() {
+    vec2 place = v_ground / u_step - u_origin;
+    float strength = max(0.45 * lines(place), 0.9 * lines(place / 10.0));
+    float away = clamp(length(v_ground) / u_fade, 0.0, 1.0);
+    float alpha = strength * (1.0 - away) * (1.0 - away);
+    f_color = vec4(u_line_color * alpha, alpha);
+}

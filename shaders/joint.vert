@@ -1,0 +1,37 @@
+#version 330
+// Places one box per joint: instances of a cube from 0 to 1.
+
+in vec3 in_corner;      // corner of the cube
+in vec3 in_normal;      // of its face
+in vec3 in_low;         // per joint: lowest corner of the box, joint space
+in vec3 in_high;        // per joint: highest corner
+in vec3 in_color;       // per joint, linear
+
+uniform mat4 u_model_view;     // figure space, minus the skeleton's centre, to camera space
+uniform mat3 u_normal_matrix;
+uniform mat4 u_projection;
+uniform sampler2D u_world;     // joint matrices to figure space minus centre, three rows each
+uniform int u_selected;        // this joint is drawn in u_highlight; -1 for none
+uniform vec3 u_highlight;      // linear
+
+out vec3 v_position;    // camera space
+out vec3 v_normal;      // camera space, any length
+out vec2 v_uv;
+out vec3 v_color;
+
+vec4 world_row(int row) {
+    int index = 3 * gl_InstanceID + row, per_row = textureSize(u_world, 0).x;
+    return texelFetch(u_world, ivec2(index % per_row, index / per_row), 0);
+}
+
+void main() {
+    vec4 corner = vec4(mix(in_low, in_high, in_corner), 1.0);
+    vec4 x = world_row(0), y = world_row(1), z = world_row(2);
+    vec3 normal = vec3(dot(x.xyz, in_normal), dot(y.xyz, in_normal), dot(z.xyz, in_normal));
+    vec4 position = u_model_view * vec4(dot(x, corner), dot(y, corner), dot(z, corner), 1.0);
+    v_position = position.xyz;
+    v_normal = u_normal_matrix * normal;
+    v_uv = vec2(0.0);
+    v_color = gl_InstanceID == u_selected ? u_highlight : in_color;
+    gl_Position = u_projection * position;
+}

@@ -1,0 +1,39 @@
+#version 330
+// Shades a surface from both sides; everything is in camera space, colours are linear.
+
+in vec3 v_position;
+in vec3 v_normal;
+in vec2 v_uv;
+in vec3 v_color;
+
+uniform bool u_flat;            // one normal per triangle
+uniform bool u_orthographic;
+uniform float u_opacity;
+uniform bool u_has_uv;
+uniform bool u_textured;
+uniform sampler2D u_texture;    // sRGB, decoded by the sampler
+
+out vec4 f_color;               // sRGB, multiplied by alpha
+
+// Linear to sRGB, IEC 61966-2-1.
+vec3 encode(vec3 color) {
+    vec3 low = 12.92 * color;
+    vec3 high = 1.055 * pow(max(color, vec3(0.0)), vec3(1.0 / 2.4)) - 0.055;
+    return mix(high, low, lessThanEqual(color, vec3(0.0031308)));
+}
+
+vec4 base_color() {
+    return u_textured ? texture(u_texture, v_uv) : vec4(v_color, 1.0);
+}
+
+#pragma chunk
+
+void main() {
+    vec3 to_eye = u_orthographic ? vec3(0.0, 0.0, 1.0) : normalize(-v_position);
+    vec3 face = cross(dFdx(v_position), dFdy(v_position));
+    // The side that is seen decides, not the winding: some files are clockwise.
+    face *= dot(face, to_eye) < 0.0 ? -1.0 : 1.0;
+    vec3 normal = u_flat || dot(v_normal, v_normal) == 0.0 ? face : v_normal;
+    normal = normalize(dot(normal, face) < 0.0 ? -normal : normal);
+    f_color = vec4(encode(shade(v_position, normal, to_eye)) * u_opacity, u_opacity);
+}

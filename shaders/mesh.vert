@@ -1,0 +1,27 @@
+#version 330
+// Places a posed mesh before the camera. It was skinned before: see skin.vert.
+
+in vec3 in_position;    // figure units, minus the posed centre
+in vec3 in_normal;      // unit length
+in vec2 in_uv;          // v = 0 at the bottom row of the texture
+
+uniform mat4 u_model_view;     // to camera space
+uniform mat3 u_normal_matrix;  // its inverse transpose
+uniform mat4 u_projection;
+uniform float u_bias;          // towards the eye, in clip depth: lines lie on their surface
+uniform vec3 u_color;          // linear
+
+out vec3 v_position;    // camera space
+out vec3 v_normal;      // camera space, any length
+out vec2 v_uv;
+out vec3 v_color;
+
+void main() {
+    vec4 position = u_model_view * vec4(in_position, 1.0);
+    v_position = position.xyz;
+    v_normal = u_normal_matrix * in_normal;
+    v_uv = in_uv;
+    v_color = u_color;
+    gl_Position = u_projection * position;
+    gl_Position.z -= u_bias * gl_Position.w;
+}

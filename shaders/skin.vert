@@ -1,0 +1,46 @@
+#version 330
+// Skins a vertex once per changed pose; its outputs are captured by transform feedback.
+// Positions are in figure units, relative to the rest centre on the way in and to the posed
+// centre on the way out, so that float32 keeps its digits far from the origin.
+
+in vec3 in_position;     // bind space, minus the rest centre
+in vec3 in_normal;       // bind space, any length
+in uvec2 in_influences;  // first pair, number of pairs
+
+uniform bool u_attached;        // false: leave the vertex in its binding space
+uniform vec3 u_rest_shift;      // rest centre minus posed centre
+uniform vec3 u_center;          // posed centre, figure space
+uniform sampler2D u_palette;    // skinning matrices, three rows each
+uniform sampler2D u_pairs;      // joint and weight
+
+out vec3 v_position;     // figure space, minus the posed centre
+out vec3 v_normal;       // figure space, unit length
+
+ivec2 texel(int index, int per_row) {
+    return ivec2(index % per_row, index / per_row);
+}
+
+// Joint index and weight of one pair.
+vec2 influence(uint index) {
+    return texelFetch(u_pairs, texel(int(index), textureSize(u_pairs, 0).x), 0).rg;
+}
+
+// One row of a joint's skinning matrix.
+vec4 palette_row(int joint, int row) {
+    return texelFetch(u_palette, texel(3 * joint + row, textureSize(u_palette, 0).x), 0);
+}
+
+#pragma chunk
+
+void main() {
+    vec3 position = in_position;
+    vec3 normal = in_normal;
+    if (u_attached && in_influences.y > 0u) {
+        skin(position, normal);
+    } else {
+        position += u_rest_shift;
+    }
+    float size = length(normal);
+    v_position = position;
+    v_normal = size > 0.0 ? normal / size : normal;
+}

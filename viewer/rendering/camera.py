@@ -1,0 +1,183 @@
+"""Orbit camera: distance, azimuth and inclination about a target. The only importer of pyrr."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from pyrr import matrix44
+
+from viewer.rig.arrays import Floats
+from viewer.rig.mesh import box_size
+
+__all__ = ["VIEWS", "Camera", "camera_axes", "eye", "fit", "orbit", "pan", "zoom"]
+
+VIEWS = {
+    "front": (0.0, 0.0),
+    "back": (180.0, 0.0),
+    "right": (-90.0, 0.0),
+    "left": (90.0, 0.0),
+    "top": (0.0, 90.0),
+    "bottom": (0.0, -90.0),
+}
+"""Azimuth and inclination in degrees; "left" looks at the side of a left hand (+x)."""
+
+_MARGIN = 1.08  # room around a fitted figure
+_SMALLEST = 1e-9  # distance of a camera that fits nothing
+
+
+@dataclass(slots=True)
+class Camera:
+    """Where the picture is taken from.
+
+    Attributes
+    ----------
+    target : (3,)
+        The point it turns about, scene space.
+    distance : float
+        From eye to target, scene units.
+    azimuth, inclination : float
+        Degrees about the up axis, and above the horizon. At 0, 0 the camera looks at the
+        front: along -z if y is up, along +y if z is up.
+    fov : float
+        Vertical field of view, degrees.
+    orthographic : bool
+        Parallel projection with the same height at the target.
+    up : "y" or "z"
+        The scene's up axis.
+    """
+
+    target: Floats = field(default_factory=lambda: np.zeros(3))
+    distance: float = 3.0
+    azimuth: float = 35.0
+    inclination: float = 15.0
+    fov: float = 35.0
+    orthographic: bool = False
+    up: Literal["y", "z"] = "y"
+
+    def copy(self) -> Camera:
+        """Return a camera that shares nothing with this one."""
+        return Camera(
+            self.target.copy(),
+            self.distance,
+            self.azimuth,
+            self.inclination,
+            self.fov,
+            self.orthographic,
+            self.up,
+        )
+
+    def view_matrix(self) -> Floats:
+        """Return the matrix from scene to camera space, for column vectors: (4, 4)."""
+        _, up, _ = camera_axes(self)
+        # pyrr's matrices suit row vectors.
+        return np.array(matrix44.create_look_at(eye(self), self.target, up, dtype="f8")).T
+
+    def projection_matrix(self, aspect: float, box: Floats) -> Floats:
+        """Return the matrix from camera to clip space, for column vectors.
+
+        Parameters
+        ----------
+        aspect : float
+            Width / height.
+        box : (2, 3)
+            What must lie between the near and the far plane, scene space.
+
+        Returns
+        -------
+        (4, 4)
+            OpenGL clip space, z in -1..1.
+        """
+        reach = box_size(box) + float(np.linalg.norm(box.mean(axis=0) - self.target))
+        far = self.distance + 20.0 * reach
+        if self.orthographic:
+            half = self.half_height
+            near = self.distance - 20.0 * reach
+            matrix = matrix44.create_orthogonal_projection(
+                -half * aspect, half * aspect, -half, half, near, far, dtype="f8"
+            )
+        else:
+            near = max(self.distance - reach, 5e-3 * self.distance)
+            matrix = matrix44.create_perspective_projection(self.fov, aspect, near, far, dtype="f8")
+        return np.array(matrix).T
+
+    @property
+    def half_height(self) -> float:
+        """Half of what is seen vertically at the target, scene units."""
+        return self.distance * math.tan(math.radians(self.fov) / 2)
+
+
+def camera_axes(camera: Camera) -> tuple[Floats, Floats, Floats]:
+    """Return the camera's right, up and backward axes in scene space, each (3,).
+
+    Up is the derivative of the backward axis by inclination, so it is defined at the poles too.
+    """
+    azimuth, inclination = math.radians(camera.azimuth), math.radians(camera.inclination)
+    sin_a, cos_a = math.sin(azimuth), math.cos(azimuth)
+    sin_i, cos_i = math.sin(inclination), math.cos(inclination)
+    right = np.array([cos_a, 0.0, -sin_a])
+    up = np.array([-sin_i * sin_a, cos_i, -sin_i * cos_a])
+    backward = np.array([cos_i * sin_a, sin_i, cos_i * cos_a])
+    if camera.up == "z":
+        # Turn y up into z up: (x, y, z) -> (x, -z, y).
+        right, up, backward = (np.array([a[0], -a[2], a[1]]) for a in (right, up, backward))
+    return right, up, backward
+
+
+def eye(camera: Camera) -> Floats:
+    """Return the position of the camera in scene space: (3,)."""
+    return camera.target + camera.distance * camera_axes(camera)[2]
+
+
+def fit(camera: Camera, box: Floats, aspect: float) -> None:
+    """Aim at a box and step back until it just fills the picture; direction stays.
+
+    Parameters
+    ----------
+    camera : Camera
+        Changed in place: target and distance.
+    box : (2, 3)
+        Lowest and highest corner, scene space.
+    aspect : float
+        Width / height of the picture.
+    """
+    camera.target = box.mean(axis=0)
+    corners = np.array([[box[i >> axis & 1, axis] for axis in range(3)] for i in range(8)])
+    right, up, backward = camera_axes(camera)
+    across, upward, near = np.abs((corners - camera.target) @ np.stack([right, up, backward]).T).T
+    tangent = math.tan(math.radians(camera.fov) / 2)
+    needed = np.maximum(across / (tangent * aspect), upward / tangent) * _MARGIN
+    # The box's own depth counts only where perspective makes its near corners larger.
+    distance = float((needed + (0.0 if camera.orthographic else near)).max())
+    camera.distance = max(distance, _SMALLEST) if distance > 0 else 1.0
+
+
+def orbit(camera: Camera, azimuth: float, inclination: float) -> None:
+    """Turn about the target by angles in degrees; the poles are not crossed."""
+    camera.azimuth = (camera.azimuth + azimuth + 180.0) % 360.0 - 180.0
+    camera.inclination = min(max(camera.inclination + inclination, -90.0), 90.0)
+
+
+def pan(camera: Camera, across: float, upward: float) -> None:
+    """Move the target in the picture's plane, in units of the picture's height."""
+    right, up, _ = camera_axes(camera)
+    height = 2.0 * camera.half_height
+    camera.target = camera.target + height * (across * right + upward * up)
+
+
+def zoom(camera: Camera, factor: float, x: float = 0.0, y: float = 0.0) -> None:
+    """Scale the distance and keep the point under the pointer in place.
+
+    Parameters
+    ----------
+    camera : Camera
+        Changed in place: target and distance.
+    factor : float
+        New distance over old distance.
+    x, y : float
+        The pointer from the middle of the picture, right and up, in picture heights.
+    """
+    pan(camera, x * (1.0 - factor), y * (1.0 - factor))
+    camera.distance = min(max(camera.distance * factor, _SMALLEST), 1e12)

@@ -1,0 +1,166 @@
+"""Draws a skeleton: one box per joint, instances of a small cube."""
+
+from __future__ import annotations
+
+import colorsys
+
+import moderngl
+import numpy as np
+
+from viewer.rendering.options import DisplayOptions
+from viewer.rendering.program import Programs, set_uniforms
+from viewer.rendering.upload import buffer, matrix_texture, write_matrices
+from viewer.rendering.view import View, set_lights, set_model
+from viewer.rig.arrays import Floats
+from viewer.rig.kinematics import world_matrices
+from viewer.rig.mesh import bounding_box, box_size
+from viewer.rig.pose import Pose, rest_pose
+from viewer.rig.skeleton import Skeleton
+
+__all__ = ["JointPass", "SkeletonBuffers", "joint_colors"]
+
+_HIGHLIGHT = (1.0, 0.55, 0.02)  # linear
+_CUBE_SIZE = 0.015  # of a skeleton without boxes
+_GOLDEN = 0.618033988749895
+_WORLD_UNIT = 0
+
+
+def joint_colors(n_joints: int) -> Floats:
+    """Return a colour for each joint: hues a golden ratio apart, so neighbours differ.
+
+    Returns
+    -------
+    (J, 3)
+        Linear.
+    """
+    hues = 0.58 + _GOLDEN * np.arange(n_joints)
+    return np.array([colorsys.hsv_to_rgb(hue % 1.0, 0.42, 0.72) for hue in hues])
+
+
+class SkeletonBuffers:
+    """Boxes and colours of one skeleton's joints, and the matrices of one actor's pose."""
+
+    def __init__(
+        self, context: moderngl.Context, skeleton: Skeleton, cube: moderngl.Buffer
+    ) -> None:
+        self.context, self.skeleton, self._cube = context, skeleton, cube
+        boxes = skeleton.boxes if skeleton.boxes is not None else _cubes(skeleton)
+        self._low = buffer(context, boxes[:, 0], "f4")
+        self._high = buffer(context, boxes[:, 1], "f4")
+        self._colors = buffer(context, joint_colors(skeleton.n_joints), "f4")
+        self.world = matrix_texture(context, skeleton.n_joints)
+        self.center: Floats = np.zeros(3)
+        self._array: moderngl.VertexArray | None = None
+        self._key: tuple[bytes, ...] | None = None
+
+    def update(self, pose: Pose) -> None:
+        """Upload the joints' matrices if the pose changed."""
+        arrays = (pose.dofs, pose.translations, pose.rotations, pose.scales)
+        key = tuple(array.tobytes() for array in arrays)
+        if key == self._key:
+            return
+        world = world_matrices(self.skeleton, pose)
+        self.center = bounding_box(world[:, :3, 3]).mean(axis=0)
+        world[:, :3, 3] -= self.center
+        write_matrices(self.world, world)
+        self._key = key
+
+    def array(self, program: moderngl.Program) -> moderngl.VertexArray:
+        """Return the instanced cubes for a program."""
+        if self._array is None:
+            content = [
+                (self._cube, "3f4 3f4", "in_corner", "in_normal"),
+                (self._low, "3f4/i", "in_low"),
+                (self._high, "3f4/i", "in_high"),
+                (self._colors, "3f4/i", "in_color"),
+            ]
+            self._array = self.context.vertex_array(program, content)
+        return self._array
+
+    def release(self) -> None:
+        """Free every buffer."""
+        for item in (self._array, self._low, self._high, self._colors, self.world):
+            if item is not None:
+                item.release()
+
+
+class JointPass:
+    """Draws skeletons as boxes.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        The context in use.
+    programs : Programs
+        Gives the program.
+    """
+
+    def __init__(self, context: moderngl.Context, programs: Programs) -> None:
+        self.programs = programs
+        self.cube = buffer(context, _cube_vertices(), "f4")
+
+    def draw(
+        self,
+        skeleton: SkeletonBuffers,
+        placement: Floats,
+        view: View,
+        options: DisplayOptions,
+        selected: int = -1,
+    ) -> None:
+        """Draw one box per joint.
+
+        Parameters
+        ----------
+        skeleton : SkeletonBuffers
+            Already updated.
+        placement : (4, 4)
+            Figure space to scene.
+        view : View
+            The camera's matrices.
+        options : DisplayOptions
+            Lights.
+        selected : int
+            The joint to highlight, -1 for none.
+        """
+        program = self.programs.drawing("joint", "phong", fragment="mesh")
+        set_model(program, view, placement, skeleton.center)
+        set_lights(program, view, options.lights)
+        values = {
+            "u_world": _WORLD_UNIT,
+            "u_selected": selected,
+            "u_highlight": _HIGHLIGHT,
+            "u_flat": False,
+            "u_textured": False,
+            "u_opacity": 1.0,
+        }
+        set_uniforms(program, values)
+        skeleton.world.use(_WORLD_UNIT)
+        array = skeleton.array(program)
+        array.render(moderngl.TRIANGLES, vertices=36, instances=skeleton.skeleton.n_joints)
+
+    def release(self) -> None:
+        """Free the cube."""
+        self.cube.release()
+
+
+def _cubes(skeleton: Skeleton) -> Floats:
+    """Return small cubes for joints that no file gave a box: (J, 2, 3)."""
+    points = world_matrices(skeleton, rest_pose(skeleton))[:, :3, 3]
+    half = _CUBE_SIZE * (box_size(bounding_box(points)) or 1.0)
+    return np.tile([[-half] * 3, [half] * 3], (skeleton.n_joints, 1, 1))
+
+
+def _cube_vertices() -> Floats:
+    """Return the 12 triangles of a cube from 0 to 1: (36, 6) corners and face normals."""
+    rows = []
+    for axis in range(3):
+        u, v = (axis + 1) % 3, (axis + 2) % 3
+        for side in (0, 1):
+            normal = np.zeros(3)
+            normal[axis] = 2 * side - 1
+            order = [(0, 0), (1, 0), (1, 1), (0, 0), (1, 1), (0, 1)]
+            for a, b in order if side else order[::-1]:
+                corner = np.zeros(3)
+                corner[[axis, u, v]] = side, a, b
+                rows.append([*corner, *normal])
+    return np.array(rows)

@@ -1,0 +1,137 @@
+"""Draws posed meshes: surface, edges, vertex normals. Nothing here knows of skinning."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import moderngl
+import numpy as np
+
+from viewer.rendering.options import DisplayOptions
+from viewer.rendering.program import Programs, set_uniforms
+from viewer.rendering.skin_pass import PosedMesh
+from viewer.rendering.view import View, set_lights, set_model
+from viewer.rig.arrays import Floats
+
+__all__ = ["MeshPass"]
+
+SKIN_COLOR = (0.62, 0.60, 0.57)  # linear
+_EDGE_COLOR = (0.05, 0.07, 0.10, 0.55)  # sRGB and alpha
+_NORMAL_COLOR = (0.10, 0.75, 0.85, 1.0)
+_NORMAL_LENGTH = 0.02  # of the figure's size
+_TEXTURE_UNIT = 2
+
+
+class MeshPass:
+    """Draws posed meshes with any shading.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        The context in use.
+    programs : Programs
+        Gives the shading programs.
+    """
+
+    def __init__(self, context: moderngl.Context, programs: Programs) -> None:
+        self.context, self.programs = context, programs
+        self._arrays: dict[tuple[int, int], tuple[PosedMesh, moderngl.VertexArray]] = {}
+
+    def draw(self, mesh: PosedMesh, placement: Floats, view: View, options: DisplayOptions) -> None:
+        """Draw the surface; behind a skeleton as one translucent layer.
+
+        Parameters
+        ----------
+        mesh : PosedMesh
+            Already updated.
+        placement : (4, 4)
+            Figure space to scene.
+        view : View
+            The camera's matrices.
+        options : DisplayOptions
+            Shading and lights.
+        """
+        program = self.programs.drawing("mesh", options.shading)
+        set_model(program, view, placement, mesh.center)
+        set_lights(program, view, options.lights)
+        opacity = options.skin_opacity if options.show == "both" else 1.0
+        values = {
+            "u_flat": options.flat,
+            "u_color": SKIN_COLOR,
+            "u_opacity": opacity,
+            "u_has_uv": mesh.mesh.uvs is not None,
+            "u_texture": _TEXTURE_UNIT,
+            "u_bias": 0.0,
+        }
+        set_uniforms(program, values)
+        array = self._array(mesh, program)
+        if opacity < 1.0:
+            self._fill_depth(mesh, array)
+        self._draw_runs(mesh, array, options.texture)
+
+    def _fill_depth(self, mesh: PosedMesh, array: moderngl.VertexArray) -> None:
+        """Let only the nearest layer through: back faces would show through front ones."""
+        target = self.context.fbo
+        target.color_mask = False, False, False, False
+        array.render(moderngl.TRIANGLES)
+        target.color_mask = True, True, True, True
+        self.context.depth_func = "<="
+
+    def _draw_runs(self, mesh: PosedMesh, array: moderngl.VertexArray, textured: bool) -> None:
+        program = array.program
+        for run in mesh.mesh.runs:
+            has_texture = textured and run.texture is not None
+            set_uniforms(program, {"u_textured": has_texture})
+            if has_texture and run.texture is not None:
+                run.texture.use(_TEXTURE_UNIT)
+            array.render(moderngl.TRIANGLES, vertices=run.count, first=run.first)
+
+    def draw_edges(self, mesh: PosedMesh, placement: Floats, view: View) -> None:
+        """Draw every triangle's edges over its surface."""
+        program = self.programs.drawing("edge", fragment="line")
+        set_model(program, view, placement, mesh.center)
+        program["u_line_color"] = _premultiplied(_EDGE_COLOR)
+        self.context.wireframe = True
+        self._array(mesh, program).render(moderngl.TRIANGLES)
+        self.context.wireframe = False
+
+    def draw_normals(self, mesh: PosedMesh, placement: Floats, view: View, size: float) -> None:
+        """Draw a line along every vertex's normal; ``size`` is the figure's."""
+        program = self.programs.drawing("line")
+        set_model(program, view, placement, mesh.center)
+        program["u_line_color"] = _premultiplied(_NORMAL_COLOR)
+        program["u_length"] = _NORMAL_LENGTH * size
+        key = (id(mesh), id(program))
+        if key not in self._arrays:
+            content = [(mesh.posed, "3f4 3f4/i", "in_position", "in_normal")]
+            self._arrays[key] = (mesh, self.context.vertex_array(program, content))
+        instances = mesh.mesh.n_vertices
+        self._arrays[key][1].render(moderngl.LINES, vertices=2, instances=instances)
+
+    def _array(self, mesh: PosedMesh, program: moderngl.Program) -> moderngl.VertexArray:
+        """Return the mesh's vertex array for a program, with what the compiler kept."""
+        key = (id(mesh), id(program))
+        if key not in self._arrays:
+            content: list[Any] = [(mesh.posed, "3f4 12x", "in_position")]
+            if "in_normal" in program:
+                content = [(mesh.posed, "3f4 3f4", "in_position", "in_normal")]
+            if "in_uv" in program and mesh.mesh.uvs is not None:
+                content.append((mesh.mesh.uvs, "2f4", "in_uv"))
+            array = self.context.vertex_array(program, content, index_buffer=mesh.mesh.indices)
+            self._arrays[key] = (mesh, array)
+        return self._arrays[key][1]
+
+    def forget(self, mesh: PosedMesh) -> None:
+        """Free what was made for a mesh that is about to be released."""
+        for key in [key for key, (owner, _) in self._arrays.items() if owner is mesh]:
+            self._arrays.pop(key)[1].release()
+
+    def release(self) -> None:
+        """Free all vertex arrays."""
+        for _, array in self._arrays.values():
+            array.release()
+        self._arrays.clear()
+
+
+def _premultiplied(color: tuple[float, float, float, float]) -> tuple[float, ...]:
+    return tuple(np.multiply(color, (color[3], color[3], color[3], 1.0)))

@@ -1,0 +1,136 @@
+"""Pictures without a window: a scene in, an array of pixels out."""
+
+from __future__ import annotations
+
+import threading
+
+from viewer.rendering.camera import Camera, fit
+from viewer.rendering.context import headless_context
+from viewer.rendering.options import DisplayOptions
+from viewer.rendering.renderer import Renderer
+from viewer.rendering.target import Target
+from viewer.rig.arrays import Bytes, Floats
+from viewer.rig.scene import Scene, scene_box
+
+__all__ = ["Offscreen", "default_camera", "render"]
+
+_thread = threading.local()
+
+
+class Offscreen:
+    """A context of its own that draws any number of scenes.
+
+    Parameters
+    ----------
+    device : int, optional
+        Index of the EGL device; without it each one is tried in turn.
+
+    Raises
+    ------
+    RenderError
+        If there is no usable OpenGL, with the cause and the cure.
+    """
+
+    def __init__(self, device: int | None = None) -> None:
+        self.context = headless_context(device)
+        self.renderer = Renderer(self.context)
+        self._target: Target | None = None
+
+    def target(self, size: tuple[int, int], samples: int) -> Target:
+        """Return a target of this size, the last one if it fits."""
+        target = self._target
+        if target is None or (target.size, target.asked_samples) != (size, samples):
+            if target is not None:
+                target.release()
+            self._target = None
+            self._target = target = Target(self.context, size, samples)
+        return target
+
+    def render(
+        self,
+        scene: Scene,
+        size: tuple[int, int],
+        camera: Camera,
+        options: DisplayOptions,
+        box: Floats,
+    ) -> Bytes:
+        """Draw a scene and return its pixels; see ``render``."""
+        target = self.target(size, options.samples)
+        self.renderer.draw(scene, camera, options, target, box)
+        target.resolve()
+        return target.read()
+
+    def release(self) -> None:
+        """Free everything, the context too."""
+        if self._target is not None:
+            self._target.release()
+        self.renderer.release()
+        self.context.release()
+
+    def __enter__(self) -> Offscreen:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.release()
+
+
+def default_camera(scene: Scene, size: tuple[int, int], box: Floats | None = None) -> Camera:
+    """Return a camera that sees the whole scene from the front, a little to its left and above.
+
+    Parameters
+    ----------
+    scene : Scene
+        Gives the up axis.
+    size : (int, int)
+        Width and height of the picture.
+    box : (2, 3), optional
+        What to fit; the scene's box if omitted.
+    """
+    camera = Camera(up="z" if scene.up == "z" else "y")
+    fit(camera, scene_box(scene) if box is None else box, size[0] / size[1])
+    return camera
+
+
+def render(
+    scene: Scene,
+    size: tuple[int, int] = (1280, 720),
+    camera: Camera | None = None,
+    options: DisplayOptions | None = None,
+) -> Bytes:
+    """Draw a scene without a window.
+
+    The context is made on first use and kept, one per thread; ``Offscreen`` gives control.
+
+    Parameters
+    ----------
+    scene : Scene
+        What to draw, as its actors are posed.
+    size : (int, int)
+        Width and height in pixels.
+    camera : Camera, optional
+        The point of view; fits the scene if omitted.
+    options : DisplayOptions, optional
+        What is shown and how.
+
+    Returns
+    -------
+    (H, W, 4) uint8
+        sRGB and alpha, first row at the top.
+
+    Raises
+    ------
+    ViewerError
+        If the driver cannot draw a picture of this size.
+    RenderError
+        If there is no usable OpenGL.
+
+    >>> import viewer
+    >>> viewer.render(viewer.load(), size=(64, 48)).shape
+    (48, 64, 4)
+    """
+    if not hasattr(_thread, "offscreen"):
+        _thread.offscreen = Offscreen()
+    offscreen: Offscreen = _thread.offscreen
+    box = scene_box(scene)
+    camera = camera or default_camera(scene, size, box)
+    return offscreen.render(scene, size, camera, options or DisplayOptions(), box)

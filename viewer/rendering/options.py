@@ -1,0 +1,106 @@
+"""How a scene is shown: plain data that the command line, the panels and the passes share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+__all__ = ["BACKGROUNDS", "SHOWN", "Color", "DisplayOptions", "Light", "Lights"]
+
+Color = tuple[float, float, float]
+
+SHOWN = {
+    "skin": "Attached skin",
+    "skeleton": "Skeleton",
+    "both": "Skin and skeleton",
+    "binding": "Skin in binding space",
+}
+"""What is drawn of a figure, with the name that menus show."""
+
+BACKGROUNDS = ("gradient", "transparent")
+"""Backgrounds by name; a colour is given as ``#rrggbb``."""
+
+
+@dataclass(slots=True)
+class Light:
+    """A directional light.
+
+    Attributes
+    ----------
+    azimuth, inclination : float
+        Where it comes from, in degrees: about the up axis and above the horizon; relative to
+        the camera if the lights follow it, else to the scene.
+    color : (r, g, b)
+        Linear, 0 to 1.
+    strength : float
+        Factor on the colour.
+    """
+
+    azimuth: float
+    inclination: float
+    color: Color
+    strength: float = 1.0
+
+
+@dataclass(slots=True)
+class Lights:
+    """Two coloured lights, the ambient light, and how surfaces shine.
+
+    Attributes
+    ----------
+    key, rim : Light
+        A warm one from the front, a cool one from behind the other side.
+    ambient : float
+        Light from everywhere.
+    specular, shininess : float
+        Strength and exponent of the Blinn-Phong highlight.
+    follow_camera : bool
+        Whether the directions turn with the camera.
+    """
+
+    key: Light = field(default_factory=lambda: Light(-38.0, 38.0, (1.0, 0.80, 0.56), 1.0))
+    rim: Light = field(default_factory=lambda: Light(118.0, 22.0, (0.30, 0.52, 1.0), 1.1))
+    ambient: float = 0.16
+    specular: float = 0.18
+    shininess: float = 32.0
+    follow_camera: bool = True
+
+
+@dataclass(slots=True)
+class DisplayOptions:
+    """Everything about a picture that is neither scene nor camera.
+
+    Attributes
+    ----------
+    show : str
+        A key of ``SHOWN``; a figure without a mesh shows its skeleton, one without a skeleton
+        its mesh.
+    shading : str
+        A key of ``viewer.rendering.program.SHADING``.
+    flat, wireframe, normals, texture, grid, cull : bool
+        One normal per triangle; edges on top; vertex normals as lines; the texture; the ground
+        grid; leave out triangles seen from behind.
+    background : str
+        ``"gradient"``, ``"transparent"`` or ``"#rrggbb"``.
+    skin_opacity : float
+        Of the skin when the skeleton is shown with it.
+    samples : int
+        Multisampling; the driver's maximum if that is smaller.
+    lights : Lights
+        The two lights.
+    selected_joint : int
+        Drawn in a highlight colour; -1 for none. Of the first actor.
+    """
+
+    show: str = "skin"
+    shading: str = "phong"
+    flat: bool = False
+    wireframe: bool = False
+    normals: bool = False
+    texture: bool = True
+    grid: bool = True
+    cull: bool = False
+    background: str = "gradient"
+    skin_opacity: float = 0.45
+    samples: int = 4
+    lights: Lights = field(default_factory=Lights)
+    selected_joint: int = -1

@@ -1,0 +1,128 @@
+"""Shader programs: composed of a file and a chunk, compiled once, errors with the file's name."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+import moderngl
+
+from viewer.errors import RenderError
+from viewer.resources import resource
+
+__all__ = ["SHADING", "Programs", "set_uniforms"]
+
+SHADING = {
+    "phong": "Blinn-Phong, two lights",
+    "normals": "Normals as colours",
+    "checker": "UV checker",
+}
+"""Chunks in ``shaders/shade``, with the name that menus show."""
+
+_CHUNK_MARK = re.compile(r"^#pragma chunk\s*$", re.MULTILINE)
+
+
+def set_uniforms(program: moderngl.Program, values: Mapping[str, object]) -> None:
+    """Set uniforms by name; those that the compiler found unused and dropped are left out.
+
+    Parameters
+    ----------
+    program : moderngl.Program
+        The program.
+    values : mapping
+        Numbers, tuples of numbers, or ``bytes`` laid out as GLSL stores them.
+    """
+    for name, value in values.items():
+        if name in program:
+            uniform = program[name]
+            assert isinstance(uniform, moderngl.Uniform)  # the names say so: u_
+            if isinstance(value, bytes):
+                uniform.write(value)
+            else:
+                uniform.value = value
+
+
+class Programs:
+    """Compiles programs and keeps them; one per context.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        Owns the programs; ``release`` frees them.
+    """
+
+    def __init__(self, context: moderngl.Context) -> None:
+        self.context = context
+        self._cache: dict[tuple[str, ...], moderngl.Program] = {}
+
+    def drawing(self, name: str, chunk: str = "", fragment: str = "") -> moderngl.Program:
+        """Return the program of ``name.vert`` and a fragment shader, with the chunk in the latter.
+
+        Parameters
+        ----------
+        name : str
+            Of the vertex shader, without suffix.
+        chunk : str
+            A key of ``SHADING``, for fragment shaders that take one.
+        fragment : str
+            Of the fragment shader; the same name if omitted.
+
+        Raises
+        ------
+        RenderError
+            If the driver refuses a shader; the message names our file and its line.
+        """
+        return self._get((name, fragment or name, chunk), ())
+
+    def feedback(self, name: str, chunk: str, outputs: tuple[str, ...]) -> moderngl.Program:
+        """Return a program without fragments whose outputs are captured, interleaved."""
+        return self._get((name, "", chunk), outputs)
+
+    def _get(self, key: tuple[str, str, str], outputs: tuple[str, ...]) -> moderngl.Program:
+        if key not in self._cache:
+            name, fragment_name, chunk = key
+            files: list[str] = []
+            vertex = _compose(f"{name}.vert", "" if fragment_name else chunk, files)
+            fragment = _compose(f"{fragment_name}.frag", chunk, files) if fragment_name else None
+            try:
+                self._cache[key] = self.context.program(
+                    vertex_shader=vertex, fragment_shader=fragment, varyings=outputs
+                )
+            except moderngl.Error as problem:
+                raise RenderError(self._explain(str(problem), files)) from None
+        return self._cache[key]
+
+    def _explain(self, text: str, files: list[str]) -> str:
+        """Put our file names in place of the driver's numbers: ``3(12)`` or ``3:12``."""
+        lines = [line.strip() for line in text.splitlines() if re.search(r"\berror\b", line, re.I)]
+        shown = " / ".join(lines[:3]) or " ".join(text.split())
+        for number, file in enumerate(files):
+            shown = re.sub(rf"\b{number}[(:](\d+)\)?", rf"{file}:\1", shown)
+        info = self.context.info
+        return (
+            f"the driver refused a shader ({shown}) on {info['GL_RENDERER']}, "
+            f"{info['GL_VERSION']}: please report this"
+        )
+
+    def release(self) -> None:
+        """Free all programs."""
+        for program in self._cache.values():
+            program.release()
+        self._cache.clear()
+
+
+def _compose(name: str, chunk: str, files: list[str]) -> str:
+    """Return a shader's text with its chunk inside, each line numbered as in its own file."""
+    base = len(files)
+    files.append(name)
+    text = resource("shaders", name).read_text()
+    if not chunk:
+        return text.replace("#version 330\n", f"#version 330\n#line 2 {base}\n", 1)
+    folder = "skin" if name.endswith(".vert") else "shade"
+    files.append(f"{folder}/{chunk}.glsl")
+    inner = resource("shaders", folder, f"{chunk}.glsl").read_text()
+    mark = _CHUNK_MARK.search(text)
+    assert mark is not None  # every shader that takes a chunk has the mark
+    after = text[: mark.end()].count("\n") + 2
+    head = text[: mark.start()].replace("#version 330\n", f"#version 330\n#line 2 {base}\n", 1)
+    return f"{head}#line 1 {base + 1}\n{inner}\n#line {after} {base}{text[mark.end() :]}"

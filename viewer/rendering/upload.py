@@ -1,0 +1,114 @@
+"""Arrays to the GPU: the only place that turns float64 into float32 or transposes a matrix."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.errors import RenderError
+from viewer.rendering.context import check_errors
+from viewer.rig.arrays import Bytes, Floats
+
+__all__ = [
+    "as_uniform",
+    "buffer",
+    "matrix_rows",
+    "matrix_texture",
+    "pair_texture",
+    "picture_texture",
+    "write_matrices",
+]
+
+_MATRICES_PER_ROW = 256  # three texels each; every driver takes textures 1024 wide
+_PAIRS_PER_ROW = 1024
+_SRGB8_ALPHA8 = 0x8C43
+
+
+def buffer(context: moderngl.Context, values: Any, dtype: str) -> moderngl.Buffer:
+    """Return a vertex or index buffer; one byte long if there is nothing to hold."""
+    data = np.ascontiguousarray(values, dtype=dtype).tobytes() or b"\0"
+    result = context.buffer(data)
+    check_errors(context, f"a mesh buffer of {len(data) / 1e6:.1f} MB")
+    return result
+
+
+def as_uniform(matrix: NDArray[np.floating]) -> bytes:
+    """Return a matrix for column vectors as GLSL stores it, column by column."""
+    return np.ascontiguousarray(matrix.T, dtype="f4").tobytes()
+
+
+def matrix_rows(matrices: Floats) -> bytes:
+    """Return the affine rows of (J, 4, 4) matrices, three texels each, padded to whole rows."""
+    rows = np.zeros((_height(len(matrices), _MATRICES_PER_ROW) * _MATRICES_PER_ROW, 3, 4), "f4")
+    rows[: len(matrices)] = matrices[:, :3, :]
+    return rows.tobytes()
+
+
+def matrix_texture(context: moderngl.Context, count: int) -> moderngl.Texture:
+    """Return an empty texture for ``count`` joint matrices."""
+    size = (3 * _MATRICES_PER_ROW, _height(count, _MATRICES_PER_ROW))
+    return _data_texture(context, size, 4, f"{count} joints")
+
+
+def write_matrices(texture: moderngl.Texture, matrices: Floats) -> None:
+    """Upload (J, 4, 4) matrices: all that a frame of a posed figure sends."""
+    texture.write(matrix_rows(matrices))
+
+
+def pair_texture(context: moderngl.Context, joints: Any, weights: Any) -> moderngl.Texture:
+    """Return a texture of (joint, weight) pairs, one texel each."""
+    height = _height(len(joints), _PAIRS_PER_ROW)
+    pairs = np.zeros((height * _PAIRS_PER_ROW, 2), "f4")
+    # float32 holds every joint index below 2^24 exactly.
+    pairs[: len(joints), 0] = joints
+    pairs[: len(joints), 1] = weights
+    texture = _data_texture(context, (_PAIRS_PER_ROW, height), 2, f"{len(joints)} influences")
+    texture.write(pairs.tobytes())
+    check_errors(context, f"{len(joints)} influences")
+    return texture
+
+
+def picture_texture(context: moderngl.Context, pixels: Bytes, notes: list[str]) -> moderngl.Texture:
+    """Return a mip-mapped sRGB texture, clamped at its edges, v = 0 at the picture's last row.
+
+    A picture larger than the driver takes is shrunk by whole factors, and ``notes`` says so.
+    """
+    limit = context.info["GL_MAX_TEXTURE_SIZE"]
+    factor = -(-max(pixels.shape[:2]) // limit)
+    if factor > 1:
+        notes.append(
+            f"a texture of {pixels.shape[1]} x {pixels.shape[0]} pixels is above this driver's "
+            f"limit of {limit} and was shrunk by {factor}"
+        )
+        pixels = pixels[::factor, ::factor]
+    flipped = np.ascontiguousarray(pixels[::-1])
+    size = (pixels.shape[1], pixels.shape[0])
+    texture = context.texture(size, 4, flipped.tobytes(), internal_format=_SRGB8_ALPHA8)
+    texture.repeat_x = texture.repeat_y = False
+    texture.build_mipmaps()
+    texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+    texture.anisotropy = 8.0
+    check_errors(context, f"a texture of {size[0]} x {size[1]} pixels")
+    return texture
+
+
+def _height(count: int, per_row: int) -> int:
+    return max(1, -(-count // per_row))
+
+
+def _data_texture(
+    context: moderngl.Context, size: tuple[int, int], components: int, what: str
+) -> moderngl.Texture:
+    limit = context.info["GL_MAX_TEXTURE_SIZE"]
+    if max(size) > limit:
+        raise RenderError(
+            f"{what} need a texture of {size[0]} x {size[1]}; "
+            f"{context.info['GL_RENDERER']} takes at most {limit}"
+        )
+    texture = context.texture(size, components, dtype="f4")
+    texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+    check_errors(context, what)
+    return texture

@@ -1,0 +1,74 @@
+"""What every pass needs of the camera: matrices in float64 until the last moment."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+
+from viewer.rendering.camera import Camera, camera_axes
+from viewer.rendering.options import Light, Lights
+from viewer.rendering.program import set_uniforms
+from viewer.rendering.upload import as_uniform
+from viewer.rig.arrays import Floats
+from viewer.rig.transform import translation_matrix
+
+__all__ = ["View", "set_lights", "set_model", "view_of"]
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """A camera's matrices for one picture, (4, 4) for column vectors, and the camera itself."""
+
+    matrix: Floats
+    projection: Floats
+    camera: Camera
+
+
+def view_of(camera: Camera, size: tuple[int, int], box: Floats) -> View:
+    """Return the matrices of a camera for a picture of ``size`` that shows ``box``."""
+    return View(camera.view_matrix(), camera.projection_matrix(size[0] / size[1], box), camera)
+
+
+def set_model(program: moderngl.Program, view: View, placement: Floats, center: Floats) -> None:
+    """Set the matrices of a mesh whose positions are relative to ``center``.
+
+    The product is formed in float64: its large translations cancel before float32 sees them.
+    """
+    model_view = view.matrix @ placement @ translation_matrix(center)
+    values = {
+        "u_model_view": as_uniform(model_view),
+        "u_projection": as_uniform(view.projection),
+        "u_normal_matrix": as_uniform(np.linalg.inv(model_view[:3, :3]).T),
+        "u_orthographic": view.camera.orthographic,
+    }
+    set_uniforms(program, values)
+
+
+def set_lights(program: moderngl.Program, view: View, lights: Lights) -> None:
+    """Set the uniforms of ``shade/phong.glsl`` that the program kept."""
+    pair = (lights.key, lights.rim)
+    directions = [_direction(light, lights.follow_camera, view) for light in pair]
+    colors = [[light.strength * channel for channel in light.color] for light in pair]
+    values = {
+        "u_light_directions": np.array(directions, dtype="f4").tobytes(),
+        "u_light_colors": np.array(colors, dtype="f4").tobytes(),
+        "u_ambient": lights.ambient,
+        "u_specular": lights.specular,
+        "u_shininess": max(lights.shininess, 1.0),
+    }
+    set_uniforms(program, values)
+
+
+def _direction(light: Light, follows: bool, view: View) -> Floats:
+    """Return the unit vector towards a light in camera space: (3,)."""
+    if follows:
+        azimuth, inclination = math.radians(light.azimuth), math.radians(light.inclination)
+        flat = math.cos(inclination)
+        across, towards = flat * math.sin(azimuth), flat * math.cos(azimuth)
+        return np.array([across, math.sin(inclination), towards])
+    # A camera that looked from there would have the light behind it.
+    seat = Camera(azimuth=light.azimuth, inclination=light.inclination, up=view.camera.up)
+    return view.matrix[:3, :3] @ camera_axes(seat)[2]
