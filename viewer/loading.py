@@ -11,7 +11,7 @@ from viewer.errors import FormatError, RigError, printable
 from viewer.formats import MAX_SIZE, Source, read
 from viewer.resources import resource
 from viewer.rig.figure import Figure
-from viewer.rig.scene import Actor, Scene, actor_points
+from viewer.rig.scene import Actor, Scene, scene_box
 from viewer.rig.transform import translation_matrix
 
 __all__ = ["bundled_files", "load"]
@@ -27,9 +27,9 @@ def bundled_files() -> tuple[Path, Path]:
 def load(*paths: str | Path, max_size: int = MAX_SIZE) -> Scene:
     """Open files as one scene; without files, the bundled figure.
 
-    Files are recognised by content. Skeletons and skins are paired in the order given: a
-    ``.skel`` with the ``.skin`` that follows or precedes it. One without a partner opens alone.
-    Several actors stand side by side.
+    Files are recognised by content. A skeleton takes the first skin that has its number of
+    joints, one of the same name if there is one. A figure without a partner opens alone; several
+    actors stand side by side.
 
     Parameters
     ----------
@@ -56,32 +56,37 @@ def load(*paths: str | Path, max_size: int = MAX_SIZE) -> Scene:
     """
     sources = [Source.open(path, max_size) for path in paths or bundled_files()]
     figures = [read(source) for source in sources]
-    pairs = _pairs([figure.skeleton is not None for figure in figures])
     actors = [
-        Actor(_join([sources[i].path for i in pair], [figures[i] for i in pair])) for pair in pairs
+        Actor(_join([sources[i].path for i in pair], [figures[i] for i in pair]))
+        for pair in _pairs(figures)
     ]
     _place_side_by_side(actors)
     return Scene(actors, tuple(text for source in sources for text in source.warnings))
 
 
-def _pairs(is_skeleton: Sequence[bool]) -> list[tuple[int, ...]]:
-    """Match each skeleton with the nearest free skin, neighbours first, in file order.
-
-    >>> _pairs([True, False, True, False])
-    [(0, 1), (2, 3)]
-    >>> _pairs([False, True, True])
-    [(1, 0), (2,)]
-    """
-    free_skins = [index for index, skeleton in enumerate(is_skeleton) if not skeleton]
+def _pairs(figures: Sequence[Figure]) -> list[tuple[int, ...]]:
+    """Match skeletons with skins: by joints and name, then by joints, then whatever is left."""
+    skeletons = [index for index, figure in enumerate(figures) if figure.skeleton is not None]
+    skins = [index for index, figure in enumerate(figures) if figure.skeleton is None]
     pairs: list[tuple[int, ...]] = []
-    skeletons = [index for index, skeleton in enumerate(is_skeleton) if skeleton]
-    for index in skeletons:
-        if free_skins:
-            pairs.append((index, free_skins.pop(0)))
-        else:
-            pairs.append((index,))
-    pairs += [(index,) for index in free_skins]
+    for fits in (_fits_by_name, _fits, lambda skeleton, skin: True):
+        for index in [*skeletons]:
+            partner = next((skin for skin in skins if fits(figures[index], figures[skin])), None)
+            if partner is not None:
+                skeletons.remove(index)
+                skins.remove(partner)
+                pairs.append((index, partner))
+    pairs += [(index,) for index in skeletons + skins]
     return sorted(pairs, key=min)
+
+
+def _fits(skeleton: Figure, skin: Figure) -> bool:
+    bound, joints = skin.skin, skeleton.skeleton
+    return bound is not None and joints is not None and bound.n_joints == joints.n_joints
+
+
+def _fits_by_name(skeleton: Figure, skin: Figure) -> bool:
+    return skeleton.name == skin.name and _fits(skeleton, skin)
 
 
 def _join(paths: list[Path], figures: list[Figure]) -> Figure:
@@ -107,15 +112,13 @@ def _join(paths: list[Path], figures: list[Figure]) -> Figure:
 
 def _place_side_by_side(actors: list[Actor]) -> None:
     """Move the second and later actors to the right of those before them."""
-    edge = 0.0
-    for number, actor in enumerate(actors):
-        xs = actor_points(actor)[:, 0] if len(actors) > 1 else None
-        if xs is None:
-            return
-        low, width = float(xs.min()), float(xs.max() - xs.min())
-        if number:
-            gap = _GAP * width
-            actor.placement = translation_matrix(np.array([edge + gap - low, 0.0, 0.0]))
-            edge += gap + width
-        else:
-            edge = low + width
+    if len(actors) < 2:
+        return
+    # A stray vertex far outside must not send the next actor there.
+    spans = [scene_box(Scene([actor]))[:, 0] for actor in actors]
+    edge = spans[0][1]
+    for actor, before, span in zip(actors[1:], spans[:-1], spans[1:], strict=True):
+        low, high = span
+        gap = _GAP * max(high - low, before[1] - before[0])
+        actor.placement = translation_matrix(np.array([edge + gap - low, 0.0, 0.0]))
+        edge += gap + high - low

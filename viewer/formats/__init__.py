@@ -8,10 +8,23 @@ from importlib import import_module
 from pathlib import Path
 
 from viewer.errors import FormatError, UnsupportedFormatError
+from viewer.formats._image import save_image
+from viewer.formats._save import free_path, save_bytes
 from viewer.formats._source import MAX_SIZE, Source
 from viewer.rig.figure import Figure
 
-__all__ = ["FORMATS", "MAX_SIZE", "Format", "Source", "detect", "read", "write"]
+__all__ = [
+    "FORMATS",
+    "MAX_SIZE",
+    "Format",
+    "Source",
+    "detect",
+    "free_path",
+    "read",
+    "save_bytes",
+    "save_image",
+    "write",
+]
 
 _HEAD = 1 << 16  # bytes in which a file has to show what it is
 
@@ -61,7 +74,7 @@ def detect(source: Source) -> str:
     """
     suffix = source.path.suffix.lower()
     by_suffix = next((key for key, kind in FORMATS.items() if kind.suffix == suffix), None)
-    head = source.data[:_HEAD]
+    head = source.head(_HEAD)
     if by_suffix and re.search(FORMATS[by_suffix].signature, head):
         return by_suffix
     for key, kind in FORMATS.items():

@@ -8,14 +8,15 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.errors import FormatError
+from viewer.errors import FormatError, printable
 from viewer.formats._save import save_bytes
-from viewer.formats._source import Source
+from viewer.formats._source import Source, read_bytes
 from viewer.rig.arrays import Bytes
 
 __all__ = ["encode_png", "load_image", "save_image"]
 
 _MAX_PIXELS = 16384 * 16384
+_REFUSALS = (OSError, ValueError, SyntaxError, MemoryError, Warning)  # what Pillow raises
 _FORMATS = ("PNG", "JPEG", "BMP", "TGA", "TIFF", "GIF", "WEBP", "PPM")
 
 
@@ -40,19 +41,26 @@ def load_image(source: Source, name: str, offset: int) -> Bytes | None:
 
     path = source.path.parent / name.replace("\\", "/")
     try:
-        data = Source.open(path).data
+        data = read_bytes(path)
         with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
             warnings.simplefilter("error", Image.DecompressionBombWarning)
             with Image.open(io.BytesIO(data), formats=_FORMATS) as picture:
                 if picture.width * picture.height > _MAX_PIXELS:
                     raise ValueError(f"{picture.width} x {picture.height} pixels are too many")
-                return np.array(picture.convert("RGBA"))
+                pixels = np.array(picture.convert("RGBA"))
+                pixels.flags.writeable = False  # materials may share it
+                return pixels
     except UnidentifiedImageError:
-        source.warn(f"texture {path}: not a picture that can be read; drawn untextured", offset)
+        source.warn(
+            f"texture {printable(path, 300)}: not a picture that can be read; drawn untextured",
+            offset,
+        )
     except FormatError as problem:
         source.warn(f"texture {problem}; drawn untextured", offset)
-    except (OSError, ValueError, SyntaxError, Warning, Image.DecompressionBombError) as problem:
-        source.warn(f"texture {path}: {problem}; drawn untextured", offset)
+    except (*_REFUSALS, Image.DecompressionBombError) as problem:
+        reason = f"{printable(path, 300)}: {printable(problem)}"
+        source.warn(f"texture {reason}; drawn untextured", offset)
     return None
 
 

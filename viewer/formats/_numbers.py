@@ -23,7 +23,7 @@ __all__ = ["LARGEST", "is_number", "parse_numbers", "to_number"]
 LARGEST = float(np.finfo(np.float32).max)
 """Numbers beyond this become infinite on the GPU, so no file may hold them."""
 
-_NUMBER = re.compile(rb"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?[fF]?")
+_NUMBER = re.compile(rb"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?[fF]?")
 _SPACE = re.compile(rb"[ \t\n\r\v\f]")
 _CHUNK = 1 << 17  # bytes; temporaries stay inside the processor's cache
 _PAD = 16  # bytes before a chunk, so that the first words can be read as 16 characters
@@ -102,16 +102,15 @@ def parse_numbers(data: bytes, start: int, end: int) -> tuple[Floats, int]:
 def _parse_chunk(chunk: bytes) -> tuple[Floats, int]:
     padded = b" " * _PAD + chunk + b" "
     letters = np.frombuffer(padded, dtype=np.uint8)
+    # Control characters would count as white space below, but they belong to a word.
+    if ((letters < 9) | ((letters > 13) & (letters < ord(" ")))).any():
+        return _parse_slowly(chunk)
     space = letters <= ord(" ")
     edges = np.flatnonzero(space[1:] != space[:-1]) + 1
     starts, ends = edges[0::2], edges[1::2]
     if len(starts) == 0:
         return np.zeros(0), -1
     values, odd = _parse_words(padded, letters, starts, ends)
-    # Control characters count as white space above; words next to one are judged again.
-    controls = (letters < 9) | ((letters > 13) & (letters < ord(" ")))
-    if controls.any():
-        return _parse_slowly(chunk)
     for index in np.flatnonzero(odd):
         value = to_number(padded[starts[index] : ends[index]])
         if value is None:

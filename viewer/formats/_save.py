@@ -10,7 +10,40 @@ from pathlib import Path
 
 from viewer.errors import OutputError, printable
 
-__all__ = ["save_bytes", "save_text"]
+__all__ = ["as_words", "free_path", "save_bytes", "save_text"]
+
+
+def as_words(name: str) -> list[bytes] | None:
+    """Return the words that are read back as ``name``, or None if no words are.
+
+    >>> as_words("left leg"), as_words(" leg")
+    ([b'left', b'leg'], None)
+    """
+    try:
+        text = name.encode("utf-8", "surrogateescape")
+    except UnicodeEncodeError:  # a lone surrogate, which no bytes are decoded to
+        return None
+    words = text.split()
+    comes_back = b" ".join(words).decode("utf-8", "surrogateescape") == name
+    return words if comes_back and not set(text) & set(b"{}") else None
+
+
+def free_path(folder: Path, stem: str, suffix: str) -> Path:
+    """Return a path that no file has: ``fox.png``, then ``fox-2.png``, and so on.
+
+    Parameters
+    ----------
+    folder : Path
+        Where to look.
+    stem, suffix : str
+        Of the name; what could confuse a shell becomes an underscore.
+    """
+    safe = "".join(letter if letter.isalnum() or letter in "-_." else "_" for letter in stem)[:100]
+    path, number = folder / f"{safe or 'picture'}{suffix}", 1
+    while path.exists():
+        number += 1
+        path = folder / f"{safe or 'picture'}-{number}{suffix}"
+    return path
 
 
 def save_text(path: str | Path, text: str) -> None:
@@ -69,7 +102,7 @@ def _write_through(target: Path, data: bytes) -> None:
 
 def _replace(target: Path, data: bytes, permissions: int) -> None:
     if not target.parent.is_dir():
-        raise FileNotFoundError(None, f"the folder {target.parent} does not exist")
+        raise FileNotFoundError(None, f"the folder {printable(target.parent, 300)} does not exist")
     handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name[:40]}.")
     try:
         with os.fdopen(handle, "wb") as stream:

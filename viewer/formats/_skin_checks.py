@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from viewer.formats._numbers import LARGEST
 from viewer.formats._skin_sections import Sections
 from viewer.formats._source import Source
+from viewer.rig.arrays import Floats
 from viewer.rig.mesh import Mesh
 from viewer.rig.skin import Skin, has_influence, influence_counts, weight_sums
 
-__all__ = ["check_bindings", "check_mesh", "check_triangles", "check_weights"]
+__all__ = ["check_joints", "check_mesh", "check_triangles", "check_weights", "invert_bindings"]
 
 WEIGHT_TOLERANCE = 0.01  # the format's own: a sum further from 1 is worth a warning
 _SINGULAR = 1e-12  # determinant relative to the product of the column lengths
@@ -47,13 +49,16 @@ def check_triangles(source: Source, sections: Sections, n_vertices: int) -> None
             )
 
 
-def check_bindings(source: Source, sections: Sections) -> None:
-    """Refuse bindings that cannot be inverted and indices of joints that are not bound."""
+def invert_bindings(source: Source, sections: Sections) -> Floats:
+    """Return the inverse bind matrices, (J, 4, 4); refuse bindings that a float32 has none for."""
     assert sections.bindings is not None  # the caller looked
     linear = sections.bindings[:, :3, :3]
     lengths = np.linalg.norm(linear, axis=1).prod(axis=1)
     determinants = np.linalg.det(linear)
     flat = np.abs(determinants) <= _SINGULAR * lengths
+    with np.errstate(over="ignore", invalid="ignore"):
+        inverse = np.linalg.inv(np.where(flat[:, None, None], np.eye(4), sections.bindings))
+        flat |= ~(np.abs(inverse) <= LARGEST).all(axis=(1, 2))
     if flat.any():
         index = int(flat.argmax())
         raise source.error(
@@ -69,7 +74,11 @@ def check_bindings(source: Source, sections: Sections) -> None:
                 f"(condition number {conditions.max():.2g})",
                 sections.offsets["bindings"],
             )
-    n_joints = len(linear)
+    return inverse.astype(np.float64, copy=False)
+
+
+def check_joints(source: Source, sections: Sections, n_joints: int) -> None:
+    """Refuse indices of joints that are not bound."""
     wrong = np.flatnonzero((sections.joints < 0) | (sections.joints >= n_joints))
     if len(wrong):
         assert sections.starts is not None  # the caller looked

@@ -8,18 +8,20 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from viewer.errors import FormatError
-from viewer.formats._image import load_image
 from viewer.formats._numbers import parse_numbers, to_number
+from viewer.formats._skin_material import read_material
 from viewer.formats._source import Source, shown
-from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.arrays import Bools, Bytes, Floats, Ints
 from viewer.rig.mesh import Material
 
-__all__ = ["Block", "Sections", "TriangleRun", "read_sections"]
+__all__ = ["KEYWORDS", "Block", "Sections", "TriangleRun", "read_sections"]
 
 _WIDTHS = {"positions": 3, "normals": 3, "texcoords": 2}
-_SECTIONS = {b"positions", b"normals", b"texcoords", b"skinweights"}
-_SECTIONS |= {b"material", b"triangles", b"bindings"}
-_LINE_REST = re.compile(rb"[^\r\n}]*")
+KEYWORDS = frozenset(
+    (b"positions", b"normals", b"texcoords", b"skinweights", b"material", b"triangles", b"bindings")
+)
+"""Words that begin a section."""
+
 
 Word = re.Match[bytes]
 
@@ -53,6 +55,7 @@ class Sections:
     joints: Ints = field(default_factory=lambda: np.zeros(0, np.int32))
     weights: Floats = field(default_factory=lambda: np.zeros(0))
     materials: list[Material] = field(default_factory=list)
+    pictures: dict[str, Bytes | None] = field(default_factory=dict)
     triangles: list[TriangleRun] = field(default_factory=list)
     bindings: Floats | None = None
     offsets: dict[str, int] = field(default_factory=dict)
@@ -73,20 +76,17 @@ def read_sections(source: Source) -> Sections:
         With file and line, if the text breaks the grammar.
     """
     sections = Sections()
-    skipped: set[bytes] = set()
     extra_braces = 0
     position = 0
     while (word := source.next_word(position)) is not None:
         name = word.group()
-        if name in _SECTIONS:
+        if name in KEYWORDS:
             position = _read_section(source, sections, word)
         elif name == b"}":
             extra_braces += 1
             position = word.end()
         else:
-            if name not in skipped:
-                source.warn(f"skipped unknown section {shown(name)}", word.start())
-            skipped.add(name)
+            source.warn(f"skipped unknown section {shown(name)}", word.start())
             position = _skip(source, word)
     if extra_braces:
         source.warn(f'ignored {extra_braces} "}}" outside all sections')
@@ -100,7 +100,9 @@ def _read_section(source: Source, sections: Sections, word: Word) -> int:
         source.warn(f"{name} occurs again: the last one counts", word.start())
     sections.offsets[name] = word.start()
     if name == "material":
-        return _read_material(source, sections, word)
+        material, position = read_material(source, word, KEYWORDS, sections.pictures)
+        sections.materials.append(material)
+        return position
     count, position = _count(source, name, word)
     if name == "bindings":
         sections.bindings, position = _read_bindings(source, count, word, position)
@@ -158,7 +160,7 @@ def _numbers(source: Source, block: Block) -> Floats:
     if bad < 0:
         return values
     offset, word = _word_at(source, block, bad)
-    if word in _SECTIONS or word == b"{":
+    if word in KEYWORDS or word == b"{":
         raise source.error(
             f'expected "}}" to close {_opened(source, block)}, found {shown(word)}', offset
         )
@@ -278,12 +280,14 @@ def _weights_count_error(
             f"(from line {source.line(block.header)})",
             block.end,
         )
+    if count == 0:
+        return source.error(
+            f"skinweights: expected no vertices, found {n_numbers} numbers", block.start
+        )
     offset, word = _word_at(source, block, heads[-1])
-    missing = n_numbers < heads[-1] + 1
-    found = "the end of the section" if missing else f"{n_numbers - heads[-1] - 1} numbers"
     return source.error(
         f"skinweights of vertex {count - 1}, the last: expected {word.decode()} pairs of joint "
-        f"and weight, found {found} up to the closing brace",
+        f"and weight, found {n_numbers - heads[-1] - 1} numbers up to the closing brace",
         offset,
     )
 
@@ -332,51 +336,13 @@ def _read_matrix(source: Source, index: int, word: Word) -> tuple[Floats, int]:
     return values, block.end + 1
 
 
-def _read_material(source: Source, sections: Sections, header: Word) -> int:
-    brace = source.next_word(header.end())
-    name: list[bytes] = []
-    while brace is not None and brace.group() not in (b"{", b"}", *_SECTIONS):
-        name.append(brace.group())
-        brace = source.next_word(brace.end())
-    if brace is None or brace.group() != b"{":
-        found = "the end of the file" if brace is None else shown(brace.group())
-        where = header.start() if brace is None else brace.start()
-        raise source.error(f'material: expected "{{", found {found}', where)
-    texture: str | None = None
-    position = brace.end()
-    while (word := source.next_word(position)) is not None and word.group() != b"}":
-        if word.group() == b"texture":
-            rest = _LINE_REST.match(source.data, word.end())
-            assert rest is not None  # the pattern matches the empty string too
-            texture = rest.group().strip().decode("utf-8", "surrogateescape") or None
-            position = rest.end()
-        else:
-            source.warn(f"skipped unknown {shown(word.group())} in a material", word.start())
-            rest = _LINE_REST.match(source.data, word.end())
-            position = rest.end() if rest is not None else word.end()
-    if word is None:
-        raise source.error(
-            f'expected "}}" to close material (line {source.line(header.start())}), '
-            "found the end of the file",
-            len(source.data.rstrip()),
-        )
-    label = b" ".join(name).decode("utf-8", "surrogateescape")
-    image = None
-    if texture is None:
-        source.warn("material without texture: drawn untextured", header.start())
-    else:
-        image = load_image(source, texture, header.start())
-    sections.materials.append(Material(label, texture, image))
-    return word.end()
-
-
 def _skip(source: Source, word: Word) -> int:
     """Return the offset behind an unknown section: its numbers, or its whole balanced block."""
     depth = 0
     position = word.start()
     while (following := source.next_word(position)) is not None:
         text = following.group()
-        if depth == 0 and position > word.start() and (text in _SECTIONS or text == b"}"):
+        if depth == 0 and position > word.start() and (text in KEYWORDS or text == b"}"):
             return following.start()
         depth += {b"{": 1, b"}": -1}.get(text, 0)
         position = following.end()

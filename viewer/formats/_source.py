@@ -9,11 +9,14 @@ from pathlib import Path
 
 from viewer.errors import FormatError, printable
 
-__all__ = ["MAX_SIZE", "Source", "shown"]
+__all__ = ["MAX_SIZE", "Source", "read_bytes", "shown"]
 
 MAX_SIZE = 2 << 30
 """Largest file that is read, in bytes, unless the caller says otherwise."""
 
+_MAX_WARNINGS = 100  # a file that earns more is no figure; nobody reads on
+_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+_CONTROL_Z = b"\x1a"  # ends a text file written under CP/M or DOS
 _WORD = re.compile(rb"[{}]|[^{} \t\n\r\v\f]+")
 _CARRIAGE_RETURNS = re.compile(rb"\r+\n?")
 _MAGIC = (
@@ -30,6 +33,7 @@ _MAGIC = (
     (b"\xfe\xff", "UTF-16 text"),
     (b"\x93NUMPY", "a numpy array"),
 )
+_LOOK = 4096  # bytes that show what a file is
 _KINDS = {
     stat.S_IFDIR: "a folder",
     stat.S_IFIFO: "a pipe",
@@ -37,6 +41,37 @@ _KINDS = {
     stat.S_IFBLK: "a device",
     stat.S_IFSOCK: "a socket",
 }
+
+
+def read_bytes(path: Path, max_size: int = MAX_SIZE) -> bytes:
+    """Read a regular file whole.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    max_size : int
+        Larger files, in bytes, are refused before they are read.
+
+    Raises
+    ------
+    FormatError
+        If the file is missing, unreadable, not a regular file, or too large.
+    """
+    try:
+        # A pipe would block on opening, so look before.
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):
+            kind = _KINDS.get(stat.S_IFMT(status.st_mode), "something else")
+            raise FormatError(path, f"expected a file, found {kind}")
+        if status.st_size > max_size:
+            raise FormatError(
+                path, f"expected at most {max_size} bytes, found {status.st_size} (--max-size)"
+            )
+        return path.read_bytes()
+    except (OSError, ValueError) as problem:
+        reason = getattr(problem, "strerror", None) or problem
+        raise FormatError(path, f"cannot be read: {reason}") from None
 
 
 class Source:
@@ -47,48 +82,22 @@ class Source:
     path : Path
         Where the bytes came from; texture names are relative to its folder.
     data : bytes
-        The whole file, without a UTF-8 byte order mark.
+        The whole file, without a UTF-8 byte order mark and a closing Ctrl-Z.
     warnings : list of str
-        One line each.
+        One line each, none twice.
     """
 
     def __init__(self, path: str | Path, data: bytes) -> None:
         self.path = Path(path)
-        self.data = data.removeprefix(b"\xef\xbb\xbf")
+        self.data = data.removeprefix(_BYTE_ORDER_MARK).rstrip(_CONTROL_Z)
         self.warnings: list[str] = []
+        self._warned: set[str] = set()
         self._counted = (0, 1)  # an offset whose line is known, and that line
 
     @classmethod
     def open(cls, path: str | Path, max_size: int = MAX_SIZE) -> Source:
-        """Read a regular file.
-
-        Parameters
-        ----------
-        path : str or Path
-            The file.
-        max_size : int
-            Larger files are refused before they are read.
-
-        Raises
-        ------
-        FormatError
-            If the file is missing, unreadable, not a regular file, or too large.
-        """
-        path = Path(path)
-        try:
-            # A pipe would block on opening, so look before.
-            status = path.stat()
-            if not stat.S_ISREG(status.st_mode):
-                kind = _KINDS.get(stat.S_IFMT(status.st_mode), "something else")
-                raise FormatError(path, f"expected a file, found {kind}")
-            if status.st_size > max_size:
-                raise FormatError(
-                    path, f"expected at most {max_size} bytes, found {status.st_size} (--max-size)"
-                )
-            return cls(path, path.read_bytes())
-        except (OSError, ValueError) as problem:
-            reason = getattr(problem, "strerror", None) or problem
-            raise FormatError(path, f"cannot be read: {reason}") from None
+        """Read a file; see ``read_bytes`` for what it raises."""
+        return cls(path, read_bytes(Path(path), max_size))
 
     def words(self, start: int = 0, end: int | None = None) -> Iterator[re.Match[bytes]]:
         """Yield words and braces, braces always on their own, with their offsets."""
@@ -125,22 +134,34 @@ class Source:
         return FormatError(self.path, message, None if offset is None else self.line(offset))
 
     def warn(self, message: str, offset: int | None = None) -> None:
-        """Add a warning that names the file, and the line of ``offset``."""
+        """Add a warning that names the file, and the line of ``offset``; each text only once."""
+        if message in self._warned or len(self._warned) > _MAX_WARNINGS:
+            return
+        self._warned.add(message)
+        if len(self._warned) > _MAX_WARNINGS:
+            message, offset = "further warnings are left out", None
         self.warnings.append(str(self.error(message, offset)))
+
+    def head(self, size: int) -> bytes:
+        """Return up to ``size`` bytes from the first word on."""
+        first = self.next_word(0)
+        return b"" if first is None else self.data[first.start() : first.start() + size]
 
     def looks_like(self) -> str | None:
         """Return what the bytes look like if they are no text of ours, e.g. ``"gzip data"``."""
-        head = self.data[:4096].lstrip()
+        head = self.head(_LOOK)
         if not head:
-            return "an empty file" if len(self.data) < 4096 else "only white space"
+            return "only white space" if self.data else "an empty file"
         for magic, kind in _MAGIC:
             if self.data.startswith(magic):
                 return kind
         if re.match(rb"<(!doctype|html|\?xml)", head, re.IGNORECASE):
             return "HTML or XML (a failed download?)"
-        if head.count(0) * 3 > len(head):
-            return "zeros" if not head.strip(b"\0") else "binary data"
-        return None
+        if not head.strip(b"\0"):
+            return "zeros"
+        if not self.data[1:_LOOK:2].strip(b"\0") or not self.data[:_LOOK:2].strip(b"\0"):
+            return "UTF-16 text"
+        return "binary data" if head.count(0) * 3 > len(head) else None
 
 
 def shown(word: bytes) -> str:

@@ -21,13 +21,13 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.errors import UnsupportedFormatError
-from viewer.formats._numbers import is_number, to_number
-from viewer.formats._save import save_text
+from viewer.errors import UnsupportedFormatError, printable
+from viewer.formats._numbers import LARGEST, is_number, to_number
+from viewer.formats._save import as_words, save_text
 from viewer.formats._source import Source, shown
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
-from viewer.rig.skeleton import DOF_KINDS, Skeleton
+from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_label
 
 __all__ = ["read", "write"]
 
@@ -90,7 +90,6 @@ class _Parser:
         self.word: Word | None = None
         self.found: list[_Joint] = []
         self.open: list[int] = []
-        self.skipped: set[bytes] = set()
         self.extra_braces = 0
 
     def joints(self) -> list[_Joint]:
@@ -147,8 +146,9 @@ class _Parser:
         self._advance()
         while len(values) < count:
             if self.word is None or self.word.group() in (b"{", b"}", *_KEYWORDS):
+                end = ", then the end of the file" * (self.word is None)
                 raise self.source.error(
-                    f"{what}: expected {count} numbers, found {len(values)}", keyword.start()
+                    f"{what}: expected {count} numbers, found {len(values)}{end}", keyword.start()
                 )
             value = to_number(self.word.group())
             if value is None:
@@ -169,9 +169,7 @@ class _Parser:
         """Skip a word we do not know with its numbers, or with its whole balanced block."""
         assert self.word is not None  # the caller looked at it
         keyword = self.word
-        if keyword.group() not in self.skipped:
-            self.source.warn(f"skipped unknown {shown(keyword.group())}", keyword.start())
-        self.skipped.add(keyword.group())
+        self.source.warn(f"skipped unknown {shown(keyword.group())}", keyword.start())
         if keyword.group() != b"{":
             self._advance()
         while self.word is not None and is_number(self.word.group()):
@@ -278,11 +276,13 @@ def write(figure: Figure, path: str | Path) -> None:
     """
     if figure.skeleton is None:
         raise UnsupportedFormatError(f"figure {figure.name} has no skeleton to write as .skel")
-    _check_writable(figure.skeleton)
+    _check_dofs(figure.skeleton)
+    _check_numbers(figure.skeleton)
+    _check_names(figure.skeleton)
     save_text(path, "".join(_lines(figure.skeleton)))
 
 
-def _check_writable(skeleton: Skeleton) -> None:
+def _check_dofs(skeleton: Skeleton) -> None:
     unturned = np.allclose(skeleton.rest_rotations[:, :3], 0.0, atol=1e-12)
     unscaled = np.allclose(skeleton.rest_scales, 1.0, atol=1e-12)
     if not (unturned and unscaled):
@@ -294,21 +294,37 @@ def _check_writable(skeleton: Skeleton) -> None:
         np.array_equal(skeleton.dof_kinds, table) and np.array_equal(skeleton.dof_joints, owners)
     ):
         raise UnsupportedFormatError(".skel holds the DOFs x, y, z of each joint, no others")
-    if skeleton.rest_dofs[:3].any():
-        raise UnsupportedFormatError(".skel cannot hold a translation of the root in its pose")
+    if skeleton.rest_dofs[:3].any() or np.isfinite(skeleton.dof_limits[:3]).any():
+        raise UnsupportedFormatError(
+            ".skel cannot hold a translation of the root in its pose, nor limits of one"
+        )
+
+
+def _check_numbers(skeleton: Skeleton) -> None:
+    limits = skeleton.dof_limits
+    finite = np.isfinite(limits)
+    if (finite & np.stack([limits[:, 0] <= -UNLIMITED, limits[:, 1] >= UNLIMITED], 1)).any():
+        raise UnsupportedFormatError(f".skel takes limits beyond +-{UNLIMITED:.0f} for none")
+    arrays = [skeleton.rest_translations, skeleton.boxes, skeleton.rest_dofs, limits[finite]]
+    if any(np.abs(array).max(initial=0.0) > LARGEST for array in arrays if array is not None):
+        raise UnsupportedFormatError(f".skel cannot hold numbers beyond {LARGEST:.3g}")
+
+
+def _check_names(skeleton: Skeleton) -> None:
     ancestors: list[int] = []
     for joint, parent in enumerate(skeleton.parents):
         while ancestors and ancestors[-1] != parent:
             ancestors.pop()
         if parent >= 0 and not ancestors:
             raise UnsupportedFormatError(
-                f".skel lists joints depth-first; joint {skeleton.names[joint]} comes too late"
+                f".skel lists joints depth-first; joint {joint_label(skeleton, joint)} "
+                "comes too late"
             )
         ancestors.append(joint)
     for name in skeleton.names:
-        words = set(name.encode("utf-8", "surrogateescape").split())
-        if "{" in name or "}" in name or words & _KEYWORDS or name != " ".join(name.split()):
-            raise UnsupportedFormatError(f'.skel cannot hold the joint name "{name}"')
+        words = as_words(name)
+        if words is None or _KEYWORDS & set(words):
+            raise UnsupportedFormatError(f'.skel cannot hold the joint name "{printable(name)}"')
 
 
 def _lines(skeleton: Skeleton) -> list[str]:
@@ -338,7 +354,8 @@ def _items(skeleton: Skeleton, joint: int) -> list[str]:
     rows = slice(3 + 3 * joint, 6 + 3 * joint)
     for axis, limits in zip("xyz", skeleton.dof_limits[rows], strict=True):
         if np.isfinite(limits).any():
-            items.append(f"rot{axis}limit {_numbers(np.clip(limits, -UNLIMITED, UNLIMITED))}")
+            written = np.nan_to_num(limits, posinf=UNLIMITED, neginf=-UNLIMITED)
+            items.append(f"rot{axis}limit {_numbers(written)}")
     return [*items, f"pose {_numbers(skeleton.rest_dofs[rows])}"]
 
 

@@ -17,21 +17,24 @@ applies to the triangles sections after it. Weights are used as stored.
 
 from __future__ import annotations
 
+import re
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
-from viewer.errors import UnsupportedFormatError
+from viewer.errors import UnsupportedFormatError, printable
 from viewer.formats._image import save_image
-from viewer.formats._save import save_text
+from viewer.formats._numbers import LARGEST
+from viewer.formats._save import as_words, save_text
 from viewer.formats._skin_checks import (
-    check_bindings,
+    check_joints,
     check_mesh,
     check_triangles,
     check_weights,
+    invert_bindings,
 )
-from viewer.formats._skin_sections import Sections, read_sections
+from viewer.formats._skin_sections import KEYWORDS, Sections, read_sections
 from viewer.formats._source import Source
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
@@ -39,6 +42,8 @@ from viewer.rig.mesh import Material, Mesh, vertex_normals
 from viewer.rig.skin import Skin
 
 __all__ = ["read", "write"]
+
+_SHORTEST = 1e-15  # of a normal: the square of a shorter one is 0 in float32
 
 
 def read(source: Source) -> Figure:
@@ -73,7 +78,9 @@ def _mesh(source: Source, sections: Sections) -> Mesh:
     check_triangles(source, sections, len(positions))
     triangles = np.concatenate([run.triangles for run in sections.triangles])
     if len(triangles) == 0:
-        raise source.error("expected at least one triangle, found none")
+        raise source.error(
+            "expected at least one triangle, found none", sections.offsets["triangles"]
+        )
     materials = np.repeat(
         [run.material for run in sections.triangles],
         [len(run.triangles) for run in sections.triangles],
@@ -96,7 +103,7 @@ def _required(source: Source, sections: Sections, name: str) -> Floats:
             f"expected a skin, found no `{name}` section{f' ({looks})' * bool(looks)}"
         )
     if len(table) == 0:
-        raise source.error(f"expected at least one vertex, found {name} 0")
+        raise source.error(f"expected at least one vertex, found {name} 0", sections.offsets[name])
     return table
 
 
@@ -118,7 +125,7 @@ def _normals(source: Source, sections: Sections, positions: Floats, triangles: I
     if normals is None:
         source.warn("no `normals` section: computed them from the triangles")
         return vertex_normals(positions, triangles)
-    zero: Bools = np.all(normals == 0.0, axis=1)
+    zero: Bools = np.abs(normals).max(axis=1) < _SHORTEST
     if zero.any():
         source.warn(
             f"{zero.sum()} normals of length 0, first of vertex {zero.argmax()}: "
@@ -137,8 +144,8 @@ def _skin(source: Source, sections: Sections) -> Skin | None:
         missing = "skinweights" if sections.starts is None else "bindings"
         present = "bindings" if sections.starts is None else "skinweights"
         raise source.error(f"expected a `{missing}` section beside `{present}`, found none")
-    check_bindings(source, sections)
-    inverse_bind = np.linalg.inv(sections.bindings).astype(np.float64, copy=False)
+    inverse_bind = invert_bindings(source, sections)
+    check_joints(source, sections, len(inverse_bind))
     skin = Skin(
         starts=sections.starts,
         joints=sections.joints,
@@ -162,13 +169,14 @@ def write(figure: Figure, path: str | Path) -> None:
     Raises
     ------
     UnsupportedFormatError
-        If there is no mesh, or a name does not fit the grammar.
+        If there is no mesh, or a name or number does not fit the grammar.
     OutputError
         If a file cannot be written.
     """
     if figure.mesh is None:
         raise UnsupportedFormatError(f"figure {figure.name} has no mesh to write as .skin")
     mesh = figure.mesh
+    _check_writable(figure.name, mesh, figure.skin)
     parts = [_table("positions", mesh.positions), _table("normals", mesh.normals)]
     if mesh.uvs is not None:
         parts.append(_table("texcoords", mesh.uvs))
@@ -180,6 +188,14 @@ def write(figure: Figure, path: str | Path) -> None:
     for material in mesh.materials:
         _save_texture(material, Path(path).parent)
     save_text(path, "".join(parts))
+
+
+def _check_writable(name: str, mesh: Mesh, skin: Skin | None) -> None:
+    if mesh.n_triangles == 0:
+        raise UnsupportedFormatError(f"figure {name} has no triangles to write as .skin")
+    arrays = [mesh.positions, mesh.normals, mesh.uvs, None if skin is None else skin.weights]
+    if any(np.abs(array).max(initial=0.0) > LARGEST for array in arrays if array is not None):
+        raise UnsupportedFormatError(f".skin cannot hold numbers beyond {LARGEST:.3g}")
 
 
 def _table(name: str, rows: Floats | Ints) -> str:
@@ -215,11 +231,23 @@ def _triangle_runs(mesh: Mesh) -> list[str]:
 
 
 def _material_text(material: Material) -> str:
-    words = f"{material.name} {material.texture or ''}"
-    if set(words) & set("{}\r\n"):
-        raise UnsupportedFormatError(f'.skin cannot hold the material "{words.strip()}"')
+    name, texture = as_words(material.name), _as_rest_of_line(material.texture)
+    if name is None or not KEYWORDS.isdisjoint(name) or texture != material.texture:
+        raise UnsupportedFormatError(
+            f'.skin cannot hold the material "{printable(material.name)}" '
+            f'with the texture "{printable(material.texture)}"'
+        )
     head = " ".join(filter(None, ["material", material.name, "{\n"]))
     return head + (f"  texture {material.texture}\n" if material.texture else "") + "}\n"
+
+
+def _as_rest_of_line(texture: str | None) -> str | None:
+    """Return what is read back where a texture's name is written."""
+    try:
+        text = (texture or "").encode("utf-8", "surrogateescape").strip()
+    except UnicodeEncodeError:  # a lone surrogate, which no bytes are decoded to
+        return None
+    return re.split(rb"[\r\n{}]", text)[0].decode("utf-8", "surrogateescape") or None
 
 
 def _bindings_text(skin: Skin) -> str:
@@ -238,6 +266,6 @@ def _save_texture(material: Material, folder: Path) -> None:
     """Put a picture beside the file that names it, unless one is there already."""
     if material.texture is None or material.image is None:
         return
-    if Path(material.texture).name != material.texture or (folder / material.texture).exists():
-        return
-    save_image(folder / material.texture, material.image)
+    name = material.texture.replace("\\", "/")  # as the reader takes it
+    if Path(name).name == name and not (folder / name).exists():
+        save_image(folder / name, material.image)

@@ -10,7 +10,7 @@ import numpy as np
 from pyrr import matrix44
 
 from viewer.rig.arrays import Floats
-from viewer.rig.mesh import box_size
+from viewer.rig.mesh import bounding_box, box_size
 
 __all__ = ["VIEWS", "Camera", "camera_axes", "eye", "fit", "orbit", "pan", "zoom"]
 
@@ -131,27 +131,25 @@ def eye(camera: Camera) -> Floats:
     return camera.target + camera.distance * camera_axes(camera)[2]
 
 
-def fit(camera: Camera, box: Floats, aspect: float) -> None:
-    """Aim at a box and step back until it just fills the picture; direction stays.
+def fit(camera: Camera, points: Floats, aspect: float) -> None:
+    """Aim at the middle of some points and step back until all are seen; direction stays.
 
     Parameters
     ----------
     camera : Camera
         Changed in place: target and distance.
-    box : (2, 3)
-        Lowest and highest corner, scene space.
+    points : (N, 3)
+        What to see, scene space.
     aspect : float
         Width / height of the picture.
     """
-    camera.target = box.mean(axis=0)
-    corners = np.array([[box[i >> axis & 1, axis] for axis in range(3)] for i in range(8)])
-    right, up, backward = camera_axes(camera)
-    across, upward, near = np.abs((corners - camera.target) @ np.stack([right, up, backward]).T).T
+    camera.target = bounding_box(points).mean(axis=0)
+    across, upward, near = ((points - camera.target) @ np.stack(camera_axes(camera)).T).T
     tangent = math.tan(math.radians(camera.fov) / 2)
-    needed = np.maximum(across / (tangent * aspect), upward / tangent) * _MARGIN
-    # The box's own depth counts only where perspective makes its near corners larger.
-    distance = float((needed + (0.0 if camera.orthographic else near)).max())
-    camera.distance = max(distance, _SMALLEST) if distance > 0 else 1.0
+    needed = np.maximum(np.abs(across) / (tangent * aspect), np.abs(upward) / tangent) * _MARGIN
+    # Perspective makes what is near larger, so a near point needs the camera further away.
+    distance = float((needed if camera.orthographic else needed + near).max(initial=0.0))
+    camera.distance = distance if distance > _SMALLEST else 1.0
 
 
 def orbit(camera: Camera, azimuth: float, inclination: float) -> None:

@@ -10,7 +10,7 @@ from viewer.rendering.options import DisplayOptions
 from viewer.rendering.renderer import Renderer
 from viewer.rendering.target import Target
 from viewer.rig.arrays import Bytes, Floats
-from viewer.rig.scene import Scene, scene_box
+from viewer.rig.scene import Scene, scene_box, scene_points
 
 __all__ = ["Offscreen", "default_camera", "render"]
 
@@ -74,20 +74,18 @@ class Offscreen:
         self.release()
 
 
-def default_camera(scene: Scene, size: tuple[int, int], box: Floats | None = None) -> Camera:
+def default_camera(scene: Scene, size: tuple[int, int]) -> Camera:
     """Return a camera that sees the whole scene from the front, a little to its left and above.
 
     Parameters
     ----------
     scene : Scene
-        Gives the up axis.
+        What to fit, and the up axis.
     size : (int, int)
         Width and height of the picture.
-    box : (2, 3), optional
-        What to fit; the scene's box if omitted.
     """
-    camera = Camera(up="z" if scene.up == "z" else "y")
-    fit(camera, scene_box(scene) if box is None else box, size[0] / size[1])
+    camera = Camera(up=scene.up)
+    fit(camera, scene_points(scene), size[0] / size[1])
     return camera
 
 
@@ -131,6 +129,5 @@ def render(
     if not hasattr(_thread, "offscreen"):
         _thread.offscreen = Offscreen()
     offscreen: Offscreen = _thread.offscreen
-    box = scene_box(scene)
-    camera = camera or default_camera(scene, size, box)
-    return offscreen.render(scene, size, camera, options or DisplayOptions(), box)
+    camera = camera or default_camera(scene, size)
+    return offscreen.render(scene, size, camera, options or DisplayOptions(), scene_box(scene))

@@ -87,8 +87,6 @@ class DisplayOptions:
         Multisampling; the driver's maximum if that is smaller.
     lights : Lights
         The two lights.
-    selected_joint : int
-        Drawn in a highlight colour; -1 for none. Of the first actor.
     """
 
     show: str = "skin"
@@ -103,4 +101,3 @@ class DisplayOptions:
     skin_opacity: float = 0.45
     samples: int = 4
     lights: Lights = field(default_factory=Lights)
-    selected_joint: int = -1

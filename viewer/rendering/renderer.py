@@ -48,7 +48,13 @@ class Renderer:
         self._skeletons: dict[int, tuple[Actor, SkeletonBuffers]] = {}
 
     def draw(
-        self, scene: Scene, camera: Camera, options: DisplayOptions, target: Target, box: Floats
+        self,
+        scene: Scene,
+        camera: Camera,
+        options: DisplayOptions,
+        target: Target,
+        box: Floats,
+        selected_joint: int = -1,
     ) -> None:
         """Draw a scene.
 
@@ -65,6 +71,8 @@ class Renderer:
         box : (2, 3)
             What the grid lies under and the depth range covers, scene space: ``scene_box`` of
             the pose in which the scene was opened.
+        selected_joint : int
+            Of the first actor, drawn in a highlight colour; -1 for none.
         """
         self._note_samples(target)
         self._forget_others(scene)
@@ -75,11 +83,26 @@ class Renderer:
         self.ground_pass.draw_background(options.background)
         for actor in scene.actors:
             if actor.visible:
-                self._draw_skeleton(actor, view, options, scene.actors[0] is actor)
+                selected = selected_joint if actor is scene.actors[0] else -1
+                self._draw_skeleton(actor, view, options, selected)
         for actor, mesh in meshes:
             self._draw_mesh(actor, mesh, view, options)
         if options.grid:
             self.ground_pass.draw_grid(view, box, options.background)
+
+    def prepare(self, scene: Scene) -> None:
+        """Upload what a scene needs, so that a refusal comes before the old scene is given up.
+
+        Raises
+        ------
+        RenderError
+            If the driver has no room for it.
+        """
+        for actor in scene.actors:
+            if actor.figure.mesh is not None:
+                self.posed_mesh(actor)
+            if actor.figure.skeleton is not None:
+                self._skeleton(actor)
 
     def _prepare(self, target: Target) -> None:
         context = self.context
@@ -115,7 +138,7 @@ class Renderer:
         self.context.depth_func = "<"
 
     def _draw_skeleton(
-        self, actor: Actor, view: View, options: DisplayOptions, is_first: bool
+        self, actor: Actor, view: View, options: DisplayOptions, selected: int
     ) -> None:
         if actor.figure.skeleton is None or actor.pose is None:
             return
@@ -123,7 +146,6 @@ class Renderer:
             return
         skeleton = self._skeleton(actor)
         skeleton.update(actor.pose)
-        selected = options.selected_joint if is_first else -1
         self.joint_pass.draw(skeleton, actor.placement, view, options, selected)
 
     def posed_mesh(self, actor: Actor) -> PosedMesh:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from viewer.errors import RigError
+from viewer.errors import RigError, printable
 
 __all__ = ["Bools", "Bytes", "Floats", "Ints", "frozen"]
 
@@ -36,12 +36,12 @@ def frozen(
     Raises
     ------
     RigError
-        If the shape differs or a number is not finite.
+        If the shape differs, or a number is not finite, or not whole where it must be.
 
     >>> frozen("offset", [1, 2, 3], (3,)).flags.writeable
     False
     """
-    array = np.asarray(values, dtype=dtype)
+    array = _converted(name, values, np.dtype(dtype))
     fits = array.ndim == len(shape) and all(
         wanted is None or wanted == found for wanted, found in zip(shape, array.shape, strict=True)
     )
@@ -55,6 +55,20 @@ def frozen(
     if shared and (array.flags.writeable or not array.flags.owndata):
         array = array.copy()
     array.flags.writeable = False
+    return array
+
+
+def _converted(name: str, values: Any, dtype: np.dtype[Any]) -> NDArray[Any]:
+    try:
+        given = np.asarray(values)
+        if given.dtype == dtype:
+            return given
+        with np.errstate(invalid="ignore"):
+            array = given.astype(dtype)
+    except (TypeError, ValueError) as problem:
+        raise RigError(f"{name}: expected numbers, found {printable(problem)}") from None
+    if dtype.kind != "f" and not np.array_equal(array, given):
+        raise RigError(f"{name}: expected whole numbers that fit {dtype}")
     return array
 
 

@@ -87,10 +87,10 @@ class Mesh:
                 f"triangles: expected vertex indices 0 to {self.n_vertices - 1}, "
                 f"found {self.triangles.min()} to {self.triangles.max()}"
             )
-        if self.material_indices.max() >= len(self.materials):
+        if self.material_indices.min() < -1 or self.material_indices.max() >= len(self.materials):
             raise RigError(
-                f"triangle_materials: expected at most {len(self.materials) - 1}, "
-                f"found {self.material_indices.max()}"
+                f"triangle_materials: expected -1 to {len(self.materials) - 1}, "
+                f"found {self.material_indices.min()} to {self.material_indices.max()}"
             )
 
     @property

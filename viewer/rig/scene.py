@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from viewer.rig.pose import Pose, rest_pose
 from viewer.rig.skinning import deform
 from viewer.rig.transform import apply_transform
 
-__all__ = ["Actor", "Scene", "scene_box"]
+__all__ = ["Actor", "Scene", "actor_points", "scene_box", "scene_points"]
 
 _OUTLIER_SHARE = 0.001  # the camera fits the box of the other 99.9 % of the points
 _OUTLIER_RATIO = 100.0  # ... if the whole box is this much larger
@@ -61,15 +62,15 @@ class Scene:
     warnings: tuple[str, ...] = ()
 
     @property
-    def up(self) -> str:
+    def up(self) -> Literal["y", "z"]:
         """The first figure's up axis, ``"y"`` or ``"z"``."""
         return self.actors[0].figure.up if self.actors else "y"
 
 
-def scene_box(scene: Scene) -> Floats:
-    """Return the box that a camera should fit: posed meshes and skeletons of visible actors.
+def scene_points(scene: Scene) -> Floats:
+    """Return what a camera should fit: posed meshes and skeletons of visible actors.
 
-    A few stray points far outside do not count: the box then holds 99.9 % of the points.
+    A few stray points far outside do not count: they are moved to the box of the other 99.9 %.
 
     Parameters
     ----------
@@ -78,18 +79,24 @@ def scene_box(scene: Scene) -> Floats:
 
     Returns
     -------
-    (2, 3)
-        Lowest and highest corner, scene space.
+    (N, 3)
+        Scene space; the origin alone if nothing is visible.
     """
     clouds = [actor_points(actor) for actor in scene.actors if actor.visible]
-    points = np.concatenate(clouds) if clouds else np.zeros((0, 3))
-    box = bounding_box(points)
+    points = np.concatenate(clouds) if clouds else np.zeros((1, 3))
     if len(points) < 1.0 / _OUTLIER_SHARE:
-        return box
+        return points
+    size = box_size(bounding_box(points))
     share = _OUTLIER_SHARE / 2
-    inner = np.quantile(points, [share, 1.0 - share], axis=0)
-    inner_size = box_size(inner)
-    return inner if inner_size > 0 and box_size(box) > _OUTLIER_RATIO * inner_size else box
+    # Partitioning finds the two quantiles of an axis without sorting it.
+    inner = np.quantile(points, [share, 1.0 - share], axis=0, method="nearest")
+    has_strays = size > _OUTLIER_RATIO * box_size(inner) > 0
+    return np.clip(points, *inner) if has_strays else points
+
+
+def scene_box(scene: Scene) -> Floats:
+    """Return the box around ``scene_points``: lowest and highest corner, (2, 3)."""
+    return bounding_box(scene_points(scene))
 
 
 def actor_points(actor: Actor) -> Floats:

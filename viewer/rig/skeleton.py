@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,15 @@ import numpy as np
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints, frozen
 
-__all__ = ["DOF_KINDS", "Skeleton", "clamp_dofs", "dof_label", "find_dof", "joint_label"]
+__all__ = [
+    "DOF_KINDS",
+    "Skeleton",
+    "clamp_dofs",
+    "dof_label",
+    "find_dof",
+    "joint_label",
+    "joint_labels",
+]
 
 DOF_KINDS = ("tx", "ty", "tz", "x", "y", "z")
 """Kinds of DOF by code: translations along x, y, z, then rotations about x, y, z."""
@@ -69,6 +78,7 @@ class Skeleton:
         limits.flags.writeable = False
         object.__setattr__(self, "dof_limits", limits)
         self._check_order()
+        self._check_dofs()
 
     def _check_order(self) -> None:
         if len(self.names) == 0:
@@ -79,6 +89,28 @@ class Skeleton:
             raise RigError(
                 f"joint {joint_label(self, joint)}: expected a parent before it, "
                 f"found {self.parents[joint]}"
+            )
+
+    def _check_dofs(self) -> None:
+        for name, values, end in (
+            ("dof_joints", self.dof_joints, self.n_joints),
+            ("dof_kinds", self.dof_kinds, len(DOF_KINDS)),
+        ):
+            wrong = np.flatnonzero((values < 0) | (values >= end))
+            if len(wrong):
+                raise RigError(f"{name}: expected 0 to {end - 1}, found {values[wrong[0]]}")
+        wrong = np.flatnonzero(self.dof_limits[:, 0] > self.dof_limits[:, 1])
+        if len(wrong):
+            low, high = self.dof_limits[wrong[0]]
+            raise RigError(
+                f"dof_limits of {dof_label(self, wrong[0])}: expected a minimum not above the "
+                f"maximum, found {low:g} and {high:g}"
+            )
+        zero = np.flatnonzero(~self.rest_rotations.any(axis=1))
+        if len(zero):
+            raise RigError(
+                f"rest_rotations of joint {joint_label(self, zero[0])}: expected a quaternion, "
+                "found 0 0 0 0"
             )
 
     @property
@@ -115,21 +147,28 @@ def clamp_dofs(skeleton: Skeleton, dofs: Floats) -> Floats:
     return np.clip(dofs, skeleton.dof_limits[:, 0], skeleton.dof_limits[:, 1])
 
 
-def joint_label(skeleton: Skeleton, joint: int) -> str:
-    """Return a joint's name, with its index if the name is missing or repeated.
+def joint_labels(skeleton: Skeleton) -> tuple[str, ...]:
+    """Return what every joint is called, so that no two are called the same.
 
     Parameters
     ----------
     skeleton : Skeleton
         Holds the names.
-    joint : int
-        Index of the joint.
 
     Returns
     -------
-    str
+    tuple of J str
         ``"knee"``, ``"knee#5"`` if several joints are called so, ``"#5"`` without a name.
     """
+    counts = Counter(skeleton.names)
+    return tuple(
+        name if name and counts[name] == 1 else f"{name}#{joint}"
+        for joint, name in enumerate(skeleton.names)
+    )
+
+
+def joint_label(skeleton: Skeleton, joint: int) -> str:
+    """Return what one joint is called, as ``joint_labels`` does for all."""
     name = skeleton.names[joint]
     if name and skeleton.names.count(name) == 1:
         return name
@@ -182,7 +221,7 @@ def find_dof(skeleton: Skeleton, label: str) -> int:
 
 def _find_joint(skeleton: Skeleton, text: str) -> int:
     name, hash_sign, index = text.rpartition("#")
-    if hash_sign and index.isdecimal() and int(index) < skeleton.n_joints:
+    if hash_sign and index.isdecimal() and len(index) < 10 and int(index) < skeleton.n_joints:
         joint = int(index)
         if skeleton.names[joint].lower() == name.lower() or not name:
             return joint
@@ -193,5 +232,8 @@ def _find_joint(skeleton: Skeleton, text: str) -> int:
     if found:
         labels = ", ".join(joint_label(skeleton, joint) for joint in found[:4])
         raise RigError(f'"{text}" names {len(found)} joints: say which one, {labels}')
-    shown = ", ".join(joint_label(skeleton, joint) for joint in range(min(6, skeleton.n_joints)))
-    raise RigError(f'no joint is called "{text}"; there are {skeleton.n_joints}: {shown}, …')
+    first = [joint_label(skeleton, joint) for joint in range(min(6, skeleton.n_joints))]
+    more = ["…"] if skeleton.n_joints > len(first) else []
+    raise RigError(
+        f'no joint is called "{text}"; there are {skeleton.n_joints}: {", ".join(first + more)}'
+    )

@@ -1,0 +1,57 @@
+"""Whether a window can be opened here, and if not, why."""
+
+from __future__ import annotations
+
+import os
+import sys
+import warnings
+from typing import Any
+
+from viewer.errors import ViewerError
+
+__all__ = ["NoDisplay", "find_display", "import_glfw"]
+
+
+class NoDisplay(ViewerError):  # noqa: N818  a state of the machine, not a fault
+    """There is no display to open a window on."""
+
+
+def import_glfw() -> Any:
+    """Return the module glfw, bound to the library that imgui-bundle carries.
+
+    Two copies of GLFW in one process do not know each other's windows. imgui-bundle tells glfw
+    which one to load, so it has to be imported first.
+    """
+    import imgui_bundle  # noqa: F401
+
+    # GLFW reports errors as warnings; here they are raised or asked for instead.
+    os.environ.setdefault("PYGLFW_PREVIEW", "0")
+    import glfw
+
+    glfw.ERROR_REPORTING = "ignore"
+    return glfw
+
+
+def find_display() -> None:
+    """Return if a window could be opened.
+
+    Raises
+    ------
+    NoDisplay
+        In one line, with the reason.
+    """
+    if sys.platform.startswith("linux"):
+        names = ("DISPLAY", "WAYLAND_DISPLAY")
+        if not any(os.environ.get(name) for name in names):
+            raise NoDisplay("no display found (DISPLAY is not set)")
+        if not os.environ.get("DISPLAY"):
+            raise NoDisplay("no X display found (DISPLAY is not set; Wayland needs XWayland)")
+    glfw = import_glfw()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        started = glfw.init()
+    if not started:
+        code, text = glfw.get_error()
+        words = text.decode() if isinstance(text, bytes) else text or f"GLFW error {code}"
+        display = os.environ.get("DISPLAY", "")
+        raise NoDisplay(f"no display found (DISPLAY={display}: {words})")

@@ -1,0 +1,216 @@
+"""One frame, whatever shows it: interface, input, scene, and both drawn into a framebuffer."""
+
+from __future__ import annotations
+
+import copy
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import moderngl
+from imgui_bundle import imgui
+
+from viewer.app.file_dialog import FileDialog, draw_file_dialog
+from viewer.app.interface import draw_hints, draw_interface
+from viewer.app.keys import handle_keys
+from viewer.app.loader import Loader
+from viewer.app.mouse import handle_mouse
+from viewer.app.recent import remember
+from viewer.app.state import AppState
+from viewer.errors import RenderError, ViewerError, printable
+from viewer.formats import free_path, save_image
+from viewer.loading import bundled_files
+from viewer.rendering.renderer import Renderer
+from viewer.rendering.target import Target
+from viewer.rig.arrays import Bytes
+
+__all__ = ["Frame"]
+
+
+class Frame:
+    """Draws frames of one state with one context; ImGui's frame is begun by the caller.
+
+    Parameters
+    ----------
+    state : AppState
+        What is shown and changed.
+    context : moderngl.Context
+        Current in this thread.
+    wake : callable
+        Called from other threads when there is something to draw.
+    keeps_recent : bool
+        Whether opened files are remembered for the next run.
+    """
+
+    def __init__(
+        self,
+        state: AppState,
+        context: moderngl.Context,
+        wake: Callable[[], None] = lambda: None,
+        keeps_recent: bool = False,
+    ) -> None:
+        self.state, self.context, self.wake = state, context, wake
+        self.keeps_recent = keeps_recent
+        self.renderer = Renderer(context)
+        self.target: Target | None = None
+        self._drawn: object = None
+        state.stats.renderer = context.info["GL_RENDERER"]
+        state.stats.version = context.info["GL_VERSION"]
+
+    def draw(self, framebuffer: moderngl.Framebuffer, size: tuple[int, int], scale: float) -> None:
+        """Draw one frame between ``imgui.new_frame`` and the swap of buffers.
+
+        Parameters
+        ----------
+        framebuffer : moderngl.Framebuffer
+            The window's, or one that stands for it.
+        size : (int, int)
+            Its width and height in pixels.
+        scale : float
+            Pixels per window coordinate.
+        """
+        started = time.perf_counter()
+        state = self.state
+        self.open(draw_interface(state))
+        self.open(draw_file_dialog(state))
+        handle_keys(state)
+        handle_mouse(state)
+        self._do_wanted()
+        self._take_loaded()
+        state.history.observe(state.scene, state.options, imgui.is_any_item_active())
+        self._draw_scene(scale)
+        imgui.render()
+        framebuffer.use()
+        self.context.viewport = (0, 0, *size)
+        framebuffer.clear(0.10, 0.11, 0.12, 1.0)
+        imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
+        state.stats.frame_ms = 1e3 * (time.perf_counter() - started)
+
+    def _draw_scene(self, scale: float) -> None:
+        """Draw the scene if anything about it changed, and put it behind the panels."""
+        state = self.state
+        x, y, width, height = state.view_rect
+        size = (round(width * scale), round(height * scale))
+        if min(size) < 1:
+            return
+        key = self._scene_key(size)
+        if key != self._drawn:
+            target = self._target(size)
+            self.renderer.draw(
+                state.scene, state.camera, state.options, target, state.box, state.selected_joint
+            )
+            target.resolve()
+            self._drawn = key
+            state.stats.samples = target.samples
+            state.say(*self.renderer.notes)
+            self.renderer.notes.clear()
+        if self.target is not None:
+            picture = imgui.ImTextureRef(self.target.texture.glo)
+            corner = (x + size[0] / scale, y + size[1] / scale)
+            draw_list = imgui.get_background_draw_list()
+            # Textures have their first row at the bottom.
+            draw_list.add_image(picture, (x, y), corner, (0.0, 1.0), (1.0, 0.0))
+            if state.panels_visible:
+                draw_hints(state)
+
+    def _scene_key(self, size: tuple[int, int]) -> object:
+        """Return everything the picture of the scene depends on."""
+        state, camera = self.state, self.state.camera
+        poses = tuple(
+            (id(actor), actor.visible, actor.placement.tobytes(), *_pose_bytes(actor))
+            for actor in state.scene.actors
+        )
+        place = (camera.target.tobytes(), camera.distance, camera.azimuth, camera.inclination)
+        lens = (camera.fov, camera.orthographic, camera.up)
+        return (size, place, lens, copy.deepcopy(state.options), poses, state.selected_joint)
+
+    def _target(self, size: tuple[int, int]) -> Target:
+        samples = self.state.options.samples
+        target = self.target
+        if target is None or (target.size, target.asked_samples) != (size, samples):
+            if target is not None:
+                target.release()
+            self.target = None
+            self.target = target = Target(self.context, size, samples)
+        return target
+
+    def open(self, paths: Sequence[Path]) -> None:
+        """Begin to read files; the present scene stays until they have been read.
+
+        A skin dropped on a lone skeleton, or the other way round, joins it if they fit.
+        """
+        if not paths:
+            return
+        state = self.state
+        paths = [Path(path) for path in paths]
+        attempts = [paths]
+        figures = [actor.figure for actor in state.scene.actors]
+        is_part = len(figures) == 1 and (figures[0].mesh is None or figures[0].skeleton is None)
+        suffixes = {path.suffix.lower() for path in (*paths, *state.paths)}
+        if is_part and len(paths) == 1 and len(state.paths) == 1 and len(suffixes) == 2:
+            attempts.insert(0, [*state.paths, *paths])
+        state.loader = Loader(paths, attempts, self.wake)
+
+    def _take_loaded(self) -> None:
+        """Show what was read, or say why it was not."""
+        state, loader = self.state, self.state.loader
+        if loader is None or not loader.is_done:
+            return
+        state.loader = None
+        if loader.scene is None:
+            state.error = loader.error
+            return
+        try:
+            self.renderer.prepare(loader.scene)
+        except RenderError as problem:
+            state.error = str(problem)
+            return
+        state.show_scene(loader.scene, loader.paths)
+        if self.keeps_recent:
+            problem_text = remember(state.recent, loader.paths)
+            if problem_text:
+                state.say(problem_text)
+
+    def _do_wanted(self) -> None:
+        state = self.state
+        if "open dialog" in state.wants:
+            folder = state.paths[0].resolve().parent if state.paths else Path.cwd()
+            state.dialog = FileDialog(folder)
+        if "open bundled" in state.wants:
+            self.open(bundled_files())
+        if "screenshot" in state.wants:
+            self._save_screenshot()
+        state.wants -= {"open dialog", "open bundled", "screenshot"}
+
+    def _save_screenshot(self) -> None:
+        """Save the scene, without panels, under a new name in the current folder."""
+        path = free_path(Path.cwd(), self.state.scene.actors[0].figure.name, ".png")
+        try:
+            save_image(path, self.scene_picture())
+            self.state.say(f"Saved {printable(path, 200)}")
+        except ViewerError as problem:
+            self.state.error = str(problem)
+
+    def scene_picture(self) -> Bytes:
+        """Return the scene as it was drawn last, without panels: (H, W, 4) uint8."""
+        if self.target is None:
+            raise ViewerError("nothing has been drawn yet")
+        return self.target.read()
+
+    def release(self) -> None:
+        """Free everything that was made for drawing."""
+        if self.target is not None:
+            self.target.release()
+        self.renderer.release()
+
+
+def _pose_bytes(actor: object) -> tuple[bytes, ...]:
+    pose = getattr(actor, "pose", None)
+    if pose is None:
+        return ()
+    return (
+        pose.dofs.tobytes(),
+        pose.translations.tobytes(),
+        pose.rotations.tobytes(),
+        pose.scales.tobytes(),
+    )

@@ -1,0 +1,93 @@
+"""The whole interface without a window: pictures with panels, and tests with synthetic input."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from viewer.app.frame import Frame
+from viewer.app.state import AppState
+from viewer.app.theme import apply_theme
+from viewer.rendering.camera import fit
+from viewer.rendering.context import headless_context
+from viewer.rendering.target import Target
+from viewer.rig.arrays import Bytes
+from viewer.rig.scene import scene_points
+
+__all__ = ["HeadlessApp"]
+
+_SETTLE_FRAMES = 3  # docking and automatic sizes take two frames to come to rest
+
+
+class HeadlessApp:
+    """Runs frames of the interface in an EGL context.
+
+    Parameters
+    ----------
+    state : AppState
+        What is shown and changed.
+    size : (int, int)
+        Of the window that there is not, in window coordinates.
+    device : int, optional
+        Index of the EGL device.
+    scale : float
+        Size of the interface.
+    pixels_per_point : float
+        As on a HiDPI screen: the framebuffer is this much larger than the window.
+    """
+
+    def __init__(
+        self,
+        state: AppState,
+        size: tuple[int, int],
+        device: int | None = None,
+        scale: float = 1.0,
+        pixels_per_point: float = 1.0,
+    ) -> None:
+        self.state, self.size, self.pixels_per_point = state, size, pixels_per_point
+        self.context = headless_context(device)
+        pixels = (round(size[0] * pixels_per_point), round(size[1] * pixels_per_point))
+        self.screen = Target(self.context, pixels, 1)
+        self._imgui = imgui.create_context()
+        io = imgui.get_io()
+        io.set_ini_filename(None)
+        io.config_flags |= imgui.ConfigFlags_.docking_enable
+        io.display_size = imgui.ImVec2(*size)
+        io.display_framebuffer_scale = imgui.ImVec2(pixels_per_point, pixels_per_point)
+        apply_theme(scale)
+        imgui.backends.opengl3_init("#version 330")
+        self.frame = Frame(state, self.context)
+
+    def step(self, frames: int = 1) -> None:
+        """Run frames, a sixtieth of a second each; input is what was queued in ImGui's io."""
+        for _ in range(frames):
+            imgui.get_io().delta_time = 1.0 / 60.0
+            imgui.backends.opengl3_new_frame()
+            imgui.new_frame()
+            self.frame.draw(self.screen.framebuffer, self.screen.size, self.pixels_per_point)
+
+    def picture(self, fits: bool = True) -> Bytes:
+        """Return the whole interface as pixels, (H, W, 4) uint8, the view fitted to its room."""
+        self.step(_SETTLE_FRAMES)
+        if fits:
+            distance = self.state.camera.distance
+            fit(self.state.camera, scene_points(self.state.scene), self.state.aspect)
+            self.state.camera.distance = max(distance, self.state.camera.distance)
+        self.state.stats.frame_ms = 0.0  # the same picture every time
+        self.step(1)
+        pixels = self.screen.read()
+        pixels[..., 3] = 255
+        return pixels
+
+    def release(self) -> None:
+        """Free everything, the context too."""
+        imgui.backends.opengl3_shutdown()
+        imgui.destroy_context(self._imgui)
+        self.frame.release()
+        self.screen.release()
+        self.context.release()
+
+    def __enter__(self) -> HeadlessApp:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.release()

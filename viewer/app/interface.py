@@ -1,0 +1,237 @@
+"""One frame of the interface: docked panels, menu, messages. Reads and writes AppState only."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from imgui_bundle import imgui
+
+from viewer.app.actions import cancel, redo, reset_pose, undo
+from viewer.app.keys import KEYS, MOUSE
+from viewer.app.panels import PANELS, panel_module
+from viewer.app.state import AppState
+from viewer.app.widgets import button, note_item
+from viewer.errors import printable
+from viewer.rendering.ground_pass import grid_step
+
+__all__ = ["draw_hints", "draw_interface"]
+
+_DOCK = "viewer dock"
+_LEFT_SHARE, _RIGHT_SHARE = 0.235, 0.27  # of the window's width
+_SHOW_PROGRESS_AFTER = 0.3  # seconds
+_ERROR_TITLE = "Could not open"
+
+
+def draw_interface(state: AppState) -> list[Path]:
+    """Draw everything but the scene; return files that a menu asked to open."""
+    state.item_rects.clear()
+    if state.panels_visible:
+        chosen = _draw_menu(state)
+        dock = _draw_dock(state)
+        for name, panel in PANELS.items():
+            if name not in state.closed_panels:
+                _draw_panel(state, name, panel.title)
+        node = imgui.internal.dock_builder_get_central_node(dock)
+        state.view_rect = (node.pos.x, node.pos.y, node.size.x, node.size.y)
+    else:
+        chosen = []
+        viewport = imgui.get_main_viewport()
+        state.view_rect = (viewport.pos.x, viewport.pos.y, viewport.size.x, viewport.size.y)
+    _draw_notes(state)
+    _draw_keys(state)
+    _draw_progress(state)
+    _draw_error(state)
+    return chosen
+
+
+def _draw_dock(state: AppState) -> int:
+    """Draw the dock space, with the first layout if none was remembered."""
+    dock = imgui.get_id(_DOCK)
+    is_new = imgui.internal.dock_builder_get_node(dock) is None
+    if is_new or state.wants_layout_reset:
+        _build_layout(dock)
+        state.wants_layout_reset = False
+        state.closed_panels.clear()
+    flags = imgui.DockNodeFlags_.passthru_central_node
+    flags |= imgui.DockNodeFlags_.no_docking_over_central_node
+    imgui.dock_space_over_viewport(dock, imgui.get_main_viewport(), flags)
+    return dock
+
+
+def _build_layout(dock: int) -> None:
+    builder = imgui.internal
+    builder.dock_builder_remove_node(dock)
+    builder.dock_builder_add_node(dock, imgui.internal.DockNodeFlagsPrivate_.dock_space)
+    builder.dock_builder_set_node_size(dock, imgui.get_main_viewport().size)
+    split = builder.dock_builder_split_node(dock, imgui.Dir.left, _LEFT_SHARE)
+    left, rest = split.id_at_dir, split.id_at_opposite_dir
+    share = _RIGHT_SHARE / (1.0 - _LEFT_SHARE)
+    right = builder.dock_builder_split_node(rest, imgui.Dir.right, share).id_at_dir
+    middle = builder.dock_builder_split_node(right, imgui.Dir.down, 0.64)
+    bottom = builder.dock_builder_split_node(middle.id_at_dir, imgui.Dir.down, 0.45)
+    places = {
+        "left": left,
+        "right 1": middle.id_at_opposite_dir,
+        "right 2": bottom.id_at_opposite_dir,
+        "right 3": bottom.id_at_dir,
+    }
+    for panel in PANELS.values():
+        builder.dock_builder_dock_window(panel.title, places[panel.place])
+    builder.dock_builder_finish(dock)
+
+
+def _draw_panel(state: AppState, name: str, title: str) -> None:
+    shown, stays = imgui.begin(title, True)
+    if shown:
+        # Labels stand right of their widgets and must not be cut off.
+        imgui.push_item_width(-7.5 * imgui.get_font_size())
+        panel_module(name).draw(state)
+        imgui.pop_item_width()
+    imgui.end()
+    if not stays:
+        state.closed_panels.add(name)
+
+
+def _draw_menu(state: AppState) -> list[Path]:
+    chosen: list[Path] = []
+    if not imgui.begin_main_menu_bar():
+        return chosen
+    if imgui.begin_menu("File"):
+        chosen = _draw_file_menu(state)
+        imgui.end_menu()
+    note_item(state, "menu File")
+    if imgui.begin_menu("Edit"):
+        if imgui.menu_item("Undo", "Ctrl+Z", False, state.history.can_undo)[0]:
+            undo(state)
+        if imgui.menu_item("Redo", "Ctrl+Shift+Z", False, state.history.can_redo)[0]:
+            redo(state)
+        if imgui.menu_item("Reset pose", "R", False)[0]:
+            reset_pose(state)
+        imgui.end_menu()
+    if imgui.begin_menu("Window"):
+        for name, panel in PANELS.items():
+            if imgui.menu_item(panel.title, "", name not in state.closed_panels)[0]:
+                state.closed_panels ^= {name}
+        imgui.separator()
+        if imgui.menu_item("Reset layout", "", False)[0]:
+            state.wants_layout_reset = True
+        imgui.end_menu()
+    if imgui.begin_menu("Help"):
+        if imgui.menu_item("Keys", "H", state.keys_visible)[0]:
+            state.keys_visible = not state.keys_visible
+        imgui.end_menu()
+    imgui.end_main_menu_bar()
+    return chosen
+
+
+def _draw_file_menu(state: AppState) -> list[Path]:
+    chosen: list[Path] = []
+    if imgui.menu_item("Open…", "Ctrl+O", False)[0]:
+        state.wants.add("open dialog")
+    note_item(state, "Open…")
+    if imgui.begin_menu("Open recent", bool(state.recent)):
+        for number, group in enumerate(state.recent):
+            text = printable(" + ".join(Path(path).name for path in group), 80)
+            if imgui.menu_item(f"{text}##recent{number}", "", False)[0]:
+                chosen = [Path(path) for path in group]
+            if imgui.is_item_hovered():
+                imgui.set_tooltip("\n".join(printable(path, 200) for path in group))
+        imgui.end_menu()
+    if imgui.menu_item("Bundled figure", "", False)[0]:
+        state.wants.add("open bundled")
+    imgui.separator()
+    if imgui.menu_item("Save screenshot", "F12", False)[0]:
+        state.wants.add("screenshot")
+    if imgui.menu_item("Quit", "Ctrl+Q", False)[0]:
+        state.wants.add("quit")
+    return chosen
+
+
+def _overlay(name: str, x: float, y: float, pivot: tuple[float, float]) -> bool:
+    imgui.set_next_window_pos((x, y), imgui.Cond_.always, pivot)
+    imgui.set_next_window_bg_alpha(0.72)
+    flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_docking
+    flags |= imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_saved_settings
+    flags |= imgui.WindowFlags_.no_inputs | imgui.WindowFlags_.no_focus_on_appearing
+    flags |= imgui.WindowFlags_.no_nav
+    return imgui.begin(name, None, flags)[0]
+
+
+def draw_hints(state: AppState) -> None:
+    """Say what the grid measures and where the keys are listed, in the corner of the view.
+
+    Drawn behind the panels like the picture of the scene, so it has to come after that.
+    """
+    x, y, width, height = state.view_rect
+    grid = f"grid {grid_step(state.box):g} units   " if state.options.grid else ""
+    text = f"{grid}H keys"
+    size = imgui.calc_text_size(text)
+    place = (x + width - size.x - 10, y + height - size.y - 8)
+    draw_list = imgui.get_background_draw_list()
+    shadow, color = imgui.get_color_u32((0, 0, 0, 0.5)), imgui.get_color_u32((1, 1, 1, 0.85))
+    draw_list.add_text((place[0] + 1, place[1] + 1), shadow, text)
+    draw_list.add_text(place, color, text)
+
+
+def _draw_notes(state: AppState) -> None:
+    state.drop_old_notes()
+    x, y, width, height = state.view_rect
+    if state.notes and width > 40:
+        imgui.set_next_window_size_constraints((0.0, 0.0), (max(width - 20, 60.0), 1e6))
+        if _overlay("##notes", x + 10, y + height - 10, (0.0, 1.0)):
+            imgui.push_text_wrap_pos(max(width - 40, 50.0))
+            for note in state.notes[-8:]:
+                imgui.text_unformatted(printable(note.text, 400))
+            imgui.pop_text_wrap_pos()
+        imgui.end()
+
+
+def _draw_keys(state: AppState) -> None:
+    if not state.keys_visible:
+        return
+    x, y, width, height = state.view_rect
+    if _overlay("##keys", x + width / 2, y + height / 2, (0.5, 0.5)):
+        for label, text in [*((key.label, key.text) for key in KEYS), *MOUSE]:
+            imgui.text_colored((1.0, 0.78, 0.45, 1.0), label)
+            imgui.same_line(11 * imgui.get_font_size())
+            imgui.text_unformatted(text)
+    imgui.end()
+
+
+def _draw_progress(state: AppState) -> None:
+    loader = state.loader
+    if loader is None or loader.seconds < _SHOW_PROGRESS_AFTER:
+        return
+    x, y, width, height = state.view_rect
+    imgui.set_next_window_pos((x + width / 2, y + height / 2), imgui.Cond_.always, (0.5, 0.5))
+    flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.always_auto_resize
+    flags |= imgui.WindowFlags_.no_docking | imgui.WindowFlags_.no_saved_settings
+    if imgui.begin("##progress", None, flags)[0]:
+        imgui.text_unformatted(f"Opening {printable(loader.paths[-1].name, 60)}")
+        # Negative fractions make ImGui draw a bar of unknown length that moves.
+        imgui.progress_bar(-loader.seconds, (260.0, 0.0), f"{loader.seconds:.0f} s")
+        if button(state, "Cancel opening"):
+            cancel(state)
+    imgui.end()
+
+
+def _draw_error(state: AppState) -> None:
+    if not state.error:
+        return
+    imgui.open_popup(_ERROR_TITLE)
+    center = imgui.get_main_viewport().get_center()
+    imgui.set_next_window_pos(center, imgui.Cond_.always, (0.5, 0.5))
+    width = min(560.0, imgui.get_main_viewport().size.x)
+    imgui.set_next_window_size((width, 0.0))
+    opened, stays = imgui.begin_popup_modal(_ERROR_TITLE, True, imgui.WindowFlags_.no_resize)
+    if opened:
+        imgui.text_wrapped(printable(state.error, 1000))
+        if button(state, "OK"):
+            stays = False
+        imgui.same_line()
+        if button(state, "Copy"):
+            imgui.set_clipboard_text(state.error)
+        if not stays:
+            state.error = ""
+            imgui.close_current_popup()
+        imgui.end_popup()

@@ -1,0 +1,89 @@
+"""The keyboard: one table for what keys do, the help that lists them, and the README."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from imgui_bundle import imgui
+
+from viewer.app import actions
+from viewer.app.state import AppState
+
+__all__ = ["KEYS", "Shortcut", "handle_keys"]
+
+_CTRL, _SHIFT = imgui.Key.mod_ctrl, imgui.Key.mod_shift
+
+
+@dataclass(frozen=True, slots=True)
+class Shortcut:
+    """A key, what it is called, what it does, in words and as a function."""
+
+    chords: tuple[int, ...]
+    label: str
+    text: str
+    action: Callable[[AppState], None]
+
+
+def _toggle(name: str, text: str) -> Callable[[AppState], None]:
+    return lambda state: actions.toggle_option(state, name, text)
+
+
+def _look(name: str) -> Callable[[AppState], None]:
+    return lambda state: actions.look(state, name)
+
+
+def _want(what: str) -> Callable[[AppState], None]:
+    return lambda state: state.wants.add(what)
+
+
+def _toggle_panels(state: AppState) -> None:
+    state.panels_visible = not state.panels_visible
+
+
+def _toggle_keys(state: AppState) -> None:
+    state.keys_visible = not state.keys_visible
+
+
+_K = imgui.Key
+
+KEYS = (
+    Shortcut((_K.r,), "R", "reset every DOF to the file's pose", actions.reset_pose),
+    Shortcut((_K.s,), "S", "skeleton on or off", actions.toggle_skeleton),
+    Shortcut((_K.k,), "K", "attached skin or skin in binding space", actions.toggle_binding),
+    Shortcut((_K.w,), "W", "wireframe", _toggle("wireframe", "Wireframe")),
+    Shortcut((_K.n,), "N", "vertex normals", _toggle("normals", "Vertex normals")),
+    Shortcut((_K.t,), "T", "texture", _toggle("texture", "Texture")),
+    Shortcut((_K.g,), "G", "ground grid", _toggle("grid", "Grid")),
+    Shortcut((_K.f,), "F", "fit the view", actions.fit_view),
+    Shortcut((_K._1, _K.keypad1), "1", "front view", _look("front")),
+    Shortcut((_K._3, _K.keypad3), "3", "side view", _look("left")),
+    Shortcut((_K._7, _K.keypad7), "7", "top view", _look("top")),
+    Shortcut((_K._5, _K.keypad5), "5", "orthographic or perspective", actions.toggle_projection),
+    Shortcut((_K.tab,), "Tab", "hide or show the panels", _toggle_panels),
+    Shortcut((_K.h, _SHIFT | _K.slash, _K.f1), "H or ?", "this list", _toggle_keys),
+    Shortcut((_K.f12,), "F12", "save a screenshot", _want("screenshot")),
+    Shortcut((_CTRL | _K.o,), "Ctrl+O", "open files", _want("open dialog")),
+    Shortcut((_CTRL | _K.z,), "Ctrl+Z", "undo", actions.undo),
+    Shortcut((_CTRL | _SHIFT | _K.z, _CTRL | _K.y), "Ctrl+Shift+Z", "redo", actions.redo),
+    Shortcut((_K.escape,), "Esc", "close what is on top", actions.cancel),
+    Shortcut((_CTRL | _K.q,), "Ctrl+Q", "quit", _want("quit")),
+)
+
+MOUSE = (
+    ("Left drag", "orbit"),
+    ("Right drag, Shift drag", "pan"),
+    ("Wheel", "zoom to the pointer"),
+    ("Drop files", "open them"),
+)
+
+
+def handle_keys(state: AppState) -> None:
+    """Run what was pressed in this frame; letters typed into a text box do nothing here."""
+    # ImGui would move the focus with Tab: the key belongs to us.
+    imgui.internal.set_key_owner(imgui.Key.tab, imgui.get_id("viewer"))
+    if imgui.get_io().want_text_input:
+        return
+    for shortcut in KEYS:
+        if any(imgui.is_key_chord_pressed(chord) for chord in shortcut.chords):
+            shortcut.action(state)

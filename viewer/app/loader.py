@@ -1,0 +1,76 @@
+"""Open files beside the frame loop, so that the window answers and opening can be cancelled."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from viewer.errors import ViewerError
+from viewer.loading import load
+from viewer.rig.scene import Scene
+
+__all__ = ["Loader"]
+
+
+class Loader:
+    """Files being read in a thread of their own.
+
+    Dropping a loader cancels it: what it reads is thrown away when it is done.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        What to open.
+    attempts : sequence of sequences of Path
+        Tried in order; the first that loads counts, the last one's error does.
+    wake : callable
+        Called from the thread when it is done.
+
+    Attributes
+    ----------
+    scene : Scene or None
+        What was read.
+    error : str
+        Why nothing was read; empty if nothing is wrong.
+    """
+
+    def __init__(
+        self,
+        paths: Sequence[Path],
+        attempts: Sequence[Sequence[Path]],
+        wake: Callable[[], None],
+    ) -> None:
+        self.paths: tuple[Path, ...] = tuple(paths)
+        self.scene: Scene | None = None
+        self.error = ""
+        self._attempts, self._wake = attempts, wake
+        self._started = time.monotonic()
+        self._thread = threading.Thread(target=self._read, daemon=True)
+        self._thread.start()
+
+    def _read(self) -> None:
+        for paths in self._attempts:
+            try:
+                self.scene, self.paths, self.error = load(*paths), tuple(paths), ""
+                break
+            except ViewerError as problem:
+                self.error = str(problem)
+            except MemoryError:
+                self.error = f"{paths[-1]}: not enough memory"
+        self._wake()
+
+    @property
+    def is_done(self) -> bool:
+        """Whether there is a scene or an error."""
+        return not self._thread.is_alive()
+
+    @property
+    def seconds(self) -> float:
+        """How long it has been reading."""
+        return time.monotonic() - self._started
+
+    def wait(self) -> None:
+        """Return when it is done."""
+        self._thread.join()

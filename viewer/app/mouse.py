@@ -1,0 +1,33 @@
+"""The mouse in the view: orbit, pan, zoom."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from viewer.app.state import AppState
+from viewer.rendering.camera import orbit, pan, zoom
+
+__all__ = ["handle_mouse"]
+
+_DEGREES_PER_POINT = 0.4
+_ZOOM_PER_NOTCH = 0.88
+
+
+def handle_mouse(state: AppState) -> None:
+    """Move the camera by what the mouse did in this frame outside all panels."""
+    io = imgui.get_io()
+    x, y, width, height = state.view_rect
+    if io.want_capture_mouse or width < 1 or height < 1:
+        return
+    delta = io.mouse_delta
+    left = imgui.is_mouse_dragging(imgui.MouseButton_.left, 0.0)
+    pans = imgui.is_mouse_dragging(imgui.MouseButton_.right, 0.0)
+    pans = pans or imgui.is_mouse_dragging(imgui.MouseButton_.middle, 0.0)
+    if pans or (left and io.key_shift):
+        pan(state.camera, -delta.x / height, delta.y / height)
+    elif left:
+        orbit(state.camera, -_DEGREES_PER_POINT * delta.x, _DEGREES_PER_POINT * delta.y)
+    if io.mouse_wheel:
+        across = (io.mouse_pos.x - x - width / 2) / height
+        upward = -(io.mouse_pos.y - y - height / 2) / height
+        zoom(state.camera, _ZOOM_PER_NOTCH**io.mouse_wheel, across, upward)

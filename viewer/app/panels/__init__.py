@@ -1,0 +1,32 @@
+"""Panels: one module each with ``draw(state)``, docked where the table says."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import import_module
+from types import ModuleType
+
+__all__ = ["PANELS", "Panel", "panel_module"]
+
+
+@dataclass(frozen=True, slots=True)
+class Panel:
+    """A panel's title and its place at first: "left", or "right 1" to "right 3" downwards."""
+
+    title: str
+    place: str
+
+
+PANELS = {
+    "joints": Panel("Joints", "left"),
+    "display": Panel("Display", "right 1"),
+    "camera": Panel("Camera", "right 2"),
+    "lights": Panel("Lights", "right 2"),
+    "stats": Panel("Stats", "right 3"),
+}
+"""Modules in this folder."""
+
+
+def panel_module(name: str) -> ModuleType:
+    """Return a panel's module, imported on first use."""
+    return import_module(f"{__name__}.{name}")

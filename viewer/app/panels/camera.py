@@ -1,0 +1,48 @@
+"""Camera: distance, azimuth, inclination, and named views."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from viewer.app.actions import fit_view, look, toggle_projection
+from viewer.app.state import AppState
+from viewer.app.widgets import button, checkbox, slider
+from viewer.rendering.camera import VIEWS
+from viewer.rig.mesh import box_size
+
+__all__ = ["draw"]
+
+_CLAMP = imgui.SliderFlags_.always_clamp
+_LOG = imgui.SliderFlags_.logarithmic | imgui.SliderFlags_.no_round_to_format
+
+
+def draw(state: AppState) -> None:
+    """Draw the panel."""
+    camera = state.camera
+    size = box_size(state.box) or 1.0
+    distance = slider(
+        state, "Distance", camera.distance, 0.05 * size, 20.0 * size, _digits(size), _LOG
+    )
+    camera.distance = max(distance, 1e-9)
+    camera.azimuth = slider(state, "Azimuth", camera.azimuth, -180.0, 180.0, "%.1f\N{DEGREE SIGN}")
+    camera.inclination = slider(
+        state, "Inclination", camera.inclination, -90.0, 90.0, "%.1f\N{DEGREE SIGN}", _CLAMP
+    )
+    camera.fov = slider(
+        state, "Field of view", camera.fov, 5.0, 120.0, "%.0f\N{DEGREE SIGN}", _CLAMP
+    )
+    if checkbox(state, "Orthographic", camera.orthographic) != camera.orthographic:
+        toggle_projection(state)
+    imgui.same_line()
+    if button(state, "Fit (F)"):
+        fit_view(state)
+    for number, name in enumerate(VIEWS):
+        if number % 3:
+            imgui.same_line()
+        if button(state, name.capitalize()):
+            look(state, name)
+
+
+def _digits(size: float) -> str:
+    """Return a format with digits enough for the figure's unit."""
+    return "%.3g" if size < 0.1 or size > 1e4 else "%.2f"

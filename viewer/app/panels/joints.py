@@ -1,0 +1,223 @@
+"""Joints: the tree with a filter, and a slider per DOF within its limits."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+import numpy as np
+from imgui_bundle import imgui
+
+from viewer.app.actions import reset_pose
+from viewer.app.state import AppState
+from viewer.app.widgets import button, note_item
+from viewer.errors import printable
+from viewer.rig.mesh import box_size
+from viewer.rig.pose import Pose
+from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_labels
+
+__all__ = ["draw", "rows"]
+
+_FIRST_ROTATION = 3
+_INDENT = 9.0  # points a level
+_DEEPEST = 14  # levels that are indented: chains of thousands must stay readable
+_AXIS_COLORS = ((0.95, 0.45, 0.42, 1.0), (0.48, 0.85, 0.45, 1.0), (0.45, 0.65, 1.0, 1.0))
+_MAY_TYPE_BEYOND = imgui.SliderFlags_.none
+_STAYS_WITHIN = imgui.SliderFlags_.always_clamp
+
+
+def draw(state: AppState) -> None:
+    """Draw the panel for the first actor."""
+    actor = state.actor
+    if actor.figure.skeleton is None or actor.pose is None:
+        imgui.text_wrapped("This figure has no skeleton: open its .skel with it.")
+        return
+    _draw_head(state)
+    skeleton = actor.figure.skeleton
+    if not imgui.begin_child("joints", (0.0, 0.0)):
+        imgui.end_child()
+        return
+    shown = rows(skeleton, frozenset(state.opened_joints), state.joint_filter)
+    labels = _labels(skeleton)
+    clipper = imgui.ListClipper()
+    clipper.begin(len(shown))
+    while clipper.step():
+        for joint, dof, depth in shown[clipper.display_start : clipper.display_end]:
+            if dof < 0:
+                _draw_joint(state, skeleton, joint, depth, labels[joint])
+            else:
+                _draw_dof(state, skeleton, actor.pose, dof, depth, labels[joint])
+    clipper.end()
+    imgui.end_child()
+
+
+def _draw_head(state: AppState) -> None:
+    imgui.set_next_item_width(-1.0)
+    state.joint_filter = imgui.input_text_with_hint(
+        "##filter", "Filter joints", state.joint_filter
+    )[1]
+    note_item(state, "Filter")
+    if button(state, "Reset (R)"):
+        reset_pose(state)
+    imgui.same_line()
+    if imgui.radio_button("degrees", state.in_degrees):
+        state.in_degrees = True
+    note_item(state, "degrees")
+    imgui.same_line()
+    if imgui.radio_button("radians", not state.in_degrees):
+        state.in_degrees = False
+    note_item(state, "radians")
+
+
+@lru_cache(maxsize=4)
+def _labels(skeleton: Skeleton) -> tuple[str, ...]:
+    return tuple(printable(label, 60) for label in joint_labels(skeleton))
+
+
+@lru_cache(maxsize=4)
+def rows(
+    skeleton: Skeleton, opened: frozenset[int], wanted: str
+) -> tuple[tuple[int, int, int], ...]:
+    """Return what is listed, as (joint, DOF or -1 for the joint's own row, depth).
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Gives joints and DOFs.
+    opened : frozenset of int
+        Joints whose DOFs and children are listed.
+    wanted : str
+        If not empty, only joints whose name contains it are listed, without hierarchy.
+    """
+    dofs: list[list[int]] = [[] for _ in range(skeleton.n_joints)]
+    for dof, joint in enumerate(skeleton.dof_joints.tolist()):
+        dofs[joint].append(dof)
+    listed: list[tuple[int, int, int]] = []
+    depths, visible = [0] * skeleton.n_joints, [True] * skeleton.n_joints
+    labels = _labels(skeleton)
+    for joint, parent in enumerate(skeleton.parents.tolist()):
+        if wanted:
+            visible[joint] = wanted.lower() in labels[joint].lower()
+        elif parent >= 0:
+            depths[joint] = depths[parent] + 1
+            visible[joint] = visible[parent] and parent in opened
+        if visible[joint]:
+            listed.append((joint, -1, depths[joint]))
+            if wanted or joint in opened:
+                listed += [(joint, dof, depths[joint] + 1) for dof in dofs[joint]]
+    # Parents come before children in a skeleton, but not always right before them.
+    order = _depth_first(skeleton.parents.tolist())
+    return tuple(sorted(listed, key=lambda row: order[row[0]]))
+
+
+def _depth_first(parents: list[int]) -> list[int]:
+    """Return each joint's place in depth-first order."""
+    children: list[list[int]] = [[] for _ in parents]
+    stack: list[int] = []
+    for joint, parent in enumerate(parents):
+        (children[parent] if parent >= 0 else stack).append(joint)
+    stack.reverse()
+    place = [0] * len(parents)
+    count = 0
+    while stack:
+        joint = stack.pop()
+        place[joint] = count
+        count += 1
+        stack.extend(reversed(children[joint]))
+    return place
+
+
+def _draw_joint(state: AppState, skeleton: Skeleton, joint: int, depth: int, label: str) -> None:
+    _indent(depth)
+    flags = imgui.TreeNodeFlags_.no_tree_push_on_open | imgui.TreeNodeFlags_.open_on_arrow
+    flags |= imgui.TreeNodeFlags_.span_avail_width
+    if joint == state.selected_joint:
+        flags |= imgui.TreeNodeFlags_.selected
+    imgui.set_next_item_open(joint in state.opened_joints or bool(state.joint_filter))
+    imgui.tree_node_ex(f"{label}##joint{joint}", flags)
+    note_item(state, f"joint {label}")
+    if imgui.is_item_toggled_open():
+        state.opened_joints ^= {joint}
+    elif imgui.is_item_clicked():
+        state.selected_joint = -1 if state.selected_joint == joint else joint
+    if imgui.begin_popup_context_item(f"menu of joint {joint}"):
+        if imgui.menu_item("Reset this joint", "", False)[0]:
+            _reset(state, np.flatnonzero(skeleton.dof_joints == joint))
+        imgui.end_popup()
+
+
+def _indent(depth: int) -> None:
+    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + _INDENT * min(depth, _DEEPEST))
+
+
+def _draw_dof(
+    state: AppState, skeleton: Skeleton, pose: Pose, dof: int, depth: int, label: str
+) -> None:
+    kind = int(skeleton.dof_kinds[dof])
+    name = DOF_KINDS[kind]
+    _indent(depth)
+    imgui.align_text_to_frame_padding()
+    imgui.text_colored(_AXIS_COLORS[kind % 3], f"{name:>2}")
+    imgui.same_line()
+    imgui.set_next_item_width(-1.0)
+    low, high = skeleton.dof_limits[dof]
+    locked = low == high
+    imgui.begin_disabled(bool(locked))
+    value = _dof_slider(state, skeleton, pose, dof)
+    imgui.end_disabled()
+    note_item(state, f"{label}.{name}")
+    if imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):
+        imgui.set_tooltip(f"{label}.{name}\n{_limits_text(low, high, kind)}")
+        if imgui.is_mouse_double_clicked(imgui.MouseButton_.left) and not locked:
+            value = float(skeleton.rest_dofs[dof])
+    if imgui.begin_popup_context_item(f"menu of DOF {dof}"):
+        if imgui.menu_item("Reset", "", False, not locked)[0]:
+            value = float(skeleton.rest_dofs[dof])
+        if imgui.menu_item("Set to 0", "", False, bool(low <= 0.0 <= high) and not locked)[0]:
+            value = 0.0
+        if imgui.menu_item("Copy value", "", False)[0]:
+            imgui.set_clipboard_text(repr(float(pose.dofs[dof])))
+        imgui.end_popup()
+    pose.dofs[dof] = min(max(value, low), high)
+
+
+def _dof_slider(state: AppState, skeleton: Skeleton, pose: Pose, dof: int) -> float:
+    """Draw the slider in the chosen unit and return the value in the file's own."""
+    low, high = (float(limit) for limit in skeleton.dof_limits[dof])
+    is_rotation = skeleton.dof_kinds[dof] >= _FIRST_ROTATION
+    unlimited = math.pi if is_rotation else _reach(state)
+    factor = math.degrees(1.0) if is_rotation and state.in_degrees else 1.0
+    text = ("%.1f\N{DEGREE SIGN}" if state.in_degrees else "%.4f rad") if is_rotation else "%.4f"
+    if low == high:
+        text += "  locked"
+    bounded = math.isfinite(low) and math.isfinite(high)
+    changed, moved = imgui.slider_float(
+        f"##dof{dof}",
+        float(pose.dofs[dof]) * factor,
+        (low if math.isfinite(low) else min(-unlimited, high - unlimited)) * factor,
+        (high if math.isfinite(high) else max(unlimited, low + unlimited)) * factor,
+        text,
+        _STAYS_WITHIN if bounded else _MAY_TYPE_BEYOND,
+    )
+    # float32 of the widget must not touch a value that nobody moved.
+    return moved / factor if changed else float(pose.dofs[dof])
+
+
+def _reach(state: AppState) -> float:
+    """Return how far a slider moves the root: the size of the scene."""
+    return box_size(state.box) or 1.0
+
+
+def _limits_text(low: float, high: float, kind: int) -> str:
+    if low == high:
+        return f"locked at {low:g}"
+    if not math.isfinite(low) and not math.isfinite(high):
+        return "unlimited; Ctrl+click types any value\ndouble-click resets"
+    unit = " rad" if kind >= _FIRST_ROTATION else ""
+    return f"{low:g} to {high:g}{unit}\nCtrl+click types a value, double-click resets"
+
+
+def _reset(state: AppState, dofs: np.ndarray) -> None:
+    actor = state.actor
+    if actor.pose is not None and actor.figure.skeleton is not None:
+        actor.pose.dofs[dofs] = actor.figure.skeleton.rest_dofs[dofs]

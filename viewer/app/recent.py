@@ -1,0 +1,53 @@
+"""Files opened before, remembered between runs."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import platformdirs
+
+from viewer.errors import OutputError
+from viewer.formats import save_bytes
+
+__all__ = ["load_recent", "remember", "state_folder"]
+
+_MOST = 12
+
+
+def state_folder() -> Path:
+    """Return the folder where layout and recent files are kept."""
+    return Path(platformdirs.user_state_dir("viewer", appauthor=False))
+
+
+def load_recent() -> list[tuple[str, ...]]:
+    """Return groups of files that were opened together, latest first; none if unreadable."""
+    try:
+        groups = json.loads((state_folder() / "recent.json").read_text("utf-8"))
+        return [tuple(map(str, group)) for group in groups if isinstance(group, list)][:_MOST]
+    except (OSError, ValueError, RecursionError):
+        return []
+
+
+def remember(recent: list[tuple[str, ...]], paths: Sequence[Path]) -> str:
+    """Put files first in the list and save it; return what went wrong, or nothing.
+
+    Parameters
+    ----------
+    recent : list
+        Changed in place.
+    paths : sequence of Path
+        Opened together.
+    """
+    group = tuple(str(path.resolve()) for path in paths)
+    if not group:
+        return ""
+    recent[:] = [group, *(old for old in recent if old != group)][:_MOST]
+    try:
+        state_folder().mkdir(parents=True, exist_ok=True)
+        text = json.dumps([list(old) for old in recent], indent=1)
+        save_bytes(state_folder() / "recent.json", text.encode("utf-8", "replace"))
+    except (OSError, OutputError) as problem:
+        return f"recent files could not be saved: {problem}"
+    return ""

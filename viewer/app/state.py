@@ -1,0 +1,141 @@
+"""AppState: all that panels read and write. Passes and the window act on it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from viewer.app.edits import History
+from viewer.rendering.camera import Camera, fit
+from viewer.rendering.options import DisplayOptions
+from viewer.rig.arrays import Floats
+from viewer.rig.mesh import bounding_box
+from viewer.rig.scene import Actor, Scene, scene_points
+
+if TYPE_CHECKING:
+    from viewer.app.file_dialog import FileDialog
+    from viewer.app.loader import Loader
+
+__all__ = ["AppState", "Note", "Stats"]
+
+_NOTE_SECONDS = 4.0
+
+
+@dataclass(slots=True)
+class Note:
+    """A message that goes away by itself."""
+
+    text: str
+    until: float
+
+
+@dataclass(slots=True)
+class Stats:
+    """What the last frame took and who drew it."""
+
+    frame_ms: float = 0.0
+    renderer: str = ""
+    version: str = ""
+    samples: int = 0
+    skin_updates: int = 0
+
+
+@dataclass(slots=True)
+class AppState:
+    """Everything that the interface shows and changes.
+
+    Attributes
+    ----------
+    scene, camera, options : Scene, Camera, DisplayOptions
+        What is shown, from where, and how.
+    box : (2, 3)
+        The scene's box as it was opened: the grid lies under it.
+    paths : tuple of Path
+        The files of the scene; empty for the bundled figure.
+    selected_joint : int
+        Of the first actor; -1 for none.
+    in_degrees : bool
+        Whether rotations are shown in degrees or radians.
+    view_rect : (x, y, width, height)
+        The part of the window that panels leave free, in window coordinates.
+    item_rects : dict
+        Where each labelled widget was drawn last: (x0, y0, x1, y1). Tests aim by it.
+    wants : set of str
+        What the window has to do after the frame: "screenshot", "quit", "open dialog".
+    """
+
+    scene: Scene
+    camera: Camera
+    options: DisplayOptions
+    box: Floats
+    paths: tuple[Path, ...] = ()
+    selected_joint: int = -1
+    in_degrees: bool = True
+    panels_visible: bool = True
+    keys_visible: bool = False
+    wants_layout_reset: bool = False
+    joint_filter: str = ""
+    opened_joints: set[int] = field(default_factory=set)
+    closed_panels: set[str] = field(default_factory=set)
+    view_rect: tuple[float, float, float, float] = (0.0, 0.0, 1.0, 1.0)
+    item_rects: dict[str, tuple[float, float, float, float]] = field(default_factory=dict)
+    wants: set[str] = field(default_factory=set)
+    error: str = ""
+    notes: list[Note] = field(default_factory=list)
+    stats: Stats = field(default_factory=Stats)
+    history: History = field(default_factory=History)
+    recent: list[tuple[str, ...]] = field(default_factory=list)
+    dialog: FileDialog | None = None
+    loader: Loader | None = None
+
+    def __post_init__(self) -> None:
+        self.history.start(self.scene, self.options)
+        self.opened_joints = _first_opened(self.scene)
+
+    @property
+    def actor(self) -> Actor:
+        """The actor that panels act on: the first."""
+        return self.scene.actors[0]
+
+    @property
+    def aspect(self) -> float:
+        """Width / height of the view."""
+        _, _, width, height = self.view_rect
+        return max(width, 1.0) / max(height, 1.0)
+
+    def show_scene(self, scene: Scene, paths: Sequence[Path]) -> None:
+        """Replace the scene; the camera keeps its direction and fits what is new."""
+        points = scene_points(scene)
+        self.scene, self.paths = scene, tuple(paths)
+        self.box = bounding_box(points)
+        self.camera.up = scene.up
+        fit(self.camera, points, self.aspect)
+        self.selected_joint = -1
+        self.joint_filter = ""
+        self.opened_joints = _first_opened(scene)
+        self.history.start(scene, self.options)
+        self.say(*scene.warnings)
+
+    def say(self, *texts: str) -> None:
+        """Show messages that go away by themselves; longer ones stay longer."""
+        for text in texts:
+            seconds = _NOTE_SECONDS + len(text) / 30.0
+            self.notes.append(Note(text, time.monotonic() + seconds))
+
+    def drop_old_notes(self) -> None:
+        """Forget messages whose time is over."""
+        now = time.monotonic()
+        self.notes[:] = [note for note in self.notes if note.until > now]
+
+
+def _first_opened(scene: Scene) -> set[int]:
+    """Return the joints whose rows are open at first: all of a small rig, else the roots."""
+    skeleton = scene.actors[0].figure.skeleton if scene.actors else None
+    if skeleton is None:
+        return set()
+    if skeleton.n_joints <= 128:
+        return set(range(skeleton.n_joints))
+    return {joint for joint, parent in enumerate(skeleton.parents) if parent < 0}

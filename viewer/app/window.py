@@ -1,0 +1,227 @@
+"""The window: a frame loop that sleeps until something happens."""
+
+from __future__ import annotations
+
+import ctypes
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from viewer.app.display import find_display, import_glfw
+
+glfw = import_glfw()
+
+import moderngl  # noqa: E402  after glfw, whose library imgui-bundle chooses
+from imgui_bundle import imgui  # noqa: E402
+
+from viewer.app.frame import Frame  # noqa: E402
+from viewer.app.recent import load_recent, remember, state_folder  # noqa: E402
+from viewer.app.state import AppState  # noqa: E402
+from viewer.app.theme import apply_theme  # noqa: E402
+from viewer.errors import RenderError, printable  # noqa: E402
+from viewer.rendering.camera import Camera, fit  # noqa: E402
+from viewer.rendering.context import explain  # noqa: E402
+from viewer.rendering.options import DisplayOptions  # noqa: E402
+from viewer.rig.mesh import bounding_box  # noqa: E402
+from viewer.rig.scene import Scene, scene_points  # noqa: E402
+
+__all__ = ["show"]
+
+_SIZE = (1280, 800)
+_SETTLE_FRAMES = 3  # drawn after an event: ImGui needs two to come to rest
+_IDLE_SECONDS = 0.5  # how often messages that time out are looked at
+
+
+def show(
+    scene: Scene,
+    camera: Camera | None = None,
+    options: DisplayOptions | None = None,
+    paths: Sequence[str | Path] = (),
+    scale: float | None = None,
+    fit_distance: bool = True,
+) -> None:
+    """Open a window and return when it is closed.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its poses are changed by what the user does.
+    camera : Camera, optional
+        The point of view at first; fits the scene if omitted.
+    options : DisplayOptions, optional
+        What is shown and how at first.
+    paths : sequence of str or Path
+        The files of the scene, for the title and the list of recent files.
+    scale : float, optional
+        Size of the interface; the screen's own if omitted.
+    fit_distance : bool
+        Whether the camera steps back until the scene fills the view.
+
+    Raises
+    ------
+    NoDisplay
+        If there is no display.
+    RenderError
+        If there is no usable OpenGL.
+    """
+    find_display()
+    points = scene_points(scene)
+    camera = camera or Camera(up=scene.up)
+    if fit_distance:
+        fit(camera, points, _SIZE[0] / _SIZE[1])
+    files = tuple(map(Path, paths))
+    state = AppState(scene, camera, options or DisplayOptions(), bounding_box(points), files)
+    state.recent = load_recent()
+    state.say(*scene.warnings, *filter(None, [remember(state.recent, files)]))
+    window = _Window(state, scale)
+    try:
+        window.run(fit_distance)
+    finally:
+        window.release()
+
+
+class _Window:
+    """One GLFW window with its context, its ImGui, and its loop."""
+
+    def __init__(self, state: AppState, scale: float | None) -> None:
+        self.state = state
+        self.handle = _create_window(_title(state))
+        try:
+            glfw.make_context_current(self.handle)
+            glfw.swap_interval(1)
+            self.context = _context()
+        except BaseException:
+            glfw.destroy_window(self.handle)
+            raise
+        self._dropped: list[Path] = []
+        self._is_dirty = True
+        self._title = ""
+        self._set_callbacks()
+        self._imgui = imgui.create_context()
+        self._set_up_imgui(scale)
+        self.frame = Frame(state, self.context, glfw.post_empty_event, keeps_recent=True)
+
+    def _set_callbacks(self) -> None:
+        """Note what happened; the loop acts on it, so nothing is raised inside a callback."""
+        glfw.set_drop_callback(self.handle, self._on_drop)
+        glfw.set_framebuffer_size_callback(self.handle, self._on_change)
+        glfw.set_window_refresh_callback(self.handle, self._on_change)
+
+    def _on_drop(self, _: Any, names: Sequence[str]) -> None:
+        self._dropped += map(Path, names)
+
+    def _on_change(self, *_: Any) -> None:
+        self._is_dirty = True
+
+    def _set_up_imgui(self, scale: float | None) -> None:
+        io = imgui.get_io()
+        io.config_flags |= imgui.ConfigFlags_.docking_enable
+        folder = state_folder()
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            io.set_ini_filename(str(folder / "layout.ini"))
+        except OSError as problem:
+            io.set_ini_filename(None)
+            self.state.say(f"the layout cannot be remembered: {problem.strerror}")
+        apply_theme(scale or self._screen_scale())
+        address = ctypes.cast(self.handle, ctypes.c_void_p).value or 0
+        imgui.backends.glfw_init_for_opengl(address, True)
+        imgui.backends.opengl3_init("#version 330")
+
+    def _screen_scale(self) -> float:
+        """Return how much larger than usual the interface must be, in window coordinates."""
+        content = glfw.get_window_content_scale(self.handle)[0] or 1.0
+        return max(content / self._pixels_per_point(), 0.5)
+
+    def _pixels_per_point(self) -> float:
+        width = glfw.get_window_size(self.handle)[0]
+        pixels = glfw.get_framebuffer_size(self.handle)[0]
+        return pixels / width if width and pixels else 1.0
+
+    def run(self, fits: bool) -> None:
+        """Draw frames until the window is closed; sleep while nothing happens."""
+        left = _SETTLE_FRAMES
+        while not glfw.window_should_close(self.handle):
+            left = _SETTLE_FRAMES if self._wait(left) else left - 1
+            if self._dropped:
+                self.frame.open(self._dropped)
+                self._dropped = []
+            if self._draw() and fits:
+                # Only now it is known how much room the panels leave.
+                fit(self.state.camera, scene_points(self.state.scene), self.state.aspect)
+                fits = False
+            if "quit" in self.state.wants:
+                glfw.set_window_should_close(self.handle, True)
+
+    def _wait(self, left: int) -> bool:
+        """Wait for events unless frames are left to draw; return whether something happened."""
+        self._is_dirty = False
+        if left > 0 or imgui.get_io().want_text_input:
+            glfw.poll_events()
+            return self._is_dirty
+        busy = self.state.notes or self.state.loader is not None
+        while True:
+            started = time.monotonic()
+            glfw.wait_events_timeout(0.05 if self.state.loader else _IDLE_SECONDS)
+            came_early = time.monotonic() - started < 0.9 * _IDLE_SECONDS
+            if came_early or busy or self._dropped:
+                return True
+
+    def _draw(self) -> bool:
+        """Draw one frame; return False if the window has no pixels at present."""
+        size = glfw.get_framebuffer_size(self.handle)
+        if min(size) < 1:
+            return False
+        self._set_title()
+        imgui.backends.opengl3_new_frame()
+        imgui.backends.glfw_new_frame()
+        imgui.new_frame()
+        self.frame.draw(self.context.screen, size, self._pixels_per_point())
+        glfw.swap_buffers(self.handle)
+        return True
+
+    def _set_title(self) -> None:
+        title = _title(self.state)
+        if title != self._title:
+            glfw.set_window_title(self.handle, title)
+            self._title = title
+
+    def release(self) -> None:
+        """Close the window and free everything; the layout is saved."""
+        imgui.backends.opengl3_shutdown()
+        imgui.backends.glfw_shutdown()
+        imgui.destroy_context(self._imgui)
+        self.frame.release()
+        self.context.release()
+        glfw.destroy_window(self.handle)
+
+
+def _title(state: AppState) -> str:
+    names = [path.name for path in state.paths] or [state.scene.actors[0].figure.name]
+    return f"{printable(' + '.join(names), 100)} - viewer"
+
+
+def _create_window(title: str) -> Any:
+    glfw.default_window_hints()
+    glfw.window_hint(glfw.CONTEXT_VERSION_MAJOR, 3)
+    glfw.window_hint(glfw.CONTEXT_VERSION_MINOR, 3)
+    glfw.window_hint(glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE)
+    glfw.window_hint(glfw.OPENGL_FORWARD_COMPAT, True)
+    glfw.window_hint(glfw.SAMPLES, 0)  # the scene has its own multisampled framebuffer
+    glfw.window_hint(glfw.SCALE_TO_MONITOR, True)
+    glfw.window_hint_string(glfw.X11_CLASS_NAME, "viewer")
+    handle = glfw.create_window(*_SIZE, title, None, None)
+    if not handle:
+        code, text = glfw.get_error()
+        words = text.decode() if isinstance(text, bytes) else text or f"GLFW error {code}"
+        raise RenderError(explain(words))
+    glfw.set_window_size_limits(handle, 320, 240, glfw.DONT_CARE, glfw.DONT_CARE)
+    return handle
+
+
+def _context() -> moderngl.Context:
+    try:
+        return moderngl.create_context(require=330)
+    except Exception as problem:  # glcontext raises nothing more special
+        raise RenderError(explain(str(problem))) from None

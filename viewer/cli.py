@@ -1,0 +1,119 @@
+"""The command line: finds the subcommand, and turns what goes wrong into one line and a code."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from types import FrameType
+from typing import NoReturn
+
+import viewer
+from viewer.commands import COMMANDS
+from viewer.errors import ViewerError, printable
+
+__all__ = ["run"]
+
+_EPILOG = """\
+Without a command, FILES open in a window; without files, the bundled figure does.
+"viewer COMMAND --help" lists a command's options.
+
+exit codes: 0 done, 2 bad input, 4 no usable OpenGL, 5 output could not be written
+"""
+
+
+class _Terminated(BaseException):
+    """SIGTERM arrived; unwinds like Ctrl-C, so that no temporary file stays behind."""
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Run one command.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        Without the program's name.
+
+    Returns
+    -------
+    int
+        The exit code: 0, or that of the ``ViewerError``.
+    """
+    signal.signal(signal.SIGTERM, _terminate)
+    try:
+        code = _dispatch(list(arguments))
+        sys.stdout.flush()
+        return code
+    except ViewerError as problem:
+        return _fail(printable(problem, 2000), problem.exit_code)
+    except KeyboardInterrupt:
+        return _fail("interrupted", 130)
+    except _Terminated:
+        return _fail("terminated", 143)
+    except BrokenPipeError:
+        # The reader of our output has gone (``viewer info x | head -1``): nothing to report.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except MemoryError:
+        return _fail("not enough memory", 2)
+
+
+def _dispatch(arguments: list[str]) -> int:
+    if arguments and arguments[0] in ("-h", "--help"):
+        _overview().print_help()
+        return 0
+    if arguments and arguments[0] == "--version":
+        print(f"viewer {viewer.__version__}")
+        return 0
+    name = arguments.pop(0) if arguments and arguments[0] in COMMANDS else "view"
+    command = import_module(f"viewer.commands.{name}")
+    parser = _Parser(prog=f"viewer {name}", description=COMMANDS[name])
+    command.add_arguments(parser)
+    return command.run(parser.parse_intermixed_args(_protect_numbers(arguments)))
+
+
+class _Parser(argparse.ArgumentParser):
+    """Reports a usage error in one line, like every other error."""
+
+    def error(self, message: str) -> NoReturn:
+        raise ViewerError(f"{message} ({self.prog} --help lists the options)")
+
+
+def _protect_numbers(arguments: list[str]) -> list[str]:
+    """Join ``--option -1`` to ``--option=-1``: argparse takes ``-1,2`` for an option."""
+    joined: list[str] = []
+    for argument in arguments:
+        is_negative = len(argument) > 1 and argument[0] == "-" and argument[1] in "0123456789."
+        if is_negative and joined and joined[-1].startswith("--") and "=" not in joined[-1]:
+            joined[-1] += f"={argument}"
+        else:
+            joined.append(argument)
+    return joined
+
+
+def _overview() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="viewer",
+        description="See, check and produce skinned characters.",
+        epilog=_EPILOG,
+        usage="viewer [COMMAND] [FILES ...] [options]",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="store_true", help="print the version")
+    group = parser.add_argument_group("commands")
+    for name, text in COMMANDS.items():
+        # Listed like options, so that argparse aligns them.
+        group.add_argument(name, nargs="?", help=text, metavar=name)
+    return parser
+
+
+def _fail(message: str, code: int) -> int:
+    print(f"viewer: {message}", file=sys.stderr)
+    return code
+
+
+def _terminate(signum: int, frame: FrameType | None) -> None:
+    raise _Terminated

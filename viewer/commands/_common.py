@@ -1,0 +1,200 @@
+"""What several commands share: options that open a scene, pose it, aim at it and show it."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import re
+import sys
+from collections.abc import Sequence
+
+from viewer.errors import RigError, ViewerError
+from viewer.loading import load
+from viewer.rendering.camera import Camera, fit
+from viewer.rendering.options import SHOWN, DisplayOptions
+from viewer.rendering.program import SHADING
+from viewer.rig.arrays import Floats
+from viewer.rig.scene import Actor, Scene
+from viewer.rig.skeleton import clamp_dofs, dof_label, find_dof
+
+__all__ = [
+    "add_camera_arguments",
+    "add_display_arguments",
+    "add_scene_arguments",
+    "apply_dofs",
+    "camera_of",
+    "display_of",
+    "number",
+    "open_scene",
+    "parse_size",
+    "print_warnings",
+]
+
+_UNITS = {"k": 1 << 10, "m": 1 << 20, "g": 1 << 30}
+
+
+def add_scene_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add FILES and the options that pose what they hold."""
+    parser.add_argument("files", nargs="*", metavar="FILES", help=".skel and .skin files")
+    parser.add_argument(
+        "--dof",
+        action="append",
+        default=[],
+        metavar="NAME.X=VALUE",
+        help="set a DOF: joint (or #index) and x, y, z for a rotation (radians as in the file, or "
+        "30deg) or tx, ty, tz for the root's translation; may be repeated",
+    )
+    parser.add_argument(
+        "--max-size", default="2G", metavar="SIZE", help="refuse larger files (default 2G)"
+    )
+
+
+def add_camera_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options that aim the camera; what is not given fits the scene."""
+    parser.add_argument("--azimuth", type=number, metavar="A", help="degrees about the up axis")
+    parser.add_argument("--inclination", type=number, metavar="I", help="degrees above the horizon")
+    parser.add_argument("--distance", type=number, metavar="D", help="from the target, in units")
+    parser.add_argument("--orthographic", action="store_true", help="parallel projection")
+
+
+def add_display_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options that choose what is shown and how."""
+    parser.add_argument("--show", choices=SHOWN, default="skin", help="default: skin")
+    parser.add_argument("--shading", choices=SHADING, default="phong", help="default: phong")
+    parser.add_argument(
+        "--background",
+        default="gradient",
+        metavar="NAME|#rrggbb",
+        help="gradient, transparent or a colour",
+    )
+    parser.add_argument("--samples", type=int, default=4, metavar="N", help="samples a pixel")
+    for name, text in (
+        ("flat", "one normal per triangle"),
+        ("wireframe", "edges on top"),
+        ("normals", "vertex normals as lines"),
+        ("no-texture", "plain colour instead of the texture"),
+        ("no-grid", "leave out the ground grid"),
+    ):
+        parser.add_argument(f"--{name}", action="store_true", help=text)
+
+
+def number(text: str) -> float:
+    """Return a finite number; argparse words the refusal."""
+    value = float(text)
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"expected a finite number, found {text}")
+    return value
+
+
+def parse_size(text: str) -> tuple[int, int]:
+    """Return the width and height of ``1280x720``."""
+    found = re.fullmatch(r"(\d{1,6})[xX](\d{1,6})", text)
+    if not found:
+        raise ViewerError(f'--size: expected WIDTHxHEIGHT in pixels, found "{text}"')
+    return int(found[1]), int(found[2])
+
+
+def _parse_bytes(text: str) -> int:
+    found = re.fullmatch(r"(\d{1,15})([kKmMgG]?)", text)
+    if not found:
+        raise ViewerError(f'--max-size: expected a number with k, M or G, found "{text}"')
+    return int(found[1]) * _UNITS.get(found[2].lower(), 1)
+
+
+def open_scene(arguments: argparse.Namespace) -> Scene:
+    """Load the files, print what their readers noticed, and pose them as asked."""
+    scene = load(*arguments.files, max_size=_parse_bytes(arguments.max_size))
+    print_warnings(scene.warnings)
+    apply_dofs(scene, arguments.dof)
+    return scene
+
+
+def print_warnings(warnings: Sequence[str]) -> None:
+    """Print one line each to the error stream."""
+    for warning in warnings:
+        print(f"warning: {warning}", file=sys.stderr)
+
+
+def apply_dofs(scene: Scene, settings: Sequence[str]) -> None:
+    """Set DOFs given as ``NAME.X=VALUE``, on the first actor that has such a joint.
+
+    Values beyond a limit are clamped, with a warning.
+
+    Raises
+    ------
+    ViewerError
+        If the text, the joint or the value is wrong.
+    """
+    for setting in settings:
+        label, equals, text = setting.partition("=")
+        if not equals:
+            raise ViewerError(f'--dof: expected NAME.X=VALUE, found "{setting}"')
+        actor, dof = _find(scene, label)
+        skeleton = actor.figure.skeleton
+        assert skeleton is not None and actor.pose is not None  # _find looked
+        is_rotation = skeleton.dof_kinds[dof] >= 3
+        wanted = actor.pose.dofs.copy()
+        wanted[dof] = _dof_value(setting, text, is_rotation)
+        clamped = clamp_dofs(skeleton, wanted)
+        if clamped[dof] != wanted[dof]:
+            low, high = skeleton.dof_limits[dof]
+            name, unit = dof_label(skeleton, dof), " rad" if is_rotation else ""
+            print_warnings([f"{name}={text} is clamped to its limits {low:g} to {high:g}{unit}"])
+        actor.pose.dofs[:] = clamped
+
+
+def _find(scene: Scene, label: str) -> tuple[Actor, int]:
+    problem: RigError | None = None
+    for actor in scene.actors:
+        if actor.figure.skeleton is not None:
+            try:
+                return actor, find_dof(actor.figure.skeleton, label)
+            except RigError as error:
+                problem = problem or error
+    raise ViewerError(f"--dof: {problem or 'no file has a skeleton'}")
+
+
+def _dof_value(setting: str, text: str, is_rotation: bool) -> float:
+    found = re.fullmatch(r"(.*?)(rad|deg)?", text.strip())
+    assert found is not None  # the pattern matches everything
+    try:
+        value = number(found[1])
+    except (ValueError, argparse.ArgumentTypeError):
+        raise ViewerError(f'--dof: expected a number after "=", found "{setting}"') from None
+    return math.radians(value) if found[2] == "deg" and is_rotation else value
+
+
+def camera_of(
+    arguments: argparse.Namespace, scene: Scene, points: Floats, size: tuple[int, int]
+) -> Camera:
+    """Return the camera asked for; its distance fits the points unless it is given."""
+    camera = Camera(up=scene.up, orthographic=arguments.orthographic)
+    if arguments.azimuth is not None:
+        camera.azimuth = arguments.azimuth
+    if arguments.inclination is not None:
+        if not -90 <= arguments.inclination <= 90:
+            raise ViewerError(f"--inclination: expected -90 to 90, found {arguments.inclination:g}")
+        camera.inclination = arguments.inclination
+    fit(camera, points, size[0] / size[1])
+    if arguments.distance is not None:
+        if arguments.distance <= 0:
+            raise ViewerError(f"--distance: expected more than 0, found {arguments.distance:g}")
+        camera.distance = arguments.distance
+    return camera
+
+
+def display_of(arguments: argparse.Namespace) -> DisplayOptions:
+    """Return the display options asked for."""
+    if arguments.samples < 1:
+        raise ViewerError(f"--samples: expected at least 1, found {arguments.samples}")
+    return DisplayOptions(
+        show=arguments.show,
+        shading=arguments.shading,
+        flat=arguments.flat,
+        wireframe=arguments.wireframe,
+        normals=arguments.normals,
+        texture=not arguments.no_texture,
+        grid=not arguments.no_grid,
+        background=arguments.background,
+        samples=arguments.samples,
+    )

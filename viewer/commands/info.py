@@ -1,0 +1,213 @@
+"""Say what is in files: joints, DOFs, limits, vertices, triangles, influences, warnings."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from typing import Any
+
+import numpy as np
+
+from viewer.commands._common import add_scene_arguments, open_scene
+from viewer.errors import printable
+from viewer.rig.mesh import Mesh, bounding_box, box_size, triangle_areas
+from viewer.rig.scene import Actor, Scene, actor_points
+from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_labels
+from viewer.rig.skin import Skin, has_influence, influence_counts, weight_sums
+
+__all__ = ["add_arguments", "describe", "run"]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    add_scene_arguments(parser)
+    parser.add_argument("--json", action="store_true", help="everything, for programs")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print what the files hold."""
+    scene = open_scene(arguments)
+    if arguments.json:
+        print(json.dumps(describe(scene), indent=1, allow_nan=False))
+    else:
+        for actor in describe(scene)["actors"]:
+            print("\n".join(_lines(actor)))
+    return 0
+
+
+def describe(scene: Scene) -> dict[str, Any]:
+    """Return everything ``info`` tells, ready for JSON; lengths in figure units, angles in rad.
+
+    Parameters
+    ----------
+    scene : Scene
+        Figures and poses.
+    """
+    return {
+        "actors": [_describe_actor(actor) for actor in scene.actors],
+        "warnings": list(scene.warnings),
+    }
+
+
+def _describe_actor(actor: Actor) -> dict[str, Any]:
+    figure = actor.figure
+    box = bounding_box(actor_points(actor))
+    parts: dict[str, Any] = {"name": figure.name, "up": figure.up}
+    parts |= {"box": box.tolist(), "size": box_size(box), "attached": figure.is_attached}
+    if figure.skeleton is not None and actor.pose is not None:
+        parts["skeleton"] = _describe_skeleton(figure.skeleton, actor.pose.dofs.tolist())
+    if figure.mesh is not None:
+        parts["mesh"] = _describe_mesh(figure.mesh)
+    if figure.skin is not None:
+        parts["skin"] = _describe_skin(figure.skin)
+    return parts
+
+
+def _describe_skeleton(skeleton: Skeleton, dofs: list[float]) -> dict[str, Any]:
+    labels = joint_labels(skeleton)
+    limits = skeleton.dof_limits
+    return {
+        "joints": skeleton.n_joints,
+        "roots": int((skeleton.parents < 0).sum()),
+        "dofs": skeleton.n_dofs,
+        "locked_dofs": int(skeleton.locked.sum()),
+        "limited_dofs": int(np.isfinite(limits).any(axis=1).sum()),
+        "joint_table": [
+            {"index": index, "name": name, "label": label, "parent": int(parent)}
+            for index, (name, label, parent) in enumerate(
+                zip(map(printable, skeleton.names), labels, skeleton.parents, strict=True)
+            )
+        ],
+        "dof_table": [
+            {
+                "name": f"{labels[joint]}.{DOF_KINDS[kind]}",
+                "value": value,
+                "minimum": _finite(low),
+                "maximum": _finite(high),
+            }
+            for joint, kind, value, (low, high) in zip(
+                skeleton.dof_joints, skeleton.dof_kinds, dofs, limits.tolist(), strict=True
+            )
+        ],
+    }
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _describe_mesh(mesh: Mesh) -> dict[str, Any]:
+    areas = triangle_areas(mesh.positions, mesh.triangles)
+    lengths = np.linalg.norm(mesh.normals, axis=1)
+    return {
+        "vertices": mesh.n_vertices,
+        "triangles": mesh.n_triangles,
+        "degenerate_triangles": int((areas == 0.0).sum()),
+        "unused_vertices": int(mesh.n_vertices - len(np.unique(mesh.triangles))),
+        "normal_lengths": [float(lengths.min()), float(lengths.max())],
+        "has_uvs": mesh.uvs is not None,
+        "materials": [
+            {
+                "name": material.name,
+                "texture": material.texture,
+                "pixels": None if material.image is None else list(material.image.shape[1::-1]),
+            }
+            for material in mesh.materials
+        ],
+    }
+
+
+def _describe_skin(skin: Skin) -> dict[str, Any]:
+    counts = influence_counts(skin)
+    sums = weight_sums(skin)
+    moved = has_influence(skin)
+    used = np.unique(skin.joints[skin.weights != 0.0])
+    return {
+        "bindings": skin.n_joints,
+        "influences": len(skin.joints),
+        "influence_histogram": {
+            str(count): int(number) for count, number in enumerate(np.bincount(counts)) if number
+        },
+        "mean_influences": float(counts.mean()),
+        "weight_sums": [float(sums[moved].min()), float(sums[moved].max())] if moved.any() else [],
+        "zero_weights": int((skin.weights == 0.0).sum()),
+        "negative_weights": int((skin.weights < 0.0).sum()),
+        "vertices_without_influence": int((~moved).sum()),
+        "joints_without_vertices": sorted(set(range(skin.n_joints)) - set(used.tolist())),
+    }
+
+
+def _lines(actor: dict[str, Any]) -> list[str]:
+    low, high = actor["box"]
+    lines = [
+        f"{printable(actor['name'])}",
+        f"  box        {_point(low)} to {_point(high)}, size {actor['size']:.6g}, {actor['up']} up",
+    ]
+    if "skeleton" in actor:
+        lines += _skeleton_lines(actor["skeleton"])
+    if "mesh" in actor:
+        lines += _mesh_lines(actor["mesh"])
+    if "skin" in actor:
+        lines += _skin_lines(actor["skin"])
+    return lines
+
+
+def _skeleton_lines(skeleton: dict[str, Any]) -> list[str]:
+    lines = [
+        f"  skeleton   {skeleton['joints']} joints, {skeleton['dofs']} DOFs "
+        f"({skeleton['limited_dofs']} limited, {skeleton['locked_dofs']} of them locked)"
+    ]
+    for dof in skeleton["dof_table"]:
+        low, high = dof["minimum"], dof["maximum"]
+        if low is None and high is None and dof["value"] == 0.0:
+            continue
+        limits = "unlimited" if low is None and high is None else f"{_bound(low)} to {_bound(high)}"
+        if low is not None and low == high:
+            limits = "locked"
+        lines.append(f"    {printable(dof['name']):<24} {dof['value']:>10.6g}  {limits}")
+    return lines
+
+
+def _bound(value: float | None) -> str:
+    return "unlimited" if value is None else f"{value:.6g}"
+
+
+def _mesh_lines(mesh: dict[str, Any]) -> list[str]:
+    lines = [
+        f"  mesh       {mesh['vertices']} vertices, {mesh['triangles']} triangles "
+        f"({mesh['degenerate_triangles']} without area), "
+        f"{'with' if mesh['has_uvs'] else 'without'} texture coordinates"
+    ]
+    for material in mesh["materials"]:
+        pixels = material["pixels"]
+        state = f"{pixels[0]} x {pixels[1]} pixels" if pixels else "not drawn"
+        name = printable(material["name"] or "without a name")
+        lines.append(f"    material {name}: {printable(material['texture'])}, {state}")
+    return lines
+
+
+def _skin_lines(skin: dict[str, Any]) -> list[str]:
+    histogram = "  ".join(f"{k}: {n}" for k, n in skin["influence_histogram"].items())
+    sums = skin["weight_sums"]
+    lines = [
+        f"  skin       {skin['bindings']} bindings, {skin['influences']} influences, "
+        f"mean {skin['mean_influences']:.3g} a vertex",
+        f"    vertices by number of influences   {histogram}",
+    ]
+    if sums:
+        lines.append(f"    weight sums {sums[0]:.6g} to {sums[1]:.6g}")
+    for key, text in (
+        ("zero_weights", "weights are 0"),
+        ("negative_weights", "weights are negative"),
+        ("vertices_without_influence", "vertices have no influence"),
+    ):
+        if skin[key]:
+            lines.append(f"    {skin[key]} {text}")
+    if skin["joints_without_vertices"]:
+        lines.append(f"    {len(skin['joints_without_vertices'])} joints move no vertex")
+    return lines
+
+
+def _point(values: list[float]) -> str:
+    return f"({', '.join(f'{value:.6g}' for value in values)})"

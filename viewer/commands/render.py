@@ -1,0 +1,123 @@
+"""Draw files into a picture, without display or window."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from viewer.commands._common import (
+    add_camera_arguments,
+    add_display_arguments,
+    add_scene_arguments,
+    camera_of,
+    display_of,
+    open_scene,
+    parse_size,
+    print_warnings,
+)
+from viewer.errors import OutputError, ViewerError, printable
+from viewer.rendering.camera import Camera
+from viewer.rendering.options import DisplayOptions
+from viewer.rig.arrays import Bytes, Floats
+from viewer.rig.mesh import bounding_box
+from viewer.rig.scene import Scene, scene_points
+
+__all__ = ["add_arguments", "run"]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    add_scene_arguments(parser)
+    parser.add_argument("-o", "--output", required=True, metavar="PICTURE", help=".png, .jpg, …")
+    parser.add_argument("--force", action="store_true", help="replace an existing picture")
+    parser.add_argument("--size", default="1280x720", metavar="WxH", help="default: 1280x720")
+    add_camera_arguments(parser)
+    add_display_arguments(parser)
+    parser.add_argument("--panels", action="store_true", help="draw the whole interface too")
+    parser.add_argument("--gpu", type=int, metavar="N", help="use EGL device N (see doctor)")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Draw the picture, write it, and say where it is."""
+    size = parse_size(arguments.size)
+    output = Path(arguments.output)
+    check_output(output, [Path(file) for file in arguments.files], arguments.force)
+    options = display_of(arguments)
+    scene = open_scene(arguments)
+    points = scene_points(scene)
+    camera = camera_of(arguments, scene, points, size)
+    draw = _draw_panels if arguments.panels else draw_scene
+    pixels = draw(scene, size, camera, options, bounding_box(points), arguments.gpu)
+    save_picture(output, pixels)
+    grid = f", grid {_grid_step(points):g}" if options.grid else ""
+    print(f"{printable(output)}: {size[0]} x {size[1]}{grid}")
+    return 0
+
+
+def check_output(output: Path, inputs: list[Path], force: bool) -> None:
+    """Refuse, before anything is drawn, to replace a file nobody said may be replaced.
+
+    Raises
+    ------
+    OutputError
+        If the output is one of the inputs, a folder, or exists without ``--force``.
+    """
+    shown = printable(output, 300)
+    try:
+        if output.is_dir():
+            raise OutputError(f"{shown}: is a folder")
+        if any(path.exists() and output.exists() and path.samefile(output) for path in inputs):
+            raise OutputError(f"{shown}: is an input file, which is never replaced")
+        if output.is_file() and not force:
+            raise OutputError(f"{shown}: exists already (--force replaces it)")
+    except (OSError, ValueError) as problem:
+        reason = getattr(problem, "strerror", None) or problem
+        raise OutputError(f"{shown}: {reason}") from None
+
+
+def draw_scene(
+    scene: Scene,
+    size: tuple[int, int],
+    camera: Camera,
+    options: DisplayOptions,
+    box: Floats,
+    device: int | None = None,
+) -> Bytes:
+    """Return the scene's pixels, (H, W, 4) uint8; what the driver could not do is printed."""
+    from viewer.rendering.offscreen import Offscreen
+
+    with Offscreen(device) as offscreen:
+        pixels = offscreen.render(scene, size, camera, options, box)
+        print_warnings(offscreen.renderer.notes)
+        return pixels
+
+
+def _draw_panels(
+    scene: Scene,
+    size: tuple[int, int],
+    camera: Camera,
+    options: DisplayOptions,
+    box: Floats,
+    device: int | None = None,
+) -> Bytes:
+    from viewer.app.headless import HeadlessApp
+    from viewer.app.state import AppState
+
+    if min(size) < 200:
+        raise ViewerError(f"--panels needs at least 200 x 200 pixels, found {size[0]} x {size[1]}")
+    state = AppState(scene, camera=camera, options=options, box=box)
+    with HeadlessApp(state, size, device=device) as app:
+        return app.picture()
+
+
+def save_picture(path: Path, pixels: Bytes) -> None:
+    """Write a picture in the format of its suffix."""
+    from viewer.formats import save_image
+
+    save_image(path, pixels)
+
+
+def _grid_step(points: Floats) -> float:
+    from viewer.rendering.ground_pass import grid_step
+
+    return grid_step(bounding_box(points))

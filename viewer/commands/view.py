@@ -1,0 +1,71 @@
+"""Open files in a window; without a display, draw them into a picture in the current folder."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from viewer.commands._common import (
+    add_camera_arguments,
+    add_display_arguments,
+    add_scene_arguments,
+    camera_of,
+    display_of,
+    open_scene,
+)
+from viewer.errors import printable
+from viewer.formats import free_path
+from viewer.rendering.camera import Camera
+from viewer.rendering.options import DisplayOptions
+from viewer.rig.arrays import Floats
+from viewer.rig.mesh import bounding_box
+from viewer.rig.scene import Scene, scene_points
+
+__all__ = ["add_arguments", "run"]
+
+SIZE = (1280, 720)
+"""Of the picture that is drawn where no window can be opened."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    add_scene_arguments(parser)
+    add_camera_arguments(parser)
+    add_display_arguments(parser)
+    parser.add_argument("--scale", type=float, metavar="S", help="size of the interface, e.g. 1.5")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Open the window, or write the picture that it would show."""
+    options = display_of(arguments)
+    scene = open_scene(arguments)
+    points = scene_points(scene)
+    camera = camera_of(arguments, scene, points, SIZE)
+    from viewer.app.display import NoDisplay, find_display
+
+    try:
+        find_display()
+    except NoDisplay as problem:
+        return _draw_instead(str(problem), scene, camera, options, bounding_box(points))
+    from viewer.app.window import show
+
+    show(
+        scene,
+        camera=camera,
+        options=options,
+        paths=arguments.files,
+        scale=arguments.scale,
+        fit_distance=arguments.distance is None,
+    )
+    return 0
+
+
+def _draw_instead(
+    reason: str, scene: Scene, camera: Camera, options: DisplayOptions, box: Floats
+) -> int:
+    from viewer.commands.render import draw_scene, save_picture
+
+    path = free_path(Path.cwd(), scene.actors[0].figure.name, ".png")
+    save_picture(path, draw_scene(scene, SIZE, camera, options, box))
+    print(f"{reason}; drew {printable(path, 300)} instead")
+    return 0

@@ -1,0 +1,103 @@
+"""The ``material`` section of a ``.skin`` file and the picture it names."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Container
+
+from viewer.formats._image import load_image
+from viewer.formats._numbers import is_number
+from viewer.formats._source import Source, shown
+from viewer.rig.arrays import Bytes
+from viewer.rig.mesh import Material
+
+__all__ = ["read_material"]
+
+# A file name may hold blanks: it reaches to the end of its line.
+_FILE_NAME = re.compile(rb"[ \t\n\r\v\f]*([^\r\n{}]*)")
+
+Word = re.Match[bytes]
+
+
+def read_material(
+    source: Source, header: Word, keywords: Container[bytes], pictures: dict[str, Bytes | None]
+) -> tuple[Material, int]:
+    """Read one material.
+
+    Parameters
+    ----------
+    source : Source
+        The file.
+    header : Word
+        The word ``material``.
+    keywords : container of bytes
+        Words that begin a section, and so are no part of a name.
+    pictures : dict
+        Those loaded so far, by name; this material's is added.
+
+    Returns
+    -------
+    material : Material
+        With its picture, if that can be read.
+    end : int
+        Offset behind it.
+
+    Raises
+    ------
+    FormatError
+        If a brace is missing.
+    """
+    name, brace = _name(source, header, keywords)
+    texture: str | None = None
+    position = brace.end()
+    while (word := source.next_word(position)) is not None and word.group() != b"}":
+        if word.group() == b"texture":
+            rest = _FILE_NAME.match(source.data, word.end())
+            assert rest is not None  # the pattern matches the empty string too
+            texture = rest[1].strip().decode("utf-8", "surrogateescape") or None
+            position = rest.end()
+        else:
+            source.warn(f"skipped unknown {shown(word.group())} in a material", word.start())
+            position = _skip(source, word)
+    if word is None:
+        raise source.error(
+            f'expected "}}" to close material (line {source.line(header.start())}), '
+            "found the end of the file",
+            len(source.data.rstrip()),
+        )
+    if texture is None:
+        source.warn("material without texture: drawn untextured", header.start())
+        return Material(name), word.end()
+    if texture not in pictures:
+        pictures[texture] = load_image(source, texture, header.start())
+    return Material(name, texture, pictures[texture]), word.end()
+
+
+def _name(source: Source, header: Word, keywords: Container[bytes]) -> tuple[str, Word]:
+    """Return the words up to the opening brace, and that brace."""
+    words: list[bytes] = []
+    word = source.next_word(header.end())
+    while word is not None and word.group() not in (b"{", b"}") and word.group() not in keywords:
+        words.append(word.group())
+        word = source.next_word(word.end())
+    if word is None or word.group() != b"{":
+        found = "the end of the file" if word is None else shown(word.group())
+        where = header.start() if word is None else word.start()
+        raise source.error(f'material: expected "{{", found {found}', where)
+    return b" ".join(words).decode("utf-8", "surrogateescape"), word
+
+
+def _skip(source: Source, word: Word) -> int:
+    """Return the offset behind an unknown item: its numbers, or its whole balanced block."""
+    position, depth = word.end(), int(word.group() == b"{")
+    while (following := source.next_word(position)) is not None:
+        text = following.group()
+        if depth == 0 and text != b"{" and not is_number(text):
+            return position
+        depth += {b"{": 1, b"}": -1}.get(text, 0)
+        position = following.end()
+        if text == b"}" and depth == 0:
+            return position
+    if depth:
+        raise source.error(f"{shown(word.group())} is still open where the file ends", word.start())
+    return position
