@@ -149,7 +149,7 @@ def _draw_file_menu(state: AppState) -> list[Path]:
 
 def _overlay(name: str, x: float, y: float, pivot: tuple[float, float]) -> bool:
     imgui.set_next_window_pos((x, y), imgui.Cond_.always, pivot)
-    imgui.set_next_window_bg_alpha(0.72)
+    imgui.set_next_window_bg_alpha(0.86)
     flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_docking
     flags |= imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_saved_settings
     flags |= imgui.WindowFlags_.no_inputs | imgui.WindowFlags_.no_focus_on_appearing

@@ -20,9 +20,8 @@ def handle_mouse(state: AppState) -> None:
     if io.want_capture_mouse or width < 1 or height < 1:
         return
     delta = io.mouse_delta
-    left = imgui.is_mouse_dragging(imgui.MouseButton_.left, 0.0)
-    pans = imgui.is_mouse_dragging(imgui.MouseButton_.right, 0.0)
-    pans = pans or imgui.is_mouse_dragging(imgui.MouseButton_.middle, 0.0)
+    left = _drags(imgui.MouseButton_.left)
+    pans = _drags(imgui.MouseButton_.right) or _drags(imgui.MouseButton_.middle)
     if pans or (left and io.key_shift):
         pan(state.camera, -delta.x / height, delta.y / height)
     elif left:
@@ -31,3 +30,8 @@ def handle_mouse(state: AppState) -> None:
         across = (io.mouse_pos.x - x - width / 2) / height
         upward = -(io.mouse_pos.y - y - height / 2) / height
         zoom(state.camera, _ZOOM_PER_NOTCH**io.mouse_wheel, across, upward)
+
+
+def _drags(button: imgui.MouseButton_) -> bool:
+    # A quick hand moves and lets go within one frame: that way belongs to the drag as well.
+    return imgui.is_mouse_dragging(button, 0.0) or imgui.is_mouse_released(button)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -31,6 +30,7 @@ __all__ = ["show"]
 _SIZE = (1280, 800)
 _SETTLE_FRAMES = 3  # drawn after an event: ImGui needs two to come to rest
 _IDLE_SECONDS = 0.5  # how often messages that time out are looked at
+_BUSY_SECONDS = 0.05  # the same while a file is read
 
 
 def show(
@@ -98,7 +98,7 @@ class _Window:
         self._is_dirty = True
         self._title = ""
         self._set_callbacks()
-        self._imgui = imgui.create_context()
+        self._imgui: Any = imgui.create_context()
         self._set_up_imgui(scale)
         self.frame = Frame(state, self.context, glfw.post_empty_event, keeps_recent=True)
 
@@ -143,30 +143,34 @@ class _Window:
         """Draw frames until the window is closed; sleep while nothing happens."""
         left = _SETTLE_FRAMES
         while not glfw.window_should_close(self.handle):
-            left = _SETTLE_FRAMES if self._wait(left) else left - 1
+            left = _SETTLE_FRAMES if self._wait(left > 0) else left - 1
             if self._dropped:
                 self.frame.open(self._dropped)
                 self._dropped = []
-            if self._draw() and fits:
+            if left < 0 or not self._draw():
+                continue
+            if fits and left == 0:
                 # Only now it is known how much room the panels leave.
                 fit(self.state.camera, scene_points(self.state.scene), self.state.aspect)
-                fits = False
+                fits, left = False, 1
             if "quit" in self.state.wants:
                 glfw.set_window_should_close(self.handle, True)
 
-    def _wait(self, left: int) -> bool:
-        """Wait for events unless frames are left to draw; return whether something happened."""
+    def _wait(self, is_settling: bool) -> bool:
+        """Take in what happened, waiting for it unless frames are left to draw.
+
+        Returns whether something happened. ImGui spreads quick events over several frames, so
+        it counts as well that it has some left.
+        """
         self._is_dirty = False
-        if left > 0 or imgui.get_io().want_text_input:
+        state = self.state
+        if is_settling:
             glfw.poll_events()
-            return self._is_dirty
-        busy = self.state.notes or self.state.loader is not None
-        while True:
-            started = time.monotonic()
-            glfw.wait_events_timeout(0.05 if self.state.loader else _IDLE_SECONDS)
-            came_early = time.monotonic() - started < 0.9 * _IDLE_SECONDS
-            if came_early or busy or self._dropped:
-                return True
+        else:
+            glfw.wait_events_timeout(_BUSY_SECONDS if state.loader else _IDLE_SECONDS)
+            # Messages that time out, the bar of a file being read, a text cursor that blinks.
+            self._is_dirty |= bool(state.notes or state.loader or imgui.get_io().want_text_input)
+        return self._is_dirty or bool(self._dropped) or len(self._imgui.input_events_queue) > 0
 
     def _draw(self) -> bool:
         """Draw one frame; return False if the window has no pixels at present."""
