@@ -24,10 +24,9 @@ def import_glfw() -> Any:
     """
     import imgui_bundle  # noqa: F401
 
-    # GLFW reports errors as warnings; here they are raised or asked for instead.
-    os.environ.setdefault("PYGLFW_PREVIEW", "0")
     import glfw
 
+    # GLFW reports errors as Python warnings; here they are asked for and raised instead.
     glfw.ERROR_REPORTING = "ignore"
     return glfw
 

@@ -25,7 +25,7 @@ from viewer.rendering.options import DisplayOptions  # noqa: E402
 from viewer.rig.mesh import bounding_box  # noqa: E402
 from viewer.rig.scene import Scene, scene_points  # noqa: E402
 
-__all__ = ["show"]
+__all__ = ["probe", "show"]
 
 _SIZE = (1280, 800)
 _SETTLE_FRAMES = 3  # drawn after an event: ImGui needs two to come to rest
@@ -79,6 +79,20 @@ def show(
         window.run(fit_distance)
     finally:
         window.release()
+
+
+def probe() -> str:
+    """Open a window that nobody sees and return what draws in it; see ``show`` for errors."""
+    find_display()
+    handle = _create_window("viewer", is_visible=False)
+    try:
+        glfw.make_context_current(handle)
+        context = _context()
+        found = f"{context.info['GL_RENDERER']}, OpenGL {context.info['GL_VERSION']}"
+        context.release()
+        return found
+    finally:
+        glfw.destroy_window(handle)
 
 
 class _Window:
@@ -206,8 +220,9 @@ def _title(state: AppState) -> str:
     return f"{printable(' + '.join(names), 100)} - viewer"
 
 
-def _create_window(title: str) -> Any:
+def _create_window(title: str, is_visible: bool = True) -> Any:
     glfw.default_window_hints()
+    glfw.window_hint(glfw.VISIBLE, is_visible)
     glfw.window_hint(glfw.CONTEXT_VERSION_MAJOR, 3)
     glfw.window_hint(glfw.CONTEXT_VERSION_MINOR, 3)
     glfw.window_hint(glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE)

@@ -13,7 +13,13 @@ import moderngl
 
 from viewer.errors import RenderError
 
-__all__ = ["check_errors", "explain", "headless_context"]
+__all__ = [
+    "check_errors",
+    "device_count",
+    "explain",
+    "headless_context",
+    "unreadable_devices",
+]
 
 NEEDED_VERSION = 330
 
@@ -52,7 +58,7 @@ def headless_context(device: int | None = None) -> moderngl.Context:
     try:
         return _create({"device_index": 0})
     except RenderError as first:
-        for index in range(1, _device_count()):
+        for index in range(1, device_count()):
             try:
                 return _create({"device_index": index})
             except RenderError:
@@ -72,7 +78,7 @@ def _create(options: Mapping[str, int]) -> moderngl.Context:
     return context
 
 
-def _device_count() -> int:
+def device_count() -> int:
     """Ask for an impossible device: the refusal tells how many there are."""
     try:
         _create({"device_index": 1 << 20})

@@ -1,0 +1,49 @@
+# Two commands for a fresh machine with python3 and make:
+#   make run    open the bundled figure (without a display: write its picture here)
+#   make test   run all tests
+# Others: make lint, make bench, make golden, make figure, make clean.
+
+PYTHON ?= python3
+VENV ?= .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+
+.PHONY: run test lint bench golden figure system clean
+
+run: $(READY) system
+	@$(BIN)/viewer $(FILES)
+
+test: $(READY) system
+	@$(BIN)/ruff check viewer tests assets
+	@$(BIN)/ruff format --check viewer tests assets
+	@$(BIN)/mypy
+	@$(BIN)/python -m pytest $(TESTS)
+
+lint: $(READY)
+	@$(BIN)/ruff check --fix viewer tests assets
+	@$(BIN)/ruff format viewer tests assets
+	@$(BIN)/mypy
+
+bench: $(READY) system
+	@$(BIN)/python tests/bench/run.py
+
+golden: $(READY) system
+	@VIEWER_UPDATE_GOLDEN=1 $(BIN)/python -m pytest -q tests/rendering tests/app
+
+# Makes the bundled figure anew; it needs scipy and scikit-image beside the rest.
+figure: $(READY)
+	@$(BIN)/pip install --quiet scipy scikit-image xatlas
+	@$(BIN)/python assets/make_fox.py
+
+# The environment, made anew when the dependencies change.
+$(READY): pyproject.toml
+	@sh .ci/environment "$(PYTHON)" "$(VENV)"
+	@touch $@
+
+# OpenGL in software and the tools of the window tests, where they are missing.
+system: $(READY)
+	@sh .ci/system "$(BIN)/python"
+
+clean:
+	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

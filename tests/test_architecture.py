@@ -1,0 +1,130 @@
+"""Imports point one way, headless stays lean, and files stay readable."""
+
+import ast
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+PACKAGE = ROOT / "viewer"
+SOURCES = sorted(PACKAGE.rglob("*.py"))
+
+# Which parts of the package each part may import.
+ALLOWED = {
+    "rig": {"rig", "errors"},
+    "formats": {"formats", "rig", "errors"},
+    "rendering": {"rendering", "rig", "errors", "resources"},
+    "loading": {"formats", "rig", "errors", "resources"},
+    "app": {"app", "formats", "loading", "rendering", "rig", "errors", "resources"},
+    "errors": set(),
+    "resources": {"errors"},
+}
+# Third-party modules with a single home.
+HOMES = {
+    "moderngl": {"rendering", "app"},
+    "pyrr": {"rendering/camera.py"},
+    "glfw": {"app"},
+    "imgui_bundle": {"app"},
+    "PIL": {"formats/_image.py"},
+}
+
+
+def imports(path: Path) -> set[str]:
+    """Return the modules that a file imports anywhere, those for type checking left out."""
+    tree = ast.parse(path.read_text())
+    guarded = {
+        id(inner)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
+        for inner in ast.walk(node)
+    }
+    names: set[str] = set()
+    for node in ast.walk(tree):
+        if id(node) in guarded:
+            continue
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names.add(node.module)
+    return names
+
+
+def part_of(path: Path) -> str:
+    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_imports_point_one_way(path: Path) -> None:
+    allowed = ALLOWED.get(part_of(path))
+    if allowed is None:
+        return  # the command line may import everything
+    used = {name.split(".")[1] for name in imports(path) if name.startswith("viewer.")}
+    assert used <= allowed
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_third_party_modules_have_one_home(path: Path) -> None:
+    inside = path.relative_to(PACKAGE).as_posix()
+    for name in imports(path):
+        homes = HOMES.get(name.split(".")[0])
+        assert homes is None or any(inside.startswith(home) for home in homes), name
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_files_and_functions_stay_short(path: Path) -> None:
+    text = path.read_text()
+    assert text.count("\n") <= 400
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.FunctionDef):
+            lines = node.end_lineno - node.lineno + 1
+            documented = ast.get_docstring(node, clean=False)
+            lines -= documented.count("\n") + 1 if documented else 0
+            assert lines <= 45, f"{node.name}: {lines} lines"
+
+
+def test_every_public_module_documents_itself() -> None:
+    for path in SOURCES:
+        assert ast.get_docstring(ast.parse(path.read_text())), path
+
+
+def test_shaders_state_the_version_and_prefix_their_names() -> None:
+    for path in (ROOT / "shaders").glob("*.*"):
+        text = path.read_text()
+        assert text.startswith("#version 330\n"), path
+        assert not re.findall(r"^in \w+ (?!in_|v_)", text, re.MULTILINE), path
+        assert not re.findall(r"^out \w+ (?!v_|f_)", text, re.MULTILINE), path
+        assert not re.findall(r"^uniform \w+ (?!u_)", text, re.MULTILINE), path
+
+
+def loaded_modules(script: str) -> set[str]:
+    code = f"import sys\n{script}\nprint(*sys.modules, file=sys.stderr)"
+    result = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, timeout=60
+    )
+    assert result.returncode == 0, result.stderr
+    return {name.split(".")[0] for name in result.stderr.splitlines()[-1].split()}
+
+
+def test_import_viewer_is_lean() -> None:
+    loaded = loaded_modules("import viewer")
+    assert not loaded & {"numpy", "moderngl", "PIL", "imgui_bundle", "glfw", "scipy", "pyrr"}
+
+
+def test_reading_a_figure_needs_no_opengl() -> None:
+    loaded = loaded_modules("import viewer; viewer.deform(viewer.load().actors[0].figure)")
+    assert not loaded & {"moderngl", "imgui_bundle", "glfw", "scipy", "pyrr"}
+
+
+def test_drawing_headlessly_needs_no_window_library() -> None:
+    loaded = loaded_modules("import viewer; viewer.render(viewer.load(), size=(32, 32))")
+    assert "moderngl" in loaded
+    assert not loaded & {"imgui_bundle", "glfw", "scipy"}
+
+
+def test_nothing_touches_the_environment_of_the_process() -> None:
+    """Libraries that set variables for everyone are a recurring fault of peers."""
+    for path in SOURCES:
+        assert not re.search(r"os\.environ\[[^]]+\]\s*=|putenv|environ\.update", path.read_text())

@@ -1,0 +1,67 @@
+"""The wheel holds all that is needed: install it in an empty environment and draw."""
+
+import os
+import subprocess
+import sys
+import venv
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+def call(*command: object, cwd: Path) -> str:
+    environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+    result = subprocess.run(
+        [str(word) for word in command],
+        capture_output=True,
+        text=True,
+        cwd=cwd,
+        env=environment,
+        timeout=600,
+    )
+    assert result.returncode == 0, result.stdout + result.stderr
+    return result.stdout
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("wheel")
+    # No isolation: hatchling is a development dependency, and the network may be away.
+    build = ("-m", "build", "--wheel", "--no-isolation", "--outdir", folder)
+    call(sys.executable, *build, ROOT, cwd=folder)
+    return next(folder.glob("*.whl"))
+
+
+def test_wheel_ships_shaders_and_assets_but_no_generators(wheel: Path) -> None:
+    names = zipfile.ZipFile(wheel).namelist()
+    assert "viewer/shaders/skin.vert" in names
+    assert "viewer/shaders/skin/lbs.glsl" in names
+    assert "viewer/assets/samples/fox.skin" in names
+    assert "viewer/assets/samples/fox.png" in names
+    assert not [name for name in names if "assets/" in name and name.endswith(".py")]
+    assert not [name for name in names if name.startswith(("tests/", "shaders/", "assets/"))]
+
+
+def test_wheel_draws_the_bundled_figure_in_an_empty_environment(
+    wheel: Path, tmp_path: Path
+) -> None:
+    venv.create(tmp_path / "venv", with_pip=True)
+    python = tmp_path / "venv" / "bin" / "python"
+    call(python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", wheel,
+         cwd=tmp_path)  # fmt: skip
+    picture = tmp_path / "fox.png"
+    viewer = tmp_path / "venv" / "bin" / "viewer"
+    printed = call(viewer, "render", "-o", picture, "--size", "320x240", cwd=tmp_path)
+    assert printed.startswith(str(picture))
+    where = call(python, "-c", "import viewer; print(viewer.__file__)", cwd=tmp_path)
+    assert str(tmp_path) in where
+    from PIL import Image
+
+    with Image.open(picture) as drawn:
+        assert drawn.size == (320, 240)
+        colors = drawn.convert("RGB").getcolors(maxcolors=1 << 20)
+    # A gradient alone has few colours; a lit, textured figure has thousands.
+    assert colors is not None and len(colors) > 3000

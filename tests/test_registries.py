@@ -1,0 +1,76 @@
+"""Each registry is exactly its folder, and what it names can be loaded."""
+
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+import viewer
+from viewer.app.panels import PANELS
+from viewer.commands import COMMANDS
+from viewer.formats import FORMATS
+from viewer.rendering.program import SHADING
+from viewer.resources import resource
+from viewer.rig.skinning import METHODS
+
+PACKAGE = Path(viewer.__file__).parent
+
+
+def modules(folder: str) -> set[str]:
+    return {path.stem for path in (PACKAGE / folder).glob("*.py") if not path.name.startswith("_")}
+
+
+@pytest.mark.parametrize(
+    ("folder", "registry"),
+    [
+        ("formats", FORMATS),
+        ("rig/skinning", METHODS),
+        ("app/panels", PANELS),
+        ("commands", COMMANDS),
+    ],
+    ids=["formats", "skinning", "panels", "commands"],
+)
+def test_registry_is_exactly_its_folder(folder: str, registry: dict[str, object]) -> None:
+    assert modules(folder) == set(registry)
+
+
+@pytest.mark.parametrize(
+    ("folder", "registry"), [("skin", METHODS), ("shade", SHADING)], ids=["skin", "shade"]
+)
+def test_shader_registry_is_exactly_its_folder(folder: str, registry: dict[str, object]) -> None:
+    assert {path.stem for path in resource("shaders", folder).glob("*.glsl")} == set(registry)
+
+
+def test_formats_can_read_and_write() -> None:
+    for name in FORMATS:
+        module = import_module(f"viewer.formats.{name}")
+        assert callable(module.read) and callable(module.write)
+
+
+def test_panels_can_draw() -> None:
+    for name in PANELS:
+        assert callable(import_module(f"viewer.app.panels.{name}").draw)
+
+
+def test_commands_can_run() -> None:
+    for name in COMMANDS:
+        module = import_module(f"viewer.commands.{name}")
+        assert callable(module.run) and callable(module.add_arguments)
+
+
+def test_public_names_exist_and_are_documented() -> None:
+    for name in viewer.__all__:
+        value = getattr(viewer, name)
+        assert value.__doc__ and value.__doc__.strip(), name
+
+
+def test_readme_lists_every_key_format_and_command() -> None:
+    from viewer.app.keys import KEYS
+
+    readme = (PACKAGE.parent / "README.md").read_text()
+    for key in KEYS:
+        assert f"| {key.label} | {key.text} |" in readme, key.label
+    for kind in FORMATS.values():
+        assert f"`{kind.suffix}`" in readme
+    for command in COMMANDS:
+        assert f"viewer {command}" in readme or command == "view"

@@ -1,0 +1,166 @@
+"""Say what this machine offers: packages, OpenGL, EGL, display; with the cure for what it lacks."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+
+import viewer
+from viewer.errors import RenderError, printable
+
+__all__ = ["Finding", "add_arguments", "examine", "run"]
+
+_PACKAGES = (
+    "numpy",
+    "moderngl",
+    "glcontext",
+    "glfw",
+    "imgui-bundle",
+    "pyrr",
+    "pillow",
+    "platformdirs",
+)
+_WINDOW_SECONDS = 20
+_SOFTWARE = ("llvmpipe", "softpipe", "swrast")
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One line of the report: what was looked at, whether it is fine, what was found, the cure."""
+
+    subject: str
+    state: str  # "ok", "note" or "missing"
+    found: str
+    cure: str = ""
+    is_vital: bool = False
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options: there are none."""
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print the report; 4 if nothing can be drawn here."""
+    code = 0
+    for finding in examine():
+        print(f"{finding.state:<8}{finding.subject:<12}{printable(finding.found, 300)}", flush=True)
+        if finding.cure:
+            print(f"{'':<20}-> {printable(finding.cure, 400)}", flush=True)
+        if finding.is_vital and finding.state == "missing":
+            code = RenderError.exit_code
+    return code
+
+
+def examine() -> Iterator[Finding]:
+    """Yield findings one by one, quick ones first."""
+    system = f"{platform.system()} {platform.release()} {platform.machine()}"
+    yield Finding(
+        "viewer", "ok", f"{viewer.__version__}, Python {sys.version.split()[0]}, {system}"
+    )
+    yield from _examine_packages()
+    yield from _examine_devices()
+    yield from _examine_drawing()
+    yield from _examine_display()
+    yield _examine_state_folder()
+
+
+def _examine_packages() -> Iterator[Finding]:
+    found, missing = [], []
+    for name in _PACKAGES:
+        try:
+            found.append(f"{name} {metadata.version(name)}")
+        except metadata.PackageNotFoundError:
+            missing.append(name)
+    yield Finding("packages", "ok", ", ".join(found))
+    if missing:
+        cure = f"pip install {' '.join(missing)}"
+        yield Finding("packages", "missing", ", ".join(missing), cure, is_vital=True)
+
+
+def _examine_devices() -> Iterator[Finding]:
+    """Report every EGL device by itself: `--gpu N` chooses among them."""
+    if not sys.platform.startswith("linux"):
+        return
+    from viewer.rendering.context import device_count, headless_context, unreadable_devices
+
+    count = device_count()
+    for index in range(count):
+        try:
+            context = headless_context(index)
+            found = f"{context.info['GL_RENDERER']}, OpenGL {context.info['GL_VERSION']}"
+            context.release()
+            yield Finding(f"EGL {index}", "ok", f"{found} (--gpu {index})")
+        except RenderError as problem:
+            yield Finding(f"EGL {index}", "note", str(problem))
+    for node in unreadable_devices():
+        cure = f"sudo usermod -aG render {os.environ.get('USER', '$USER')}, then log in again"
+        yield Finding("graphics", "note", f"{node} exists but you may not open it", cure)
+
+
+def _examine_drawing() -> Iterator[Finding]:
+    from viewer.rendering.context import headless_context
+
+    try:
+        context = headless_context()
+    except RenderError as problem:
+        yield Finding("drawing", "missing", str(problem), is_vital=True)
+        return
+    info = context.info
+    yield Finding("drawing", "ok", f"without a window: {info['GL_RENDERER']}, {info['GL_VENDOR']}")
+    yield Finding(
+        "limits",
+        "ok",
+        f"textures {info['GL_MAX_TEXTURE_SIZE']}, pictures "
+        f"{min(info['GL_MAX_VIEWPORT_DIMS'])} pixels a side, {context.max_samples} samples a pixel",
+    )
+    if any(name in info["GL_RENDERER"].lower() for name in _SOFTWARE):
+        cure = "a graphics card needs its driver, and in a container access to /dev/dri"
+        yield Finding("graphics", "note", "drawing is done in software", cure)
+    context.release()
+
+
+def _examine_display() -> Iterator[Finding]:
+    names = ("DISPLAY", "WAYLAND_DISPLAY", "XDG_SESSION_TYPE")
+    values = ", ".join(f"{name}={os.environ[name]}" for name in names if os.environ.get(name))
+    from viewer.app.display import NoDisplay, find_display
+
+    try:
+        find_display()
+    except NoDisplay as problem:
+        cure = "for pictures without a window: viewer render FILES -o out.png; over ssh: ssh -X"
+        yield Finding("display", "note", str(problem), cure)
+        return
+    yield Finding("display", "ok", values or "found")
+    yield _examine_window()
+
+
+def _examine_window() -> Finding:
+    """Open a window in a process of its own: a broken driver may take that one down, not us."""
+    script = "from viewer.app.window import probe; print(probe())"
+    command = [sys.executable, "-c", script]
+    try:
+        result = subprocess.run(command, capture_output=True, text=True, timeout=_WINDOW_SECONDS)
+    except subprocess.TimeoutExpired:
+        return Finding("window", "missing", f"none within {_WINDOW_SECONDS} s")
+    if result.returncode == 0:
+        return Finding("window", "ok", result.stdout.strip())
+    words = (result.stderr or result.stdout).strip().splitlines() or ["it crashed"]
+    return Finding("window", "missing", words[-1])
+
+
+def _examine_state_folder() -> Finding:
+    from viewer.app.recent import state_folder
+
+    folder = state_folder()
+    existing = next((path for path in (folder, *folder.parents) if path.exists()), Path("/"))
+    if os.access(existing, os.W_OK):
+        return Finding("settings", "ok", str(folder))
+    cure = "set XDG_STATE_HOME to a folder that you may write to"
+    return Finding("settings", "note", f"{folder} cannot be written: nothing is remembered", cure)
