@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from viewer.rendering.camera import Camera
     from viewer.rendering.offscreen import render
     from viewer.rendering.options import DisplayOptions, Light, Lights
+    from viewer.rig.clip import Channel, Clip, evaluate, sample
     from viewer.rig.figure import Figure
     from viewer.rig.mesh import Material, Mesh
     from viewer.rig.pose import Pose, rest_pose
@@ -35,6 +36,8 @@ __version__ = "0.1.0"
 __all__ = [
     "Actor",
     "Camera",
+    "Channel",
+    "Clip",
     "DisplayOptions",
     "Figure",
     "Light",
@@ -47,9 +50,11 @@ __all__ = [
     "Skin",
     "ViewerError",
     "deform",
+    "evaluate",
     "load",
     "render",
     "rest_pose",
+    "sample",
     "show",
     "write",
 ]
@@ -57,6 +62,8 @@ __all__ = [
 _HOMES = {
     "Actor": "rig.scene",
     "Camera": "rendering.camera",
+    "Channel": "rig.clip",
+    "Clip": "rig.clip",
     "DisplayOptions": "rendering.options",
     "Figure": "rig.figure",
     "Light": "rendering.options",
@@ -69,9 +76,11 @@ _HOMES = {
     "Skin": "rig.skin",
     "ViewerError": "errors",
     "deform": "rig.skinning",
+    "evaluate": "rig.clip",
     "load": "loading",
     "render": "rendering.offscreen",
     "rest_pose": "rig.pose",
+    "sample": "rig.clip",
     "show": "app.window",
     "write": "formats",
 }

@@ -25,6 +25,9 @@ __all__ = [
 ]
 
 
+_LONGEST = 1000  # characters of a message with names in it
+
+
 def printable(text: object, limit: int = 200) -> str:
     r"""Return ``text`` on one line: control characters escaped, cut after ``limit`` characters.
 
@@ -69,9 +72,16 @@ class FormatError(ViewerError):
 class UnsupportedFormatError(ViewerError):
     """No reader or writer knows this kind of file."""
 
+    def __init__(self, message: str) -> None:
+        super().__init__(printable(message, _LONGEST))
+
 
 class RigError(ViewerError):
     """Parts of a figure that do not fit each other, or a name that it does not have."""
+
+    def __init__(self, message: str) -> None:
+        # Names of joints and figures come from files, and may hold anything.
+        super().__init__(printable(message, _LONGEST))
 
 
 class RenderError(ViewerError):

@@ -10,6 +10,7 @@ import numpy as np
 from viewer.errors import FormatError, RigError, printable
 from viewer.formats import MAX_SIZE, Source, read
 from viewer.resources import resource
+from viewer.rig.clip import Clip, sample
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor, Scene, scene_box
 from viewer.rig.transform import translation_matrix
@@ -29,12 +30,13 @@ def load(*paths: str | Path, max_size: int = MAX_SIZE) -> Scene:
 
     Files are recognised by content. A skeleton takes the first skin that has its number of
     joints, one of the same name if there is one. A figure without a partner opens alone; several
-    actors stand side by side.
+    actors stand side by side. A clip goes to the first actor without one that has its number of
+    channels, and poses it as at the clip's start.
 
     Parameters
     ----------
     *paths : str or Path
-        ``.skel`` and ``.skin`` files in any order.
+        ``.skel``, ``.skin`` and ``.anim`` files in any order.
     max_size : int
         Larger files, in bytes, are refused before they are read.
 
@@ -48,18 +50,25 @@ def load(*paths: str | Path, max_size: int = MAX_SIZE) -> Scene:
     FormatError
         If a file cannot be read; with the line if there is one.
     RigError
-        If a skin does not fit its skeleton; the message names both files and both numbers.
+        If a skin or clip does not fit its skeleton; the message names files and numbers.
 
     >>> scene = load()
     >>> scene.actors[0].figure.name
     'fox'
     """
     sources = [Source.open(path, max_size) for path in paths or bundled_files()]
-    figures = [read(source) for source in sources]
-    actors = [
-        Actor(_join([sources[i].path for i in pair], [figures[i] for i in pair]))
-        for pair in _pairs(figures)
-    ]
+    figures: list[tuple[Path, Figure]] = []
+    clips: list[tuple[Path, Clip]] = []
+    for source in sources:
+        content = read(source)
+        if isinstance(content, Clip):
+            clips.append((source.path, content))
+        else:
+            figures.append((source.path, content))
+    pairs = _pairs([figure for _, figure in figures])
+    actors = [Actor(_join([figures[index] for index in pair])) for pair in pairs]
+    for path, clip in clips:
+        _assign(path, clip, actors, [path for path, figure in figures if figure.skeleton])
     _place_side_by_side(actors)
     return Scene(actors, tuple(text for source in sources for text in source.warnings))
 
@@ -89,10 +98,32 @@ def _fits_by_name(skeleton: Figure, skin: Figure) -> bool:
     return skeleton.name == skin.name and _fits(skeleton, skin)
 
 
-def _join(paths: list[Path], figures: list[Figure]) -> Figure:
+def _assign(path: Path, clip: Clip, actors: list[Actor], skeleton_paths: list[Path]) -> None:
+    """Give a clip to the first actor that it fits, and pose that one as at its start."""
+    skeletons = [actor.figure.skeleton for actor in actors]
+    for actor, skeleton in zip(actors, skeletons, strict=True):
+        fits = skeleton is not None and skeleton.n_dofs == len(clip.channels)
+        if fits and skeleton is not None and actor.pose is not None and actor.clip is None:
+            actor.clip = clip
+            sample(clip, skeleton, clip.start, out=actor.pose)
+            return
+    shown, count = printable(path, 300), len(clip.channels)
+    first = next((skeleton for skeleton in skeletons if skeleton is not None), None)
+    if first is None:
+        raise RigError(f"{shown} is a clip: open it together with its .skel")
+    if any(skeleton is not None and skeleton.n_dofs == count for skeleton in skeletons):
+        raise RigError(f"{shown}: every skeleton that it fits has a clip already")
+    raise RigError(
+        f"{shown} has {count} channels, {printable(skeleton_paths[0], 300)} needs "
+        f"{first.n_dofs} (3 + 3 x {first.n_joints} joints)"
+    )
+
+
+def _join(parts: list[tuple[Path, Figure]]) -> Figure:
     """Attach a skin to its skeleton, or return the figure that stands alone."""
-    if len(figures) == 1:
-        return figures[0]
+    if len(parts) == 1:
+        return parts[0][1]
+    paths, figures = [path for path, _ in parts], [figure for _, figure in parts]
     skeleton, skin = figures[0].skeleton, figures[1].skin
     skel_path, skin_path = (printable(path, 300) for path in paths)
     assert skeleton is not None  # the pairs put it first

@@ -22,7 +22,7 @@ def import_glfw() -> Any:
     Two copies of GLFW in one process do not know each other's windows. imgui-bundle tells glfw
     which one to load, so it has to be imported first.
     """
-    import imgui_bundle  # noqa: F401
+    import imgui_bundle  # noqa: F401, I001
 
     import glfw
 

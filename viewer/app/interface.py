@@ -10,7 +10,7 @@ from viewer.app.actions import cancel, redo, reset_pose, undo
 from viewer.app.keys import KEYS, MOUSE
 from viewer.app.panels import PANELS, panel_module
 from viewer.app.state import AppState
-from viewer.app.widgets import button, note_item
+from viewer.app.widgets import begin_menu, button, menu_item, note_item
 from viewer.errors import printable
 from viewer.rendering.ground_pass import grid_step
 
@@ -96,28 +96,27 @@ def _draw_menu(state: AppState) -> list[Path]:
     chosen: list[Path] = []
     if not imgui.begin_main_menu_bar():
         return chosen
-    if imgui.begin_menu("File"):
+    if begin_menu(state, "File"):
         chosen = _draw_file_menu(state)
         imgui.end_menu()
-    note_item(state, "menu File")
-    if imgui.begin_menu("Edit"):
-        if imgui.menu_item("Undo", "Ctrl+Z", False, state.history.can_undo)[0]:
+    if begin_menu(state, "Edit"):
+        if menu_item(state, "Undo", "Ctrl+Z", enabled=state.history.can_undo):
             undo(state)
-        if imgui.menu_item("Redo", "Ctrl+Shift+Z", False, state.history.can_redo)[0]:
+        if menu_item(state, "Redo", "Ctrl+Shift+Z", enabled=state.history.can_redo):
             redo(state)
-        if imgui.menu_item("Reset pose", "R", False)[0]:
+        if menu_item(state, "Reset pose", "R"):
             reset_pose(state)
         imgui.end_menu()
-    if imgui.begin_menu("Window"):
+    if begin_menu(state, "Window"):
         for name, panel in PANELS.items():
-            if imgui.menu_item(panel.title, "", name not in state.closed_panels)[0]:
+            if menu_item(state, panel.title, "", name not in state.closed_panels):
                 state.closed_panels ^= {name}
         imgui.separator()
-        if imgui.menu_item("Reset layout", "", False)[0]:
+        if menu_item(state, "Reset layout"):
             state.wants_layout_reset = True
         imgui.end_menu()
-    if imgui.begin_menu("Help"):
-        if imgui.menu_item("Keys", "H", state.keys_visible)[0]:
+    if begin_menu(state, "Help"):
+        if menu_item(state, "Keys", "H", state.keys_visible):
             state.keys_visible = not state.keys_visible
         imgui.end_menu()
     imgui.end_main_menu_bar()
@@ -126,23 +125,23 @@ def _draw_menu(state: AppState) -> list[Path]:
 
 def _draw_file_menu(state: AppState) -> list[Path]:
     chosen: list[Path] = []
-    if imgui.menu_item("Open…", "Ctrl+O", False)[0]:
+    if menu_item(state, "Open…", "Ctrl+O"):
         state.wants.add("open dialog")
-    note_item(state, "Open…")
-    if imgui.begin_menu("Open recent", bool(state.recent)):
+    if begin_menu(state, "Open recent", bool(state.recent)):
         for number, group in enumerate(state.recent):
             text = printable(" + ".join(Path(path).name for path in group), 80)
             if imgui.menu_item(f"{text}##recent{number}", "", False)[0]:
                 chosen = [Path(path) for path in group]
+            note_item(state, f"recent {number}")
             if imgui.is_item_hovered():
                 imgui.set_tooltip("\n".join(printable(path, 200) for path in group))
         imgui.end_menu()
-    if imgui.menu_item("Bundled figure", "", False)[0]:
+    if menu_item(state, "Bundled figure"):
         state.wants.add("open bundled")
     imgui.separator()
-    if imgui.menu_item("Save screenshot", "F12", False)[0]:
+    if menu_item(state, "Save screenshot", "F12"):
         state.wants.add("screenshot")
-    if imgui.menu_item("Quit", "Ctrl+Q", False)[0]:
+    if menu_item(state, "Quit", "Ctrl+Q"):
         state.wants.add("quit")
     return chosen
 

@@ -14,6 +14,7 @@ from viewer.rendering.camera import Camera, fit
 from viewer.rendering.options import SHOWN, DisplayOptions
 from viewer.rendering.program import SHADING
 from viewer.rig.arrays import Floats
+from viewer.rig.clip import sample
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skeleton import clamp_dofs, dof_label, find_dof
 
@@ -35,7 +36,10 @@ _UNITS = {"k": 1 << 10, "m": 1 << 20, "g": 1 << 30}
 
 def add_scene_arguments(parser: argparse.ArgumentParser) -> None:
     """Add FILES and the options that pose what they hold."""
-    parser.add_argument("files", nargs="*", metavar="FILES", help=".skel and .skin files")
+    parser.add_argument("files", nargs="*", metavar="FILES", help=".skel, .skin, .anim files")
+    parser.add_argument(
+        "--time", type=number, metavar="S", help="pose by the clip at S seconds (default its start)"
+    )
     parser.add_argument(
         "--dof",
         action="append",
@@ -105,8 +109,27 @@ def open_scene(arguments: argparse.Namespace) -> Scene:
     """Load the files, print what their readers noticed, and pose them as asked."""
     scene = load(*arguments.files, max_size=_parse_bytes(arguments.max_size))
     print_warnings(scene.warnings)
+    apply_time(scene, arguments.time)
     apply_dofs(scene, arguments.dof)
     return scene
+
+
+def apply_time(scene: Scene, time: float | None) -> None:
+    """Pose every actor that has a clip as it is at a time in seconds.
+
+    Raises
+    ------
+    ViewerError
+        If a time is given and no actor has a clip.
+    """
+    if time is None:
+        return
+    moving = [actor for actor in scene.actors if actor.clip is not None]
+    if not moving:
+        raise ViewerError("--time: no file is a clip")
+    for actor in moving:
+        if actor.clip and actor.figure.skeleton and actor.pose:
+            sample(actor.clip, actor.figure.skeleton, time, out=actor.pose)
 
 
 def print_warnings(warnings: Sequence[str]) -> None:

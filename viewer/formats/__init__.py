@@ -11,6 +11,7 @@ from viewer.errors import FormatError, UnsupportedFormatError
 from viewer.formats._image import save_image
 from viewer.formats._save import free_path, save_bytes
 from viewer.formats._source import MAX_SIZE, Source
+from viewer.rig.clip import Clip
 from viewer.rig.figure import Figure
 
 __all__ = [
@@ -55,8 +56,9 @@ FORMATS = {
         ".skin",
         rb"(?:^|[\s}])(?:positions|normals|texcoords|skinweights|triangles|bindings)\s+[-+\w]",
     ),
+    "anim": Format("clip (CSE169)", ".anim", rb"(?:^|\s)animation\s*\{"),
 }
-"""Modules in this folder; each has ``read(source)``, ``write(figure, path)``, or both."""
+"""Modules in this folder; each has ``read(source)``, ``write(figure or clip, path)``, or both."""
 
 
 def detect(source: Source) -> str:
@@ -91,17 +93,17 @@ def detect(source: Source) -> str:
     raise FormatError(source.path, f"expected a {wanted} file, found {looks or 'something else'}")
 
 
-def read(source: Source) -> Figure:
+def read(source: Source) -> Figure | Clip:
     """Read whatever the file holds; see the format modules for what they raise."""
     return import_module(f"{__name__}.{detect(source)}").read(source)
 
 
-def write(figure: Figure, path: str | Path) -> None:
-    """Write a figure, or the part of it that the format of the suffix holds.
+def write(content: Figure | Clip, path: str | Path) -> None:
+    """Write a clip or a figure, or the part of it that the format of the suffix holds.
 
     Parameters
     ----------
-    figure : Figure
+    content : Figure or Clip
         What to write.
     path : str or Path
         Its suffix chooses the format.
@@ -109,14 +111,14 @@ def write(figure: Figure, path: str | Path) -> None:
     Raises
     ------
     UnsupportedFormatError
-        If no format has this suffix, or it cannot hold the figure.
+        If no format has this suffix, or it cannot hold the content.
     OutputError
         If the file cannot be written.
     """
     suffix = Path(path).suffix.lower()
     for key, kind in FORMATS.items():
         if kind.suffix == suffix:
-            import_module(f"{__name__}.{key}").write(figure, path)
+            import_module(f"{__name__}.{key}").write(content, path)
             return
     known = ", ".join(kind.suffix for kind in FORMATS.values())
     raise UnsupportedFormatError(f'no writer for "{suffix}"; there are: {known}')

@@ -34,6 +34,7 @@ __all__ = ["read", "write"]
 UNLIMITED = 100_000.0
 """The course's word for "no limit", written out by some files."""
 
+_DEEPEST = 32  # tabs that a line begins with
 _VECTORS = {b"offset": 3, b"boxmin": 3, b"boxmax": 3, b"pose": 3}
 _LIMITS = {b"rotxlimit": 0, b"rotylimit": 1, b"rotzlimit": 2}
 _JOINT = b"balljoint"
@@ -334,16 +335,21 @@ def _lines(skeleton: Skeleton) -> list[str]:
     def close_until(parent: int) -> None:
         while open_joints and open_joints[-1] != parent:
             open_joints.pop()
-            lines.append("\t" * len(open_joints) + "}\n")
+            lines.append(_indent(open_joints) + "}\n")
 
     for joint, parent in enumerate(skeleton.parents):
         close_until(parent)
-        indent = "\t" * len(open_joints)
+        indent = _indent(open_joints)
         lines.append(" ".join(filter(None, [f"{indent}balljoint", skeleton.names[joint], "{\n"])))
         lines.extend(f"{indent}\t{item}\n" for item in _items(skeleton, joint))
         open_joints.append(joint)
     close_until(-1)
     return lines
+
+
+def _indent(open_joints: list[int]) -> str:
+    # A chain of n joints indented in full would take n^2 bytes.
+    return "\t" * min(len(open_joints), _DEEPEST)
 
 
 def _items(skeleton: Skeleton, joint: int) -> list[str]:

@@ -23,6 +23,7 @@ __all__ = [
 
 NEEDED_VERSION = 330
 
+_LIBEGL, _LIBGL = "libEGL.so.1", "libGL.so.1"
 _INSTALL = "on Debian or Ubuntu: apt install libegl1 libgl1 libgl1-mesa-dri"
 _EGL_ERRORS = {
     "0x3001": "EGL could not be initialised: its driver files are missing or broken",
@@ -70,12 +71,28 @@ def _create(options: Mapping[str, int]) -> moderngl.Context:
     settings: dict[str, Any] = {"standalone": True, "require": NEEDED_VERSION, **options}
     if sys.platform.startswith("linux"):
         # Given names spare a search that starts other programs and takes 60 ms.
-        settings |= {"backend": "egl", "libegl": "libEGL.so.1", "libgl": "libGL.so.1"}
+        settings |= {"backend": "egl", "libegl": _LIBEGL, "libgl": _LIBGL}
+        # Mesa would print lines of its own before the one that says what to do.
+        os.environ.setdefault("EGL_LOG_LEVEL", "fatal")
     try:
-        context = moderngl.create_context(**settings)
+        return moderngl.create_context(**settings)
     except Exception as problem:  # glcontext raises nothing more special
-        raise RenderError(explain(str(problem))) from None
-    return context
+        text = str(problem)
+        offer = _offered_version(settings) if "0x3009" in text or "version" in text else ""
+        raise RenderError(f"OpenGL 3.3 is needed; {offer}" if offer else explain(text)) from None
+
+
+def _offered_version(settings: dict[str, Any]) -> str:
+    """Return what a machine without OpenGL 3.3 has, "" if it has nothing at all."""
+    for version in (310, 210):
+        try:
+            context = moderngl.create_context(**{**settings, "require": version})
+        except Exception:  # as in _create
+            continue
+        number, renderer = context.version_code, context.info["GL_RENDERER"]
+        context.release()
+        return f"this machine offers {number // 100}.{number // 10 % 10} (renderer {renderer})"
+    return ""
 
 
 def device_count() -> int:
@@ -107,7 +124,9 @@ def explain(text: str) -> str:
     devices = re.search(r"requested device index (\d+), but found (\d+)", text)
     code = re.search(r"0x30[0-9a-fA-F]{2}", text)
     if "not loaded" in text or "cannot open shared object" in text:
-        library = "libEGL" if "egl" in text.lower() else "libGL"
+        # glcontext lets these variables replace the names we gave.
+        asked_gl = os.environ.get("GLCONTEXT_LINUX_LIBGL") or _LIBGL
+        library = "libGL" if asked_gl in text else "libEGL"
         return f"{library} was not found ({_INSTALL}) [{text}]"
     if devices and int(devices.group(2)) == 0:
         return (
@@ -152,5 +171,9 @@ def check_errors(context: moderngl.Context, doing: str) -> None:
         With the renderer's name.
     """
     error = context.error
-    if error != "GL_NO_ERROR":
-        raise RenderError(f"{doing}: {error} on {context.info['GL_RENDERER']}")
+    if error == "GL_NO_ERROR":
+        return
+    renderer = context.info["GL_RENDERER"]
+    if error == "GL_OUT_OF_MEMORY":
+        raise RenderError(f"{doing}: not enough graphics memory on {renderer} ({error})")
+    raise RenderError(f"{doing}: {error} on {renderer}")

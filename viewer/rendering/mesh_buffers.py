@@ -9,7 +9,7 @@ from viewer.rendering.upload import buffer, pair_texture, picture_texture
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import bounding_box
-from viewer.rig.skin import has_influence
+from viewer.rig.skin import has_influence, weight_sums
 
 __all__ = ["MeshBuffers", "MeshRun"]
 
@@ -68,13 +68,17 @@ class MeshBuffers:
         if skin is None:
             self.joint_shares = np.zeros(0)
             ranges, self.pairs = np.zeros((self.n_vertices, 2)), pair_texture(context, [], [])
+            excess = np.zeros(self.n_vertices)
         else:
             counts = np.where(has_influence(skin), np.diff(skin.starts), 0)
             ranges = np.stack([skin.starts[:-1], counts], axis=1)
             self.pairs = pair_texture(context, skin.joints, skin.weights)
             sums = np.bincount(skin.joints, np.abs(skin.weights), minlength=skin.n_joints)
             self.joint_shares = sums / (sums.sum() or 1.0)
+            # Summed in float64: in float32 even thirds miss 1, which far away moves a vertex.
+            excess = weight_sums(skin) - 1.0
         self.influences = buffer(context, ranges, "u4")
+        self.excess = buffer(context, excess, "f4")
 
     def _runs(self, materials: np.ndarray) -> list[MeshRun]:
         edges = np.flatnonzero(np.diff(materials)) + 1
@@ -87,7 +91,7 @@ class MeshBuffers:
 
     def release(self) -> None:
         """Free every buffer and texture."""
-        owned = [self.positions, self.normals, self.uvs, self.indices, self.influences, self.pairs]
-        for item in [*owned, *self._textures]:
+        owned = [self.positions, self.normals, self.uvs, self.indices]
+        for item in [*owned, self.influences, self.excess, self.pairs, *self._textures]:
             if item is not None:
                 item.release()

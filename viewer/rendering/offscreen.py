@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 
 from viewer.rendering.camera import Camera, fit
@@ -40,10 +41,11 @@ class Offscreen:
         """Return a target of this size, the last one if it fits."""
         target = self._target
         if target is None or (target.size, target.asked_samples) != (size, samples):
+            # The old one is still bound: moderngl binds it again after making another.
+            self._target = Target(self.context, size, samples)
             if target is not None:
                 target.release()
-            self._target = None
-            self._target = target = Target(self.context, size, samples)
+            return self._target
         return target
 
     def render(
@@ -55,16 +57,18 @@ class Offscreen:
         box: Floats,
     ) -> Bytes:
         """Draw a scene and return its pixels; see ``render``."""
-        target = self.target(size, options.samples)
-        self.renderer.draw(scene, camera, options, target, box)
-        target.resolve()
-        return target.read()
+        with self.context:  # another one may be current
+            target = self.target(size, options.samples)
+            self.renderer.draw(scene, camera, options, target, box)
+            target.resolve()
+            return target.read()
 
     def release(self) -> None:
         """Free everything, the context too."""
-        if self._target is not None:
-            self._target.release()
-        self.renderer.release()
+        with self.context:
+            if self._target is not None:
+                self._target.release()
+            self.renderer.release()
         self.context.release()
 
     def __enter__(self) -> Offscreen:
@@ -72,6 +76,18 @@ class Offscreen:
 
     def __exit__(self, *_: object) -> None:
         self.release()
+
+
+class _OfThread:
+    """A thread's own Offscreen: freed in that thread when it ends."""
+
+    def __init__(self) -> None:
+        self.offscreen = Offscreen()
+
+    def __del__(self) -> None:
+        # The end of the process frees everything, in an order of its own.
+        if hasattr(self, "offscreen") and not sys.is_finalizing():
+            self.offscreen.release()
 
 
 def default_camera(scene: Scene, size: tuple[int, int]) -> Camera:
@@ -126,8 +142,8 @@ def render(
     >>> viewer.render(viewer.load(), size=(64, 48)).shape
     (48, 64, 4)
     """
-    if not hasattr(_thread, "offscreen"):
-        _thread.offscreen = Offscreen()
-    offscreen: Offscreen = _thread.offscreen
+    if not hasattr(_thread, "kept"):
+        _thread.kept = _OfThread()
+    offscreen: Offscreen = _thread.kept.offscreen
     camera = camera or default_camera(scene, size)
     return offscreen.render(scene, size, camera, options or DisplayOptions(), scene_box(scene))

@@ -20,6 +20,8 @@ SHADING = {
 """Chunks in ``shaders/shade``, with the name that menus show."""
 
 _CHUNK_MARK = re.compile(r"^#pragma chunk\s*$", re.MULTILINE)
+_LINES_PER_FILE = 10_000
+_PLACE = re.compile(r"(?:ERROR:\s*)?\b\d+[:(](\d+)\)?(?:\(\d+\))?\s*:\s*")
 
 
 def set_uniforms(program: moderngl.Program, values: Mapping[str, object]) -> None:
@@ -93,11 +95,15 @@ class Programs:
         return self._cache[key]
 
     def _explain(self, text: str, files: list[str]) -> str:
-        """Put our file names in place of the driver's numbers: ``3(12)`` or ``3:12``."""
+        """Put our files and lines in place of the driver's: ``0:12(5): ``, ``0(12) : ``."""
+
+        def place(found: re.Match[str]) -> str:
+            file, line = divmod(int(found[1]), _LINES_PER_FILE)
+            return f"{files[file]}:{line}: " if file < len(files) else found[0]
+
         lines = [line.strip() for line in text.splitlines() if re.search(r"\berror\b", line, re.I)]
-        shown = " / ".join(lines[:3]) or " ".join(text.split())
-        for number, file in enumerate(files):
-            shown = re.sub(rf"\b{number}[(:](\d+)\)?", rf"{file}:\1", shown)
+        lines = [_PLACE.sub(place, line, count=1) for line in lines[:3]]
+        shown = " / ".join(lines) or " ".join(text.split())
         info = self.context.info
         return (
             f"the driver refused a shader ({shown}) on {info['GL_RENDERER']}, "
@@ -112,17 +118,26 @@ class Programs:
 
 
 def _compose(name: str, chunk: str, files: list[str]) -> str:
-    """Return a shader's text with its chunk inside, each line numbered as in its own file."""
+    """Return a shader's text with its chunk inside, each line numbered as in its own file.
+
+    The line tells the file too, as ``_LINES_PER_FILE`` times its index in ``files``: Mesa forgets
+    a source number after parsing.
+    """
     base = len(files)
     files.append(name)
     text = resource("shaders", name).read_text()
     if not chunk:
-        return text.replace("#version 330\n", f"#version 330\n#line 2 {base}\n", 1)
+        return _number_lines(text, base)
     folder = "skin" if name.endswith(".vert") else "shade"
     files.append(f"{folder}/{chunk}.glsl")
     inner = resource("shaders", folder, f"{chunk}.glsl").read_text()
     mark = _CHUNK_MARK.search(text)
     assert mark is not None  # every shader that takes a chunk has the mark
     after = text[: mark.end()].count("\n") + 2
-    head = text[: mark.start()].replace("#version 330\n", f"#version 330\n#line 2 {base}\n", 1)
-    return f"{head}#line 1 {base + 1}\n{inner}\n#line {after} {base}{text[mark.end() :]}"
+    inside, behind = (base + 1) * _LINES_PER_FILE + 1, base * _LINES_PER_FILE + after
+    head = _number_lines(text[: mark.start()], base)
+    return f"{head}#line {inside}\n{inner}\n#line {behind}{text[mark.end() :]}"
+
+
+def _number_lines(text: str, file: int) -> str:
+    return text.replace("#version 330\n", f"#version 330\n#line {file * _LINES_PER_FILE + 2}\n", 1)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 
+from viewer.rendering.context import check_errors
 from viewer.rendering.mesh_buffers import MeshBuffers
 from viewer.rendering.program import Programs, set_uniforms
 from viewer.rendering.upload import matrix_texture, write_matrices
@@ -44,7 +45,9 @@ class PosedMesh:
 
     def __init__(self, context: moderngl.Context, programs: Programs, mesh: MeshBuffers) -> None:
         self.context, self.programs, self.mesh = context, programs, mesh
-        self.posed = context.buffer(reserve=_BYTES_PER_VERTEX * mesh.n_vertices)
+        size = _BYTES_PER_VERTEX * mesh.n_vertices
+        self.posed = context.buffer(reserve=size)
+        check_errors(context, f"a posed mesh of {size / 1e6:.1f} MB")
         self.center: Floats = mesh.center
         skin = mesh.figure.skin
         self._palette = matrix_texture(context, skin.n_joints if skin else 0)
@@ -104,6 +107,7 @@ class PosedMesh:
                 (mesh.positions, "3f4", "in_position"),
                 (mesh.normals, "3f4", "in_normal"),
                 (mesh.influences, "2u4", "in_influences"),
+                (mesh.excess, "f4", "in_excess"),
             ]
             self._arrays[method] = self.context.vertex_array(
                 program, [item for item in attributes if item[2] in program]

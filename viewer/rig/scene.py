@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from viewer.rig.arrays import Floats
+from viewer.rig.clip import Clip
 from viewer.rig.figure import Figure, skeleton_points
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.pose import Pose, rest_pose
@@ -30,6 +31,8 @@ class Actor:
         Shared, never changed.
     pose : Pose or None
         This actor's own; None if the figure has no skeleton.
+    clip : Clip or None
+        Its motion; ``sample`` poses the actor by it.
     placement : (4, 4)
         Figure space to scene.
     visible : bool
@@ -38,6 +41,7 @@ class Actor:
 
     figure: Figure
     pose: Pose | None = None
+    clip: Clip | None = None
     placement: Floats = field(default_factory=lambda: np.eye(4))
     visible: bool = True
 

@@ -10,7 +10,7 @@ from imgui_bundle import imgui
 
 from viewer.app.actions import reset_pose
 from viewer.app.state import AppState
-from viewer.app.widgets import button, note_item
+from viewer.app.widgets import button, menu_item, note_item, same_line_if_room
 from viewer.errors import printable
 from viewer.rig.mesh import box_size
 from viewer.rig.pose import Pose
@@ -59,11 +59,11 @@ def _draw_head(state: AppState) -> None:
     note_item(state, "Filter")
     if button(state, "Reset (R)"):
         reset_pose(state)
-    imgui.same_line()
+    same_line_if_room("degrees")
     if imgui.radio_button("degrees", state.in_degrees):
         state.in_degrees = True
     note_item(state, "degrees")
-    imgui.same_line()
+    same_line_if_room("radians")
     if imgui.radio_button("radians", not state.in_degrees):
         state.in_degrees = False
     note_item(state, "radians")
@@ -141,7 +141,7 @@ def _draw_joint(state: AppState, skeleton: Skeleton, joint: int, depth: int, lab
     elif imgui.is_item_clicked():
         state.selected_joint = -1 if state.selected_joint == joint else joint
     if imgui.begin_popup_context_item(f"menu of joint {joint}"):
-        if imgui.menu_item("Reset this joint", "", False)[0]:
+        if menu_item(state, "Reset this joint"):
             _reset(state, np.flatnonzero(skeleton.dof_joints == joint))
         imgui.end_popup()
 
@@ -171,11 +171,11 @@ def _draw_dof(
         if imgui.is_mouse_double_clicked(imgui.MouseButton_.left) and not locked:
             value = float(skeleton.rest_dofs[dof])
     if imgui.begin_popup_context_item(f"menu of DOF {dof}"):
-        if imgui.menu_item("Reset", "", False, not locked)[0]:
+        if menu_item(state, "Reset", enabled=not locked):
             value = float(skeleton.rest_dofs[dof])
-        if imgui.menu_item("Set to 0", "", False, bool(low <= 0.0 <= high) and not locked)[0]:
+        if menu_item(state, "Set to 0", enabled=bool(low <= 0.0 <= high) and not locked):
             value = 0.0
-        if imgui.menu_item("Copy value", "", False)[0]:
+        if menu_item(state, "Copy value"):
             imgui.set_clipboard_text(repr(float(pose.dofs[dof])))
         imgui.end_popup()
     pose.dofs[dof] = min(max(value, low), high)
@@ -199,8 +199,8 @@ def _dof_slider(state: AppState, skeleton: Skeleton, pose: Pose, dof: int) -> fl
         text,
         _STAYS_WITHIN if bounded else _MAY_TYPE_BEYOND,
     )
-    # float32 of the widget must not touch a value that nobody moved.
-    return moved / factor if changed else float(pose.dofs[dof])
+    # float32 of the widget must not touch a value that nobody moved; "nan" can be typed.
+    return moved / factor if changed and math.isfinite(moved) else float(pose.dofs[dof])
 
 
 def _reach(state: AppState) -> float:

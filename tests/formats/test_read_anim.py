@@ -1,0 +1,159 @@
+"""The .anim reader and writer: grammar, quirks, exact messages."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from viewer.errors import FormatError, RigError, UnsupportedFormatError
+from viewer.formats import Source, detect, read, write
+from viewer.loading import load
+from viewer.rig.clip import Channel, Clip
+
+ONE = "channel { extrapolate cycle bounce keys 2 { 0 1 flat smooth 2 3 linear -0.5 } }"
+GOOD = f"animation {{ range -1 4 numchannels 1 {ONE} }}"
+SKEL = "balljoint root { offset 0 0 0 }"
+
+
+def parse(text: str) -> tuple[Clip, list[str]]:
+    source = Source("walk.anim", text.encode())
+    clip = read(source)
+    assert isinstance(clip, Clip)
+    return clip, source.warnings
+
+
+def test_reads_every_part() -> None:
+    clip, warnings = parse(GOOD)
+    assert (clip.name, clip.start, clip.end, warnings) == ("walk", -1.0, 4.0, [])
+    (channel,) = clip.channels
+    assert channel.extrapolation == ("cycle", "bounce")
+    assert channel.tangents == (("flat", "smooth"), ("linear", -0.5))
+    np.testing.assert_array_equal(channel.times, [0, 2])
+    np.testing.assert_array_equal(channel.values, [1, 3])
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        GOOD.replace(" ", "\r\n"),
+        GOOD.replace(" ", "\r"),
+        GOOD.replace(" ", "\t"),
+        GOOD.replace("channel {", "channel 14{"),
+        GOOD.replace(" {", "{"),
+        "\ufeff" + GOOD,
+    ],
+    ids=["crlf", "cr", "tabs", "numbered", "glued", "byte order mark"],
+)
+def test_quirks_load_without_a_word(text: str) -> None:
+    clip, warnings = parse(text)
+    assert len(clip.channels) == 1 and warnings == []
+
+
+def test_unsorted_keys_are_sorted_with_a_warning() -> None:
+    clip, warnings = parse(GOOD.replace("0 1 flat smooth 2", "3 1 flat smooth 2"))
+    np.testing.assert_array_equal(clip.channels[0].times, [2, 3])
+    assert warnings == ["walk.anim: channel 0: key 1 is before key 0; keys sorted"]
+
+
+def test_channel_without_keys_warns() -> None:
+    _, warnings = parse("animation { range 0 1 numchannels 1 channel { keys 0 { } } }")
+    assert warnings == ["walk.anim: channel 0 has no keys: its value is 0"]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("balloon {", 'walk.anim:1: animation: expected "animation", found "balloon"'),
+        (
+            GOOD.replace("\n", "").replace("keys", "\nkeys").replace("flat", "steep"),
+            "walk.anim:2: channel 0, key 0: tangent: expected flat, linear, smooth or a number, "
+            'found "steep"',
+        ),
+        (
+            GOOD.replace("bounce", "jump"),
+            "walk.anim:1: channel 0: extrapolate: expected one of constant, linear, cycle, "
+            'cycle_offset, bounce, found "jump"',
+        ),
+        (
+            GOOD.replace("{ 0 1", "{ 0 nan"),
+            'walk.anim:1: channel 0, key 0: value: expected a number, found "nan"',
+        ),
+        (GOOD.replace("keys 2", "keys 3"), "walk.anim:1: channel 0: expected 3 keys, found 2"),
+        (
+            GOOD.replace("keys 2", "keys 2000000000"),
+            "walk.anim:1: channel 0: keys: expected a count that the file can hold, "
+            'found "2000000000"',
+        ),
+        (
+            GOOD.replace("numchannels 1", "numchannels 2"),
+            "walk.anim:1: animation: expected 2 channels as numchannels says, found 1",
+        ),
+        (
+            GOOD.split("keys")[0],
+            'walk.anim:1: channel 0: expected "}", found the end of the file',
+        ),
+    ],
+)
+def test_malformed_files_are_refused_with_their_line(text: str, message: str) -> None:
+    with pytest.raises(FormatError) as caught:
+        parse(text)
+    assert str(caught.value) == message
+
+
+def test_truncation_anywhere_is_an_error_or_a_warning() -> None:
+    for length in range(len(GOOD)):
+        try:
+            _, warnings = parse(GOOD[:length])
+        except FormatError as problem:
+            assert str(problem).startswith("walk.anim")
+        else:
+            assert warnings, GOOD[:length]
+
+
+def test_write_then_read_gives_the_clip_back(tmp_path: Path) -> None:
+    clip, _ = parse(GOOD)
+    write(clip, tmp_path / "copy.anim")
+    again = read(Source.open(tmp_path / "copy.anim"))
+    assert isinstance(again, Clip)
+    assert (again.start, again.end) == (clip.start, clip.end)
+    for old, new in zip(clip.channels, again.channels, strict=True):
+        np.testing.assert_array_equal(old.times, new.times)
+        np.testing.assert_array_equal(old.values, new.values)
+        assert (old.tangents, old.extrapolation) == (new.tangents, new.extrapolation)
+
+
+def test_write_refuses_channels_out_of_order(tmp_path: Path) -> None:
+    channel = Channel(3, np.zeros(1), np.zeros(1), (("flat", "flat"),))
+    with pytest.raises(UnsupportedFormatError, match="a channel for every DOF"):
+        write(Clip("odd", (channel,), 0, 1), tmp_path / "odd.anim")
+
+
+def test_clip_is_recognised_by_content() -> None:
+    assert detect(Source("walk.txt", GOOD.encode())) == "anim"
+
+
+def test_clip_of_another_skeleton_names_both_numbers(tmp_path: Path) -> None:
+    (tmp_path / "a.skel").write_text(SKEL)
+    (tmp_path / "a.anim").write_text(GOOD)
+    with pytest.raises(RigError) as caught:
+        load(tmp_path / "a.skel", tmp_path / "a.anim")
+    assert str(caught.value) == (
+        f"{tmp_path / 'a.anim'} has 1 channels, {tmp_path / 'a.skel'} needs 6 (3 + 3 x 1 joints)"
+    )
+
+
+def test_clip_alone_asks_for_its_skeleton(tmp_path: Path) -> None:
+    (tmp_path / "a.anim").write_text(GOOD)
+    with pytest.raises(RigError, match=r"open it together with its \.skel"):
+        load(tmp_path / "a.anim")
+
+
+def test_clip_poses_its_actor_at_the_start_of_the_range(tmp_path: Path) -> None:
+    key = "channel {{ extrapolate linear linear keys 2 {{ 0 0 flat {0} 1 {0} {0} flat }} }}"
+    channels = " ".join(key.format(value) for value in (1, 2, 3, 0.1, 0.2, 0.3))
+    (tmp_path / "a.skel").write_text(SKEL.replace("offset", "rotylimit 0 0.05 offset"))
+    (tmp_path / "a.anim").write_text(f"animation {{ range 1 2 numchannels 6 {channels} }}")
+    actor = load(tmp_path / "a.skel", tmp_path / "a.anim").actors[0]
+    assert actor.clip is not None and actor.pose is not None
+    # The rotation about y is clamped to its limit.
+    np.testing.assert_allclose(actor.pose.dofs, [1, 2, 3, 0.1, 0.05, 0.3], atol=1e-12)
