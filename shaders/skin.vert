@@ -6,6 +6,7 @@
 in vec3 in_position;     // bind space, minus the rest centre
 in vec3 in_normal;       // bind space, any length
 in uvec2 in_influences;  // first pair, number of pairs
+in float in_excess;      // sum of the weights, minus 1
 
 uniform bool u_attached;        // false: leave the vertex in its binding space
 uniform vec3 u_rest_shift;      // rest centre minus posed centre

@@ -1,7 +1,6 @@
 // Linear blend skinning: v' = (sum w M) [v 1], n' = (sum w M) [n 0].
 void skin(inout vec3 position, inout vec3 normal) {
     vec4 x = vec4(0.0), y = vec4(0.0), z = vec4(0.0);
-    float sum = 0.0;
     uint end = in_influences.x + in_influences.y;
     for (uint index = in_influences.x; index < end; ++index) {
         vec2 pair = influence(index);
@@ -9,10 +8,9 @@ void skin(inout vec3 position, inout vec3 normal) {
         x += pair.y * palette_row(joint, 0);
         y += pair.y * palette_row(joint, 1);
         z += pair.y * palette_row(joint, 2);
-        sum += pair.y;
     }
     vec4 point = vec4(position, 1.0);
     // The matrices have the posed centre subtracted once per unit of weight.
-    position = vec3(dot(x, point), dot(y, point), dot(z, point)) + (sum - 1.0) * u_center;
+    position = vec3(dot(x, point), dot(y, point), dot(z, point)) + in_excess * u_center;
     normal = vec3(dot(x.xyz, normal), dot(y.xyz, normal), dot(z.xyz, normal));
 }

@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.errors import UnsupportedFormatError, printable
+from viewer.errors import FormatError, UnsupportedFormatError, printable
 from viewer.formats._numbers import LARGEST, is_number, to_number
 from viewer.formats._save import as_words, save_text
 from viewer.formats._source import Source, shown
@@ -141,30 +141,36 @@ class _Parser:
     def _numbers(self, count: int) -> list[float]:
         """Read the numbers of an item; the current word is its keyword."""
         assert self.word is not None  # the caller looked at it
-        keyword, joint = self.word, self.found[self.open[-1]]
-        what = f"{keyword.group().decode()} of joint {_called(joint)}"
+        keyword = self.word
         values: list[float] = []
         self._advance()
         while len(values) < count:
-            if self.word is None or self.word.group() in (b"{", b"}", *_KEYWORDS):
-                end = ", then the end of the file" * (self.word is None)
-                raise self.source.error(
-                    f"{what}: expected {count} numbers, found {len(values)}{end}", keyword.start()
-                )
-            value = to_number(self.word.group())
+            value = None if self.word is None else to_number(self.word.group())
             if value is None:
-                raise self.source.error(
-                    f"{what}: expected a number, found {shown(self.word.group())}",
-                    self.word.start(),
-                )
+                raise self._numbers_error(keyword, count, len(values))
             values.append(value)
             self._advance()
         if self.word is not None and is_number(self.word.group()):
             raise self.source.error(
-                f"{what}: expected {count} numbers, found more: {shown(self.word.group())}",
+                f"{self._item(keyword)}: expected {count} numbers, found more: "
+                f"{shown(self.word.group())}",
                 self.word.start(),
             )
         return values
+
+    def _numbers_error(self, keyword: Word, count: int, found: int) -> FormatError:
+        if self.word is not None and self.word.group() not in (b"{", b"}", *_KEYWORDS):
+            return self.source.error(
+                f"{self._item(keyword)}: expected a number, found {shown(self.word.group())}",
+                self.word.start(),
+            )
+        end = ", then the end of the file" * (self.word is None)
+        return self.source.error(
+            f"{self._item(keyword)}: expected {count} numbers, found {found}{end}", keyword.start()
+        )
+
+    def _item(self, keyword: Word) -> str:
+        return f"{keyword.group().decode()} of joint {_called(self.found[self.open[-1]])}"
 
     def _skip_unknown(self) -> None:
         """Skip a word we do not know with its numbers, or with its whole balanced block."""

@@ -9,7 +9,7 @@ from viewer.rendering.camera import Camera, fit
 from viewer.rendering.context import headless_context
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.renderer import Renderer
-from viewer.rendering.target import Target
+from viewer.rendering.target import Target, check_size
 from viewer.rig.arrays import Bytes, Floats
 from viewer.rig.scene import Scene, scene_box, scene_points
 
@@ -145,5 +145,7 @@ def render(
     if not hasattr(_thread, "kept"):
         _thread.kept = _OfThread()
     offscreen: Offscreen = _thread.kept.offscreen
+    with offscreen.context:
+        check_size(offscreen.context, size)  # before the camera divides by it
     camera = camera or default_camera(scene, size)
     return offscreen.render(scene, size, camera, options or DisplayOptions(), scene_box(scene))

@@ -58,7 +58,7 @@ class Lights:
     """
 
     key: Light = field(default_factory=lambda: Light(-38.0, 38.0, (1.0, 0.80, 0.56), 1.0))
-    rim: Light = field(default_factory=lambda: Light(118.0, 22.0, (0.30, 0.52, 1.0), 1.1))
+    rim: Light = field(default_factory=lambda: Light(106.0, 14.0, (0.22, 0.46, 1.0), 1.6))
     ambient: float = 0.16
     specular: float = 0.18
     shininess: float = 32.0

@@ -6,9 +6,11 @@ import numpy as np
 
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import Mesh
-from viewer.rig.skin import Skin, has_influence
+from viewer.rig.skin import Skin
 
 __all__ = ["blended_matrices", "deform", "unit"]
+
+_CHUNK = 1 << 16  # vertices at a time, which bounds the memory that large meshes take
 
 
 def deform(mesh: Mesh, skin: Skin, palette: Floats) -> tuple[Floats, Floats]:
@@ -32,13 +34,17 @@ def deform(mesh: Mesh, skin: Skin, palette: Floats) -> tuple[Floats, Floats]:
     normals : (V, 3)
         Unit length.
     """
-    blended = blended_matrices(skin, palette)
-    positions = np.einsum("vab,vb->va", blended[:, :, :3], mesh.positions) + blended[:, :, 3]
-    normals = np.einsum("vab,vb->va", blended[:, :, :3], mesh.normals)
+    positions, normals = np.empty_like(mesh.positions), np.empty_like(mesh.normals)
+    for first in range(0, skin.n_vertices, _CHUNK):
+        rows = slice(first, first + _CHUNK)
+        blended = blended_matrices(skin, palette, rows)
+        linear = blended[:, :, :3]
+        positions[rows] = np.einsum("vab,vb->va", linear, mesh.positions[rows]) + blended[:, :, 3]
+        normals[rows] = np.einsum("vab,vb->va", linear, mesh.normals[rows])
     return positions, unit(normals)
 
 
-def blended_matrices(skin: Skin, palette: Floats) -> Floats:
+def blended_matrices(skin: Skin, palette: Floats, rows: slice = slice(None)) -> Floats:
     """Sum each vertex's joint matrices by weight: sum_i w_i M_i, identity without influence.
 
     Parameters
@@ -47,19 +53,26 @@ def blended_matrices(skin: Skin, palette: Floats) -> Floats:
         V vertices.
     palette : (J, 4, 4)
         Skinning matrices.
+    rows : slice
+        The vertices wanted; all if omitted.
 
     Returns
     -------
     (V, 3, 4)
-        The affine part of the blended matrices.
+        The affine part of the blended matrices of those vertices.
     """
-    blended = np.zeros((skin.n_vertices, 3, 4))
-    filled = np.diff(skin.starts) > 0
-    if filled.any():
-        terms = palette[skin.joints, :3, :] * skin.weights[:, None, None]
-        # Vertices that list nothing own no terms, so the filled ones' starts delimit all terms.
-        blended[filled] = np.add.reduceat(terms, skin.starts[:-1][filled], axis=0)
-    blended[~has_influence(skin)] = np.eye(3, 4)
+    first, last, _ = rows.indices(skin.n_vertices)
+    starts = skin.starts[first : last + 1]
+    span = slice(starts[0], starts[-1])
+    blended = np.tile(np.eye(3, 4), (last - first, 1, 1))
+    weights = skin.weights[span]
+    listing = np.flatnonzero(np.diff(starts) > 0)
+    if len(listing):
+        # Vertices that list nothing own no terms, so the others' starts delimit all terms.
+        edges = starts[listing] - starts[0]
+        terms = palette[skin.joints[span], :3, :] * weights[:, None, None]
+        moved = np.logical_or.reduceat(weights != 0.0, edges)
+        blended[listing[moved]] = np.add.reduceat(terms, edges, axis=0)[moved]
     return blended
 
 
