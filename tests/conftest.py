@@ -1,0 +1,48 @@
+"""Fixtures and paths that several test files use."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import moderngl
+import pytest
+from hypothesis import settings
+
+SHARED = Path(__file__).resolve().parents[2] / "shared" / "data" / "cse169"
+
+# Every run tries the same examples, and takes as long as it takes.
+settings.register_profile("fixed", derandomize=True, deadline=None, database=None)
+settings.load_profile("fixed")
+
+
+@pytest.fixture(scope="session")
+def shared() -> Path:
+    """The folder of real files of the course, if it lies beside the checkout."""
+    if not SHARED.is_dir():
+        pytest.skip(f"no real files in {SHARED}")
+    return SHARED
+
+
+@pytest.fixture(scope="session")
+def gl_framebuffer() -> Iterator[moderngl.Framebuffer]:
+    """A framebuffer of a context without a window, for all tests; use ``ctx``, which checks it."""
+    from viewer.rendering.context import headless_context
+
+    context = headless_context()
+    framebuffer = context.simple_framebuffer((4, 4))
+    yield framebuffer
+    framebuffer.release()
+    context.release()
+
+
+@pytest.fixture
+def ctx(gl_framebuffer: moderngl.Framebuffer) -> Iterator[moderngl.Context]:
+    """A context, current and with a framebuffer bound; no test leaves an error behind."""
+    context: moderngl.Context = gl_framebuffer.ctx
+    with context:
+        gl_framebuffer.use()
+        assert context.error == "GL_NO_ERROR"
+        yield context
+        assert context.error == "GL_NO_ERROR"
+        gl_framebuffer.use()  # what the test bound may have been released

@@ -1,0 +1,103 @@
+import gzip
+
+import pytest
+
+from viewer.errors import FormatError
+from viewer.formats import FORMATS, Source, detect
+
+ANY = " or ".join(kind.suffix for kind in FORMATS.values())
+SKEL = b"balljoint a { }"
+SKIN = b"positions 1 { 0 0 0 } triangles 1 { 0 0 0 }"
+
+
+def found(name, data):
+    source = Source(name, data)
+    return detect(source), source.warnings
+
+
+@pytest.mark.parametrize(("data", "key"), [(SKEL, "skel"), (SKIN, "skin")])
+@pytest.mark.parametrize("suffix", ["", ".txt", ".{key}", ".{KEY}"])
+def test_content_decides(data, key, suffix):
+    name = "a" + suffix.format(key=key, KEY=key.upper())
+    assert found(name, data) == (key, [])
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "key", "warning"),
+    [
+        ("a.skin", SKEL, "skel", "a.skin: is a .skel, named .skin"),
+        ("a.skel", SKIN, "skin", "a.skel: is a .skin, named .skel"),
+        ("A.SKEL", SKIN, "skin", "A.SKEL: is a .skin, named .skel"),
+    ],
+)
+def test_wrong_suffix_is_a_warning(name, data, key, warning):
+    assert found(name, data) == (key, [warning])
+
+
+@pytest.mark.parametrize(
+    "data", [b"\xef\xbb\xbf" + SKEL, b"\n" * 200_000 + SKEL, b"balljoint{}", b"x{}balljoint a{}"]
+)
+def test_skeleton_is_recognised(data):
+    assert found("a", data) == ("skel", [])
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b" " * 200_000 + SKIN,
+        b"bindings\r\n3",
+        b"foo{}triangles +1",
+        b"normals nan",
+        b"texcoords\t\t1",
+        b"skinweights 3",
+    ],
+)
+def test_skin_is_recognised(data):
+    assert found("a", data) == ("skin", [])
+
+
+@pytest.mark.parametrize(
+    ("data", "kind"),
+    [
+        (b"", "an empty file"),
+        (b"\xef\xbb\xbf", "an empty file"),
+        (b" \n\t", "only white space"),
+        (b"\n" * 100_000, "only white space"),
+        (b"\0" * 100, "zeros"),
+        (b"\1a\0\0b\2\0\0\0c", "binary data"),
+        (gzip.compress(SKEL), "gzip data"),
+        (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "a PNG picture"),
+        (b"\xff\xd8\xff\xe0\0\x10JFIF", "a JPEG picture"),
+        (b"BM\x36\0\x0c\0", "a BMP picture"),
+        (b"GIF89a", "a GIF picture"),
+        (b"PK\x03\x04\x14", "a ZIP archive"),
+        (b"%PDF-1.7", "a PDF document"),
+        (b"glTF\2\0\0\0", "a binary glTF file"),
+        (b"\x7fELF\2\1\1", "a program (ELF)"),
+        (b"\x93NUMPY\1\0", "a numpy array"),
+        ("balljoint a {}".encode("utf-16"), "UTF-16 text"),
+        ("balljoint a {}".encode("utf-16-be"), "UTF-16 text"),
+        ("balljoint a {}".encode("utf-16-le"), "UTF-16 text"),
+        (b"\n<!DOCTYPE html><html>positions</html>", "HTML or XML (a failed download?)"),
+        (b"<HTML>", "HTML or XML (a failed download?)"),
+        (b"<?xml version='1.0'?>", "HTML or XML (a failed download?)"),
+    ],
+)
+@pytest.mark.parametrize(
+    ("name", "wanted"), [("a.skel", ".skel"), ("a.skin", ".skin"), ("a", None)]
+)
+def test_other_content_is_named(data, kind, name, wanted):
+    with pytest.raises(FormatError) as caught:
+        found(name, data)
+    assert str(caught.value) == f"{name}: expected a {wanted or ANY} file, found {kind}"
+
+
+def test_text_of_another_kind_is_refused():
+    with pytest.raises(FormatError) as caught:
+        found("a.txt", b"hello world")
+    assert str(caught.value) == f"a.txt: expected a {ANY} file, found something else"
+
+
+@pytest.mark.parametrize(("name", "key"), [("a.skel", "skel"), ("a.skin", "skin")])
+def test_text_with_a_known_suffix_goes_to_its_reader(name, key):
+    assert found(name, b"hello world") == (key, [])

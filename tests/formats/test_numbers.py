@@ -1,0 +1,167 @@
+import random
+import struct
+
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from viewer.formats import _numbers
+from viewer.formats._numbers import LARGEST, is_number, parse_numbers, to_number
+
+DIGITS = st.text("0123456789", min_size=1, max_size=24)
+SIGNS = st.sampled_from(["", "+", "-"])
+MANTISSAS = st.one_of(
+    DIGITS,
+    DIGITS.map(lambda digits: f"{digits}."),
+    DIGITS.map(lambda digits: f".{digits}"),
+    st.builds("{}.{}".format, DIGITS, DIGITS),
+)
+EXPONENTS = st.one_of(
+    st.just(""),
+    st.builds("{}{}{}".format, st.sampled_from("eE"), SIGNS, st.integers(0, 45)),
+)
+SPELLINGS = st.builds(
+    "{}{}{}{}".format, SIGNS, MANTISSAS, EXPONENTS, st.sampled_from(["", "f", "F"])
+)
+NUMBERS = SPELLINGS.filter(lambda text: abs(float(text.rstrip("fF"))) <= LARGEST)
+SPACES = st.text(" \t\n\r\v\f", min_size=1, max_size=9)
+
+NO_NUMBERS = [
+    *("", "up", "-", "+", ".", "-.", "+.", "e5", ".e5", "1e", "1e+", "--1", "+-1", "-+1", "1-"),
+    *("1.0-2.0", "1-2", "1+2", "1.2.3", "1..2", "..1", "1,5", "1_000", "1__0", "0x10", "1e5e5"),
+    *("nan", "NaN", "-nan", "inf", "-inf", "Infinity", "1e999", "-1e999", "3.5e38", "-3.5e38"),
+    *("\u0663", "\u0663\u0664", "\uff11", "1\u0663", "\xbc", "1ff", "1fF", "f", "-f", ".f", "1d5"),
+    *("1\0", "\x001", "\0", "1\x1f2", "\x1a", "1\x85", "12345678:", "/1234567", "1\xa0000", "1l"),
+    *("1234567.1234567.1", "12345678.2345678.", "1.345678901234.6", "1234567890123456x", "0b1"),
+    *("9" * 39, "9" * 400, "1" + "0" * 39, "1234567890abcdef", ":2345678", "1.23456789/", "1e39"),
+    *("(1)", "1;", "#1", "$", "1e1.5", "1+"),
+]  # fmt: skip
+
+
+def bits(values):
+    return [struct.pack("<d", value) for value in values]
+
+
+def parsed(text):
+    data = text.encode() if isinstance(text, str) else text
+    values, bad = parse_numbers(data, 0, len(data))
+    return values.tolist(), bad
+
+
+@given(st.lists(st.tuples(NUMBERS, SPACES), max_size=40))
+@settings(max_examples=400)
+@example([("-0", " "), ("-0.0", " "), ("+0", " "), ("-.0", " "), ("-0.", "\n"), ("0e0", " ")])
+@example([("999999999999999", " "), ("9007199254740993", " "), (".000000000000001", " ")])
+@example([("1.7976931348623157", " "), ("2.2250738585072014e-308", " "), ("5e-324", " ")])
+def test_numbers_are_bit_equal_to_float(pairs):
+    values, bad = parsed("".join(number + space for number, space in pairs))
+    assert bad == -1
+    assert bits(values) == bits(float(number.rstrip("fF")) for number, _ in pairs)
+
+
+@pytest.mark.parametrize("length", range(1, 25))
+def test_every_place_of_the_point_is_bit_equal_to_float(length):
+    rng = random.Random(length)
+    words = []
+    for place in range(length + 1):
+        for sign in ("", "-", "+"):
+            digits = "".join(rng.choices("0123456789", k=length))
+            words += [f"{sign}{digits[:place]}.{digits[place:]}", f"{sign}{digits}"]
+    values, bad = parsed(" ".join(words))
+    assert bad == -1
+    assert bits(values) == bits(map(float, words))
+
+
+def test_repr_of_random_floats_is_read_back_bit_equal():
+    rng = random.Random(3)
+    numbers = [rng.choice([rng.gauss(0, 1), rng.uniform(-1e6, 1e6), 10 ** rng.uniform(-300, 38)])
+               for _ in range(20_000)]  # fmt: skip
+    values, bad = parsed(" ".join(map(repr, numbers)))
+    assert bad == -1
+    assert bits(values) == bits(numbers)
+
+
+@pytest.mark.parametrize("chunk", [1, 2, 3, 7, 8, 9, 16, 17, 31, 64, 100])
+def test_chunk_boundaries_split_no_number(monkeypatch, chunk):
+    monkeypatch.setattr(_numbers, "_CHUNK", chunk)
+    rng = random.Random(chunk)
+    words = [repr(round(rng.uniform(-1e5, 1e5), rng.randrange(12))) for _ in range(300)]
+    text = "".join(word + rng.choice([" ", "\n", "\t\t", " " * 40, "\r\n"]) for word in words)
+    values, bad = parsed(text)
+    assert bad == -1
+    assert bits(values) == bits(map(float, words))
+
+
+@pytest.mark.parametrize("chunk", [1, 5, 8, 64, 1 << 17])
+@pytest.mark.parametrize("word", [word for word in NO_NUMBERS if word])
+def test_word_that_is_no_number_is_found_at_its_index(monkeypatch, chunk, word):
+    monkeypatch.setattr(_numbers, "_CHUNK", chunk)
+    for index in (0, 1, 6):
+        text = [*["0", "-1.5", "2e1", "3", "4", "5"][:index], word, "7", "bad", "8"]
+        values, bad = parsed(" ".join(text))
+        assert bad == index
+        assert values == [0.0, -1.5, 20.0, 3.0, 4.0, 5.0][:index]
+
+
+@pytest.mark.parametrize("word", NO_NUMBERS)
+def test_single_word_that_is_no_number_is_refused(word):
+    assert not is_number(word.encode())
+    assert to_number(word.encode()) is None
+
+
+@given(st.lists(st.text("0123456789.+-eEf_x \n\x00\u0663", max_size=20), max_size=10))
+@settings(max_examples=400)
+def test_block_and_single_words_agree(parts):
+    data = " ".join(parts).encode()
+    single = [to_number(word) for word in data.split()]
+    first_bad = single.index(None) if None in single else -1
+    values, bad = parse_numbers(data, 0, len(data))
+    assert bad == first_bad
+    assert bits(values) == bits(single[: len(single) if first_bad < 0 else first_bad])
+
+
+@pytest.mark.parametrize("control", [code for code in range(32) if code not in range(9, 14)])
+def test_control_characters_belong_to_their_word(control):
+    letter = bytes([control])
+    assert parsed(b"1 2" + letter + b" 3") == ([1.0], 1)
+    assert parsed(b"1 " + letter + b" 3") == ([1.0], 1)
+    assert parsed(letter) == ([], 0)
+    assert parsed(letter * 3) == ([], 0)
+
+
+@pytest.mark.parametrize("code", range(128, 256))
+def test_letters_beyond_ascii_belong_to_their_word(code):
+    assert parsed(b"1 2" + bytes([code]) + b"3") == ([1.0], 1)
+
+
+def test_six_kinds_of_white_space_separate():
+    assert parsed("1 2\t3\n4\r5\v6\f7") == ([1, 2, 3, 4, 5, 6, 7], -1)
+
+
+@pytest.mark.parametrize("text", ["", " ", "\n\n", " " * 5000])
+def test_no_words_give_no_numbers(text):
+    assert parsed(text) == ([], -1)
+
+
+def test_only_the_given_part_is_parsed():
+    values, bad = parse_numbers(b"x 12345 y", 3, 6)
+    assert (values.tolist(), bad) == ([234.0], -1)
+
+
+def test_largest_float32_is_the_limit():
+    assert parsed("340282346638528859811704183484516925440") == ([LARGEST], -1)
+    assert parsed("-3.4028234663852886e38") == ([-LARGEST], -1)
+    assert parsed("340282346638528900000000000000000000000") == ([], 0)
+
+
+@pytest.mark.parametrize(
+    "word", [b"9" * 5_000_000 + b"x", b"0." + b"0" * 5_000_000 + b"e", b"." * 5_000_000]
+)
+def test_word_of_5_mb_is_refused_without_quadratic_time(word):
+    assert to_number(word) is None
+    assert parse_numbers(b"1 " + word, 0, len(word) + 2)[1] == 1
+
+
+def test_number_of_5_mb_is_read():
+    assert parsed("0." + "0" * 5_000_000 + "1") == ([0.0], -1)
+    assert parsed("0" * 5_000_000 + "7") == ([7.0], -1)

@@ -1,0 +1,475 @@
+"""Every quirk of ``.skel`` as a tiny file, and every broken one with its exact message."""
+
+import math
+import tracemalloc
+
+import numpy as np
+import pytest
+
+from viewer.errors import FormatError
+from viewer.formats import Source, skel
+from viewer.rig.pose import rest_pose
+
+INF = math.inf
+ROOT_MOVES = [[-INF, INF]] * 3
+GOOD = """balljoint root {
+  offset 1 2 3
+  boxmin -0.5 -0.25 -1
+  boxmax 0.5 0.25 1
+  rotxlimit -1 1
+  rotylimit 0 0.5
+  rotzlimit -100000 100000
+  pose 0.5 0.25 7
+  balljoint arm {
+    offset 0 1 0
+  }
+}
+"""
+
+
+def read(text):
+    """Return the skeleton and the warnings of a text."""
+    source = Source("a.skel", text if isinstance(text, bytes) else text.encode())
+    return skel.read(source).skeleton, source.warnings
+
+
+def silent(text):
+    skeleton, warnings = read(text)
+    assert warnings == []
+    return skeleton
+
+
+def refusal(text):
+    with pytest.raises(FormatError) as caught:
+        read(text)
+    assert caught.value.exit_code == 2
+    return str(caught.value)
+
+
+def assert_good(skeleton):
+    assert skeleton.names == ("root", "arm")
+    assert skeleton.parents.tolist() == [-1, 0]
+    assert skeleton.rest_translations.tolist() == [[1, 2, 3], [0, 1, 0]]
+    assert skeleton.boxes.tolist() == [
+        [[-0.5, -0.25, -1], [0.5, 0.25, 1]],
+        [[-0.1] * 3, [0.1] * 3],
+    ]
+    assert skeleton.dof_joints.tolist() == [0] * 6 + [1] * 3
+    assert skeleton.dof_kinds.tolist() == [0, 1, 2, 3, 4, 5, 3, 4, 5]
+    limits = [*ROOT_MOVES, [-1, 1], [0, 0.5], [-INF, INF], *[[-INF, INF]] * 3]
+    assert skeleton.dof_limits.tolist() == limits
+    assert skeleton.rest_dofs.tolist() == [0, 0, 0, 0.5, 0.25, 7, 0, 0, 0]
+
+
+def test_good_file_gives_every_value():
+    assert_good(silent(GOOD))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        pytest.param(GOOD.replace("\n", "\r\n"), id="CRLF"),
+        pytest.param(GOOD.replace("\n", "\r"), id="CR"),
+        pytest.param(GOOD.replace("\n", "\r\r\n"), id="CR CR LF"),
+        pytest.param(GOOD.replace("\n", "\r", 5).replace("\n", "\r\r\n"), id="CR and CR CR LF"),
+        pytest.param(" ".join(GOOD.split()), id="one line"),
+        pytest.param("\n".join(GOOD.split()), id="a word a line"),
+        pytest.param(GOOD.replace(" {", "{").replace("}", "}"), id="glued braces"),
+        pytest.param("".join(GOOD.split("\n")).replace(" {", "{"), id="all glued"),
+        pytest.param(GOOD.rstrip(), id="no final newline"),
+        pytest.param(GOOD + "\n \t\n\n", id="blank lines at the end"),
+        pytest.param("\n\n\t" + GOOD, id="blank lines at the start"),
+        pytest.param(GOOD.replace(" ", "\t\v\f"), id="tabs"),
+        pytest.param("\ufeff" + GOOD, id="byte order mark"),
+        pytest.param(GOOD + "\x1a", id="Ctrl-Z"),
+        pytest.param(GOOD.replace("0.5", ".5").replace(" 0.25", " +2.5e-1"), id="spellings"),
+        pytest.param(GOOD.replace("1 2 3", "1. 2.0f 3F"), id="trailing f"),
+    ],
+)
+def test_white_space_and_spelling_mean_nothing(text):
+    assert_good(silent(text))
+
+
+def test_items_come_in_any_order_and_mix_with_joints():
+    skeleton = silent(
+        "balljoint root { balljoint arm { offset 0 1 0 } pose 0.5 0.25 7 boxmax 0.5 0.25 1 "
+        "rotzlimit -100000 100000 rotylimit 0 0.5 offset 1 2 3 boxmin -0.5 -0.25 -1 "
+        "rotxlimit -1 1 }"
+    )
+    assert_good(skeleton)
+
+
+def test_last_of_repeated_items_wins():
+    skeleton = silent(
+        "balljoint a { offset 1 1 1 pose 1 1 1 rotxlimit 0 1 boxmin 0 0 0 boxmax 5 5 5 "
+        "offset 2 3 4 pose 5 6 7 rotxlimit -9 9 boxmin -1 -2 -3 boxmax 1 2 3 }"
+    )
+    assert skeleton.rest_translations.tolist() == [[2, 3, 4]]
+    assert skeleton.rest_dofs[3:].tolist() == [5, 6, 7]
+    assert skeleton.dof_limits[3].tolist() == [-9, 9]
+    assert skeleton.boxes.tolist() == [[[-1, -2, -3], [1, 2, 3]]]
+
+
+def test_empty_joint_has_the_defaults():
+    skeleton = silent("balljoint a {}")
+    assert skeleton.rest_translations.tolist() == [[0, 0, 0]]
+    assert skeleton.boxes.tolist() == [[[-0.1] * 3, [0.1] * 3]]
+    assert skeleton.rest_dofs.tolist() == [0] * 6
+    assert skeleton.dof_limits.tolist() == [[-INF, INF]] * 6
+
+
+@pytest.mark.parametrize(
+    ("head", "name"),
+    [
+        ("balljoint{", ""),
+        ("balljoint  {", ""),
+        ("balljoint left upper leg {", "left upper leg"),
+        ("balljoint left\r\n\tleg{", "left leg"),
+        ("balljoint 3 {", "3"),
+        ("balljoint pos {", "pos"),
+        ("balljoint J\u00e9r\u00f4me {", "J\u00e9r\u00f4me"),
+        ("balljoint a\u00a0b {", "a\u00a0b"),
+        ("balljoint %s {", "%s"),
+        ('balljoint "quoted" {', '"quoted"'),
+    ],
+)
+def test_names_are_all_words_up_to_the_brace(head, name):
+    assert silent(head + "}").names == (name,)
+
+
+def test_name_in_latin_1_is_kept_byte_by_byte():
+    skeleton = silent(b"balljoint \xe9t\xe9 {}")
+    assert skeleton.names[0].encode("utf-8", "surrogateescape") == b"\xe9t\xe9"
+
+
+def test_joints_are_numbered_in_file_order_even_with_equal_names():
+    skeleton = silent(
+        "balljoint a{ balljoint a{ balljoint {} } balljoint a{} balljoint {balljoint b{}} }"
+    )
+    assert skeleton.names == ("a", "a", "", "a", "", "b")
+    assert skeleton.parents.tolist() == [-1, 0, 1, 0, 0, 4]
+
+
+def test_several_roots_stand_side_by_side():
+    skeleton = silent("balljoint a { balljoint b {} } balljoint c { balljoint d {} }")
+    assert skeleton.parents.tolist() == [-1, 0, -1, 2]
+    assert skeleton.dof_joints.tolist() == [0] * 6 + [1] * 3 + [2] * 3 + [3] * 3
+
+
+def test_corners_of_boxes_are_sorted_per_axis():
+    skeleton = silent("balljoint a { boxmin 1 -2 3 boxmax -1 2 -3 }")
+    assert skeleton.boxes.tolist() == [[[-1, -2, -3], [1, 2, 3]]]
+
+
+def test_boxes_may_be_flat():
+    skeleton = silent("balljoint a { boxmin 0 0 1 boxmax 2 0 1 }")
+    assert skeleton.boxes.tolist() == [[[0, 0, 1], [2, 0, 1]]]
+
+
+def test_box_with_one_corner_takes_the_other_from_the_default():
+    assert silent("balljoint a { boxmin -2 -2 -2 }").boxes.tolist() == [[[-2] * 3, [0.1] * 3]]
+
+
+# Limits
+
+
+def test_pose_is_clamped_after_the_whole_joint_is_read():
+    # As knee_r of test.skel, and with the pose before its limits as in horse.skel.
+    after = "rotxlimit -2 0 rotylimit 0 0 rotzlimit 0 0 pose -3 1 2"
+    before = "pose -3 1 2 rotxlimit -2 0 rotylimit 0 0 rotzlimit 0 0"
+    for items in (after, before):
+        skeleton = silent(f"balljoint a {{ {items} }}")
+        assert skeleton.rest_dofs[3:].tolist() == [-2, 0, 0]
+        assert rest_pose(skeleton).dofs[3:].tolist() == [-2, 0, 0]
+
+
+def test_equal_limits_lock_a_dof():
+    skeleton = silent("balljoint a { rotxlimit -0.11 -0.11 rotylimit 0 0 }")
+    assert skeleton.locked.tolist() == [False, False, False, True, True, False]
+    assert skeleton.rest_dofs[3:].tolist() == [-0.11, 0, 0]
+
+
+def test_limits_may_exclude_zero():
+    skeleton = silent("balljoint a { rotxlimit -3 -2 rotylimit 1 2 }")
+    assert skeleton.rest_dofs[3:].tolist() == [-2, 1, 0]
+
+
+@pytest.mark.parametrize(
+    ("written", "meant"),
+    [
+        ("-100000 100000", [-INF, INF]),
+        ("-1e5 1", [-INF, 1]),
+        ("0 100000", [0, INF]),
+        ("-200000 3e38", [-INF, INF]),
+        ("-99999 99999", [-99999, 99999]),
+        ("100000 100000", [100000, INF]),
+    ],
+)
+def test_limits_of_100000_mean_unlimited(written, meant):
+    assert silent(f"balljoint a {{ rotylimit {written} }}").dof_limits[4].tolist() == meant
+
+
+def test_minimum_above_maximum_is_ignored_with_a_warning():
+    skeleton, warnings = read(
+        "balljoint a {}\nballjoint b {\nrotylimit 2 -1\nrotxlimit 5 4\npose 9 9 9\n}"
+    )
+    assert skeleton.dof_limits[6:].tolist() == [[-INF, INF]] * 3
+    assert skeleton.rest_dofs[6:].tolist() == [9, 9, 9]
+    assert warnings == [
+        "a.skel:2: ignored 2 limits whose minimum is above the maximum, "
+        "first rotxlimit 5 4 of joint b"
+    ]
+
+
+# What is not known
+
+
+@pytest.mark.parametrize(
+    ("item", "words"),
+    [
+        ("pos 0 0 1.57", ["pos"]),
+        ("orient 1 0 0 0 1 0 0 0 1", ["orient"]),
+        ("joint end { }", ["joint"]),
+        ("joint { }", ["joint"]),
+        ("joint{}", ["joint"]),
+        ("joint end { offset 1 2 3 joint { pose 9 9 9 } balljoint b { } }", ["joint"]),
+        ("limits { x { 1 2 } y { 3 4 } }", ["limits"]),
+        ("colour red", ["colour", "red"]),
+        ("{ offset 9 9 9 }", ["{"]),
+        ("flag", ["flag"]),
+        ("scale 2 { 3 }", ["scale"]),
+    ],
+)
+@pytest.mark.parametrize("place", ["before", "between", "after"])
+def test_unknown_item_is_skipped_whole(item, words, place):
+    known = ["offset 1 2 3", "balljoint arm { offset 0 1 0 }"]
+    known.insert({"before": 0, "between": 1, "after": 2}[place], f"\n{item}\n")
+    skeleton, warnings = read(f"balljoint root {{ {' '.join(known)} }}")
+    assert skeleton.names == ("root", "arm")
+    assert skeleton.parents.tolist() == [-1, 0]
+    assert skeleton.rest_translations.tolist() == [[1, 2, 3], [0, 1, 0]]
+    assert warnings == [f'a.skel:2: skipped unknown "{word}"' for word in words]
+
+
+def test_numbers_that_belong_to_nothing_are_skipped():
+    skeleton, warnings = read("balljoint a {\n5 6 7\noffset 1 2 3 balljoint b { }\n8 9 }")
+    assert skeleton.rest_translations.tolist() == [[1, 2, 3], [0, 0, 0]]
+    assert warnings == ['a.skel:2: skipped unknown "5"', 'a.skel:4: skipped unknown "8"']
+
+
+@pytest.mark.parametrize("text", ["version 1.0 {} ", "header { name { balljoint x { } } } ", "v "])
+def test_unknown_words_outside_of_all_joints_are_skipped(text):
+    skeleton, warnings = read(f"{text} balljoint a {{ }} {text}")
+    assert skeleton.names == ("a",)
+    assert warnings == [f'a.skel:1: skipped unknown "{text.split()[0]}"']
+
+
+def test_unknown_keyword_is_named_once_and_with_its_first_line():
+    _, warnings = read("balljoint a {\npos 1\nfoo 2\npos 3\nballjoint b { pos 4 }\nfoo { }\n}")
+    assert warnings == ['a.skel:2: skipped unknown "pos"', 'a.skel:3: skipped unknown "foo"']
+
+
+def test_warnings_of_a_hopeless_file_end_after_100():
+    _, warnings = read(f"balljoint a {{ {' '.join(f'w{number}' for number in range(500))} }}")
+    assert len(warnings) == 101
+    assert warnings[99] == 'a.skel:1: skipped unknown "w99"'
+    assert warnings[100] == "a.skel: further warnings are left out"
+
+
+def test_keywords_are_lower_case():
+    _, warnings = read("balljoint a { Offset 1 2 3 }")
+    assert warnings == ['a.skel:1: skipped unknown "Offset"']
+
+
+def test_missing_brace_at_the_very_end_is_a_warning():
+    skeleton, warnings = read(GOOD.rstrip().removesuffix("}"))
+    assert_good(skeleton)
+    assert warnings == ['a.skel: the last "}" is missing']
+
+
+def test_extra_braces_after_the_root_are_a_warning():
+    skeleton, warnings = read(GOOD + "}\n}")
+    assert_good(skeleton)
+    assert warnings == ['a.skel: ignored 2 "}" after the root']
+
+
+# Broken files
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "a.skel: expected a skeleton, found no balljoint (an empty file)"),
+        (" \n ", "a.skel: expected a skeleton, found no balljoint (only white space)"),
+        ("offset 1 2 3", "a.skel: expected a skeleton, found no balljoint"),
+        ("\0\0\0\0", "a.skel: expected a skeleton, found no balljoint (zeros)"),
+        ("balljoint", 'a.skel:1: joint without a name: expected "{", found the end of the file'),
+        ("\nballjoint a b\n", 'a.skel:2: joint a b: expected "{", found the end of the file'),
+        ("balljoint a\noffset 1 2 3 }", 'a.skel:2: joint a: expected "{", found "offset"'),
+        ("balljoint a\nballjoint b {}", 'a.skel:2: joint a: expected "{", found "balljoint"'),
+        ("balljoint\n}", 'a.skel:2: joint without a name: expected "{", found "}"'),
+        (
+            "balljoint a {\n\n offset 1 up 3 }",
+            'a.skel:3: offset of joint a: expected a number, found "up"',
+        ),
+        (
+            "balljoint a {\r\n\r\n offset 1 nan 3 }",
+            'a.skel:3: offset of joint a: expected a number, found "nan"',
+        ),
+        (
+            "balljoint a {\r\r\noffset 1\r\r\ninf 3 }",
+            'a.skel:3: offset of joint a: expected a number, found "inf"',
+        ),
+        (
+            "balljoint a {\r\rpose 1e999 0 0 }",
+            'a.skel:3: pose of joint a: expected a number, found "1e999"',
+        ),
+        (
+            "balljoint a { rotxlimit 0 3.5e38 }",
+            'a.skel:1: rotxlimit of joint a: expected a number, found "3.5e38"',
+        ),
+        (
+            "balljoint a { rotylimit 0 1,5 }",
+            'a.skel:1: rotylimit of joint a: expected a number, found "1,5"',
+        ),
+        (
+            "balljoint a { rotzlimit 0 1_000 }",
+            'a.skel:1: rotzlimit of joint a: expected a number, found "1_000"',
+        ),
+        (
+            "balljoint a { boxmin 1.0-2.0 3 4 }",
+            'a.skel:1: boxmin of joint a: expected a number, found "1.0-2.0"',
+        ),
+        (
+            "balljoint a { boxmax 1 2 \u0663 }",
+            'a.skel:1: boxmax of joint a: expected a number, found "\u0663"',
+        ),
+        (
+            "balljoint a { offset 1 2\0 3 }",
+            'a.skel:1: offset of joint a: expected a number, found "2\\x00"',
+        ),
+        (
+            "balljoint a {\noffset 1 2\n}",
+            "a.skel:2: offset of joint a: expected 3 numbers, found 2",
+        ),
+        (
+            "balljoint {\npose\nballjoint b {}",
+            "a.skel:2: pose of joint without a name: expected 3 numbers, found 0",
+        ),
+        (
+            "balljoint a {\noffset 1 2",
+            "a.skel:2: offset of joint a: expected 3 numbers, found 2, then the end of the file",
+        ),
+        (
+            "balljoint a { rotxlimit 1\n2 3 }",
+            'a.skel:2: rotxlimit of joint a: expected 2 numbers, found more: "3"',
+        ),
+        (
+            "balljoint a {\n balljoint b {\n offset 1 2 3\n\n",
+            'a.skel:3: expected "}", found the end of the file: joint b (line 2) is still open',
+        ),
+        (
+            "balljoint a {\n balljoint b { }\n balljoint {\n",
+            'a.skel:3: expected "}", found the end of the file: '
+            "joint without a name (line 3) is still open",
+        ),
+        (
+            "balljoint a {\nfoo {\n { } balljoint b { }",
+            'a.skel:2: "foo" is still open where the file ends',
+        ),
+        ("{ balljoint a { }", 'a.skel:1: "{" is still open where the file ends'),
+    ],
+)
+def test_broken_file_is_refused_with_its_line(text, message):
+    assert refusal(text) == message
+
+
+def test_odd_names_are_shown_on_one_line():
+    text = b"balljoint \xff\x1b[31m\xe2\x80\xa8 {\n pose x 0 0 }"
+    assert refusal(text) == (
+        'a.skel:2: pose of joint \ufffd\\x1b[31m\\u2028: expected a number, found "x"'
+    )
+
+
+def test_long_names_and_words_are_cut():
+    text = f"balljoint {'n' * 5_000_000} {{ pose {'9x' * 2_500_000} 0 0 }}"
+    assert refusal(text) == (
+        f'a.skel:1: pose of joint {"n" * 39}…: expected a number, found "{"9x" * 19}9…"'
+    )
+
+
+@pytest.mark.parametrize("cut", range(len(GOOD.rstrip())))
+def test_file_cut_anywhere_is_refused_or_warned_of(cut):
+    source = Source("a.skel", GOOD[:cut].encode())
+    try:
+        skel.read(source)
+    except FormatError as problem:
+        assert str(problem).startswith("a.skel")
+    else:
+        # Only the last brace may be missing without making it another file.
+        assert 'a.skel: the last "}" is missing' in source.warnings
+
+
+# Large files
+
+
+def test_100_000_nested_joints_load():
+    skeleton = silent("balljoint a{" * 100_000 + "}" * 100_000)
+    assert skeleton.n_joints == 100_000
+    assert skeleton.parents[[0, 1, -1]].tolist() == [-1, 0, 99_998]
+
+
+def test_100_000_unclosed_joints_name_the_innermost():
+    assert refusal("balljoint a{\n" * 100_000) == (
+        'a.skel:100000: expected "}", found the end of the file: '
+        "joint a (line 100000) is still open"
+    )
+
+
+def test_20_000_siblings_load():
+    skeleton = silent("balljoint r{\n" + "balljoint a{}\n" * 20_000 + "}")
+    assert skeleton.parents.tolist() == [-1] + [0] * 20_000
+
+
+def test_unknown_block_nested_a_million_deep_is_skipped():
+    _, warnings = read("balljoint a { foo " + "{" * 1_000_000 + "}" * 1_000_000 + " }")
+    assert warnings == ['a.skel:1: skipped unknown "foo"']
+
+
+def test_20_000_different_unknown_words_are_skipped():
+    words = "\n".join(f"w{number}" for number in range(20_000))
+    assert len(read(f"balljoint a {{ {words} }}")[1]) == 101
+
+
+@pytest.mark.parametrize("end", ["\n", "\r", "\r\n", "\r\r\n", " "])
+def test_5_million_blank_lines_are_counted(end):
+    text = end * 5_000_000 + "balljoint a { offset up }"
+    line = 1 if end == " " else 5_000_001
+    assert refusal(text) == f'a.skel:{line}: offset of joint a: expected a number, found "up"'
+
+
+def test_name_of_5_mb_loads():
+    assert silent(f"balljoint {'x' * 5_000_000} {{}}").names == ("x" * 5_000_000,)
+
+
+def test_refusal_takes_little_memory():
+    text = b"balljoint a {\n" + b"offset 0 0 0\n" * 20_000 + b"pose up"
+    tracemalloc.start()
+    try:
+        refusal(text)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 1_000_000
+
+
+def test_arrays_of_a_skeleton_read_are_locked():
+    assert not silent(GOOD).rest_translations.flags.writeable
+
+
+def test_real_robot_has_six_joints(shared):
+    skeleton, warnings = read((shared / "test.skel").read_bytes())
+    assert warnings == []
+    assert skeleton.names == ("root", "head", "hip_l", "knee_l", "hip_r", "knee_r")
+    assert skeleton.parents.tolist() == [-1, 0, 0, 2, 0, 4]
+    assert np.count_nonzero(skeleton.locked) == 2

@@ -1,0 +1,117 @@
+import math
+
+import numpy as np
+import pytest
+from hand_made import matrix, skeleton, turn_x, turn_y, turn_z
+from numpy.testing import assert_allclose
+
+from viewer.rig.pose import local_matrices, rest_pose
+
+ROUNDING = 1e-15  # a few units in the last place of numbers up to 1
+
+
+def printed_matrix(x, y, z, offset):
+    """The matrix L as the specification prints it, entry by entry."""
+    cx, sx, cy, sy, cz, sz = *trig(x), *trig(y), *trig(z)
+    ox, oy, oz = offset
+    return np.array(
+        [
+            [cy * cz, sx * sy * cz - cx * sz, cx * sy * cz + sx * sz, ox],
+            [cy * sz, sx * sy * sz + cx * cz, cx * sy * sz - sx * cz, oy],
+            [-sy, sx * cy, cx * cy, oz],
+            [0, 0, 0, 1],
+        ]
+    )
+
+
+def trig(angle):
+    return math.cos(angle), math.sin(angle)
+
+
+def euler_joint(order, values, offset=(0.0, 0.0, 0.0)):
+    dofs = [(0, axis, value) for axis, value in zip(order, values, strict=True)]
+    return skeleton([-1], dofs, offsets=[offset])
+
+
+@pytest.mark.parametrize(
+    "angles", [(0, 0, 0), (0.1, 0.2, 0.3), (-1.5, 2.0, 3.0), (math.pi / 2,) * 3, (9.0, -8.0, 7.0)]
+)
+def test_local_matrix_is_the_printed_one(angles):
+    joint = euler_joint("xyz", angles, (1.0, -2.0, 3.0))
+    local = local_matrices(joint, rest_pose(joint))
+    assert_allclose(local[0], printed_matrix(*angles, (1.0, -2.0, 3.0)), atol=ROUNDING)
+
+
+def test_quarter_turns_about_x_then_y_then_z_by_hand():
+    # z axis: x turns it to -y, y leaves it, z turns -y to +x.
+    joint = euler_joint("xyz", [math.pi / 2] * 3)
+    local = local_matrices(joint, rest_pose(joint))[0]
+    assert_allclose(local[:3, :3] @ [0, 0, 1], [1, 0, 0], atol=ROUNDING)
+
+
+@pytest.mark.parametrize("order", ["xyz", "xzy", "yxz", "yzx", "zxy", "zyx", "zx", "y", "xyx"])
+def test_first_row_of_the_dof_table_is_applied_first(order):
+    values = [0.4, -0.9, 1.7][: len(order)]
+    joint = euler_joint(order, values)
+    expected = np.eye(3)
+    for axis, value in zip(order, values, strict=True):
+        expected = {"x": turn_x, "y": turn_y, "z": turn_z}[axis](value) @ expected
+    assert_allclose(local_matrices(joint, rest_pose(joint))[0, :3, :3], expected, atol=ROUNDING)
+
+
+def test_dof_rows_of_several_joints_may_be_interleaved():
+    rows = [(1, "z", 0.3), (0, "y", 0.5), (1, "tx", 4.0), (1, "x", -0.7), (0, "x", 0.2)]
+    both = skeleton([-1, 0], rows, offsets=[[0, 0, 0], [1, 1, 1]])
+    local = local_matrices(both, rest_pose(both))
+    assert_allclose(local[0], matrix(turn_x(0.2) @ turn_y(0.5)), atol=ROUNDING)
+    assert_allclose(local[1], matrix(turn_x(-0.7) @ turn_z(0.3), (5, 1, 1)), atol=ROUNDING)
+
+
+def test_translation_dofs_are_added_to_the_offset_and_not_turned():
+    rows = [(0, "tx", 1.0), (0, "z", math.pi / 2), (0, "ty", 2.0), (0, "tz", 3.0), (0, "tx", 0.5)]
+    joint = skeleton([-1], rows, offsets=[[10, 20, 30]])
+    local = local_matrices(joint, rest_pose(joint))[0]
+    assert local[:3, 3].tolist() == [11.5, 22, 33]
+    assert_allclose(local[:3, :3], turn_z(math.pi / 2), atol=ROUNDING)
+
+
+def test_joints_without_dofs_keep_their_rest_transform():
+    joints = skeleton([-1, 0], [], offsets=[[0, 1, 0], [2, 0, 0]])
+    local = local_matrices(joints, rest_pose(joints))
+    assert local.tolist() == [matrix(None, (0, 1, 0)).tolist(), matrix(None, (2, 0, 0)).tolist()]
+
+
+def test_local_matrix_multiplies_quaternion_then_dofs_then_scale():
+    joint = euler_joint("x", [0.6], (1.0, 2.0, 3.0))
+    pose = rest_pose(joint)
+    pose.rotations[0] = 0, 0, math.sin(0.45), math.cos(0.45)
+    pose.scales[0] = 2, 3, 4
+    expected = matrix(turn_z(0.9) @ turn_x(0.6) @ np.diag([2.0, 3, 4]), (1, 2, 3))
+    assert_allclose(local_matrices(joint, pose)[0], expected, atol=4 * ROUNDING)
+
+
+def test_rest_pose_is_clamped():
+    joint = skeleton(
+        [-1], [(0, "x", -3.0, -2.0, 0.0), (0, "y", 1.0, 0.0, 0.0), (0, "z", 0.0, 1, 2)]
+    )
+    assert rest_pose(joint).dofs.tolist() == [-2, 0, 1]
+
+
+def test_rest_poses_share_nothing_with_each_other_or_the_skeleton():
+    joint = euler_joint("x", [0.5])
+    pose = rest_pose(joint)
+    pose.dofs[0] = pose.translations[0, 0] = 7.0
+    assert rest_pose(joint).dofs.tolist() == [0.5]
+    assert joint.rest_translations[0, 0] == 0.0
+
+
+def test_copy_of_a_pose_shares_no_array():
+    pose = rest_pose(euler_joint("x", [0.5]))
+    other = pose.copy()
+    other.dofs[0], other.translations[0], other.rotations[0], other.scales[0] = 1, 1, 1, 2
+    assert (pose.dofs[0], pose.translations[0, 0], pose.rotations[0, 0], pose.scales[0, 0]) == (
+        0.5,
+        0.0,
+        0.0,
+        1.0,
+    )

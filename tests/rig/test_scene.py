@@ -1,0 +1,66 @@
+import numpy as np
+from hand_made import mesh, skeleton
+
+from viewer.rig.figure import Figure
+from viewer.rig.scene import Actor, Scene, actor_points, scene_box
+from viewer.rig.transform import translation_matrix
+
+
+def cloud(points) -> Actor:
+    return Actor(Figure("cloud", mesh=mesh(points)))
+
+
+def test_actor_takes_the_rest_pose_of_its_figure():
+    actor = Actor(Figure("a", skeleton=skeleton([-1], [(0, "x", 0.5)])))
+    assert actor.pose.dofs.tolist() == [0.5]
+    assert cloud([[0, 0, 0]]).pose is None
+
+
+def test_actors_of_one_figure_move_on_their_own():
+    figure = Figure("a", skeleton=skeleton([-1], [(0, "tx", 0.0)]))
+    first, second = Actor(figure), Actor(figure)
+    first.pose.dofs[0] = 5.0
+    assert second.pose.dofs.tolist() == [0.0]
+    assert actor_points(first).tolist() == [[5, 0, 0]]
+
+
+def test_actor_points_are_placed():
+    actor = cloud([[1, 2, 3]])
+    actor.placement = translation_matrix(np.array([10.0, 0, 0]))
+    assert actor_points(actor).tolist() == [[11, 2, 3]]
+
+
+def test_scene_box_spans_visible_actors_only():
+    near, far = cloud([[0, 0, 0], [1, 1, 1]]), cloud([[9, 9, 9]])
+    assert scene_box(Scene([near, far])).tolist() == [[0, 0, 0], [9, 9, 9]]
+    far.visible = False
+    assert scene_box(Scene([near, far])).tolist() == [[0, 0, 0], [1, 1, 1]]
+
+
+def test_scene_box_of_nothing_is_the_origin():
+    assert scene_box(Scene([])).tolist() == [[0, 0, 0], [0, 0, 0]]
+
+
+def test_scene_box_leaves_out_a_stray_vertex():
+    points = np.stack([np.linspace(0, 1, 5000)] * 3, axis=1)
+    points[17] = 1e30, 0, 0
+    box = scene_box(Scene([cloud(points)]))
+    # The box of 99.9 % may miss 0.05 % of the line at either end.
+    assert np.abs(box - [[0, 0, 0], [1, 1, 1]]).max() < 0.001
+
+
+def test_scene_box_keeps_every_point_of_an_ordinary_figure():
+    points = np.stack([np.linspace(0, 1, 5000)] * 3, axis=1)
+    points[17] = 50.0, 0, 0
+    assert scene_box(Scene([cloud(points)]))[1].tolist() == [50, 1, 1]
+
+
+def test_scene_box_keeps_every_point_of_a_small_figure():
+    points = np.zeros((10, 3))
+    points[3] = 1e30
+    assert scene_box(Scene([cloud(points)]))[1].tolist() == [1e30] * 3
+
+
+def test_scene_is_up_as_its_first_figure():
+    assert Scene([]).up == "y"
+    assert Scene([Actor(Figure("a", mesh=mesh([[0, 0, 0]]), up="z"))]).up == "z"

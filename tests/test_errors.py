@@ -1,0 +1,53 @@
+import pytest
+
+from viewer import errors
+from viewer.errors import FormatError, OutputError, RenderError, ViewerError, printable
+
+
+@pytest.mark.parametrize("name", [name for name in errors.__all__ if name.endswith("Error")])
+def test_every_error_is_a_viewer_error(name):
+    assert issubclass(getattr(errors, name), ViewerError)
+
+
+def test_exit_codes_tell_input_graphics_and_output_apart():
+    assert (FormatError.exit_code, RenderError.exit_code, OutputError.exit_code) == (2, 4, 5)
+    assert errors.RigError.exit_code == errors.UnsupportedFormatError.exit_code == 2
+
+
+def test_format_error_begins_with_file_and_line():
+    error = FormatError("dir/tube.skin", "expected 3 numbers, found 2", 41)
+    assert str(error) == "dir/tube.skin:41: expected 3 numbers, found 2"
+    assert (str(error.path), error.line) == ("dir/tube.skin", 41)
+    assert str(FormatError("a b.skel", "x")) == "a b.skel: x"
+
+
+def test_format_error_shows_an_odd_path_on_one_line():
+    assert str(FormatError("a\nb\udcff\x1b[0m{}%s", "x")) == "a\\nb\\udcff\\x1b[0m{}%s: x"
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("plain text", "plain text"),
+        ("tab\tcr\rlf\n", "tab\\tcr\\rlf\\n"),
+        ("\0\x85\u2028\xa0", "\\x00\\x85\\u2028\\xa0"),
+        ("\ud800\udcff", "\\ud800\\udcff"),
+        ("caf\u00e9 \u65e5\u672c", "caf\u00e9 \u65e5\u672c"),
+        ("back\\slash", "back\\slash"),
+        (12, "12"),
+    ],
+)
+def test_printable_escapes_what_cannot_be_shown(text, shown):
+    assert printable(text) == shown
+
+
+def test_printable_cuts_long_text():
+    assert printable("x" * 200) == "x" * 200
+    assert printable("x" * 201) == "x" * 199 + "…"
+    assert printable("abcdef", 3) == "ab…"
+
+
+@pytest.mark.parametrize("kind", [errors.RigError, errors.UnsupportedFormatError])
+def test_names_in_messages_stay_on_one_line(kind):
+    assert str(kind("joint a\nb\x1b: x")) == "joint a\\nb\\x1b: x"
+    assert len(str(kind("x" * 5000))) == 1000

@@ -1,0 +1,373 @@
+import gzip
+import os
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import viewer
+from viewer.errors import FormatError, RigError
+from viewer.formats import FORMATS
+from viewer.loading import bundled_files
+from viewer.rig.mesh import bounding_box
+from viewer.rig.scene import actor_points
+
+ANY = " or ".join(kind.suffix for kind in FORMATS.values())
+MATRIX = "matrix { 1 0 0 0 1 0 0 0 1 0 0 0 } "
+
+
+def skel_text(n_joints, width=1.0):
+    children = "balljoint { } " * (n_joints - 1)
+    return f"balljoint root {{ boxmin 0 0 0 boxmax {width} 1 1 {children} }}"
+
+
+def skin_text(n_joints, width=1.0, left=0.0):
+    mesh = (
+        f"positions 3 {{ {left} 0 0 {left + width} 0 0 {left} 1 0 }} normals 3 {{ {'0 0 1 ' * 3} }}"
+    )
+    weights = f"skinweights 3 {{ {'1 0 1 ' * 3} }} triangles 1 {{ 0 1 2 }}"
+    return f"{mesh} {weights} bindings {n_joints} {{ {MATRIX * n_joints} }}"
+
+
+@pytest.fixture
+def files(tmp_path):
+    """Write files whose names begin with their number of joints: ``2a.skel``, ``3.skin``."""
+
+    def write(*names, **changes):
+        for name in names:
+            text = skel_text if name.endswith(".skel") else skin_text
+            (tmp_path / name).write_text(text(int(name[0]), **changes))
+        return [tmp_path / name for name in names]
+
+    return write
+
+
+def parts(scene):
+    """Return the name and joint count of each actor, None for a missing part."""
+    return [
+        (
+            actor.figure.name,
+            actor.figure.skeleton and actor.figure.skeleton.n_joints,
+            actor.figure.skin and actor.figure.skin.n_joints,
+        )
+        for actor in scene.actors
+    ]
+
+
+def refusal(*paths, **options):
+    with pytest.raises((FormatError, RigError)) as caught:
+        viewer.load(*paths, **options)
+    assert caught.value.exit_code == 2
+    text = str(caught.value)
+    assert text.isprintable()
+    return text
+
+
+# Pairs
+
+
+def test_skeleton_alone_opens_as_boxes(files):
+    scene = viewer.load(*files("2.skel"))
+    assert parts(scene) == [("2", 2, None)]
+    assert scene.actors[0].pose is not None
+    assert scene.warnings == ()
+
+
+def test_skin_alone_opens_in_its_binding_space(files):
+    scene = viewer.load(*files("2.skin"))
+    assert parts(scene) == [("2", None, 2)]
+    assert scene.actors[0].pose is None
+
+
+def test_path_may_be_text(files):
+    assert parts(viewer.load(*map(str, files("2.skel")))) == [("2", 2, None)]
+
+
+@pytest.mark.parametrize("order", [("2.skel", "2.skin"), ("2.skin", "2.skel")])
+def test_pair_opens_attached_in_any_order(files, order):
+    scene = viewer.load(*files(*order))
+    assert parts(scene) == [("2", 2, 2)]
+    assert scene.actors[0].figure.is_attached
+
+
+@pytest.mark.parametrize(
+    ("order", "expected"),
+    [
+        (["2.skel", "2.skin", "3.skel", "3.skin"], [("2", 2, 2), ("3", 3, 3)]),
+        (["3.skin", "2.skin", "2.skel", "3.skel"], [("3", 3, 3), ("2", 2, 2)]),
+        (["2.skel", "3.skel", "3.skin", "2.skin"], [("2", 2, 2), ("3", 3, 3)]),
+        (["2.skel", "3.skel", "3.skin"], [("2", 2, None), ("3", 3, 3)]),
+        (["2.skel", "2a.skel", "2a.skin"], [("2", 2, None), ("2a", 2, 2)]),
+        (["2a.skel", "2b.skel", "2b.skin", "2a.skin"], [("2a", 2, 2), ("2b", 2, 2)]),
+        (["2a.skel", "2b.skel", "2c.skin", "2d.skin"], [("2c", 2, 2), ("2d", 2, 2)]),
+        (["2.skel", "2a.skin", "2b.skin"], [("2a", 2, 2), ("2b", None, 2)]),
+        (["2.skin", "3.skin"], [("2", None, 2), ("3", None, 3)]),
+        (["2.skel", "2.skel"], [("2", 2, None), ("2", 2, None)]),
+        (["2.skel", "2.skin"] * 2, [("2", 2, 2), ("2", 2, 2)]),
+    ],
+)
+def test_files_find_their_partners(files, order, expected):
+    assert parts(viewer.load(*files(*order))) == expected
+
+
+def test_skin_of_another_skeleton_is_refused_with_both_names_and_numbers(files):
+    skel, skin = files("2.skel", "3.skin")
+    expected = f"{skin} has 3 binding matrices, {skel} has 2 joints"
+    assert refusal(skel, skin) == expected
+    assert refusal(skin, skel) == expected
+
+
+def test_odd_skin_among_pairs_is_refused(files):
+    skels = files("2.skel", "3.skel")
+    skins = files("2.skin", "5.skin")
+    assert refusal(*skels, *skins) == (
+        f"{skins[1]} has 5 binding matrices, {skels[1]} has 3 joints"
+    )
+
+
+def test_skin_without_weights_cannot_follow_a_skeleton(files, tmp_path):
+    (skel,) = files("2.skel")
+    bare = tmp_path / "bare.skin"
+    bare.write_text("positions 1 { 0 0 0 } normals 1 { 0 0 1 } triangles 1 { 0 0 0 }")
+    assert refusal(skel, bare) == (
+        f"{bare}: expected weights and bindings to follow the 2 joints of {skel}, found none"
+    )
+    assert viewer.load(bare).warnings == (
+        f"{bare}: no `skinweights` and no `bindings`: the mesh cannot follow a skeleton",
+    )
+
+
+def test_real_skin_of_another_skeleton_is_refused(shared):
+    skel, skin = shared / "test.skel", shared / "wasp.skin"
+    assert refusal(skel, skin) == f"{skin} has 23 binding matrices, {skel} has 6 joints"
+
+
+# Side by side
+
+
+def spans(scene):
+    boxes = [bounding_box(actor_points(actor)) for actor in scene.actors]
+    return [tuple(box[:, 0].tolist()) for box in boxes]
+
+
+def test_one_actor_stays_where_it_is(files):
+    assert spans(viewer.load(*files("2.skin", left=7.0))) == [(7, 8)]
+
+
+def test_actors_stand_side_by_side_a_quarter_of_the_wider_apart(files):
+    paths = files("2.skin", left=-5.0, width=4.0) + files("3.skin", left=100.0, width=1.0)
+    paths += files("4.skin", left=-9.0, width=8.0)
+    # 4 wide, a gap of 1, 1 wide, a gap of 2, 8 wide.
+    assert spans(viewer.load(*paths)) == [(-5, -1), (0, 1), (3, 11)]
+
+
+def test_many_actors_do_not_overlap(shared):
+    names = ["wasp.skel", "wasp.skin", "test.skel", "tube.skin", "tube.skel", "wasp.skel"]
+    scene = viewer.load(*(shared / name for name in names))
+    edges = spans(scene)
+    assert len(edges) == 4
+    assert all(before[1] < after[0] for before, after in pairwise(edges))
+
+
+def test_stray_vertex_does_not_push_the_next_actor_away(files, tmp_path):
+    rows = " ".join(f"{number / 2000} 0 0" for number in range(1999)) + " 1e30 0 0"
+    stray = tmp_path / "stray.skin"
+    stray.write_text(f"positions 2000 {{ {rows} }} triangles 1 {{ 0 1 2 }}")
+    (other,) = files("2.skin")
+    scene = viewer.load(stray, other)
+    assert 1.0 <= scene.actors[1].placement[0, 3] < 1.5
+
+
+def test_actors_of_no_width_stand_apart_from_wide_ones(files):
+    paths = files("2.skin", width=0.0) + files("3.skin", width=4.0)
+    assert spans(viewer.load(*paths)) == [(0, 0), (1, 5)]
+
+
+# Recognition
+
+
+def test_skeleton_named_skin_opens_with_a_warning(files):
+    (skel,) = files("2.skel")
+    wrong = skel.with_suffix(".skin")
+    skel.rename(wrong)
+    scene = viewer.load(wrong)
+    assert parts(scene) == [("2", 2, None)]
+    assert scene.warnings == (f"{wrong}: is a .skel, named .skin",)
+
+
+def test_exchanged_names_still_pair(files):
+    skel, skin = files("2.skel", "2.skin")
+    text = skel.read_text()
+    skel.write_text(skin.read_text())
+    skin.write_text(text)
+    scene = viewer.load(skel, skin)
+    assert parts(scene) == [("2", 2, 2)]
+    assert scene.warnings == (
+        f"{skel}: is a .skin, named .skel",
+        f"{skin}: is a .skel, named .skin",
+    )
+
+
+@pytest.mark.parametrize("name", ["figure", "figure.txt", ".skel", "a.SKEL", "a.b.c"])
+def test_any_name_will_do(files, name):
+    (skel,) = files("2.skel")
+    other = skel.with_name(name)
+    skel.rename(other)
+    assert viewer.load(other).warnings == ()
+
+
+def test_5_million_blank_lines_before_a_skeleton_load(tmp_path):
+    path = tmp_path / "a.skel"
+    path.write_bytes(b"\n" * 5_000_000 + b"balljoint a { }")
+    assert parts(viewer.load(path)) == [("a", 1, None)]
+
+
+@pytest.mark.parametrize(
+    ("data", "kind"),
+    [
+        (b"", "an empty file"),
+        (b"\0" * 5000, "zeros"),
+        (b"\x89PNG\r\n\x1a\n", "a PNG picture"),
+        (gzip.compress(b"balljoint a { }"), "gzip data"),
+        (b"<html><body>404</body></html>", "HTML or XML (a failed download?)"),
+        ("balljoint a { }".encode("utf-16"), "UTF-16 text"),
+    ],
+)
+def test_other_content_is_named(tmp_path, data, kind):
+    for name, wanted in (("a.skel", ".skel"), ("a.skin", ".skin"), ("a", ANY)):
+        path = tmp_path / name
+        path.write_bytes(data)
+        assert refusal(path) == f"{path}: expected a {wanted} file, found {kind}"
+
+
+# What is no file
+
+
+def test_missing_file_is_named(tmp_path):
+    path = tmp_path / "gone.skel"
+    assert refusal(path) == f"{path}: cannot be read: No such file or directory"
+
+
+def test_folder_is_refused(tmp_path):
+    assert refusal(tmp_path) == f"{tmp_path}: expected a file, found a folder"
+    assert refusal("") == ".: expected a file, found a folder"
+
+
+def test_file_as_a_folder_is_refused(files):
+    (skel,) = files("2.skel")
+    assert refusal(skel / "a.skel") == f"{skel}/a.skel: cannot be read: Not a directory"
+
+
+def test_pipe_is_refused_at_once(tmp_path):
+    path = tmp_path / "pipe.skel"
+    os.mkfifo(path)
+    assert refusal(path) == f"{path}: expected a file, found a pipe"
+
+
+def test_device_is_refused_at_once():
+    assert refusal("/dev/zero") == "/dev/zero: expected a file, found a device"
+
+
+def test_socket_is_refused(tmp_path, monkeypatch):
+    import socket
+
+    monkeypatch.chdir(tmp_path)  # the name of a socket must be short
+    with socket.socket(socket.AF_UNIX) as server:
+        server.bind("s.skel")
+        assert refusal("s.skel") == "s.skel: expected a file, found a socket"
+
+
+def test_link_is_followed_and_a_broken_one_named(files, tmp_path):
+    (skel,) = files("2.skel")
+    link = tmp_path / "link.skel"
+    link.symlink_to(skel)
+    assert parts(viewer.load(link)) == [("link", 2, None)]
+    skel.unlink()
+    assert refusal(link) == f"{link}: cannot be read: No such file or directory"
+
+
+def test_link_that_leads_to_itself_is_refused(tmp_path):
+    link = tmp_path / "loop.skel"
+    link.symlink_to(link)
+    assert refusal(link) == f"{link}: cannot be read: Too many levels of symbolic links"
+
+
+def test_unreadable_file_is_refused(files, monkeypatch):
+    (skel,) = files("2.skel")
+    skel.chmod(0)
+    if os.access(skel, os.R_OK):  # root reads everything
+
+        def refuse(path):
+            raise PermissionError(13, "Permission denied")
+
+        monkeypatch.setattr(Path, "read_bytes", refuse)
+    assert refusal(skel) == f"{skel}: cannot be read: Permission denied"
+
+
+def test_name_that_no_system_can_have_is_refused(tmp_path):
+    assert refusal("a\0b.skel").startswith("a\\x00b.skel: cannot be read: embedded null")
+    long = "x" * 300 + ".skel"
+    assert refusal(long) == f"{'x' * 299}…: cannot be read: File name too long"
+
+
+@pytest.mark.parametrize(
+    "name", ["a b.skel", "a'\"{}%s.skel", "a\nb.skel", "\udcff.skel", "x" * 240]
+)
+def test_odd_names_load_and_are_shown_on_one_line(tmp_path, name):
+    path = tmp_path / name
+    path.write_text("balljoint a { offset up }")
+    shown = str(path).replace("\n", "\\n").replace("\udcff", "\\udcff")
+    assert refusal(path).startswith(f"{shown}"[:299])
+    path.write_text("balljoint a { }")
+    assert viewer.load(path).warnings == ()
+
+
+def test_file_above_the_size_cap_is_refused_before_it_is_read(tmp_path):
+    path = tmp_path / "big.skel"
+    with path.open("wb") as stream:
+        stream.truncate(3 << 30)  # a hole: it takes no room
+    assert refusal(path) == (
+        f"{path}: expected at most 2147483648 bytes, found 3221225472 (--max-size)"
+    )
+
+
+def test_size_cap_can_be_set(files):
+    (skel,) = files("2.skel")
+    size = skel.stat().st_size
+    assert parts(viewer.load(skel, max_size=size)) == [("2", 2, None)]
+    assert refusal(skel, max_size=size - 1) == (
+        f"{skel}: expected at most {size - 1} bytes, found {size} (--max-size)"
+    )
+
+
+def test_one_bad_file_among_good_ones_is_named(files, tmp_path):
+    bad = tmp_path / "bad.skel"
+    bad.write_text("balljoint a {\n\noffset up }")
+    assert refusal(*files("2.skel", "2.skin"), bad) == (
+        f'{bad}:3: offset of joint a: expected a number, found "up"'
+    )
+
+
+def test_warnings_of_all_files_are_gathered(files, tmp_path):
+    first, second = tmp_path / "a.skel", tmp_path / "b.skel"
+    first.write_text("balljoint a { foo }")
+    second.write_text("balljoint b {\nbar }")
+    assert viewer.load(first, second).warnings == (
+        f'{first}:1: skipped unknown "foo"',
+        f'{second}:2: skipped unknown "bar"',
+    )
+
+
+# The bundled figure
+
+
+def test_no_files_open_the_bundled_figure():
+    if not all(path.exists() for path in bundled_files()):
+        pytest.skip("the bundled figure is not there yet")
+    scene = viewer.load()
+    assert len(scene.actors) == 1
+    assert scene.warnings == ()
+    figure = scene.actors[0].figure
+    assert figure.is_attached
+    assert np.isfinite(viewer.deform(figure)[0]).all()
