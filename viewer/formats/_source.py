@@ -123,7 +123,8 @@ class Source:
         if offset < start:
             start, line = 0, 1
         line += self.data.count(b"\n", start, offset)
-        if self.data.find(b"\r", start, offset) >= 0:
+        lone = self.data.count(b"\r", start, offset) - self.data.count(b"\r\n", start, offset)
+        if lone:
             runs = (run.group() for run in _CARRIAGE_RETURNS.finditer(self.data, start, offset))
             line += sum(len(run) for run in runs if not run.endswith(b"\n"))
         self._counted = offset, line
