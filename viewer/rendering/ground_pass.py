@@ -25,7 +25,7 @@ _EXTENT = 6.0  # half the grid's side, in sizes of the figure
 def grid_step(box: Floats) -> float:
     """Return the distance between grid lines: 1, 2 or 5 times a power of ten of scene units.
 
-    >>> grid_step(np.array([[0.0, 0.0, 0.0], [0.0, 1.7, 0.0]]))
+    >>> grid_step(np.array([[0.0, 0.0, 0.0], [0.0, 1.6, 0.0]]))
     0.2
     """
     wanted = (box_size(box) or 1.0) / 8.0
