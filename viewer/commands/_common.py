@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import math
 import re
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
-from viewer.errors import RigError, ViewerError
+from viewer.errors import RigError, ViewerError, printable
 from viewer.loading import load
 from viewer.rendering.camera import Camera, fit
 from viewer.rendering.options import SHOWN, DisplayOptions
@@ -31,6 +33,7 @@ __all__ = [
     "print_warnings",
 ]
 
+_SLOW_BYTES = 60e6  # about a second of reading
 _UNITS = {"k": 1 << 10, "m": 1 << 20, "g": 1 << 30}
 
 
@@ -107,11 +110,23 @@ def _parse_bytes(text: str) -> int:
 
 def open_scene(arguments: argparse.Namespace) -> Scene:
     """Load the files, print what their readers noticed, and pose them as asked."""
+    _announce(arguments.files)
     scene = load(*arguments.files, max_size=_parse_bytes(arguments.max_size))
     print_warnings(scene.warnings)
     apply_time(scene, arguments.time)
     apply_dofs(scene, arguments.dof)
     return scene
+
+
+def _announce(files: Sequence[str]) -> None:
+    """Tell a person at a terminal about reading that takes longer than a second."""
+    if not sys.stderr.isatty():
+        return
+    for file in files:
+        with contextlib.suppress(OSError, ValueError):  # the reader will say what is wrong
+            size = Path(file).stat().st_size
+            if size > _SLOW_BYTES:
+                print(f"reading {printable(file)} ({size / 1e6:.0f} MB) …", file=sys.stderr)
 
 
 def apply_time(scene: Scene, time: float | None) -> None:
