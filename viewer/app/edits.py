@@ -5,10 +5,8 @@ from __future__ import annotations
 import copy
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.pose import Pose
+from viewer.rig.pose import Pose, pose_key
 from viewer.rig.scene import Scene
 
 __all__ = ["History"]
@@ -109,9 +107,4 @@ def _is_same(snapshot: _Snapshot, scene: Scene, options: DisplayOptions) -> bool
 def _same_pose(old: Pose | None, new: Pose | None) -> bool:
     if old is None or new is None:
         return old is new
-    return (
-        np.array_equal(old.dofs, new.dofs)
-        and np.array_equal(old.translations, new.translations)
-        and np.array_equal(old.rotations, new.rotations)
-        and np.array_equal(old.scales, new.scales)
-    )
+    return pose_key(old) == pose_key(new)

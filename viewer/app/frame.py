@@ -23,6 +23,7 @@ from viewer.loading import bundled_files
 from viewer.rendering.renderer import Renderer
 from viewer.rendering.target import Target
 from viewer.rig.arrays import Bytes
+from viewer.rig.pose import pose_key
 
 __all__ = ["Frame"]
 
@@ -117,7 +118,12 @@ class Frame:
         """Return everything the picture of the scene depends on."""
         state, camera = self.state, self.state.camera
         poses = tuple(
-            (id(actor), actor.visible, actor.placement.tobytes(), *_pose_bytes(actor))
+            (
+                id(actor),
+                actor.visible,
+                actor.placement.tobytes(),
+                *(pose_key(actor.pose) if actor.pose else ()),
+            )
             for actor in state.scene.actors
         )
         place = (camera.target.tobytes(), camera.distance, camera.azimuth, camera.inclination)
@@ -202,15 +208,3 @@ class Frame:
         if self.target is not None:
             self.target.release()
         self.renderer.release()
-
-
-def _pose_bytes(actor: object) -> tuple[bytes, ...]:
-    pose = getattr(actor, "pose", None)
-    if pose is None:
-        return ()
-    return (
-        pose.dofs.tobytes(),
-        pose.translations.tobytes(),
-        pose.rotations.tobytes(),
-        pose.scales.tobytes(),
-    )

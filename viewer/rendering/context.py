@@ -18,6 +18,7 @@ __all__ = [
     "device_count",
     "explain",
     "headless_context",
+    "is_software",
     "unreadable_devices",
 ]
 
@@ -146,6 +147,12 @@ def explain(text: str) -> str:
     if "version" in text.lower():
         return f"OpenGL 3.3 is needed: {text}"
     return f"no OpenGL context: {text} ({_INSTALL})"
+
+
+def is_software(context: moderngl.Context) -> bool:
+    """Return whether the processor draws, not a graphics card."""
+    renderer = context.info["GL_RENDERER"].lower()
+    return any(name in renderer for name in ("llvmpipe", "softpipe", "swrast", "software", "basic"))
 
 
 def unreadable_devices() -> list[str]:

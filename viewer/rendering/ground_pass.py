@@ -121,8 +121,10 @@ class GroundPass:
             self._ground = self.context.vertex_array(program, content)
         target = self.context.fbo
         target.depth_mask = False  # the translucent grid hides nothing
+        target.use()  # moderngl hands masks to OpenGL only then
         self._ground.render(moderngl.TRIANGLE_STRIP)
         target.depth_mask = True
+        target.use()
 
     def release(self) -> None:
         """Free vertex arrays and buffers."""

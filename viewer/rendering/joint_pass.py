@@ -14,7 +14,7 @@ from viewer.rendering.view import View, set_lights, set_model
 from viewer.rig.arrays import Floats
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.pose import Pose, rest_pose
+from viewer.rig.pose import Pose, pose_key, rest_pose
 from viewer.rig.skeleton import Skeleton
 
 __all__ = ["JointPass", "SkeletonBuffers", "joint_colors"]
@@ -55,8 +55,7 @@ class SkeletonBuffers:
 
     def update(self, pose: Pose) -> None:
         """Upload the joints' matrices if the pose changed."""
-        arrays = (pose.dofs, pose.translations, pose.rotations, pose.scales)
-        key = tuple(array.tobytes() for array in arrays)
+        key = pose_key(pose)
         if key == self._key:
             return
         world = world_matrices(self.skeleton, pose)

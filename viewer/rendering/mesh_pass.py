@@ -73,8 +73,10 @@ class MeshPass:
         """Let only the nearest layer through: back faces would show through front ones."""
         target = self.context.fbo
         target.color_mask = False, False, False, False
+        target.use()  # moderngl hands masks to OpenGL only then
         array.render(moderngl.TRIANGLES)
         target.color_mask = True, True, True, True
+        target.use()
         self.context.depth_func = "<="
 
     def _draw_runs(self, mesh: PosedMesh, array: moderngl.VertexArray, textured: bool) -> None:

@@ -15,7 +15,7 @@ from viewer.rendering.program import Programs, set_uniforms
 from viewer.rendering.upload import matrix_texture, write_matrices
 from viewer.rig.arrays import Floats
 from viewer.rig.kinematics import skinning_matrices, world_matrices
-from viewer.rig.pose import Pose
+from viewer.rig.pose import Pose, pose_key
 
 __all__ = ["PosedMesh"]
 
@@ -66,7 +66,7 @@ class PosedMesh:
             A key of ``viewer.rig.skinning.METHODS``.
         """
         attached = self.mesh.figure.is_attached and pose is not None
-        key = (method, *_pose_key(pose)) if attached and pose is not None else ("binding",)
+        key = (method, *pose_key(pose)) if attached and pose is not None else ("binding",)
         if key == self._key:
             return
         array = self._array(method)
@@ -125,8 +125,3 @@ class PosedMesh:
             array.release()
         self.posed.release()
         self._palette.release()
-
-
-def _pose_key(pose: Pose) -> tuple[bytes, ...]:
-    arrays = (pose.dofs, pose.translations, pose.rotations, pose.scales)
-    return tuple(array.tobytes() for array in arrays)

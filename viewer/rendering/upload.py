@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.errors import RenderError
-from viewer.rendering.context import check_errors
+from viewer.rendering.context import check_errors, is_software
 from viewer.rig.arrays import Bytes, Floats
 
 __all__ = [
@@ -90,7 +90,8 @@ def picture_texture(context: moderngl.Context, pixels: Bytes, notes: list[str]) 
     texture.repeat_x = texture.repeat_y = False
     texture.build_mipmaps()
     texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
-    texture.anisotropy = 8.0
+    if not is_software(context):
+        texture.anisotropy = 8.0  # without a GPU it doubles the time of a picture
     check_errors(context, f"a texture of {size[0]} x {size[1]} pixels")
     return texture
 

@@ -11,7 +11,7 @@ from viewer.rig.arrays import Floats, Ints
 from viewer.rig.rotation import axis_rotations, quaternion_to_matrix
 from viewer.rig.skeleton import Skeleton, clamp_dofs
 
-__all__ = ["Pose", "local_matrices", "rest_pose"]
+__all__ = ["Pose", "local_matrices", "pose_key", "rest_pose"]
 
 _FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
 
@@ -38,6 +38,12 @@ class Pose:
         return Pose(
             self.dofs.copy(), self.translations.copy(), self.rotations.copy(), self.scales.copy()
         )
+
+
+def pose_key(pose: Pose) -> tuple[bytes, ...]:
+    """Return what changes if and only if a pose does: to know when to skin or draw again."""
+    arrays = (pose.dofs, pose.translations, pose.rotations, pose.scales)
+    return tuple(array.tobytes() for array in arrays)
 
 
 def rest_pose(skeleton: Skeleton) -> Pose:
