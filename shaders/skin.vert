@@ -17,18 +17,17 @@ uniform sampler2D u_pairs;      // joint and weight
 out vec3 v_position;     // figure space, minus the posed centre
 out vec3 v_normal;       // figure space, unit length
 
-ivec2 texel(int index, int per_row) {
-    return ivec2(index % per_row, index / per_row);
-}
+// Shifts, as processors have no division of eight integers at once: upload.py's rows hold 1024
+// pairs or 256 matrices.
 
 // Joint index and weight of one pair.
 vec2 influence(uint index) {
-    return texelFetch(u_pairs, texel(int(index), textureSize(u_pairs, 0).x), 0).rg;
+    return texelFetch(u_pairs, ivec2(index & 1023u, index >> 10), 0).rg;
 }
 
 // One row of a joint's skinning matrix.
 vec4 palette_row(int joint, int row) {
-    return texelFetch(u_palette, texel(3 * joint + row, textureSize(u_palette, 0).x), 0);
+    return texelFetch(u_palette, ivec2(3 * (joint & 255) + row, joint >> 8), 0);
 }
 
 #pragma chunk

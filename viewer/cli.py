@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+import io
 import os
 import signal
 import sys
@@ -43,9 +45,13 @@ def run(arguments: Sequence[str]) -> int:
         The exit code: 0, or that of the ``ViewerError``.
     """
     signal.signal(signal.SIGTERM, _terminate)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        # A name that the terminal's encoding lacks is no reason to fail.
+        sys.stdout.reconfigure(errors="backslashreplace")
     try:
         code = _dispatch(list(arguments))
-        sys.stdout.flush()
+        if sys.stdout is not None:
+            sys.stdout.flush()
         return code
     except ViewerError as problem:
         return _fail(printable(problem, 2000), problem.exit_code)
@@ -55,8 +61,11 @@ def run(arguments: Sequence[str]) -> int:
         return _fail("terminated", 143)
     except BrokenPipeError:
         # The reader of our output has gone (``viewer info x | head -1``): nothing to report.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _drop_output()
         return 0
+    except OSError as problem:
+        _drop_output()
+        return _fail(f"output could not be written: {problem.strerror or problem}", 5)
     except MemoryError:
         return _fail("not enough memory", 2)
 
@@ -72,7 +81,12 @@ def _dispatch(arguments: list[str]) -> int:
     command = import_module(f"viewer.commands.{name}")
     parser = _Parser(prog=f"viewer {name}", description=COMMANDS[name])
     command.add_arguments(parser)
-    return command.run(parser.parse_intermixed_args(_protect_numbers(arguments)))
+    # What follows "--" are files, whatever they are called.
+    end = arguments.index("--") if "--" in arguments else len(arguments)
+    parsed = parser.parse_intermixed_args(_protect_numbers(arguments[:end]))
+    if arguments[end + 1 :]:
+        parsed.files = [*getattr(parsed, "files", []), *arguments[end + 1 :]]
+    return command.run(parsed)
 
 
 class _Parser(argparse.ArgumentParser):
@@ -113,6 +127,13 @@ def _overview() -> argparse.ArgumentParser:
 def _fail(message: str, code: int) -> int:
     print(f"viewer: {message}", file=sys.stderr)
     return code
+
+
+def _drop_output() -> None:
+    """Let what is left of the output vanish, or Python would complain about it at its end."""
+    if sys.stdout is not None:
+        with contextlib.suppress(io.UnsupportedOperation):  # no file, as in tests
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _terminate(signum: int, frame: FrameType | None) -> None:

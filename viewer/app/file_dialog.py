@@ -46,6 +46,18 @@ class FileDialog:
         self.folder, self.entries, self.problem = folder, found, ""
         self.chosen.clear()
 
+    def typed(self, text: str) -> Path | None:
+        """Return the file that a text names, or look into the folder that it names."""
+        try:
+            path = Path(text).expanduser()
+            if path.is_file():
+                return path
+        except (OSError, RuntimeError) as problem:  # too long; no such user
+            self.problem = f"{printable(text)}: {getattr(problem, 'strerror', None) or problem}"
+            return None
+        self.enter(path)
+        return None
+
     def listed(self) -> list[Path]:
         """Return folders, and the files that can be opened or all files."""
         suffixes = {kind.suffix for kind in FORMATS.values()}
@@ -66,7 +78,8 @@ def draw_file_dialog(state: AppState) -> list[Path]:
         imgui.open_popup(_TITLE)
         dialog.is_new = False
     size = imgui.get_main_viewport().size
-    imgui.set_next_window_size((min(620.0, size.x), min(460.0, size.y)), imgui.Cond_.appearing)
+    room = (min(620.0, 0.95 * size.x), min(460.0, 0.92 * size.y))
+    imgui.set_next_window_size(room, imgui.Cond_.appearing)
     center = imgui.get_main_viewport().get_center()
     imgui.set_next_window_pos(center, imgui.Cond_.appearing, (0.5, 0.5))
     result: list[Path] = []
@@ -84,11 +97,11 @@ def _draw_content(state: AppState, dialog: FileDialog) -> list[Path]:
     entered, text = imgui.input_text(
         "##folder", str(dialog.folder), imgui.InputTextFlags_.enter_returns_true
     )
+    note_item(state, "Folder")
     if entered:
-        path = Path(text).expanduser()
-        if path.is_file():
+        path = dialog.typed(text)
+        if path is not None:
             return [path]
-        dialog.enter(path)
     if button(state, "Up"):
         dialog.enter(dialog.folder.parent)
     imgui.same_line()
@@ -117,13 +130,16 @@ def _draw_list(state: AppState, dialog: FileDialog) -> list[Path]:
     if imgui.begin_child(
         "files", (0.0, -1.5 * imgui.get_frame_height()), imgui.ChildFlags_.borders
     ):
-        for path in dialog.listed():
+        for number, path in enumerate(dialog.listed()):
             is_folder = path.is_dir()
             name = printable(path.name, 90) + ("/" if is_folder else "")
             flags = imgui.SelectableFlags_.allow_double_click
             flags |= imgui.SelectableFlags_.no_auto_close_popups
-            pressed, _ = imgui.selectable(name, path in dialog.chosen, flags)
+            # The name is drawn as text: "##" in a label would hide what follows.
+            pressed, _ = imgui.selectable(f"##file{number}", path in dialog.chosen, flags)
             note_item(state, f"file {path.name}")
+            imgui.same_line(0.0, 0.0)
+            imgui.text_unformatted(name)
             if not pressed:
                 continue
             if is_folder:

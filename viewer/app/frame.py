@@ -76,6 +76,7 @@ class Frame:
         self.open(draw_file_dialog(state))
         handle_keys(state)
         handle_mouse(state)
+        state.limit_camera()
         self._do_wanted()
         self._take_loaded()
         state.history.observe(state.scene, state.options, imgui.is_any_item_active())
@@ -180,8 +181,7 @@ class Frame:
     def _do_wanted(self) -> None:
         state = self.state
         if "open dialog" in state.wants:
-            folder = state.paths[0].resolve().parent if state.paths else Path.cwd()
-            state.dialog = FileDialog(folder)
+            state.dialog = FileDialog(_folder_of(state.paths))
         if "open bundled" in state.wants:
             self.open(bundled_files())
         if "screenshot" in state.wants:
@@ -190,12 +190,14 @@ class Frame:
 
     def _save_screenshot(self) -> None:
         """Save the scene, without panels, under a new name in the current folder."""
-        path = free_path(Path.cwd(), self.state.scene.actors[0].figure.name, ".png")
         try:
+            path = free_path(Path.cwd(), self.state.scene.actors[0].figure.name, ".png")
             save_image(path, self.scene_picture())
             self.state.say(f"Saved {printable(path, 200)}")
         except ViewerError as problem:
             self.state.error = str(problem)
+        except OSError as problem:
+            self.state.error = f"the current folder: {problem.strerror}"
 
     def scene_picture(self) -> Bytes:
         """Return the scene as it was drawn last, without panels: (H, W, 4) uint8."""
@@ -208,3 +210,11 @@ class Frame:
         if self.target is not None:
             self.target.release()
         self.renderer.release()
+
+
+def _folder_of(paths: Sequence[Path]) -> Path:
+    """Return where a dialog begins: beside the first file, else the current folder, else home."""
+    try:
+        return paths[0].resolve().parent if paths else Path.cwd()
+    except (OSError, RuntimeError):  # the folder is gone
+        return Path.home()

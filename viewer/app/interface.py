@@ -17,7 +17,8 @@ from viewer.rendering.ground_pass import grid_step
 __all__ = ["draw_hints", "draw_interface"]
 
 _DOCK = "viewer dock"
-_LEFT_SHARE, _RIGHT_SHARE = 0.235, 0.27  # of the window's width
+_LEFT, _RIGHT = (0.235, 0.30, 14.0), (0.27, 0.36, 17.0)
+"""Usual and largest share of the window's width, and the letters' heights wanted across."""
 _SHOW_PROGRESS_AFTER = 0.3  # seconds
 _ERROR_TITLE = "Could not open"
 
@@ -63,9 +64,10 @@ def _build_layout(dock: int) -> None:
     builder.dock_builder_remove_node(dock)
     builder.dock_builder_add_node(dock, imgui.internal.DockNodeFlagsPrivate_.dock_space)
     builder.dock_builder_set_node_size(dock, imgui.get_main_viewport().size)
-    split = builder.dock_builder_split_node(dock, imgui.Dir.left, _LEFT_SHARE)
+    left_share, right_share = _share(_LEFT), _share(_RIGHT)
+    split = builder.dock_builder_split_node(dock, imgui.Dir.left, left_share)
     left, rest = split.id_at_dir, split.id_at_opposite_dir
-    share = _RIGHT_SHARE / (1.0 - _LEFT_SHARE)
+    share = right_share / (1.0 - left_share)
     right = builder.dock_builder_split_node(rest, imgui.Dir.right, share).id_at_dir
     middle = builder.dock_builder_split_node(right, imgui.Dir.down, 0.64)
     bottom = builder.dock_builder_split_node(middle.id_at_dir, imgui.Dir.down, 0.45)
@@ -78,6 +80,13 @@ def _build_layout(dock: int) -> None:
     for panel in PANELS.values():
         builder.dock_builder_dock_window(panel.title, places[panel.place])
     builder.dock_builder_finish(dock)
+
+
+def _share(side: tuple[float, float, float]) -> float:
+    """Return a side's share of the width: the usual one, or more if the window is narrow."""
+    usual, largest, wanted = side
+    width = max(imgui.get_main_viewport().size.x, 1.0)
+    return max(usual, min(largest, wanted * imgui.get_font_size() / width))
 
 
 def _draw_panel(state: AppState, name: str, title: str) -> None:
@@ -188,13 +197,20 @@ def _draw_notes(state: AppState) -> None:
 def _draw_keys(state: AppState) -> None:
     if not state.keys_visible:
         return
-    x, y, width, height = state.view_rect
-    if _overlay("##keys", x + width / 2, y + height / 2, (0.5, 0.5)):
-        for label, text in [*((key.label, key.text) for key in KEYS), *MOUSE]:
+    lines = [*((key.label, key.text) for key in KEYS), *MOUSE]
+    viewport = imgui.get_main_viewport()
+    fits = (len(lines) + 3) * imgui.get_text_line_height_with_spacing() <= viewport.size.y
+    gap = imgui.get_style().item_spacing
+    # In a low window the lines move together rather than out of it.
+    imgui.push_style_var(imgui.StyleVar_.item_spacing, (gap.x, gap.y if fits else 0.0))
+    center = viewport.get_center()
+    if _overlay("##keys", center.x, center.y, (0.5, 0.5)):
+        for label, text in lines:
             imgui.text_colored((1.0, 0.78, 0.45, 1.0), label)
             imgui.same_line(11 * imgui.get_font_size())
             imgui.text_unformatted(text)
     imgui.end()
+    imgui.pop_style_var()
 
 
 def _draw_progress(state: AppState) -> None:
@@ -220,7 +236,7 @@ def _draw_error(state: AppState) -> None:
     imgui.open_popup(_ERROR_TITLE)
     center = imgui.get_main_viewport().get_center()
     imgui.set_next_window_pos(center, imgui.Cond_.always, (0.5, 0.5))
-    width = min(560.0, imgui.get_main_viewport().size.x)
+    width = min(560.0, 0.92 * imgui.get_main_viewport().size.x)
     imgui.set_next_window_size((width, 0.0))
     opened, stays = imgui.begin_popup_modal(_ERROR_TITLE, True, imgui.WindowFlags_.no_resize)
     if opened:

@@ -70,6 +70,8 @@ KEYS = (
     Shortcut((_CTRL | _K.q,), "Ctrl+Q", "quit", _want("quit")),
 )
 
+_ALWAYS = ("Esc", "Ctrl+Q")  # also while a message or dialog lies over everything
+
 MOUSE = (
     ("Left drag", "orbit"),
     ("Right drag, Shift drag", "pan"),
@@ -82,8 +84,21 @@ def handle_keys(state: AppState) -> None:
     """Run what was pressed in this frame; letters typed into a text box do nothing here."""
     # ImGui would move the focus with Tab: the key belongs to us.
     imgui.internal.set_key_owner(imgui.Key.tab, imgui.get_id("viewer"))
+    # A quick hand lets go of Ctrl within the frame in which the letter goes down: what was held
+    # in the frame before still counts, or Ctrl+S would be S.
+    now = imgui.get_io().key_mods
+    held, state.held_modifiers = now | state.held_modifiers, now
     if imgui.get_io().want_text_input:
         return
+    is_covered = bool(state.error) or state.dialog is not None
     for shortcut in KEYS:
-        if any(imgui.is_key_chord_pressed(chord) for chord in shortcut.chords):
+        if is_covered and shortcut.label not in _ALWAYS:
+            continue
+        if any(_is_pressed(chord, held) for chord in shortcut.chords):
             shortcut.action(state)
+
+
+def _is_pressed(chord: int, held: int) -> bool:
+    """Return whether a key went down with exactly the modifiers of the chord."""
+    modifiers = chord & imgui.Key.mod_mask_
+    return held == modifiers and imgui.is_key_pressed(imgui.Key(chord & ~modifiers), False)

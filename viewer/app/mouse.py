@@ -26,7 +26,7 @@ def handle_mouse(state: AppState) -> None:
         pan(state.camera, -delta.x / height, delta.y / height)
     elif left:
         orbit(state.camera, -_DEGREES_PER_POINT * delta.x, _DEGREES_PER_POINT * delta.y)
-    if io.mouse_wheel:
+    if io.mouse_wheel and imgui.is_mouse_pos_valid():
         across = (io.mouse_pos.x - x - width / 2) / height
         upward = -(io.mouse_pos.y - y - height / 2) / height
         zoom(state.camera, _ZOOM_PER_NOTCH**io.mouse_wheel, across, upward)

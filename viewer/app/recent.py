@@ -25,8 +25,9 @@ def load_recent() -> list[tuple[str, ...]]:
     """Return groups of files that were opened together, latest first; none if unreadable."""
     try:
         groups = json.loads((state_folder() / "recent.json").read_text("utf-8"))
-        return [tuple(map(str, group)) for group in groups if isinstance(group, list)][:_MOST]
-    except (OSError, ValueError, RecursionError):
+        lists = [group for group in groups if isinstance(group, list) and group]
+        return [tuple(map(str, group)) for group in lists][:_MOST]
+    except (OSError, ValueError, TypeError, RecursionError):
         return []
 
 
@@ -40,14 +41,14 @@ def remember(recent: list[tuple[str, ...]], paths: Sequence[Path]) -> str:
     paths : sequence of Path
         Opened together.
     """
-    group = tuple(str(path.resolve()) for path in paths)
-    if not group:
+    if not paths:
         return ""
-    recent[:] = [group, *(old for old in recent if old != group)][:_MOST]
     try:
+        group = tuple(str(path.resolve()) for path in paths)
+        recent[:] = [group, *(old for old in recent if old != group)][:_MOST]
         state_folder().mkdir(parents=True, exist_ok=True)
         text = json.dumps([list(old) for old in recent], indent=1)
         save_bytes(state_folder() / "recent.json", text.encode("utf-8", "replace"))
-    except (OSError, OutputError) as problem:
+    except (OSError, RuntimeError, OutputError) as problem:  # resolve() raises both
         return f"recent files could not be saved: {problem}"
     return ""

@@ -8,11 +8,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from viewer.app.edits import History
 from viewer.rendering.camera import Camera, fit
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.arrays import Floats
-from viewer.rig.mesh import bounding_box
+from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.scene import Actor, Scene, scene_points
 
 if TYPE_CHECKING:
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["AppState", "Note", "Stats"]
 
 _NOTE_SECONDS = 4.0
+_FARTHEST = 1e4  # sizes of the scene
 
 
 @dataclass(slots=True)
@@ -59,6 +62,8 @@ class AppState:
         Of the first actor; -1 for none.
     in_degrees : bool
         Whether rotations are shown in degrees or radians.
+    held_modifiers : int
+        Ctrl, Shift and so on in the frame before, as ImGui's bits.
     view_rect : (x, y, width, height)
         The part of the window that panels leave free, in window coordinates.
     item_rects : dict
@@ -76,6 +81,7 @@ class AppState:
     in_degrees: bool = True
     panels_visible: bool = True
     keys_visible: bool = False
+    held_modifiers: int = 0
     wants_layout_reset: bool = False
     joint_filter: str = ""
     opened_joints: set[int] = field(default_factory=set)
@@ -118,6 +124,16 @@ class AppState:
         self.opened_joints = _first_opened(scene)
         self.history.start(scene, self.options)
         self.say(*scene.warnings)
+
+    def limit_camera(self) -> None:
+        """Keep the camera where float32 still draws the scene: near it, by its size."""
+        size = box_size(self.box) or 1.0
+        camera, center = self.camera, self.box.mean(axis=0)
+        camera.distance = min(max(camera.distance, 1e-5 * size), _FARTHEST * size)
+        away = camera.target - center
+        length = float(np.linalg.norm(away))
+        if length > _FARTHEST * size:
+            camera.target = center + away * (_FARTHEST * size / length)
 
     def say(self, *texts: str) -> None:
         """Show messages that go away by themselves; longer ones stay longer."""

@@ -13,10 +13,12 @@ from pathlib import Path
 from viewer.errors import RigError, ViewerError, printable
 from viewer.loading import load
 from viewer.rendering.camera import Camera, fit
-from viewer.rendering.options import SHOWN, DisplayOptions
+from viewer.rendering.ground_pass import parse_color
+from viewer.rendering.options import BACKGROUNDS, SHOWN, DisplayOptions
 from viewer.rendering.program import SHADING
 from viewer.rig.arrays import Floats
 from viewer.rig.clip import sample
+from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skeleton import clamp_dofs, dof_label, find_dof
 
@@ -98,7 +100,10 @@ def parse_size(text: str) -> tuple[int, int]:
     found = re.fullmatch(r"(\d{1,6})[xX](\d{1,6})", text)
     if not found:
         raise ViewerError(f'--size: expected WIDTHxHEIGHT in pixels, found "{text}"')
-    return int(found[1]), int(found[2])
+    size = int(found[1]), int(found[2])
+    if min(size) < 1:
+        raise ViewerError(f"--size: expected at least 1 x 1 pixels, found {text}")
+    return size
 
 
 def _parse_bytes(text: str) -> int:
@@ -217,12 +222,20 @@ def camera_of(
     if arguments.distance is not None:
         if arguments.distance <= 0:
             raise ViewerError(f"--distance: expected more than 0, found {arguments.distance:g}")
+        limit = 1e4 * (box_size(bounding_box(points)) or 1.0)
+        if arguments.distance > limit:
+            raise ViewerError(
+                f"--distance: expected at most {limit:g}, 10000 times the figure's size, "
+                f"found {arguments.distance:g}"
+            )
         camera.distance = arguments.distance
     return camera
 
 
 def display_of(arguments: argparse.Namespace) -> DisplayOptions:
     """Return the display options asked for."""
+    if arguments.background not in BACKGROUNDS:
+        parse_color(arguments.background)
     if arguments.samples < 1:
         raise ViewerError(f"--samples: expected at least 1, found {arguments.samples}")
     return DisplayOptions(

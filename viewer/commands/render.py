@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
 from viewer.commands._common import (
@@ -23,6 +24,8 @@ from viewer.rig.mesh import bounding_box
 from viewer.rig.scene import Scene, scene_points
 
 __all__ = ["add_arguments", "run"]
+
+_STDOUT = ("/dev/stdout", "/dev/fd/1", "/proc/self/fd/1")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -46,11 +49,17 @@ def run(arguments: argparse.Namespace) -> int:
     scene = open_scene(arguments)
     points = scene_points(scene)
     camera = camera_of(arguments, scene, points, size)
-    draw = _draw_panels if arguments.panels else draw_scene
-    pixels = draw(scene, size, camera, options, bounding_box(points), arguments.gpu)
+    box = bounding_box(points)
+    if arguments.panels:
+        fits = arguments.distance is None
+        pixels = _draw_panels(scene, size, camera, options, box, arguments.gpu, fits)
+    else:
+        pixels = draw_scene(scene, size, camera, options, box, arguments.gpu)
     save_picture(output, pixels)
     grid = f", grid {_grid_step(points):g}" if options.grid else ""
-    print(f"{printable(output)}: {size[0]} x {size[1]}{grid}")
+    # A picture on its way through a pipe must not be followed by words.
+    stream = sys.stderr if str(output) in _STDOUT else sys.stdout
+    print(f"{printable(output)}: {size[0]} x {size[1]}{grid}", file=stream)
     return 0
 
 
@@ -68,7 +77,7 @@ def check_output(output: Path, inputs: list[Path], force: bool) -> None:
             raise OutputError(f"{shown}: is a folder")
         if any(path.exists() and output.exists() and path.samefile(output) for path in inputs):
             raise OutputError(f"{shown}: is an input file, which is never replaced")
-        if output.is_file() and not force:
+        if output.is_file() and not force and str(output) not in _STDOUT:
             raise OutputError(f"{shown}: exists already (--force replaces it)")
     except (OSError, ValueError) as problem:
         reason = getattr(problem, "strerror", None) or problem
@@ -98,7 +107,8 @@ def _draw_panels(
     camera: Camera,
     options: DisplayOptions,
     box: Floats,
-    device: int | None = None,
+    device: int | None,
+    fits: bool,
 ) -> Bytes:
     from viewer.app.headless import HeadlessApp
     from viewer.app.state import AppState
@@ -107,14 +117,24 @@ def _draw_panels(
         raise ViewerError(f"--panels needs at least 200 x 200 pixels, found {size[0]} x {size[1]}")
     state = AppState(scene, camera=camera, options=options, box=box)
     with HeadlessApp(state, size, device=device) as app:
-        return app.picture()
+        return app.picture(fits)
 
 
 def save_picture(path: Path, pixels: Bytes) -> None:
-    """Write a picture in the format of its suffix."""
+    """Write a picture in the format of its suffix; a PNG into a pipe or redirected output."""
     from viewer.formats import save_image
+    from viewer.formats._image import encode_png
 
-    save_image(path, pixels)
+    try:
+        if str(path) in _STDOUT:
+            sys.stdout.buffer.write(encode_png(pixels))
+            return
+        save_image(path, pixels)
+    except BrokenPipeError:
+        raise
+    except (KeyError, ValueError, OSError) as problem:  # what Pillow raises
+        reason = problem if isinstance(problem, OSError) else "pictures cannot be written as this"
+        raise OutputError(f"{printable(path, 300)}: {reason}") from None
 
 
 def _grid_step(points: Floats) -> float:

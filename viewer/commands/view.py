@@ -11,6 +11,7 @@ from viewer.commands._common import (
     add_scene_arguments,
     camera_of,
     display_of,
+    number,
     open_scene,
 )
 from viewer.errors import printable
@@ -32,7 +33,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_scene_arguments(parser)
     add_camera_arguments(parser)
     add_display_arguments(parser)
-    parser.add_argument("--scale", type=float, metavar="S", help="size of the interface, e.g. 1.5")
+    parser.add_argument("--scale", type=_scale, metavar="S", help="size of the interface, e.g. 1.5")
+
+
+def _scale(text: str) -> float:
+    value = number(text)
+    if not 0.25 <= value <= 8.0:
+        raise argparse.ArgumentTypeError(f"expected 0.25 to 8, found {text}")
+    return value
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -12,6 +12,7 @@ stricter than ``float()``, which takes ``nan``, ``1_000`` and digits of other sc
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,26 +85,30 @@ def parse_numbers(data: bytes, start: int, end: int) -> tuple[Floats, int]:
     [1.0, -2.5, 1000.0]
     """
     parts: list[Floats] = []
-    count = 0
+    for first, last in _chunk_bounds(data, start, end):
+        values, bad = _parse_chunk(data[first:last])
+        parts.append(values)
+        if bad >= 0:
+            return np.concatenate(parts), sum(map(len, parts))
+    return (np.concatenate(parts) if parts else np.zeros(0)), -1
+
+
+def _chunk_bounds(data: bytes, start: int, end: int) -> Iterator[tuple[int, int]]:
     while start < end:
         stop = min(start + _CHUNK, end)
         if stop < end:
             boundary = _SPACE.search(data, stop, end)
             stop = boundary.start() if boundary else end
-        values, bad = _parse_chunk(data[start:stop])
-        parts.append(values)
-        if bad >= 0:
-            return np.concatenate(parts), count + bad
-        count += len(values)
+        yield start, stop
         start = stop
-    return (np.concatenate(parts) if parts else np.zeros(0)), -1
 
 
 def _parse_chunk(chunk: bytes) -> tuple[Floats, int]:
     padded = b" " * _PAD + chunk + b" "
     letters = np.frombuffer(padded, dtype=np.uint8)
-    # Control characters would count as white space below, but they belong to a word.
-    if ((letters < 9) | ((letters > 13) & (letters < ord(" ")))).any():
+    # Control characters, 0-8 and 14-31, would count as white space below, but they belong to a
+    # word. The subtraction wraps around, so one comparison finds the second range.
+    if letters.min() < 9 or (letters - np.uint8(14) < 18).any():
         return _parse_slowly(chunk)
     space = letters <= ord(" ")
     edges = np.flatnonzero(space[1:] != space[:-1]) + 1
@@ -133,10 +138,12 @@ def _parse_words(
     padded: bytes, letters: NDArray[np.uint8], starts: NDArray[np.intp], ends: NDArray[np.intp]
 ) -> tuple[Floats, NDArray[np.bool_]]:
     """Return the words' values and which of them need ``float()`` instead."""
-    first = letters.take(starts)
-    minus = first == ord("-")
     lengths = ends - starts
-    lengths -= minus | (first == ord("+"))
+    minus = None
+    if b"-" in padded or b"+" in padded:
+        first = letters.take(starts)
+        minus = first == ord("-")
+        lengths -= minus | (first == ord("+"))
     # V8 has alignment 1, so eight characters can be gathered from any address.
     windows = np.ndarray(len(padded) - 7, dtype="V8", buffer=padded, strides=(1,))
     has_dots = b"." in padded
@@ -146,7 +153,8 @@ def _parse_words(
         values[long_words], odd[long_words] = _parse_long(
             windows, ends.take(long_words), lengths.take(long_words)
         )
-    np.negative(values, where=minus, out=values)
+    if minus is not None:
+        np.negative(values, where=minus, out=values)
     return values, odd
 
 

@@ -27,6 +27,7 @@ from viewer.errors import UnsupportedFormatError, printable
 from viewer.formats._image import save_image
 from viewer.formats._numbers import LARGEST
 from viewer.formats._save import as_words, save_text
+from viewer.formats._skin_blocks import KEYWORDS
 from viewer.formats._skin_checks import (
     check_joints,
     check_mesh,
@@ -34,7 +35,7 @@ from viewer.formats._skin_checks import (
     check_weights,
     invert_bindings,
 )
-from viewer.formats._skin_sections import KEYWORDS, Sections, read_sections
+from viewer.formats._skin_sections import Sections, read_sections
 from viewer.formats._source import Source
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure

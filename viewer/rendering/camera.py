@@ -91,6 +91,7 @@ class Camera:
             OpenGL clip space, z in -1..1.
         """
         reach = box_size(box) + float(np.linalg.norm(box.mean(axis=0) - self.target))
+        reach = reach or self.distance  # an empty scene needs a depth range too
         far = self.distance + 20.0 * reach
         if self.orthographic:
             half = self.half_height
@@ -177,5 +178,7 @@ def zoom(camera: Camera, factor: float, x: float = 0.0, y: float = 0.0) -> None:
     x, y : float
         The pointer from the middle of the picture, right and up, in picture heights.
     """
+    distance = min(max(camera.distance * factor, _SMALLEST), 1e12)
+    factor = distance / camera.distance  # at the end of the range nothing moves any more
     pan(camera, x * (1.0 - factor), y * (1.0 - factor))
-    camera.distance = min(max(camera.distance * factor, _SMALLEST), 1e12)
+    camera.distance = distance

@@ -10,7 +10,7 @@ import numpy as np
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.program import Programs, set_uniforms
 from viewer.rendering.upload import buffer, matrix_texture, write_matrices
-from viewer.rendering.view import View, set_lights, set_model
+from viewer.rendering.view import View, in_front, set_lights, set_model
 from viewer.rig.arrays import Floats
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.mesh import bounding_box, box_size
@@ -23,6 +23,7 @@ _HIGHLIGHT = (1.0, 0.55, 0.02)  # linear
 _CUBE_SIZE = 0.015  # of a skeleton without boxes
 _GOLDEN = 0.618033988749895
 _WORLD_UNIT = 0
+_CUBE_VERTICES = 36
 
 
 def joint_colors(n_joints: int) -> Floats:
@@ -95,7 +96,7 @@ class JointPass:
     """
 
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
-        self.programs = programs
+        self.context, self.programs = context, programs
         self.cube = buffer(context, _cube_vertices(), "f4")
 
     def draw(
@@ -105,6 +106,7 @@ class JointPass:
         view: View,
         options: DisplayOptions,
         selected: int = -1,
+        opacity: float = 1.0,
     ) -> None:
         """Draw one box per joint.
 
@@ -120,7 +122,12 @@ class JointPass:
             Lights.
         selected : int
             The joint to highlight, -1 for none.
+        opacity : float
+            Below 1 the boxes are one translucent layer over everything drawn before: boxes
+            often enclose the skin, and would hide it.
         """
+        overlays = opacity < 1.0
+        view = in_front(view) if overlays else view
         program = self.programs.drawing("joint", "phong", fragment="mesh")
         set_model(program, view, placement, skeleton.center)
         set_lights(program, view, options.lights)
@@ -130,12 +137,22 @@ class JointPass:
             "u_highlight": _HIGHLIGHT,
             "u_flat": False,
             "u_textured": False,
-            "u_opacity": 1.0,
+            "u_opacity": opacity,
         }
         set_uniforms(program, values)
         skeleton.world.use(_WORLD_UNIT)
-        array = skeleton.array(program)
-        array.render(moderngl.TRIANGLES, vertices=36, instances=skeleton.skeleton.n_joints)
+        array, count = skeleton.array(program), skeleton.skeleton.n_joints
+        if overlays:
+            # Only the nearest boxes count: the others would show through them.
+            target = self.context.fbo
+            target.color_mask = False, False, False, False
+            target.use()  # moderngl hands masks to OpenGL only then
+            array.render(moderngl.TRIANGLES, vertices=_CUBE_VERTICES, instances=count)
+            target.color_mask = True, True, True, True
+            target.use()
+            self.context.depth_func = "<="
+        array.render(moderngl.TRIANGLES, vertices=_CUBE_VERTICES, instances=count)
+        self.context.depth_func = "<"
 
     def release(self) -> None:
         """Free the cube."""

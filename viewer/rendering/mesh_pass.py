@@ -38,7 +38,7 @@ class MeshPass:
         self._arrays: dict[tuple[int, int], tuple[PosedMesh, moderngl.VertexArray]] = {}
 
     def draw(self, mesh: PosedMesh, placement: Floats, view: View, options: DisplayOptions) -> None:
-        """Draw the surface; behind a skeleton as one translucent layer.
+        """Draw the surface.
 
         Parameters
         ----------
@@ -54,30 +54,17 @@ class MeshPass:
         program = self.programs.drawing("mesh", options.shading)
         set_model(program, view, placement, mesh.center)
         set_lights(program, view, options.lights)
-        opacity = options.skin_opacity if options.show == "both" else 1.0
         values = {
             "u_flat": options.flat,
             "u_color": SKIN_COLOR,
-            "u_opacity": opacity,
+            "u_opacity": 1.0,
             "u_has_uv": mesh.mesh.uvs is not None,
             "u_texture": _TEXTURE_UNIT,
             "u_bias": 0.0,
         }
         set_uniforms(program, values)
         array = self._array(mesh, program)
-        if opacity < 1.0:
-            self._fill_depth(mesh, array)
         self._draw_runs(mesh, array, options.texture)
-
-    def _fill_depth(self, mesh: PosedMesh, array: moderngl.VertexArray) -> None:
-        """Let only the nearest layer through: back faces would show through front ones."""
-        target = self.context.fbo
-        target.color_mask = False, False, False, False
-        target.use()  # moderngl hands masks to OpenGL only then
-        array.render(moderngl.TRIANGLES)
-        target.color_mask = True, True, True, True
-        target.use()
-        self.context.depth_func = "<="
 
     def _draw_runs(self, mesh: PosedMesh, array: moderngl.VertexArray, textured: bool) -> None:
         program = array.program

@@ -21,6 +21,9 @@ _thread = threading.local()
 class Offscreen:
     """A context of its own that draws any number of scenes.
 
+    The context is current only while it draws, so any thread may use it, one at a time; another
+    context that was current must be made current again (``with context:``).
+
     Parameters
     ----------
     device : int, optional
@@ -34,7 +37,9 @@ class Offscreen:
 
     def __init__(self, device: int | None = None) -> None:
         self.context = headless_context(device)
-        self.renderer = Renderer(self.context)
+        with self.context:
+            self.renderer = Renderer(self.context)
+            self.context.info  # noqa: B018 - kept from now on, current or not
         self._target: Target | None = None
 
     def target(self, size: tuple[int, int], samples: int) -> Target:
@@ -57,7 +62,7 @@ class Offscreen:
         box: Floats,
     ) -> Bytes:
         """Draw a scene and return its pixels; see ``render``."""
-        with self.context:  # another one may be current
+        with self.context:
             target = self.target(size, options.samples)
             self.renderer.draw(scene, camera, options, target, box)
             target.resolve()
@@ -114,6 +119,7 @@ def render(
     """Draw a scene without a window.
 
     The context is made on first use and kept, one per thread; ``Offscreen`` gives control.
+    Afterwards no context is current in this thread.
 
     Parameters
     ----------

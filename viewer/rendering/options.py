@@ -81,8 +81,8 @@ class DisplayOptions:
         grid; leave out triangles seen from behind.
     background : str
         ``"gradient"``, ``"transparent"`` or ``"#rrggbb"``.
-    skin_opacity : float
-        Of the skin when the skeleton is shown with it.
+    skeleton_opacity : float
+        Of the skeleton when it is shown over the skin.
     samples : int
         Multisampling; the driver's maximum if that is smaller.
     lights : Lights
@@ -98,6 +98,6 @@ class DisplayOptions:
     grid: bool = True
     cull: bool = False
     background: str = "gradient"
-    skin_opacity: float = 0.45
+    skeleton_opacity: float = 0.35
     samples: int = 4
     lights: Lights = field(default_factory=Lights)

@@ -81,14 +81,21 @@ class Renderer:
         meshes = self._update(scene, options)
         self._prepare(target)
         self.ground_pass.draw_background(options.background)
-        for actor in scene.actors:
-            if actor.visible:
-                selected = selected_joint if actor is scene.actors[0] else -1
-                self._draw_skeleton(actor, view, options, selected)
         for actor, mesh in meshes:
             self._draw_mesh(actor, mesh, view, options)
+        skeletons = [
+            (actor, selected_joint if index == 0 else -1)
+            for index, actor in enumerate(scene.actors)
+            if _shows_skeleton(actor, options)
+        ]
+        for actor, selected in skeletons:
+            if not _shows_mesh(actor.figure, options):
+                self._draw_skeleton(actor, view, options, selected, 1.0)
         if options.grid:
             self.ground_pass.draw_grid(view, box, options.background)
+        for actor, selected in skeletons:
+            if _shows_mesh(actor.figure, options):
+                self._draw_skeleton(actor, view, options, selected, options.skeleton_opacity)
 
     def prepare(self, scene: Scene) -> None:
         """Upload what a scene needs, so that a refusal comes before the old scene is given up.
@@ -138,15 +145,17 @@ class Renderer:
         self.context.depth_func = "<"
 
     def _draw_skeleton(
-        self, actor: Actor, view: View, options: DisplayOptions, selected: int
+        self,
+        actor: Actor,
+        view: View,
+        options: DisplayOptions,
+        selected: int,
+        opacity: float,
     ) -> None:
-        if actor.figure.skeleton is None or actor.pose is None:
-            return
-        if options.show not in ("skeleton", "both") and actor.figure.mesh is not None:
-            return
+        assert actor.pose is not None  # whoever has a skeleton has a pose
         skeleton = self._skeleton(actor)
         skeleton.update(actor.pose)
-        self.joint_pass.draw(skeleton, actor.placement, view, options, selected)
+        self.joint_pass.draw(skeleton, actor.placement, view, options, selected, opacity)
 
     def posed_mesh(self, actor: Actor) -> PosedMesh:
         """Return an actor's posed buffer, made on first use; the figure's mesh must exist."""
@@ -192,3 +201,9 @@ class Renderer:
 
 def _shows_mesh(figure: Figure, options: DisplayOptions) -> bool:
     return figure.mesh is not None and (options.show != "skeleton" or figure.skeleton is None)
+
+
+def _shows_skeleton(actor: Actor, options: DisplayOptions) -> bool:
+    figure = actor.figure
+    wanted = options.show in ("skeleton", "both") or figure.mesh is None
+    return actor.visible and figure.skeleton is not None and wanted

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from viewer.errors import RenderError
 from viewer.rendering.context import check_errors, is_software
+from viewer.rendering.mipmaps import add_mipmaps
 from viewer.rig.arrays import Bytes, Floats
 
 __all__ = [
@@ -22,7 +23,8 @@ __all__ = [
     "write_matrices",
 ]
 
-_MATRICES_PER_ROW = 256  # three texels each; every driver takes textures 1024 wide
+# Every driver takes textures 1024 wide; the shaders count on these two.
+_MATRICES_PER_ROW = 256  # three texels each
 _PAIRS_PER_ROW = 1024
 _SRGB8_ALPHA8 = 0x8C43
 
@@ -88,7 +90,7 @@ def picture_texture(context: moderngl.Context, pixels: Bytes, notes: list[str]) 
     size = (pixels.shape[1], pixels.shape[0])
     texture = context.texture(size, 4, flipped.tobytes(), internal_format=_SRGB8_ALPHA8)
     texture.repeat_x = texture.repeat_y = False
-    texture.build_mipmaps()
+    add_mipmaps(texture, flipped)
     texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
     if not is_software(context):
         texture.anisotropy = 8.0  # without a GPU it doubles the time of a picture

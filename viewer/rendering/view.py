@@ -15,7 +15,7 @@ from viewer.rendering.upload import as_uniform
 from viewer.rig.arrays import Floats
 from viewer.rig.transform import translation_matrix
 
-__all__ = ["View", "set_lights", "set_model", "view_of"]
+__all__ = ["View", "in_front", "set_lights", "set_model", "view_of"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +30,13 @@ class View:
 def view_of(camera: Camera, size: tuple[int, int], box: Floats) -> View:
     """Return the matrices of a camera for a picture of ``size`` that shows ``box``."""
     return View(camera.view_matrix(), camera.projection_matrix(size[0] / size[1], box), camera)
+
+
+def in_front(view: View) -> View:
+    """Return the same view with all depths moved in front of what the other view draws."""
+    squeeze = np.eye(4)
+    squeeze[2] = 0.0, 0.0, 0.01, -0.98
+    return View(view.matrix, squeeze @ view.projection, view.camera)
 
 
 def set_model(program: moderngl.Program, view: View, placement: Floats, center: Floats) -> None:

@@ -118,7 +118,9 @@ def has_influence(skin: Skin) -> Bools:
 
     The others stay where they were bound; summing nothing would send them to the origin.
     """
-    owners = np.repeat(np.arange(skin.n_vertices), influence_counts(skin))
-    moved = np.zeros(skin.n_vertices, dtype=bool)
-    moved[owners[skin.weights != 0.0]] = True
-    return moved
+    counts = influence_counts(skin)
+    zero = skin.weights == 0.0
+    if not zero.any():
+        return counts > 0
+    owners = np.repeat(np.arange(skin.n_vertices), counts)
+    return np.bincount(owners, weights=~zero, minlength=skin.n_vertices) > 0

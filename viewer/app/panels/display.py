@@ -24,19 +24,19 @@ def draw(state: AppState) -> None:
             show(state, key)
         note_item(state, text)
     if options.show == "both":
-        options.skin_opacity = slider(
-            state, "Skin opacity", options.skin_opacity, 0.0, 1.0, flags=_CLAMP
+        options.skeleton_opacity = slider(
+            state, "Skeleton opacity", options.skeleton_opacity, 0.0, 1.0, flags=_CLAMP
         )
     imgui.separator()
     options.shading = choice(state, "Shading", options.shading, SHADING)
     options.flat = checkbox(state, "Flat", options.flat)
-    _beside()
+    _beside("Wireframe")
     options.wireframe = checkbox(state, "Wireframe", options.wireframe)
     options.normals = checkbox(state, "Vertex normals", options.normals)
-    _beside()
+    _beside("Texture")
     options.texture = checkbox(state, "Texture", options.texture)
     options.cull = checkbox(state, "Cull back faces", options.cull)
-    _beside()
+    _beside("Grid (0.5)")
     options.grid = checkbox(state, f"Grid ({grid_step(state.box):g})###Grid", options.grid)
     _draw_background(state)
 
@@ -44,8 +44,13 @@ def draw(state: AppState) -> None:
 _CLAMP = imgui.SliderFlags_.always_clamp
 
 
-def _beside() -> None:
-    imgui.same_line(imgui.get_content_region_avail().x * 0.5)
+def _beside(text: str) -> None:
+    """Put a check box with this text into the right half of the last one's line if it fits."""
+    start, room = imgui.get_cursor_screen_pos().x, imgui.get_content_region_avail().x
+    gap = imgui.get_style().item_spacing.x
+    begins_free = imgui.get_item_rect_max().x + gap <= start + room * 0.5
+    if begins_free and imgui.get_frame_height() + gap + imgui.calc_text_size(text).x <= room * 0.5:
+        imgui.same_line(room * 0.5)
 
 
 def _draw_background(state: AppState) -> None:

@@ -1,0 +1,226 @@
+"""A hand for the tests: mouse and keys for a HeadlessApp, aimed by the labels of widgets."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from imgui_bundle import imgui
+
+import viewer
+from viewer.app.headless import HeadlessApp
+from viewer.app.state import AppState
+from viewer.rendering.camera import Camera, fit
+from viewer.rendering.options import DisplayOptions
+from viewer.rig.scene import Scene, scene_box, scene_points
+from viewer.rig.skeleton import find_dof
+
+MODIFIERS = {
+    "ctrl": imgui.Key.mod_ctrl,
+    "shift": imgui.Key.mod_shift,
+    "alt": imgui.Key.mod_alt,
+}
+
+
+def make_state(scene: Scene, paths=()) -> AppState:
+    """Return the state that the window starts with."""
+    camera = Camera(up=scene.up)
+    fit(camera, scene_points(scene), 1.0)
+    files = tuple(map(Path, paths))
+    return AppState(scene, camera, DisplayOptions(), scene_box(scene), files)
+
+
+class Driver:
+    """Moves the mouse and presses keys; every event gets a frame of its own.
+
+    Parameters
+    ----------
+    paths : str or Path
+        What to open; the bundled figure if none.
+    size, scale, pixels_per_point
+        As for ``HeadlessApp``.
+    """
+
+    def __init__(self, *paths, size=(900, 640), scale=1.0, pixels_per_point=1.0, scene=None):
+        scene = scene or viewer.load(*paths)
+        self.state = make_state(scene, paths)
+        self.app = HeadlessApp(self.state, size, scale=scale, pixels_per_point=pixels_per_point)
+        self.io = imgui.get_io()
+        # Clicks of a test follow each other quickly: only double_click means two as one.
+        self.io.mouse_double_click_time = 1e-4
+        self.step(4)
+
+    def step(self, frames=1):
+        self.app.step(frames)
+
+    def close(self):
+        self.app.release()
+
+    # Mouse
+
+    def place(self, target, across=0.5, down=0.5):
+        """Return a point given as such, or in the widget of this label."""
+        if not isinstance(target, str):
+            return target
+        x0, y0, x1, y1 = self.state.item_rects[target]
+        return x0 + across * (x1 - x0), y0 + down * (y1 - y0)
+
+    def move(self, target):
+        self.io.add_mouse_pos_event(*self.place(target))
+        self.step()
+
+    def press(self, button=0):
+        self.io.add_mouse_button_event(button, True)
+        self.step()
+
+    def let_go(self, button=0):
+        self.io.add_mouse_button_event(button, False)
+        self.step()
+
+    def click(self, target, button=0, held=""):
+        # Check boxes, radio buttons and menus react at their left end, whatever their width.
+        self.move(self.place(target, 0.1) if isinstance(target, str) else target)
+        with self.holding(held):
+            self.press(button)
+            self.let_go(button)
+        self.step(2)
+
+    def double_click(self, target):
+        self.move(target)
+        self.io.mouse_double_click_time = 0.3
+        for _ in range(2):
+            self.press()
+            self.let_go()
+        self.io.mouse_double_click_time = 1e-4
+        self.step(2)
+
+    def pull(self, start, end, button=0, held="", steps=4):
+        """Drag from one point to another."""
+        (x0, y0), (x1, y1) = self.place(start), self.place(end)
+        self.move((x0, y0))
+        with self.holding(held):
+            self.press(button)
+            for k in range(1, steps + 1):
+                self.move((x0 + (x1 - x0) * k / steps, y0 + (y1 - y0) * k / steps))
+            self.let_go(button)
+
+    def drag(self, label, fraction, text=""):
+        """Drag a slider to a fraction of its length; ``text`` is its label, if it shows one."""
+        x0, y0, x1, y1 = self.state.item_rects[label]
+        if text:
+            x1 -= imgui.calc_text_size(text).x + imgui.get_style().item_inner_spacing.x
+        margin = 2 + imgui.get_style().grab_min_size / 2
+        y = (y0 + y1) / 2
+        end = x0 + margin + fraction * (x1 - x0 - 2 * margin)
+        self.pull(((x0 + x1) / 2, y), (end, y))
+        self.step()
+
+    def wheel(self, notches, target):
+        self.move(target)
+        self.io.add_mouse_wheel_event(0.0, notches)
+        self.step()
+
+    @property
+    def middle(self):
+        x, y, width, height = self.state.view_rect
+        return x + width / 2, y + height / 2
+
+    # Keys
+
+    def holding(self, modifiers):
+        return _Held(self, modifiers)
+
+    def key(self, name, held=""):
+        """Press and release a key, named as in ``imgui.Key``, with modifiers ("ctrl shift")."""
+        code = getattr(imgui.Key, name)
+        with self.holding(held):
+            for is_down in (True, False):
+                self.io.add_key_event(code, is_down)
+                self.step()
+
+    def type(self, text):
+        """Type letters as a keyboard does: the key and the character."""
+        for letter in text:
+            code = getattr(imgui.Key, letter.lower() if letter.isalpha() else "", None)
+            if code is not None:
+                self.io.add_key_event(code, True)
+            self.io.add_input_character(ord(letter))
+            self.step()
+            if code is not None:
+                self.io.add_key_event(code, False)
+                self.step()
+
+    def enter_value(self, label, text):
+        """Type a number into a slider: Ctrl+click, the text, Enter."""
+        self.click(self.place(label, 0.3), held="ctrl")
+        self.type(text)
+        self.key("enter")
+        self.step(2)
+
+    def menu(self, *titles):
+        """Choose an entry of the menu bar."""
+        for title in titles:
+            self.click(title)
+            self.step(2)
+
+    # What is shown
+
+    def dof(self, label):
+        """Return the value of a DOF of the first actor."""
+        return float(self.state.actor.pose.dofs[self.dof_index(label)])
+
+    def dof_index(self, label):
+        return find_dof(self.state.actor.figure.skeleton, label)
+
+    def dofs(self):
+        return self.state.actor.pose.dofs.copy()
+
+    @property
+    def undo_steps(self):
+        return len(self.state.history._undo)
+
+    def wait_for_loader(self):
+        """Run frames until the file that is being read is shown or refused."""
+        loader = self.state.loader
+        if loader is not None:
+            loader.wait()
+        self.step(3)
+
+    def screen(self):
+        """Return what the window would show: (H, W, 3) uint8."""
+        self.step(3)
+        return self.app.screen.read()[..., :3]
+
+    def scene_picture(self):
+        return self.app.frame.scene_picture()
+
+    def assert_sane(self):
+        """Check what must hold whatever the user does."""
+        camera = self.state.camera
+        numbers = [*camera.target, camera.distance, camera.azimuth, camera.inclination, camera.fov]
+        assert np.isfinite(numbers).all() and camera.distance > 0
+        assert -90 <= camera.inclination <= 90
+        for actor in self.state.scene.actors:
+            if actor.pose is not None:
+                limits = actor.figure.skeleton.dof_limits
+                assert np.isfinite(actor.pose.dofs).all()
+                assert (limits[:, 0] <= actor.pose.dofs).all()
+                assert (actor.pose.dofs <= limits[:, 1]).all()
+
+
+class _Held:
+    """Modifier keys that are down while a block runs."""
+
+    def __init__(self, driver, modifiers):
+        self.driver, self.codes = driver, [MODIFIERS[name] for name in modifiers.split()]
+
+    def __enter__(self):
+        self._send(True)
+
+    def __exit__(self, *_):
+        self._send(False)
+
+    def _send(self, is_down):
+        for code in self.codes:
+            self.driver.io.add_key_event(code, is_down)
+            self.driver.step()

@@ -1,0 +1,273 @@
+"""The keyboard: every row of KEYS does what it says, and undo takes it back."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from app.tiny import FILE_POSE
+from imgui_bundle import imgui
+from PIL import Image
+
+from viewer.app.keys import KEYS
+
+OPTION_KEYS = {"w": "wireframe", "n": "normals", "t": "texture", "g": "grid"}
+
+
+def test_keys_are_told_apart_and_described():
+    labels = [key.label for key in KEYS]
+    chords = [int(chord) for key in KEYS for chord in key.chords]
+    assert len(set(labels)) == len(labels) and len(set(chords)) == len(chords)
+    assert all(key.text for key in KEYS)
+
+
+def test_r_resets_every_dof_to_the_clamped_pose_of_the_file(hand):
+    for label in ("root.x", "root.y", "arm.x", "arm.z", "root.tx"):
+        hand.drag(label, 0.9)
+    hand.key("r")
+    assert {label: hand.dof(label) for label in FILE_POSE} == FILE_POSE
+    assert hand.dof("root.tx") == 0.0
+    hand.key("z", "ctrl")
+    assert hand.dof("arm.x") != FILE_POSE["arm.x"]
+
+
+def test_s_toggles_the_skeleton(hand):
+    seen = []
+    for _ in range(3):
+        hand.key("s")
+        seen.append(hand.state.options.show)
+    assert seen == ["both", "skin", "both"]
+    hand.state.options.show = "skeleton"
+    hand.key("s")
+    assert hand.state.options.show == "skin"
+
+
+def test_k_toggles_the_binding_space(hand):
+    attached = hand.scene_picture()
+    hand.key("k")
+    assert hand.state.options.show == "binding"
+    assert (hand.scene_picture() != attached).any()
+    hand.key("k")
+    assert hand.state.options.show == "skin"
+    assert (hand.scene_picture() == attached).all()
+
+
+@pytest.mark.parametrize("key", OPTION_KEYS)
+def test_letter_toggles_its_display_option_and_the_picture(drive, key):
+    hand = drive()  # the bundled figure: it has a texture
+    before, picture = getattr(hand.state.options, OPTION_KEYS[key]), hand.scene_picture()
+    hand.key(key)
+    assert getattr(hand.state.options, OPTION_KEYS[key]) is not before
+    assert (hand.scene_picture() != picture).any()
+    hand.key("z", "ctrl")
+    assert getattr(hand.state.options, OPTION_KEYS[key]) is before
+    assert (hand.scene_picture() == picture).all()
+
+
+def test_f_fits_the_posed_figure(hand):
+    hand.wheel(-8, hand.middle)
+    hand.pull(hand.middle, (hand.middle[0] + 90, hand.middle[1]), button=1)
+    far = hand.state.camera.distance
+    hand.key("f")
+    assert hand.state.camera.distance < far
+    first = hand.state.camera.target.copy(), hand.state.camera.distance
+    hand.key("f")
+    assert (hand.state.camera.target == first[0]).all()
+    assert hand.state.camera.distance == first[1]
+
+
+@pytest.mark.parametrize(
+    ("keys", "view"),
+    [(("_1", "keypad1"), (0, 0)), (("_3", "keypad3"), (90, 0)), (("_7", "keypad7"), (0, 90))],
+)
+def test_digits_look_from_named_sides(hand, keys, view):
+    for key in keys:
+        hand.state.camera.azimuth, hand.state.camera.inclination = 12.0, 34.0
+        hand.key(key)
+        assert (hand.state.camera.azimuth, hand.state.camera.inclination) == view
+
+
+def test_5_switches_the_projection(hand):
+    for key, wanted in (("_5", True), ("keypad5", False)):
+        hand.key(key)
+        assert hand.state.camera.orthographic is wanted
+
+
+def test_tab_hides_the_panels_and_brings_them_back(hand):
+    labels, rect = set(hand.state.item_rects), hand.state.view_rect
+    hand.key("tab")
+    assert not hand.state.item_rects
+    assert hand.state.view_rect == (0.0, 0.0, 900.0, 640.0)
+    hand.key("tab")
+    hand.step(2)
+    assert set(hand.state.item_rects) == labels and hand.state.view_rect == rect
+
+
+def test_h_and_question_mark_list_the_keys(hand):
+    quiet = hand.screen()
+    for key, held in (("h", ""), ("slash", "shift"), ("f1", "")):
+        hand.key(key, held)
+        assert hand.state.keys_visible
+        assert (hand.screen() != quiet).any()
+        hand.key(key, held)
+        assert not hand.state.keys_visible
+
+
+def test_escape_closes_in_order_and_never_quits(hand):
+    state = hand.state
+    hand.click(hand.place("joint arm", 0.5))
+    hand.key("h")
+    hand.key("o", "ctrl")
+    hand.step(2)
+    before = hand.dofs()
+    seen = []
+    for number in range(5):
+        if number == 1:
+            state.error = "something"
+        hand.step(2)
+        hand.key("escape")
+        hand.step(2)
+        seen.append(
+            (bool(state.error), state.dialog is not None, state.keys_visible, state.selected_joint)
+        )
+    assert seen == [
+        (False, False, True, 1),
+        (False, False, True, 1),
+        (False, False, False, 1),
+        (False, False, False, -1),
+        (False, False, False, -1),
+    ]
+    assert "quit" not in state.wants and (hand.dofs() == before).all()
+
+
+def test_letters_do_nothing_under_a_dialog_or_message(hand):
+    before = hand.state.options.show, hand.dofs()
+    hand.state.error = "something"
+    hand.step(2)
+    for key in ("s", "w", "r", "tab"):
+        hand.key(key)
+    hand.key("escape")
+    hand.step(2)
+    assert hand.state.options.show == before[0] and not hand.state.options.wireframe
+    assert hand.state.panels_visible
+
+
+def test_f12_saves_what_is_shown_and_never_replaces(hand, tmp_path, monkeypatch):
+    folder = tmp_path / "pictures"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    hand.step(2)
+    shown = hand.scene_picture()
+    hand.key("f12")
+    first = folder / "tiny.png"
+    assert (np.array(Image.open(first)) == shown).all()
+    kept = first.read_bytes()
+    hand.key("w")
+    hand.key("f12")
+    assert sorted(path.name for path in folder.iterdir()) == ["tiny-2.png", "tiny.png"]
+    assert first.read_bytes() == kept
+    assert any("tiny-2.png" in note.text for note in hand.state.notes)
+    assert hand.undo_steps == 1  # only the wireframe
+
+
+def test_f12_without_a_current_folder_shows_a_message(hand, tmp_path, monkeypatch):
+    folder = tmp_path / "gone"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    folder.rmdir()
+    hand.key("f12")
+    assert hand.state.error
+    hand.key("escape")
+    hand.state.paths = ()
+    hand.key("o", "ctrl")
+    assert hand.state.dialog is not None
+
+
+def test_ctrl_q_asks_to_quit(hand):
+    hand.key("q", "ctrl")
+    assert "quit" in hand.state.wants
+
+
+def test_ctrl_o_opens_the_file_dialog_in_the_figures_folder(hand, tmp_path):
+    hand.key("o", "ctrl")
+    assert hand.state.dialog.folder == tmp_path.resolve()
+
+
+@pytest.mark.parametrize("redo", [("z", "ctrl shift"), ("y", "ctrl")])
+def test_undo_and_redo_walk_over_pose_and_display(hand, redo):
+    states = []
+
+    def note():
+        states.append((hand.dofs().tolist(), hand.state.options.show, hand.state.options.flat))
+
+    note()
+    hand.drag("arm.x", 0.9)
+    note()
+    hand.key("s")
+    note()
+    hand.click("Flat")
+    note()
+    hand.drag("root.x", 0.1)
+    note()
+    assert hand.undo_steps == 4
+    now = lambda: (hand.dofs().tolist(), hand.state.options.show, hand.state.options.flat)  # noqa: E731
+    for wanted in reversed(states[:-1]):
+        hand.key("z", "ctrl")
+        assert now() == wanted
+    hand.key("z", "ctrl")  # nothing left
+    assert now() == states[0]
+    for wanted in states[1:]:
+        hand.key(*redo)
+        assert now() == wanted
+    hand.key(*redo)
+    assert now() == states[-1]
+
+
+def test_new_change_after_undo_forgets_redo(hand):
+    hand.key("w")
+    hand.key("z", "ctrl")
+    hand.key("g")
+    hand.key("y", "ctrl")
+    assert not hand.state.options.wireframe and not hand.state.options.grid
+
+
+def test_ctrl_letters_are_not_plain_letters(hand):
+    for key in ("s", "w", "r", "h", "g"):
+        hand.key(key, "ctrl")
+    assert hand.undo_steps == 0 and not hand.state.keys_visible
+
+
+def test_keys_overlay_lists_every_key_within_the_view(drive, rig):
+    hand = drive(*rig, size=(900, 700))
+    hand.key("h")
+    hand.step(2)
+    window = imgui.internal.find_window_by_name("##keys")
+    assert window.pos.y >= 0 and window.pos.y + window.size.y <= 700
+
+
+def test_menu_entries_act(hand):
+    hand.drag("arm.x", 0.9)
+    moved = hand.dofs()
+    hand.menu("menu Edit", "Undo")
+    assert hand.dof("arm.x") == FILE_POSE["arm.x"]
+    hand.menu("menu Edit", "Redo")
+    assert (hand.dofs() == moved).all()
+    hand.menu("menu Edit", "Reset pose")
+    assert hand.dof("arm.x") == FILE_POSE["arm.x"]
+    hand.menu("menu Help", "Keys")
+    assert hand.state.keys_visible
+    hand.menu("menu File", "Quit")
+    assert "quit" in hand.state.wants
+
+
+@pytest.mark.parametrize("key", ["q", "w"])
+def test_modifier_let_go_within_the_frame_of_the_letter_still_counts(hand, key):
+    hand.io.add_key_event(imgui.Key.mod_ctrl, True)
+    hand.step()
+    hand.io.add_key_event(getattr(imgui.Key, key), True)
+    hand.io.add_key_event(imgui.Key.mod_ctrl, False)
+    hand.io.add_key_event(getattr(imgui.Key, key), False)
+    hand.step(4)
+    assert ("quit" in hand.state.wants) is (key == "q")
+    assert not hand.state.options.wireframe
+    hand.key("w")
+    assert hand.state.options.wireframe

@@ -1,0 +1,137 @@
+"""Panels, sizes and scales: what is closed comes back, and clicks hit at every scale."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from app.tiny import FILE_POSE
+from imgui_bundle import imgui
+
+from viewer.app.panels import PANELS
+
+
+def test_closed_panel_leaves_and_the_menu_brings_it_back(hand):
+    hand.menu("menu Window", "Joints")
+    hand.step(3)
+    assert hand.state.closed_panels == {"joints"} and "Filter" not in hand.state.item_rects
+    assert hand.state.view_rect[0] == 0
+    hand.menu("menu Window", "Joints")
+    hand.step(3)
+    assert "Filter" in hand.state.item_rects
+
+
+def test_panel_closes_by_its_cross(hand):
+    right = hand.state.view_rect[0]
+    hand.click((right - 13, hand.state.view_rect[1] + 10))
+    hand.step(3)
+    assert hand.state.closed_panels == {"joints"}
+
+
+def test_all_panels_closed_leave_the_view(hand):
+    for panel in PANELS.values():
+        hand.menu("menu Window", panel.title)
+    hand.step(3)
+    x, _y, width, height = hand.state.view_rect
+    assert (x, width) == (0, 900) and height > 600
+    hand.pull(hand.middle, (hand.middle[0] + 50, hand.middle[1]))
+
+
+def test_reset_layout_opens_every_panel_where_it_was(hand):
+    rect, labels = hand.state.view_rect, set(hand.state.item_rects)
+    hand.menu("menu Window", "Joints")
+    hand.menu("menu Window", "Stats")
+    hand.menu("menu Window", "Reset layout")
+    hand.step(4)
+    assert not hand.state.closed_panels
+    assert hand.state.view_rect == rect and set(hand.state.item_rects) == labels
+
+
+def test_reset_layout_keeps_pose_and_camera(hand):
+    hand.drag("arm.x", 0.9)
+    before = hand.dofs(), hand.state.camera.azimuth
+    hand.menu("menu Window", "Reset layout")
+    hand.step(4)
+    assert (hand.dofs() == before[0]).all() and hand.state.camera.azimuth == before[1]
+
+
+@pytest.mark.parametrize("size", [(900, 640), (640, 480), (320, 240), (50, 40), (8, 8), (1, 1)])
+def test_small_windows_draw_without_a_fault(drive, rig, size):
+    hand = drive(*rig, size=size)
+    hand.key("s")
+    hand.key("f")
+    hand.wheel(2, (size[0] / 2, size[1] / 2))
+    hand.key("h")
+    hand.state.error = "message"
+    hand.step(2)
+    hand.key("escape")
+    hand.key("tab")
+    hand.key("f")
+    hand.step(3)
+    hand.assert_sane()
+
+
+def test_window_shrinks_to_nothing_and_grows_again(hand):
+    for size in ((300, 200), (40, 300), (300, 1), (1, 1), (900, 640)):
+        hand.io.display_size = imgui.ImVec2(*size)
+        hand.step(4)
+        hand.key("f")
+        hand.wheel(1, (size[0] / 2, size[1] / 2))
+        hand.assert_sane()
+    hand.key("f")
+    hand.drag("arm.x", 0.9)
+    assert hand.dof("arm.x") != FILE_POSE["arm.x"]
+
+
+def test_view_of_no_width_or_height_is_skipped(hand):
+    for rect in ((0, 0, 0, 0), (0, 0, 0, 50), (0, 0, 50, 0), (0, 0, 0.2, 0.2), (0, 0, -5, 9)):
+        hand.state.view_rect = tuple(map(float, rect))
+        hand.app.frame._draw_scene(1.0)
+        assert hand.state.aspect > 0
+
+
+@pytest.mark.parametrize(
+    ("pixels", "scale"),
+    [(1.0, 1.0), (1.25, 1.0), (2.0, 1.0), (1.0, 1.5), (1.0, 2.0), (2.0, 2.0)],
+)
+def test_clicks_hit_at_every_scale(drive, rig, pixels, scale):
+    hand = drive(*rig, size=(900, 640), pixels_per_point=pixels, scale=scale)
+    assert hand.app.screen.size == (round(900 * pixels), round(640 * pixels))
+    width, height = (round(side * pixels) for side in hand.state.view_rect[2:])
+    assert hand.scene_picture().shape == (height, width, 4)
+    hand.drag("root.x", 0.8)
+    assert hand.dof("root.x") == pytest.approx(0.6, abs=0.06)
+    hand.click("Skeleton")
+    assert hand.state.options.show == "skeleton"
+    hand.key("r")
+    before = hand.state.camera.azimuth
+    hand.pull(hand.middle, (hand.middle[0] + 50, hand.middle[1]))
+    assert hand.state.camera.azimuth == pytest.approx(before - 20)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.5, 2.0])
+@pytest.mark.parametrize("size", [(640, 480), (1280, 800)])
+def test_unit_buttons_stay_within_the_panel(drive, rig, size, scale):
+    hand = drive(*rig, size=size, scale=scale)
+    for label in ("Reset (R)", "degrees", "radians"):
+        assert hand.state.item_rects[label][2] <= hand.state.view_rect[0], label
+
+
+def test_scene_fills_exactly_its_place_in_the_window(drive, rig):
+    hand = drive(*rig, pixels_per_point=2.0)
+    hand.state.panels_visible = False
+    screen, scene = hand.screen(), hand.scene_picture()
+    assert scene.shape[:2] == screen.shape[:2]
+    notes = len(hand.state.notes)
+    assert notes or np.abs(screen.astype(int) - scene[..., :3]).max() <= 1
+
+
+def test_background_that_is_transparent_shows_no_older_frame(hand):
+    hand.state.options.background = "transparent"
+    hand.state.options.grid = False
+    hand.key("tab")
+    first = hand.screen()
+    hand.state.camera.azimuth += 90
+    hand.screen()
+    hand.state.camera.azimuth -= 90
+    hand.state.notes.clear()
+    assert (hand.screen() == first).mean() > 0.99

@@ -1,0 +1,197 @@
+"""The Display, Camera, Lights and Stats panels: every widget changes what it names."""
+
+from __future__ import annotations
+
+import pytest
+
+from viewer.rendering.camera import VIEWS
+from viewer.rendering.options import SHOWN, Lights
+from viewer.rendering.program import SHADING
+
+
+@pytest.fixture
+def tall(drive, rig):
+    """A hand on a window that shows every widget without scrolling."""
+    return drive(*rig, size=(900, 1000))
+
+
+def _show_lights(hand):
+    window = [900 * 0.73 + 105, hand.state.item_rects["Distance"][1] - 20]
+    hand.click(tuple(window))
+    hand.step(2)
+    assert "Ambient" in hand.state.item_rects
+
+
+@pytest.mark.parametrize("shown", SHOWN)
+def test_radio_button_chooses_what_is_shown(tall, shown):
+    tall.state.options.show = "skeleton" if shown == "skin" else "skin"
+    tall.step(2)
+    before = tall.scene_picture()
+    tall.click(SHOWN[shown])
+    assert tall.state.options.show == shown
+    assert (tall.scene_picture() != before).any()
+
+
+@pytest.mark.parametrize(
+    ("label", "option"),
+    [
+        ("Flat", "flat"),
+        ("Wireframe", "wireframe"),
+        ("Vertex normals", "normals"),
+        ("Texture", "texture"),
+        ("Cull back faces", "cull"),
+        ("grid", "grid"),
+    ],
+)
+def test_check_box_is_one_step(tall, label, option):
+    if label == "grid":
+        label = next(label for label in tall.state.item_rects if label.startswith("Grid"))
+    before = getattr(tall.state.options, option)
+    tall.click(label)
+    assert getattr(tall.state.options, option) is not before
+    assert tall.undo_steps == 1
+    tall.click(label)
+    assert getattr(tall.state.options, option) is before
+
+
+def test_skin_opacity_is_a_slider_while_both_are_shown(tall):
+    assert "Skeleton opacity" not in tall.state.item_rects
+    tall.click(SHOWN["both"])
+    before = tall.scene_picture()
+    tall.drag("Skeleton opacity", 1.3, "Skeleton opacity")
+    assert tall.state.options.skeleton_opacity == pytest.approx(1.0, abs=0.02)
+    assert (tall.scene_picture() != before).any()
+
+
+def _pick(hand, label, number):
+    """Choose an entry of a drop-down list."""
+    hand.click(label)
+    x, _y = hand.place(label, 0.1)
+    hand.step(2)
+    from imgui_bundle import imgui
+
+    line = imgui.get_style().item_spacing.y + imgui.get_font_size()
+    rect = hand.state.item_rects[label]
+    hand.click((x, rect[3] + 8 + (number + 0.4) * line))
+    hand.step(2)
+
+
+def test_shading_is_chosen_from_a_list(tall):
+    for number, name in enumerate(SHADING):
+        _pick(tall, "Shading", number)
+        assert tall.state.options.shading == name
+
+
+def test_background_is_chosen_from_a_list(tall):
+    _pick(tall, "Background", 1)
+    assert tall.state.options.background == "transparent"
+    _pick(tall, "Background", 2)
+    assert tall.state.options.background == "#ffffff"
+    assert "Colour" in tall.state.item_rects
+    tall.click(tall.place("Colour", 0.35), held="ctrl")
+    tall.type("0")
+    tall.key("enter")
+    tall.step(2)
+    assert tall.state.options.background == "#ff00ff"
+    _pick(tall, "Background", 0)
+    assert tall.state.options.background == "gradient"
+
+
+@pytest.mark.parametrize(
+    ("label", "attribute", "low", "high"),
+    [
+        ("Azimuth", "azimuth", -180, 180),
+        ("Inclination", "inclination", -90, 90),
+        ("Field of view", "fov", 5, 120),
+    ],
+)
+def test_camera_slider_sets_its_angle(tall, label, attribute, low, high):
+    for fraction in (0.2, 0.7):
+        tall.drag(label, fraction, label)
+        wanted = low + fraction * (high - low)
+        assert getattr(tall.state.camera, attribute) == pytest.approx(wanted, abs=0.03 * 360)
+
+
+def test_camera_changes_are_no_undo_steps(tall):
+    tall.drag("Azimuth", 0.9, "Azimuth")
+    tall.wheel(2, tall.middle)
+    tall.click("Top")
+    assert tall.undo_steps == 0
+
+
+def test_distance_slider_moves_the_eye(tall):
+    tall.drag("Distance", 0.1, "Distance")
+    near = tall.state.camera.distance
+    tall.drag("Distance", 0.9, "Distance")
+    assert tall.state.camera.distance > 5 * near
+    tall.click("Fit (F)")
+    assert near < tall.state.camera.distance < 20
+
+
+@pytest.mark.parametrize("text", ["0", "-5", "nan", "inf", "1e39", "3e38", "1e-44", ""])
+def test_typed_camera_values_leave_a_camera_that_draws(tall, text):
+    for label in ("Distance", "Azimuth", "Inclination", "Field of view"):
+        tall.enter_value(label, text)
+    tall.wheel(2, tall.middle)
+    tall.pull(tall.middle, (tall.middle[0] + 30, tall.middle[1] + 30), button=1)
+    tall.assert_sane()
+    assert -90 <= tall.state.camera.inclination <= 90 and 5 <= tall.state.camera.fov <= 120
+
+
+@pytest.mark.parametrize("name", VIEWS)
+def test_named_view_button_turns_the_camera(tall, name):
+    tall.state.camera.azimuth, tall.state.camera.inclination = 1.0, 2.0
+    tall.click(name.capitalize())
+    assert (tall.state.camera.azimuth, tall.state.camera.inclination) == VIEWS[name]
+
+
+def test_orthographic_box_switches_the_projection(tall):
+    tall.click("Orthographic")
+    assert tall.state.camera.orthographic
+    tall.click("Orthographic")
+    assert not tall.state.camera.orthographic
+
+
+@pytest.mark.parametrize("light", ["Key", "Rim"])
+@pytest.mark.parametrize("part", ["Strength", "Azimuth", "Inclination"])
+def test_light_slider_changes_its_light_only(tall, light, part):
+    _show_lights(tall)
+    tall.drag(f"{light} {part}", 0.9, part)
+    lights, usual = tall.state.options.lights, Lights()
+    changed, other = (lights.key, lights.rim) if light == "Key" else (lights.rim, lights.key)
+    was, same = (usual.key, usual.rim) if light == "Key" else (usual.rim, usual.key)
+    assert getattr(changed, part.lower()) != getattr(was, part.lower())
+    assert other == same and tall.undo_steps == 1
+
+
+@pytest.mark.parametrize("part", ["Ambient", "Specular", "Shininess"])
+def test_light_slider_is_one_step_and_can_be_reset(tall, part):
+    _show_lights(tall)
+    before = tall.scene_picture()
+    tall.drag(part, 0.9, part)
+    assert getattr(tall.state.options.lights, part.lower()) != getattr(Lights(), part.lower())
+    assert tall.undo_steps == 1
+    assert part == "Shininess" or (tall.scene_picture() != before).any()
+    tall.click("Reset lights")
+    assert tall.state.options.lights == Lights()
+    tall.key("z", "ctrl")
+    assert tall.state.options.lights != Lights()
+
+
+def test_lights_can_stay_with_the_scene(tall):
+    _show_lights(tall)
+    tall.click("Follow the camera")
+    assert not tall.state.options.lights.follow_camera
+
+
+def test_light_colour_is_picked(tall):
+    _show_lights(tall)
+    before = tall.state.options.lights.key.color
+    x0, y0, _x1, y1 = tall.state.item_rects["Key light"]
+    tall.click((x0 + 5, (y0 + y1) / 2))
+    tall.step(3)
+    x, y = x0 + 60, y1 + 60  # in the square of the picker below
+    tall.pull((x, y), (x + 30, y + 20))
+    assert tall.state.options.lights.key.color != before
+    assert tall.state.options.lights.rim == Lights().rim
+    assert all(0 <= value <= 1 for value in tall.state.options.lights.key.color)

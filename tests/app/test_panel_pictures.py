@@ -1,0 +1,106 @@
+"""Golden pictures of the interface, compared coarsely: letters differ between machines.
+
+VIEWER_UPDATE_GOLDEN=1 draws them anew; look at them before they are committed.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image, ImageFilter
+
+GOLDEN = Path(__file__).resolve().parents[1] / "golden"
+SIZE = (560, 420)
+MOST_MEAN, MOST_LOCAL = 3.0, 40.0  # of 255, after blurring away letters and hinting
+
+
+def _nothing(hand):
+    pass
+
+
+def _skeleton(hand):
+    hand.state.options.show = "both"
+    hand.state.selected_joint = 1
+
+
+def _lights(hand):
+    x0, y0, _, _ = hand.state.item_rects["Distance"]
+    hand.click((x0 + 112, y0 - 20))
+
+
+def _keys(hand):
+    hand.key("tab")
+    hand.key("h")
+
+
+def _message(hand):
+    hand.state.error = "tube.skin:41: expected 3 numbers, found 2"
+
+
+def _dialog(hand):
+    hand.key("o", "ctrl")
+    hand.state.dialog.folder = Path("/figures")
+
+
+STATES = {
+    "start": _nothing,
+    "skeleton": _skeleton,
+    "lights": _lights,
+    "keys": _keys,
+    "message": _message,
+    "dialog": _dialog,
+}
+
+
+def _coarse(pixels):
+    picture = Image.fromarray(pixels).filter(ImageFilter.GaussianBlur(4))
+    return np.asarray(picture.reduce(4), dtype=float)
+
+
+def _difference(first, second):
+    gap = np.abs(_coarse(first) - _coarse(second))
+    return gap.mean(), gap.max()
+
+
+def _is_like(first, second):
+    mean, local = _difference(first, second)
+    return mean <= MOST_MEAN and local <= MOST_LOCAL
+
+
+def _shown(hand, name):
+    STATES[name](hand)
+    hand.step(3)
+    hand.state.notes.clear()
+    hand.state.stats.renderer = hand.state.stats.version = "driver"
+    hand.key("f")
+    hand.state.notes.clear()
+    return hand.screen()
+
+
+@pytest.mark.parametrize("name", STATES)
+def test_interface_looks_as_it_did(drive, rig, name):
+    pixels = _shown(drive(*rig, size=SIZE), name)
+    path = GOLDEN / f"app_{name}.png"
+    if os.environ.get("VIEWER_UPDATE_GOLDEN") == "1":
+        Image.fromarray(pixels).save(path)
+    assert path.is_file(), f"{path} is missing: VIEWER_UPDATE_GOLDEN=1 draws it"
+    with Image.open(path) as golden:
+        wanted = np.array(golden.convert("RGB"))
+    assert _is_like(pixels, wanted), _difference(pixels, wanted)
+
+
+def test_comparison_tells_states_apart(drive, rig):
+    hand = drive(*rig, size=SIZE)
+    start = _shown(hand, "start")
+    hand.state.closed_panels.add("stats")
+    without_panel = hand.screen()
+    hand.state.closed_panels.clear()
+    hand.state.options.show = "skeleton"
+    without_skin = hand.screen()
+    assert _is_like(start, start)
+    assert not _is_like(start, without_panel)
+    assert not _is_like(start, without_skin)
+    assert not _is_like(start, _shown(hand, "message"))

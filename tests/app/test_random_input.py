@@ -1,0 +1,98 @@
+"""A monkey at mouse and keyboard: whatever it does, nothing is raised and numbers stay finite.
+
+VIEWER_MONKEY_EVENTS=20000 tries more by hand.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+
+from app.tiny import SKEL, write_rig
+from imgui_bundle import imgui
+
+KEYS = [
+    *"rskwntgfhzyoa",
+    *("_1", "_3", "_5", "_7", "tab", "escape", "f1", "f12", "enter", "backspace", "delete"),
+    *("left_arrow", "right_arrow", "up_arrow", "down_arrow", "space", "keypad5", "page_down"),
+]
+EVENTS = int(os.environ.get("VIEWER_MONKEY_EVENTS", "2000"))
+
+
+class Monkey:
+    def __init__(self, hand, files, seed):
+        self.hand, self.files, self.random = hand, files, random.Random(seed)
+
+    def act(self):
+        choose = self.random
+        action = choose.choices(
+            [self.move, self.button, self.wheel, self.key, self.letter, self.aim, self.drop,
+             self.resize, self.frame],
+            [30, 25, 8, 14, 6, 12, 1, 1, 20],
+        )[0]  # fmt: skip
+        action()
+
+    def point(self):
+        width, height = self.hand.io.display_size
+        return self.random.uniform(-20, width + 20), self.random.uniform(-20, height + 20)
+
+    def move(self):
+        self.hand.io.add_mouse_pos_event(*self.point())
+
+    def aim(self):
+        rects = self.hand.state.item_rects
+        if rects:
+            x0, y0, x1, y1 = rects[self.random.choice(sorted(rects))]
+            x, y = self.random.uniform(x0, x1), self.random.uniform(y0, y1)
+            self.hand.io.add_mouse_pos_event(x, y)
+            self.hand.io.add_mouse_button_event(0, True)
+
+    def button(self):
+        self.hand.io.add_mouse_button_event(self.random.randrange(3), self.random.random() < 0.4)
+
+    def wheel(self):
+        self.hand.io.add_mouse_wheel_event(0.0, self.random.uniform(-6, 6))
+
+    def key(self):
+        for name in ("mod_ctrl", "mod_shift"):
+            self.hand.io.add_key_event(getattr(imgui.Key, name), self.random.random() < 0.2)
+        code = getattr(imgui.Key, self.random.choice(KEYS))
+        self.hand.io.add_key_event(code, True)
+        self.hand.io.add_key_event(code, False)
+
+    def letter(self):
+        self.hand.io.add_input_character(ord(self.random.choice("0123456789.-eEnaif#%{")))
+
+    def drop(self):
+        self.hand.app.frame.open(self.random.choice(self.files))
+        self.hand.wait_for_loader()
+
+    def resize(self):
+        sizes = [(900, 640), (420, 300), (60, 500), (1, 1), (900, 640), (640, 480)]
+        self.hand.io.display_size = imgui.ImVec2(*self.random.choice(sizes))
+
+    def frame(self):
+        self.hand.step()
+
+
+def test_random_input_raises_nothing_and_keeps_numbers_finite(drive, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    rig = write_rig(tmp_path)
+    bad = tmp_path / "bad.skel"
+    bad.write_text(SKEL[:100])
+    files = [list(rig), [rig[0]], [rig[1]], [bad], [tmp_path / "missing.skel"], []]
+    hand = drive(*rig, size=(640, 480))
+    hand.state.options.samples = 1
+    monkey = Monkey(hand, files, seed=len("skinned"))
+    for number in range(EVENTS):
+        monkey.act()
+        if number % 4 == 0:
+            hand.step()
+            hand.assert_sane()
+        if number % 300 == 299:
+            hand.state.panels_visible = True
+            hand.io.display_size = imgui.ImVec2(640, 480)
+            for picture in tmp_path.glob("*.png"):
+                picture.unlink()
+    hand.step(5)
+    hand.assert_sane()

@@ -1,0 +1,62 @@
+"""What the benchmarks share: interleaved rounds, ratios, processes."""
+
+from __future__ import annotations
+
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+# Compiled modules, as an installed program has them; the first round fills it.
+_CACHE = tempfile.TemporaryDirectory(prefix="viewer-bench-")
+
+
+def interleaved(work: Mapping[str, Callable[[], object]], rounds: int) -> dict[str, list[float]]:
+    """Time every piece of work once a round, in turn; return milliseconds by name."""
+    times: dict[str, list[float]] = {name: [] for name in work}
+    for number in range(rounds + 1):
+        for name, run in work.items():
+            started = time.perf_counter()
+            run()
+            if number:  # the first round warms caches
+                times[name].append(1e3 * (time.perf_counter() - started))
+    return times
+
+
+def report(title: str, times: Mapping[str, Sequence[float]], ratio: tuple[str, str], goal: float):
+    """Print medians with their spread, and the median of the ratios within a round."""
+    print(title)
+    for name, values in times.items():
+        ordered = sorted(values)
+        low, high = ordered[len(ordered) // 10], ordered[-1 - len(ordered) // 10]
+        print(f"  {name:<44} {statistics.median(values):9.2f} ms  ({low:.2f}..{high:.2f})")
+    measured = median_ratio(times, *ratio)
+    verdict = "met" if measured <= goal else "MISSED"
+    print(f"  {ratio[0]} / {ratio[1]}: {measured:.2f} (goal: at most {goal:g}, {verdict})\n")
+
+
+def median_ratio(times: Mapping[str, Sequence[float]], first: str, second: str) -> float:
+    """Return the median of first / second within one round."""
+    pairs = zip(times[first], times[second], strict=True)
+    return statistics.median(a / b for a, b in pairs)
+
+
+def run_process(arguments: Sequence[str]) -> tuple[float, float]:
+    """Run Python with arguments; return its wall time in seconds and its peak memory in MB."""
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONPYCACHEPREFIX": _CACHE.name}
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
+    started = time.perf_counter()
+    process = subprocess.Popen(
+        [sys.executable, *arguments], env=environment, cwd=ROOT, stdout=subprocess.DEVNULL
+    )
+    _, status, usage = os.wait4(process.pid, 0)
+    took = time.perf_counter() - started
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode:
+        raise SystemExit(f"{' '.join(arguments)}: exit code {process.returncode}")
+    return took, usage.ru_maxrss / (1e3 if sys.platform != "darwin" else 1e6)

@@ -1,0 +1,111 @@
+"""``viewer info``: numbers counted by hand, as text and as JSON."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from app.tiny import write_rig
+
+from viewer.cli import run
+
+
+@pytest.fixture
+def describe(capsys):
+    def info(*arguments):
+        assert run(["info", *map(str, arguments), "--json"]) == 0
+        return json.loads(capsys.readouterr().out)
+
+    return info
+
+
+def test_tiny_rig_is_described_exactly(describe, tmp_path):
+    described = describe(*write_rig(tmp_path))
+    (actor,) = described["actors"]
+    assert described["warnings"] == [] and actor["name"] == "tiny" and actor["attached"]
+    skeleton = actor["skeleton"]
+    assert skeleton["joints"] == 2 and skeleton["roots"] == 1
+    assert skeleton["dofs"] == 9 and skeleton["limited_dofs"] == 3 and skeleton["locked_dofs"] == 1
+    assert [joint["parent"] for joint in skeleton["joint_table"]] == [-1, 0]
+    assert skeleton["dof_table"][3:6] == [
+        {"name": "root.x", "value": 0.25, "minimum": -1.0, "maximum": 1.0},
+        {"name": "root.y", "value": 0.5, "minimum": 0.5, "maximum": 2.0},
+        {"name": "root.z", "value": 0.3, "minimum": 0.3, "maximum": 0.3},
+    ]
+    assert skeleton["dof_table"][6]["minimum"] is None
+    mesh = actor["mesh"]
+    assert (mesh["vertices"], mesh["triangles"]) == (12, 20)
+    assert mesh["degenerate_triangles"] == 0 and mesh["unused_vertices"] == 0
+    assert not mesh["has_uvs"] and mesh["materials"] == []
+    skin = actor["skin"]
+    assert skin["influences"] == 4 + 8 + 4 and skin["bindings"] == 2
+    assert skin["influence_histogram"] == {"1": 8, "2": 4}
+    assert skin["mean_influences"] == pytest.approx(16 / 12)
+    assert skin["weight_sums"] == [1.0, 1.0] and skin["joints_without_vertices"] == []
+
+
+def test_text_says_the_same_in_words(tmp_path, capsys):
+    assert run(["info", *map(str, write_rig(tmp_path))]) == 0
+    text = capsys.readouterr().out
+    for words in (
+        "2 joints, 9 DOFs (3 limited, 1 of them locked)",
+        "12 vertices, 20 triangles (0 without area), without texture coordinates",
+        "2 bindings, 16 influences, mean 1.33 a vertex",
+        "1: 8  2: 4",
+        "weight sums 1 to 1",
+        "locked",
+    ):
+        assert words in text
+
+
+def test_parts_alone_are_described(describe, tmp_path):
+    skel, skin = write_rig(tmp_path)
+    assert set(describe(skel)["actors"][0]) >= {"skeleton"}
+    assert "mesh" not in describe(skel)["actors"][0]
+    assert "skeleton" not in describe(skin)["actors"][0]
+    # A lone skeleton reaches from the floor of its boxes to their top.
+    assert describe(skel)["actors"][0]["size"] > 1.8
+
+
+def test_dofs_given_are_described(describe, tmp_path):
+    described = describe(*write_rig(tmp_path), "--dof", "arm.x=0.5")
+    assert described["actors"][0]["skeleton"]["dof_table"][6]["value"] == 0.5
+
+
+def test_warnings_are_described_and_printed(tmp_path, capsys):
+    path = tmp_path / "odd.skel"
+    path.write_text("balljoint a { rotxlimit 2 1 }")
+    assert run(["info", str(path), "--json"]) == 0
+    captured = capsys.readouterr()
+    warnings = json.loads(captured.out)["warnings"]
+    assert len(warnings) == 1 and captured.err == f"warning: {warnings[0]}\n"
+
+
+def test_names_are_printed_on_one_line(tmp_path, capsys):
+    path = tmp_path / "two\nlines.skel"
+    path.write_text("balljoint a { pose 1 0 0 }")
+    assert run(["info", str(path)]) == 0
+    assert capsys.readouterr().out.splitlines()[0] == "two\\nlines"
+
+
+def test_course_skeleton_is_counted(describe, shared):
+    (actor,) = describe(shared / "test.skel")["actors"]
+    skeleton = actor["skeleton"]
+    # Six balljoints: 18 rotations and three translations of the root; knee_r has three limits.
+    assert (skeleton["joints"], skeleton["dofs"]) == (6, 21)
+    assert (skeleton["limited_dofs"], skeleton["locked_dofs"]) == (3, 2)
+    values = {dof["name"]: dof["value"] for dof in skeleton["dof_table"]}
+    assert values["root.y"] == 0.1
+    assert [values[f"knee_r.{axis}"] for axis in "xyz"] == [-2.0, 0.0, 0.0]  # clamped
+
+
+@pytest.mark.parametrize(
+    ("name", "joints", "vertices", "triangles"), [("tube", 2, 240, 456), ("wasp", 23, 694, 1236)]
+)
+def test_course_figures_are_counted(describe, shared, name, joints, vertices, triangles):
+    (actor,) = describe(shared / f"{name}.skel", shared / f"{name}.skin")["actors"]
+    # The counts that the files declare.
+    assert actor["skeleton"]["joints"] == joints == actor["skin"]["bindings"]
+    assert (actor["mesh"]["vertices"], actor["mesh"]["triangles"]) == (vertices, triangles)
+    assert sum(actor["skin"]["influence_histogram"].values()) == vertices
+    assert actor["skin"]["weight_sums"] == pytest.approx([1.0, 1.0], abs=2e-2)

@@ -1,0 +1,70 @@
+"""``viewer FILES`` without a display: one line, a picture in the current folder, exit code 0."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from app.tiny import write_rig
+from PIL import Image
+
+import viewer
+from viewer.cli import run
+
+
+@pytest.fixture(autouse=True)
+def _no_display(monkeypatch):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+
+
+def test_without_display_the_figure_is_drawn_under_a_new_name(tmp_path, monkeypatch, capsys):
+    rig = write_rig(tmp_path)
+    folder = tmp_path / "here"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    for number, name in enumerate(("tiny.png", "tiny-2.png")):
+        assert run(list(map(str, rig))) == 0
+        captured = capsys.readouterr()
+        assert captured.out == (
+            f"no display found (DISPLAY is not set); drew {folder.resolve() / name} instead\n"
+        )
+        assert captured.err == ""
+        assert len(list(folder.iterdir())) == number + 1
+    picture = np.array(Image.open(folder / "tiny.png"))
+    assert (picture == viewer.render(viewer.load(*rig), (1280, 720))).all()
+
+
+def test_without_display_and_files_the_fox_is_drawn(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert run([]) == 0
+    assert "fox.png" in capsys.readouterr().out and (tmp_path / "fox.png").is_file()
+
+
+def test_without_display_the_wasp_is_drawn(tmp_path, monkeypatch, shared):
+    monkeypatch.chdir(tmp_path)
+    assert run([str(shared / "wasp.skel"), str(shared / "wasp.skin")]) == 0
+    assert (tmp_path / "wasp.png").is_file()
+
+
+def test_without_display_a_bad_file_is_exit_code_2(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert run([str(tmp_path / "missing.skel")]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_display_that_does_not_answer_is_one_line(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("DISPLAY", ":987")
+    monkeypatch.chdir(tmp_path)
+    assert run([]) == 0
+    captured = capsys.readouterr()
+    assert captured.out.count("\n") == 1 and "DISPLAY=:987" in captured.out
+
+
+def test_current_folder_that_is_gone_is_exit_code_5(tmp_path, monkeypatch, capsys):
+    folder = tmp_path / "gone"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    folder.rmdir()
+    assert run([]) == 5
+    assert capsys.readouterr().err.count("\n") == 1

@@ -1,0 +1,263 @@
+"""The orbit camera: where points land, by hand and by projecting with plain numpy."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from viewer.rendering.camera import VIEWS, Camera, camera_axes, eye, fit, orbit, pan, zoom
+
+BOX = np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
+ANGLES = [(0, 0), (35, 15), (-120, -60), (180, 0), (90, 90), (-30, -90), (10, 89.999)]
+
+
+def project(camera: Camera, points, aspect: float = 1.0, box=BOX):
+    """Return normalised device coordinates: x right, y up, z depth, each -1 to 1."""
+    points = np.atleast_2d(np.asarray(points, dtype=float))
+    clip = camera.projection_matrix(aspect, box) @ camera.view_matrix()
+    x = np.column_stack([points, np.ones(len(points))]) @ clip.T
+    return x[:, :3] / x[:, 3:]
+
+
+@pytest.mark.parametrize(
+    ("up", "azimuth", "inclination", "wanted"),
+    [
+        ("y", 0, 0, (0, 0, 4)),
+        ("y", 90, 0, (4, 0, 0)),
+        ("y", -90, 0, (-4, 0, 0)),
+        ("y", 180, 0, (0, 0, -4)),
+        ("y", 0, 90, (0, 4, 0)),
+        ("y", 0, -90, (0, -4, 0)),
+        ("y", 0, 30, (0, 2, 4 * math.sqrt(0.75))),
+        ("z", 0, 0, (0, -4, 0)),
+        ("z", 90, 0, (4, 0, 0)),
+        ("z", 0, 90, (0, 0, 4)),
+        ("z", 180, 0, (0, 4, 0)),
+    ],
+)
+def test_eye_stands_where_the_angles_say(up, azimuth, inclination, wanted):
+    camera = Camera(distance=4.0, azimuth=azimuth, inclination=inclination, up=up)
+    np.testing.assert_allclose(eye(camera), wanted, atol=1e-12)
+    camera.target = np.array([10.0, 20.0, 30.0])
+    np.testing.assert_allclose(eye(camera), np.add(wanted, camera.target), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("view", "right", "up"),
+    [
+        ("front", (1, 0, 0), (0, 1, 0)),
+        ("back", (-1, 0, 0), (0, 1, 0)),
+        ("left", (0, 0, -1), (0, 1, 0)),
+        ("right", (0, 0, 1), (0, 1, 0)),
+        ("top", (1, 0, 0), (0, 0, -1)),
+        ("bottom", (1, 0, 0), (0, 0, 1)),
+    ],
+)
+def test_views_show_the_side_they_are_named_after(view, right, up):
+    azimuth, inclination = VIEWS[view]
+    camera = Camera(azimuth=azimuth, inclination=inclination)
+    found = camera_axes(camera)
+    np.testing.assert_allclose(found[0], right, atol=1e-12)
+    np.testing.assert_allclose(found[1], up, atol=1e-12)
+    np.testing.assert_allclose(np.cross(found[0], found[1]), found[2], atol=1e-12)
+
+
+def test_z_up_shows_z_upwards():
+    camera = Camera(distance=4.0, azimuth=0.0, inclination=0.0, up="z")
+    right, up, backward = camera_axes(camera)
+    np.testing.assert_allclose(
+        [right, up, backward], [[1, 0, 0], [0, 0, 1], [0, -1, 0]], atol=1e-12
+    )
+
+
+@pytest.mark.parametrize("up", ["y", "z"])
+@pytest.mark.parametrize(("azimuth", "inclination"), ANGLES)
+def test_view_matrix_is_a_rigid_motion_that_puts_the_target_ahead(up, azimuth, inclination):
+    target = np.array([1.0, -2.0, 3.0])
+    camera = Camera(target, 5.0, azimuth, inclination, up=up)
+    view = camera.view_matrix()
+    np.testing.assert_allclose(view[:3, :3] @ view[:3, :3].T, np.eye(3), atol=1e-9)
+    assert np.linalg.det(view) == pytest.approx(1.0)
+    np.testing.assert_allclose(view @ [*target, 1.0], [0, 0, -5.0, 1.0], atol=1e-9)
+    np.testing.assert_allclose(view @ [*eye(camera), 1.0], [0, 0, 0, 1.0], atol=1e-9)
+    np.testing.assert_allclose(view[:3, :3], np.stack(camera_axes(camera)), atol=1e-9)
+
+
+def test_the_poles_are_reached_without_a_jump():
+    for sign in (1, -1):
+        at = Camera(azimuth=40.0, inclination=90.0 * sign).view_matrix()
+        near = Camera(azimuth=40.0, inclination=(90.0 - 1e-6) * sign).view_matrix()
+        np.testing.assert_allclose(at, near, atol=1e-6)
+
+
+def test_perspective_matrix_has_its_textbook_entries():
+    """fov 90: cot(45) = 1, over the aspect across."""
+    camera = Camera(distance=4.0, azimuth=0.0, inclination=0.0, fov=90.0)
+    matrix = camera.projection_matrix(2.0, BOX)
+    assert matrix[0, 0] == pytest.approx(0.5)
+    assert matrix[1, 1] == pytest.approx(1.0)
+    np.testing.assert_allclose(matrix[3], [0, 0, -1, 0], atol=1e-12)
+
+
+def test_perspective_lands_a_known_point_on_a_known_place():
+    """3 ahead and 1.5 up at 45 degrees half angle is half way up; 1 right of it a third."""
+    camera = Camera(distance=4.0, azimuth=0.0, inclination=0.0, fov=90.0)
+    np.testing.assert_allclose(project(camera, [1.0, 1.5, 1.0])[0, :2], [1 / 3, 0.5], atol=1e-9)
+    np.testing.assert_allclose(
+        project(camera, [1.0, 1.5, 1.0], aspect=2.0)[0, :2], [1 / 6, 0.5], atol=1e-9
+    )
+
+
+def test_orthographic_lands_a_known_point_whatever_its_depth():
+    """Half the height seen at the target is 4 tan 45 = 4."""
+    camera = Camera(distance=4.0, azimuth=0.0, inclination=0.0, fov=90.0, orthographic=True)
+    for depth in (-1.0, 0.0, 1.0):
+        np.testing.assert_allclose(
+            project(camera, [1.0, 2.0, depth])[0, :2], [0.25, 0.5], atol=1e-9
+        )
+
+
+def test_both_projections_agree_at_the_target():
+    points = np.array([[0.3, 0.4, 0.0], [-0.5, 0.1, 0.0]])
+    flat = Camera(distance=4.0, azimuth=0.0, inclination=0.0)
+    parallel = Camera(distance=4.0, azimuth=0.0, inclination=0.0, orthographic=True)
+    np.testing.assert_allclose(
+        project(flat, points)[:, :2], project(parallel, points)[:, :2], atol=1e-9
+    )
+
+
+@pytest.mark.parametrize("orthographic", [False, True])
+@pytest.mark.parametrize("distance", [0.5, 4.0, 400.0])
+def test_depth_covers_the_box_in_order(orthographic, distance):
+    camera = Camera(distance=distance, azimuth=0.0, inclination=0.0, orthographic=orthographic)
+    ahead = min(1.0, 0.9 * distance)
+    depths = project(camera, [[0, 0, ahead], [0, 0, 0], [0, 0, -1]])[:, 2]
+    assert (np.diff(depths) > 0).all()
+    assert np.abs(depths).max() < 1.0
+
+
+@pytest.mark.parametrize("up", ["y", "z"])
+@pytest.mark.parametrize("orthographic", [False, True])
+@pytest.mark.parametrize("aspect", [0.3, 1.0, 2.5])
+@pytest.mark.parametrize(("azimuth", "inclination"), ANGLES)
+def test_fit_shows_every_point_and_wastes_little(up, orthographic, aspect, azimuth, inclination):
+    rng = np.random.default_rng(3)
+    points = rng.normal(size=(200, 3)) * [1.0, 3.0, 0.5] + [100.0, -50.0, 7.0]
+    box = np.stack([points.min(axis=0), points.max(axis=0)])
+    camera = Camera(azimuth=azimuth, inclination=inclination, orthographic=orthographic, up=up)
+    fit(camera, points, aspect)
+    seen = project(camera, points, aspect, box)
+    assert np.abs(seen).max() < 1.0
+    assert np.abs(seen[:, :2]).max() > 0.85
+    assert (camera.azimuth, camera.inclination) == (azimuth, inclination)
+
+
+def test_fit_gives_the_distance_worked_by_hand():
+    """Two points 1 from the middle, seen at 45 degrees half angle, with 8 % of room."""
+    points = np.array([[-1.0, 5.0, 0.0], [1.0, 5.0, 0.0]])
+    for orthographic in (False, True):
+        camera = Camera(azimuth=0.0, inclination=0.0, fov=90.0, orthographic=orthographic)
+        fit(camera, points, 1.0)
+        assert camera.distance == pytest.approx(1.08)
+        assert camera.target.tolist() == [0.0, 5.0, 0.0]
+        fit(camera, points, 2.0)
+        assert camera.distance == pytest.approx(0.54)
+
+
+def test_fit_steps_back_for_points_in_front():
+    """A point 3 nearer than the middle needs 3 more."""
+    points = np.array([[1.0, 0.0, 3.0], [-1.0, 0.0, -3.0]])
+    camera = Camera(azimuth=0.0, inclination=0.0, fov=90.0)
+    fit(camera, points, 1.0)
+    assert camera.distance == pytest.approx(3.0 + 1.08)
+
+
+@pytest.mark.parametrize("points", [np.zeros((0, 3)), np.ones((1, 3)), np.ones((5, 3))])
+@pytest.mark.parametrize("orthographic", [False, True])
+def test_fit_of_nothing_or_one_point_keeps_a_usable_distance(points, orthographic):
+    camera = Camera(orthographic=orthographic)
+    fit(camera, points, 1.0)
+    assert camera.distance == 1.0
+    assert np.isfinite(camera.view_matrix()).all()
+    assert np.isfinite(camera.projection_matrix(1.0, np.zeros((2, 3)))).all()
+
+
+def test_fit_works_for_tiny_and_huge_figures():
+    for scale in (1e-6, 1e6):
+        points = scale * np.array([[-1.0, -1, -1], [1, 1, 1]])
+        camera = Camera()
+        fit(camera, points, 1.0)
+        seen = project(camera, points, 1.0, points)
+        assert np.abs(seen).max() < 1.0
+
+
+def test_orbit_adds_angles_and_wraps_around():
+    camera = Camera(azimuth=170.0, inclination=10.0)
+    orbit(camera, 20.0, 5.0)
+    assert (camera.azimuth, camera.inclination) == (-170.0, 15.0)
+    orbit(camera, -720.0, 0.0)
+    assert camera.azimuth == -170.0
+
+
+def test_orbit_stops_at_the_poles():
+    camera = Camera(inclination=80.0)
+    orbit(camera, 0.0, 50.0)
+    assert camera.inclination == 90.0
+    orbit(camera, 0.0, -500.0)
+    assert camera.inclination == -90.0
+
+
+def test_orbit_keeps_target_and_distance():
+    camera = Camera(np.array([1.0, 2.0, 3.0]), 7.0)
+    orbit(camera, 33.0, -12.0)
+    assert np.linalg.norm(eye(camera) - [1.0, 2.0, 3.0]) == pytest.approx(7.0)
+
+
+def test_pan_by_one_moves_by_the_height_of_the_picture():
+    """At distance 4 and 45 degrees half angle 8 units are seen."""
+    camera = Camera(distance=4.0, azimuth=0.0, inclination=0.0, fov=90.0)
+    pan(camera, 1.0, 0.5)
+    np.testing.assert_allclose(camera.target, [8.0, 4.0, 0.0], atol=1e-12)
+
+
+@pytest.mark.parametrize("orthographic", [False, True])
+def test_pan_carries_the_scene_with_the_pointer(orthographic):
+    camera = Camera(np.array([1.0, 2.0, 3.0]), 4.0, 30.0, 20.0, orthographic=orthographic)
+    point = camera.target.copy()
+    pan(camera, -0.25, -0.1)
+    # A quarter of the height is half a unit of device coordinates, upwards; across by aspect 2.
+    np.testing.assert_allclose(project(camera, point, aspect=2.0)[0, :2], [0.25, 0.2], atol=1e-9)
+
+
+@pytest.mark.parametrize("orthographic", [False, True])
+@pytest.mark.parametrize("factor", [0.25, 0.9, 1.0, 3.0])
+@pytest.mark.parametrize(("x", "y"), [(0.0, 0.0), (0.4, -0.3), (-0.7, 0.5)])
+def test_zoom_keeps_the_point_under_the_pointer(orthographic, factor, x, y):
+    camera = Camera(np.array([1.0, 2.0, 3.0]), 4.0, 30.0, 20.0, orthographic=orthographic)
+    right, up, _ = camera_axes(camera)
+    point = camera.target + 2.0 * camera.half_height * (x * right + y * up)
+    before = project(camera, point)
+    np.testing.assert_allclose(before[0, :2], [2 * x, 2 * y], atol=1e-9)
+    zoom(camera, factor, x, y)
+    np.testing.assert_allclose(project(camera, point)[0, :2], before[0, :2], atol=1e-9)
+    assert camera.distance == pytest.approx(4.0 * factor)
+
+
+def test_zoom_never_reaches_zero_or_infinity():
+    camera = Camera()
+    for factor in (1e-30, 1e-30, 1e300, 1e300):
+        zoom(camera, factor, 0.1, 0.1)
+        assert 0.0 < camera.distance < math.inf
+        assert np.isfinite(camera.target).all()
+        assert np.isfinite(camera.view_matrix()).all()
+
+
+def test_copy_shares_nothing():
+    camera = Camera(np.array([1.0, 2.0, 3.0]), 4.0, 5.0, 6.0, 7.0, True, "z")
+    twin = camera.copy()
+    assert (twin.distance, twin.azimuth, twin.inclination) == (4.0, 5.0, 6.0)
+    assert (twin.fov, twin.orthographic, twin.up) == (7.0, True, "z")
+    twin.target[0] = 9.0
+    assert camera.target[0] == 1.0

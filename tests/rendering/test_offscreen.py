@@ -1,0 +1,263 @@
+"""Pictures without a window: sizes, samples, several contexts, threads, memory."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+from drawn_figures import arm, bent, checker, scene_of, square
+
+import viewer
+from viewer.errors import RenderError, ViewerError
+from viewer.rendering import target as target_module
+from viewer.rendering.camera import Camera
+from viewer.rendering.context import headless_context
+from viewer.rendering.offscreen import Offscreen, default_camera
+from viewer.rendering.options import DisplayOptions
+from viewer.rendering.target import Target
+from viewer.rendering.upload import matrix_texture, picture_texture
+from viewer.rig.scene import Scene, scene_box
+
+ROOT = Path(__file__).resolve().parents[2]
+LINUX = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return Scene([bent(arm(3), (1, "z", 0.6), (2, "y", -0.4))])
+
+
+def draw(offscreen: Offscreen, scene: Scene, size=(64, 48), samples=4):
+    options = DisplayOptions(samples=samples)
+    return offscreen.render(scene, size, default_camera(scene, size), options, scene_box(scene))
+
+
+def test_render_returns_rows_from_the_top(scene):
+    pixels = viewer.render(scene, size=(64, 48))
+    assert (pixels.shape, pixels.dtype) == ((48, 64, 4), np.uint8)
+    assert (pixels[..., 3] == 255).all()
+    # The gradient is darker at the top.
+    assert pixels[0, :, :3].mean() < pixels[-1, :, :3].mean()
+
+
+def test_render_twice_gives_the_same_pixels(scene):
+    np.testing.assert_array_equal(viewer.render(scene, (64, 48)), viewer.render(scene, (64, 48)))
+
+
+def test_size_and_samples_may_change_from_picture_to_picture(scene):
+    """A released framebuffer that is still bound makes the next one fail."""
+    for size in ((64, 48), (32, 32), (100, 20), (64, 48)):
+        for samples in (1, 4):
+            options = DisplayOptions(samples=samples)
+            assert viewer.render(scene, size, options=options).shape == (*size[::-1], 4)
+
+
+@pytest.mark.parametrize("size", [(0, 48), (64, 0), (-1, 48), (64, -48), (1_000_000, 48)])
+def test_sizes_that_cannot_be_drawn_are_refused(scene, size):
+    with pytest.raises(ViewerError, match=rf"expected 1 to \d+ pixels .* {size[0]} x {size[1]}$"):
+        viewer.render(scene, size)
+    assert viewer.render(scene, (8, 8)).shape == (8, 8, 4)
+
+
+def test_a_picture_of_one_pixel_is_drawn(scene):
+    assert viewer.render(scene, (1, 1)).shape == (1, 1, 4)
+
+
+def test_a_very_wide_picture_shows_the_whole_figure(scene):
+    options = DisplayOptions(background="transparent", grid=False)
+    alpha = viewer.render(scene, (2000, 10), options=options)[..., 3]
+    assert alpha.any()
+    assert not alpha[:, 0].any()
+    assert not alpha[:, -1].any()
+
+
+def test_too_many_samples_are_noted_once(scene):
+    with Offscreen() as offscreen:
+        for _ in range(2):
+            draw(offscreen, scene, samples=4096)
+        limit = offscreen.context.max_samples
+        assert offscreen.renderer.notes == [f"4096 samples a pixel asked for, {limit} drawn"]
+
+
+def test_one_sample_is_not_noted(scene):
+    with Offscreen() as offscreen:
+        draw(offscreen, scene, samples=1)
+        assert offscreen.renderer.notes == []
+
+
+def test_two_offscreens_draw_in_turn(scene):
+    other = Scene([bent(arm(3), (1, "z", -0.6))])
+    wanted, wanted_other = viewer.render(scene, (64, 48)), viewer.render(other, (64, 48))
+    first, second = Offscreen(), Offscreen()
+    for _ in range(2):
+        np.testing.assert_array_equal(draw(first, scene), wanted)
+        np.testing.assert_array_equal(draw(second, other), wanted_other)
+        np.testing.assert_array_equal(viewer.render(scene, (64, 48)), wanted)
+    first.release()
+    np.testing.assert_array_equal(draw(second, other), wanted_other)
+    second.release()
+    np.testing.assert_array_equal(viewer.render(scene, (64, 48)), wanted)
+
+
+def test_another_context_can_be_made_current_again(scene):
+    mine = headless_context()
+    buffer = mine.buffer(b"mine")
+    viewer.render(scene, (8, 8))
+    with mine:
+        assert buffer.read() == b"mine"
+    mine.release()
+
+
+def in_threads(work, count: int) -> list[object]:
+    """Run ``work`` in threads at once; return what went wrong."""
+    problems: list[object] = []
+
+    def run() -> None:
+        try:
+            work()
+        except Exception as problem:
+            problems.append(problem)
+
+    threads = [threading.Thread(target=run) for _ in range(count)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    return problems
+
+
+def test_threads_draw_at_the_same_time(scene):
+    wanted = viewer.render(scene, (64, 48))
+
+    def work() -> None:
+        for _ in range(5):
+            np.testing.assert_array_equal(viewer.render(scene, (64, 48)), wanted)
+
+    assert in_threads(work, 3) == []
+
+
+def test_an_offscreen_may_be_used_by_one_thread_after_another(scene):
+    wanted = viewer.render(scene, (64, 48))
+    offscreen = Offscreen()
+
+    def work() -> None:
+        np.testing.assert_array_equal(draw(offscreen, scene), wanted)
+
+    for _ in range(3):
+        assert in_threads(work, 1) == []
+        work()
+    offscreen.release()
+
+
+def run_alone(code: str) -> str:
+    """Run code in a fresh process and return what it prints; it must say nothing else."""
+    head = f"import sys; sys.path[:0] = [{str(ROOT)!r}, {str(Path(__file__).parent)!r}]\n"
+    result = subprocess.run(
+        [sys.executable, "-c", head + code],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert (result.returncode, result.stderr) == (0, "")
+    return result.stdout
+
+
+MEMORY = """
+import threading, viewer
+from drawn_figures import arm
+from viewer.rig.scene import Actor, Scene
+from viewer.rendering.options import DisplayOptions
+
+def resident():
+    with open('/proc/self/statm') as file:
+        return int(file.read().split()[1]) * 4096 / 1e6
+
+figure = arm(3)
+scene = Scene([Actor(figure)])
+"""
+
+
+@LINUX
+def test_three_hundred_renders_take_no_more_memory():
+    """Poses, sizes, actors and options change all the time."""
+    code = """
+for i in range(330):
+    if i % 10 == 0:
+        scene = Scene([Actor(figure), Actor(arm(2))])
+    scene.actors[0].pose.dofs[4] = 0.01 * i
+    viewer.render(scene, (64 + i % 2, 48), options=DisplayOptions(show=('skin', 'both')[i % 2]))
+    if i == 29:
+        before = resident()
+print(resident() - before)
+"""
+    assert float(run_alone(MEMORY + code)) < 8.0  # MB; a leaked mesh or target is 0.1 MB
+
+
+@LINUX
+def test_threads_that_end_take_their_contexts_with_them():
+    code = """
+def work():
+    thread = threading.Thread(target=lambda: viewer.render(scene, (64, 48)))
+    thread.start()
+    thread.join()
+for i in range(15):
+    work()
+    if i == 4:
+        before = resident()
+print(resident() - before)
+"""
+    assert float(run_alone(MEMORY + code)) < 20.0  # MB; a context is 7
+
+
+def test_a_texture_above_the_limit_is_shrunk_with_a_note(ctx):
+    limit = ctx.info["GL_MAX_TEXTURE_SIZE"]
+    notes: list[str] = []
+    pixels = np.zeros((1, limit + 2, 4), dtype=np.uint8)
+    pixels[:, :, 0] = 200
+    texture = picture_texture(ctx, pixels, notes)
+    assert texture.size == (limit // 2 + 1, 1)
+    assert notes == [
+        f"a texture of {limit + 2} x 1 pixels is above this driver's limit of {limit} "
+        "and was shrunk by 2"
+    ]
+    assert texture.read()[:4] == bytes([200, 0, 0, 0])
+    texture.release()
+
+
+def test_a_note_about_a_texture_reaches_the_renderer(monkeypatch):
+    scene = scene_of(square(material=checker(129)))
+    with Offscreen() as offscreen:
+        offscreen.context.info["GL_MAX_TEXTURE_SIZE"]  # fills the cache that is changed here
+        monkeypatch.setitem(offscreen.context.info, "GL_MAX_TEXTURE_SIZE", 1024)
+        offscreen.render(scene, (32, 32), Camera(), DisplayOptions(samples=1), scene_box(scene))
+        assert offscreen.renderer.notes == [
+            "a texture of 1032 x 1032 pixels is above this driver's limit of 1024 "
+            "and was shrunk by 2"
+        ]
+
+
+def test_more_joints_than_a_texture_holds_are_refused(ctx):
+    limit = ctx.info["GL_MAX_TEXTURE_SIZE"]
+    with pytest.raises(RenderError, match=rf"^{256 * (limit + 1)} joints need a texture of 768 x "):
+        matrix_texture(ctx, 256 * (limit + 1))
+
+
+def test_a_picture_without_room_is_an_error_with_its_size(ctx, monkeypatch):
+    def refuse(context, doing):
+        raise RenderError(f"{doing}: not enough graphics memory")
+
+    monkeypatch.setattr(target_module, "check_errors", refuse)
+    with pytest.raises(RenderError, match=r"^a picture of 64 x 48 pixels: not enough"):
+        Target(ctx, (64, 48), 4)
+
+
+def test_a_target_is_kept_while_its_size_and_samples_are(scene):
+    with Offscreen() as offscreen, offscreen.context:
+        first = offscreen.target((64, 48), 4)
+        assert offscreen.target((64, 48), 4) is first
+        assert offscreen.target((64, 48), 1) is not first

@@ -1,0 +1,226 @@
+"""The command line as a program: exit codes, one-line messages, signals, pipes, imports."""
+
+from __future__ import annotations
+
+import os
+import signal
+import stat
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from app.tiny import write_rig
+
+import viewer
+from viewer.cli import run
+
+ROOT = Path(__file__).resolve().parents[1]
+ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONWARNINGS": "error"}
+COMMAND = [sys.executable, "-m", "viewer"]
+
+
+def call(*arguments, cwd=None, environment=None, **settings):
+    settings = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "timeout": 60, **settings}
+    variables = {**ENVIRONMENT, **(environment or {})}
+    return subprocess.run([*COMMAND, *arguments], cwd=cwd, env=variables, check=False, **settings)
+
+
+@pytest.fixture
+def rig(tmp_path):
+    return write_rig(tmp_path)
+
+
+def _refused(done, code, *words):
+    lines = done.stderr.decode("utf-8", "replace").splitlines()
+    assert done.returncode == code, lines
+    assert len(lines) == 1 and lines[0].startswith("viewer: "), lines
+    assert all(word in lines[0] for word in words), lines
+
+
+def test_help_and_version():
+    done = call("--help")
+    assert done.returncode == 0 and not done.stderr
+    assert all(word in done.stdout.decode() for word in ("render", "info", "doctor", "exit codes"))
+    assert call("--version").stdout.decode() == f"viewer {viewer.__version__}\n"
+
+
+@pytest.mark.parametrize("command", ["view", "render", "info"])
+def test_help_of_a_command(command, capsys):
+    with pytest.raises(SystemExit) as stop:
+        run([command, "--help"])
+    assert stop.value.code == 0
+    assert "--dof" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["render"],
+        ["render", "-o"],
+        ["render", "-o", "x.png", "--nonsense"],
+        ["render", "-o", "x.png", "--show", "bones"],
+        ["render", "-o", "x.png", "--azimuth", "left"],
+        ["render", "-o", "x.png", "--azimuth", "nan"],
+        ["render", "-o", "x.png", "--samples", "many"],
+        ["info", "--nonsense"],
+        ["view", "--scale", "0"],
+        ["view", "--scale", "nan"],
+        ["view", "--scale", "-1"],
+        ["view", "--scale", "9e9"],
+    ],
+)
+def test_usage_error_is_one_line(arguments, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert run(arguments) == 2
+    captured = capsys.readouterr()
+    assert captured.err.startswith("viewer: ") and captured.err.count("\n") == 1
+    assert "--help" in captured.err and not captured.out
+
+
+def test_word_that_is_no_command_is_taken_for_a_file(capsys):
+    assert run(["infoo"]) == 2
+    assert "infoo" in capsys.readouterr().err
+
+
+def test_bad_file_is_one_line_with_its_place(tmp_path):
+    bad = tmp_path / "bad.skel"
+    bad.write_text("balljoint root {\n offset 1 2\n}\n")
+    for command in (["info"], ["render", "-o", str(tmp_path / "x.png")], ["view"]):
+        _refused(call(*command, bad), 2, "bad.skel:")
+    assert not (tmp_path / "x.png").exists()
+
+
+def test_missing_gl_is_exit_code_4(rig, tmp_path):
+    done = call(
+        "render", *rig, "-o", tmp_path / "x.png",
+        environment={"__EGL_VENDOR_LIBRARY_FILENAMES": "/nonexistent"},
+    )  # fmt: skip
+    _refused(done, 4)
+
+
+def test_info_into_a_closed_pipe_is_silent(rig):
+    line = f"{sys.executable} -m viewer info {rig[0]} --json | head -1; echo ${{PIPESTATUS[0]}}"
+    done = subprocess.run(
+        ["bash", "-c", line], env=ENVIRONMENT, capture_output=True, timeout=60, check=False
+    )
+    assert done.stdout == b"{\n0\n" and done.stderr == b""
+
+
+def test_pipe_that_is_closed_before_anything_is_written_is_silent(rig):
+    process = subprocess.Popen(
+        [*COMMAND, "info", *rig], env=ENVIRONMENT, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    process.stdout.close()
+    assert process.stderr.read() == b""
+    process.stderr.close()
+    assert process.wait(30) == 0
+
+
+def test_full_output_is_exit_code_5(rig):
+    with Path("/dev/full").open("wb") as full:
+        _refused(call("info", *rig, stdout=full), 5, "No space left")
+
+
+def test_missing_output_stream_is_no_fault(rig):
+    line = f"{sys.executable} -m viewer info {rig[0]} >&-"
+    done = subprocess.run(
+        ["bash", "-c", line], env=ENVIRONMENT, capture_output=True, timeout=60, check=False
+    )
+    assert done.returncode == 0 and done.stderr == b""
+
+
+def test_terminal_without_unicode_is_no_fault(tmp_path):
+    path = tmp_path / "f.skel"
+    path.write_text("balljoint Küken { pose 1 0 0 }")
+    done = call("info", path, environment={"PYTHONIOENCODING": "ascii"})
+    assert done.returncode == 0 and rb"K\xfcken" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("number", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)], ids=["term", "int"]
+)
+def test_signal_while_writing_leaves_no_file(rig, tmp_path, number, code):
+    # The program stops itself at the moment when the temporary file is complete.
+    program = (
+        "import os, sys, viewer.formats._save, viewer.cli\n"
+        f"os.fsync = lambda handle: os.kill(os.getpid(), {int(number)})\n"
+        "sys.exit(viewer.cli.run(sys.argv[1:]))\n"
+    )
+    folder = tmp_path / "out"
+    folder.mkdir()
+    done = subprocess.run(
+        [sys.executable, "-c", program, "render", *rig, "-o", folder / "x.png", "--size", "40x30"],
+        env=ENVIRONMENT, capture_output=True, timeout=60, check=False,
+    )  # fmt: skip
+    _refused(done, code)
+    assert list(folder.iterdir()) == []
+
+
+def test_sigterm_ends_a_program_that_waits(rig, tmp_path):
+    pipe = tmp_path / "pipe.png"
+    os.mkfifo(pipe)
+    process = subprocess.Popen(
+        [*COMMAND, "render", *rig, "-o", pipe, "--size", "40x30"],
+        env=ENVIRONMENT, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )  # fmt: skip
+    deadline = time.monotonic() + 20
+    while time.monotonic() < deadline:  # it waits for a reader of the pipe
+        if Path(f"/proc/{process.pid}/wchan").read_text() in ("wait_for_partner", "fifo_open"):
+            break
+        time.sleep(0.05)
+        if time.monotonic() > deadline - 18:
+            break
+    process.terminate()
+    out, err = process.communicate(timeout=20)
+    assert process.returncode == 143 and err == b"viewer: terminated\n" and out == b""
+    assert stat.S_ISFIFO(pipe.stat().st_mode)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["with blank", "quo'te\"s", "{x} %s %(a)d", "new\nline", "-1", "umläut", b"un\xffdecodable"],
+)
+def test_strange_file_names(tmp_path, name):
+    folder = os.fsencode(tmp_path)
+    path = os.path.join(folder, os.fsencode(name) + b".skel")  # noqa: PTH118
+    with open(path, "w") as stream:  # noqa: PTH123
+        stream.write("balljoint root { pose 1 0 0 }")
+    done = call("info", path)
+    assert done.returncode == 0 and not done.stderr
+    out = os.path.join(folder, os.fsencode(name) + b".png")  # noqa: PTH118
+    done = call("render", path, b"--output", out, "--size", "40x30")
+    assert (
+        done.returncode == 0 and done.stdout.count(b"\n") == 1 and Path(os.fsdecode(out)).is_file()
+    )
+    with open(path, "w") as stream:  # noqa: PTH123
+        stream.write("balljoint root { pose 1 0 }")
+    _refused(call("info", path), 2)
+
+
+def test_files_after_two_dashes_may_begin_with_a_dash(tmp_path):
+    (tmp_path / "-1.skel").write_text("balljoint root { }")
+    assert call("info", "--", "-1.skel", cwd=tmp_path).returncode == 0
+
+
+@pytest.mark.parametrize("command", ["render", "info"])
+def test_headless_commands_import_no_interface(rig, tmp_path, command):
+    program = (
+        "import sys, viewer.cli\n"
+        "code = viewer.cli.run(sys.argv[1:])\n"
+        "heavy = {'imgui_bundle', 'glfw', 'scipy', 'hypothesis'} & set(sys.modules)\n"
+        "assert not heavy, heavy\n"
+        "sys.exit(code)\n"
+    )
+    extra = ["-o", tmp_path / "x.png", "--size", "40x30"] if command == "render" else []
+    done = subprocess.run(
+        [sys.executable, "-c", program, command, *rig, *extra],
+        env=ENVIRONMENT, capture_output=True, timeout=60, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+
+
+def test_program_runs_from_any_folder_without_files(tmp_path):
+    done = call("info", cwd=tmp_path)
+    assert done.returncode == 0 and done.stdout.startswith(b"fox\n")

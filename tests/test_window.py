@@ -1,0 +1,345 @@
+"""The real window under Xvfb, driven by xdotool; pictures of the screen are compared."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from app.driver import Driver
+from app.tiny import write_rig
+from PIL import Image, ImageGrab
+
+import viewer
+from viewer.rendering.camera import Camera, fit
+from viewer.rig.scene import scene_points
+
+ROOT = Path(__file__).resolve().parents[1]
+SHARED = ROOT.parent / "shared" / "data" / "cse169"
+SIZE = (1280, 800)
+PATIENCE = 20.0  # seconds until something that should happen counts as missing
+
+
+def _wait_for(condition, what):
+    deadline = time.monotonic() + PATIENCE
+    while time.monotonic() < deadline:
+        found = condition()
+        if found is not None and found is not False:
+            return found
+        time.sleep(0.03)
+    raise AssertionError(f"not seen within {PATIENCE:g} s: {what}")
+
+
+@pytest.fixture(scope="module")
+def display():
+    """The name of an Xvfb display of this module's own."""
+    missing = [tool for tool in ("Xvfb", "xdotool") if shutil.which(tool) is None]
+    if missing:
+        text = f"{' and '.join(missing)} not installed"
+        pytest.fail(text) if os.environ.get("CI") == "true" else pytest.skip(text)
+    reading, writing = os.pipe()
+    command = [
+        "Xvfb",
+        "-displayfd",
+        str(writing),
+        "-screen",
+        "0",
+        "1400x900x24",
+        "-nolisten",
+        "tcp",
+    ]
+    server = subprocess.Popen(
+        command, pass_fds=[writing], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    os.close(writing)
+    with os.fdopen(reading) as stream:
+        number = stream.readline().strip()
+    yield f":{number}"
+    server.terminate()
+    server.wait(10)
+
+
+@pytest.fixture(scope="module")
+def figure(tmp_path_factory):
+    if SHARED.is_dir():
+        return SHARED / "wasp.skel", SHARED / "wasp.skin"
+    return write_rig(tmp_path_factory.mktemp("rig"))
+
+
+@pytest.fixture
+def window(display, figure, tmp_path):
+    """Return a function that starts the viewer; windows left open are closed."""
+    started = []
+
+    def start(*arguments):
+        started.append(Window(display, tmp_path, arguments or figure))
+        return started[-1]
+
+    yield start
+    for one in started:
+        if one.process.poll() is None:
+            one.process.kill()
+        one.process.communicate()
+
+
+@pytest.fixture(scope="module")
+def places(figure):
+    """Where widgets are, from a headless app of the window's size and layout."""
+    driver = Driver(*figure, size=SIZE)
+    rects, view = dict(driver.state.item_rects), driver.state.view_rect
+    driver.close()
+    return rects, view
+
+
+class _ClientMessage(ctypes.Structure):
+    """XClientMessageEvent, padded to the size of XEvent."""
+
+    _fields_ = (
+        ("type", ctypes.c_int),
+        ("serial", ctypes.c_ulong),
+        ("send_event", ctypes.c_int),
+        ("display", ctypes.c_void_p),
+        ("window", ctypes.c_ulong),
+        ("message_type", ctypes.c_ulong),
+        ("format", ctypes.c_int),
+        ("data", ctypes.c_long * 5),
+        ("padding", ctypes.c_long * 24),
+    )
+
+
+def _ask_to_close(display, window):
+    """Send WM_DELETE_WINDOW, as a window manager does when its cross is clicked."""
+    x11 = ctypes.CDLL("libX11.so.6")
+    x11.XOpenDisplay.restype = ctypes.c_void_p
+    x11.XInternAtom.restype = ctypes.c_ulong
+    connection = ctypes.c_void_p(x11.XOpenDisplay(display.encode()))
+    protocols = x11.XInternAtom(connection, b"WM_PROTOCOLS", 0)
+    delete = x11.XInternAtom(connection, b"WM_DELETE_WINDOW", 0)
+    event = _ClientMessage(type=33, window=window, message_type=protocols, format=32)
+    event.data[0] = delete
+    x11.XSendEvent(connection, ctypes.c_ulong(window), 0, ctypes.c_long(0), ctypes.byref(event))
+    x11.XCloseDisplay(connection)
+
+
+class Window:
+    """A running viewer, its window, and a hand on its mouse and keys."""
+
+    def __init__(self, display, folder, arguments):
+        self.display, self.folder = display, folder
+        self.environment = {
+            **os.environ,
+            "DISPLAY": display,
+            "XDG_STATE_HOME": str(folder / "state"),
+            "PYTHONPATH": str(ROOT),
+            "PYTHONWARNINGS": "error",
+        }
+        self.environment.pop("WAYLAND_DISPLAY", None)
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "viewer", *map(str, arguments)],
+            cwd=folder, env=self.environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        )  # fmt: skip
+        self.id = _wait_for(self._find, "the window")
+        self.tell("windowfocus", "--sync", self.id)
+        self.wait_until_quiet()
+
+    def _find(self):
+        assert self.process.poll() is None, self.process.communicate()
+        pid = str(self.process.pid)
+        found = self.tell("search", "--onlyvisible", "--pid", pid, "--class", "viewer", check=False)
+        return found.split()[0] if found else None
+
+    def tell(self, *words, check=True):
+        done = subprocess.run(
+            ["xdotool", *map(str, words)],
+            env=self.environment, capture_output=True, text=True, timeout=20, check=check,
+        )  # fmt: skip
+        return done.stdout.strip()
+
+    def screen(self):
+        return np.array(ImageGrab.grab(xdisplay=self.display).convert("RGB"))
+
+    def wait_until_quiet(self):
+        """Return the screen as soon as it shows the figure and has stopped changing."""
+        last = [self.screen(), time.monotonic()]
+
+        def is_quiet():
+            now = self.screen()
+            if (now != last[0]).any() or now.max() == 0:
+                last[:] = now, time.monotonic()
+            return now if time.monotonic() - last[1] > 0.25 else None
+
+        return _wait_for(is_quiet, "a picture that stands still")
+
+    def wait_until_changed(self, before, region=None):
+        x, y, width, height = region or (0, 0, 1400, 900)
+        part = np.s_[int(y) : int(y + height), int(x) : int(x + width)]
+        _wait_for(lambda: (self.screen()[part] != before[part]).any(), "a change")
+        return self.wait_until_quiet()
+
+    def wait_until_shown(self, wanted, part):
+        _wait_for(lambda: (self.screen()[part] == wanted[part]).all(), "an earlier picture")
+
+    def key(self, name):
+        # Without a window manager the focus may be lost, and keys follow the pointer then.
+        self.tell("windowfocus", "--sync", self.id)
+        self.tell("key", "--clearmodifiers", name)
+
+    def drag(self, start, end):
+        self.tell("mousemove", round(start[0]), round(start[1]), "mousedown", 1)
+        for k in (0.3, 0.7, 1.0):
+            x, y = (round(a + k * (b - a)) for a, b in zip(start, end, strict=True))
+            self.tell("mousemove", x, y)
+            time.sleep(0.05)
+        self.tell("mouseup", 1)
+        self.tell("mousemove", 640, 870)  # off the window: nothing is hovered
+
+    def finish(self):
+        """Return what the program printed after it has ended well."""
+        out, err = self.process.communicate(timeout=PATIENCE)
+        assert (self.process.returncode, out, err) == (0, b"", b"")
+
+    def seconds_of_cpu(self):
+        fields = Path(f"/proc/{self.process.pid}/stat").read_text().rpartition(")")[2].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def test_window_does_what_hands_ask_for(window, places, figure):
+    rects, view = places
+    app = window()
+    before = app.wait_until_quiet()
+    x, y, width, height = map(int, view)
+    inside = (x, y, width, height - 90)  # the lowest part shows messages that go away
+    part = np.s_[y : y + inside[3], x : x + width]
+
+    # A slider moves the figure, R brings it back to the pixel.
+    label = "root.y"
+    x0, y0, x1, y1 = rects[label]
+    middle = (y0 + y1) / 2
+    app.drag(((x0 + x1) / 2, middle), (x0 + 0.9 * (x1 - x0), middle))
+    moved = app.wait_until_changed(before, inside)
+    app.key("r")
+    app.wait_until_shown(before, part)
+    app.key("ctrl+z")
+    app.wait_until_shown(moved, part)
+    app.key("r")
+    app.wait_until_shown(before, part)
+
+    # Skeleton and binding space come and go.
+    for key in ("s", "k"):
+        now = app.wait_until_quiet()
+        app.key(key)
+        changed = app.wait_until_changed(now, inside)
+        assert (changed[part] != now[part]).mean() > 0.001
+        app.key("s" if key == "s" else "k")
+        app.wait_until_changed(changed, inside)
+
+    # Tab leaves nothing but the figure.
+    now = app.wait_until_quiet()
+    app.key("Tab")
+    wide = app.wait_until_changed(now, (0, 100, 200, 500))
+    app.key("Tab")
+    app.wait_until_changed(wide, (0, 100, 200, 500))
+
+    # Smaller, hidden and back, larger again.
+    app.tell("windowsize", app.id, 700, 500)
+    _wait_for(lambda: app.screen()[600:, 900:].max() == 0, "the smaller window")
+    app.wait_until_quiet()
+    app.tell("windowunmap", app.id)
+    _wait_for(lambda: app.screen().max() == 0, "an empty screen")
+    app.tell("windowmap", "--sync", app.id)
+    _wait_for(lambda: app.screen().max() > 0, "the window again")
+    app.tell("windowsize", app.id, *SIZE)
+    app.wait_until_quiet()
+    assert app.process.poll() is None
+
+    app.tell("windowfocus", "--sync", app.id)
+    app.key("ctrl+q")
+    app.finish()
+    names = json.loads((app.folder / "state" / "viewer" / "recent.json").read_text())
+    assert names[0] == [str(path.resolve()) for path in figure]
+
+
+def test_screenshot_is_the_headless_picture_to_the_pixel(window, places, figure):
+    app = window()
+    app.key("F12")
+    path = app.folder / f"{figure[1].stem}.png"
+    _wait_for(path.is_file, "the screenshot")
+    with Image.open(path) as picture:
+        saved = np.array(picture)
+    height, width = saved.shape[:2]
+    assert (width, height) == tuple(round(side) for side in places[1][2:])
+    scene = viewer.load(*figure)
+    camera = Camera(up=scene.up)
+    fit(camera, scene_points(scene), width / height)
+    assert (saved == viewer.render(scene, (width, height), camera)).all()
+    # And the window shows these pixels, but for messages and hints at the lower edge.
+    shown = app.screen()
+    x, y = map(int, places[1][:2])
+    rows = height - 120
+    assert (shown[y : y + rows, x : x + width] == saved[:rows, :, :3]).mean() > 0.999
+    app.key("ctrl+q")
+    app.finish()
+
+
+def test_window_closes_as_window_managers_ask(window):
+    app = window()
+    _ask_to_close(app.display, int(app.id))
+    app.finish()
+
+
+def test_window_ends_at_sigterm_without_a_traceback(window):
+    app = window()
+    app.process.send_signal(signal.SIGTERM)
+    out, err = app.process.communicate(timeout=PATIENCE)
+    assert (app.process.returncode, out, err) == (143, b"", b"viewer: terminated\n")
+
+
+def test_layout_is_remembered_between_runs(window, places):
+    _, (x, y, _, height) = places
+    app = window()
+    before = app.wait_until_quiet()
+    app.drag((x - 1, y + height / 2), (x + 120, y + height / 2))
+    wider = app.wait_until_changed(before)
+    app.tell("windowfocus", "--sync", app.id)
+    app.key("ctrl+q")
+    app.finish()
+    assert (app.folder / "state" / "viewer" / "layout.ini").stat().st_size > 100
+    again = window().wait_until_quiet()
+    strip = np.s_[200:700, int(x) + 20 : int(x) + 100]  # was view, is panel now
+    assert (wider[strip] != before[strip]).mean() > 0.5
+    assert (again[strip] == wider[strip]).mean() > 0.98
+
+
+def test_idle_window_burns_no_processor(window):
+    app = window()
+    # Messages at the start go away after some seconds; until then frames are drawn.
+    time.sleep(0.5)
+    app.tell("mousemove", 640, 870)
+
+    def is_idle():
+        spent, since = app.seconds_of_cpu(), time.monotonic()
+        time.sleep(1.5)
+        return (app.seconds_of_cpu() - spent) / (time.monotonic() - since) < 0.05
+
+    _wait_for(is_idle, "an idle processor")
+
+
+def test_bad_file_opens_no_window(display, tmp_path):
+    bad = tmp_path / "bad.skel"
+    bad.write_text("balljoint root {\n offset 1 2\n}\n")
+    environment = {**os.environ, "DISPLAY": display, "PYTHONPATH": str(ROOT)}
+    environment["XDG_STATE_HOME"] = str(tmp_path)
+    done = subprocess.run(
+        [sys.executable, "-m", "viewer", bad],
+        env=environment, capture_output=True, timeout=60, check=False,
+    )  # fmt: skip
+    assert done.returncode == 2 and done.stdout == b""
+    assert done.stderr.startswith(b"viewer: ") and done.stderr.count(b"\n") == 1

@@ -1,0 +1,137 @@
+"""Blocks of numbers in a ``.skin`` file: found, parsed, and every fault put into words."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.formats._numbers import parse_numbers
+from viewer.formats._source import Source, shown
+from viewer.rig.arrays import Floats, Ints
+
+__all__ = [
+    "KEYWORDS",
+    "Block",
+    "block_numbers",
+    "block_rows",
+    "find_block",
+    "opened",
+    "to_whole",
+    "whole_numbers",
+    "word_at",
+]
+
+KEYWORDS = frozenset(
+    (b"positions", b"normals", b"texcoords", b"skinweights", b"material", b"triangles", b"bindings")
+)
+"""Words that begin a section."""
+
+_INT32 = 2.0**31
+
+Word = re.Match[bytes]
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Where the numbers of a section are, to find a word again when an error needs its line."""
+
+    name: str
+    header: int
+    start: int
+    end: int
+    closed: bool
+
+
+def find_block(source: Source, name: str, header: Word, position: int) -> Block:
+    """Return where a section's numbers are; only weights may leave out the opening brace."""
+    brace = source.next_word(position)
+    if brace is not None and brace.group() == b"{":
+        position = brace.end()
+    elif name != "skinweights":
+        found = "the end of the file" if brace is None else shown(brace.group())
+        where = header.start() if brace is None else brace.start()
+        raise source.error(f'{name}: expected "{{", found {found}', where)
+    end = source.data.find(b"}", position)
+    closed = end >= 0
+    return Block(name, header.start(), position, end if closed else len(source.data), closed)
+
+
+def block_numbers(source: Source, block: Block) -> Floats:
+    """Parse all numbers of a block."""
+    values, bad = parse_numbers(source.data, block.start, block.end)
+    if bad < 0:
+        return values
+    offset, word = word_at(source, block, bad)
+    if word in KEYWORDS or word == b"{":
+        raise source.error(
+            f'expected "}}" to close {opened(source, block)}, found {shown(word)}', offset
+        )
+    raise source.error(f"{block.name}: expected a number, found {shown(word)}", offset)
+
+
+def opened(source: Source, block: Block) -> str:
+    """Return what an error calls a block: its name and the line of its header."""
+    return f"{block.name} (line {source.line(block.header)})"
+
+
+def word_at(source: Source, block: Block, index: int) -> tuple[int, bytes]:
+    """Return a word of a block and its offset; slow, for errors only."""
+    offset = source.word_offset(block.start, index)
+    word = source.next_word(offset)
+    return offset, b"" if word is None else word.group()
+
+
+def block_rows(source: Source, block: Block, count: int, width: int) -> Floats:
+    """Parse a block of ``count`` rows of ``width`` numbers: (count, width)."""
+    values = block_numbers(source, block)
+    if len(values) == count * width:
+        return values.reshape(count, width)
+    if not block.closed:
+        raise source.error(
+            f'expected "}}" to close {opened(source, block)}, found the end of the file '
+            f"after {len(values) // width} of {count} rows",
+            len(source.data.rstrip()),
+        )
+    _raise_for_short_line(source, block, width)
+    raise source.error(
+        f"{block.name}: expected {count} rows of {width} numbers, "
+        f"found {len(values) // width}"
+        + (f" and {len(values) % width} numbers" if len(values) % width else "")
+        + f" (from line {source.line(block.header)})",
+        block.end,
+    )
+
+
+def _raise_for_short_line(source: Source, block: Block, width: int) -> None:
+    """Find the line at fault: in files written row by row, the one that is not a row."""
+    text = source.data[block.start : block.end]
+    offset = block.start
+    lines = text.splitlines(keepends=True)
+    lengths = [len(line.split()) for line in lines]
+    filled = [length for length in lengths if length]
+    # Lines mean nothing to the format; only a file that keeps to them tells more this way.
+    if sum(length == width for length in filled) * 2 < len(filled):
+        return
+    for line, length in zip(lines, lengths, strict=True):
+        if length % width:
+            start = offset + len(line) - len(line.lstrip())
+            raise source.error(f"{block.name}: expected {width} numbers, found {length}", start)
+        offset += len(line)
+
+
+def whole_numbers(source: Source, block: Block, values: Floats, what: str) -> Ints:
+    """Return whole numbers of a block as int32; what is none is an error."""
+    whole, wrong = to_whole(values)
+    if wrong >= 0:
+        offset, word = word_at(source, block, wrong)
+        raise source.error(f"{block.name}: expected {what}, found {shown(word)}", offset)
+    return whole
+
+
+def to_whole(values: Floats) -> tuple[Ints, int]:
+    """Return numbers as int32, and the place of the first that this changes, -1 for none."""
+    whole = np.clip(values, -_INT32, _INT32 - 1).astype(np.int32)
+    differs = whole != values
+    return whole, int(differs.argmax()) if differs.any() else -1
