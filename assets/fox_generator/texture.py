@@ -13,7 +13,7 @@ from .colours import paint
 from .shapes import Floats
 
 MARGIN = 14  # texels that the edge colours spread beyond the charts
-COLOURS = 240  # palette size; more would not fit 250 KB with this much fur
+COLOURS = 256  # palette size
 
 
 def crease_shade(vertices: Floats, normals: Floats) -> Floats:

@@ -22,7 +22,7 @@ from viewer.rig.mesh import Mesh
 from viewer.rig.scene import Scene, scene_box
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden"
-REGENERATE = os.environ.get("VIEWER_GOLDEN") == "write"
+REGENERATE = os.environ.get("VIEWER_UPDATE_GOLDEN") == "1"
 KEEP = os.environ.get("VIEWER_GOLDEN_FAILED")  # a folder for pictures that differ
 
 
