@@ -273,7 +273,7 @@ def test_screenshot_is_the_headless_picture_to_the_pixel(window, places, figure)
     path = app.folder / f"{figure[1].stem}.png"
     _wait_for(path.is_file, "the screenshot")
     with Image.open(path) as picture:
-        saved = np.array(picture)
+        saved = np.array(picture.convert("RGBA"))
     height, width = saved.shape[:2]
     assert (width, height) == tuple(round(side) for side in places[1][2:])
     scene = viewer.load(*figure)

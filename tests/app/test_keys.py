@@ -159,7 +159,7 @@ def test_f12_saves_what_is_shown_and_never_replaces(hand, tmp_path, monkeypatch)
     shown = hand.scene_picture()
     hand.key("f12")
     first = folder / "tiny.png"
-    assert (np.array(Image.open(first)) == shown).all()
+    assert (np.array(Image.open(first).convert("RGBA")) == shown).all()
     kept = first.read_bytes()
     hand.key("w")
     hand.key("f12")

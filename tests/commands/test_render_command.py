@@ -44,7 +44,7 @@ def draw(rig, tmp_path):
             ["render", *map(str, files), "-o", str(out), "--force", "--size", "64x48", *options]
         )
         assert code == 0
-        return np.array(Image.open(out))
+        return np.array(Image.open(out).convert("RGBA"))
 
     return picture
 
@@ -335,7 +335,7 @@ def test_picture_goes_through_standard_output(rig, tmp_path, into):
 def test_panels_draw_the_whole_interface(draw, rig, tmp_path):
     out = tmp_path / "panels.png"
     assert run(["render", *map(str, rig), "-o", str(out), "--panels", "--size", "640x480"]) == 0
-    picture = np.array(Image.open(out))
+    picture = np.array(Image.open(out).convert("RGBA"))
     assert picture.shape == (480, 640, 4) and (picture[..., 3] == 255).all()
     assert picture[240, 20, :3].max() < 100  # the Joints panel is dark
 

@@ -58,7 +58,7 @@ def toggle_option(state: AppState, name: str, text: str) -> None:
 
 def fit_view(state: AppState) -> None:
     """Aim the camera at the scene as it is posed and fill the view with it."""
-    fit(state.camera, scene_points(state.scene), state.aspect)
+    fit(state.camera, scene_points(state.scene, state.options.show), state.aspect)
 
 
 def look(state: AppState, name: str) -> None:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
+from viewer.app.actions import fit_view
 from viewer.app.frame import Frame
 from viewer.app.state import AppState
 from viewer.app.theme import apply_theme
-from viewer.rendering.camera import fit
 from viewer.rendering.context import headless_context
 from viewer.rendering.target import Target
 from viewer.rig.arrays import Bytes
-from viewer.rig.scene import scene_points
 
 __all__ = ["HeadlessApp"]
 
@@ -59,18 +58,23 @@ class HeadlessApp:
 
     def step(self, frames: int = 1) -> None:
         """Run frames, a sixtieth of a second each; input is what was queued in ImGui's io."""
+        self._make_current()
         for _ in range(frames):
             imgui.get_io().delta_time = 1.0 / 60.0
             imgui.backends.opengl3_new_frame()
             imgui.new_frame()
             self.frame.draw(self.screen.framebuffer, self.screen.size, self.pixels_per_point)
 
+    def _make_current(self) -> None:
+        """Take this thread's OpenGL: another context may have been used since."""
+        self.context.__enter__()  # type: ignore[no-untyped-call]
+
     def picture(self, fits: bool = True) -> Bytes:
         """Return the whole interface as pixels, (H, W, 4) uint8, the view fitted to its room."""
         self.step(_SETTLE_FRAMES)
         if fits:
             distance = self.state.camera.distance
-            fit(self.state.camera, scene_points(self.state.scene), self.state.aspect)
+            fit_view(self.state)
             self.state.camera.distance = max(distance, self.state.camera.distance)
         self.state.stats.frame_ms = 0.0  # the same picture every time
         self.step(1)
@@ -80,6 +84,7 @@ class HeadlessApp:
 
     def release(self) -> None:
         """Free everything, the context too."""
+        self._make_current()
         imgui.backends.opengl3_shutdown()
         imgui.destroy_context(self._imgui)
         self.frame.release()

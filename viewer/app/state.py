@@ -114,7 +114,7 @@ class AppState:
 
     def show_scene(self, scene: Scene, paths: Sequence[Path]) -> None:
         """Replace the scene; the camera keeps its direction and fits what is new."""
-        points = scene_points(scene)
+        points = scene_points(scene, self.options.show)
         self.scene, self.paths = scene, tuple(paths)
         self.box = bounding_box(points)
         self.camera.up = scene.up

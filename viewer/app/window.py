@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from viewer.app.actions import fit_view
 from viewer.app.display import find_display, import_glfw
 
 glfw = import_glfw()
@@ -66,12 +67,13 @@ def show(
         If there is no usable OpenGL.
     """
     find_display()
-    points = scene_points(scene)
+    options = options or DisplayOptions()
+    points = scene_points(scene, options.show)
     camera = camera or Camera(up=scene.up)
     if fit_distance:
         fit(camera, points, _SIZE[0] / _SIZE[1])
     files = tuple(map(Path, paths))
-    state = AppState(scene, camera, options or DisplayOptions(), bounding_box(points), files)
+    state = AppState(scene, camera, options, bounding_box(points), files)
     state.recent = load_recent()
     state.say(*scene.warnings, *filter(None, [remember(state.recent, files)]))
     window = _Window(state, scale)
@@ -165,7 +167,7 @@ class _Window:
                 continue
             if fits and left == 0:
                 # Only now it is known how much room the panels leave.
-                fit(self.state.camera, scene_points(self.state.scene), self.state.aspect)
+                fit_view(self.state)
                 fits, left = False, 1
             if "quit" in self.state.wants:
                 glfw.set_window_should_close(self.handle, True)

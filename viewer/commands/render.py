@@ -47,7 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
     check_output(output, [Path(file) for file in arguments.files], arguments.force)
     options = display_of(arguments)
     scene = open_scene(arguments)
-    points = scene_points(scene)
+    points = scene_points(scene, options.show)
     camera = camera_of(arguments, scene, points, size)
     box = bounding_box(points)
     if arguments.panels:

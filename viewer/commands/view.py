@@ -47,7 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Open the window, or write the picture that it would show."""
     options = display_of(arguments)
     scene = open_scene(arguments)
-    points = scene_points(scene)
+    points = scene_points(scene, options.show)
     camera = camera_of(arguments, scene, points, SIZE)
     from viewer.app.display import NoDisplay, find_display
 

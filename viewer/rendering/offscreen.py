@@ -95,7 +95,7 @@ class _OfThread:
             self.offscreen.release()
 
 
-def default_camera(scene: Scene, size: tuple[int, int]) -> Camera:
+def default_camera(scene: Scene, size: tuple[int, int], show: str = "skin") -> Camera:
     """Return a camera that sees the whole scene from the front, a little to its left and above.
 
     Parameters
@@ -104,9 +104,11 @@ def default_camera(scene: Scene, size: tuple[int, int]) -> Camera:
         What to fit, and the up axis.
     size : (int, int)
         Width and height of the picture.
+    show : str
+        What of the figures is drawn, a key of ``SHOWN``.
     """
     camera = Camera(up=scene.up)
-    fit(camera, scene_points(scene), size[0] / size[1])
+    fit(camera, scene_points(scene, show), size[0] / size[1])
     return camera
 
 
@@ -153,5 +155,6 @@ def render(
     offscreen: Offscreen = _thread.kept.offscreen
     with offscreen.context:
         check_size(offscreen.context, size)  # before the camera divides by it
-    camera = camera or default_camera(scene, size)
-    return offscreen.render(scene, size, camera, options or DisplayOptions(), scene_box(scene))
+    options = options or DisplayOptions()
+    camera = camera or default_camera(scene, size, options.show)
+    return offscreen.render(scene, size, camera, options, scene_box(scene, options.show))

@@ -71,7 +71,7 @@ class Scene:
         return self.actors[0].figure.up if self.actors else "y"
 
 
-def scene_points(scene: Scene) -> Floats:
+def scene_points(scene: Scene, show: str = "skin") -> Floats:
     """Return what a camera should fit: posed meshes and skeletons of visible actors.
 
     A few stray points far outside do not count: they are moved to the box of the other 99.9 %.
@@ -80,13 +80,15 @@ def scene_points(scene: Scene) -> Floats:
     ----------
     scene : Scene
         With any number of actors.
+    show : "skin", "skeleton", "both" or "binding"
+        What of them is drawn.
 
     Returns
     -------
     (N, 3)
         Scene space; the origin alone if nothing is visible.
     """
-    clouds = [actor_points(actor) for actor in scene.actors if actor.visible]
+    clouds = [actor_points(actor, show) for actor in scene.actors if actor.visible]
     points = np.concatenate(clouds) if clouds else np.zeros((1, 3))
     if len(points) < 1.0 / _OUTLIER_SHARE:
         return points
@@ -98,18 +100,20 @@ def scene_points(scene: Scene) -> Floats:
     return np.clip(points, *inner) if has_strays else points
 
 
-def scene_box(scene: Scene) -> Floats:
+def scene_box(scene: Scene, show: str = "skin") -> Floats:
     """Return the box around ``scene_points``: lowest and highest corner, (2, 3)."""
-    return bounding_box(scene_points(scene))
+    return bounding_box(scene_points(scene, show))
 
 
-def actor_points(actor: Actor) -> Floats:
-    """Return an actor's posed vertices, or its skeleton's points if it has no mesh.
+def actor_points(actor: Actor, show: str = "skin") -> Floats:
+    """Return the points of what is drawn of an actor.
 
     Parameters
     ----------
     actor : Actor
         Placed and posed.
+    show : "skin", "skeleton", "both" or "binding"
+        What is drawn of it; what the figure lacks is replaced by what it has.
 
     Returns
     -------
@@ -117,9 +121,11 @@ def actor_points(actor: Actor) -> Floats:
         Scene space.
     """
     figure = actor.figure
-    if figure.mesh is not None:
-        points = deform(figure, actor.pose)[0]
-    else:
-        assert figure.skeleton is not None and actor.pose is not None  # a figure has one of both
-        points = skeleton_points(figure.skeleton, actor.pose)
-    return apply_transform(actor.placement, points)
+    parts = []
+    shows_skeleton = show in ("skeleton", "both") or figure.mesh is None
+    if figure.skeleton is not None and actor.pose is not None and shows_skeleton:
+        parts.append(skeleton_points(figure.skeleton, actor.pose))
+    if figure.mesh is not None and (show != "skeleton" or figure.skeleton is None):
+        is_bound = show == "binding"
+        parts.append(figure.mesh.positions if is_bound else deform(figure, actor.pose)[0])
+    return apply_transform(actor.placement, np.concatenate(parts))
