@@ -16,7 +16,7 @@ from PIL import Image
 
 import viewer
 from viewer.cli import run
-from viewer.commands._common import apply_dofs
+from viewer.commands._scene import apply_dofs
 from viewer.rendering.camera import Camera, fit
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.scene import scene_points

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from viewer.commands._common import add_scene_arguments, open_scene
+from viewer.commands._scene import add_scene_arguments, open_scene
 from viewer.errors import printable
 from viewer.rig.clip import Clip
 from viewer.rig.mesh import Mesh, bounding_box, box_size, triangle_areas

@@ -6,15 +6,13 @@ import argparse
 import sys
 from pathlib import Path
 
-from viewer.commands._common import (
+from viewer.commands._scene import add_scene_arguments, open_scene, print_warnings
+from viewer.commands._view import (
     add_camera_arguments,
     add_display_arguments,
-    add_scene_arguments,
     camera_of,
     display_of,
-    open_scene,
     parse_size,
-    print_warnings,
 )
 from viewer.errors import OutputError, ViewerError, printable
 from viewer.rendering.camera import Camera

@@ -5,14 +5,12 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from viewer.commands._common import (
+from viewer.commands._scene import add_scene_arguments, number, open_scene
+from viewer.commands._view import (
     add_camera_arguments,
     add_display_arguments,
-    add_scene_arguments,
     camera_of,
     display_of,
-    number,
-    open_scene,
 )
 from viewer.errors import printable
 from viewer.formats import free_path

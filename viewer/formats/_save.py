@@ -71,14 +71,13 @@ def save_bytes(path: str | Path, data: bytes) -> None:
     """
     path = Path(path)
     try:
-        target = path.resolve()
-        mode = _mode(target)
+        mode = _mode(path)
         if stat.S_ISDIR(mode):
             raise IsADirectoryError(None, "is a folder")
         if not stat.S_ISREG(mode):
-            _write_through(target, data)
+            _write_through(path, data)  # not resolved: /dev/stdout may lead to a nameless pipe
         else:
-            _replace(target, data, stat.S_IMODE(mode))
+            _replace(path.resolve(), data, stat.S_IMODE(mode))
     except (OSError, ValueError, RuntimeError) as problem:
         reason = getattr(problem, "strerror", None) or problem
         raise OutputError(f"{printable(path, 300)}: {reason}") from None

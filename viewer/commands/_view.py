@@ -1,0 +1,108 @@
+"""Options that aim the camera and choose what is shown; shared by the commands that draw."""
+
+from __future__ import annotations
+
+import argparse
+import re
+
+from viewer.commands._scene import number
+from viewer.errors import ViewerError
+from viewer.rendering.camera import Camera, fit
+from viewer.rendering.ground_pass import parse_color
+from viewer.rendering.options import BACKGROUNDS, SHOWN, DisplayOptions
+from viewer.rendering.program import SHADING
+from viewer.rig.arrays import Floats
+from viewer.rig.mesh import bounding_box, box_size
+from viewer.rig.scene import Scene
+
+__all__ = [
+    "add_camera_arguments",
+    "add_display_arguments",
+    "camera_of",
+    "display_of",
+    "parse_size",
+]
+
+
+def add_camera_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options that aim the camera; what is not given fits the scene."""
+    parser.add_argument("--azimuth", type=number, metavar="A", help="degrees about the up axis")
+    parser.add_argument("--inclination", type=number, metavar="I", help="degrees above the horizon")
+    parser.add_argument("--distance", type=number, metavar="D", help="from the target, in units")
+    parser.add_argument("--orthographic", action="store_true", help="parallel projection")
+
+
+def add_display_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options that choose what is shown and how."""
+    parser.add_argument("--show", choices=SHOWN, default="skin", help="default: skin")
+    parser.add_argument("--shading", choices=SHADING, default="phong", help="default: phong")
+    parser.add_argument(
+        "--background",
+        default="gradient",
+        metavar="NAME|#rrggbb",
+        help="gradient, transparent or a colour",
+    )
+    parser.add_argument("--samples", type=int, default=4, metavar="N", help="samples a pixel")
+    for name, text in (
+        ("flat", "one normal per triangle"),
+        ("wireframe", "edges on top"),
+        ("normals", "vertex normals as lines"),
+        ("no-texture", "plain colour instead of the texture"),
+        ("no-grid", "leave out the ground grid"),
+    ):
+        parser.add_argument(f"--{name}", action="store_true", help=text)
+
+
+def parse_size(text: str) -> tuple[int, int]:
+    """Return the width and height of ``1280x720``."""
+    found = re.fullmatch(r"(\d{1,6})[xX](\d{1,6})", text)
+    if not found:
+        raise ViewerError(f'--size: expected WIDTHxHEIGHT in pixels, found "{text}"')
+    size = int(found[1]), int(found[2])
+    if min(size) < 1:
+        raise ViewerError(f"--size: expected at least 1 x 1 pixels, found {text}")
+    return size
+
+
+def camera_of(
+    arguments: argparse.Namespace, scene: Scene, points: Floats, size: tuple[int, int]
+) -> Camera:
+    """Return the camera asked for; its distance fits the points unless it is given."""
+    camera = Camera(up=scene.up, orthographic=arguments.orthographic)
+    if arguments.azimuth is not None:
+        camera.azimuth = arguments.azimuth
+    if arguments.inclination is not None:
+        if not -90 <= arguments.inclination <= 90:
+            raise ViewerError(f"--inclination: expected -90 to 90, found {arguments.inclination:g}")
+        camera.inclination = arguments.inclination
+    fit(camera, points, size[0] / size[1])
+    if arguments.distance is not None:
+        if arguments.distance <= 0:
+            raise ViewerError(f"--distance: expected more than 0, found {arguments.distance:g}")
+        limit = 1e4 * (box_size(bounding_box(points)) or 1.0)
+        if arguments.distance > limit:
+            raise ViewerError(
+                f"--distance: expected at most {limit:g}, 10000 times the figure's size, "
+                f"found {arguments.distance:g}"
+            )
+        camera.distance = arguments.distance
+    return camera
+
+
+def display_of(arguments: argparse.Namespace) -> DisplayOptions:
+    """Return the display options asked for."""
+    if arguments.background not in BACKGROUNDS:
+        parse_color(arguments.background)
+    if arguments.samples < 1:
+        raise ViewerError(f"--samples: expected at least 1, found {arguments.samples}")
+    return DisplayOptions(
+        show=arguments.show,
+        shading=arguments.shading,
+        flat=arguments.flat,
+        wireframe=arguments.wireframe,
+        normals=arguments.normals,
+        texture=not arguments.no_texture,
+        grid=not arguments.no_grid,
+        background=arguments.background,
+        samples=arguments.samples,
+    )
