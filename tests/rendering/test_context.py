@@ -13,6 +13,7 @@ import pytest
 
 from viewer.errors import RenderError
 from viewer.rendering.context import check_errors, explain, headless_context
+from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.upload import buffer
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -217,3 +218,20 @@ def test_two_contexts_live_side_by_side():
     with first:
         assert ours.read() == b"ours"
     first.release()
+
+
+def test_graphics_card_that_may_not_be_opened_is_a_note(monkeypatch):
+    monkeypatch.setattr("viewer.rendering.offscreen.is_software", lambda context: True)
+    nodes = ["/dev/dri/renderD128"]
+    monkeypatch.setattr("viewer.rendering.offscreen.unreadable_devices", lambda: nodes)
+    with Offscreen() as offscreen:
+        assert offscreen.renderer.notes == [
+            "drawing in software: /dev/dri/renderD128 exists but you may not open it (group render)"
+        ]
+
+
+def test_display_without_opengl_3_says_what_is_needed():
+    assert explain("GLX: Failed to create context: GLXBadFBConfig") == (
+        "OpenGL 3.3 is needed and this display's driver does not offer it "
+        "[GLX: Failed to create context: GLXBadFBConfig]"
+    )

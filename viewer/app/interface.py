@@ -70,7 +70,7 @@ def _build_layout(dock: int) -> None:
     share = right_share / (1.0 - left_share)
     right = builder.dock_builder_split_node(rest, imgui.Dir.right, share).id_at_dir
     middle = builder.dock_builder_split_node(right, imgui.Dir.down, 0.64)
-    bottom = builder.dock_builder_split_node(middle.id_at_dir, imgui.Dir.down, 0.45)
+    bottom = builder.dock_builder_split_node(middle.id_at_dir, imgui.Dir.down, 0.48)
     places = {
         "left": left,
         "right 1": middle.id_at_opposite_dir,

@@ -146,6 +146,8 @@ def explain(text: str) -> str:
         return f"{meaning} ({_INSTALL}) [{text}]"
     if "version" in text.lower():
         return f"OpenGL 3.3 is needed: {text}"
+    if re.match(r"(GLX|WGL|NSGL|EGL): ", text):
+        return f"OpenGL 3.3 is needed and this display's driver does not offer it [{text}]"
     return f"no OpenGL context: {text} ({_INSTALL})"
 
 

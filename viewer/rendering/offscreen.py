@@ -6,7 +6,7 @@ import sys
 import threading
 
 from viewer.rendering.camera import Camera, fit
-from viewer.rendering.context import headless_context
+from viewer.rendering.context import headless_context, is_software, unreadable_devices
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.renderer import Renderer
 from viewer.rendering.target import Target, check_size
@@ -40,6 +40,11 @@ class Offscreen:
         with self.context:
             self.renderer = Renderer(self.context)
             self.context.info  # noqa: B018 - kept from now on, current or not
+        if is_software(self.context):
+            self.renderer.notes += [
+                f"drawing in software: {node} exists but you may not open it (group render)"
+                for node in unreadable_devices()
+            ]
         self._target: Target | None = None
 
     def target(self, size: tuple[int, int], samples: int) -> Target:

@@ -8,7 +8,6 @@ from imgui_bundle import imgui
 
 from viewer.app.state import AppState
 from viewer.errors import printable
-from viewer.rendering.ground_pass import grid_step
 from viewer.rig.scene import Scene
 from viewer.rig.skin import influence_counts
 
@@ -19,8 +18,7 @@ def draw(state: AppState) -> None:
     """Draw the panel."""
     for name, value in (
         *_counts(state.scene),
-        ("Grid", f"{grid_step(state.box):g} units"),
-        ("Frame", f"{state.stats.frame_ms:.1f} ms"),
+        ("Frame", f"{state.stats.frame_ms:.1f} ms" if state.stats.frame_ms else "not measured"),
         ("Renderer", state.stats.renderer),
         ("OpenGL", state.stats.version),
         ("Samples", f"{state.stats.samples or 1} a pixel"),
