@@ -33,7 +33,9 @@ void main() {
     vec3 face = cross(dFdx(v_position), dFdy(v_position));
     // The side that is seen decides, not the winding: some files are clockwise.
     face *= dot(face, to_eye) < 0.0 ? -1.0 : 1.0;
-    vec3 normal = u_flat || dot(v_normal, v_normal) == 0.0 ? face : v_normal;
-    normal = normalize(dot(normal, face) < 0.0 ? -normal : normal);
+    face = dot(face, face) > 0.0 ? normalize(face) : to_eye;
+    vec3 normal = u_flat || dot(v_normal, v_normal) == 0.0 ? face : normalize(v_normal);
+    // Well beyond a right angle: at one, rounding would turn every other pixel.
+    normal = dot(normal, face) < -0.1 ? -normal : normal;
     f_color = vec4(encode(shade(v_position, normal, to_eye)) * u_opacity, u_opacity);
 }
