@@ -8,7 +8,6 @@ in vec2 in_uv;          // v = 0 at the bottom row of the texture
 uniform mat4 u_model_view;     // to camera space
 uniform mat3 u_normal_matrix;  // its inverse transpose
 uniform mat4 u_projection;
-uniform float u_bias;          // towards the eye, in clip depth: lines lie on their surface
 uniform vec3 u_color;          // linear
 
 out vec3 v_position;    // camera space
@@ -23,5 +22,4 @@ void main() {
     v_uv = in_uv;
     v_color = u_color;
     gl_Position = u_projection * position;
-    gl_Position.z -= u_bias * gl_Position.w;
 }

@@ -15,7 +15,7 @@ from typing import NoReturn
 
 import viewer
 from viewer.commands import COMMANDS
-from viewer.errors import ViewerError, printable
+from viewer.errors import FormatError, ViewerError, printable
 
 __all__ = ["run"]
 
@@ -53,6 +53,9 @@ def run(arguments: Sequence[str]) -> int:
         if sys.stdout is not None:
             sys.stdout.flush()
         return code
+    except FormatError as problem:
+        # Path and line first, as compilers do, so that editors jump there.
+        return _fail(printable(problem, 2000), problem.exit_code, prefix="")
     except ViewerError as problem:
         return _fail(printable(problem, 2000), problem.exit_code)
     except KeyboardInterrupt:
@@ -124,8 +127,8 @@ def _overview() -> argparse.ArgumentParser:
     return parser
 
 
-def _fail(message: str, code: int) -> int:
-    print(f"viewer: {message}", file=sys.stderr)
+def _fail(message: str, code: int, prefix: str = "viewer: ") -> int:
+    print(f"{prefix}{message}", file=sys.stderr)
     return code
 
 

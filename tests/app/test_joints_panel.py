@@ -247,3 +247,41 @@ def test_rows_list_children_right_below_their_parent(hand):
     assert [(joint, depth) for joint, dof, depth in listed if dof < 0] == [(0, 0), (1, 1)]
     assert [dof for joint, dof, _ in listed if joint == 0 and dof >= 0] == list(range(6))
     assert not [dof for joint, dof, _ in listed if joint == 1 and dof >= 0]
+
+
+def test_second_figure_is_chosen_posed_and_reset(drive, rig, tmp_path):
+    other = tmp_path / "other.skel"
+    other.write_text("balljoint hip { offset 0 0 0 balljoint knee { offset 0 -1 0 } }")
+    hand = drive(*rig, other)
+    first = hand.state.scene.actors[0].pose.dofs.copy()
+    hand.click("Actor")
+    hand.key("down_arrow")
+    assert "Actor" in hand.state.item_rects
+    hand.state.choose_actor(1)
+    hand.step(2)
+    assert "knee.x" in hand.state.item_rects and "arm.x" not in hand.state.item_rects
+    hand.key("escape")
+    hand.drag("knee.x", 0.75)
+    assert hand.state.actor is hand.state.scene.actors[1]
+    assert hand.dof("knee.x") == pytest.approx(math.pi / 2, abs=0.1)
+    assert (hand.state.scene.actors[0].pose.dofs == first).all()
+    hand.key("r")
+    assert hand.dof("knee.x") == 0.0
+
+
+def test_escape_closes_a_context_menu_and_keeps_the_pose(hand):
+    before = hand.dofs()
+    hand.click("root.x", button=1)
+    hand.step(2)
+    hand.key("escape")
+    hand.click("Filter")
+    hand.type("root")
+    assert hand.state.joint_filter == "root"
+    assert (hand.dofs() == before).all() and not hand.state.keys_visible
+
+
+def test_filter_without_a_match_says_so_and_draws_no_row(hand):
+    hand.click("Filter")
+    hand.type("xyz")
+    hand.step(2)
+    assert not [label for label in hand.state.item_rects if label.startswith("joint ")]

@@ -256,3 +256,20 @@ def test_undecodable_names_survive_the_list(tmp_path):
     assert remember(recent, [odd]) == ""
     assert load_recent() == [(str(odd.resolve()),)]
     json.loads((state_folder() / "recent.json").read_text("utf-8"))
+
+
+def test_driver_that_refuses_while_drawing_becomes_a_message(hand, monkeypatch):
+    pose = hand.dofs()
+
+    def refuse(*arguments, **settings):
+        raise RenderError("the driver refused a shader")
+
+    monkeypatch.setattr(hand.app.frame.renderer, "draw", refuse)
+    hand.state.options.wireframe = True
+    hand.step(3)
+    assert hand.state.error == "the driver refused a shader"
+    monkeypatch.undo()
+    hand.key("escape")
+    hand.state.options.wireframe = False
+    hand.step(3)
+    assert hand.state.error == "" and (hand.dofs() == pose).all()

@@ -302,6 +302,22 @@ def test_format_that_cannot_be_written_is_exit_code_5(rig, tmp_path, suffix, cap
     assert capsys.readouterr().err.count("\n") == 1 and not out.exists()
 
 
+@pytest.mark.parametrize("suffix", [".xyz", ".svg", ".skin"])
+def test_picture_under_another_kind_of_name_is_refused(rig, tmp_path, suffix, capsys):
+    out = tmp_path / f"x{suffix}"
+    out.write_text("precious")
+    assert run(["render", *map(str, rig), "-o", str(out), "--force"]) == 5
+    assert f"pictures cannot be written as {suffix}" in capsys.readouterr().err
+    assert out.read_text() == "precious"
+
+
+def test_transparency_that_the_format_lacks_is_a_warning(rig, tmp_path, capsys):
+    out = tmp_path / "x.jpg"
+    arguments = ["-o", str(out), "--size", "40x30", "--background", "transparent"]
+    assert run(["render", *map(str, rig), *arguments]) == 0
+    assert "this format knows no transparency" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("into", ["pipe", "file"])
 def test_picture_goes_through_standard_output(rig, tmp_path, into):
     command = [

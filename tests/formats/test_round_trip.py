@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from viewer.errors import UnsupportedFormatError
+from viewer.errors import OutputError, UnsupportedFormatError
 from viewer.formats import FORMATS, Source, skel, skin, write
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Material, Mesh
@@ -143,13 +143,31 @@ def test_mesh_without_skin_comes_back():
     assert len(warnings) == 1
 
 
-def test_pictures_that_exist_are_not_replaced(tmp_path):
+def test_other_pictures_are_not_replaced(tmp_path):
     (tmp_path / "a.png").write_bytes(b"mine")
-    image = np.zeros((1, 1, 4), np.uint8)
-    textured = mesh(materials=(Material("", "a.png", image), Material("", "sub/b.png", image)))
-    write(Figure("a", textured), tmp_path / "a.skin")
+    textured = mesh(materials=(Material("", "a.png", np.zeros((1, 1, 4), np.uint8)),))
+    with pytest.raises(OutputError, match=r"a\.png: another picture is there already"):
+        write(Figure("a", textured), tmp_path / "a.skin")
     assert (tmp_path / "a.png").read_bytes() == b"mine"
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.png", "a.skin"]
+    assert [path.name for path in tmp_path.iterdir()] == ["a.png"]
+
+
+def test_pictures_in_folders_come_back(tmp_path):
+    image = np.arange(16, dtype=np.uint8).reshape(2, 2, 4)
+    textured = mesh(materials=(Material("", "sub/b.png", image),))
+    for _ in range(2):  # the second time the same picture is there already
+        write(Figure("a", textured), tmp_path / "a.skin")
+    found = skin.read(Source.open(tmp_path / "a.skin")).mesh.materials[0]
+    assert found.texture == "sub/b.png" and np.array_equal(found.image, image)
+
+
+def test_pictures_outside_the_folder_are_not_written(tmp_path):
+    image = np.zeros((1, 1, 4), np.uint8)
+    textured = mesh(materials=(Material("", "../b.png", image),))
+    (tmp_path / "here").mkdir()
+    with pytest.raises(UnsupportedFormatError, match="outside the folder"):
+        write(Figure("a", textured), tmp_path / "here" / "a.skin")
+    assert not (tmp_path / "b.png").exists()
 
 
 @pytest.mark.parametrize("name", ["wasp", "tube"])

@@ -37,7 +37,7 @@ def draw(offscreen: Offscreen, shot: Shot):
         target: Target = offscreen.target(SIZE, shot.options.samples)
         box = scene_box(shot.scene)
         offscreen.renderer.draw(
-            shot.scene, shot.camera, shot.options, target, box, shot.selected_joint
+            shot.scene, shot.camera, shot.options, target, box, (0, shot.selected_joint)
         )
         target.resolve()
         return target.read()

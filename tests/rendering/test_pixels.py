@@ -55,7 +55,8 @@ def draw(offscreen, scene, options=None, camera=None, selected=-1, size=(N, N)):
     options, camera = options or plain(), camera or front()
     with offscreen.context:
         target = offscreen.target(size, options.samples)
-        offscreen.renderer.draw(scene, camera, options, target, scene_box(scene), selected)
+        chosen = (0, selected)
+        offscreen.renderer.draw(scene, camera, options, target, scene_box(scene), chosen)
         target.resolve()
         return target.read()
 

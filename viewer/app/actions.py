@@ -29,7 +29,7 @@ def reset_pose(state: AppState) -> None:
     for actor in state.scene.actors:
         if actor.figure.skeleton is not None:
             actor.pose = rest_pose(actor.figure.skeleton)
-    state.say("Pose reset")
+    state.say_status("Pose reset")
 
 
 def toggle_skeleton(state: AppState) -> None:
@@ -46,14 +46,14 @@ def toggle_binding(state: AppState) -> None:
 def show(state: AppState, what: str) -> None:
     """Choose what is drawn, a key of ``SHOWN``, and say so."""
     state.options.show = what
-    state.say(SHOWN[what])
+    state.say_status(SHOWN[what])
 
 
 def toggle_option(state: AppState, name: str, text: str) -> None:
     """Flip a display option and say so."""
     value = not getattr(state.options, name)
     setattr(state.options, name, value)
-    state.say(f"{text} {'on' if value else 'off'}")
+    state.say_status(f"{text} {'on' if value else 'off'}")
 
 
 def fit_view(state: AppState) -> None:
@@ -69,7 +69,7 @@ def look(state: AppState, name: str) -> None:
 def toggle_projection(state: AppState) -> None:
     """Switch between perspective and parallel projection."""
     state.camera.orthographic = not state.camera.orthographic
-    state.say("Orthographic" if state.camera.orthographic else "Perspective")
+    state.say_status("Orthographic" if state.camera.orthographic else "Perspective")
 
 
 def reset_lights(state: AppState) -> None:
@@ -80,13 +80,13 @@ def reset_lights(state: AppState) -> None:
 def undo(state: AppState) -> None:
     """Take back the last change of pose or display."""
     if not state.history.undo(state.scene, state.options):
-        state.say("Nothing to undo")
+        state.say_status("Nothing to undo")
 
 
 def redo(state: AppState) -> None:
     """Bring back the change that was undone last."""
     if not state.history.redo(state.scene, state.options):
-        state.say("Nothing to redo")
+        state.say_status("Nothing to redo")
 
 
 def cancel(state: AppState) -> None:
@@ -97,7 +97,7 @@ def cancel(state: AppState) -> None:
         state.dialog = None
     elif state.loader is not None:
         state.loader = None
-        state.say("Opening was cancelled")
+        state.say_status("Opening was cancelled")
     elif state.keys_visible:
         state.keys_visible = False
     else:

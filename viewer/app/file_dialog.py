@@ -114,7 +114,8 @@ def _draw_content(state: AppState, dialog: FileDialog) -> list[Path]:
     result = _draw_list(state, dialog)
     count = len(dialog.chosen)
     imgui.begin_disabled(count == 0)
-    if button(state, f"Open {count} files###Open" if count != 1 else "Open###Open"):
+    pressed = button(state, f"Open {count} files###Open" if count > 1 else "Open###Open")
+    if pressed or (count and imgui.is_key_pressed(imgui.Key.enter, False)):
         result = sorted(dialog.chosen)
     imgui.end_disabled()
     imgui.same_line()

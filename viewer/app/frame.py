@@ -97,15 +97,8 @@ class Frame:
             return
         key = self._scene_key(size)
         if key != self._drawn:
-            target = self._target(size)
-            self.renderer.draw(
-                state.scene, state.camera, state.options, target, state.box, state.selected_joint
-            )
-            target.resolve()
-            self._drawn = key
-            state.stats.samples = target.samples
-            state.say(*self.renderer.notes)
-            self.renderer.notes.clear()
+            self._drawn = key  # also if it fails: not again before something has changed
+            self._draw_target(size)
         if self.target is not None:
             picture = imgui.ImTextureRef(self.target.texture.glo)
             corner = (x + size[0] / scale, y + size[1] / scale)
@@ -114,6 +107,22 @@ class Frame:
             draw_list.add_image(picture, (x, y), corner, (0.0, 1.0), (1.0, 0.0))
             if state.panels_visible:
                 draw_hints(state)
+
+    def _draw_target(self, size: tuple[int, int]) -> None:
+        """Draw the scene; what the driver refuses becomes a message, and the window stays."""
+        state = self.state
+        try:
+            target = self._target(size)
+            selected = (state.chosen_actor, state.selected_joint)
+            self.renderer.draw(
+                state.scene, state.camera, state.options, target, state.box, selected
+            )
+            target.resolve()
+            state.stats.samples = target.samples
+        except ViewerError as problem:
+            state.error = str(problem)
+        state.say(*self.renderer.notes)
+        self.renderer.notes.clear()
 
     def _scene_key(self, size: tuple[int, int]) -> object:
         """Return everything the picture of the scene depends on."""
@@ -127,9 +136,10 @@ class Frame:
             )
             for actor in state.scene.actors
         )
+        selected = (state.chosen_actor, state.selected_joint)
         place = (camera.target.tobytes(), camera.distance, camera.azimuth, camera.inclination)
         lens = (camera.fov, camera.orthographic, camera.up)
-        return (size, place, lens, copy.deepcopy(state.options), poses, state.selected_joint)
+        return (size, place, lens, copy.deepcopy(state.options), poses, *selected)
 
     def _target(self, size: tuple[int, int]) -> Target:
         samples = self.state.options.samples

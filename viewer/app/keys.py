@@ -90,12 +90,24 @@ def handle_keys(state: AppState) -> None:
     held, state.held_modifiers = now | state.held_modifiers, now
     if imgui.get_io().want_text_input:
         return
+    if imgui.is_key_pressed(imgui.Key.escape, False) and _close_menus():
+        return
     is_covered = bool(state.error) or state.dialog is not None
     for shortcut in KEYS:
         if is_covered and shortcut.label not in _ALWAYS:
             continue
         if any(_is_pressed(chord, held) for chord in shortcut.chords):
             shortcut.action(state)
+
+
+def _close_menus() -> bool:
+    """Close an open menu or list; return whether there was one. Messages close by themselves."""
+    any_popup = imgui.PopupFlags_.any_popup_id | imgui.PopupFlags_.any_popup_level
+    has_modal = imgui.internal.get_top_most_popup_modal() is not None
+    if has_modal or not imgui.is_popup_open("", any_popup):
+        return False
+    imgui.internal.close_popup_to_level(0, True)
+    return True
 
 
 def _is_pressed(chord: int, held: int) -> bool:

@@ -29,10 +29,11 @@ _FARTHEST = 1e4  # sizes of the scene
 
 @dataclass(slots=True)
 class Note:
-    """A message that goes away by itself."""
+    """A message that goes away by itself, or when the next one of its kind comes."""
 
     text: str
     until: float
+    is_status: bool = False
 
 
 @dataclass(slots=True)
@@ -58,8 +59,10 @@ class AppState:
         The scene's box as it was opened: the grid lies under it.
     paths : tuple of Path
         The files of the scene; empty for the bundled figure.
+    chosen_actor : int
+        Index of the actor that panels act on.
     selected_joint : int
-        Of the first actor; -1 for none.
+        Of the chosen actor; -1 for none.
     in_degrees : bool
         Whether rotations are shown in degrees or radians.
     held_modifiers : int
@@ -77,6 +80,7 @@ class AppState:
     options: DisplayOptions
     box: Floats
     paths: tuple[Path, ...] = ()
+    chosen_actor: int = 0
     selected_joint: int = -1
     in_degrees: bool = True
     panels_visible: bool = True
@@ -99,12 +103,19 @@ class AppState:
 
     def __post_init__(self) -> None:
         self.history.start(self.scene, self.options)
-        self.opened_joints = _first_opened(self.scene)
+        self.opened_joints = _first_opened(self.actor)
 
     @property
     def actor(self) -> Actor:
-        """The actor that panels act on: the first."""
-        return self.scene.actors[0]
+        """The actor that panels act on."""
+        return self.scene.actors[self.chosen_actor]
+
+    def choose_actor(self, index: int) -> None:
+        """Let panels act on another actor."""
+        self.chosen_actor = index
+        self.selected_joint = -1
+        self.joint_filter = ""
+        self.opened_joints = _first_opened(self.actor)
 
     @property
     def aspect(self) -> float:
@@ -119,9 +130,7 @@ class AppState:
         self.box = bounding_box(points)
         self.camera.up = scene.up
         fit(self.camera, points, self.aspect)
-        self.selected_joint = -1
-        self.joint_filter = ""
-        self.opened_joints = _first_opened(scene)
+        self.choose_actor(0)
         self.history.start(scene, self.options)
         self.say(*scene.warnings)
 
@@ -141,15 +150,21 @@ class AppState:
             seconds = _NOTE_SECONDS + len(text) / 30.0
             self.notes.append(Note(text, time.monotonic() + seconds))
 
+    def say_status(self, text: str) -> None:
+        """Show what a key did, in place of what the key before did."""
+        self.notes[:] = [note for note in self.notes if not note.is_status]
+        self.say(text)
+        self.notes[-1].is_status = True
+
     def drop_old_notes(self) -> None:
         """Forget messages whose time is over."""
         now = time.monotonic()
         self.notes[:] = [note for note in self.notes if note.until > now]
 
 
-def _first_opened(scene: Scene) -> set[int]:
+def _first_opened(actor: Actor) -> set[int]:
     """Return the joints whose rows are open at first: all of a small rig, else the roots."""
-    skeleton = scene.actors[0].figure.skeleton if scene.actors else None
+    skeleton = actor.figure.skeleton
     if skeleton is None:
         return set()
     if skeleton.n_joints <= 128:

@@ -7,10 +7,11 @@ from pathlib import Path
 import imgui_bundle
 from imgui_bundle import imgui
 
-__all__ = ["apply_theme"]
+__all__ = ["apply_theme", "change_scale"]
 
 _FONT_POINTS = 15.0
 _ACCENT = (0.93, 0.55, 0.20, 1.0)
+_GRAB = (0.93, 0.55, 0.20, 0.55)  # the number shows through
 
 
 def apply_theme(scale: float) -> None:
@@ -37,6 +38,13 @@ def apply_theme(scale: float) -> None:
     style.font_scale_dpi = scale
 
 
+def change_scale(old: float, new: float) -> None:
+    """Change the size of everything, as when a window moves to another screen."""
+    style = imgui.get_style()
+    style.scale_all_sizes(new / old)
+    style.font_scale_dpi = new
+
+
 def _set_colors(style: imgui.Style) -> None:
     names = imgui.Col_
     quiet, hovered, active = (
@@ -59,8 +67,8 @@ def _set_colors(style: imgui.Style) -> None:
         (names.header, (0.24, 0.27, 0.31, 1.0)),
         (names.header_hovered, hovered),
         (names.header_active, active),
-        (names.slider_grab, _ACCENT),
-        (names.slider_grab_active, (1.0, 0.70, 0.35, 1.0)),
+        (names.slider_grab, _GRAB),
+        (names.slider_grab_active, (1.0, 0.70, 0.35, 0.75)),
         (names.check_mark, _ACCENT),
         (names.tab, (0.11, 0.12, 0.135, 1.0)),
         (names.tab_hovered, hovered),

@@ -18,7 +18,7 @@ from imgui_bundle import imgui  # noqa: E402
 from viewer.app.frame import Frame  # noqa: E402
 from viewer.app.recent import load_recent, remember, state_folder  # noqa: E402
 from viewer.app.state import AppState  # noqa: E402
-from viewer.app.theme import apply_theme  # noqa: E402
+from viewer.app.theme import apply_theme, change_scale  # noqa: E402
 from viewer.errors import RenderError, printable  # noqa: E402
 from viewer.rendering.camera import Camera, fit  # noqa: E402
 from viewer.rendering.context import explain  # noqa: E402
@@ -140,7 +140,9 @@ class _Window:
         except OSError as problem:
             io.set_ini_filename(None)
             self.state.say(f"the layout cannot be remembered: {problem.strerror}")
-        apply_theme(scale or self._screen_scale())
+        self._given_scale = scale
+        self._scale = scale or self._screen_scale()
+        apply_theme(self._scale)
         address = ctypes.cast(self.handle, ctypes.c_void_p).value or 0
         imgui.backends.glfw_init_for_opengl(address, True)
         imgui.backends.opengl3_init("#version 330")
@@ -194,12 +196,20 @@ class _Window:
         if min(size) < 1:
             return False
         self._set_title()
+        self._follow_scale()
         imgui.backends.opengl3_new_frame()
         imgui.backends.glfw_new_frame()
         imgui.new_frame()
         self.frame.draw(self.context.screen, size, self._pixels_per_point())
         glfw.swap_buffers(self.handle)
         return True
+
+    def _follow_scale(self) -> None:
+        """Keep the interface's size on a screen with another scale."""
+        scale = self._given_scale or self._screen_scale()
+        if scale != self._scale:
+            change_scale(self._scale, scale)
+            self._scale = scale
 
     def _set_title(self) -> None:
         title = _title(self.state)

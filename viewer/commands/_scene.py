@@ -125,19 +125,27 @@ def apply_dofs(scene: Scene, settings: Sequence[str]) -> None:
         if clamped[dof] != wanted[dof]:
             low, high = skeleton.dof_limits[dof]
             name, unit = dof_label(skeleton, dof), " rad" if is_rotation else ""
-            print_warnings([f"{name}={text} is clamped to its limits {low:g} to {high:g}{unit}"])
+            limits = f"{low:g} to {high:g}{unit}"
+            how = f"locked at {low:g}{unit}" if low == high else f"clamped to its limits {limits}"
+            print_warnings([f"{name}={text} is {how}"])
         actor.pose.dofs[:] = clamped
 
 
 def _find(scene: Scene, label: str) -> tuple[Actor, int]:
     problem: RigError | None = None
+    found: list[tuple[Actor, int]] = []
     for actor in scene.actors:
         if actor.figure.skeleton is not None:
             try:
-                return actor, find_dof(actor.figure.skeleton, label)
+                found.append((actor, find_dof(actor.figure.skeleton, label)))
             except RigError as error:
                 problem = problem or error
-    raise ViewerError(f"--dof: {problem or 'no file has a skeleton'}")
+    if not found:
+        raise ViewerError(f"--dof: {problem or 'no file has a skeleton'}")
+    if len(found) > 1:
+        first = printable(found[0][0].figure.name)
+        print_warnings([f"{len(found)} figures have {label}; the first, {first}, is posed"])
+    return found[0]
 
 
 def _dof_value(setting: str, text: str, is_rotation: bool) -> float:

@@ -143,16 +143,17 @@ def _examine_display() -> Iterator[Finding]:
 
 def _examine_window() -> Finding:
     """Open a window in a process of its own: a broken driver may take that one down, not us."""
+    cure = "update the graphics driver, or draw in software: LIBGL_ALWAYS_SOFTWARE=1 viewer"
     script = "from viewer.app.window import probe; print(probe())"
     command = [sys.executable, "-c", script]
     try:
         result = subprocess.run(command, capture_output=True, text=True, timeout=_WINDOW_SECONDS)
     except subprocess.TimeoutExpired:
-        return Finding("window", "missing", f"none within {_WINDOW_SECONDS} s")
+        return Finding("window", "missing", f"none within {_WINDOW_SECONDS} s", cure)
     if result.returncode == 0:
         return Finding("window", "ok", result.stdout.strip())
     words = (result.stderr or result.stdout).strip().splitlines() or ["it crashed"]
-    return Finding("window", "missing", words[-1])
+    return Finding("window", "missing", words[-1].removeprefix("viewer.errors.RenderError: "), cure)
 
 
 def _examine_state_folder() -> Finding:

@@ -198,6 +198,9 @@ def _skeleton_lines(skeleton: dict[str, Any]) -> list[str]:
         if low is not None and low == high:
             limits = "locked"
         lines.append(f"    {printable(dof['name']):<24} {dof['value']:>10.6g}  {limits}")
+    left_out = skeleton["dofs"] - (len(lines) - 1)
+    if left_out:
+        lines.append(f"    {left_out} more are 0 and unlimited (--json lists all)")
     return lines
 
 

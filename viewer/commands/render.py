@@ -23,6 +23,8 @@ from viewer.rig.scene import Scene, scene_points
 
 __all__ = ["add_arguments", "run"]
 
+_PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".ppm", ".tga", ".tif", ".tiff", ".webp")
+_OPAQUE = (".jpg", ".jpeg", ".bmp", ".ppm")
 _STDOUT = ("/dev/stdout", "/dev/fd/1", "/proc/self/fd/1")
 
 
@@ -44,6 +46,8 @@ def run(arguments: argparse.Namespace) -> int:
     output = Path(arguments.output)
     check_output(output, [Path(file) for file in arguments.files], arguments.force)
     options = display_of(arguments)
+    if options.background == "transparent" and output.suffix.lower() in _OPAQUE:
+        print_warnings([f"{printable(output)}: this format knows no transparency"])
     scene = open_scene(arguments)
     points = scene_points(scene, options.show)
     camera = camera_of(arguments, scene, points, size)
@@ -75,6 +79,12 @@ def check_output(output: Path, inputs: list[Path], force: bool) -> None:
             raise OutputError(f"{shown}: is a folder")
         if any(path.exists() and output.exists() and path.samefile(output) for path in inputs):
             raise OutputError(f"{shown}: is an input file, which is never replaced")
+        suffix = output.suffix.lower()
+        if suffix not in ("", *_PICTURES) and (output.is_file() or not output.exists()):
+            raise OutputError(
+                f"{shown}: pictures cannot be written as {suffix}; there are: "
+                f"{', '.join(_PICTURES)}"
+            )
         if output.is_file() and not force and str(output) not in _STDOUT:
             raise OutputError(f"{shown}: exists already (--force replaces it)")
     except (OSError, ValueError) as problem:

@@ -101,6 +101,8 @@ def read(source: Source) -> Figure | Clip:
 def write(content: Figure | Clip, path: str | Path) -> None:
     """Write a clip or a figure, or the part of it that the format of the suffix holds.
 
+    A file of that name is replaced.
+
     Parameters
     ----------
     content : Figure or Clip

@@ -117,7 +117,7 @@ def _raise_for_short_line(source: Source, block: Block, width: int) -> None:
     for line, length in zip(lines, lengths, strict=True):
         if length % width:
             start = offset + len(line) - len(line.lstrip())
-            raise source.error(f"{block.name}: expected {width} numbers, found {length}", start)
+            raise source.error(f"expected {width} numbers, found {length} ({block.name})", start)
         offset += len(line)
 
 

@@ -189,7 +189,8 @@ class _Parser:
         if value != int(value) or value < 0 or value * _WORDS_PER_KEY > left:
             self.word = word
             raise self._error(
-                f"{item}: expected a count that the file can hold, found {self._found()}"
+                f"{item}: expected a count that the file can hold, found {self._found()} "
+                f"with {left} bytes left"
             )
         return int(value)
 

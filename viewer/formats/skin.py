@@ -23,8 +23,8 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.errors import UnsupportedFormatError, printable
-from viewer.formats._image import save_image
+from viewer.errors import OutputError, UnsupportedFormatError, printable
+from viewer.formats._image import load_image, save_image
 from viewer.formats._numbers import LARGEST
 from viewer.formats._save import as_words, save_text
 from viewer.formats._skin_blocks import KEYWORDS
@@ -264,9 +264,20 @@ def _matrix_text(rows: Floats) -> str:
 
 
 def _save_texture(material: Material, folder: Path) -> None:
-    """Put a picture beside the file that names it, unless one is there already."""
+    """Put a picture where the file names it, unless the same one is there already."""
     if material.texture is None or material.image is None:
         return
-    name = material.texture.replace("\\", "/")  # as the reader takes it
-    if Path(name).name == name and not (folder / name).exists():
-        save_image(folder / name, material.image)
+    name = Path(material.texture.replace("\\", "/"))  # as the reader takes it
+    path = folder / name
+    if path.exists():
+        there = load_image(Source(folder / "x.skin", b""), material.texture, 0)
+        if there is None or not np.array_equal(there, material.image):
+            raise OutputError(f"{printable(path, 300)}: another picture is there already")
+        return
+    if name.is_absolute() or ".." in name.parts:
+        raise UnsupportedFormatError(f"the texture {printable(path, 300)} lies outside the folder")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as problem:
+        raise OutputError(f"{printable(path.parent, 300)}: {problem.strerror}") from None
+    save_image(path, material.image)

@@ -11,7 +11,7 @@ from viewer.rendering.options import DisplayOptions
 from viewer.rendering.program import Programs, set_uniforms
 from viewer.rendering.upload import buffer, matrix_texture, write_matrices
 from viewer.rendering.view import View, in_front, set_lights, set_model
-from viewer.rig.arrays import Floats
+from viewer.rig.arrays import Bools, Floats
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.pose import Pose, pose_key, rest_pose
@@ -24,6 +24,7 @@ _CUBE_SIZE = 0.015  # of a skeleton without boxes
 _GOLDEN = 0.618033988749895
 _WORLD_UNIT = 0
 _CUBE_VERTICES = 36
+_CROWD = 1000  # joints from which on it pays to look for coincident boxes
 
 
 def joint_colors(n_joints: int) -> Floats:
@@ -46,6 +47,7 @@ class SkeletonBuffers:
     ) -> None:
         self.context, self.skeleton, self._cube = context, skeleton, cube
         boxes = skeleton.boxes if skeleton.boxes is not None else _cubes(skeleton)
+        self._boxes = boxes
         self._low = buffer(context, boxes[:, 0], "f4")
         self._high = buffer(context, boxes[:, 1], "f4")
         self._colors = buffer(context, joint_colors(skeleton.n_joints), "f4")
@@ -62,8 +64,21 @@ class SkeletonBuffers:
         world = world_matrices(self.skeleton, pose)
         self.center = bounding_box(world[:, :3, 3]).mean(axis=0)
         world[:, :3, 3] -= self.center
+        if self.skeleton.n_joints > _CROWD:
+            world[self._hidden(world)] = 0.0
         write_matrices(self.world, world)
         self._key = key
+
+    def _hidden(self, world: Floats) -> Bools:
+        """Return which joints' boxes coincide with another's; shrunk to a point, they cost nothing.
+
+        A hundred thousand boxes over one another would take minutes to draw in software.
+        """
+        rows = np.concatenate([world[:, :3].reshape(-1, 12), self._boxes.reshape(-1, 6)], axis=1)
+        _, first = np.unique(rows.astype(np.float32), axis=0, return_index=True)
+        hidden = np.ones(len(rows), dtype=bool)
+        hidden[first] = False
+        return hidden
 
     def array(self, program: moderngl.Program) -> moderngl.VertexArray:
         """Return the instanced cubes for a program."""

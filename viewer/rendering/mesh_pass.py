@@ -60,7 +60,6 @@ class MeshPass:
             "u_opacity": 1.0,
             "u_has_uv": mesh.mesh.uvs is not None,
             "u_texture": _TEXTURE_UNIT,
-            "u_bias": 0.0,
         }
         set_uniforms(program, values)
         array = self._array(mesh, program)

@@ -125,12 +125,12 @@ def _compose(name: str, chunk: str, files: list[str]) -> str:
     """
     base = len(files)
     files.append(name)
-    text = resource("shaders", name).read_text()
+    text = resource("shaders", name).read_text("utf-8")
     if not chunk:
         return _number_lines(text, base)
     folder = "skin" if name.endswith(".vert") else "shade"
     files.append(f"{folder}/{chunk}.glsl")
-    inner = resource("shaders", folder, f"{chunk}.glsl").read_text()
+    inner = resource("shaders", folder, f"{chunk}.glsl").read_text("utf-8")
     mark = _CHUNK_MARK.search(text)
     assert mark is not None  # every shader that takes a chunk has the mark
     after = text[: mark.end()].count("\n") + 2

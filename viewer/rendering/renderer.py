@@ -54,7 +54,7 @@ class Renderer:
         options: DisplayOptions,
         target: Target,
         box: Floats,
-        selected_joint: int = -1,
+        selected: tuple[int, int] = (0, -1),
     ) -> None:
         """Draw a scene.
 
@@ -71,8 +71,8 @@ class Renderer:
         box : (2, 3)
             What the grid lies under and the depth range covers, scene space: ``scene_box`` of
             the pose in which the scene was opened.
-        selected_joint : int
-            Of the first actor, drawn in a highlight colour; -1 for none.
+        selected : (int, int)
+            An actor's index and a joint of it that is drawn in a highlight colour, -1 for none.
         """
         self._note_samples(target)
         self._forget_others(scene)
@@ -84,18 +84,18 @@ class Renderer:
         for actor, mesh in meshes:
             self._draw_mesh(actor, mesh, view, options)
         skeletons = [
-            (actor, selected_joint if index == 0 else -1)
+            (actor, selected[1] if index == selected[0] else -1)
             for index, actor in enumerate(scene.actors)
             if _shows_skeleton(actor, options)
         ]
-        for actor, selected in skeletons:
+        for actor, joint in skeletons:
             if not _shows_mesh(actor.figure, options):
-                self._draw_skeleton(actor, view, options, selected, 1.0)
+                self._draw_skeleton(actor, view, options, joint, 1.0)
         if options.grid:
             self.ground_pass.draw_grid(view, box, options.background)
-        for actor, selected in skeletons:
+        for actor, joint in skeletons:
             if _shows_mesh(actor.figure, options):
-                self._draw_skeleton(actor, view, options, selected, options.skeleton_opacity)
+                self._draw_skeleton(actor, view, options, joint, options.skeleton_opacity)
 
     def prepare(self, scene: Scene) -> None:
         """Upload what a scene needs, so that a refusal comes before the old scene is given up.

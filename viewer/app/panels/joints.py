@@ -27,7 +27,8 @@ _STAYS_WITHIN = imgui.SliderFlags_.always_clamp
 
 
 def draw(state: AppState) -> None:
-    """Draw the panel for the first actor."""
+    """Draw the panel for the chosen actor."""
+    _draw_actor_choice(state)
     actor = state.actor
     if actor.figure.skeleton is None or actor.pose is None:
         imgui.text_wrapped("This figure has no skeleton: open its .skel with it.")
@@ -39,6 +40,8 @@ def draw(state: AppState) -> None:
         return
     shown = rows(skeleton, frozenset(state.opened_joints), state.joint_filter)
     labels = _labels(skeleton)
+    if not shown:
+        imgui.text_disabled("no joint has this in its name")
     clipper = imgui.ListClipper()
     clipper.begin(len(shown))
     while clipper.step():
@@ -49,6 +52,21 @@ def draw(state: AppState) -> None:
                 _draw_dof(state, skeleton, actor.pose, dof, depth, labels[joint])
     clipper.end()
     imgui.end_child()
+
+
+def _draw_actor_choice(state: AppState) -> None:
+    """Draw a list of the actors if there are several."""
+    if len(state.scene.actors) < 2:
+        return
+    names = [
+        f"{number}  {printable(actor.figure.name, 60)}"
+        for number, actor in enumerate(state.scene.actors, 1)
+    ]
+    imgui.set_next_item_width(-1.0)
+    changed, index = imgui.combo("##actor", state.chosen_actor, names)
+    note_item(state, "Actor")
+    if changed:
+        state.choose_actor(index)
 
 
 def _draw_head(state: AppState) -> None:

@@ -1,0 +1,13 @@
+"""Skeletons of a hundred thousand joints are drawn in seconds, also with all boxes in one place."""
+
+import subprocess
+import sys
+
+
+def test_a_hundred_thousand_coincident_boxes_are_drawn(tmp_path):
+    deep = tmp_path / "deep.skel"
+    deep.write_text("balljoint a { " * 100_000 + "} " * 100_000)
+    out = tmp_path / "deep.png"
+    command = [sys.executable, "-m", "viewer", "render", deep, "-o", out, "--size", "320x240"]
+    done = subprocess.run([*map(str, command)], capture_output=True, text=True, timeout=120)
+    assert (done.returncode, done.stderr) == (0, "") and out.stat().st_size > 1000
