@@ -87,6 +87,7 @@ def block_rows(source: Source, block: Block, count: int, width: int) -> Floats:
     """Parse a block of ``count`` rows of ``width`` numbers: (count, width)."""
     values = block_numbers(source, block)
     if len(values) == count * width:
+        values.flags.writeable = False  # so that nobody has to copy it
         return values.reshape(count, width)
     if not block.closed:
         raise source.error(
@@ -134,4 +135,5 @@ def to_whole(values: Floats) -> tuple[Ints, int]:
     """Return numbers as int32, and the place of the first that this changes, -1 for none."""
     whole = np.clip(values, -_INT32, _INT32 - 1).astype(np.int32)
     differs = whole != values
+    whole.flags.writeable = False  # so that nobody has to copy it
     return whole, int(differs.argmax()) if differs.any() else -1

@@ -49,7 +49,9 @@ def read_weights(source: Source, block: Block, count: int) -> tuple[Ints, Ints, 
         raise _error(source, block, vertex, place, "a joint index")
     starts = np.zeros(count + 1, dtype=np.int32)
     np.cumsum(values[heads].astype(np.int32), out=starts[1:])
-    return starts, joints, pairs[:, 1].copy()
+    weights = pairs[:, 1].copy()
+    starts.flags.writeable = weights.flags.writeable = False  # so that nobody has to copy them
+    return starts, joints, weights
 
 
 def _find_heads(values: Floats, count: int) -> NDArray[np.integer] | None:

@@ -27,7 +27,7 @@ def frozen(
     name : str
         What the array is called in the error message.
     values : array-like of ``shape``
-        The numbers; an array that is read-only and owns its memory is taken as it is.
+        The numbers; an array that nobody can write to is taken as it is.
     shape : tuple
         Wanted shape; ``None`` leaves an axis free.
     dtype : dtype
@@ -51,11 +51,22 @@ def frozen(
         raise RigError(f"{name}: expected shape {wanted_text}, found {found_text}")
     if array.dtype.kind == "f" and not np.isfinite(array).all():
         raise RigError(f"{name}: expected finite numbers, found {_first_odd(array)}")
-    shared = array is values or array.base is not None
-    if shared and (array.flags.writeable or not array.flags.owndata):
+    if (array is values or array.base is not None) and _is_writeable_by_others(array):
         array = array.copy()
     array.flags.writeable = False
     return array
+
+
+def _is_writeable_by_others(array: NDArray[Any]) -> bool:
+    """Return whether some name that is not ours may still change the memory."""
+    owner: Any = array
+    while isinstance(owner, np.ndarray):
+        if owner.flags.writeable:
+            return True
+        if owner.base is None:
+            return False
+        owner = owner.base
+    return True  # memory of something else, which may do as it likes
 
 
 def _converted(name: str, values: Any, dtype: np.dtype[Any]) -> NDArray[Any]:
