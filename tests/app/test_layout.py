@@ -135,3 +135,27 @@ def test_background_that_is_transparent_shows_no_older_frame(hand):
     hand.state.camera.azimuth -= 90
     hand.state.notes.clear()
     assert (hand.screen() == first).mean() > 0.99
+
+
+def test_closed_panels_are_remembered(tmp_path, monkeypatch):
+    from viewer.app.recent import load_closed_panels, save_closed_panels
+
+    assert load_closed_panels() == set()
+    save_closed_panels({"stats", "joints"})
+    assert load_closed_panels() == {"stats", "joints"}
+    (tmp_path / "state" / "viewer" / "closed.json").write_text("null")
+    assert load_closed_panels() == set()
+
+
+def test_changed_scale_enlarges_widgets_that_still_work(hand):
+    from viewer.app.theme import change_scale
+
+    x0, y0, x1, y1 = hand.state.item_rects["Reset (R)"]
+    change_scale(1.0, 2.0)
+    hand.step(4)
+    a0, b0, a1, b1 = hand.state.item_rects["Reset (R)"]
+    assert (b1 - b0) > 1.6 * (y1 - y0) and (a1 - a0) > 1.6 * (x1 - x0)
+    hand.state.actor.pose.dofs[0] = 0.25
+    hand.step(1)
+    hand.click("Reset (R)")
+    assert hand.state.actor.pose.dofs[0] == 0.0

@@ -1,7 +1,8 @@
-"""Files opened before, remembered between runs."""
+"""What is remembered between runs: files opened before, and panels that were closed."""
 
 from __future__ import annotations
 
+import contextlib
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,7 +12,13 @@ import platformdirs
 from viewer.errors import OutputError
 from viewer.formats import save_bytes
 
-__all__ = ["load_recent", "remember", "state_folder"]
+__all__ = [
+    "load_closed_panels",
+    "load_recent",
+    "remember",
+    "save_closed_panels",
+    "state_folder",
+]
 
 _MOST = 12
 
@@ -52,3 +59,19 @@ def remember(recent: list[tuple[str, ...]], paths: Sequence[Path]) -> str:
     except (OSError, RuntimeError, OutputError) as problem:  # resolve() raises both
         return f"recent files could not be saved: {problem}"
     return ""
+
+
+def load_closed_panels() -> set[str]:
+    """Return the panels that were closed when the last window was; none if unreadable."""
+    try:
+        names = json.loads((state_folder() / "closed.json").read_text("utf-8"))
+        return {name for name in names if isinstance(name, str)}
+    except (OSError, ValueError, TypeError, RecursionError):
+        return set()
+
+
+def save_closed_panels(names: set[str]) -> None:
+    """Remember which panels are closed; a folder that cannot be written remembers nothing."""
+    with contextlib.suppress(OSError, OutputError):
+        state_folder().mkdir(parents=True, exist_ok=True)
+        save_bytes(state_folder() / "closed.json", json.dumps(sorted(names)).encode())

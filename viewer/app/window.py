@@ -16,7 +16,13 @@ import moderngl  # noqa: E402  after glfw, whose library imgui-bundle chooses
 from imgui_bundle import imgui  # noqa: E402
 
 from viewer.app.frame import Frame  # noqa: E402
-from viewer.app.recent import load_recent, remember, state_folder  # noqa: E402
+from viewer.app.recent import (  # noqa: E402
+    load_closed_panels,
+    load_recent,
+    remember,
+    save_closed_panels,
+    state_folder,
+)
 from viewer.app.state import AppState  # noqa: E402
 from viewer.app.theme import apply_theme, change_scale  # noqa: E402
 from viewer.errors import RenderError, printable  # noqa: E402
@@ -75,6 +81,7 @@ def show(
     files = tuple(map(Path, paths))
     state = AppState(scene, camera, options, bounding_box(points), files)
     state.recent = load_recent()
+    state.closed_panels = load_closed_panels()
     state.say(*scene.warnings, *filter(None, [remember(state.recent, files)]))
     window = _Window(state, scale)
     try:
@@ -219,6 +226,7 @@ class _Window:
 
     def release(self) -> None:
         """Close the window and free everything; the layout is saved."""
+        save_closed_panels(self.state.closed_panels)
         imgui.backends.opengl3_shutdown()
         imgui.backends.glfw_shutdown()
         imgui.destroy_context(self._imgui)
