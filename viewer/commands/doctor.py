@@ -28,7 +28,6 @@ _PACKAGES = (
     "platformdirs",
 )
 _WINDOW_SECONDS = 20
-_SOFTWARE = ("llvmpipe", "softpipe", "swrast")
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +104,7 @@ def _examine_devices() -> Iterator[Finding]:
 
 
 def _examine_drawing() -> Iterator[Finding]:
-    from viewer.rendering.context import headless_context
+    from viewer.rendering.context import headless_context, is_software
 
     try:
         context = headless_context()
@@ -120,7 +119,7 @@ def _examine_drawing() -> Iterator[Finding]:
         f"textures {info['GL_MAX_TEXTURE_SIZE']}, pictures "
         f"{min(info['GL_MAX_VIEWPORT_DIMS'])} pixels a side, {context.max_samples} samples a pixel",
     )
-    if any(name in info["GL_RENDERER"].lower() for name in _SOFTWARE):
+    if is_software(context):
         cure = "a graphics card needs its driver, and in a container access to /dev/dri"
         yield Finding("graphics", "note", "drawing is done in software", cure)
     context.release()
