@@ -18,6 +18,7 @@ out vec3 v_position;    // camera space
 out vec3 v_normal;      // camera space, any length
 out vec2 v_uv;
 out vec3 v_color;
+out float v_scalar;
 
 vec4 world_row(int row) {
     // upload.py's rows hold 256 matrices.
@@ -32,6 +33,7 @@ void main() {
     v_position = position.xyz;
     v_normal = u_normal_matrix * normal;
     v_uv = vec2(0.0);
+    v_scalar = 0.0;
     v_color = gl_InstanceID == u_selected ? u_highlight : in_color;
     gl_Position = u_projection * position;
 }

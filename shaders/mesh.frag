@@ -5,6 +5,7 @@ in vec3 v_position;
 in vec3 v_normal;
 in vec2 v_uv;
 in vec3 v_color;
+in float v_scalar;
 
 uniform bool u_flat;            // one normal per triangle
 uniform bool u_orthographic;

@@ -4,22 +4,27 @@
 in vec3 in_position;    // figure units, minus the posed centre
 in vec3 in_normal;      // unit length
 in vec2 in_uv;          // v = 0 at the bottom row of the texture
+in vec3 in_color;       // linear
+in float in_scalar;     // what a scalar view shows
 
 uniform mat4 u_model_view;     // to camera space
 uniform mat3 u_normal_matrix;  // its inverse transpose
 uniform mat4 u_projection;
+uniform bool u_has_colors;     // in_color counts
 uniform vec3 u_color;          // linear
 
 out vec3 v_position;    // camera space
 out vec3 v_normal;      // camera space, any length
 out vec2 v_uv;
 out vec3 v_color;
+out float v_scalar;
 
 void main() {
     vec4 position = u_model_view * vec4(in_position, 1.0);
     v_position = position.xyz;
     v_normal = u_normal_matrix * in_normal;
     v_uv = in_uv;
-    v_color = u_color;
+    v_color = u_has_colors ? in_color : u_color;
+    v_scalar = in_scalar;
     gl_Position = u_projection * position;
 }

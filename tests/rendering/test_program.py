@@ -114,7 +114,7 @@ def test_every_shading_mode_compiles(ctx, shading):
 @pytest.mark.parametrize("method", METHODS)
 def test_every_skinning_method_compiles(ctx, method):
     programs = Programs(ctx)
-    assert "u_palette" in programs.feedback("skin", method, VARYINGS)
+    assert "u_pairs" in programs.feedback("skin", method, VARYINGS)
     programs.release()
 
 

@@ -9,12 +9,17 @@ from viewer.rig.mesh import Mesh
 from viewer.rig.pose import rest_pose
 from viewer.rig.skin import skin_from_lists
 from viewer.rig.skinning import METHODS, deform
-from viewer.rig.skinning.lbs import blended_matrices, unit
-from viewer.rig.skinning.lbs import deform as skin_mesh
+from viewer.rig.skinning.lbs import blended_matrices
+from viewer.rig.skinning.lbs import deform as lbs
+from viewer.rig.vectors import unit
 
 RIGID = [matrix(turn_x(0.8), (1, 2, 3)), matrix(turn_z(-2.0), (-4, 0, 1)), np.eye(4)]
 PALETTE = np.array(RIGID)
 POINT = mesh([[1, 2, 3]], [[0.6, 0.0, 0.8]])
+
+
+def skin_mesh(shape, skin, palette):
+    return lbs(shape.positions, shape.normals, skin, palette)
 
 
 def skinned(pairs, palette=PALETTE):

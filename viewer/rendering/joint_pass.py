@@ -12,12 +12,14 @@ from viewer.rendering.program import Programs, set_uniforms
 from viewer.rendering.upload import buffer, matrix_texture, write_matrices
 from viewer.rendering.view import View, in_front, set_lights, set_model
 from viewer.rig.arrays import Bools, Floats
+from viewer.rig.figure import Figure
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.pose import Pose, pose_key, rest_pose
+from viewer.rig.pose import Pose, rest_pose, skinning_key
+from viewer.rig.shape import shaped
 from viewer.rig.skeleton import Skeleton
 
-__all__ = ["JointPass", "SkeletonBuffers", "joint_colors"]
+__all__ = ["JointPass", "SkeletonBuffers", "draw_boxes", "joint_colors"]
 
 _HIGHLIGHT = (1.0, 0.55, 0.02)  # linear
 _CUBE_SIZE = 0.015  # of a skeleton without boxes
@@ -40,12 +42,13 @@ def joint_colors(n_joints: int) -> Floats:
 
 
 class SkeletonBuffers:
-    """Boxes and colours of one skeleton's joints, and the matrices of one actor's pose."""
+    """Boxes and colours of one figure's joints, and the matrices of one actor's pose."""
 
-    def __init__(
-        self, context: moderngl.Context, skeleton: Skeleton, cube: moderngl.Buffer
-    ) -> None:
-        self.context, self.skeleton, self._cube = context, skeleton, cube
+    def __init__(self, context: moderngl.Context, figure: Figure, cube: moderngl.Buffer) -> None:
+        skeleton = figure.skeleton
+        assert skeleton is not None  # only figures with a skeleton come here
+        self.context, self.figure, self._cube = context, figure, cube
+        self.n_joints = skeleton.n_joints
         boxes = skeleton.boxes if skeleton.boxes is not None else _cubes(skeleton)
         self._boxes = boxes
         self._low = buffer(context, boxes[:, 0], "f4")
@@ -58,13 +61,15 @@ class SkeletonBuffers:
 
     def update(self, pose: Pose) -> None:
         """Upload the joints' matrices if the pose changed."""
-        key = pose_key(pose)
+        key = skinning_key(pose)
         if key == self._key:
             return
-        world = world_matrices(self.skeleton, pose)
+        skeleton = shaped(self.figure, pose.shape_weights).skeleton
+        assert skeleton is not None  # shaping keeps it
+        world = world_matrices(skeleton, pose)
         self.center = bounding_box(world[:, :3, 3]).mean(axis=0)
         world[:, :3, 3] -= self.center
-        if self.skeleton.n_joints > _CROWD:
+        if self.n_joints > _CROWD:
             world[self._hidden(world)] = 0.0
         write_matrices(self.world, world)
         self._key = key
@@ -144,34 +149,52 @@ class JointPass:
         overlays = opacity < 1.0
         view = in_front(view) if overlays else view
         program = self.programs.drawing("joint", "phong", fragment="mesh")
-        set_model(program, view, placement, skeleton.center)
-        set_lights(program, view, options.lights)
-        values = {
-            "u_world": _WORLD_UNIT,
-            "u_selected": selected,
-            "u_highlight": _HIGHLIGHT,
-            "u_flat": False,
-            "u_textured": False,
-            "u_opacity": opacity,
-        }
-        set_uniforms(program, values)
-        skeleton.world.use(_WORLD_UNIT)
-        array, count = skeleton.array(program), skeleton.skeleton.n_joints
+        array, count = skeleton.array(program), skeleton.n_joints
         if overlays:
             # Only the nearest boxes count: the others would show through them.
             target = self.context.fbo
             target.color_mask = False, False, False, False
             target.use()  # moderngl hands masks to OpenGL only then
-            array.render(moderngl.TRIANGLES, vertices=_CUBE_VERTICES, instances=count)
+        place = placement, skeleton.center, view, options, selected, opacity
+        draw_boxes(program, array, count, skeleton.world, *place)
+        if overlays:
             target.color_mask = True, True, True, True
             target.use()
             self.context.depth_func = "<="
-        array.render(moderngl.TRIANGLES, vertices=_CUBE_VERTICES, instances=count)
+            draw_boxes(program, array, count, skeleton.world, *place)
         self.context.depth_func = "<"
 
     def release(self) -> None:
         """Free the cube."""
         self.cube.release()
+
+
+def draw_boxes(
+    program: moderngl.Program,
+    array: moderngl.VertexArray,
+    count: int,
+    world: moderngl.Texture,
+    placement: Floats,
+    center: Floats,
+    view: View,
+    options: DisplayOptions,
+    selected: int = -1,
+    opacity: float = 1.0,
+) -> None:
+    """Draw instances of the cube, each by its own matrix of ``world``."""
+    set_model(program, view, placement, center)
+    set_lights(program, view, options.lights)
+    values = {
+        "u_world": _WORLD_UNIT,
+        "u_selected": selected,
+        "u_highlight": _HIGHLIGHT,
+        "u_flat": False,
+        "u_textured": False,
+        "u_opacity": opacity,
+    }
+    set_uniforms(program, values)
+    world.use(_WORLD_UNIT)
+    array.render(moderngl.TRIANGLES, vertices=_CUBE_VERTICES, instances=count)
 
 
 def _cubes(skeleton: Skeleton) -> Floats:

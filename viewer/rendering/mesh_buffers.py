@@ -1,31 +1,26 @@
-"""A figure's mesh and skin on the GPU: uploaded once, never changed."""
+"""A figure's mesh and skin on the GPU: uploaded when first needed, never changed."""
 
 from __future__ import annotations
 
 import moderngl
 import numpy as np
 
-from viewer.rendering.upload import buffer, pair_texture, picture_texture
-from viewer.rig.arrays import Floats
+from viewer.rendering.index_sets import IndexSet, index_set, kept_triangles
+from viewer.rendering.part_colors import part_colors
+from viewer.rendering.skin_buffers import SkinBuffers
+from viewer.rendering.upload import buffer, float32, offset_texture, picture_texture
+from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
-from viewer.rig.mesh import bounding_box
-from viewer.rig.skin import has_influence, weight_sums
+from viewer.rig.mesh import bounding_box, split_seams
+from viewer.rig.skinning import Skinning, skin_used
 
-__all__ = ["MeshBuffers", "MeshRun"]
-
-
-class MeshRun:
-    """Consecutive triangles with one material: first index, number of indices, its texture."""
-
-    __slots__ = ("count", "first", "texture")
-
-    def __init__(self, first: int, count: int, texture: moderngl.Texture | None) -> None:
-        self.first, self.count, self.texture = first, count, texture
+__all__ = ["MeshBuffers"]
 
 
 class MeshBuffers:
     """Rest vertices, triangle indices, influences and textures of one figure.
 
+    Along seams a vertex is uploaded once per texture coordinate: these are the split vertices.
     Positions are stored relative to the middle of the mesh: float32 then spends its digits on
     the figure's shape, however far from the origin it stands.
 
@@ -42,56 +37,102 @@ class MeshBuffers:
     ----------
     center : (3,)
         What was subtracted, figure space.
-    joint_shares : (J,)
-        Each joint's part in all weights: their mean motion is that of the figure.
+    sources : (R,) int32
+        The figure's vertex of each split vertex.
+    copies : (V,) int32
+        A split vertex of each of the figure's.
     """
 
     def __init__(self, context: moderngl.Context, figure: Figure, notes: list[str]) -> None:
         mesh = figure.mesh
         assert mesh is not None  # only figures with a mesh come here
-        self.figure = figure
-        self.n_vertices = mesh.n_vertices
+        self.context, self.figure = context, figure
+        self.sources, uv_indices, self.triangles = split_seams(mesh)
+        self.n_vertices = len(self.sources)
+        self.copies: Ints = np.empty(mesh.n_vertices, dtype=np.int32)
+        self.copies[self.sources] = np.arange(self.n_vertices)
         self.center: Floats = bounding_box(mesh.positions).mean(axis=0)
-        self.positions = buffer(context, mesh.positions - self.center, "f4")
-        self.normals = buffer(context, mesh.normals, "f4")
-        self.uvs = None if mesh.uvs is None else buffer(context, mesh.uvs, "f4")
-        self.indices = buffer(context, mesh.triangles, "u4")
-        self._upload_influences(context, figure)
+        self.positions = self.upload(mesh.positions - self.center)
+        self.normals = self.upload(mesh.normals)
+        self.uvs = None if mesh.uvs is None else buffer(context, mesh.uvs[uv_indices], "f4")
+        self.source_ids = buffer(context, self.sources, "i4")
         self._textures = [
-            None if material.image is None else picture_texture(context, material.image, notes)
+            None
+            if material.image is None or self.uvs is None
+            else picture_texture(context, material.image, notes)
             for material in mesh.materials
         ]
-        self.runs = self._runs(mesh.material_indices)
+        self._index_sets: dict[tuple[bool, tuple[int, ...]], IndexSet] = {}
+        self._skins: dict[tuple[int, bool], SkinBuffers] = {}
+        self._colors: moderngl.Buffer | None = None
+        self._offsets: moderngl.Texture | None = None
+        self._product: np.ndarray | None = None
+        self.index_set(False, ())
+        self.skin(Skinning())
 
-    def _upload_influences(self, context: moderngl.Context, figure: Figure) -> None:
-        skin = figure.skin
-        if skin is None:
-            self.joint_shares = np.zeros(0)
-            ranges, self.pairs = np.zeros((self.n_vertices, 2)), pair_texture(context, [], [])
-            excess = np.zeros(self.n_vertices)
+    def upload(self, rows: Floats) -> moderngl.Buffer:
+        """Return a buffer with one row of (V, 3) for every split vertex."""
+        return buffer(self.context, rows[self.sources], "f4")
+
+    def index_set(self, reduced: bool, hidden: tuple[int, ...]) -> IndexSet:
+        """Return the triangles of the full or the reduced mesh, without hidden body parts."""
+        reduced = reduced and self.figure.reduced is not None
+        key = (reduced, hidden)
+        if key not in self._index_sets:
+            self._index_sets[key] = self._make_index_set(reduced, hidden)
+        return self._index_sets[key]
+
+    def _make_index_set(self, reduced: bool, hidden: tuple[int, ...]) -> IndexSet:
+        mesh, coarse = self.figure.mesh, self.figure.reduced
+        assert mesh is not None
+        if reduced and coarse is not None:
+            of_figure = coarse.vertices[coarse.triangles]
+            split, materials = self.copies[of_figure], np.full(len(of_figure), -1, dtype=np.int32)
         else:
-            counts = np.where(has_influence(skin), np.diff(skin.starts), 0)
-            ranges = np.stack([skin.starts[:-1], counts], axis=1)
-            self.pairs = pair_texture(context, skin.joints, skin.weights)
-            sums = np.bincount(skin.joints, np.abs(skin.weights), minlength=skin.n_joints)
-            self.joint_shares = sums / (sums.sum() or 1.0)
-            # Summed in float64: in float32 even thirds miss 1, which far away moves a vertex.
-            excess = weight_sums(skin) - 1.0
-        self.influences = buffer(context, ranges, "u4")
-        self.excess = buffer(context, excess, "f4")
+            of_figure, split, materials = mesh.triangles, self.triangles, mesh.material_indices
+        kept = kept_triangles(self.figure, hidden, of_figure)
+        return index_set(self.context, split[kept], materials[kept], self._textures)
 
-    def _runs(self, materials: np.ndarray) -> list[MeshRun]:
-        edges = np.flatnonzero(np.diff(materials)) + 1
-        runs = []
-        for first, last in zip([0, *edges], [*edges, len(materials)], strict=True):
-            index = int(materials[first]) if len(materials) else -1
-            texture = None if index < 0 or self.uvs is None else self._textures[index]
-            runs.append(MeshRun(3 * int(first), 3 * int(last - first), texture))
-        return runs
+    def skin(self, skinning: Skinning) -> SkinBuffers:
+        """Return the influences that count."""
+        key = (skinning.max_influences, skinning.normalize)
+        if key not in self._skins:
+            skin = self.figure.skin
+            used = None if skin is None else skin_used(skin, skinning)
+            self._skins[key] = SkinBuffers(self.context, used, self.sources)
+        return self._skins[key]
+
+    @property
+    def colors(self) -> moderngl.Buffer | None:
+        """A colour for every split vertex by its body part; None if the figure has no parts."""
+        parts = self.figure.body_parts
+        if self._colors is None and parts is not None:
+            self._colors = self.upload(part_colors(len(parts.names))[parts.of_vertex])
+        return self._colors
+
+    @property
+    def offsets(self) -> moderngl.Texture:
+        """The pose correctives as a texture, for drivers that sum them in the shader."""
+        if self._offsets is None:
+            correctives = self.figure.correctives
+            assert correctives is not None  # the caller looked
+            self._offsets = offset_texture(self.context, correctives.values())
+        return self._offsets
+
+    @property
+    def product(self) -> np.ndarray:
+        """The pose correctives as float32, (P, 3 V), for drivers that want them summed here."""
+        if self._product is None:
+            correctives = self.figure.correctives
+            assert correctives is not None  # the caller looked
+            values = correctives.values()
+            self._product = float32(values.reshape(len(values), -1))
+        return self._product
 
     def release(self) -> None:
         """Free every buffer and texture."""
-        owned = [self.positions, self.normals, self.uvs, self.indices]
-        for item in [*owned, self.influences, self.excess, self.pairs, *self._textures]:
+        owned = [self.positions, self.normals, self.uvs, self.source_ids, self._colors]
+        owned += [kept.indices for kept in self._index_sets.values()]
+        for item in [*owned, *self._textures, self._offsets, *self._skins.values()]:
             if item is not None:
                 item.release()

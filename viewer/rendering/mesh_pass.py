@@ -7,9 +7,12 @@ from typing import Any
 import moderngl
 import numpy as np
 
+from viewer.rendering.colormap import colormap
+from viewer.rendering.index_sets import IndexSet
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.program import Programs, set_uniforms
 from viewer.rendering.skin_pass import PosedMesh
+from viewer.rendering.upload import picture_texture
 from viewer.rendering.view import View, set_lights, set_model
 from viewer.rig.arrays import Floats
 
@@ -19,7 +22,7 @@ SKIN_COLOR = (0.62, 0.60, 0.57)  # linear
 _EDGE_COLOR = (0.05, 0.07, 0.10, 0.55)  # sRGB and alpha
 _NORMAL_COLOR = (0.10, 0.75, 0.85, 1.0)
 _NORMAL_LENGTH = 0.02  # of the figure's size
-_TEXTURE_UNIT = 2
+_TEXTURE_UNIT, _COLORMAP_UNIT = 2, 3
 
 
 class MeshPass:
@@ -35,7 +38,8 @@ class MeshPass:
 
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
         self.context, self.programs = context, programs
-        self._arrays: dict[tuple[int, int], tuple[PosedMesh, moderngl.VertexArray]] = {}
+        self._arrays: dict[tuple[int, int, int], tuple[PosedMesh, moderngl.VertexArray]] = {}
+        self._colormap = picture_texture(context, colormap()[None], [])
 
     def draw(self, mesh: PosedMesh, placement: Floats, view: View, options: DisplayOptions) -> None:
         """Draw the surface.
@@ -60,27 +64,35 @@ class MeshPass:
             "u_opacity": 1.0,
             "u_has_uv": mesh.mesh.uvs is not None,
             "u_texture": _TEXTURE_UNIT,
+            "u_has_colors": options.shading == "parts" and mesh.mesh.colors is not None,
+            "u_scalar_range": mesh.scalars.shown,
+            "u_colormap": _COLORMAP_UNIT,
         }
         set_uniforms(program, values)
-        array = self._array(mesh, program)
-        self._draw_runs(mesh, array, options.texture)
+        if options.shading == "scalar":
+            self._colormap.use(_COLORMAP_UNIT)
+        indices = mesh.mesh.index_set(options.reduced, options.hidden_parts)
+        self._draw_runs(self._array(mesh, program, indices), indices, options.texture)
 
-    def _draw_runs(self, mesh: PosedMesh, array: moderngl.VertexArray, textured: bool) -> None:
+    def _draw_runs(self, array: moderngl.VertexArray, indices: IndexSet, textured: bool) -> None:
         program = array.program
-        for run in mesh.mesh.runs:
+        for run in indices.runs:
             has_texture = textured and run.texture is not None
             set_uniforms(program, {"u_textured": has_texture})
             if has_texture and run.texture is not None:
                 run.texture.use(_TEXTURE_UNIT)
             array.render(moderngl.TRIANGLES, vertices=run.count, first=run.first)
 
-    def draw_edges(self, mesh: PosedMesh, placement: Floats, view: View) -> None:
+    def draw_edges(
+        self, mesh: PosedMesh, placement: Floats, view: View, options: DisplayOptions
+    ) -> None:
         """Draw every triangle's edges over its surface."""
         program = self.programs.drawing("edge", fragment="line")
         set_model(program, view, placement, mesh.center)
         program["u_line_color"] = _premultiplied(_EDGE_COLOR)
         self.context.wireframe = True
-        self._array(mesh, program).render(moderngl.TRIANGLES)
+        indices = mesh.mesh.index_set(options.reduced, options.hidden_parts)
+        self._array(mesh, program, indices).render(moderngl.TRIANGLES)
         self.context.wireframe = False
 
     def draw_normals(self, mesh: PosedMesh, placement: Floats, view: View, size: float) -> None:
@@ -89,23 +101,30 @@ class MeshPass:
         set_model(program, view, placement, mesh.center)
         program["u_line_color"] = _premultiplied(_NORMAL_COLOR)
         program["u_length"] = _NORMAL_LENGTH * size
-        key = (id(mesh), id(program))
+        key = (id(mesh), id(program), 0)
         if key not in self._arrays:
             content = [(mesh.posed, "3f4 3f4/i", "in_position", "in_normal")]
             self._arrays[key] = (mesh, self.context.vertex_array(program, content))
         instances = mesh.mesh.n_vertices
         self._arrays[key][1].render(moderngl.LINES, vertices=2, instances=instances)
 
-    def _array(self, mesh: PosedMesh, program: moderngl.Program) -> moderngl.VertexArray:
+    def _array(
+        self, mesh: PosedMesh, program: moderngl.Program, indices: IndexSet
+    ) -> moderngl.VertexArray:
         """Return the mesh's vertex array for a program, with what the compiler kept."""
-        key = (id(mesh), id(program))
+        key = (id(mesh), id(program), id(indices))
         if key not in self._arrays:
             content: list[Any] = [(mesh.posed, "3f4 12x", "in_position")]
             if "in_normal" in program:
                 content = [(mesh.posed, "3f4 3f4", "in_position", "in_normal")]
-            if "in_uv" in program and mesh.mesh.uvs is not None:
-                content.append((mesh.mesh.uvs, "2f4", "in_uv"))
-            array = self.context.vertex_array(program, content, index_buffer=mesh.mesh.indices)
+            for values, layout, name in (
+                (mesh.mesh.uvs, "2f4", "in_uv"),
+                (mesh.mesh.colors, "3f4", "in_color"),
+                (mesh.scalars.values, "f4", "in_scalar"),
+            ):
+                if name in program and values is not None:
+                    content.append((values, layout, name))
+            array = self.context.vertex_array(program, content, index_buffer=indices.indices)
             self._arrays[key] = (mesh, array)
         return self._arrays[key][1]
 
@@ -119,6 +138,7 @@ class MeshPass:
         for _, array in self._arrays.values():
             array.release()
         self._arrays.clear()
+        self._colormap.release()
 
 
 def _premultiplied(color: tuple[float, float, float, float]) -> tuple[float, ...]:

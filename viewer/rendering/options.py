@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from viewer.rig.skinning import Skinning
+
 __all__ = ["BACKGROUNDS", "SHOWN", "Color", "DisplayOptions", "Light", "Lights"]
 
 Color = tuple[float, float, float]
@@ -87,6 +89,16 @@ class DisplayOptions:
         Multisampling; the driver's maximum if that is smaller.
     lights : Lights
         The two lights.
+    skinning : Skinning
+        How joints move the mesh.
+    scalar : str
+        A key of ``viewer.rig.scalars.SCALARS``: what the shading ``"scalar"`` shows.
+    reduced : bool
+        Draw the coarser mesh of figures that have one.
+    keypoints : bool
+        Draw the figure's keypoints as markers.
+    hidden_parts : tuple of int
+        Body parts that are left out.
     """
 
     show: str = "skin"
@@ -101,3 +113,8 @@ class DisplayOptions:
     skeleton_opacity: float = 0.35
     samples: int = 4
     lights: Lights = field(default_factory=Lights)
+    skinning: Skinning = field(default_factory=Skinning)
+    scalar: str = "cut"
+    reduced: bool = False
+    keypoints: bool = False
+    hidden_parts: tuple[int, ...] = ()

@@ -16,9 +16,12 @@ SHADING = {
     "phong": "Blinn-Phong, two lights",
     "normals": "Normals as colours",
     "checker": "UV checker",
+    "parts": "Body parts as colours",
+    "scalar": "Numbers as colours",
 }
 """Chunks in ``shaders/shade``, with the name that menus show."""
 
+_NEEDS = re.compile(r"^#pragma needs ([\w ]+)\n")
 _CHUNK_MARK = re.compile(r"^#pragma chunk\s*$", re.MULTILINE)
 _LINES_PER_FILE = 10_000
 _PLACE = re.compile(r"(?:ERROR:\s*)?\b\d+[:(](\d+)\)?(?:\(\d+\))?\s*:\s*")
@@ -128,15 +131,29 @@ def _compose(name: str, chunk: str, files: list[str]) -> str:
     text = resource("shaders", name).read_text("utf-8")
     if not chunk:
         return _number_lines(text, base)
-    folder = "skin" if name.endswith(".vert") else "shade"
-    files.append(f"{folder}/{chunk}.glsl")
-    inner = resource("shaders", folder, f"{chunk}.glsl").read_text("utf-8")
     mark = _CHUNK_MARK.search(text)
     assert mark is not None  # every shader that takes a chunk has the mark
-    after = text[: mark.end()].count("\n") + 2
-    inside, behind = (base + 1) * _LINES_PER_FILE + 1, base * _LINES_PER_FILE + after
+    folder = "skin" if name.endswith(".vert") else "shade"
+    inner = _chunk(folder, chunk, files)
+    behind = base * _LINES_PER_FILE + text[: mark.end()].count("\n") + 2
     head = _number_lines(text[: mark.start()], base)
-    return f"{head}#line {inside}\n{inner}\n#line {behind}{text[mark.end() :]}"
+    return f"{head}{inner}#line {behind}{text[mark.end() :]}"
+
+
+def _chunk(folder: str, chunk: str, files: list[str]) -> str:
+    """Return a chunk's text; what it needs comes first, its function renamed after its file."""
+    inner = resource("shaders", folder, f"{chunk}.glsl").read_text("utf-8")
+    needs = _NEEDS.match(inner)
+    parts = []
+    for name in needs[1].split() if needs else []:
+        parts.append(f"#define {folder} {folder}_{name}\n")
+        parts.append(_chunk(folder, name, files))
+        parts.append(f"#undef {folder}\n")
+    if needs:
+        inner = f"\n{inner[needs.end() :]}"  # the line stays, so that lines count right
+    parts.append(f"#line {len(files) * _LINES_PER_FILE + 1}\n{inner}\n")
+    files.append(f"{folder}/{chunk}.glsl")
+    return "".join(parts)
 
 
 def _number_lines(text: str, file: int) -> str:

@@ -7,6 +7,7 @@ import moderngl
 from viewer.rendering.camera import Camera
 from viewer.rendering.ground_pass import GroundPass
 from viewer.rendering.joint_pass import JointPass, SkeletonBuffers
+from viewer.rendering.keypoint_pass import KeypointBuffers, KeypointPass
 from viewer.rendering.mesh_buffers import MeshBuffers
 from viewer.rendering.mesh_pass import MeshPass
 from viewer.rendering.options import DisplayOptions
@@ -17,6 +18,7 @@ from viewer.rendering.view import View, view_of
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import bounding_box, box_size
+from viewer.rig.pose import placement_matrix
 from viewer.rig.scene import Actor, Scene
 
 __all__ = ["Renderer"]
@@ -42,10 +44,12 @@ class Renderer:
         self.programs = Programs(context)
         self.mesh_pass = MeshPass(context, self.programs)
         self.joint_pass = JointPass(context, self.programs)
+        self.keypoint_pass = KeypointPass(self.joint_pass)
         self.ground_pass = GroundPass(context, self.programs)
         self._meshes: dict[int, MeshBuffers] = {}
         self._posed: dict[int, tuple[Actor, PosedMesh]] = {}
         self._skeletons: dict[int, tuple[Actor, SkeletonBuffers]] = {}
+        self._keypoints: dict[int, tuple[Actor, KeypointBuffers]] = {}
 
     def draw(
         self,
@@ -96,6 +100,9 @@ class Renderer:
         for actor, joint in skeletons:
             if _shows_mesh(actor.figure, options):
                 self._draw_skeleton(actor, view, options, joint, options.skeleton_opacity)
+        if options.keypoints and options.show != "binding":
+            for actor in scene.actors:
+                self._draw_keypoints(actor, view, options)
 
     def prepare(self, scene: Scene) -> None:
         """Upload what a scene needs, so that a refusal comes before the old scene is given up.
@@ -125,7 +132,10 @@ class Renderer:
         for actor in scene.actors:
             if actor.visible and _shows_mesh(actor.figure, options):
                 mesh = self.posed_mesh(actor)
-                mesh.update(None if options.show == "binding" else actor.pose)
+                pose = None if options.show == "binding" else actor.pose
+                mesh.update(pose, options.skinning)
+                if options.shading == "scalar":
+                    mesh.scalars.update(options.scalar, pose, options.skinning)
                 meshes.append((actor, mesh))
         return meshes
 
@@ -134,14 +144,15 @@ class Renderer:
     ) -> None:
         if options.cull:
             self.context.enable(moderngl.CULL_FACE)
-        self.mesh_pass.draw(mesh, actor.placement, view, options)
+        placement = _placement(actor, options)
+        self.mesh_pass.draw(mesh, placement, view, options)
         self.context.disable(moderngl.CULL_FACE)
         self.context.depth_func = "<="
         if options.wireframe:
-            self.mesh_pass.draw_edges(mesh, actor.placement, view)
+            self.mesh_pass.draw_edges(mesh, placement, view, options)
         if options.normals and actor.figure.mesh is not None:
             size = box_size(bounding_box(actor.figure.mesh.positions))
-            self.mesh_pass.draw_normals(mesh, actor.placement, view, size)
+            self.mesh_pass.draw_normals(mesh, placement, view, size)
         self.context.depth_func = "<"
 
     def _draw_skeleton(
@@ -155,7 +166,19 @@ class Renderer:
         assert actor.pose is not None  # whoever has a skeleton has a pose
         skeleton = self._skeleton(actor)
         skeleton.update(actor.pose)
-        self.joint_pass.draw(skeleton, actor.placement, view, options, selected, opacity)
+        placement = _placement(actor, options)
+        self.joint_pass.draw(skeleton, placement, view, options, selected, opacity)
+
+    def _draw_keypoints(self, actor: Actor, view: View, options: DisplayOptions) -> None:
+        if actor.pose is None or actor.figure.keypoints is None or not actor.visible:
+            return
+        if id(actor) not in self._keypoints:
+            points = KeypointBuffers(self.context, actor.figure, self.joint_pass.cube)
+            self._keypoints[id(actor)] = (actor, points)
+        points = self._keypoints[id(actor)][1]
+        points.update(actor.pose, options.skinning)
+        # The markers' place is part of their positions.
+        self.keypoint_pass.draw(points, actor.placement, view, options)
 
     def posed_mesh(self, actor: Actor) -> PosedMesh:
         """Return an actor's posed buffer, made on first use; the figure's mesh must exist."""
@@ -170,7 +193,7 @@ class Renderer:
     def _skeleton(self, actor: Actor) -> SkeletonBuffers:
         if id(actor) not in self._skeletons:
             assert actor.figure.skeleton is not None  # the caller looked
-            skeleton = SkeletonBuffers(self.context, actor.figure.skeleton, self.joint_pass.cube)
+            skeleton = SkeletonBuffers(self.context, actor.figure, self.joint_pass.cube)
             self._skeletons[id(actor)] = (actor, skeleton)
         return self._skeletons[id(actor)][1]
 
@@ -188,6 +211,8 @@ class Renderer:
             mesh.release()
         for key in [key for key in self._skeletons if key not in present]:
             self._skeletons.pop(key)[1].release()
+        for key in [key for key in self._keypoints if key not in present]:
+            self._keypoints.pop(key)[1].release()
         figures = {id(actor.figure) for actor in scene.actors}
         for key in [key for key in self._meshes if key not in figures]:
             self._meshes.pop(key).release()
@@ -207,3 +232,10 @@ def _shows_skeleton(actor: Actor, options: DisplayOptions) -> bool:
     figure = actor.figure
     wanted = options.show in ("skeleton", "both") or figure.mesh is None
     return actor.visible and figure.skeleton is not None and wanted
+
+
+def _placement(actor: Actor, options: DisplayOptions) -> Floats:
+    """Return where an actor stands: its placement, then that of its pose."""
+    if actor.pose is None or options.show == "binding":
+        return actor.placement
+    return actor.placement @ placement_matrix(actor.pose)

@@ -12,15 +12,23 @@ import numpy as np
 from viewer.rendering.context import check_errors
 from viewer.rendering.mesh_buffers import MeshBuffers
 from viewer.rendering.program import Programs, set_uniforms
-from viewer.rendering.upload import matrix_texture, write_matrices
+from viewer.rendering.rest_buffers import RestBuffers
+from viewer.rendering.scalar_buffer import ScalarBuffer
+from viewer.rendering.skin_buffers import SkinBuffers
+from viewer.rendering.upload import matrix_texture, rigid_texture, write_matrices, write_rigid
 from viewer.rig.arrays import Floats
+from viewer.rig.figure import Figure
 from viewer.rig.kinematics import skinning_matrices, world_matrices
-from viewer.rig.pose import Pose, pose_key
+from viewer.rig.pose import Pose, skinning_key
+from viewer.rig.shape import shaped
+from viewer.rig.skin import bind_positions
+from viewer.rig.skinning import Skinning
+from viewer.rig.skinning.dqs import split_palette
 
 __all__ = ["PosedMesh"]
 
 _BYTES_PER_VERTEX = 24  # position and normal, three float32 each
-_PALETTE_UNIT, _PAIRS_UNIT = 0, 1
+_PALETTE_UNIT, _PAIRS_UNIT, _RIGID_UNIT, _LIST_UNIT, _OFFSETS_UNIT = range(5)
 
 
 class PosedMesh:
@@ -34,94 +42,139 @@ class PosedMesh:
         Gives the skinning program.
     mesh : MeshBuffers
         Shared with all actors of the figure.
+    way : str
+        How pose correctives are summed, see ``rest_buffers``.
 
     Attributes
     ----------
     posed : moderngl.Buffer
-        V rows of position (relative to ``center``) and unit normal.
+        A row of position (relative to ``center``) and unit normal for every split vertex.
     center : (3,)
         Add it to the positions for figure space; it is part of the model matrix.
+    scalars : ScalarBuffer
+        The numbers of a scalar view, computed when one is shown.
     """
 
-    def __init__(self, context: moderngl.Context, programs: Programs, mesh: MeshBuffers) -> None:
+    def __init__(
+        self, context: moderngl.Context, programs: Programs, mesh: MeshBuffers, way: str = ""
+    ) -> None:
         self.context, self.programs, self.mesh = context, programs, mesh
         size = _BYTES_PER_VERTEX * mesh.n_vertices
         self.posed = context.buffer(reserve=size)
         check_errors(context, f"a posed mesh of {size / 1e6:.1f} MB")
         self.center: Floats = mesh.center
         skin = mesh.figure.skin
-        self._palette = matrix_texture(context, skin.n_joints if skin else 0)
-        self._arrays: dict[str, moderngl.VertexArray] = {}
+        self._n_joints = skin.n_joints if skin else 0
+        self._palette = matrix_texture(context, self._n_joints)
+        self._rigid: moderngl.Texture | None = None
+        self._rest = RestBuffers(context, mesh, way)
+        self.scalars = ScalarBuffer(context, mesh)
+        self._arrays: dict[tuple[object, ...], moderngl.VertexArray] = {}
         self._key: tuple[object, ...] | None = None
         self.n_updates = 0
 
-    def update(self, pose: Pose | None, method: str = "lbs") -> None:
+    def update(self, pose: Pose | None, skinning: Skinning | str = "lbs") -> None:
         """Skin the mesh if pose or method changed since the last call.
 
         Parameters
         ----------
         pose : Pose or None
             None leaves the mesh in its binding space.
-        method : str
-            A key of ``viewer.rig.skinning.METHODS``.
+        skinning : Skinning or str
+            How, or a key of ``viewer.rig.skinning.METHODS`` alone.
         """
+        how = Skinning(skinning) if isinstance(skinning, str) else skinning
         attached = self.mesh.figure.is_attached and pose is not None
-        key = (method, *pose_key(pose)) if attached and pose is not None else ("binding",)
+        key = (*_skinning_words(how), *skinning_key(pose)) if attached and pose else ("binding",)
         if key == self._key:
             return
-        array = self._array(method)
-        program = array.program
         self.center = self.mesh.center
+        skin = self.mesh.skin(how)
         if attached and pose is not None:
-            self._write_palette(pose)
+            figure = shaped(self.mesh.figure, pose.shape_weights)
+            self._rest.update(figure, pose, how.correctives)
+            self._write_palette(figure, pose, how, skin)
+        self._run(skin, how, bool(attached))
+        self._key = key
+        self.n_updates += 1
+
+    def _run(self, skin: SkinBuffers, how: Skinning, attached: bool) -> None:
+        array = self._array(how.method, skin, attached)
         values = {
             "u_attached": attached,
             "u_rest_shift": tuple(self.mesh.center - self.center),
             "u_center": tuple(self.center),
+            "u_share": how.share,
+            "u_n_offsets": self._rest.n_offsets if attached else 0,
+            "u_n_sources": len(self.mesh.copies),
             "u_palette": _PALETTE_UNIT,
             "u_pairs": _PAIRS_UNIT,
+            "u_rigid": _RIGID_UNIT,
+            "u_offset_list": _LIST_UNIT,
+            "u_offsets": _OFFSETS_UNIT,
         }
-        set_uniforms(program, values)
+        set_uniforms(array.program, values)
         self._palette.use(_PALETTE_UNIT)
-        self.mesh.pairs.use(_PAIRS_UNIT)
+        skin.pairs.use(_PAIRS_UNIT)
+        if self._rigid is not None:
+            self._rigid.use(_RIGID_UNIT)
+        self._rest.use(_LIST_UNIT, _OFFSETS_UNIT)
         array.transform(self.posed, mode=moderngl.POINTS, vertices=self.mesh.n_vertices)
-        self._key = key
-        self.n_updates += 1
 
-    def _write_palette(self, pose: Pose) -> None:
+    def _write_palette(
+        self, figure: Figure, pose: Pose, how: Skinning, buffers: SkinBuffers
+    ) -> None:
         """Upload T(-center') M T(center): the shader sees small numbers on both sides."""
-        figure = self.mesh.figure
-        assert figure.skeleton is not None and figure.skin is not None  # the caller looked
-        palette = skinning_matrices(world_matrices(figure.skeleton, pose), figure.skin.inverse_bind)
+        skeleton, skin = figure.skeleton, figure.skin
+        assert skeleton is not None and skin is not None  # the caller looked
+        palette = skinning_matrices(world_matrices(skeleton, pose), skin.inverse_bind)
         palette[:, :3, 3] += palette[:, :3, :3] @ self.mesh.center
-        if self.mesh.joint_shares.any():
-            self.center = self.mesh.joint_shares @ palette[:, :3, 3]
+        if buffers.joint_shares.any():
+            self.center = buffers.joint_shares @ palette[:, :3, 3]
         palette[:, :3, 3] -= self.center
-        write_matrices(self._palette, palette)
+        if how.method != "dqs":
+            write_matrices(self._palette, palette)
+        if how.method != "lbs":
+            self._rigid = self._rigid or rigid_texture(self.context, self._n_joints)
+            centers = bind_positions(skin) - self.mesh.center
+            write_rigid(self._rigid, *split_palette(palette, centers))
 
-    def _array(self, method: str) -> moderngl.VertexArray:
-        if method not in self._arrays:
+    def _array(self, method: str, skin: SkinBuffers, attached: bool) -> moderngl.VertexArray:
+        mesh, rest = self.mesh, self._rest
+        positions = rest.positions if attached else mesh.positions
+        normals = rest.normals if attached else mesh.normals
+        key = (method, id(skin), id(positions))
+        if key not in self._arrays:
             program = self.programs.feedback("skin", method, ("v_position", "v_normal"))
-            mesh = self.mesh
             attributes = [
-                (mesh.positions, "3f4", "in_position"),
-                (mesh.normals, "3f4", "in_normal"),
-                (mesh.influences, "2u4", "in_influences"),
-                (mesh.excess, "f4", "in_excess"),
+                (positions, "3f4", "in_position"),
+                (normals, "3f4", "in_normal"),
+                (skin.influences, "2u4", "in_influences"),
+                (skin.excess, "f4", "in_excess"),
+                (mesh.source_ids, "i4", "in_source"),
             ]
-            self._arrays[method] = self.context.vertex_array(
+            self._arrays[key] = self.context.vertex_array(
                 program, [item for item in attributes if item[2] in program]
             )
-        return self._arrays[method]
+        return self._arrays[key]
 
     def read(self) -> tuple[Floats, Floats]:
-        """Return what was drawn last: positions in figure space and normals, (V, 3) each."""
+        """Return what was drawn last: positions in figure space and normals, (V, 3) each.
+
+        Of the split vertices only one copy each; the place of the pose is not applied.
+        """
         rows = np.frombuffer(self.posed.read(), dtype="f4").reshape(-1, 6).astype(np.float64)
+        rows = rows[self.mesh.copies]
         return rows[:, :3] + self.center, rows[:, 3:]
 
     def release(self) -> None:
         """Free what belongs to this actor alone."""
         for array in self._arrays.values():
             array.release()
-        self.posed.release()
-        self._palette.release()
+        for item in (self.posed, self._palette, self._rigid, self._rest, self.scalars):
+            if item is not None:
+                item.release()
+
+
+def _skinning_words(how: Skinning) -> tuple[object, ...]:
+    return (how.method, how.share, how.max_influences, how.normalize, how.correctives)

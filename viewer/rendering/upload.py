@@ -16,16 +16,24 @@ from viewer.rig.arrays import Bytes, Floats
 __all__ = [
     "as_uniform",
     "buffer",
+    "float32",
     "matrix_rows",
     "matrix_texture",
+    "offset_texture",
     "pair_texture",
     "picture_texture",
+    "rigid_texture",
     "write_matrices",
+    "write_pairs",
+    "write_rigid",
 ]
 
-# Every driver takes textures 1024 wide; the shaders count on these two.
+# Every driver takes textures 1024 wide, and those with OpenGL 3.3 4096; the shaders count on
+# these.
 _MATRICES_PER_ROW = 256  # three texels each
 _PAIRS_PER_ROW = 1024
+_OFFSETS_PER_ROW = 4096
+_RIGID_PER_ROW = 128  # five texels each
 _SRGB8_ALPHA8 = 0x8C43
 
 
@@ -35,6 +43,11 @@ def buffer(context: moderngl.Context, values: Any, dtype: str) -> moderngl.Buffe
     result = context.buffer(data)
     check_errors(context, f"a mesh buffer of {len(data) / 1e6:.1f} MB")
     return result
+
+
+def float32(values: Floats) -> NDArray[np.float32]:
+    """Return the same numbers as float32, in row order."""
+    return np.ascontiguousarray(values, dtype=np.float32)
 
 
 def as_uniform(matrix: NDArray[np.floating]) -> bytes:
@@ -60,16 +73,48 @@ def write_matrices(texture: moderngl.Texture, matrices: Floats) -> None:
     texture.write(matrix_rows(matrices))
 
 
-def pair_texture(context: moderngl.Context, joints: Any, weights: Any) -> moderngl.Texture:
-    """Return a texture of (joint, weight) pairs, one texel each."""
-    height = _height(len(joints), _PAIRS_PER_ROW)
-    pairs = np.zeros((height * _PAIRS_PER_ROW, 2), "f4")
-    # float32 holds every joint index below 2^24 exactly.
-    pairs[: len(joints), 0] = joints
-    pairs[: len(joints), 1] = weights
-    texture = _data_texture(context, (_PAIRS_PER_ROW, height), 2, f"{len(joints)} influences")
+def rigid_texture(context: moderngl.Context, count: int) -> moderngl.Texture:
+    """Return an empty texture for ``count`` joints' dual quaternions and stretches."""
+    size = (5 * _RIGID_PER_ROW, _height(count, _RIGID_PER_ROW))
+    return _data_texture(context, size, 4, f"{count} joints")
+
+
+def write_rigid(texture: moderngl.Texture, duals: Floats, stretches: Floats) -> None:
+    """Upload (J, 8) dual quaternions and (J, 3, 4) stretches, five texels a joint."""
+    rows = np.zeros((_height(len(duals), _RIGID_PER_ROW) * _RIGID_PER_ROW, 5, 4), "f4")
+    rows[: len(duals), :2] = duals.reshape(-1, 2, 4)
+    rows[: len(duals), 2:] = stretches
+    texture.write(rows.tobytes())
+
+
+def pair_texture(context: moderngl.Context, indices: Any, weights: Any) -> moderngl.Texture:
+    """Return a texture of (index, weight) pairs, one texel each."""
+    count = len(indices)
+    height = _height(count, _PAIRS_PER_ROW)
+    texture = _data_texture(context, (_PAIRS_PER_ROW, height), 2, f"{count} influences")
+    write_pairs(texture, indices, weights)
+    check_errors(context, f"{count} influences")
+    return texture
+
+
+def write_pairs(texture: moderngl.Texture, indices: Any, weights: Any) -> None:
+    """Upload (index, weight) pairs into a texture that holds at least as many."""
+    pairs = np.zeros((texture.width * texture.height, 2), "f4")
+    # float32 holds every index below 2^24 exactly.
+    pairs[: len(indices), 0] = indices
+    pairs[: len(indices), 1] = weights
     texture.write(pairs.tobytes())
-    check_errors(context, f"{len(joints)} influences")
+
+
+def offset_texture(context: moderngl.Context, offsets: Floats) -> moderngl.Texture:
+    """Return a texture of (P, V, 3) offsets, one texel each, row after row."""
+    count = offsets.shape[0] * offsets.shape[1]
+    height = _height(count, _OFFSETS_PER_ROW)
+    texels = np.zeros((height * _OFFSETS_PER_ROW, 3), "f4")
+    texels[:count] = offsets.reshape(-1, 3)
+    texture = _data_texture(context, (_OFFSETS_PER_ROW, height), 3, f"{count} offsets")
+    texture.write(texels.tobytes())
+    check_errors(context, f"{count} offsets")
     return texture
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -9,12 +10,58 @@ from numpy.typing import DTypeLike, NDArray
 
 from viewer.errors import RigError, printable
 
-__all__ = ["Bools", "Bytes", "Floats", "Ints", "frozen"]
+__all__ = ["Bools", "Bytes", "Deferred", "Floats", "Ints", "frozen"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 Bytes = NDArray[np.uint8]
+
+
+class Deferred:
+    """An array in a file that is read when its values are asked for, and then kept.
+
+    Parameters
+    ----------
+    shape : tuple of int
+        As the file declares it.
+    dtype : dtype
+        As the file declares it.
+    load : callable
+        Returns the array; called once, and may raise a ``FormatError``.
+
+    Attributes
+    ----------
+    is_loaded : bool
+        Whether the values were asked for before.
+    """
+
+    __slots__ = ("_load", "_values", "dtype", "shape")
+
+    def __init__(
+        self, shape: tuple[int, ...], dtype: DTypeLike, load: Callable[[], NDArray[Any]]
+    ) -> None:
+        self.shape, self.dtype, self._load = shape, np.dtype(dtype), load
+        self._values: NDArray[Any] | None = None
+
+    @property
+    def is_loaded(self) -> bool:
+        """Whether the values are in memory."""
+        return self._values is not None
+
+    def values(self) -> NDArray[Any]:
+        """Return the array, read-only.
+
+        Raises
+        ------
+        FormatError
+            If the file cannot be read any more, or holds something else than it declares.
+        """
+        if self._values is None:
+            values = self._load()
+            values.flags.writeable = False
+            self._values = values
+        return self._values
 
 
 def frozen(
@@ -66,7 +113,8 @@ def _is_writeable_by_others(array: NDArray[Any]) -> bool:
         if owner.base is None:
             return False
         owner = owner.base
-    return True  # memory of something else, which may do as it likes
+    # Bytes never change; memory of anything else may do as it likes.
+    return not isinstance(owner, bytes)
 
 
 def _converted(name: str, values: Any, dtype: np.dtype[Any]) -> NDArray[Any]:

@@ -8,17 +8,21 @@ from typing import Literal
 import numpy as np
 
 from viewer.errors import RigError
-from viewer.rig.arrays import Floats
+from viewer.rig.annotations import BodyParts, Keypoints, ReducedMesh
+from viewer.rig.arrays import Floats, Ints, frozen
+from viewer.rig.blendshapes import BlendShapes, Correctives, JointRegressor
+from viewer.rig.hands import Hand
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.mesh import Mesh
 from viewer.rig.pose import Pose
+from viewer.rig.pose_vector import PoseLayout
 from viewer.rig.skeleton import Skeleton
 from viewer.rig.skin import Skin
 
 __all__ = ["Figure", "skeleton_points"]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Figure:
     """A character as its files hold it.
 
@@ -34,6 +38,24 @@ class Figure:
         Without one the mesh does not follow the skeleton.
     up : "y" or "z"
         The axis that points up in the file; the camera obeys it.
+    unit : str
+        Of its lengths, ``"m"`` for metres; empty if the file does not say.
+    blend_shapes : BlendShapes or None
+        Directions in which the rest mesh changes; joints follow.
+    correctives : Correctives or None
+        Offsets that depend on the pose.
+    joint_regressor : JointRegressor or None
+        Gives the joints of a changed rest mesh.
+    hands : tuple of Hand
+        Principal components of the hands' poses.
+    pose_layout : PoseLayout or None
+        The order of the model's own pose numbers; None if those are the DOFs.
+    body_parts, keypoints, reduced : BodyParts, Keypoints, ReducedMesh, or None
+        What else the file says about the mesh.
+    symmetry : (V,) int32 or None
+        Each vertex's mirror partner.
+    facts : tuple of (str, str)
+        What the reader found out, for ``viewer info``: a heading and a text each.
     """
 
     name: str
@@ -41,10 +63,22 @@ class Figure:
     skeleton: Skeleton | None = None
     skin: Skin | None = None
     up: Literal["y", "z"] = "y"
+    unit: str = ""
+    blend_shapes: BlendShapes | None = None
+    correctives: Correctives | None = None
+    joint_regressor: JointRegressor | None = None
+    hands: tuple[Hand, ...] = ()
+    pose_layout: PoseLayout | None = None
+    body_parts: BodyParts | None = None
+    keypoints: Keypoints | None = None
+    reduced: ReducedMesh | None = None
+    symmetry: Ints | None = None
+    facts: tuple[tuple[str, str], ...] = ()
 
     def __post_init__(self) -> None:
         if self.mesh is None and self.skeleton is None:
             raise RigError(f"figure {self.name}: expected a mesh or a skeleton, found neither")
+        self._check_vertices()
         if self.skin is None:
             return
         if self.mesh is None or self.skin.n_vertices != self.mesh.n_vertices:
@@ -58,6 +92,40 @@ class Figure:
                 f"figure {self.name}: the skin has {self.skin.n_joints} binding matrices, "
                 f"the skeleton has {self.skeleton.n_joints} joints"
             )
+
+    def _check_vertices(self) -> None:
+        """Hold everything that is said of vertices to their number."""
+        count = 0 if self.mesh is None else self.mesh.n_vertices
+        if self.symmetry is not None:
+            symmetry = frozen("symmetry", self.symmetry, (count,), np.int32)
+            object.__setattr__(self, "symmetry", symmetry)
+        ends: dict[str, int | None] = {
+            "blend shapes": self.blend_shapes.n_vertices if self.blend_shapes else None,
+            "correctives": self.correctives.n_vertices if self.correctives else None,
+            "body parts": len(self.body_parts.of_vertex) if self.body_parts else None,
+        }
+        for what, found in ends.items():
+            if found is not None and found != count:
+                raise RigError(
+                    f"figure {self.name}: the {what} have {found} vertices, the mesh has {count}"
+                )
+        indices: dict[str, Ints | None] = {
+            "joint regressor": self.joint_regressor.vertices if self.joint_regressor else None,
+            "keypoints": self.keypoints.vertices if self.keypoints else None,
+            "reduced mesh": self.reduced.vertices if self.reduced else None,
+            "symmetry map": self.symmetry,
+        }
+        for what, listed in indices.items():
+            if listed is not None and listed.size and not 0 <= listed.min() <= listed.max() < count:
+                raise RigError(
+                    f"figure {self.name}: the {what} refers to vertices {listed.min()} to "
+                    f"{listed.max()}, the mesh has {count}"
+                )
+
+    @property
+    def n_shapes(self) -> int:
+        """Number of blend shapes, S."""
+        return 0 if self.blend_shapes is None else self.blend_shapes.n_shapes
 
     @property
     def is_attached(self) -> bool:

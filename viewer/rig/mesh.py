@@ -9,7 +9,16 @@ import numpy as np
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Bytes, Floats, Ints, frozen
 
-__all__ = ["Material", "Mesh", "bounding_box", "box_size", "triangle_areas", "vertex_normals"]
+__all__ = [
+    "Material",
+    "Mesh",
+    "bounding_box",
+    "box_size",
+    "split_seams",
+    "triangle_areas",
+    "vertex_normals",
+    "volume",
+]
 
 _ROW = 64  # points reduced side by side
 
@@ -49,8 +58,11 @@ class Mesh:
         Figure units; normals as stored, not necessarily of unit length.
     triangles : (T, 3) int32
         Vertex indices; counter-clockwise from outside in most files, never relied upon.
-    uvs : (V, 2) or None
+    uvs : (U, 2) or None
         Texture coordinates, v = 0 at the bottom row of the picture.
+    uv_triangles : (T, 3) int32 or None
+        Indices into ``uvs`` where they differ from ``triangles``: along a seam one vertex has
+        several texture coordinates. None if every vertex has one, and U = V.
     materials : tuple of Material
         In file order.
     triangle_materials : (T,) int32
@@ -63,6 +75,7 @@ class Mesh:
     uvs: Floats | None = None
     materials: tuple[Material, ...] = ()
     triangle_materials: Ints | None = None
+    uv_triangles: Ints | None = None
 
     def __post_init__(self) -> None:
         def put(name: str, values: object) -> None:
@@ -72,7 +85,11 @@ class Mesh:
         put("normals", frozen("normals", self.normals, (self.n_vertices, 3)))
         put("triangles", frozen("triangles", self.triangles, (None, 3), np.int32))
         if self.uvs is not None:
-            put("uvs", frozen("uvs", self.uvs, (self.n_vertices, 2)))
+            rows = self.n_vertices if self.uv_triangles is None else None
+            put("uvs", frozen("uvs", self.uvs, (rows, 2)))
+        if self.uv_triangles is not None:
+            shape = (self.n_triangles, 3)
+            put("uv_triangles", frozen("uv_triangles", self.uv_triangles, shape, np.int32))
         if self.triangle_materials is None:
             put("triangle_materials", np.full(self.n_triangles, -1, dtype=np.int32))
         put(
@@ -84,10 +101,10 @@ class Mesh:
     def _check_indices(self) -> None:
         if self.n_triangles == 0:
             return
-        if self.triangles.min() < 0 or self.triangles.max() >= self.n_vertices:
-            raise RigError(
-                f"triangles: expected vertex indices 0 to {self.n_vertices - 1}, "
-                f"found {self.triangles.min()} to {self.triangles.max()}"
+        _check_range("triangles", self.triangles, self.n_vertices)
+        if self.uv_triangles is not None:
+            _check_range(
+                "uv_triangles", self.uv_triangles, 0 if self.uvs is None else len(self.uvs)
             )
         if self.material_indices.min() < -1 or self.material_indices.max() >= len(self.materials):
             raise RigError(
@@ -110,6 +127,14 @@ class Mesh:
         """``triangle_materials``, never None: (T,) int32."""
         assert self.triangle_materials is not None  # set by __post_init__
         return self.triangle_materials
+
+
+def _check_range(name: str, indices: Ints, end: int) -> None:
+    if indices.min() < 0 or indices.max() >= end:
+        raise RigError(
+            f"{name}: expected vertex indices 0 to {end - 1}, "
+            f"found {indices.min()} to {indices.max()}"
+        )
 
 
 def bounding_box(points: Floats) -> Floats:
@@ -167,6 +192,59 @@ def triangle_areas(positions: Floats, triangles: Ints) -> Floats:
     return 0.5 * np.linalg.norm(_area_vectors(positions, triangles), axis=1)
 
 
+def volume(positions: Floats, triangles: Ints) -> float:
+    """Return the volume a closed mesh encloses, sum a . (b x c) / 6, by the divergence theorem.
+
+    Parameters
+    ----------
+    positions : (V, 3)
+        Figure units. Relative to their mean, so that small holes matter little.
+    triangles : (T, 3)
+        Vertex indices, counter-clockwise from outside.
+
+    Returns
+    -------
+    float
+        Cubed units; negative if the triangles are clockwise.
+
+    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    >>> round(volume(corners, np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])), 12)
+    0.166666666667
+    """
+    centered = positions - positions.mean(axis=0)
+    a, b, c = (centered[triangles[:, corner]] for corner in range(3))
+    return float(np.einsum("ta,ta->", a, np.cross(b, c)) / 6.0)
+
+
+def split_seams(mesh: Mesh) -> tuple[Ints, Ints, Ints]:
+    """Return a numbering in which every vertex has one texture coordinate, as GPUs need it.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        V vertices, U texture coordinates.
+
+    Returns
+    -------
+    sources : (R,) int32
+        The mesh's vertex that each split vertex is a copy of. Vertices of no triangle stay.
+    uv_indices : (R,) int32
+        The texture coordinate of each split vertex.
+    triangles : (T, 3) int32
+        Indices into the split vertices.
+    """
+    if mesh.uv_triangles is None or mesh.uvs is None:
+        identity = np.arange(mesh.n_vertices, dtype=np.int32)
+        return identity, identity, mesh.triangles
+    corners = mesh.triangles.ravel().astype(np.int64)
+    pairs = corners * len(mesh.uvs) + mesh.uv_triangles.ravel()
+    unique, inverse = np.unique(pairs, return_inverse=True)
+    unused = np.setdiff1d(np.arange(mesh.n_vertices), corners)
+    sources = np.concatenate([unique // len(mesh.uvs), unused]).astype(np.int32)
+    uv_indices = np.concatenate([unique % len(mesh.uvs), np.zeros_like(unused)]).astype(np.int32)
+    return sources, uv_indices, inverse.reshape(-1, 3).astype(np.int32)
+
+
 def vertex_normals(positions: Floats, triangles: Ints) -> Floats:
     """Return unit normals averaged over each vertex's triangles, weighted by area.
 
@@ -187,9 +265,12 @@ def vertex_normals(positions: Floats, triangles: Ints) -> Floats:
     [0.0, 0.0, 1.0]
     """
     vectors = _area_vectors(positions, triangles)
-    normals = np.zeros_like(positions)
-    for corner in range(3):
-        np.add.at(normals, triangles[:, corner], vectors)
+    corners = triangles.ravel()
+    columns = [
+        np.bincount(corners, np.repeat(vectors[:, axis], 3), minlength=len(positions))
+        for axis in range(3)
+    ]
+    normals = np.stack(columns, axis=1)
     lengths = np.linalg.norm(normals, axis=1)
     flat: Bools = lengths == 0.0
     normals[flat] = 0.0, 1.0, 0.0

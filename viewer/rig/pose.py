@@ -1,8 +1,8 @@
-"""The state that moves: one figure's DOFs and local transforms."""
+"""The state that moves: one figure's DOFs, local transforms, shape and place."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,15 @@ from viewer.rig.arrays import Floats, Ints
 from viewer.rig.rotation import axis_rotations, quaternion_to_matrix
 from viewer.rig.skeleton import Skeleton, clamp_dofs
 
-__all__ = ["Pose", "local_matrices", "pose_key", "rest_pose"]
+__all__ = [
+    "Pose",
+    "joint_rotations",
+    "local_matrices",
+    "placement_matrix",
+    "pose_key",
+    "rest_pose",
+    "skinning_key",
+]
 
 _FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
 
@@ -26,24 +34,53 @@ class Pose:
         Lengths or radians.
     translations, rotations, scales : (J, 3), (J, 4), (J, 3)
         Local transforms beneath the DOFs: lengths, quaternions (x, y, z, w), factors.
+    shape_weights : (S,)
+        Of the figure's blend shapes; those that are missing at the end count as 0.
+    figure_scale : float
+        Of the whole skinned figure about its origin, after everything else.
+    figure_translation : (3,)
+        Of the whole skinned figure, after its scale; not weighted by the skin.
     """
 
     dofs: Floats
     translations: Floats
     rotations: Floats
     scales: Floats
+    shape_weights: Floats = field(default_factory=lambda: np.zeros(0))
+    figure_scale: float = 1.0
+    figure_translation: Floats = field(default_factory=lambda: np.zeros(3))
 
     def copy(self) -> Pose:
         """Return a pose that shares no array with this one."""
         return Pose(
-            self.dofs.copy(), self.translations.copy(), self.rotations.copy(), self.scales.copy()
+            dofs=self.dofs.copy(),
+            translations=self.translations.copy(),
+            rotations=self.rotations.copy(),
+            scales=self.scales.copy(),
+            shape_weights=self.shape_weights.copy(),
+            figure_scale=self.figure_scale,
+            figure_translation=self.figure_translation.copy(),
         )
 
 
 def pose_key(pose: Pose) -> tuple[bytes, ...]:
-    """Return what changes if and only if a pose does: to know when to skin or draw again."""
-    arrays = (pose.dofs, pose.translations, pose.rotations, pose.scales)
+    """Return what changes if and only if a pose does: to know when to draw again."""
+    place = np.append(pose.figure_translation, pose.figure_scale)
+    return (*skinning_key(pose), place.tobytes())
+
+
+def skinning_key(pose: Pose) -> tuple[bytes, ...]:
+    """Return what changes if and only if the figure has to be skinned again: all but its place."""
+    arrays = (pose.dofs, pose.translations, pose.rotations, pose.scales, pose.shape_weights)
     return tuple(array.tobytes() for array in arrays)
+
+
+def placement_matrix(pose: Pose) -> Floats:
+    """Return T(figure_translation) S(figure_scale): (4, 4), applied after skinning."""
+    matrix = np.eye(4)
+    matrix[:3, :3] *= pose.figure_scale
+    matrix[:3, 3] = pose.figure_translation
+    return matrix
 
 
 def rest_pose(skeleton: Skeleton) -> Pose:
@@ -92,9 +129,13 @@ def local_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
     np.add.at(
         local[:, :3, 3], (skeleton.dof_joints[moves], skeleton.dof_kinds[moves]), pose.dofs[moves]
     )
-    rotations = quaternion_to_matrix(pose.rotations) @ _dof_rotations(skeleton, pose.dofs)
-    local[:, :3, :3] = rotations * pose.scales[:, None, :]
+    local[:, :3, :3] = joint_rotations(skeleton, pose) * pose.scales[:, None, :]
     return local
+
+
+def joint_rotations(skeleton: Skeleton, pose: Pose) -> Floats:
+    """Return each joint's rotation within its parent, R(quaternion) R(DOFs): (J, 3, 3)."""
+    return quaternion_to_matrix(pose.rotations) @ _dof_rotations(skeleton, pose.dofs)
 
 
 def _dof_rotations(skeleton: Skeleton, dofs: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""Rotations: about an axis, in sequence (Euler), and as unit quaternions (x, y, z, w)."""
+"""Rotations: about an axis, in sequence (Euler), as vectors, and as quaternions (x, y, z, w)."""
 
 from __future__ import annotations
 
@@ -6,7 +6,17 @@ import numpy as np
 
 from viewer.rig.arrays import Floats
 
-__all__ = ["axis_rotations", "quaternion_to_matrix"]
+__all__ = [
+    "axis_rotations",
+    "matrix_to_euler",
+    "matrix_to_quaternion",
+    "matrix_to_rotation_vector",
+    "nearest_rotations",
+    "quaternion_to_matrix",
+    "rotation_vector_to_matrix",
+]
+
+_SMALL = 1e-8  # squared angle below which the series are exact to the last digit
 
 
 def axis_rotations(axis: int, angles: Floats) -> Floats:
@@ -70,3 +80,162 @@ def quaternion_to_matrix(quaternions: Floats) -> Floats:
     matrices[..., 2, 1] = scale * (y * z + x * w)
     matrices[..., 2, 2] = 1.0 - scale * (x * x + y * y)
     return matrices
+
+
+def rotation_vector_to_matrix(vectors: Floats) -> Floats:
+    """Return the matrices of rotation vectors: R = I + a K + b K^2 with K = [r]x (Rodrigues).
+
+    a = sin(t) / t and b = 2 sin^2(t / 2) / t^2 lose nothing at any angle t: (1 - cos t) / t^2
+    would cancel near 0.
+
+    Parameters
+    ----------
+    vectors : (..., 3)
+        Axis times angle, radians.
+
+    Returns
+    -------
+    (..., 3, 3)
+        Matrices for column vectors.
+
+    >>> turned = rotation_vector_to_matrix(np.array([0, 0, np.pi / 2])) @ [1, 0, 0]
+    >>> bool(np.allclose(turned, [0, 1, 0]))
+    True
+    """
+    vectors = np.asarray(vectors, dtype=np.float64)
+    squares = np.einsum("...a,...a->...", vectors, vectors)
+    angles = np.sqrt(squares)
+    is_small = squares < _SMALL
+    divisor = np.where(is_small, 1.0, angles)
+    first = np.where(is_small, 1.0 - squares / 6.0, np.sin(angles) / divisor)
+    half = np.sin(0.5 * angles) / divisor
+    second = np.where(is_small, 0.5 - squares / 24.0, 2.0 * half * half)
+    cross = np.zeros((*squares.shape, 3, 3))
+    x, y, z = np.moveaxis(vectors, -1, 0)
+    cross[..., 2, 1], cross[..., 0, 2], cross[..., 1, 0] = x, y, z
+    cross -= np.swapaxes(cross, -1, -2)
+    return np.eye(3) + first[..., None, None] * cross + second[..., None, None] * (cross @ cross)
+
+
+def matrix_to_quaternion(matrices: Floats) -> Floats:
+    """Return the unit quaternions of rotation matrices, w >= 0 (Shepperd 1978).
+
+    Parameters
+    ----------
+    matrices : (..., 3, 3)
+        Rotations for column vectors.
+
+    Returns
+    -------
+    (..., 4)
+        (x, y, z, w).
+
+    >>> matrix_to_quaternion(np.eye(3)).tolist()
+    [0.0, 0.0, 0.0, 1.0]
+    """
+    m = np.asarray(matrices, dtype=np.float64)
+    diagonal = np.moveaxis(np.diagonal(m, axis1=-2, axis2=-1), -1, 0)
+    trace = diagonal.sum(axis=0)
+    # The four squares, times four: dividing by the largest loses no digits.
+    squares = np.stack([1.0 + 2.0 * part - trace for part in diagonal] + [1.0 + trace], axis=-1)
+    xy, xz, yz = (
+        m[..., 1, 0] + m[..., 0, 1],
+        m[..., 2, 0] + m[..., 0, 2],
+        m[..., 2, 1] + m[..., 1, 2],
+    )
+    xw, yw, zw = (
+        m[..., 2, 1] - m[..., 1, 2],
+        m[..., 0, 2] - m[..., 2, 0],
+        m[..., 1, 0] - m[..., 0, 1],
+    )
+    products = np.stack(
+        [
+            np.stack([squares[..., 0], xy, xz, xw], axis=-1),
+            np.stack([xy, squares[..., 1], yz, yw], axis=-1),
+            np.stack([xz, yz, squares[..., 2], zw], axis=-1),
+            np.stack([xw, yw, zw, squares[..., 3]], axis=-1),
+        ],
+        axis=-2,
+    )
+    largest = squares.argmax(axis=-1)
+    rows = np.take_along_axis(products, largest[..., None, None], axis=-2)[..., 0, :]
+    quaternions = rows / np.linalg.norm(rows, axis=-1, keepdims=True)
+    return np.where(quaternions[..., 3:] < 0.0, -quaternions, quaternions) + 0.0
+
+
+def matrix_to_rotation_vector(matrices: Floats) -> Floats:
+    """Return axis times angle, the angle from 0 to pi, of rotation matrices.
+
+    Parameters
+    ----------
+    matrices : (..., 3, 3)
+        Rotations for column vectors.
+
+    Returns
+    -------
+    (..., 3)
+        Radians.
+
+    >>> vector = np.array([0.3, -0.2, 0.1])
+    >>> bool(np.allclose(matrix_to_rotation_vector(rotation_vector_to_matrix(vector)), vector))
+    True
+    """
+    quaternions = matrix_to_quaternion(matrices)
+    sines = np.linalg.norm(quaternions[..., :3], axis=-1)
+    # 2 atan2 keeps its digits at both ends; near 0 the ratio is 2 / w.
+    angles = 2.0 * np.arctan2(sines, quaternions[..., 3])
+    is_zero = sines == 0.0
+    factors = np.where(is_zero, 2.0, angles / np.where(is_zero, 1.0, sines))
+    return quaternions[..., :3] * factors[..., None]
+
+
+def matrix_to_euler(matrices: Floats) -> Floats:
+    """Return angles about x, y and z with R = Rz Ry Rx, x applied first.
+
+    Where y is a right angle, x and z turn about one axis: any share of the two gives the same
+    rotation, and this one keeps R exact.
+
+    Parameters
+    ----------
+    matrices : (..., 3, 3)
+        Rotations for column vectors.
+
+    Returns
+    -------
+    (..., 3)
+        Radians; x and z from -pi to pi, y from -pi / 2 to pi / 2.
+
+    >>> bool(np.allclose(matrix_to_euler(axis_rotations(1, np.array(0.5))), [0, 0.5, 0]))
+    True
+    """
+    m = np.asarray(matrices, dtype=np.float64)
+    z = np.arctan2(m[..., 1, 0], m[..., 0, 0])
+    sine, cosine = np.sin(z), np.cos(z)
+    # The rest is read from Rz^T R, which is Ry Rx however badly z is determined.
+    y = np.arctan2(-m[..., 2, 0], cosine * m[..., 0, 0] + sine * m[..., 1, 0])
+    x = np.arctan2(
+        sine * m[..., 0, 2] - cosine * m[..., 1, 2], cosine * m[..., 1, 1] - sine * m[..., 0, 1]
+    )
+    return np.stack([x, y, z], axis=-1) + 0.0
+
+
+def nearest_rotations(matrices: Floats) -> tuple[Floats, Floats]:
+    """Split matrices into rotation and stretch, M = R P (polar decomposition by SVD).
+
+    Parameters
+    ----------
+    matrices : (..., 3, 3)
+        Any; a mirroring one gives a stretch with a negative determinant.
+
+    Returns
+    -------
+    rotations : (..., 3, 3)
+        The proper rotations nearest to the matrices.
+    stretches : (..., 3, 3)
+        R^T M.
+    """
+    left, _, right = np.linalg.svd(matrices)
+    signs = np.ones((*left.shape[:-2], 3))
+    signs[..., 2] = np.where(np.linalg.det(left @ right) < 0.0, -1.0, 1.0)
+    rotations = (left * signs[..., None, :]) @ right
+    return rotations, np.swapaxes(rotations, -1, -2) @ matrices

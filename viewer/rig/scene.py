@@ -11,11 +11,12 @@ from viewer.rig.arrays import Floats
 from viewer.rig.clip import Clip
 from viewer.rig.figure import Figure, skeleton_points
 from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.pose import Pose, rest_pose
+from viewer.rig.pose import Pose, placement_matrix, rest_pose
+from viewer.rig.shape import shaped
 from viewer.rig.skinning import deform
 from viewer.rig.transform import apply_transform
 
-__all__ = ["Actor", "Scene", "actor_points", "scene_box", "scene_points"]
+__all__ = ["Actor", "Scene", "actor_points", "figure_pose", "scene_box", "scene_points"]
 
 _OUTLIER_SHARE = 0.001  # the camera fits the box of the other 99.9 % of the points
 _OUTLIER_RATIO = 100.0  # ... if the whole box is this much larger
@@ -47,7 +48,15 @@ class Actor:
 
     def __post_init__(self) -> None:
         if self.pose is None and self.figure.skeleton is not None:
-            self.pose = rest_pose(self.figure.skeleton)
+            self.pose = figure_pose(self.figure)
+
+
+def figure_pose(figure: Figure) -> Pose:
+    """Return a new pose of a figure with a skeleton: the file's own, all shape weights 0."""
+    assert figure.skeleton is not None  # the caller looked
+    pose = rest_pose(figure.skeleton)
+    pose.shape_weights = np.zeros(figure.n_shapes)
+    return pose
 
 
 @dataclass(slots=True, eq=False)
@@ -124,7 +133,10 @@ def actor_points(actor: Actor, show: str = "skin") -> Floats:
     parts = []
     shows_skeleton = show in ("skeleton", "both") or figure.mesh is None
     if figure.skeleton is not None and actor.pose is not None and shows_skeleton:
-        parts.append(skeleton_points(figure.skeleton, actor.pose))
+        shape = shaped(figure, actor.pose.shape_weights).skeleton
+        assert shape is not None  # shaping keeps it
+        placement = placement_matrix(actor.pose)
+        parts.append(apply_transform(placement, skeleton_points(shape, actor.pose)))
     if figure.mesh is not None and (show != "skeleton" or figure.skeleton is None):
         is_bound = show == "binding"
         parts.append(figure.mesh.positions if is_bound else deform(figure, actor.pose)[0])

@@ -3,17 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints, frozen
 
-__all__ = ["Skin", "has_influence", "influence_counts", "skin_from_lists", "weight_sums"]
+__all__ = [
+    "Skin",
+    "bind_positions",
+    "has_influence",
+    "influence_counts",
+    "limit_influences",
+    "normalized",
+    "skin_from_entries",
+    "skin_from_lists",
+    "strongest_first",
+    "weight_sums",
+]
+
+_NO_SUM = 1e-12  # weights that add up to less cannot be scaled to a sum
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Skin:
     """Influences of all vertices, one after the other, as the files list them.
 
@@ -101,6 +114,12 @@ def skin_from_lists(
     )
 
 
+def bind_positions(skin: Skin) -> Floats:
+    """Return where the joints were bound: (J, 3), binding space."""
+    positions: Floats = np.linalg.inv(skin.inverse_bind)[:, :3, 3].astype(np.float64, copy=False)
+    return positions
+
+
 def influence_counts(skin: Skin) -> Ints:
     """Return how many influences each vertex lists: (V,) int32."""
     return np.diff(skin.starts)
@@ -108,8 +127,7 @@ def influence_counts(skin: Skin) -> Ints:
 
 def weight_sums(skin: Skin) -> Floats:
     """Return the sum of each vertex's weights: (V,), 0 where it lists none."""
-    owners = np.repeat(np.arange(skin.n_vertices), influence_counts(skin))
-    sums = np.bincount(owners, weights=skin.weights, minlength=skin.n_vertices)
+    sums = np.bincount(_owners(skin), weights=skin.weights, minlength=skin.n_vertices)
     return sums.astype(np.float64, copy=False)
 
 
@@ -122,5 +140,97 @@ def has_influence(skin: Skin) -> Bools:
     zero = skin.weights == 0.0
     if not zero.any():
         return counts > 0
-    owners = np.repeat(np.arange(skin.n_vertices), counts)
-    return np.bincount(owners, weights=~zero, minlength=skin.n_vertices) > 0
+    return np.bincount(_owners(skin), weights=~zero, minlength=skin.n_vertices) > 0
+
+
+def skin_from_entries(
+    n_vertices: int, vertices: Ints, joints: Ints, weights: Floats, inverse_bind: Floats
+) -> Skin:
+    """Build a skin from the entries of a sparse matrix, in any order.
+
+    Parameters
+    ----------
+    n_vertices : int
+        V.
+    vertices, joints : (N,)
+        Row and column of each weight; of one vertex they keep their order.
+    weights : (N,)
+        As stored.
+    inverse_bind : (J, 4, 4)
+        Bind-space-to-joint matrices.
+
+    Returns
+    -------
+    Skin
+        With the same entries, vertex by vertex.
+    """
+    order = np.argsort(vertices, kind="stable")
+    counts = np.bincount(vertices, minlength=n_vertices)
+    return Skin(
+        starts=np.concatenate([[0], np.cumsum(counts)]).astype(np.int32),
+        joints=np.asarray(joints)[order].astype(np.int32),
+        weights=np.asarray(weights, dtype=np.float64)[order],
+        inverse_bind=inverse_bind,
+    )
+
+
+def strongest_first(skin: Skin) -> Skin:
+    """Return the same influences, each vertex's sorted by falling weight, ties as they were."""
+    order = np.lexsort((-skin.weights, _owners(skin)))
+    return replace(skin, joints=skin.joints[order], weights=skin.weights[order])
+
+
+def limit_influences(skin: Skin, count: int) -> Skin:
+    """Return what an engine with ``count`` influences a vertex makes of a skin.
+
+    Parameters
+    ----------
+    skin : Skin
+        Any number of influences.
+    count : int
+        How many of the strongest are kept.
+
+    Returns
+    -------
+    Skin
+        Influences of one joint added up first, then cut, then scaled to a sum of 1.
+    """
+    merged = _merged(skin)
+    ordered = strongest_first(merged)
+    rank = np.arange(len(ordered.joints)) - np.repeat(
+        ordered.starts[:-1], influence_counts(ordered)
+    )
+    kept = rank < count
+    counts = np.bincount(_owners(ordered)[kept], minlength=skin.n_vertices)
+    cut = Skin(
+        starts=np.concatenate([[0], np.cumsum(counts)]).astype(np.int32),
+        joints=ordered.joints[kept],
+        weights=ordered.weights[kept],
+        inverse_bind=skin.inverse_bind,
+    )
+    return normalized(cut)
+
+
+def normalized(skin: Skin) -> Skin:
+    """Return the skin with each vertex's weights scaled to a sum of 1; sums of 0 stay."""
+    sums = weight_sums(skin)
+    factors = np.divide(1.0, sums, out=np.ones_like(sums), where=np.abs(sums) > _NO_SUM)
+    return replace(skin, weights=skin.weights * factors[_owners(skin)])
+
+
+def _merged(skin: Skin) -> Skin:
+    """Add up the weights that a vertex lists for one joint several times."""
+    keys = _owners(skin).astype(np.int64) * skin.n_joints + skin.joints
+    unique, inverse = np.unique(keys, return_inverse=True)
+    if len(unique) == len(keys):
+        return skin
+    weights = np.bincount(inverse, skin.weights).astype(np.float64, copy=False)
+    joints = (unique % skin.n_joints).astype(np.int32)
+    return skin_from_entries(
+        skin.n_vertices, unique // skin.n_joints, joints, weights, skin.inverse_bind
+    )
+
+
+def _owners(skin: Skin) -> Ints:
+    """Return the vertex of each influence: (N,) int32."""
+    return np.repeat(np.arange(skin.n_vertices, dtype=np.int32), influence_counts(skin))

@@ -2,23 +2,61 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from importlib import import_module
+
+import numpy as np
 
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.kinematics import skinning_matrices, world_matrices
-from viewer.rig.pose import Pose, rest_pose
+from viewer.rig.memo import Memo
+from viewer.rig.pose import Pose, placement_matrix, rest_pose
+from viewer.rig.shape import rest_positions, shaped
+from viewer.rig.skin import Skin, limit_influences, normalized
+from viewer.rig.transform import apply_transform
+from viewer.rig.vectors import unit
 
-__all__ = ["METHODS", "deform"]
+__all__ = ["METHODS", "Skinning", "deform", "deform_frames", "joint_matrices", "skin_used"]
 
 METHODS = {
-    "lbs": "Linear blend skinning",
+    "lbs": "Linear blend (LBS)",
+    "dqs": "Dual quaternion (DQS)",
+    "mix": "Between LBS and DQS",
 }
 """Module in this folder and GLSL chunk in ``shaders/skin``, with the name that menus show."""
 
 
-def deform(figure: Figure, pose: Pose | None = None, method: str = "lbs") -> tuple[Floats, Floats]:
+@dataclass(slots=True)
+class Skinning:
+    """How a figure is skinned; the defaults are what its files say.
+
+    Attributes
+    ----------
+    method : str
+        A key of ``METHODS``.
+    share : float
+        Of DQS in the method ``"mix"``, 0 to 1.
+    max_influences : int
+        Only so many of the strongest, scaled to a sum of 1; 0 for all, as stored.
+    normalize : bool
+        Scale each vertex's weights to a sum of 1.
+    correctives : bool
+        Add the pose correctives of figures that have some.
+    """
+
+    method: str = "lbs"
+    share: float = 0.5
+    max_influences: int = 0
+    normalize: bool = False
+    correctives: bool = True
+
+
+def deform(
+    figure: Figure, pose: Pose | None = None, method: str | Skinning = "lbs"
+) -> tuple[Floats, Floats]:
     """Return a figure's posed vertices: the float64 reference that the GPU is held to.
 
     Parameters
@@ -27,15 +65,16 @@ def deform(figure: Figure, pose: Pose | None = None, method: str = "lbs") -> tup
         With a mesh. Without skeleton or skin the mesh comes back in its binding space.
     pose : Pose, optional
         DOFs in lengths and radians; the file's own pose if omitted.
-    method : str
-        A key of ``METHODS``.
+    method : str or Skinning
+        A key of ``METHODS``, or everything about how to skin.
 
     Returns
     -------
     positions : (V, 3)
         Figure units.
     normals : (V, 3)
-        Unit length.
+        Unit length. They are turned with the rest normals of the shaped mesh: what correctives
+        do to normals is left out.
 
     Raises
     ------
@@ -48,13 +87,106 @@ def deform(figure: Figure, pose: Pose | None = None, method: str = "lbs") -> tup
     >>> positions.shape == figure.mesh.positions.shape
     True
     """
+    how = Skinning(method) if isinstance(method, str) else method
     if figure.mesh is None:
         raise RigError(f"figure {figure.name} has no mesh to deform")
-    if method not in METHODS:
-        raise RigError(f'no skinning method "{method}"; there are: {", ".join(METHODS)}')
-    module = import_module(f"{__name__}.{method}")
+    if how.method not in METHODS:
+        raise RigError(f'no skinning method "{how.method}"; there are: {", ".join(METHODS)}')
+    if pose is not None:
+        figure = shaped(figure, pose.shape_weights)
+    mesh = figure.mesh
+    assert mesh is not None  # shaping keeps it
     if figure.skeleton is None or figure.skin is None:
-        return figure.mesh.positions.copy(), module.unit(figure.mesh.normals)
-    pose = rest_pose(figure.skeleton) if pose is None else pose
-    palette = skinning_matrices(world_matrices(figure.skeleton, pose), figure.skin.inverse_bind)
-    return module.deform(figure.mesh, figure.skin, palette)
+        moved, normals = mesh.positions, unit(mesh.normals)
+    else:
+        pose = rest_pose(figure.skeleton) if pose is None else pose
+        palette = skinning_matrices(world_matrices(figure.skeleton, pose), figure.skin.inverse_bind)
+        rest = rest_positions(figure, mesh, pose, how.correctives)
+        module = import_module(f"{__name__}.{how.method}")
+        moved, normals = module.deform(
+            rest, mesh.normals, skin_used(figure.skin, how), palette, how.share
+        )
+    return moved.copy() if pose is None else apply_transform(placement_matrix(pose), moved), normals
+
+
+def deform_frames(
+    figure: Figure, poses: Sequence[Pose], skinning: Skinning | None = None
+) -> Floats:
+    """Return the vertices of many poses of one shape, linearly blended, in few products.
+
+    Parameters
+    ----------
+    figure : Figure
+        With mesh, skeleton and skin.
+    poses : sequence of F Pose
+        Their shape is that of the first.
+    skinning : Skinning, optional
+        Its method must be ``"lbs"``.
+
+    Returns
+    -------
+    (F, V, 3)
+        Figure units.
+
+    Raises
+    ------
+    RigError
+        If the figure cannot be skinned so.
+    """
+    how = skinning or Skinning()
+    if not poses or not figure.is_attached or how.method != "lbs":
+        raise RigError("expected poses, a figure with mesh, skeleton and skin, and method lbs")
+    from viewer.rig.skinning import lbs
+
+    figure = shaped(figure, poses[0].shape_weights)
+    mesh, skeleton, skin = figure.mesh, figure.skeleton, figure.skin
+    assert mesh is not None and skeleton is not None and skin is not None  # it is attached
+    used = skin_used(skin, how)
+    palettes = np.stack(
+        [skinning_matrices(world_matrices(skeleton, pose), skin.inverse_bind) for pose in poses]
+    )
+    if figure.correctives is not None and how.correctives:
+        rests = (rest_positions(figure, mesh, pose) for pose in poses)
+        pairs = zip(rests, palettes, strict=True)
+        moved = np.concatenate([lbs.move(rest, used, palette[None])[0] for rest, palette in pairs])
+    else:
+        moved = lbs.move(mesh.positions, used, palettes)[0]
+    for frame, pose in zip(moved, poses, strict=True):
+        frame *= pose.figure_scale
+        frame += pose.figure_translation
+    return moved
+
+
+def joint_matrices(figure: Figure, pose: Pose) -> Floats:
+    """Return where a pose puts a figure's joints, its shape and place included.
+
+    Parameters
+    ----------
+    figure : Figure
+        With a skeleton.
+    pose : Pose
+        DOFs in lengths and radians.
+
+    Returns
+    -------
+    (J, 4, 4)
+        Joint space to figure space.
+    """
+    skeleton = shaped(figure, pose.shape_weights).skeleton
+    assert skeleton is not None  # shaping keeps it
+    return placement_matrix(pose) @ world_matrices(skeleton, pose)
+
+
+_varied: Memo[Skin, Skin] = Memo(kept=4)
+
+
+def skin_used(skin: Skin, skinning: Skinning) -> Skin:
+    """Return the influences that count: all as stored, or cut and scaled as asked."""
+    count, normalize = skinning.max_influences, skinning.normalize
+    if not count and not normalize:
+        return skin
+    return _varied.get(
+        skin,
+        (count, normalize),
+        lambda: limit_influences(skin, count) if count else normalized(skin),
+    )

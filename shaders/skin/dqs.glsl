@@ -1,0 +1,47 @@
+// Dual quaternion skinning (Kavan et al. 2008): stretch linearly, then move rigidly.
+uniform sampler2D u_rigid;      // five texels a joint: real part, dual part, stretch rows
+
+// Texels of a joint in u_rigid: upload.py's rows hold 128 joints.
+vec4 rigid_texel(int joint, int texel) {
+    return texelFetch(u_rigid, ivec2(5 * (joint & 127) + texel, joint >> 7), 0);
+}
+
+vec3 rotate(vec4 q, vec3 v) {
+    return v + 2.0 * cross(q.xyz, cross(q.xyz, v) + q.w * v);
+}
+
+void skin(inout vec3 position, inout vec3 normal) {
+    vec4 real = vec4(0.0), dual = vec4(0.0), first = vec4(0.0);
+    vec4 x = vec4(0.0), y = vec4(0.0), z = vec4(0.0);
+    uint end = in_influences.x + in_influences.y;
+    float scale = 1.0 / (1.0 + in_excess);  // weights count relative to their sum
+    for (uint index = in_influences.x; index < end; ++index) {
+        vec2 pair = influence(index);
+        int joint = int(pair.x);
+        float weight = pair.y * scale;
+        vec4 q = rigid_texel(joint, 0);
+        // Quaternions are added on the strongest influence's side of the sphere; it comes first.
+        first = index == in_influences.x ? q : first;
+        float turned = dot(q, first) < 0.0 ? -weight : weight;
+        real += turned * q;
+        dual += turned * rigid_texel(joint, 1);
+        x += weight * rigid_texel(joint, 2);
+        y += weight * rigid_texel(joint, 3);
+        z += weight * rigid_texel(joint, 4);
+    }
+    float size = length(real);
+    if (abs(1.0 + in_excess) < 1e-12 || size < 1e-12) {
+        position += u_rest_shift;  // influences that cancel out give no rotation
+        return;
+    }
+    real /= size;
+    dual /= size;
+    vec4 point = vec4(position, 1.0);
+    vec3 stretched = vec3(dot(x, point), dot(y, point), dot(z, point));
+    vec3 shift = 2.0 * (real.w * dual.xyz - dual.w * real.xyz + cross(real.xyz, dual.xyz));
+    position = rotate(real, stretched) + shift;
+    // The cofactor matrix of the stretch keeps normals exact under any scale.
+    vec3 a = vec3(x.x, y.x, z.x), b = vec3(x.y, y.y, z.y), c = vec3(x.z, y.z, z.z);
+    vec3 turned = cross(b, c) * normal.x + cross(c, a) * normal.y + cross(a, b) * normal.z;
+    normal = rotate(real, turned);
+}

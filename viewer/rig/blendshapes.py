@@ -1,0 +1,208 @@
+"""Offsets added to rest vertices by weight: blend shapes, pose correctives, joints that follow."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.rig.arrays import Deferred, Floats, Ints, frozen
+
+__all__ = ["BlendShapes", "Correctives", "JointRegressor", "corrective_weights", "regress_joints"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BlendShapes:
+    """Directions in which the rest mesh changes, each with a weight: v = v_rest + sum_s w_s d_s.
+
+    Attributes
+    ----------
+    names : tuple of S str
+        Told apart by index, shown as they are.
+    offsets : (S, V, 3), or Deferred
+        Figure units per unit of weight; read from the file when a weight is first not 0.
+    groups : tuple of S str
+        What each belongs to: ``"shape"`` (a weight of 1 is one standard deviation) or
+        ``"expression"``.
+    """
+
+    names: tuple[str, ...]
+    offsets: Floats | Deferred
+    groups: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.offsets, Deferred):
+            offsets = frozen("offsets", self.offsets, (len(self.names), None, 3))
+            object.__setattr__(self, "offsets", offsets)
+        if not self.groups:
+            object.__setattr__(self, "groups", ("shape",) * len(self.names))
+        _check_shape("offsets", self.offsets.shape, (len(self.names), self.n_vertices, 3))
+        if len(self.groups) != len(self.names):
+            raise RigError(f"groups: expected {len(self.names)}, found {len(self.groups)}")
+
+    @property
+    def n_shapes(self) -> int:
+        """Number of directions, S."""
+        return len(self.names)
+
+    @property
+    def n_vertices(self) -> int:
+        """Number of vertices, V."""
+        return self.offsets.shape[1]
+
+    def displacement(self, weights: Floats) -> Floats:
+        """Return sum_s w_s d_s.
+
+        Parameters
+        ----------
+        weights : (N,)
+            N <= S; the others count as 0.
+
+        Returns
+        -------
+        (V, 3)
+            Figure units.
+
+        Raises
+        ------
+        RigError
+            If there are more weights than directions.
+        """
+        if len(weights) > self.n_shapes:
+            raise RigError(f"expected at most {self.n_shapes} shape weights, found {len(weights)}")
+        active = np.flatnonzero(weights)
+        if len(active) == 0:
+            return np.zeros((self.n_vertices, 3))
+        return np.einsum("s,sva->va", weights[active], _values(self.offsets)[active])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Correctives:
+    """Pose-dependent offsets of the SMPL family: v = v_rest + sum_p c_p d_p (Loper 2015, eq. 9).
+
+    Attributes
+    ----------
+    offsets : (9 (J - 1), V, 3), or Deferred
+        Figure units per unit of ``corrective_weights``.
+    """
+
+    offsets: Floats | Deferred
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.offsets, Deferred):
+            object.__setattr__(self, "offsets", frozen("offsets", self.offsets, (None, None, 3)))
+        count = self.offsets.shape[0]
+        if len(self.offsets.shape) != 3 or count % 9:
+            raise RigError(f"offsets: expected nine for each joint but the root, found {count}")
+
+    @property
+    def n_vertices(self) -> int:
+        """Number of vertices, V."""
+        return self.offsets.shape[1]
+
+    def values(self) -> Floats:
+        """Return the offsets, read from the file now if they were not before."""
+        return _values(self.offsets)
+
+    def displacement(self, weights: Floats) -> Floats:
+        """Return sum_p c_p d_p; joints at rest cost nothing.
+
+        Parameters
+        ----------
+        weights : (9 (J - 1),)
+            From ``corrective_weights``.
+
+        Returns
+        -------
+        (V, 3)
+            Figure units.
+        """
+        total = np.zeros(3 * self.n_vertices)
+        for rows in active_rows(weights):
+            total += weights[rows] @ self.values()[rows].reshape(rows.stop - rows.start, -1)
+        return total.reshape(-1, 3)
+
+
+def active_rows(weights: Floats) -> list[slice]:
+    """Return the runs of joints, nine rows each, whose corrective weights are not all 0."""
+    active = weights.reshape(-1, 9).any(axis=1)
+    edges = np.flatnonzero(np.diff(active, prepend=False, append=False))
+    return [slice(9 * int(a), 9 * int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def corrective_weights(rotations: Floats) -> Floats:
+    """Return what drives the correctives: the nine numbers R - I of every joint but the root.
+
+    Parameters
+    ----------
+    rotations : (J, 3, 3)
+        Of each joint within its parent.
+
+    Returns
+    -------
+    (9 (J - 1),)
+        Row by row, joints in order.
+    """
+    return (rotations[1:] - np.eye(3)).reshape(-1)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointRegressor:
+    """Rest joints as weighted sums of rest vertices, J_j = sum_v r_jv v.
+
+    Attributes
+    ----------
+    n_joints : int
+        J.
+    joints, vertices : (N,) int32
+        Row and column of each entry of the sparse (J, V) matrix.
+    weights : (N,)
+        Its value.
+    """
+
+    n_joints: int
+    joints: Ints
+    vertices: Ints
+    weights: Floats
+
+    def __post_init__(self) -> None:
+        for name, dtype in (("joints", np.int32), ("vertices", np.int32), ("weights", np.float64)):
+            values = frozen(name, getattr(self, name), (len(self.joints),), dtype)
+            object.__setattr__(self, name, values)
+        if len(self.joints) and not 0 <= self.joints.min() <= self.joints.max() < self.n_joints:
+            raise RigError(f"joints: expected indices 0 to {self.n_joints - 1}")
+        if len(self.vertices) and self.vertices.min() < 0:
+            raise RigError("vertices: expected indices from 0 on")
+
+
+def regress_joints(regressor: JointRegressor, positions: Floats) -> Floats:
+    """Return the joints of a rest mesh.
+
+    Parameters
+    ----------
+    regressor : JointRegressor
+        With J rows.
+    positions : (V, 3)
+        Rest vertices, figure units.
+
+    Returns
+    -------
+    (J, 3)
+        Figure units.
+    """
+    terms = positions[regressor.vertices] * regressor.weights[:, None]
+    columns = [
+        np.bincount(regressor.joints, terms[:, axis], minlength=regressor.n_joints)
+        for axis in range(3)
+    ]
+    return np.stack(columns, axis=1)
+
+
+def _values(offsets: Floats | Deferred) -> Floats:
+    return offsets.values() if isinstance(offsets, Deferred) else offsets
+
+
+def _check_shape(name: str, found: tuple[int, ...], wanted: tuple[int, ...]) -> None:
+    if found != wanted:
+        raise RigError(f"{name}: expected shape {wanted}, found {found}")

@@ -1,0 +1,95 @@
+"""Hand poses as principal components (Romero et al. 2017, MANO)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.rig.arrays import Floats, Ints, frozen
+
+__all__ = ["Hand", "hand_coefficients", "hand_vectors"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Hand:
+    """One hand's joints and the directions in which they usually bend together.
+
+    Attributes
+    ----------
+    side : str
+        ``"left"``, ``"right"``, or empty where a model has one hand.
+    joints : (H,) int32
+        The finger joints, in the order of the components.
+    components : (C, 3 H)
+        Rotation vectors one after the other, radians per unit of coefficient.
+    mean : (3 H,)
+        Rotation vectors of the mean hand; zeros are the flat hand.
+    """
+
+    side: str
+    joints: Ints
+    components: Floats
+    mean: Floats
+
+    def __post_init__(self) -> None:
+        size = 3 * len(self.joints)
+        put = object.__setattr__
+        put(self, "joints", frozen("joints", self.joints, (None,), np.int32))
+        put(self, "components", frozen("hands_components", self.components, (None, size)))
+        put(self, "mean", frozen("hands_mean", self.mean, (size,)))
+
+
+def hand_vectors(hand: Hand, coefficients: Floats, flat: bool) -> Floats:
+    """Return the finger joints' rotation vectors: mean + sum_i c_i component_i.
+
+    Parameters
+    ----------
+    hand : Hand
+        Gives components and mean.
+    coefficients : (N,)
+        N <= C; the others count as 0.
+    flat : bool
+        Leave the mean out.
+
+    Returns
+    -------
+    (H, 3)
+        Radians.
+
+    Raises
+    ------
+    RigError
+        If there are more coefficients than components.
+    """
+    if len(coefficients) > len(hand.components):
+        raise RigError(
+            f"expected at most {len(hand.components)} hand coefficients, found {len(coefficients)}"
+        )
+    vectors = coefficients @ hand.components[: len(coefficients)]
+    return (vectors if flat else vectors + hand.mean).reshape(-1, 3)
+
+
+def hand_coefficients(hand: Hand, vectors: Floats, flat: bool, count: int) -> Floats:
+    """Return the first ``count`` coefficients of the nearest hand that they can make.
+
+    Parameters
+    ----------
+    hand : Hand
+        Gives components and mean.
+    vectors : (H, 3)
+        Rotation vectors of its joints, radians.
+    flat : bool
+        As for ``hand_vectors``.
+    count : int
+        How many components may be used.
+
+    Returns
+    -------
+    (count,)
+        In the least-squares sense, so components need not be orthogonal.
+    """
+    wanted = vectors.ravel() - (0.0 if flat else hand.mean)
+    found: Floats = np.linalg.lstsq(hand.components[:count].T, wanted, rcond=None)[0]
+    return found

@@ -1,0 +1,113 @@
+"""Where a posed figure's keypoints are, without skinning its whole mesh."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.rig.annotations import Keypoints, keypoint_positions
+from viewer.rig.arrays import Deferred, Floats, Ints
+from viewer.rig.blendshapes import BlendShapes, Correctives
+from viewer.rig.figure import Figure
+from viewer.rig.memo import Memo
+from viewer.rig.mesh import Mesh
+from viewer.rig.pose import Pose
+from viewer.rig.shape import shaped
+from viewer.rig.skin import Skin
+from viewer.rig.skinning import Skinning, deform, joint_matrices
+
+__all__ = ["posed_keypoints", "some_vertices"]
+
+_parts: Memo[Figure, tuple[Figure, Keypoints]] = Memo()
+
+
+def posed_keypoints(figure: Figure, pose: Pose, skinning: Skinning | None = None) -> Floats:
+    """Return the keypoints of a posed figure.
+
+    Parameters
+    ----------
+    figure : Figure
+        With keypoints, mesh and skeleton.
+    pose : Pose
+        DOFs in lengths and radians.
+    skinning : Skinning, optional
+        How joints move the mesh.
+
+    Returns
+    -------
+    (N, 3)
+        Figure space.
+
+    Raises
+    ------
+    RigError
+        If the figure has no keypoints.
+    """
+    if figure.keypoints is None or figure.mesh is None:
+        raise RigError(f"figure {figure.name} has no keypoints")
+    part, keypoints = _parts.get(figure, None, lambda: _part(figure))
+    # The joints are those of the whole figure, shaped; the part has no regressor of its own.
+    whole = shaped(figure, pose.shape_weights)
+    part = replace(part, skeleton=whole.skeleton, skin=_with_binds(part.skin, whole.skin))
+    vertices = deform(part, pose, skinning or Skinning())[0]
+    return keypoint_positions(keypoints, vertices, joint_matrices(figure, pose)[:, :3, 3])
+
+
+def _with_binds(skin: Skin | None, whole: Skin | None) -> Skin | None:
+    return None if skin is None or whole is None else replace(skin, inverse_bind=whole.inverse_bind)
+
+
+def _part(figure: Figure) -> tuple[Figure, Keypoints]:
+    keypoints = figure.keypoints
+    assert keypoints is not None  # the caller looked
+    vertices, index = np.unique(keypoints.vertices, return_inverse=True)
+    part = some_vertices(figure, vertices.astype(np.int32))
+    return part, replace(keypoints, vertices=index.reshape(-1, 3).astype(np.int32))
+
+
+def some_vertices(figure: Figure, vertices: Ints) -> Figure:
+    """Return a figure of a few vertices, without triangles, that moves as the whole one does.
+
+    Parameters
+    ----------
+    figure : Figure
+        With a mesh.
+    vertices : (N,)
+        Which ones.
+
+    Returns
+    -------
+    Figure
+        Without joint regressor: its joints do not follow its shape by themselves.
+    """
+    mesh = figure.mesh
+    assert mesh is not None  # the caller looked
+    shapes, correctives = figure.blend_shapes, figure.correctives
+    return Figure(
+        name=figure.name,
+        mesh=Mesh(mesh.positions[vertices], mesh.normals[vertices], np.zeros((0, 3), np.int32)),
+        skeleton=figure.skeleton,
+        skin=None if figure.skin is None else _rows_of(figure.skin, vertices),
+        blend_shapes=None
+        if shapes is None
+        else BlendShapes(shapes.names, _columns(shapes.offsets, vertices), shapes.groups),
+        correctives=None
+        if correctives is None
+        else Correctives(_columns(correctives.offsets, vertices)),
+    )
+
+
+def _columns(offsets: Floats | Deferred, vertices: Ints) -> Floats | Deferred:
+    if not isinstance(offsets, Deferred):
+        return offsets[:, vertices]
+    shape = (offsets.shape[0], len(vertices), 3)
+    return Deferred(shape, offsets.dtype, lambda: offsets.values()[:, vertices])
+
+
+def _rows_of(skin: Skin, vertices: Ints) -> Skin:
+    counts = np.diff(skin.starts)[vertices]
+    starts = np.concatenate([[0], np.cumsum(counts)])
+    index = np.repeat(skin.starts[vertices] - starts[:-1], counts) + np.arange(starts[-1])
+    return Skin(starts.astype(np.int32), skin.joints[index], skin.weights[index], skin.inverse_bind)

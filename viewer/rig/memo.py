@@ -1,0 +1,46 @@
+"""Results that are remembered as long as what they were made from is in use."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from typing import Generic, TypeVar
+from weakref import WeakKeyDictionary
+
+__all__ = ["Memo"]
+
+_Owner = TypeVar("_Owner")
+_Value = TypeVar("_Value")
+
+
+class Memo(Generic[_Owner, _Value]):
+    """A few results per owner; they go when the owner does.
+
+    Parameters
+    ----------
+    kept : int
+        How many of one owner; the oldest makes room.
+    """
+
+    def __init__(self, kept: int = 1) -> None:
+        self._kept = kept
+        self._values: WeakKeyDictionary[_Owner, dict[Hashable, _Value]] = WeakKeyDictionary()
+
+    def get(self, owner: _Owner, key: Hashable, make: Callable[[], _Value]) -> _Value:
+        """Return what ``make`` gave for this owner and key, calling it the first time.
+
+        Parameters
+        ----------
+        owner : object
+            Frozen, told apart by identity; ``make``'s result must not refer to it.
+        key : hashable
+            What else the result depends on.
+        make : callable
+            Without arguments.
+        """
+        known = self._values.setdefault(owner, {})
+        if key not in known:
+            value = make()
+            while len(known) >= self._kept:
+                del known[next(iter(known))]
+            known[key] = value
+        return known[key]

@@ -1,0 +1,142 @@
+"""A figure's rest mesh changed, and with it its joints and inverse bind matrices."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from viewer.rig.arrays import Floats
+from viewer.rig.blendshapes import corrective_weights, regress_joints
+from viewer.rig.figure import Figure
+from viewer.rig.kinematics import world_matrices
+from viewer.rig.memo import Memo
+from viewer.rig.mesh import Mesh, vertex_normals
+from viewer.rig.pose import Pose, joint_rotations, rest_pose
+from viewer.rig.skeleton import Skeleton
+from viewer.rig.skin import Skin
+from viewer.rig.transform import translation_matrix
+
+__all__ = ["rest_joints", "rest_positions", "shaped", "with_rest_mesh"]
+
+_shaped: Memo[Figure, Figure] = Memo(kept=8)
+
+
+def shaped(figure: Figure, weights: Floats) -> Figure:
+    """Return the figure with its blend shapes applied: mesh, normals, joints and bindings.
+
+    The last few results are remembered, so that passes and panels may ask for the same one.
+
+    Parameters
+    ----------
+    figure : Figure
+        With or without blend shapes.
+    weights : (N,)
+        N <= S; the others count as 0.
+
+    Returns
+    -------
+    Figure
+        The figure itself if all weights are 0.
+
+    Raises
+    ------
+    RigError
+        If there are more weights than blend shapes.
+    FormatError
+        If the offsets are read now, and the file is bad.
+    """
+    mesh, shapes = figure.mesh, figure.blend_shapes
+    if shapes is None or mesh is None or not weights.any():
+        return figure
+
+    def make() -> Figure:
+        return with_rest_mesh(figure, mesh.positions + shapes.displacement(weights))
+
+    return _shaped.get(figure, weights.tobytes(), make)
+
+
+def with_rest_mesh(figure: Figure, positions: Floats) -> Figure:
+    """Return the figure with another rest mesh, its joints regressed from it.
+
+    Without a joint regressor the joints stay where they are. Rest rotations stay.
+
+    Parameters
+    ----------
+    figure : Figure
+        With a mesh.
+    positions : (V, 3)
+        Its new rest vertices, figure units.
+
+    Returns
+    -------
+    Figure
+        With new normals, rest translations and inverse bind matrices.
+    """
+    mesh, skeleton, skin = figure.mesh, figure.skeleton, figure.skin
+    assert mesh is not None  # the caller has its positions
+    normals = vertex_normals(positions, mesh.triangles)
+    new_mesh = replace(mesh, positions=positions, normals=normals)
+    if figure.joint_regressor is None or skeleton is None:
+        return replace(figure, mesh=new_mesh)
+    old, new = rest_joints(figure), regress_joints(figure.joint_regressor, positions)
+    return replace(
+        figure,
+        mesh=new_mesh,
+        skeleton=_moved_skeleton(skeleton, new),
+        skin=None if skin is None else _moved_skin(skin, new - old),
+    )
+
+
+def _moved_skeleton(skeleton: Skeleton, joints: Floats) -> Skeleton:
+    rotations = world_matrices(skeleton, _undeflected(skeleton))[:, :3, :3]
+    parents = skeleton.parents
+    has_parent = parents >= 0
+    above = parents[has_parent]
+    translations = joints.copy()
+    offsets = joints[has_parent] - joints[above]
+    translations[has_parent] = np.einsum("jba,jb->ja", rotations[above], offsets)
+    return replace(skeleton, rest_translations=translations)
+
+
+def _moved_skin(skin: Skin, shifts: Floats) -> Skin:
+    return replace(skin, inverse_bind=skin.inverse_bind @ translation_matrix(-shifts))
+
+
+def _undeflected(skeleton: Skeleton) -> Pose:
+    pose = rest_pose(skeleton)
+    pose.dofs[:] = 0.0
+    return pose
+
+
+def rest_joints(figure: Figure) -> Floats:
+    """Return where the joints are with all DOFs at 0: (J, 3), figure units."""
+    assert figure.skeleton is not None  # the caller looked
+    return world_matrices(figure.skeleton, _undeflected(figure.skeleton))[:, :3, 3]
+
+
+def rest_positions(figure: Figure, mesh: Mesh, pose: Pose, correct: bool = True) -> Floats:
+    """Return the vertices that a pose skins: the rest mesh plus the pose correctives.
+
+    Parameters
+    ----------
+    figure : Figure
+        Already shaped.
+    mesh : Mesh
+        Its mesh.
+    pose : Pose
+        DOFs in lengths and radians.
+    correct : bool
+        Whether correctives are added, if the figure has some.
+
+    Returns
+    -------
+    (V, 3)
+        Binding space.
+    """
+    if not correct or figure.correctives is None or figure.skeleton is None:
+        return mesh.positions
+    weights = corrective_weights(joint_rotations(figure.skeleton, pose))
+    if not weights.any():
+        return mesh.positions
+    return mesh.positions + figure.correctives.displacement(weights)

@@ -1,0 +1,161 @@
+"""Dual quaternion skinning in two phases: blended stretch, then blended rigid motion.
+
+Kavan, Collins, Zara, O'Sullivan 2008, "Geometric Skinning with Approximate Dual Quaternion
+Blending", section 4.2: joints that scale are split into a stretch, blended linearly in binding
+space, and a rigid motion, blended as dual quaternions.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.rotation import matrix_to_quaternion, nearest_rotations
+from viewer.rig.skin import Skin, bind_positions, strongest_first
+from viewer.rig.vectors import unit
+
+__all__ = ["deform", "split_palette"]
+
+_CHUNK = 1 << 16  # vertices at a time, which bounds the memory that large meshes take
+_RIGID = 1e-12  # a stretch nearer to the identity is rounding
+_TINY = 1e-12  # influences that cancel out give no rotation
+
+
+def deform(
+    positions: Floats, normals: Floats, skin: Skin, palette: Floats, share: float = 1.0
+) -> tuple[Floats, Floats]:
+    """Stretch linearly, then move by the unit dual quaternion of the weighted sum.
+
+    Weights count relative to their sum, as the method demands. Quaternions are added on the
+    strongest influence's side of the sphere (eq. 14 and its text: antipodality).
+
+    Parameters
+    ----------
+    positions, normals : (V, 3)
+        Binding space.
+    skin : Skin
+        A vertex without influence stays at its bind position.
+    palette : (J, 4, 4)
+        Skinning matrices, bind to posed; they may scale, uniformly or not.
+    share : float
+        Not used: there is nothing to mix with.
+
+    Returns
+    -------
+    positions : (V, 3)
+        Figure units.
+    normals : (V, 3)
+        Unit length.
+    """
+    skin = strongest_first(skin)
+    centers = bind_positions(skin)
+    duals, stretches = split_palette(palette, centers)
+    moved, turned = positions.copy(), normals.copy()
+    for first in range(0, skin.n_vertices, _CHUNK):
+        rows = slice(first, min(first + _CHUNK, skin.n_vertices))
+        starts = skin.starts[rows.start : rows.stop + 1]
+        listing = np.flatnonzero(np.diff(starts) > 0)
+        if len(listing):
+            chosen = rows.start + listing
+            moved[chosen], turned[chosen] = _move(
+                positions[chosen], normals[chosen], skin, starts, listing, duals, stretches
+            )
+    return moved, unit(turned)
+
+
+def split_palette(palette: Floats, centers: Floats) -> tuple[Floats, Floats]:
+    """Split skinning matrices into a rigid motion after a stretch about each joint, M = D S.
+
+    Parameters
+    ----------
+    palette : (J, 4, 4)
+        Bind to posed.
+    centers : (J, 3)
+        Bind positions of the joints: the stretches leave them where they are.
+
+    Returns
+    -------
+    duals : (J, 8)
+        Unit dual quaternions (x, y, z, w) of D: the real part, then the dual part.
+    stretches : (J, 3, 4)
+        Affine matrices S.
+    """
+    linear = palette[:, :3, :3]
+    rotations = linear.copy()
+    stretches = np.tile(np.eye(3), (len(linear), 1, 1))
+    gram = np.swapaxes(linear, 1, 2) @ linear
+    other = np.abs(gram - np.eye(3)).max(axis=(1, 2)) > _RIGID
+    other |= np.linalg.det(linear) < 0.0
+    rotations[other], stretches[other] = nearest_rotations(linear[other])
+    # D carries each centre to where M does.
+    places = np.einsum("jab,jb->ja", linear, centers) + palette[:, :3, 3]
+    translations = places - np.einsum("jab,jb->ja", rotations, centers)
+    real = matrix_to_quaternion(rotations)
+    # Dual part: t q / 2 with t = (translation, 0) (eq. 5).
+    x, y, z = np.moveaxis(0.5 * translations, -1, 0)
+    qx, qy, qz, qw = np.moveaxis(real, -1, 0)
+    dual = np.stack(
+        [
+            x * qw + y * qz - z * qy,
+            y * qw + z * qx - x * qz,
+            z * qw + x * qy - y * qx,
+            -(x * qx + y * qy + z * qz),
+        ],
+        axis=-1,
+    )
+    shifts = centers - np.einsum("jab,jb->ja", stretches, centers)
+    return np.concatenate([real, dual], axis=1), np.concatenate([stretches, shifts[..., None]], 2)
+
+
+def _move(
+    positions: Floats,
+    normals: Floats,
+    skin: Skin,
+    starts: Ints,
+    listing: np.ndarray,
+    duals: Floats,
+    stretches: Floats,
+) -> tuple[Floats, Floats]:
+    """Move the vertices of one chunk that list influences."""
+    span = slice(starts[0], starts[-1])
+    edges = starts[listing] - starts[0]
+    joints, weights = skin.joints[span], skin.weights[span]
+    sums = np.add.reduceat(weights, edges)
+    is_moved = np.abs(sums) > _TINY
+    counts = np.diff(np.append(edges, len(joints)))
+    relative = weights / np.repeat(np.where(is_moved, sums, 1.0), counts)
+    quaternions = duals[joints]
+    first = np.repeat(quaternions[edges, :4], counts, axis=0)
+    sides = np.where(np.einsum("na,na->n", quaternions[:, :4], first) < 0.0, -1.0, 1.0)
+    blended = np.add.reduceat(quaternions * (relative * sides)[:, None], edges, axis=0)
+    stretch = np.add.reduceat(stretches[joints] * relative[:, None, None], edges, axis=0)
+    lengths = np.linalg.norm(blended[:, :4], axis=1)
+    is_moved &= lengths > _TINY
+    blended /= np.where(is_moved, lengths, 1.0)[:, None]
+    stretched = np.einsum("vab,vb->va", stretch[:, :, :3], positions) + stretch[:, :, 3]
+    moved = _rigid(blended, stretched)
+    turned = _rotated(blended[:, :4], _stretched_normals(stretch[:, :, :3], normals))
+    keep = ~is_moved
+    moved[keep], turned[keep] = positions[keep], normals[keep]
+    return moved, turned
+
+
+def _rigid(duals: Floats, points: Floats) -> Floats:
+    """Rotate, then translate by 2 (w_r v_d - w_d v_r + v_r x v_d) (Kavan 2008, algorithm 1)."""
+    real, dual = duals[:, :3], duals[:, 4:7]
+    w_real, w_dual = duals[:, 3:4], duals[:, 7:8]
+    return _rotated(duals[:, :4], points) + 2.0 * (
+        w_real * dual - w_dual * real + np.cross(real, dual)
+    )
+
+
+def _rotated(quaternions: Floats, vectors: Floats) -> Floats:
+    axis, w = quaternions[:, :3], quaternions[:, 3:4]
+    return vectors + 2.0 * np.cross(axis, np.cross(axis, vectors) + w * vectors)
+
+
+def _stretched_normals(stretch: Floats, normals: Floats) -> Floats:
+    """Multiply by the cofactor matrix, det(S) S^-T: exact normals under any stretch."""
+    x, y, z = np.moveaxis(stretch, -1, 0)  # columns
+    cofactors = np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)], axis=-1)
+    return np.einsum("vab,vb->va", cofactors, normals)
