@@ -8,12 +8,12 @@ import pytest
 
 import viewer
 from viewer.errors import FormatError, RigError
-from viewer.formats import FORMATS
+from viewer.formats import KNOWN
 from viewer.loading import bundled_files
 from viewer.rig.mesh import bounding_box
 from viewer.rig.scene import actor_points
 
-ANY = " or ".join(kind.suffix for kind in FORMATS.values())
+ANY = KNOWN
 MATRIX = "matrix { 1 0 0 0 1 0 0 0 1 0 0 0 } "
 
 
@@ -228,7 +228,7 @@ def test_5_million_blank_lines_before_a_skeleton_load(tmp_path):
     [
         (b"", "an empty file"),
         (b"\0" * 5000, "zeros"),
-        (b"\x89PNG\r\n\x1a\n", "a PNG picture"),
+        (b"%PDF-1.7", "a PDF document"),
         (gzip.compress(b"balljoint a { }"), "gzip data"),
         (b"<html><body>404</body></html>", "HTML or XML (a failed download?)"),
         ("balljoint a { }".encode("utf-16"), "UTF-16 text"),
@@ -250,8 +250,9 @@ def test_missing_file_is_named(tmp_path):
 
 
 def test_folder_is_refused(tmp_path):
-    assert refusal(tmp_path) == f"{tmp_path}: expected a file, found a folder"
-    assert refusal("") == ".: expected a file, found a folder"
+    wanted = "expected a file, or a folder with a PIG model's tables, found a folder"
+    assert refusal(tmp_path) == f"{tmp_path}: {wanted}"
+    assert refusal("") == f".: {wanted}"
 
 
 def test_file_as_a_folder_is_refused(files):
@@ -298,10 +299,10 @@ def test_unreadable_file_is_refused(files, monkeypatch):
     skel.chmod(0)
     if os.access(skel, os.R_OK):  # root reads everything
 
-        def refuse(path):
+        def refuse(path, mode):
             raise PermissionError(13, "Permission denied")
 
-        monkeypatch.setattr(Path, "read_bytes", refuse)
+        monkeypatch.setattr(Path, "open", refuse)
     assert refusal(skel) == f"{skel}: cannot be read: Permission denied"
 
 

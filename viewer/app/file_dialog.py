@@ -60,7 +60,7 @@ class FileDialog:
 
     def listed(self) -> list[Path]:
         """Return folders, and the files that can be opened or all files."""
-        suffixes = {kind.suffix for kind in FORMATS.values()}
+        suffixes = {suffix for kind in FORMATS.values() for suffix in kind.suffixes}
         return [
             path
             for path in self.entries

@@ -2,31 +2,42 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 
-from viewer.errors import FormatError, UnsupportedFormatError
-from viewer.formats._image import save_image
-from viewer.formats._save import free_path, save_bytes
+from viewer.errors import FormatError, UnsupportedFormatError, printable
+from viewer.formats._image import is_picture, read_picture, save_image
+from viewer.formats._save import free_path, save_arrays, save_bytes, save_text
 from viewer.formats._source import MAX_SIZE, Source
 from viewer.rig.clip import Clip
 from viewer.rig.figure import Figure
+from viewer.rig.pose_record import PoseRecord
 
 __all__ = [
     "FORMATS",
+    "KNOWN",
     "MAX_SIZE",
     "Format",
     "Source",
+    "claims",
     "detect",
     "free_path",
+    "is_picture",
     "read",
+    "read_picture",
+    "save_arrays",
     "save_bytes",
     "save_image",
+    "save_text",
     "write",
 ]
 
+_ARCHIVE_HEAD = 64
+_ARCHIVES = (".pkl", ".pickle", ".npz", ".npy")
+_ANY_TEXT = (".txt",)  # says nothing of what is inside
 _HEAD = 1 << 16  # bytes in which a file has to show what it is
 
 
@@ -38,27 +49,55 @@ class Format:
     ----------
     title : str
         For menus and the README.
-    suffix : str
-        With its dot.
+    suffixes : tuple of str
+        With their dots; the first is what files are called that we write.
     signature : bytes
-        Regular expression that the head of every such file contains.
+        Regular expression that the head of every such text file contains; empty for none.
+    keys : tuple of str
+        What an archive (``.pkl``, ``.npz``) of this kind holds: any of them tells it.
+    files : tuple of str
+        What a folder of this kind holds: any of them tells it.
+    writes : bool
+        Whether there is a writer.
     """
 
     title: str
-    suffix: str
-    signature: bytes
+    suffixes: tuple[str, ...]
+    signature: bytes = b""
+    keys: tuple[str, ...] = ()
+    files: tuple[str, ...] = ()
+    writes: bool = True
 
 
 FORMATS = {
-    "skel": Format("skeleton (CSE169)", ".skel", rb"(?:^|[\s{}])balljoint(?=[\s{]|$)"),
+    "skel": Format("skeleton (CSE169)", (".skel",), rb"(?:^|[\s{}])balljoint(?=[\s{]|$)"),
     "skin": Format(
         "skin (CSE169)",
-        ".skin",
+        (".skin",),
         rb"(?:^|[\s}])(?:positions|normals|texcoords|skinweights|triangles|bindings)\s+[-+\w]",
     ),
-    "anim": Format("clip (CSE169)", ".anim", rb"(?:^|\s)animation\s*\{"),
+    "anim": Format("clip (CSE169)", (".anim",), rb"(?:^|\s)animation\s*\{"),
+    "smpl": Format(
+        "SMPL family",
+        (".npz", ".pkl"),
+        keys=("v_template", "kintree_table", "shapedirs", "posedirs"),
+        writes=False,
+    ),
+    "pig": Format(
+        "PIG animal",
+        (".npz", ".pkl"),
+        keys=("t_pose_joints", "skinning_weights", "faces_vert"),
+        files=("vertices.txt", "t_pose_joints.txt", "skinning_weights.txt", "faces_vert.txt"),
+        writes=False,
+    ),
+    "pose": Format(
+        "pose",
+        (".json", ".npz", ".txt"),
+        rb"\A\{|\A[-+.\d][-+.\deE\s]*\Z",
+        keys=("poses", "pose", "fullpose", "global_orient", "body_pose", "dofs", "betas"),
+    ),
 }
-"""Modules in this folder; each has ``read(source)``, ``write(figure or clip, path)``, or both."""
+"""Modules in this folder; each has ``read(source)``, ``write(content, path)``, or both."""
 
 
 def detect(source: Source) -> str:
@@ -74,38 +113,89 @@ def detect(source: Source) -> str:
     FormatError
         If no format claims it; the message says what it looks like.
     """
+    if source.is_folder:
+        return _detect_folder(source)
     suffix = source.path.suffix.lower()
-    by_suffix = next((key for key, kind in FORMATS.items() if kind.suffix == suffix), None)
+    texts = {key: kind for key, kind in FORMATS.items() if kind.signature}
+    claimed = suffix if suffix not in (*_ARCHIVES, *_ANY_TEXT) else ""
+    by_suffix = next((key for key, kind in texts.items() if claimed in kind.suffixes), None)
+    if _is_archive(source):
+        # A text format's suffix on a broken archive: say what it is, not how it is broken.
+        with contextlib.nullcontext() if by_suffix is None else contextlib.suppress(FormatError):
+            return _detect_archive(source)
     head = source.head(_HEAD)
     if by_suffix and re.search(FORMATS[by_suffix].signature, head):
         return by_suffix
-    for key, kind in FORMATS.items():
-        if re.search(kind.signature, head):
+    for key, kind in texts.items():
+        # Numbers alone are a pose only where no other suffix says otherwise.
+        if re.search(kind.signature, head) and not (by_suffix and key == "pose"):
             if by_suffix:
-                source.warn(f"is a {kind.suffix}, named {suffix}")
+                source.warn(f"is a {kind.suffixes[0]}, named {suffix}")
             return key
     looks = source.looks_like()
     if by_suffix and looks is None:
         return by_suffix  # its reader knows best what is missing
-    wanted = " or ".join(kind.suffix for kind in FORMATS.values())
-    if by_suffix:
-        wanted = FORMATS[by_suffix].suffix
+    wanted = FORMATS[by_suffix].suffixes[0] if by_suffix else KNOWN
     raise FormatError(source.path, f"expected a {wanted} file, found {looks or 'something else'}")
 
 
-def read(source: Source) -> Figure | Clip:
+KNOWN = " or ".join(dict.fromkeys(suffix for kind in FORMATS.values() for suffix in kind.suffixes))
+"""All suffixes, for messages."""
+
+
+def claims(suffix: str) -> bool:
+    """Return whether a text format owns a suffix, so that other content under it is a mistake."""
+    kinds = (kind for kind in FORMATS.values() if kind.signature)
+    return any(suffix.lower() in kind.suffixes for kind in kinds) and suffix not in _ARCHIVES
+
+
+def _detect_folder(source: Source) -> str:
+    try:
+        names = {path.name for path in source.path.iterdir()}
+    except OSError as problem:
+        raise source.error(f"cannot be read: {problem.strerror or problem}") from None
+    for key, kind in FORMATS.items():
+        if names.intersection(kind.files):
+            return key
+    raise source.error("expected a file, or a folder with a PIG model's tables, found a folder")
+
+
+def _is_archive(source: Source) -> bool:
+    head = source.peek(_ARCHIVE_HEAD)
+    if head[:1].isalpha() and not head.startswith((b"PK", b"c")):
+        return False  # most text files, before the module for archives is loaded
+    from viewer.formats._archive import is_archive
+
+    return is_archive(head) or source.path.suffix.lower() in _ARCHIVES
+
+
+def _detect_archive(source: Source) -> str:
+    from viewer.formats._container import archive_of
+
+    keys = archive_of(source).keys
+    for kind, form in FORMATS.items():
+        if set(keys).intersection(form.keys):
+            return kind
+    found = ", ".join(printable(key, 40) for key in keys[:12]) or "none"
+    wanted = "; ".join(
+        f"{form.title}: {', '.join(form.keys)}" for form in FORMATS.values() if form.keys
+    )
+    raise source.error(f"expected a model or pose ({wanted}), found the keys {found}")
+
+
+def read(source: Source) -> Figure | Clip | PoseRecord:
     """Read whatever the file holds; see the format modules for what they raise."""
     return import_module(f"{__name__}.{detect(source)}").read(source)
 
 
-def write(content: Figure | Clip, path: str | Path) -> None:
-    """Write a clip or a figure, or the part of it that the format of the suffix holds.
+def write(content: Figure | Clip | PoseRecord, path: str | Path) -> None:
+    """Write a clip, a pose, or the part of a figure that the format of the suffix holds.
 
     A file of that name is replaced.
 
     Parameters
     ----------
-    content : Figure or Clip
+    content : Figure, Clip or PoseRecord
         What to write.
     path : str or Path
         Its suffix chooses the format.
@@ -118,9 +208,10 @@ def write(content: Figure | Clip, path: str | Path) -> None:
         If the file cannot be written.
     """
     suffix = Path(path).suffix.lower()
-    for key, kind in FORMATS.items():
-        if kind.suffix == suffix:
+    writers = {key: kind for key, kind in FORMATS.items() if kind.writes}
+    for key, kind in writers.items():
+        if suffix in kind.suffixes:
             import_module(f"{__name__}.{key}").write(content, path)
             return
-    known = ", ".join(kind.suffix for kind in FORMATS.values())
+    known = ", ".join(dict.fromkeys(s for kind in writers.values() for s in kind.suffixes))
     raise UnsupportedFormatError(f'no writer for "{suffix}"; there are: {known}')

@@ -18,7 +18,7 @@ from viewer.rig.arrays import Bytes
 if TYPE_CHECKING:
     from PIL import Image
 
-__all__ = ["encode_png", "load_image", "save_image"]
+__all__ = ["encode_png", "is_picture", "load_image", "read_picture", "save_image"]
 
 _MAX_PIXELS = 16384 * 16384
 _REFUSALS = (OSError, ValueError, SyntaxError, MemoryError, Warning)  # what Pillow raises
@@ -42,11 +42,36 @@ def load_image(source: Source, name: str, offset: int) -> Bytes | None:
     (H, W, 4) uint8 or None
         sRGB with alpha, first row at the top.
     """
-    from PIL import Image, UnidentifiedImageError
-
     path = source.path.parent / name.replace("\\", "/")
     try:
-        data = read_bytes(path)
+        return _decode(path, read_bytes(path))
+    except FormatError as problem:
+        source.warn(f"texture {problem}; drawn untextured", offset)
+        return None
+
+
+def read_picture(source: Source) -> Bytes:
+    """Return the pixels of a picture file: (H, W, 4) uint8, first row at the top.
+
+    Raises
+    ------
+    FormatError
+        If it is no picture that can be read.
+    """
+    return _decode(source.path, source.data)
+
+
+def is_picture(head: bytes) -> bool:
+    """Return whether a file that begins like this is a picture that textures may be."""
+    return head.startswith((b"\x89PNG", b"\xff\xd8\xff", b"BM", b"GIF8", b"II*\0", b"MM\0*")) or (
+        head[:4] == b"RIFF" and head[8:12] == b"WEBP"
+    )
+
+
+def _decode(path: Path, data: bytes) -> Bytes:
+    from PIL import Image, UnidentifiedImageError
+
+    try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             warnings.simplefilter("error", Image.DecompressionBombWarning)
@@ -57,16 +82,9 @@ def load_image(source: Source, name: str, offset: int) -> Bytes | None:
                 pixels.flags.writeable = False  # materials may share it
                 return pixels
     except UnidentifiedImageError:
-        source.warn(
-            f"texture {printable(path, 300)}: not a picture that can be read; drawn untextured",
-            offset,
-        )
-    except FormatError as problem:
-        source.warn(f"texture {problem}; drawn untextured", offset)
+        raise FormatError(path, "not a picture that can be read") from None
     except (*_REFUSALS, Image.DecompressionBombError) as problem:
-        reason = f"{printable(path, 300)}: {printable(problem)}"
-        source.warn(f"texture {reason}; drawn untextured", offset)
-    return None
+        raise FormatError(path, f"a picture that cannot be read: {printable(problem)}") from None
 
 
 def _open(data: bytes) -> Image.Image:

@@ -6,8 +6,12 @@ import re
 import stat
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from viewer.errors import FormatError, printable
+
+if TYPE_CHECKING:
+    from viewer.formats._archive import Archive
 
 __all__ = ["MAX_SIZE", "Source", "read_bytes", "shown"]
 
@@ -58,46 +62,92 @@ def read_bytes(path: Path, max_size: int = MAX_SIZE) -> bytes:
     FormatError
         If the file is missing, unreadable, not a regular file, or too large.
     """
+    kind = _check(path, max_size)
+    if kind is not None:
+        raise FormatError(path, f"expected a file, found {kind}")
+    return _read(path)
+
+
+def _check(path: Path, max_size: int) -> str | None:
+    """Look before opening, as a pipe would block: return what it is, None for a file."""
     try:
-        # A pipe would block on opening, so look before.
         status = path.stat()
-        if not stat.S_ISREG(status.st_mode):
-            kind = _KINDS.get(stat.S_IFMT(status.st_mode), "something else")
-            raise FormatError(path, f"expected a file, found {kind}")
-        if status.st_size > max_size:
-            raise FormatError(
-                path, f"expected at most {max_size} bytes, found {status.st_size} (--max-size)"
-            )
-        return path.read_bytes()
     except (OSError, ValueError) as problem:
-        reason = getattr(problem, "strerror", None) or problem
-        raise FormatError(path, f"cannot be read: {reason}") from None
+        raise _unreadable(path, problem) from None
+    if not stat.S_ISREG(status.st_mode):
+        return _KINDS.get(stat.S_IFMT(status.st_mode), "something else")
+    if status.st_size > max_size:
+        raise FormatError(
+            path, f"expected at most {max_size} bytes, found {status.st_size} (--max-size)"
+        )
+    return None
+
+
+def _read(path: Path, size: int = -1) -> bytes:
+    try:
+        with path.open("rb") as stream:
+            return stream.read(size)
+    except (OSError, ValueError) as problem:
+        raise _unreadable(path, problem) from None
+
+
+def _unreadable(path: Path, problem: Exception) -> FormatError:
+    return FormatError(path, f"cannot be read: {getattr(problem, 'strerror', None) or problem}")
 
 
 class Source:
-    """The bytes of one file with the warnings that its reader adds.
+    """One file, or folder of files, with the warnings that its reader adds.
 
     Attributes
     ----------
     path : Path
-        Where the bytes came from; texture names are relative to its folder.
-    data : bytes
-        The whole file, without a UTF-8 byte order mark and a closing Ctrl-Z.
+        Where the bytes come from; texture names are relative to its folder.
+    is_folder : bool
+        Whether it is a folder: then there are no bytes.
+    max_size : int
+        Largest size of a file, in bytes, also of those inside a folder or archive.
     warnings : list of str
         One line each, none twice.
     """
 
-    def __init__(self, path: str | Path, data: bytes) -> None:
+    def __init__(
+        self, path: str | Path, data: bytes | None = None, max_size: int = MAX_SIZE
+    ) -> None:
         self.path = Path(path)
-        self.data = data.removeprefix(_BYTE_ORDER_MARK).rstrip(_CONTROL_Z)
+        self.is_folder = False
+        self.max_size = max_size
         self.warnings: list[str] = []
+        self.archive: Archive | None = None  # opened once, by whoever asks first
+        self._data = None if data is None else _without_marks(data)
         self._warned: set[str] = set()
         self._counted = (0, 1)  # an offset whose line is known, and that line
 
     @classmethod
     def open(cls, path: str | Path, max_size: int = MAX_SIZE) -> Source:
-        """Read a file; see ``read_bytes`` for what it raises."""
-        return cls(path, read_bytes(Path(path), max_size))
+        """Look at a file or folder; see ``read_bytes`` for what it raises."""
+        source = cls(path, max_size=max_size)
+        kind = _check(source.path, max_size)
+        source.is_folder = kind == _KINDS[stat.S_IFDIR]
+        if kind is not None and not source.is_folder:
+            raise FormatError(source.path, f"expected a file, found {kind}")
+        return source
+
+    @property
+    def data(self) -> bytes:
+        """The whole file, without a UTF-8 byte order mark and a closing Ctrl-Z; read once."""
+        if self._data is None:
+            self._data = _without_marks(read_bytes(self.path, self.max_size))
+        return self._data
+
+    def peek(self, size: int) -> bytes:
+        """Return the first bytes, without reading the others if nobody has."""
+        return _read(self.path, size) if self._data is None else self._data[:size]
+
+    def inside(self, name: str) -> Source:
+        """Return a file of this folder; its warnings are this source's own."""
+        source = Source(self.path / name, max_size=self.max_size)
+        source.warnings, source._warned = self.warnings, self._warned
+        return source
 
     def words(self, start: int = 0, end: int | None = None) -> Iterator[re.Match[bytes]]:
         """Yield words and braces, braces always on their own, with their offsets."""
@@ -163,6 +213,10 @@ class Source:
         if not self.data[1:_LOOK:2].strip(b"\0") or not self.data[:_LOOK:2].strip(b"\0"):
             return "UTF-16 text"
         return "binary data" if head.count(0) * 3 > len(head) else None
+
+
+def _without_marks(data: bytes) -> bytes:
+    return data.removeprefix(_BYTE_ORDER_MARK).rstrip(_CONTROL_Z)
 
 
 def shown(word: bytes) -> str:

@@ -91,5 +91,5 @@ def hand_coefficients(hand: Hand, vectors: Floats, flat: bool, count: int) -> Fl
         In the least-squares sense, so components need not be orthogonal.
     """
     wanted = vectors.ravel() - (0.0 if flat else hand.mean)
-    found: Floats = np.linalg.lstsq(hand.components[:count].T, wanted, rcond=None)[0]
-    return found
+    found = np.linalg.lstsq(hand.components[:count].T, wanted, rcond=None)[0]
+    return np.asarray(found, dtype=np.float64)

@@ -32,8 +32,10 @@ class Pose:
     ----------
     dofs : (D,)
         Lengths or radians.
-    translations, rotations, scales : (J, 3), (J, 4), (J, 3)
-        Local transforms beneath the DOFs: lengths, quaternions (x, y, z, w), factors.
+    translations : (J, 3)
+        Added to the skeleton's rest translations, which follow the figure's shape.
+    rotations, scales : (J, 4), (J, 3)
+        Local transforms beneath the DOFs: quaternions (x, y, z, w), factors.
     shape_weights : (S,)
         Of the figure's blend shapes; those that are missing at the end count as 0.
     figure_scale : float
@@ -98,14 +100,14 @@ def rest_pose(skeleton: Skeleton) -> Pose:
     """
     return Pose(
         dofs=clamp_dofs(skeleton, skeleton.rest_dofs),
-        translations=skeleton.rest_translations.copy(),
+        translations=np.zeros((skeleton.n_joints, 3)),
         rotations=skeleton.rest_rotations.copy(),
         scales=skeleton.rest_scales.copy(),
     )
 
 
 def local_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
-    """Build each joint's matrix: L = T(translation + DOFs) R(quaternion) R(DOFs) S(scale).
+    """Build each joint's matrix: L = T(rest + translation + DOFs) R(quaternion) R(DOFs) S(scale).
 
     The rows of the DOF table multiply so that the first is applied first: rows x, y, z give
     R(DOFs) = Rz Ry Rx (CSE169 course notes, "rotation about x first, then y, then z").
@@ -124,7 +126,7 @@ def local_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
     """
     local = np.zeros((skeleton.n_joints, 4, 4))
     local[:, 3, 3] = 1.0
-    local[:, :3, 3] = pose.translations
+    local[:, :3, 3] = skeleton.rest_translations + pose.translations
     moves = skeleton.dof_kinds < _FIRST_ROTATION
     np.add.at(
         local[:, :3, 3], (skeleton.dof_joints[moves], skeleton.dof_kinds[moves]), pose.dofs[moves]

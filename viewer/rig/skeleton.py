@@ -13,6 +13,7 @@ from viewer.rig.arrays import Bools, Floats, Ints, frozen
 __all__ = [
     "DOF_KINDS",
     "Skeleton",
+    "ball_skeleton",
     "clamp_dofs",
     "dof_label",
     "find_dof",
@@ -127,6 +128,38 @@ class Skeleton:
     def locked(self) -> Bools:
         """Which DOFs have equal limits and so never move: (D,) bool."""
         return self.dof_limits[:, 0] == self.dof_limits[:, 1]
+
+
+def ball_skeleton(names: tuple[str, ...], parents: Ints, joints: Floats) -> Skeleton:
+    """Return a skeleton of ball joints without limits, at rest without rotation.
+
+    Parameters
+    ----------
+    names : tuple of J str
+        Of the joints.
+    parents : (J,)
+        -1 for the root; parents come first.
+    joints : (J, 3)
+        Rest positions, figure units.
+
+    Returns
+    -------
+    Skeleton
+        With three rotation DOFs, about x, y and z, for every joint.
+    """
+    count = len(parents)
+    above = np.where(parents[:, None] >= 0, joints[parents], 0.0)
+    return Skeleton(
+        names=names,
+        parents=parents,
+        rest_translations=joints - above,
+        rest_rotations=np.tile([0.0, 0.0, 0.0, 1.0], (count, 1)),
+        rest_scales=np.ones((count, 3)),
+        dof_joints=np.repeat(np.arange(count, dtype=np.int32), 3),
+        dof_kinds=np.tile(np.arange(3, 6, dtype=np.int32), count),
+        rest_dofs=np.zeros(3 * count),
+        dof_limits=np.tile([-np.inf, np.inf], (3 * count, 1)),
+    )
 
 
 def clamp_dofs(skeleton: Skeleton, dofs: Floats) -> Floats:

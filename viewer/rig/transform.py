@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.rig.arrays import Floats
+from viewer.rig.rotation import axis_rotations
 
-__all__ = ["apply_transform", "translation_matrix"]
+__all__ = ["apply_transform", "rotation_transform", "translation_matrix"]
 
 
 def translation_matrix(offset: Floats) -> Floats:
@@ -30,6 +31,13 @@ def translation_matrix(offset: Floats) -> Floats:
     matrices[..., [0, 1, 2, 3], [0, 1, 2, 3]] = 1.0
     matrices[..., :3, 3] = offset
     return matrices
+
+
+def rotation_transform(axis: int, angle: float) -> Floats:
+    """Return the (4, 4) matrix that turns about a coordinate axis by ``angle`` radians."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = axis_rotations(axis, np.asarray(angle))
+    return matrix
 
 
 def apply_transform(matrix: Floats, points: Floats) -> Floats:

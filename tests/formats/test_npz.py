@@ -1,0 +1,392 @@
+"""``.npz`` and ``.npy`` files: lazy, exact, and refused in one line where they lie."""
+
+from __future__ import annotations
+
+import io
+import random
+import struct
+import tracemalloc
+import warnings
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from viewer.errors import FormatError
+from viewer.formats._archive import Archive, Deferred, Opaque, open_archive
+from viewer.formats._source import Source
+
+BOUND = 64 << 20  # bytes that a refusal may take
+ROWS = np.arange(12.0).reshape(4, 3) / 8
+GIVEN = {
+    "rows": ROWS,
+    "fortran": np.asfortranarray(ROWS),
+    "big": np.arange(5).astype(">i4"),
+    "cube": np.arange(24, dtype=np.float32).reshape(2, 3, 4),
+    "bool": np.array([True, False]),
+    "single": np.array(120.5),
+    "text": np.array("female"),
+    "bytes": np.array(b"female"),
+    "names": np.array(["a", "bcd"]),
+    "none": np.zeros((0, 3), np.uint32),
+    "half": np.ones(3, np.float16),
+}
+
+
+def npz(*, packed: bool = False, **arrays: Any) -> bytes:
+    stream = io.BytesIO()
+    (np.savez_compressed if packed else np.savez)(stream, **arrays)
+    return stream.getvalue()
+
+
+def zipped(members: dict[str, bytes], method: int = zipfile.ZIP_STORED) -> bytes:
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w", method) as archive:
+        for name, data in members.items():
+            archive.writestr(name, data)
+    return stream.getvalue()
+
+
+def npy(header: str | bytes, data: bytes = b"", version: bytes = b"\1\0") -> bytes:
+    text = header.encode("latin-1") if isinstance(header, str) else header
+    width = "<H" if version == b"\1\0" else "<I"
+    return b"\x93NUMPY" + version + struct.pack(width, len(text)) + text + data
+
+
+def header(descr: str = "'<f8'", order: str = "False", shape: str = "(1,)") -> str:
+    return f"{{'descr': {descr}, 'fortran_order': {order}, 'shape': {shape}, }}   \n"
+
+
+def opened(data: bytes, max_size: int = 2 << 30) -> Archive:
+    return open_archive(Source("x.npz", data), max_size)
+
+
+def look(data: bytes, max_size: int = 2 << 30) -> None:
+    """Open an archive and read everything in it."""
+    archive = opened(data, max_size)
+    for key in archive.keys:
+        value = archive.get(key)
+        if isinstance(value, Deferred):
+            assert value.values().shape == value.shape
+
+
+def refusal(data: bytes, max_size: int = 2 << 30) -> str:
+    with pytest.raises(FormatError) as caught:
+        look(data, max_size)
+    line = str(caught.value)
+    assert "\n" not in line
+    assert line.startswith("x.npz: ")
+    return line.removeprefix("x.npz: ")
+
+
+def cost(action: Callable[[], Any]) -> int:
+    tracemalloc.start()
+    try:
+        action()
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.mark.parametrize("packed", [False, True])
+@pytest.mark.parametrize("in_file", [False, True])
+def test_every_array_is_read(packed: bool, in_file: bool, tmp_path: Path) -> None:
+    data = npz(packed=packed, **GIVEN)
+    path = tmp_path / "x.npz"
+    path.write_bytes(data)
+    archive = open_archive(Source.open(path) if in_file else Source("x.npz", data))
+    assert (archive.kind, archive.keys) == ("npz", tuple(GIVEN))
+    for key, given in GIVEN.items():
+        later = archive.get(key)
+        assert isinstance(later, Deferred)
+        assert not later.is_loaded
+        found = later.values()
+        assert_array_equal(found, given)
+        assert (later.shape, later.dtype) == (given.shape, given.dtype.newbyteorder("="))
+        assert (found.shape, found.dtype) == (later.shape, later.dtype)
+        assert found.flags.c_contiguous
+        assert not found.flags.writeable
+
+
+def test_only_what_is_asked_for_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "x.npz"
+    np.savez(path, large=np.zeros(4 << 20), small=ROWS)
+    source = Source.open(path)
+    assert cost(lambda: open_archive(source).array("small").values()) < 1 << 20
+
+
+def test_packed_arrays_are_not_unpacked_at_opening() -> None:
+    data = npz(packed=True, large=np.zeros(6 << 20))
+    assert cost(lambda: opened(data).get("large")) < 1 << 20
+
+
+def test_reading_takes_no_second_copy(tmp_path: Path) -> None:
+    path = tmp_path / "x.npz"
+    np.savez(path, large=np.ones(2 << 20))
+    archive = open_archive(Source.open(path))
+    assert cost(lambda: archive.array("large").values()) < (16 << 20) + (5 << 20)
+
+
+def test_file_that_changed_is_not_read(tmp_path: Path) -> None:
+    path = tmp_path / "x.npz"
+    np.savez(path, v=ROWS)
+    archive = open_archive(Source.open(path))
+    np.savez(path, v=ROWS + 1, w=ROWS)
+    with pytest.raises(FormatError) as caught:
+        archive.array("v").values()
+    assert str(caught.value) == f"{path}: changed since it was opened; open it again"
+    path.unlink()
+    with pytest.raises(FormatError) as caught:
+        archive.array("v").values()
+    assert str(caught.value) == f"{path}: cannot be read: No such file or directory"
+
+
+def test_headers_of_other_writers() -> None:
+    one = struct.pack("<d", 2.5)
+    headers = [
+        npy("{'descr':'<f8','fortran_order':False,'shape':(1,)}", one),
+        npy("{'shape': (1L,), 'fortran_order': False, 'descr': '<f8'}\n", one),
+        npy("{'descr': '<f8', 'fortran_order': True, 'shape': (1, 1L), }", one),
+        npy(header(), one, b"\2\0"),
+        npy(header(), one, b"\3\0"),
+        npy(header() + " " * 60_000, one),
+        npy(header("'f8'"), one),
+    ]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for data in headers:
+            found = opened(zipped({"v.npy": data})).array("v").values()
+            assert found.reshape(-1).tolist() == [2.5], data
+
+
+@pytest.mark.parametrize(
+    ("given", "what"),
+    [
+        (np.array({"L_Hip": 1}, dtype=object), "object array"),
+        (np.array([None, 1], dtype=object), "object array"),
+        (np.zeros(2, "f4,i4"), "array of records"),
+        (np.zeros(2, [("a", "f4", 3)]), "array of records"),
+        (np.zeros(2, "V8"), "array of type |V8"),
+        (np.zeros(2, complex), "array of type <c16"),
+        (np.zeros(2, "M8[s]"), "array of type <M8[s]"),
+    ],
+    ids=["object", "objects", "record", "sub-array", "void", "complex", "date"],
+)
+def test_arrays_that_are_not_evaluated(given: Any, what: str) -> None:
+    archive = opened(npz(v=given, good=ROWS))
+    assert archive.get("v") == Opaque(what)
+    assert_array_equal(archive.array("good").values(), ROWS)
+    with pytest.raises(FormatError) as caught:
+        archive.array("v")
+    line = f"x.npz: v: expected an array of numbers, found an unread value ({what})"
+    assert str(caught.value) == line
+
+
+def test_pickles_inside_are_never_opened(tmp_path: Path) -> None:
+    marker = tmp_path / "marker"
+    attack = b"cos\nsystem\n(S'touch " + str(marker).encode() + b"'\ntR."
+    data = zipped({"v.npy": npy(header("'|O'", shape="()"), attack), "w.pkl": attack})
+    archive = opened(data)
+    assert archive.get("v") == Opaque("object array")
+    assert archive.get("w.pkl") == Opaque("no array")
+    assert not marker.exists()
+
+
+def test_names_outside_the_folder_are_only_names() -> None:
+    data = zipped({"../../etc/x.npy": npy(header(), bytes(8)), "a\nb.npy": npy(header(), b"")})
+    line = r"a\nb: expected 1 float64, found 0 bytes"
+    assert refusal(data) == line
+
+
+@pytest.mark.parametrize(
+    ("data", "line"),
+    [
+        (npy(header(shape="(1099511627776,)"), bytes(8)), "1099511627776 float64, found 8 bytes"),
+        (npy(header(shape="(0, 4611686018427387904)")), f"0 x {1 << 62} float64, found 0 bytes"),
+        (npy(header(shape="(2,)"), bytes(8)), "2 float64, found 8 bytes"),
+        (npy(header(shape="(1,)"), bytes(9)), "1 float64, found 9 bytes"),
+        (npy(header(shape="()")), "one float64, found 0 bytes"),
+        (npy(header("'|S4'", shape="(9,)"), bytes(8)), "9 bytes32, found 8 bytes"),
+        (npy("")[:10], "a header with descr, fortran_order and shape, found b''"),
+        (npy("{}"), "a header with descr, fortran_order and shape, found b'{}'"),
+        (npy(header(), version=b"\4\0"), "an .npy header, found b'\\x93NUMPY\\x04\\x00'"),
+        (b"cos\nsystem\n", "an .npy header, found b'cos\\nsyst'"),
+        (b"", "an .npy header, found b''"),
+        (npy(b"x" * 10)[:15], "a header of 10 bytes, found 5"),
+        (npy("")[:6] + b"\2\0\0\0\1\0", "a header below 64 KiB, found 65536 bytes"),
+        (npy("", version=b"\2\0")[:8], "a header with descr, fortran_order and shape, found b''"),
+    ],
+)  # fmt: skip
+def test_headers_that_lie(data: bytes, line: str) -> None:
+    whole = zipped({"v.npy": data})
+    assert refusal(whole) == f"v: expected {line}"
+    assert cost(lambda: refusal(whole)) < BOUND
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        header(shape="(-1,)"),
+        header(shape="(1.5,)"),
+        header(shape="(1_0,)"),
+        header(shape="(,)"),
+        header(shape="(1,,2)"),
+        header(shape="(" + "1," * 33 + ")"),
+        header(shape="(" + "9" * 5000 + ",)"),
+        header(shape="(" * 20_000),
+        header(shape="[1]"),
+        header(order="0"),
+        header(descr="'<f8"),
+        header(descr="1"),
+        header(descr="'" + "x" * 30 + "'"),
+        header()[:-10],
+        header() + header(),
+        header() + "__import__('os')",
+        "{" * 60_000,
+        "[" * 60_000,
+        "'descr': " * 7_000,
+        header().replace("'shape'", "'size'"),
+        header().replace("{", "{'extra': 1, "),
+    ],
+    ids=lambda text: text[:40],
+)
+def test_headers_that_break_the_grammar(text: str) -> None:
+    line = refusal(zipped({"v.npy": npy(text, bytes(8))}))
+    assert line.startswith("v: expected a header with descr, fortran_order and shape, found b")
+    assert len(line) < 400
+
+
+def test_bomb_is_refused_before_it_is_unpacked() -> None:
+    lead = npy(header(shape=f"({60 << 20},)"))
+    size = len(lead) + 8 * (60 << 20)
+    stream = io.BytesIO()
+    with (
+        zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive,
+        archive.open("v.npy", "w") as member,
+    ):
+        member.write(lead)
+        for _ in range(60 * 8):
+            member.write(bytes(1 << 20))
+    data = stream.getvalue()
+    assert len(data) < 1 << 19
+    line = f"expected at most 100 times its size when unpacked, found {size} bytes in {len(data)}"
+    assert refusal(data) == line
+    assert cost(lambda: refusal(data)) < 4 << 20
+
+
+def test_max_size_is_for_all_members_together() -> None:
+    data = npz(packed=True, a=np.zeros(1000), b=np.zeros(1000))
+    assert refusal(data, 10_000) == "expected at most 10000 bytes, found 16256 (--max-size)"
+    with pytest.raises(FormatError, match="expected at most 100 bytes, found 128"):
+        stream = io.BytesIO()
+        np.save(stream, np.zeros(0))
+        open_archive(Source("x.npy", stream.getvalue()), 100)
+
+
+def test_many_directory_entries_on_one_member() -> None:
+    """The same data counted again and again, which unpacks to any size (Fifield 2019)."""
+    data = npz(packed=True, v=np.zeros(1 << 20))
+    start = data.index(b"PK\1\2")
+    end = data.index(b"PK\5\6")
+    entry = data[start:end]
+    entries = b"".join(entry.replace(b"v.npy", b"%c.npy" % (65 + n)) for n in range(26))
+    tail = struct.pack("<4s4H2LH", b"PK\5\6", 0, 0, 26, 26, len(entries), start, 0)
+    line = refusal(data[:start] + entries + tail)
+    assert line.startswith("expected at most 100 times its size when unpacked, found 218107")
+
+
+def test_directory_that_is_too_long() -> None:
+    data = zipped({f"{number:0>50}": b"" for number in range(25_000)})
+    line = refusal(data)
+    assert line == (
+        "expected a whole .npz file, found a damaged one (a directory of 2400000 bytes)"
+    )
+    assert cost(lambda: refusal(data)) < BOUND
+
+
+def changed(data: bytes, local: int, central: int, value: int) -> bytes:
+    """Set two bytes in the first local header and the first directory entry."""
+    buffer = bytearray(data)
+    struct.pack_into("<H", buffer, data.index(b"PK\3\4") + local, value)
+    struct.pack_into("<H", buffer, data.index(b"PK\1\2") + central, value)
+    return bytes(buffer)
+
+
+def test_encrypted_member() -> None:
+    line = "v: expected stored or deflated data, found encrypted data"
+    assert refusal(changed(npz(v=ROWS), 6, 8, 1)) == line
+    assert refusal(changed(npz(v=ROWS), 6, 8, 0x41)) == line
+
+
+@pytest.mark.parametrize(
+    ("method", "found"),
+    [(12, "bzip2"), (14, "LZMA"), (93, "Zstandard"), (99, "compression method 99")],
+)
+def test_other_compression(method: int, found: str) -> None:
+    line = refusal(changed(npz(v=ROWS), 8, 10, method))
+    assert line == f"v: expected stored or deflated data, found {found}"
+
+
+@pytest.mark.filterwarnings("ignore:Duplicate name")
+def test_same_name_twice() -> None:
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w") as archive:
+        for _ in "ab":
+            archive.writestr("v.npy", npy(header(), bytes(8)))
+    assert refusal(stream.getvalue()) == "v: expected one of this name, found 2"
+    one = npy(header(), bytes(8))
+    assert refusal(zipped({"v.npy": one, "v": one})) == "v: expected one of this name, found 2"
+
+
+@pytest.mark.parametrize("packed", [False, True])
+def test_damaged_values(packed: bool) -> None:
+    data = bytearray(npz(packed=packed, v=np.arange(1000.0), w=ROWS))
+    data[600] ^= 0xFF
+    line = refusal(bytes(data))
+    assert line.startswith("v: expected ")
+    archive = opened(bytes(data))
+    assert_array_equal(archive.array("w").values(), ROWS)
+
+
+SMALL = npz(v=ROWS, t=np.array("lbs"))
+PACKED = npz(packed=True, v=np.zeros((30, 3)), f=np.asfortranarray(ROWS))
+stream = io.BytesIO()
+np.save(stream, ROWS)
+SINGLE = stream.getvalue()
+
+
+def survive(data: bytes) -> None:
+    try:
+        look(data)
+    except FormatError as problem:
+        assert "\n" not in str(problem)
+
+
+@pytest.mark.parametrize("data", [SMALL, PACKED, SINGLE], ids=["stored", "deflated", "npy"])
+def test_file_cut_short_anywhere(data: bytes) -> None:
+    for length in range(len(data)):
+        with pytest.raises(FormatError):
+            look(data[:length])
+
+
+@pytest.mark.parametrize("data", [SMALL, PACKED, SINGLE], ids=["stored", "deflated", "npy"])
+def test_every_byte_changed(data: bytes) -> None:
+    for place in range(len(data)):
+        for change in (0x01, 0x20, 0x80, 0xFF):
+            survive(data[:place] + bytes([data[place] ^ change]) + data[place + 1 :])
+
+
+@pytest.mark.parametrize("data", [SMALL, PACKED, SINGLE], ids=["stored", "deflated", "npy"])
+def test_random_damage(data: bytes) -> None:
+    dice = random.Random(len(data))
+    for _ in range(1000):
+        damaged = bytearray(data)
+        for _ in range(dice.randint(1, 4)):
+            place, length = dice.randrange(len(damaged)), dice.choice([1, 1, 2, 4, 30])
+            piece = dice.choice([dice.randbytes(length), b"\xff" * length, b""])
+            damaged[place : place + dice.randint(0, length)] = piece
+        survive(bytes(damaged))

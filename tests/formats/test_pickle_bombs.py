@@ -1,0 +1,369 @@
+"""Pickles that lie about sizes, repeat or contain themselves, or are damaged at random."""
+
+from __future__ import annotations
+
+import pickle
+import random
+import struct
+import time
+import tracemalloc
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from pickle_bytes import (
+    array,
+    array_of,
+    created,
+    element_type,
+    finished,
+    mapping,
+    matrix,
+    named,
+    opened,
+    payload,
+    refusal,
+    saved,
+    several,
+    shape,
+    text,
+    unicode,
+    whole,
+)
+
+from viewer.errors import FormatError
+from viewer.formats._archive import Opaque
+
+BOUND = 64 << 20  # bytes that a refusal may take
+PATIENCE = 5.0  # seconds for what should take a fraction of one, on a busy machine
+ENDLESS = Opaque("data nested without end")
+
+
+def cost(action: Callable[[], Any]) -> int:
+    """Most bytes of memory that an action took at any time."""
+    started = time.perf_counter()
+    tracemalloc.start()
+    try:
+        action()
+        most = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert time.perf_counter() - started < PATIENCE * 4  # tracing is slow
+    return most
+
+
+@pytest.mark.parametrize(
+    ("body", "line"),
+    [
+        (array_of((1 << 40,), b"12345678"), "1099511627776 float64, found 8 bytes"),
+        (array_of((1 << 20,) * 4, bytes(8)), f"{'1048576 x ' * 3}1048576 float64, found 8 bytes"),
+        (array_of((0, 1 << 61), b""), "0 x 2305843009213693952 float64, found 0 bytes"),
+        (array_of((2,), b"12345678"), "2 float64, found 8 bytes"),
+        (array_of((1,), b"123456789"), "1 float64, found 9 bytes"),
+        (array_of((), b""), "one float64, found 0 bytes"),
+        (array_of((1, 0), b"12345678"), "1 x 0 float64, found 8 bytes"),
+        (array_of((1,), b"12345678", "i4", ">"), "1 int32, found 8 bytes"),
+        (array_of((1 << 40,), b"abcd", "S4", "|"), "1099511627776 bytes32, found 4 bytes"),
+    ],
+)  # fmt: skip
+def test_shapes_that_do_not_fit_their_bytes(body: bytes, line: str) -> None:
+    data = saved(v=body)
+    assert refusal(data) == f"expected {line}"
+    assert cost(lambda: refusal(data)) < BOUND
+
+
+@pytest.mark.parametrize("code", ["S0", "U0", "S1048577", "f16", "c16", "V8", "O8", "q", "(8)f8"])
+def test_element_types_without_numbers_are_not_evaluated(code: str) -> None:
+    made = named("numpy", "dtype") + several(text(code), whole(0), whole(1)) + b"R"
+    body = array_of((1 << 40,), b"").replace(element_type(), made)
+    found = opened(saved(v=body)).get("v")
+    assert isinstance(found, Opaque)
+
+
+@pytest.mark.parametrize("axis", [1 << 20, 33])
+def test_too_many_axes(axis: int) -> None:
+    line = refusal(saved(v=array_of((1,) * axis, b"12345678")))
+    assert line == "expected the state of an array, found a tuple"
+
+
+@pytest.mark.parametrize(
+    ("changes", "line"),
+    [
+        ({"sides": (1 << 31, 3)}, "at most 134217728 rows and columns, found 2147483648 x 3"),
+        ({"sides": (2, 1 << 27)}, "134217729 starts in a sparse matrix 2 x 134217728, found 4"),
+        ({"sides": (2, 1 << 62)}, f"at most 134217728 rows and columns, found 2 x {1 << 62}"),
+        ({"indices": (0, 2, 0)}, "indices 0 to 1 in a sparse matrix, found 0 to 2"),
+        ({"indices": (0, -1, 0)}, "indices 0 to 1 in a sparse matrix, found -1 to 0"),
+        ({"indices": (0, 1)}, "3 indices in a sparse matrix, found 2"),
+        ({"indptr": (0, 2, 1, 3)}, "starts that rise from 0 to 3 in a sparse matrix"),
+        ({"indptr": (0, 1, 1, 4)}, "starts that rise from 0 to 3 in a sparse matrix"),
+        ({"indptr": (1, 1, 1, 3)}, "starts that rise from 0 to 3 in a sparse matrix"),
+        ({"indptr": (0, 1, 3)}, "4 starts in a sparse matrix 2 x 3, found 3"),
+        ({"indptr": (), "sides": (2, 0)}, "1 starts in a sparse matrix 2 x 0, found 0"),
+        ({"data": ((1.0, 2.0, 3.0),)}, "a sparse matrix of three plain lists, found other shapes"),
+        ({"shape_key": "form"}, "a sparse matrix with rows and columns, found none"),
+        ({"sides": (1, 2, 3)}, "a sparse matrix with rows and columns, found none"),
+    ],
+)  # fmt: skip
+def test_sparse_matrices_that_contradict_themselves(changes: Any, line: str) -> None:
+    data = saved(v=matrix(**changes))
+    assert refusal(data) == f"v: expected {line}"
+    assert cost(lambda: refusal(data)) < BOUND
+
+
+def test_sparse_shape_is_compared_before_anything_is_dense() -> None:
+    archive = opened(saved(v=matrix(sides=(1 << 27, 3))))
+    with pytest.raises(FormatError) as caught:
+        archive.sparse("v", (24, 3))
+    expected = "v: expected 24 x 3 numbers, found a sparse matrix 134217728 x 3"
+    assert str(caught.value) == f"model.pkl: {expected}"
+
+
+def test_sparse_matrix_without_parts() -> None:
+    state = mapping(_shape=shape(2, 3), data=whole(1))
+    body = created("scipy.sparse.csc", "csc_matrix", state)
+    assert refusal(saved(v=body)) == "v: expected a sparse matrix with data, found none"
+
+
+def selection(indices: list[int], *sides: int) -> bytes:
+    state = mapping(
+        a=array(np.arange(6.0)), idxs=array(np.array(indices)), preferred_shape=shape(*sides)
+    )
+    return saved(v=created("chumpy.reordering", "Select", state))
+
+
+@pytest.mark.parametrize(
+    ("data", "line"),
+    [
+        (selection([0, 6], 2), "indices 0 to 5, found 0 to 6"),
+        (selection([-1, 0], 2), "indices 0 to 5, found -1 to 0"),
+        (selection([0, 1], 1 << 40), "1099511627776 indices in chumpy.reordering.Select, found 2"),
+        (selection([0, 1], 3, 1), "3 indices in chumpy.reordering.Select, found 2"),
+    ],
+)
+def test_selections_that_do_not_fit(data: bytes, line: str) -> None:
+    assert refusal(data) == f"v: expected {line}"
+
+
+def test_selection_of_long_texts_is_not_evaluated() -> None:
+    long = array_of((1,), b"x" * 100_000, "S100000", "|")
+    state = mapping(a=long, idxs=array(np.zeros(100_000, np.uint8)), preferred_shape=shape(100_000))
+    archive = opened(saved(v=created("chumpy.reordering", "Select", state)))
+    assert archive.get("v") == Opaque("chumpy.reordering.Select without plain indices")
+
+
+@pytest.mark.parametrize("name", ["Ch", "ChHandle"])
+def test_expression_that_contains_itself(name: str) -> None:
+    body = named("chumpy.ch", name) + b")\x81q\x01}" + text("x") + b"h\x01sb"
+    found = opened(saved(v=body)).get("v")
+    assert found == Opaque(f"chumpy.ch.{name} expression nested without end")
+
+
+def test_containers_that_contain_themselves() -> None:
+    data = saved(
+        a=b"]q\x01h\x01a",
+        b=b"}q\x02" + text("x") + b"h\x02s",
+        c=b"]q\x03h\x03\x85q\x04ah\x04",
+        good=array(np.ones(1)),
+    )
+    archive = opened(data.replace(b"h\x04" + text("good"), text("good")))
+    assert [archive.get(key) for key in "abc"] == [ENDLESS] * 3
+    assert archive.array("good").shape == (1,)
+
+
+WRAPPERS = {
+    "list": (b"]", b"a"),
+    "tuple": (b"", b"\x85"),
+    "dict": (b"}" + text("k"), b"s"),
+    "chumpy": (named("chumpy.ch", "Ch") + b")\x81}" + text("x"), b"sb"),
+}
+
+
+@pytest.mark.parametrize("kind", WRAPPERS)
+def test_nesting_100_000_deep(kind: str) -> None:
+    before, after = WRAPPERS[kind]
+    found = opened(saved(v=before * 100_000 + b"N" + after * 100_000)).get("v")
+    assert found == ENDLESS or found == Opaque("chumpy.ch.Ch expression nested without end")
+
+
+def doubled(first: bytes, step: Callable[[bytes], bytes], count: int) -> bytes:
+    body = first + b"q\x00"
+    for number in range(count):
+        body += b"0" + step(b"h" + bytes([number])) + b"q" + bytes([number + 1])
+    return body
+
+
+@pytest.mark.parametrize("count", [20, 100])
+def test_lists_of_the_same_list_twice(count: int) -> None:
+    """The billion laughs: 2^100 items in 800 bytes."""
+    for step in (lambda inner: b"](" + inner * 2 + b"e", lambda inner: inner * 2 + b"\x86"):
+        data = saved(v=doubled(b"]", step, count))
+        assert opened(data).get("v") == ENDLESS
+        assert cost(lambda data=data: opened(data).get("v")) < BOUND
+
+
+def test_sets_of_the_same_list_again_and_again() -> None:
+    items = b"](" + b"N" * 100_000 + b"eq\x01"
+    again = named("__builtin__", "set") + b"(h\x01tR"
+    data = saved(v=b"](" + items + again * 1000 + b"e")
+    assert refusal(data).startswith("expected at most 2000000 steps in a pickle, found more at ")
+
+
+def test_pairs_of_the_same_key_again_and_again() -> None:
+    items = b"](" + (text("k") + b"N\x86") * 100_000 + b"eq\x01"
+    again = named("collections", "OrderedDict") + b"(h\x01tR"
+    data = saved(v=b"](" + items + again * 1000 + b"e")
+    assert refusal(data).startswith("expected at most 2000000 steps in a pickle, found more at ")
+
+
+def test_long_text_used_again_and_again() -> None:
+    long = payload(b"x" * 1_000_000) + b"q\x01"
+    encoded = unicode("x" * 1_000_000) + b"q\x02" + unicode("latin1") + b"q\x03"
+    encode = named("_codecs", "encode") + b"(h\x02h\x03tR"
+    scalar = named("numpy.core.multiarray", "scalar") + b"("
+    scalar += element_type("S1000000", "|", 1_000_000) + b"h\x01tR"
+    plain = saved(v=b"](" + long + b"h\x01" * 10_000 + b"e")
+    found = opened(plain).get("v")
+    assert isinstance(found, list) and len(found) == 10_001
+    packed = saved(v=b"](" + encoded + encode * 1000 + b"e")
+    assert opened(packed).get("v") == ENDLESS
+    repeated = saved(v=b"](" + long + scalar * 1000 + b"e")
+    assert refusal(repeated).startswith("expected at most 2000000 steps")
+    for data in (plain, packed, repeated):
+        assert cost(lambda data=data: self_contained(data)) < BOUND
+
+
+def self_contained(data: bytes) -> None:
+    """Open bytes and look at everything, whether or not they are refused."""
+    try:
+        archive = opened(data)
+    except FormatError as problem:
+        assert "\n" not in str(problem)
+        return
+    for key in archive.keys:
+        for look in (archive.get, archive.array, archive.sparse, archive.text):
+            try:
+                found: Any = look(key)
+                if hasattr(found, "values") and not isinstance(found, dict):
+                    found.values()
+            except FormatError as problem:
+                assert "\n" not in str(problem)
+
+
+def test_texts_are_no_array() -> None:
+    """Numpy would make every element as long as the longest."""
+    data = saved(v=b"](" + payload(b"x" * 1_000_000) + b"e" + b"(" + b"K\x01" * 10_000 + b"e")
+    assert cost(lambda: self_contained(data)) < BOUND
+
+
+def test_memo_with_a_huge_number_costs_nothing() -> None:
+    data = saved(v=b"Nr\xff\xff\xff\x7fj\xff\xff\xff\x7f" + b"0")
+    assert opened(data).get("v") is None
+    assert cost(lambda: opened(data)) < 1 << 20
+
+
+@pytest.mark.parametrize("step", [b"N", b"(", b"]", b"}", b"2", b")"])
+def test_endless_steps_end(step: bytes) -> None:
+    data = b"\x80\x02]" + step * 3_000_000
+    assert refusal(data) == "expected at most 2000000 steps in a pickle, found more at byte 2000001"
+
+
+def test_huge_declared_lengths_cost_nothing() -> None:
+    for step in (b"B\xff\xff\xff\x7f", b"\x8e" + b"\xff" * 5 + b"\0" * 3, b"\x96" + b"\xff" * 8):
+        assert cost(lambda step=step: refusal(saved(v=step))) < 1 << 20
+
+
+@pytest.mark.parametrize(
+    ("key", "found"),
+    [
+        (b"N", "nothing"),
+        (b"G" + struct.pack(">d", 0.5), "a number"),
+        (whole(1 << 60), "a number"),
+        (b")", "a tuple"),
+        (b"]", "a list"),
+        (b"\x88", "a number"),
+        (array(np.ones(1)), "an array"),
+        (named("chumpy.ch", "Ch") + b")\x81", "an object of chumpy.ch.Ch"),
+        (payload(b"x" * 70_000), "a text"),
+    ],
+)
+def test_keys_that_are_no_names(key: bytes, found: str) -> None:
+    line = f"expected a name or a number as a key, found {found}"
+    assert refusal(saved(v=b"}" + key + b"Ns")) == line
+    assert refusal(saved(v=b"(" + key + b"Nd")) == line
+
+
+@pytest.mark.parametrize(
+    ("body", "found"),
+    [
+        (b"]", "a list"),
+        (b")", "a tuple"),
+        (b"N", "nothing"),
+        (whole(3), "a number"),
+        (text("x"), "a text"),
+        (b"C\x01x", "bytes"),
+        (array(np.ones(1)), "an array"),
+        (matrix(), "an object of scipy.sparse.csc.csc_matrix"),
+        (named("numpy", "ndarray"), "numpy.ndarray"),
+        (b"}K\x05Ns", "the key 5"),
+    ],
+)
+def test_anything_but_named_values(body: bytes, found: str) -> None:
+    assert refusal(finished(body)) == f"expected a dict of named values, found {found}"
+
+
+def test_same_name_as_text_and_bytes() -> None:
+    assert refusal(pickle.dumps({b"v": 1, "v": 2})) == "v: expected one of this name, found two"
+
+
+SMALL = saved(
+    v=array(np.arange(4.0)),
+    J=matrix(),
+    s=created("chumpy.ch", "Ch", mapping(x=array(np.ones((2, 2), np.float32)))),
+    t=text("lbs"),
+    n=b"](" + whole(70_000) + whole(-3) + b"F1.5\nI01\ne",
+)
+MODERN = pickle.dumps(
+    {"v": np.asfortranarray(np.ones((2, 3))), "s": np.float32(2), "t": ["a", (1, {"b": b"c"})]}, 5
+)
+TEXT = pickle.dumps({"v": np.arange(3), "t": "grün", "n": [1.5, 1 << 40, True, None]}, 0)
+
+
+@pytest.mark.parametrize("data", [SMALL, MODERN, TEXT], ids=["2", "5", "0"])
+def test_file_cut_short_anywhere(data: bytes) -> None:
+    self_contained(data)
+    for length in range(len(data)):
+        with pytest.raises(FormatError) as caught:
+            opened(data[:length])
+        assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("data", [SMALL, MODERN, TEXT], ids=["2", "5", "0"])
+def test_every_byte_changed(data: bytes) -> None:
+    for place in range(len(data)):
+        for change in (0x01, 0x20, 0x80, 0xFF):
+            self_contained(data[:place] + bytes([data[place] ^ change]) + data[place + 1 :])
+
+
+@pytest.mark.parametrize("data", [SMALL, MODERN, TEXT], ids=["2", "5", "0"])
+def test_random_damage(data: bytes) -> None:
+    dice = random.Random(len(data))
+    for _ in range(1500):
+        damaged = bytearray(data)
+        for _ in range(dice.randint(1, 4)):
+            place = dice.randrange(len(damaged))
+            length = dice.choice([1, 1, 1, 2, 8, 30])
+            piece = dice.choice([dice.randbytes(length), data[place:][:length] * 2, b""])
+            damaged[place : place + dice.randint(0, length)] = piece
+            damaged = damaged or bytearray(b".")
+        self_contained(bytes(damaged))
+
+
+def test_random_steps() -> None:
+    dice = random.Random(1)
+    steps = b"(0123NKMJ)]}taeuslbdR\x81\x85\x86\x87\x88\x93qhj\x94\x95co"
+    names = [named("numpy", "dtype"), named("chumpy.ch", "Ch"), named("numpy", "ndarray")]
+    pieces = [*(bytes([step]) for step in steps), *names, text("f8"), array(np.ones(1)), b"h\0q\0"]
+    for _ in range(3000):
+        self_contained(finished(b"".join(dice.choices(pieces, k=dice.randint(1, 30)))))

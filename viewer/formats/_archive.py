@@ -1,0 +1,375 @@
+"""Archives of named arrays: pickles, ``.npz`` and ``.npy``, read without running what is in them.
+
+A pickle is a program, and so is an object array inside an ``.npz``. Neither is ever given to
+Python's own unpickler: ``_pickle.py`` understands the few steps that arrays and plain data take,
+and refuses all others by name. What a file holds beyond that arrives as ``Opaque``.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.errors import FormatError, printable
+from viewer.formats._source import MAX_SIZE, Source
+from viewer.rig.arrays import Deferred
+
+__all__ = [
+    "Archive",
+    "Axes",
+    "Opaque",
+    "Plain",
+    "Sparse",
+    "Value",
+    "describe",
+    "is_archive",
+    "open_archive",
+]
+
+_MAX_SIDE = 1 << 27  # rows or columns of a sparse matrix; a mesh has far fewer vertices
+_ZIP = (b"PK\x03\x04", b"PK\x05\x06")
+_NPY = b"\x93NUMPY"
+_LFS = b"version https://git-lfs"
+# Protocols 2 to 5 announce themselves; 0 and 1 begin with what they build.
+_PICKLE = re.compile(
+    rb"\x80[\x02-\x05]|\(d[pqSUVX(.]|\}[q(.]|\(lp[0-9]|\][q(.]"
+    rb"|c(?:__builtin__|builtins|copy_reg|collections|numpy|scipy|chumpy|os|posix|nt)[\w.]*\r?\n"
+)
+_KIND_NAMES = {"biuf": "numbers", "iuf": "numbers", "iu": "whole numbers", "SU": "texts"}
+
+
+@dataclass(frozen=True, slots=True)
+class Opaque:
+    """A value that was not evaluated, because that could run code or is of no use here.
+
+    Attributes
+    ----------
+    what : str
+        For a message: ``"chumpy.ch_ops.add expression"``, ``"object array"``.
+    """
+
+    what: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sparse:
+    """A checked sparse matrix in compressed columns ("csc") or rows ("csr").
+
+    Attributes
+    ----------
+    shape : (2,)
+        Rows and columns as the file declares them: compare before making anything dense.
+    data, indices : (N,)
+        Stored values, and the row (csc) or column (csr) of each.
+    indptr : (columns + 1,) or (rows + 1,)
+        Where each column (csc) or row (csr) begins in ``data``.
+    layout : str
+        ``"csc"`` or ``"csr"``.
+
+    Raises
+    ------
+    ValueError
+        If the parts do not fit each other; the text says ``expected …, found …``.
+    """
+
+    shape: tuple[int, int]
+    data: NDArray[Any]
+    indices: NDArray[Any]
+    indptr: NDArray[Any]
+    layout: str
+
+    def __post_init__(self) -> None:
+        parts = (self.data, self.indices, self.indptr)
+        if any(part.ndim != 1 for part in parts) or self.data.dtype.kind not in "biuf":
+            raise ValueError("expected a sparse matrix of three plain lists, found other shapes")
+        if self.indices.dtype.kind not in "iu" or self.indptr.dtype.kind not in "iu":
+            raise ValueError("expected whole indices in a sparse matrix, found other numbers")
+        if not all(0 <= side <= _MAX_SIDE for side in self.shape):
+            raise ValueError(f"expected at most {_MAX_SIDE} rows and columns, found {self.size}")
+        self._check_counts()
+
+    def _check_counts(self) -> None:
+        across, along = self.shape if self.layout == "csc" else self.shape[::-1]
+        if len(self.indptr) != along + 1:
+            raise ValueError(
+                f"expected {along + 1} starts in a sparse matrix {self.size}, "
+                f"found {len(self.indptr)}"
+            )
+        count = len(self.data)
+        # Unsigned differences wrap around, so compare instead of subtracting.
+        ordered = bool((self.indptr[1:] >= self.indptr[:-1]).all())
+        if not ordered or int(self.indptr[0]) != 0 or int(self.indptr[-1]) != count:
+            raise ValueError(f"expected starts that rise from 0 to {count} in a sparse matrix")
+        if len(self.indices) != count:
+            raise ValueError(
+                f"expected {count} indices in a sparse matrix, found {len(self.indices)}"
+            )
+        if count and (int(self.indices.min()) < 0 or int(self.indices.max()) >= across):
+            raise ValueError(
+                f"expected indices 0 to {across - 1} in a sparse matrix, "
+                f"found {int(self.indices.min())} to {int(self.indices.max())}"
+            )
+
+    @property
+    def size(self) -> str:
+        """Rows and columns, for a message."""
+        return f"{self.shape[0]} x {self.shape[1]}"
+
+    def entries(self) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[Any]]:
+        """Return row, column and value of every stored entry.
+
+        Returns
+        -------
+        rows, columns, values : (N,)
+            In the order of the file. A pair may occur twice; such entries add up.
+
+        >>> eye = Sparse((2, 2), np.ones(2), np.arange(2), np.arange(3), "csc")
+        >>> [part.tolist() for part in eye.entries()]
+        [[0, 1], [0, 1], [1.0, 1.0]]
+        """
+        starts = self.indptr.astype(np.intp)
+        lengths = starts[1:] - starts[:-1]
+        outer = np.repeat(np.arange(len(lengths)), lengths)
+        inner = self.indices.astype(np.intp)
+        rows, columns = (inner, outer) if self.layout == "csc" else (outer, inner)
+        return rows, columns, self.data
+
+
+Plain: TypeAlias = str | bytes | int | float | bool | None
+"""What needs no further look; numpy's scalars arrive as these."""
+
+Value: TypeAlias = (
+    Plain | Deferred | Sparse | Opaque | list[Any] | tuple[Any, ...] | dict[str | bytes | int, Any]
+)
+"""Anything that an archive gives; containers hold more of the same."""
+
+Axes: TypeAlias = Sequence[int | str | None]
+"""A wanted shape: per axis a number, None for any, or a letter for any but the same."""
+
+
+class Archive:
+    """The named values of one file, each read when it is asked for.
+
+    Parameters
+    ----------
+    path : Path
+        The file, for messages.
+    kind : str
+        ``"pickle"``, ``"npz"`` or ``"npy"``.
+    keys : tuple of str
+        In the order of the file.
+    load : callable
+        Returns the value of a key; asked once for each.
+    """
+
+    def __init__(
+        self, path: Path, kind: str, keys: tuple[str, ...], load: Callable[[str], Value]
+    ) -> None:
+        self.path, self.kind, self.keys = path, kind, keys
+        self._load = load
+        self._values: dict[str, Value] = {}
+
+    def has(self, key: str) -> bool:
+        """Return whether the file has a value of this name."""
+        return key in self.keys
+
+    def get(self, key: str) -> Value:
+        """Return a value: an array is a ``Deferred``, a matrix may be ``Sparse``.
+
+        Containers are fresh lists, tuples and dicts. What would have to be executed, or is nested
+        without end, is ``Opaque``. Arrays are read-only, in C order and the processor's byte order.
+
+        Raises
+        ------
+        FormatError
+            If there is no such key, or its value contradicts itself.
+        """
+        if key not in self._values:
+            if key not in self.keys:
+                raise self.error(key, "expected a value, found no such key")
+            self._values[key] = self._load(key)
+        return self._values[key]
+
+    def array(self, key: str, shape: Axes | None = None, kinds: str = "biuf") -> Deferred:
+        """Return an array of the given shape and kind of numbers.
+
+        Parameters
+        ----------
+        key : str
+            Its name in the file. Numbers in nested lists count as an array.
+        shape : sequence, optional
+            Per axis a number; or None for any; or a letter for any, equal to others of its name.
+        kinds : str
+            Letters of ``numpy.dtype.kind`` that are welcome.
+
+        Raises
+        ------
+        FormatError
+            ``KEY: expected V x 3 numbers, found 800 x 4 numbers``.
+        """
+        value = self.get(key)
+        if not isinstance(value, Deferred):
+            value = _from_lists(value)
+        if value is None or value.dtype.kind not in kinds or not _fits(shape, value.shape):
+            found = describe(self.get(key))
+            raise self.error(key, f"expected {_wanted(shape, kinds)}, found {found}")
+        return value
+
+    def sparse(self, key: str, shape: Axes | None = None) -> Sparse:
+        """Return a matrix as its entries, no matter whether the file holds it sparse or dense.
+
+        Parameters
+        ----------
+        key : str
+            Its name in the file.
+        shape : sequence of two, optional
+            As for ``array``; checked before anything grows to that size.
+
+        Raises
+        ------
+        FormatError
+            If it is no matrix of numbers of this shape, or holds contradictions.
+        """
+        value = self.get(key)
+        if isinstance(value, Sparse):
+            if _fits(shape, value.shape):
+                return value
+            found = describe(value)
+            raise self.error(key, f"expected {_wanted(shape, 'biuf')}, found {found}")
+        dense = self.array(key, (None, None) if shape is None else shape).values()
+        rows, columns = np.nonzero(dense)
+        starts = np.searchsorted(rows, np.arange(len(dense) + 1))
+        return Sparse(dense.shape, dense[rows, columns], columns, starts, "csr")
+
+    def text(self, key: str) -> str:
+        """Return a single text, however it was written: as text, bytes, or an array of one.
+
+        Raises
+        ------
+        FormatError
+            If it is none of these.
+        """
+        value = self.get(key)
+        if isinstance(value, Deferred) and value.dtype.kind in "SU" and value.shape in ((), (1,)):
+            value = value.values().reshape(-1)[0].item()
+        if isinstance(value, bytes):
+            return value.decode("utf-8", "replace")
+        if isinstance(value, str):
+            return value
+        raise self.error(key, f"expected a text, found {describe(value)}")
+
+    def error(self, key: str, message: str) -> FormatError:
+        """Return an error that names the file and the key."""
+        return FormatError(self.path, f"{printable(key, 60)}: {message}")
+
+
+def describe(value: Value) -> str:
+    """Return what a value is, for a message.
+
+    >>> describe(Deferred((800, 3), "f4", lambda: np.zeros((800, 3)))), describe({})
+    ('800 x 3 float32', 'a dict of 0')
+    """
+    if isinstance(value, Deferred):
+        texts = "texts" if value.shape else "text"
+        return f"{_axes(value.shape)} {texts if value.dtype.kind in 'SU' else value.dtype.name}"
+    if isinstance(value, Sparse):
+        return f"a sparse matrix {value.size}"
+    if isinstance(value, Opaque):
+        return f"an unread value ({value.what})"
+    if isinstance(value, list | tuple):
+        return f"a list of {len(value)}"
+    if isinstance(value, dict):
+        return f"a dict of {len(value)}"
+    if isinstance(value, bytes):
+        return f"{len(value)} bytes"
+    return "nothing" if value is None else printable(repr(value), 40)
+
+
+def _wanted(shape: Axes | None, kinds: str) -> str:
+    noun = _KIND_NAMES.get(kinds, f"values of kind {kinds}")
+    if shape is None:
+        return f"an array of {noun}"
+    return f"{_axes(shape)} {noun}" if shape else f"{_axes(shape)} {noun.removesuffix('s')}"
+
+
+def _axes(shape: Axes) -> str:
+    if not shape:
+        return "a single"
+    return " x ".join("any" if axis is None else str(axis) for axis in shape)
+
+
+def _fits(wanted: Axes | None, found: tuple[int, ...]) -> bool:
+    if wanted is None:
+        return True
+    named: dict[str, int] = {}
+    return len(wanted) == len(found) and all(
+        axis is None or (named.setdefault(axis, size) if isinstance(axis, str) else axis) == size
+        for axis, size in zip(wanted, found, strict=True)
+    )
+
+
+def _from_lists(value: Value) -> Deferred | None:
+    """Return numbers in nested lists as an array, or None if they are none or ragged."""
+    # Nothing else is given to numpy: one long text makes all others of an array as long.
+    if not _is_numbers(value):
+        return None
+    try:
+        array = np.array(value)
+    except (ValueError, TypeError, OverflowError):
+        return None
+    return Deferred(array.shape, array.dtype, lambda: array)
+
+
+def _is_numbers(value: Value) -> bool:
+    if isinstance(value, list | tuple):
+        return all(map(_is_numbers, value))
+    return isinstance(value, int | float)
+
+
+def is_archive(head: bytes) -> bool:
+    r"""Return whether a file that begins like this is a pickle, an ``.npz`` or an ``.npy``.
+
+    >>> is_archive(b"\x80\x02}q\x01."), is_archive(b"positions 4 {")
+    (True, False)
+    """
+    return head.startswith((*_ZIP, _NPY)) or _PICKLE.match(head) is not None
+
+
+def open_archive(source: Source, max_size: int = MAX_SIZE) -> Archive:
+    """Open a pickle, ``.npz`` or ``.npy`` file, as its first bytes tell.
+
+    Parameters
+    ----------
+    source : Source
+        The file. Odd but harmless things are added to its warnings.
+    max_size : int
+        Largest size of all members of an ``.npz`` together, unpacked, in bytes.
+
+    Raises
+    ------
+    FormatError
+        If it is none of these, is damaged, or holds anything but data.
+    """
+    # Reading figures of other formats should not pay for these.
+    from viewer.formats._npz import open_npy, open_npz
+    from viewer.formats._pickle import open_pickle
+
+    head = source.peek(4096)
+    if head.startswith(_ZIP):
+        return open_npz(source, max_size)
+    if head.startswith(_NPY):
+        return open_npy(source, max_size)
+    if head.startswith(_LFS):
+        found = "a Git LFS pointer, not the file itself (`git lfs pull` fetches it)"
+        raise source.error(f"expected a pickle, .npz or .npy file, found {found}")
+    if not is_archive(head):
+        looks = source.looks_like()
+        if looks is not None:
+            raise source.error(f"expected a pickle, .npz or .npy file, found {looks}")
+    return open_pickle(source)

@@ -1,0 +1,373 @@
+r"""Read ``.npz`` and ``.npy`` files: arrays only, never the objects that may be pickled in them.
+
+::
+
+    npz    = zip archive of members "<key>.npy", each stored or deflated
+    npy    = "\x93NUMPY" version length header values
+    header = "{" "'descr': '<f8'" "'fortran_order': False" "'shape': (6890, 3)" "}"   in any order
+
+At opening the zip directory and the headers are read, and every size is held against the others.
+Values are read when they are asked for, from the file if there is one. The header is matched by
+its grammar; numpy's own reader evaluates it as Python text, and warns about files of Python 2.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import os
+import re
+import stat
+import struct
+import zipfile
+import zlib
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import IO, Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.errors import FormatError, printable
+from viewer.formats._archive import Archive, Opaque, Value
+from viewer.formats._source import Source
+from viewer.rig.arrays import Deferred
+
+__all__ = ["array_dtype", "item_count", "open_npy", "open_npz", "shaped"]
+
+_DTYPE = re.compile(r"[<>=|]?(?:b1|[iu][1248]|f[248]|[SU]([1-9][0-9]{0,6}))")
+_LONGEST_TEXT = 1 << 20  # letters in one element
+_MAX_AXES = 32
+_MAX_BYTES = 1 << 60  # of an array; numpy cannot count beyond, not even where an axis is 0
+_LAST_LETTER = 0x10FFFF  # of Unicode; numpy stores 4 bytes and does not look
+
+_LONGEST_DIRECTORY = 2 << 20  # bytes, some 30,000 members; each takes memory when it is read
+_MAX_RATIO = 100  # of unpacked to packed size; smooth motions reach 10 to 20
+_SMALL = 64 << 20  # bytes; below that any ratio is fine, for arrays of zeros
+_ENCRYPTED = 0x41  # flag bits 0 and 6
+_METHODS = {12: "bzip2", 14: "LZMA", 93: "Zstandard"}
+_CHUNK = 1 << 20
+# All that Python's zipfile raises on damaged archives, found by the thousand in the tests.
+_DAMAGE = (
+    zipfile.BadZipFile,
+    zipfile.LargeZipFile,
+    zlib.error,
+    struct.error,
+    OSError,
+    EOFError,
+    RuntimeError,
+    ValueError,
+    OverflowError,
+)
+
+_LONGEST_HEADER = 1 << 16
+_LEAD = {b"\1\0": "<H", b"\2\0": "<I", b"\3\0": "<I"}  # length of the header, by version
+_RECORD = re.compile(rb"'descr'\s*:\s*[\[(]")
+_ITEM = re.compile(
+    rb"'(?P<key>descr|fortran_order|shape)'\s*:\s*"
+    rb"(?:'(?P<descr>[^'\\]{1,20})'|(?P<order>True|False)|\((?P<shape>[0-9L,\s]*)\))"
+)
+_FIELDS = {b"descr": "descr", b"fortran_order": "order", b"shape": "shape"}
+
+
+def array_dtype(code: str) -> np.dtype[Any] | None:
+    """Return a type of numbers or text in numpy's spelling, or None for all others.
+
+    Records, sub-arrays, objects, dates and what differs between machines are among those.
+
+    >>> array_dtype(">f4"), array_dtype("|O"), array_dtype("S0")
+    (dtype('>f4'), None, None)
+    """
+    match = _DTYPE.fullmatch(code)
+    if match is None or int(match[1] or 1) > _LONGEST_TEXT:
+        return None
+    return np.dtype(code)
+
+
+def item_count(shape: tuple[int, ...], item_size: int) -> int | None:
+    """Return how many elements a shape has, or None if numpy could not hold it.
+
+    >>> item_count((6890, 3), 8), item_count((0, 1 << 62), 8)
+    (20670, None)
+    """
+    # An axis of length 0 hides others that are too long.
+    if (
+        len(shape) > _MAX_AXES
+        or math.prod(max(side, 1) for side in shape) > _MAX_BYTES // item_size
+    ):
+        return None
+    return math.prod(shape)
+
+
+def shaped(flat: NDArray[Any], shape: tuple[int, ...], is_fortran: bool) -> NDArray[Any]:
+    """Give flat values their shape, C order and the processor's byte order; a copy if needed.
+
+    Raises
+    ------
+    ValueError
+        If an element of a text is no letter.
+    """
+    if flat.dtype.kind == "b" and flat.size and int(flat.view(np.uint8).max()) > 1:
+        flat = flat.view(np.uint8) != 0  # numpy takes any byte for a truth value, then errs
+    array = flat.reshape(shape, order="F" if is_fortran else "C")
+    array = np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("=")).reshape(shape)
+    if array.dtype.kind == "U" and array.size:
+        last = int(array.reshape(-1).view(np.uint32).max())
+        if last > _LAST_LETTER:
+            raise ValueError(f"expected letters in a text, found number {last}")
+    return array
+
+
+@dataclass(frozen=True, slots=True)
+class _Header:
+    dtype: np.dtype[Any]
+    shape: tuple[int, ...]
+    is_fortran: bool
+    n_items: int
+    offset: int  # of the values, in bytes
+
+    def deferred(self, load: Callable[[], NDArray[Any]]) -> Deferred:
+        return Deferred(self.shape, self.dtype.newbyteorder("="), load)
+
+
+class _Reader(io.BufferedReader):
+    """A file of which nobody reads much at once, as zipfile does with a directory that says so."""
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        if size is None or size < 0:
+            here = self.tell()
+            size = self.seek(0, os.SEEK_END) - here
+            self.seek(here)
+        if size > _LONGEST_DIRECTORY:
+            raise ValueError(f"a directory of {size} bytes")
+        return super().read(size)
+
+
+class _Storage:
+    """The file behind a source, opened anew for each reading; without one, the bytes."""
+
+    def __init__(self, source: Source) -> None:
+        self.path = source.path
+        self._data = source._data  # None if nobody has read the file yet, and nobody needs to
+        self._stamp: tuple[int, int] | None = None
+        try:
+            status = self.path.stat()
+            if stat.S_ISREG(status.st_mode) and self._is_in_file():
+                self._stamp = status.st_size, status.st_mtime_ns
+        except (OSError, ValueError) as problem:
+            if self._data is None:
+                raise self._unreadable(problem) from None
+        if self._stamp is None:
+            self.size = len(self._data or b"")
+        else:
+            self._data, self.size = None, self._stamp[0]
+
+    def _is_in_file(self) -> bool:
+        """Return whether bytes that were read are those of the file, less closing Ctrl-Z."""
+        if self._data is None:
+            return True
+        with self.path.open("rb") as file:
+            head = file.read(_CHUNK)
+            file.seek(len(self._data))
+            rest = file.read(_CHUNK)
+        return self._data[:_CHUNK] == head[: len(self._data)] and not rest.strip(b"\x1a")
+
+    def _unreadable(self, problem: Exception) -> FormatError:
+        reason = getattr(problem, "strerror", None) or problem
+        return FormatError(self.path, f"cannot be read: {reason}")
+
+    def open(self) -> IO[bytes]:
+        """Return the file as it was at the first look."""
+        if self._data is not None:
+            return _Reader(cast("io.RawIOBase", io.BytesIO(self._data)))
+        try:
+            file = _Reader(self.path.open("rb", buffering=0))
+        except OSError as problem:
+            raise self._unreadable(problem) from None
+        status = os.fstat(file.fileno())
+        if (status.st_size, status.st_mtime_ns) != self._stamp:
+            file.close()
+            raise FormatError(self.path, "changed since it was opened; open it again")
+        return file
+
+    def error(self, key: str, message: str) -> FormatError:
+        """Return an error that names the file and the key."""
+        return FormatError(self.path, f"{printable(key, 60)}: {message}")
+
+
+def open_npz(source: Source, max_size: int) -> Archive:
+    """Open an ``.npz`` file; see ``open_archive`` for what it raises.
+
+    Parameters
+    ----------
+    source : Source
+        A zip archive.
+    max_size : int
+        Largest size of all members together, unpacked, in bytes.
+    """
+    storage = _Storage(source)
+    try:
+        with storage.open() as file, zipfile.ZipFile(file) as archive:
+            members = archive.infolist()
+            _check_members(source, members, storage.size, max_size)
+            values = {_key(member): _open_member(storage, archive, member) for member in members}
+    except _DAMAGE as problem:
+        raise source.error(f"expected a whole .npz file, found {_damage(problem)}") from None
+    return Archive(source.path, "npz", tuple(values), values.__getitem__)
+
+
+def open_npy(source: Source, max_size: int) -> Archive:
+    """Open an ``.npy`` file as an archive with the only key "arr_0"."""
+    key = "arr_0"
+    storage = _Storage(source)
+    with storage.open() as stream:
+        header = _read_header(storage, key, stream, storage.size)
+    if isinstance(header, Opaque):
+        value: Value = header
+    else:
+        if storage.size > max_size:
+            raise source.error(f"expected at most {max_size} bytes, found {storage.size}")
+        value = header.deferred(partial(_load_file, storage, key, header))
+    return Archive(source.path, "npy", (key,), {key: value}.__getitem__)
+
+
+def _damage(problem: Exception) -> str:
+    return f"a damaged one ({printable(problem, 100)})"
+
+
+def _key(member: zipfile.ZipInfo) -> str:
+    return member.filename.removesuffix(".npy")
+
+
+def _check_members(
+    source: Source, members: list[zipfile.ZipInfo], size: int, max_size: int
+) -> None:
+    """Refuse what could not be read, or would become too large, before anything is unpacked."""
+    for name, count in Counter(map(_key, members)).items():
+        if count > 1:
+            raise source.error(f"{printable(name, 60)}: expected one of this name, found {count}")
+    for member in members:
+        found = None
+        if member.flag_bits & _ENCRYPTED:
+            found = "encrypted data"
+        elif member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            method = member.compress_type
+            found = _METHODS.get(method, f"compression method {method}")
+        if found is not None:
+            name = printable(_key(member), 60)
+            raise source.error(f"{name}: expected stored or deflated data, found {found}")
+    total = sum(member.file_size for member in members)
+    if total > max_size:
+        raise source.error(f"expected at most {max_size} bytes, found {total} (--max-size)")
+    if total > max(_SMALL, _MAX_RATIO * size):
+        raise source.error(
+            f"expected at most {_MAX_RATIO} times its size when unpacked, found {total} bytes "
+            f"in {size}"
+        )
+
+
+def _open_member(storage: _Storage, archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> Value:
+    key = _key(member)
+    if not member.filename.endswith(".npy"):
+        return Opaque("no array")
+    with archive.open(member) as stream:
+        header = _read_header(storage, key, stream, member.file_size)
+    if isinstance(header, Opaque):
+        return header
+    return header.deferred(partial(_load_member, storage, member, header))
+
+
+def _read_header(storage: _Storage, key: str, stream: IO[bytes], size: int) -> _Header | Opaque:
+    """Read what comes before the values, and check that these take the rest of ``size`` bytes."""
+    lead = stream.read(8)
+    layout = _LEAD.get(lead[6:8])
+    if not lead.startswith(b"\x93NUMPY") or layout is None:
+        raise storage.error(key, f"expected an .npy header, found {lead!r}")
+    width = struct.calcsize(layout)
+    length = int.from_bytes(stream.read(width), "little")
+    if length >= _LONGEST_HEADER:
+        raise storage.error(key, f"expected a header below 64 KiB, found {length} bytes")
+    text = stream.read(length)
+    if len(text) < length:
+        raise storage.error(key, f"expected a header of {length} bytes, found {len(text)}")
+    if _RECORD.search(text):
+        return Opaque("array of records")
+    return _parse_header(storage, key, text, 8 + width + length, size)
+
+
+def _parse_header(
+    storage: _Storage, key: str, text: bytes, offset: int, size: int
+) -> _Header | Opaque:
+    found = {match["key"]: match[_FIELDS[match["key"]]] for match in _ITEM.finditer(text)}
+    rest = re.sub(rb"[\s,]+", b"", _ITEM.sub(b"", text))
+    shape = _parse_shape(found.get(b"shape"))
+    descr, order = found.get(b"descr"), found.get(b"fortran_order")
+    if rest != b"{}" or shape is None or descr is None or order is None:
+        raise storage.error(
+            key, f"expected a header with descr, fortran_order and shape, found {text[:80]!r}"
+        )
+    code = descr.decode("latin-1")
+    dtype = array_dtype(code)
+    if dtype is None:
+        return Opaque("object array" if code.endswith("O") else f"array of type {printable(code)}")
+    n_items = item_count(shape, dtype.itemsize)
+    if n_items is None or n_items * dtype.itemsize != size - offset:
+        sides = " x ".join(map(str, shape)) or "one"
+        raise storage.error(
+            key, f"expected {sides} {dtype.name}, found {max(size - offset, 0)} bytes"
+        )
+    return _Header(dtype, shape, order == b"True", n_items, offset)
+
+
+def _parse_shape(text: bytes | None) -> tuple[int, ...] | None:
+    """Return the sizes in ``6890, 3`` or ``5,`` or the ``6890L, 3L`` of Python 2."""
+    if text is None:
+        return None
+    words = [word.strip().removesuffix(b"L") for word in text.split(b",")]
+    if words[-1] == b"":
+        words.pop()
+    if len(words) > _MAX_AXES or not all(word.isdigit() and len(word) < 20 for word in words):
+        return None
+    return tuple(map(int, words))
+
+
+def _load_member(storage: _Storage, member: zipfile.ZipInfo, header: _Header) -> NDArray[Any]:
+    key = _key(member)
+    try:
+        with (
+            storage.open() as file,
+            zipfile.ZipFile(file) as archive,
+            archive.open(member) as stream,
+        ):
+            return _load(storage, key, header, stream)
+    except _DAMAGE as problem:
+        raise storage.error(key, f"expected a whole array, found {_damage(problem)}") from None
+
+
+def _load_file(storage: _Storage, key: str, header: _Header) -> NDArray[Any]:
+    try:
+        with storage.open() as stream:
+            return _load(storage, key, header, stream)
+    except _DAMAGE as problem:
+        raise storage.error(key, f"expected a whole array, found {_damage(problem)}") from None
+
+
+def _load(storage: _Storage, key: str, header: _Header, stream: IO[bytes]) -> NDArray[Any]:
+    stream.read(header.offset)
+    size = header.n_items * header.dtype.itemsize
+    try:
+        flat = np.empty(header.n_items, header.dtype)
+    except MemoryError:
+        raise storage.error(key, f"needs {size} bytes of memory, found fewer") from None
+    # Chunk by chunk, as reading at once would hold everything twice.
+    room = flat.view(np.uint8) if size else np.empty(0, np.uint8)
+    done = 0
+    while done < size:
+        chunk = stream.read(min(_CHUNK, size - done))
+        if not chunk:
+            raise storage.error(key, f"expected {size} bytes of values, found {done}")
+        room[done : done + len(chunk)] = np.frombuffer(chunk, np.uint8)
+        done += len(chunk)
+    return shaped(flat, header.shape, header.is_fortran)

@@ -1,0 +1,63 @@
+"""Read pickles of arrays and plain data, without Python's unpickler and without running anything.
+
+::
+
+    _pickle.py           this file: the whole must be a dict of named values
+    _pickle_steps.py     what each step of the protocols 0 to 5 does
+    _pickle_machine.py   bytes, stack, memo and budget of the machine that takes the steps
+    _pickle_names.py     the only names allowed, and the only arguments they take
+    _pickle_values.py    the inert things that the names stand for
+    _pickle_resolve.py   from those to arrays, sparse matrices and plain data, key by key
+
+Arrays are views of the file's bytes. They begin where the file has them, often at an address that
+their element size does not divide: whoever computes with one in a loop should copy it.
+"""
+
+from __future__ import annotations
+
+from viewer.errors import printable
+from viewer.formats._archive import Archive, Value
+from viewer.formats._pickle_machine import Machine
+from viewer.formats._pickle_resolve import resolve
+from viewer.formats._pickle_steps import run
+from viewer.formats._pickle_values import noun
+from viewer.formats._source import Source
+
+__all__ = ["open_pickle"]
+
+
+def open_pickle(source: Source) -> Archive:
+    """Open a pickle; see ``open_archive`` for what it raises.
+
+    Parameters
+    ----------
+    source : Source
+        Its bytes stay in memory as long as one of the arrays does.
+    """
+    machine = Machine(source)
+    whole = run(machine)
+    rest = len(source.data) - machine.at
+    if rest:
+        source.warn(f"{rest} bytes after the end of the pickle were ignored")
+    values = _named(source, whole)
+    path, size = source.path, len(source.data)
+
+    def load(key: str) -> Value:
+        return resolve(path, size, key, values[key])
+
+    return Archive(path, "pickle", tuple(values), load)
+
+
+def _named(source: Source, whole: object) -> dict[str, object]:
+    """Return the values by name; names may be bytes, as Python 3 writes those of Python 2."""
+    if not isinstance(whole, dict):
+        raise source.error(f"expected a dict of named values, found {noun(whole)}")
+    values: dict[str, object] = {}
+    for key, value in whole.items():
+        if isinstance(key, int):
+            raise source.error(f"expected a dict of named values, found the key {key}")
+        name = key if isinstance(key, str) else key.decode("latin-1")
+        if name in values:
+            raise source.error(f"{printable(name, 60)}: expected one of this name, found two")
+        values[name] = value
+    return values

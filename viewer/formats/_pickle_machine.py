@@ -1,0 +1,172 @@
+"""The state of the pickle machine: the bytes, a stack with marks, the memo, and a budget.
+
+A pickle is a list of steps for a machine with a stack. What each step does is in
+``_pickle_steps.py``; here is what they have in common. Nothing is recursive, no length is believed
+before the bytes are known to be there, and the budget bounds time and memory whatever the steps do.
+"""
+
+from __future__ import annotations
+
+import re
+
+from viewer.errors import FormatError
+from viewer.formats._pickle_values import Span
+from viewer.formats._source import Source, shown
+
+__all__ = ["Machine"]
+
+_MAX_STEPS = 2_000_000  # a body model takes a few hundred, a motion in plain lists some 100,000
+_LONGEST_LINE = 256  # letters of a name or number in the text protocols
+_INTEGER = re.compile(rb"[+-]?[0-9]+")
+
+
+class Machine:
+    """A pickle while it is read.
+
+    Attributes
+    ----------
+    data : bytes
+        The file.
+    at : int
+        Offset of the next byte.
+    stack : list
+        Values, and below each mark those that are not reachable at the moment.
+    memo : dict
+        Values by number; a dict, so that a large number costs nothing.
+    """
+
+    def __init__(self, source: Source) -> None:
+        self.source, self.data, self.at = source, source.data, 0
+        self.stack: list[object] = []
+        self.memo: dict[int, object] = {}
+        self._marks: list[int] = []
+        self._floor = 0  # height of the stack at the last mark
+        self._budget = _MAX_STEPS
+        self._step_at = 0
+
+    def fail(self, message: str) -> FormatError:
+        """Return an error that names the place of the current step."""
+        return self.source.error(f"{message} at byte {self._step_at}")
+
+    def next_step(self) -> int:
+        """Return the code of the next step, and pay for it."""
+        self._step_at = self.at
+        if self.at >= len(self.data):
+            raise self.cut_short(1, 0)
+        self.spend(1)
+        self.at += 1
+        return self.data[self.at - 1]
+
+    def spend(self, count: int) -> None:
+        """Pay for so many items; refuse a pickle that makes more than any real one."""
+        self._budget -= count
+        if self._budget < 0:
+            raise self.fail(f"expected at most {_MAX_STEPS} steps in a pickle, found more")
+
+    # Bytes of the file.
+
+    def number(self, size: int, *, is_signed: bool = False) -> int:
+        """Read an integer of ``size`` bytes, least significant first."""
+        start = self.skip(size)
+        return int.from_bytes(self.data[start : self.at], "little", signed=is_signed)
+
+    def skip(self, size: int) -> int:
+        """Step over bytes that must be there, and return where they began."""
+        start = self.at
+        if size < 0 or size > len(self.data) - start:
+            raise self.cut_short(size, len(self.data) - start)
+        self.at = start + size
+        return start
+
+    def span(self, width: int, coding: str | None = None, *, is_signed: bool = False) -> Span:
+        """Read a length of ``width`` bytes, and mark as many bytes after it."""
+        start = self.skip(self.number(width, is_signed=is_signed))
+        return Span(self.data, start, self.at, coding)
+
+    def line(self, longest: int | None = _LONGEST_LINE) -> tuple[int, int]:
+        """Step over a line, and return where its text begins and ends."""
+        start = self.at
+        end = self.data.find(b"\n", start)
+        if end < 0:
+            raise self.fail("expected the end of a line, found the end of the file (cut short?)")
+        if longest is not None and end - start > longest:
+            raise self.fail(f"expected at most {longest} letters in a line, found {end - start}")
+        self.at = end + 1
+        return start, end
+
+    def word(self) -> bytes:
+        """Read a line with a name or a number."""
+        start, end = self.line()
+        if self.data[start:end].endswith(b"\r"):
+            raise self.damaged_line_ends()
+        return self.data[start:end]
+
+    def decimal(self, word: bytes) -> int:
+        """Return a number of the text protocols; their length is bounded already."""
+        if not _INTEGER.fullmatch(word):
+            raise self.fail(f"expected a whole number, found {shown(word)}")
+        return int(word)
+
+    def cut_short(self, wanted: int, found: int) -> FormatError:
+        """Return the error of a length that goes beyond the end of the file."""
+        return self.fail(f"expected {wanted} more bytes, found {found} (a file cut short?)")
+
+    def damaged_line_ends(self) -> FormatError:
+        """Return the error of a file that passed through a text-mode transfer."""
+        return self.source.error(
+            "expected a pickle, found Windows line ends: damaged in transfer, "
+            "download it again in binary mode"
+        )
+
+    # The stack.
+
+    def push(self, value: object) -> None:
+        """Put a value on the stack."""
+        self.stack.append(value)
+
+    def top(self) -> object:
+        """Return the last value."""
+        if len(self.stack) <= self._floor:
+            raise self.fail("expected a value on the stack, found none")
+        return self.stack[-1]
+
+    def pop(self) -> object:
+        """Take the last value, but none below a mark."""
+        value = self.top()
+        self.stack.pop()
+        return value
+
+    def mark(self) -> None:
+        """Begin a list of values of any number."""
+        self._marks.append(self._floor)
+        self._floor = len(self.stack)
+
+    def pop_mark(self) -> list[object]:
+        """Take all values since the last mark, and the mark."""
+        if not self._marks:
+            raise self.fail("expected a mark on the stack, found none")
+        values = self.stack[self._floor :]
+        del self.stack[self._floor :]
+        self._floor = self._marks.pop()
+        return values
+
+    def drop(self) -> None:
+        """Take the last value or, if there is none since it, the last mark."""
+        if self._marks and len(self.stack) == self._floor:
+            self.pop_mark()
+        else:
+            self.pop()
+
+    # The memo.
+
+    def remember(self, index: int) -> None:
+        """Give the last value a number."""
+        if index < 0:
+            raise self.fail(f"expected a number from 0 on, found {index}")
+        self.memo[index] = self.top()
+
+    def recall(self, index: int) -> None:
+        """Put the value of a number on the stack."""
+        if index not in self.memo:
+            raise self.fail(f"expected a value remembered before, found number {index}")
+        self.stack.append(self.memo[index])

@@ -1,0 +1,281 @@
+"""The only names that a pickle may use, and the only ways to use them.
+
+``find`` looks a pair of module and name up in a literal table. It imports nothing, and what it
+returns is a stand-in. ``call``, ``create`` and ``build`` accept exactly what numpy, scipy, chumpy
+and Python themselves write. All four raise ``ValueError`` for everything else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeGuard
+
+from viewer.errors import printable
+from viewer.formats._archive import Opaque
+from viewer.formats._pickle_values import Array, Dtype, Instance, Span, StandIn, is_sizes, noun
+
+__all__ = ["as_key", "build", "call", "create", "find"]
+
+# Numpy 2 and scipy 1.8 renamed modules; files keep the names of their day. Never a prefix rule:
+# numpy.testing.runstring runs any text.
+_ROLES = {
+    ("numpy", "ndarray"): "ndarray",
+    ("numpy", "dtype"): "dtype",
+    ("numpy.core.multiarray", "_reconstruct"): "reconstruct",
+    ("numpy._core.multiarray", "_reconstruct"): "reconstruct",
+    ("numpy.core.multiarray", "scalar"): "scalar",
+    ("numpy._core.multiarray", "scalar"): "scalar",
+    ("numpy.core.numeric", "_frombuffer"): "frombuffer",
+    ("numpy._core.numeric", "_frombuffer"): "frombuffer",
+    ("scipy.sparse.csc", "csc_matrix"): "csc",
+    ("scipy.sparse._csc", "csc_matrix"): "csc",
+    ("scipy.sparse._csc", "csc_array"): "csc",
+    ("scipy.sparse.csr", "csr_matrix"): "csr",
+    ("scipy.sparse._csr", "csr_matrix"): "csr",
+    ("scipy.sparse._csr", "csr_array"): "csr",
+    ("chumpy.ch", "Ch"): "Ch",
+    ("chumpy.ch", "ChHandle"): "Ch",
+    ("chumpy.ch", "MatVecMult"): "expression",
+    ("chumpy.ch_ops", "add"): "expression",
+    ("chumpy.ch_ops", "dot"): "expression",
+    ("chumpy.reordering", "Select"): "Select",
+    ("chumpy.reordering", "transpose"): "expression",
+    ("chumpy.reordering", "Concatenate"): "expression",
+    ("chumpy.reordering", "AtleastNd"): "expression",
+    ("copy_reg", "_reconstructor"): "reconstructor",
+    ("copyreg", "_reconstructor"): "reconstructor",
+    ("__builtin__", "object"): "object",
+    ("builtins", "object"): "object",
+    ("__builtin__", "set"): "set",
+    ("builtins", "set"): "set",
+    ("__builtin__", "bytes"): "bytes",  # how Python 3 writes b"" in old protocols
+    ("builtins", "bytes"): "bytes",
+    ("collections", "OrderedDict"): "dict",
+    ("_codecs", "encode"): "encode",
+}
+_CLASSES = {"csc", "csr", "Ch", "Select", "expression"}
+_ORDERS = {"<", ">", "=", "|"}
+_LONGEST_NAME = 200
+_LONGEST_KEY = 1 << 16
+_LARGEST_KEY = 1 << 60
+_MOST_ARGUMENTS = 6
+_WRONG = object()  # what a call returns for unusual arguments
+
+
+def find(module: str, name: str) -> StandIn:
+    """Return a new stand-in for a name.
+
+    Raises
+    ------
+    ValueError
+        If the pair is not in the table.
+    """
+    full = ".".join(printable(part[:_LONGEST_NAME]) for part in (module, name))
+    role = _ROLES.get((module, name))
+    if role is None:
+        raise ValueError(
+            f'expected arrays and plain data, found the global "{full}", '
+            "which is not allowed; nothing was executed"
+        )
+    return StandIn(full, role)
+
+
+def call(function: object, arguments: object) -> tuple[object, int]:
+    """Return what a function would make of its arguments, and how many items were copied.
+
+    Parameters
+    ----------
+    function : object
+        A ``StandIn``; everything else is refused.
+    arguments : object
+        A tuple; everything else is refused.
+    """
+    if not isinstance(function, StandIn) or function.role not in _CALLS:
+        raise ValueError(f"expected a call of a known function, found a call of {noun(function)}")
+    if isinstance(arguments, tuple) and len(arguments) <= _MOST_ARGUMENTS:
+        made = _CALLS[function.role](arguments)
+        if made is not _WRONG:
+            copies = function.role in ("dict", "scalar", "set")
+            sizes = [len(each) for each in arguments if isinstance(each, list | Span)]
+            return made, sum(sizes) if copies else 0
+    found = ", ".join(map(noun, arguments[:6])) if isinstance(arguments, tuple) else "none"
+    raise ValueError(f"expected the usual arguments of {function.name}, found ({found})")
+
+
+def create(of: object, arguments: object) -> Instance:
+    """Return a new object of a class, whose state is still to come."""
+    if not isinstance(of, StandIn) or of.role not in _CLASSES or arguments != ():
+        raise ValueError(f"expected a new object of a known class, found {noun(of)}")
+    return Instance(of)
+
+
+def build(target: object, state: object) -> None:
+    """Give an object its state. No attribute is ever set and no method called by this."""
+    if isinstance(target, Array):
+        _build_array(target, state)
+    elif isinstance(target, Dtype):
+        _build_dtype(target, state)
+    elif isinstance(target, Instance):
+        if not isinstance(state, dict):
+            raise ValueError(f"expected a dict as state of {target.of.name}, found {noun(state)}")
+        target.state = state
+    else:
+        raise ValueError(f"expected an object that takes a state, found {noun(target)}")
+
+
+def as_key(value: object) -> str | bytes | int:
+    """Return something as the key of a dict: a text, bytes, or a number that hashes to itself.
+
+    Raises
+    ------
+    ValueError
+        If it is something else. Objects never are keys, so none is ever asked for its hash; and
+        large numbers, which can be chosen so that all of them collide, are none either.
+    """
+    if isinstance(value, str | bytes):
+        return value
+    if isinstance(value, Span) and len(value) <= _LONGEST_KEY:
+        return value.raw() if value.coding is None else value.text()
+    if type(value) is int and abs(value) < _LARGEST_KEY:
+        return value
+    raise ValueError(f"expected a name or a number as a key, found {noun(value)}")
+
+
+def _is_text(value: object, text: str) -> bool:
+    """Return whether something is this text; a long one is not even looked at."""
+    return isinstance(value, Span) and len(value) == len(text) and value.raw() == text.encode()
+
+
+def _short(value: object, longest: int = 32) -> str | None:
+    return value.text() if isinstance(value, Span) and len(value) <= longest else None
+
+
+def _is_flag(value: object) -> bool:
+    return isinstance(value, int) and value in (0, 1)
+
+
+def _reconstruct(arguments: tuple[object, ...]) -> object:
+    match arguments:
+        case (StandIn(role="ndarray"), (0,), letter) if _is_text(letter, "b"):
+            return Array()
+    return _WRONG
+
+
+def _dtype(arguments: tuple[object, ...]) -> object:
+    match arguments:
+        case (code, align, copy) if _is_flag(align) and _is_flag(copy):
+            text = _short(code)
+            return _WRONG if text is None else Dtype(printable(text))
+    return _WRONG
+
+
+def _scalar(arguments: tuple[object, ...]) -> object:
+    match arguments:
+        case (Dtype() as dtype, Span() as payload):
+            if dtype.code in ("S", "S0", "U", "U0") and len(payload) == 0:
+                return Span(b"", 0, 0, "utf-8" if dtype.code[0] == "U" else None)
+            array = Array()
+            array.fill((), dtype, False, payload)
+            return Opaque(array.what) if array.dtype is None else array.values().item()
+        case (Dtype() as dtype, _):
+            return Opaque(dtype.what()) if dtype.dtype() is None else _WRONG
+    return _WRONG
+
+
+def _frombuffer(arguments: tuple[object, ...]) -> object:
+    match arguments:
+        case (Span() as payload, Dtype() as dtype, shape, order, *more) if is_sizes(shape):
+            letter = _short(order)
+            array = Array()
+            array.fill(shape, dtype, letter == "F", payload)
+            if letter in ("C", "F") and not more:
+                return array
+            if letter == "K" and len(more) == 1 and _is_order(more[0], len(shape)):
+                array.axes = more[0]
+                return array
+    return _WRONG
+
+
+def _is_order(axes: object, n_axes: int) -> TypeGuard[tuple[int, ...]]:
+    return is_sizes(axes) and sorted(axes) == list(range(n_axes))
+
+
+def _set(arguments: tuple[object, ...]) -> object:
+    match arguments:
+        case ():
+            return []
+        case (list() as items,):
+            return list(items)  # a list, so that nothing of the file is ever hashed
+    return _WRONG
+
+
+def _dict(arguments: tuple[object, ...]) -> object:
+    match arguments:
+        case ():
+            return {}
+        case (list() as pairs,):
+            made: dict[object, object] = {}
+            for pair in pairs:
+                if not isinstance(pair, list | tuple) or len(pair) != 2:
+                    return _WRONG
+                made[as_key(pair[0])] = pair[1]
+            return made
+    return _WRONG
+
+
+def _encode(arguments: tuple[object, ...]) -> object:
+    match arguments:
+        case (Span(coding="utf-8" | "raw-unicode-escape") as text, coding):
+            return text.packed() if _is_text(coding, "latin1") else _WRONG
+    return _WRONG
+
+
+def _bytes(arguments: tuple[object, ...]) -> object:
+    return Span(b"", 0, 0) if arguments == () else _WRONG
+
+
+def _reconstructor(arguments: tuple[object, ...]) -> object:
+    match arguments:
+        case (StandIn(role=role) as of, StandIn(role="object"), None) if role in _CLASSES:
+            return Instance(of)
+    return _WRONG
+
+
+_CALLS: dict[str, Callable[[tuple[object, ...]], object]] = {
+    "reconstruct": _reconstruct,
+    "dtype": _dtype,
+    "scalar": _scalar,
+    "frombuffer": _frombuffer,
+    "set": _set,
+    "dict": _dict,
+    "encode": _encode,
+    "bytes": _bytes,
+    "reconstructor": _reconstructor,
+}
+
+
+def _build_array(target: Array, state: object) -> None:
+    match state:
+        case (1, shape, Dtype() as dtype, order, payload) if is_sizes(shape) and _is_flag(order):
+            if isinstance(payload, Span):
+                target.fill(shape, dtype, bool(order), payload)
+                return
+            if isinstance(payload, list) and dtype.code.startswith("O"):
+                target.what = dtype.what()
+                return
+    raise ValueError(f"expected the state of an array, found {noun(state)}")
+
+
+def _build_dtype(target: Dtype, state: object) -> None:
+    match state:
+        case (3 | 4, order, sub, names, fields, size, int(), int(), *_) if len(state) <= 9:
+            letter = _short(order)
+            if letter is None or letter not in _ORDERS:
+                raise ValueError(f"expected the byte order of an array, found {noun(order)}")
+            if any(part is not None for part in (sub, names, fields)):
+                target.code = "V"  # records, whatever their size
+            target.order = letter
+            dtype = target.dtype()
+            if dtype is None or size in (-1, dtype.itemsize):
+                return
+    raise ValueError(f"expected the state of an element type, found {noun(state)}")

@@ -1,0 +1,164 @@
+"""From what a pickle built to what a reader asks for, one key at a time.
+
+Values are converted when a key is asked for, so a key that nobody needs costs nothing and cannot
+spoil the others. Whatever is shared or contains itself is walked within a budget and a depth.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.errors import FormatError, printable
+from viewer.formats._archive import Opaque, Sparse, Value
+from viewer.formats._pickle_values import Array, Dtype, Instance, Span, StandIn, is_sizes
+from viewer.rig.arrays import Deferred
+
+__all__ = ["resolve"]
+
+_DEEPEST = 32  # containers in containers
+_DEEPEST_EXPRESSION = 8  # a release has two
+_SMALLEST_BUDGET = 1000
+_NUMBERS = "biuf"
+
+
+class _EndlessError(Exception):
+    """A value that contains itself, or repeats itself far beyond the size of its file."""
+
+
+def resolve(path: Path, size: int, key: str, value: object) -> Value:
+    """Return a value of the pickle as ``Archive.get`` promises it.
+
+    Parameters
+    ----------
+    path : Path
+        The file, for messages.
+    size : int
+        Its length in bytes; without sharing, no value has more items.
+    key : str
+        The name of the value, for messages.
+    value : object
+        What the machine made.
+
+    Raises
+    ------
+    FormatError
+        If an array, matrix or expression contradicts itself, or a text is none.
+    """
+    try:
+        return _Resolver(path, key, max(size, _SMALLEST_BUDGET)).value(value, 0)
+    except _EndlessError:
+        return Opaque("data nested without end")
+
+
+class _Resolver:
+    def __init__(self, path: Path, key: str, budget: int) -> None:
+        self.path, self.key, self.budget = path, key, budget
+
+    def fail(self, message: str) -> FormatError:
+        return FormatError(self.path, f"{printable(self.key, 60)}: {message}")
+
+    def value(self, value: object, depth: int) -> Value:
+        self.budget -= 1
+        if depth > _DEEPEST or self.budget < 0:
+            raise _EndlessError
+        if value is None or isinstance(value, bool | int | float | Opaque | str | bytes):
+            return value
+        if isinstance(value, list):
+            return [self.value(item, depth + 1) for item in value]
+        if isinstance(value, tuple):
+            return tuple(self.value(item, depth + 1) for item in value)
+        if isinstance(value, dict):
+            return {key: self.value(item, depth + 1) for key, item in value.items()}
+        if isinstance(value, Span):
+            return self.text(value)
+        return self.thing(value)
+
+    def text(self, span: Span) -> str | bytes:
+        if span.coding is None:
+            self.budget -= len(span)  # copied for each use, where a text is shared
+            return span.raw() if self.budget >= 0 else b""
+        try:
+            return span.text()
+        except UnicodeError:
+            raise self.fail("expected a text, found bytes that are none") from None
+
+    def thing(self, value: object) -> Deferred | Sparse | Opaque:
+        if isinstance(value, Array):
+            return value.deferred(self.fail) or Opaque(value.what)
+        if isinstance(value, Instance) and value.of.role in ("csc", "csr"):
+            return self.sparse(value)
+        if isinstance(value, Instance):
+            return self.expression(value, 0)
+        if isinstance(value, StandIn | Dtype):
+            return Opaque(value.name if isinstance(value, StandIn) else "element type")
+        raise self.fail("expected a value, found something else")
+
+    def sparse(self, matrix: Instance) -> Sparse:
+        state = matrix.state or {}
+        shape = state.get("_shape", state.get("shape"))
+        if not is_sizes(shape) or len(shape) != 2:
+            raise self.fail("expected a sparse matrix with rows and columns, found none")
+        data, indices, indptr = (self.part(state, name) for name in ("data", "indices", "indptr"))
+        try:
+            return Sparse((shape[0], shape[1]), data, indices, indptr, matrix.of.role)
+        except ValueError as problem:
+            raise self.fail(str(problem)) from None
+
+    def part(self, state: dict[str | bytes | int, object], name: str) -> NDArray[Any]:
+        array = state.get(name)
+        later = array.deferred(self.fail) if isinstance(array, Array) else None
+        if later is None:
+            raise self.fail(f"expected a sparse matrix with {name}, found none")
+        return later.values()
+
+    def expression(self, value: Instance, depth: int) -> Deferred | Opaque:
+        """Return the array that a chumpy object stands for, if it is known without computing."""
+        state = value.state or {}
+        name = value.of.name
+        if depth > _DEEPEST_EXPRESSION:
+            return Opaque(f"{name} expression nested without end")
+        if value.of.role == "expression":
+            return Opaque(f"{name} expression")
+        inner = state.get("x" if value.of.role == "Ch" else "a")
+        if isinstance(inner, Instance) and inner.of.role not in ("csc", "csr"):
+            found: Deferred | Opaque = self.expression(inner, depth + 1)
+        elif isinstance(inner, Array):
+            found = inner.deferred(self.fail) or Opaque(inner.what)
+        elif isinstance(inner, float):
+            number = np.array(inner)
+            found = Deferred((), number.dtype, lambda: number)
+        else:
+            found = Opaque(f"{name} without values")
+        if isinstance(found, Opaque) or value.of.role == "Ch":
+            return found
+        return self.selection(state, found, name)
+
+    def selection(
+        self, state: dict[str | bytes | int, object], whole: Deferred, name: str
+    ) -> Deferred | Opaque:
+        """Return ``whole.ravel()[idxs].reshape(preferred_shape)``, for later."""
+        idxs, shape = state.get("idxs"), state.get("preferred_shape")
+        chosen = idxs.deferred(self.fail) if isinstance(idxs, Array) else None
+        if chosen is None or chosen.dtype.kind not in "iu" or whole.dtype.kind not in _NUMBERS:
+            return Opaque(f"{name} without plain indices")
+        wanted = shape if is_sizes(shape) else chosen.shape
+        if math.prod(wanted) != math.prod(chosen.shape):
+            raise self.fail(
+                f"expected {math.prod(wanted)} indices in {name}, found {math.prod(chosen.shape)}"
+            )
+        return Deferred(wanted, whole.dtype, partial(self.take, whole, chosen, wanted))
+
+    def take(self, whole: Deferred, chosen: Deferred, shape: tuple[int, ...]) -> NDArray[Any]:
+        flat, indices = whole.values().reshape(-1), chosen.values()
+        if indices.size and (int(indices.min()) < 0 or int(indices.max()) >= len(flat)):
+            raise self.fail(
+                f"expected indices 0 to {len(flat) - 1}, "
+                f"found {int(indices.min())} to {int(indices.max())}"
+            )
+        return flat.take(indices.reshape(-1).astype(np.intp)).reshape(shape)

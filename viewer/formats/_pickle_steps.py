@@ -1,0 +1,354 @@
+r"""What each step of a pickle does, protocols 0 to 5.
+
+Steps are named as in Python's ``pickletools``. Those that reach outside the file are refused:
+persistent ids, extension codes and out-of-band buffers. Everything that has a name is decided in
+``_pickle_names.py``.
+"""
+
+from __future__ import annotations
+
+import codecs
+import re
+import struct
+from collections.abc import Callable
+from typing import TypeVar
+
+from viewer.formats import _pickle_names as names
+from viewer.formats._pickle_machine import Machine
+from viewer.formats._pickle_values import Span, noun
+from viewer.formats._source import shown
+
+__all__ = ["run"]
+
+Step = Callable[[Machine], None]
+Result = TypeVar("Result")
+
+_STOP = ord(".")
+_LAST_PROTOCOL = 5
+_MAX_INTEGER = 1024  # bytes
+_LONGEST_NAME = 256
+_FLOAT = re.compile(rb"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|-?inf|-?nan")
+# What repr() of Python 2 writes. Others are refused, as the decoder warns about some of them.
+_ODD_ESCAPE = re.compile(rb"\\(?!x[0-9a-fA-F]{2}|[nrt'\"])")
+
+
+def run(machine: Machine) -> object:
+    """Take all steps up to STOP, and return the value that is left.
+
+    Raises
+    ------
+    FormatError
+        At the first step that is damaged, or refused.
+    """
+    code = machine.next_step()
+    while code != _STOP:
+        step = _STEPS.get(code)
+        if step is None:
+            raise machine.fail(f"expected a step of a pickle, found {shown(bytes([code]))}")
+        step(machine)
+        code = machine.next_step()
+    return machine.pop()
+
+
+def _guarded(machine: Machine, action: Callable[[], Result]) -> Result:
+    """Turn the refusals of names, arguments and texts into errors that name the file."""
+    try:
+        return action()
+    except UnicodeError:
+        raise machine.fail("expected a text, found bytes that are none") from None
+    except ValueError as problem:
+        raise machine.source.error(str(problem)) from None
+
+
+def _constant(value: object) -> Step:
+    return lambda machine: machine.push(value)
+
+
+def _integer(size: int, *, is_signed: bool = False) -> Step:
+    return lambda machine: machine.push(machine.number(size, is_signed=is_signed))
+
+
+def _span(width: int, coding: str | None = None, *, is_signed: bool = False) -> Step:
+    return lambda machine: machine.push(machine.span(width, coding, is_signed=is_signed))
+
+
+def _refused(what: str) -> Step:
+    def refuse(machine: Machine) -> None:
+        raise machine.source.error(
+            f"expected arrays and plain data, found {what}, "
+            "which is not allowed; nothing was executed"
+        )
+
+    return refuse
+
+
+# Numbers.
+
+
+def _long_integer(width: int) -> Step:
+    def step(machine: Machine) -> None:
+        size = machine.number(width, is_signed=width == 4)
+        if not 0 <= size <= _MAX_INTEGER:
+            raise machine.fail(f"expected a number of at most {_MAX_INTEGER} bytes, found {size}")
+        machine.push(machine.number(size, is_signed=True))
+
+    return step
+
+
+def _decimal(machine: Machine) -> None:
+    word = machine.word()
+    # Protocol 1 has no other way to write True and False.
+    truth = {b"00": False, b"01": True}.get(word)
+    machine.push(machine.decimal(word) if truth is None else truth)
+
+
+def _long_decimal(machine: Machine) -> None:
+    machine.push(machine.decimal(machine.word().removesuffix(b"L")))
+
+
+def _float_text(machine: Machine) -> None:
+    word = machine.word()
+    if not _FLOAT.fullmatch(word):
+        raise machine.fail(f"expected a number, found {shown(word)}")
+    machine.push(float(word))
+
+
+def _float(machine: Machine) -> None:
+    machine.push(struct.unpack_from(">d", machine.data, machine.skip(8))[0])
+
+
+# Texts.
+
+
+def _quoted(machine: Machine) -> None:
+    start, end = machine.line(None)
+    text = machine.data[start:end]
+    if text.endswith(b"\r"):
+        raise machine.damaged_line_ends()
+    if len(text) < 2 or text[:1] not in (b"'", b'"') or text[-1:] != text[:1]:
+        raise machine.fail(f"expected a text in quotes, found {shown(text)}")
+    if b"\\" not in text:
+        machine.push(Span(machine.data, start + 1, end - 1, "latin-1"))
+        return
+    # Pairs of backslashes go first, so that each of the others begins an escape.
+    if _ODD_ESCAPE.search(text[1:-1].replace(b"\\\\", b"..")):
+        raise machine.fail("expected a text as Python 2 writes it, found another escape")
+    data = codecs.escape_decode(text[1:-1])[0]
+    machine.push(Span(data, 0, len(data), "latin-1"))
+
+
+def _text_line(machine: Machine) -> None:
+    machine.push(Span(machine.data, *machine.line(None), "raw-unicode-escape"))
+
+
+# Containers.
+
+
+def _tuple(count: int) -> Step:
+    def step(machine: Machine) -> None:
+        values = [machine.pop() for _ in range(count)]
+        machine.push(tuple(reversed(values)))
+
+    return step
+
+
+def _list_of(machine: Machine) -> list[object]:
+    target = machine.top()
+    if not isinstance(target, list):
+        raise machine.fail(f"expected a list to add to, found {noun(target)}")
+    return target
+
+
+def _append(machine: Machine) -> None:
+    value = machine.pop()
+    _list_of(machine).append(value)
+
+
+def _appends(machine: Machine) -> None:
+    values = machine.pop_mark()
+    _list_of(machine).extend(values)
+
+
+def _put_pairs(machine: Machine, values: list[object]) -> None:
+    target = machine.top()
+    if not isinstance(target, dict):
+        raise machine.fail(f"expected a dict to add to, found {noun(target)}")
+    if len(values) % 2:
+        raise machine.fail("expected keys with values, found a key without")
+    keys = _guarded(machine, lambda: [names.as_key(key) for key in values[0::2]])
+    target.update(zip(keys, values[1::2], strict=True))
+
+
+def _set_item(machine: Machine) -> None:
+    value = machine.pop()
+    _put_pairs(machine, [machine.pop(), value])
+
+
+def _set_items(machine: Machine) -> None:
+    values = machine.pop_mark()
+    _put_pairs(machine, values)
+
+
+def _dict(machine: Machine) -> None:
+    values = machine.pop_mark()
+    machine.push({})
+    _put_pairs(machine, values)
+
+
+# Names, and what is done with them.
+
+
+def _find(machine: Machine, module: str, name: str) -> object:
+    if module.endswith("\r") or name.endswith("\r"):
+        raise machine.damaged_line_ends()
+    return _guarded(machine, lambda: names.find(module, name))
+
+
+def _global_line(machine: Machine) -> object:
+    module, name = (machine.data[slice(*machine.line())].decode("utf-8", "replace") for _ in "mn")
+    return _find(machine, module, name)
+
+
+def _global(machine: Machine) -> None:
+    machine.push(_global_line(machine))
+
+
+def _stack_global(machine: Machine) -> None:
+    parts = [machine.pop(), machine.pop()]
+    texts = [part for part in parts if isinstance(part, Span) and len(part) <= _LONGEST_NAME]
+    if len(texts) < len(parts):
+        raise machine.fail(f"expected short names, found {noun(parts[1])} and {noun(parts[0])}")
+    name, module = _guarded(machine, lambda: [text.text() for text in texts])
+    machine.push(_find(machine, module, name))
+
+
+def _reduce(machine: Machine) -> None:
+    arguments, function = machine.pop(), machine.pop()
+    value, copied = _guarded(machine, lambda: names.call(function, arguments))
+    machine.spend(copied)
+    machine.push(value)
+
+
+def _create(machine: Machine, of: object, arguments: object) -> None:
+    machine.push(_guarded(machine, lambda: names.create(of, arguments)))
+
+
+def _new(machine: Machine) -> None:
+    arguments, of = machine.pop(), machine.pop()
+    _create(machine, of, arguments)
+
+
+def _new_with_keywords(machine: Machine) -> None:
+    keywords = machine.pop()
+    if keywords != {}:
+        raise machine.fail(f"expected no arguments with names, found {noun(keywords)}")
+    _new(machine)
+
+
+def _instance(machine: Machine) -> None:
+    of = _global_line(machine)
+    _create(machine, of, tuple(machine.pop_mark()))
+
+
+def _object(machine: Machine) -> None:
+    of, *arguments = machine.pop_mark() or [None]
+    _create(machine, of, tuple(arguments))
+
+
+def _build(machine: Machine) -> None:
+    state, target = machine.pop(), machine.top()
+    _guarded(machine, lambda: names.build(target, state))
+
+
+# Framing.
+
+
+def _protocol(machine: Machine) -> None:
+    protocol = machine.number(1)
+    if protocol > _LAST_PROTOCOL:
+        raise machine.fail(f"expected a pickle of protocol 0 to 5, found {protocol}")
+
+
+def _frame(machine: Machine) -> None:
+    size = machine.number(8)
+    if size > len(machine.data) - machine.at:
+        raise machine.cut_short(size, len(machine.data) - machine.at)
+
+
+_STEPS: dict[int, Step] = {
+    # Numbers and constants
+    ord("N"): _constant(None),
+    0x88: _constant(True),
+    0x89: _constant(False),
+    ord("I"): _decimal,
+    ord("L"): _long_decimal,
+    ord("K"): _integer(1),
+    ord("M"): _integer(2),
+    ord("J"): _integer(4, is_signed=True),
+    0x8A: _long_integer(1),
+    0x8B: _long_integer(4),
+    ord("F"): _float_text,
+    ord("G"): _float,
+    # Texts and bytes
+    ord("S"): _quoted,
+    ord("T"): _span(4, "latin-1", is_signed=True),
+    ord("U"): _span(1, "latin-1"),
+    ord("V"): _text_line,
+    ord("X"): _span(4, "utf-8"),
+    0x8C: _span(1, "utf-8"),
+    0x8D: _span(8, "utf-8"),
+    ord("B"): _span(4),
+    ord("C"): _span(1),
+    0x8E: _span(8),
+    0x96: _span(8),  # BYTEARRAY8
+    # Containers
+    ord(")"): _constant(()),
+    0x85: _tuple(1),
+    0x86: _tuple(2),
+    0x87: _tuple(3),
+    ord("t"): lambda machine: machine.push(tuple(machine.pop_mark())),
+    ord("]"): lambda machine: machine.push([]),
+    ord("l"): lambda machine: machine.push(machine.pop_mark()),
+    ord("a"): _append,
+    ord("e"): _appends,
+    ord("}"): lambda machine: machine.push({}),
+    ord("d"): _dict,
+    ord("s"): _set_item,
+    ord("u"): _set_items,
+    # Sets are kept as lists, so that nothing in them is asked for its hash
+    0x8F: lambda machine: machine.push([]),
+    0x90: _appends,
+    0x91: lambda machine: machine.push(machine.pop_mark()),
+    # Stack and memo
+    ord("("): Machine.mark,
+    ord("0"): Machine.drop,
+    ord("1"): lambda machine: machine.pop_mark().clear(),
+    ord("2"): lambda machine: machine.push(machine.top()),
+    ord("p"): lambda machine: machine.remember(machine.decimal(machine.word())),
+    ord("q"): lambda machine: machine.remember(machine.number(1)),
+    ord("r"): lambda machine: machine.remember(machine.number(4)),
+    0x94: lambda machine: machine.remember(len(machine.memo)),
+    ord("g"): lambda machine: machine.recall(machine.decimal(machine.word())),
+    ord("h"): lambda machine: machine.recall(machine.number(1)),
+    ord("j"): lambda machine: machine.recall(machine.number(4)),
+    # Names
+    ord("c"): _global,
+    0x93: _stack_global,
+    ord("R"): _reduce,
+    ord("b"): _build,
+    ord("i"): _instance,
+    ord("o"): _object,
+    0x81: _new,
+    0x92: _new_with_keywords,
+    # Framing
+    0x80: _protocol,
+    0x95: _frame,
+    # What reaches outside the file
+    ord("P"): _refused("a persistent id"),
+    ord("Q"): _refused("a persistent id"),
+    0x82: _refused("an extension code"),
+    0x83: _refused("an extension code"),
+    0x84: _refused("an extension code"),
+    0x97: _refused("an out-of-band buffer"),
+    0x98: _refused("an out-of-band buffer"),
+}

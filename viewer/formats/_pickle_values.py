@@ -1,0 +1,216 @@
+"""What the pickle machine has on its stack: inert things that only remember what they were.
+
+Numbers, None, lists, tuples and dicts are Python's own. Everything with a name in the pickle is one
+of the classes here, made anew for each file, so nothing a pickle does to them outlives it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, TypeGuard
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.formats._npz import array_dtype, item_count, shaped
+from viewer.rig.arrays import Deferred
+
+__all__ = ["Array", "Dtype", "Instance", "Span", "StandIn", "is_sizes", "noun"]
+
+_MOST_AXES = 32
+
+
+class Span:
+    """Bytes or a text in the file, not copied until someone needs it.
+
+    Parameters
+    ----------
+    data : bytes
+        The file, or bytes decoded from it.
+    start, stop : int
+        The part that is meant.
+    coding : str, optional
+        For a text. ``"latin-1"`` marks a string of Python 2, which may be text or bytes.
+    """
+
+    __slots__ = ("_packed", "_text", "coding", "data", "start", "stop")
+
+    def __init__(self, data: bytes, start: int, stop: int, coding: str | None = None) -> None:
+        self.data, self.start, self.stop, self.coding = data, start, stop, coding
+        self._text: str | None = None
+        self._packed: Span | None = None
+
+    def __len__(self) -> int:
+        return self.stop - self.start
+
+    def raw(self) -> bytes:
+        """Return a copy of the bytes."""
+        return self.data[self.start : self.stop]
+
+    def text(self) -> str:
+        """Return the text, decoded once however often it is asked for.
+
+        Raises
+        ------
+        ValueError
+            If the bytes are no text.
+        """
+        if self._text is None:
+            self._text = self._decoded()
+        return self._text
+
+    def packed(self) -> Span:
+        """Return the bytes of an array, which Python 3 may write as letters 0 to 255.
+
+        Raises
+        ------
+        ValueError
+            If there are other letters.
+        """
+        if self.coding in (None, "latin-1"):
+            return self
+        if self._packed is None:
+            data = self._decoded().encode("latin-1")
+            self._packed = Span(data, 0, len(data))
+        return self._packed
+
+    def _decoded(self) -> str:
+        errors = "surrogatepass" if self.coding == "utf-8" else "strict"
+        return self.raw().decode(self.coding or "latin-1", errors)
+
+
+@dataclass(slots=True, eq=False)
+class StandIn:
+    """Stands for a class or function of the table of allowed names; does nothing itself."""
+
+    name: str  # "scipy.sparse.csc.csc_matrix", for messages
+    role: str
+
+
+@dataclass(slots=True, eq=False)
+class Instance:
+    """An object of one of the classes, with the state that the pickle gave it."""
+
+    of: StandIn
+    state: dict[str | bytes | int, object] | None = None
+
+
+@dataclass(slots=True, eq=False)
+class Dtype:
+    """A numpy element type, as kind and size with the byte order beside them."""
+
+    code: str
+    order: str = "="
+
+    def dtype(self) -> np.dtype[Any] | None:
+        """Return numpy's type, or None if it is none of numbers or text."""
+        return array_dtype(self.order + self.code)
+
+    def what(self) -> str:
+        """Return why it is not evaluated."""
+        known = {"O": "object array", "V": "array of records"}
+        return known.get(self.code[:1], f"array of type {self.code[:20]}")
+
+
+@dataclass(slots=True, eq=False)
+class Array:
+    """A numpy array, whose values stay in the file until they are asked for.
+
+    Attributes
+    ----------
+    shape : tuple of int
+        Of the stored values.
+    dtype : dtype or None
+        None if the array is not evaluated; then ``what`` says why.
+    axes : tuple of int, optional
+        Order in which the stored axes are to be taken.
+    """
+
+    shape: tuple[int, ...] = ()
+    dtype: np.dtype[Any] | None = None
+    payload: Span | None = None
+    is_fortran: bool = False
+    axes: tuple[int, ...] | None = None
+    what: str = "array without values"
+
+    def fill(self, shape: tuple[int, ...], dtype: Dtype, is_fortran: bool, payload: Span) -> None:
+        """Take shape and values, which must have the same number of bytes.
+
+        Raises
+        ------
+        ValueError
+            If they have not; the text says ``expected …, found …``.
+        """
+        found = dtype.dtype()
+        if found is None:
+            self.what = dtype.what()
+            return
+        packed = payload.packed()
+        n_items = item_count(shape, found.itemsize)
+        if n_items is None or n_items * found.itemsize != len(packed):
+            sides = " x ".join(map(str, shape[:8])) or "one"
+            raise ValueError(f"expected {sides} {found.name}, found {len(packed)} bytes")
+        self.shape, self.dtype, self.payload = shape, found, packed
+        self.is_fortran = is_fortran
+
+    def deferred(self, fail: Callable[[str], Exception]) -> Deferred | None:
+        """Return the array for later, or None if it is not evaluated."""
+        if self.dtype is None or self.payload is None:
+            return None
+        shape = self.shape
+        if self.axes is not None:
+            shape = tuple(shape[axis] for axis in self.axes)
+        return Deferred(shape, self.dtype.newbyteorder("="), partial(self._load, fail))
+
+    def values(self) -> NDArray[Any]:
+        """Return the values; a view of the file where byte and memory order allow it.
+
+        Raises
+        ------
+        ValueError
+            If a text holds something else than letters.
+        """
+        if self.payload is None or self.dtype is None:
+            raise ValueError(f"expected an array of numbers, found {self.what}")
+        flat = np.empty(0, self.dtype)
+        if len(self.payload):  # numpy makes no view of nothing
+            n_items = len(self.payload) // self.dtype.itemsize
+            flat = np.frombuffer(self.payload.data, self.dtype, n_items, self.payload.start)
+        array = shaped(flat, self.shape, self.is_fortran)
+        return array if self.axes is None else np.ascontiguousarray(array.transpose(self.axes))
+
+    def _load(self, fail: Callable[[str], Exception]) -> NDArray[Any]:
+        try:
+            return self.values()
+        except ValueError as problem:
+            raise fail(str(problem)) from None
+
+
+def is_sizes(value: object) -> TypeGuard[tuple[int, ...]]:
+    """Return whether something is the shape of an array."""
+    return (
+        isinstance(value, tuple)
+        and len(value) <= _MOST_AXES
+        and all(type(side) is int and side >= 0 for side in value)
+    )
+
+
+def noun(value: object) -> str:
+    """Return what a thing on the stack is, for a message.
+
+    >>> noun([1, 2]), noun(StandIn("numpy.ndarray", "ndarray"))
+    ('a list', 'numpy.ndarray')
+    """
+    if isinstance(value, StandIn):
+        return value.name
+    if isinstance(value, Instance):
+        return f"an object of {value.of.name}"
+    if isinstance(value, Span):
+        return "bytes" if value.coding is None else "a text"
+    if isinstance(value, bool | int | float):
+        return "a number"
+    if value is None or isinstance(value, Array):
+        return "nothing" if value is None else "an array"
+    return f"a {type(value).__name__.lower()}"

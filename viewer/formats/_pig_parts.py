@@ -1,0 +1,156 @@
+"""The arrays of a PIG model, from its text folder or an archive, checked alike."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.errors import FormatError, printable
+from viewer.formats._container import archive_of
+from viewer.formats._source import Source
+from viewer.formats._table import read_table, row_error
+
+__all__ = ["CORE", "OPTIONAL", "Part", "PigFiles", "open_parts"]
+
+CORE = {
+    "vertices": 3,
+    "t_pose_joints": 3,
+    "parents": 1,
+    "skinning_weights": 3,
+    "faces_vert": 3,
+}
+"""Arrays without which there is no figure, with their columns in a text file."""
+
+OPTIONAL = {
+    "J_regressor": 3,
+    "textures": 2,
+    "faces_tex": 3,
+    "body_parts": 1,
+    "reduced_ids": 1,
+    "reduced_faces": 3,
+    "sym": 1,
+}
+"""Arrays that a model may lack."""
+
+_SPARSE = ("skinning_weights", "J_regressor")
+_WIDTHS = {**CORE, **OPTIONAL}
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """One array and where it came from.
+
+    Attributes
+    ----------
+    name : str
+        File name or key, for messages.
+    values : (N, columns)
+        Numbers; of a sparse matrix (joint, vertex, weight) rows.
+    error : callable
+        (message, row or None) to an error that names the file, and the line if there is one.
+    """
+
+    name: str
+    values: NDArray[Any]
+    error: Callable[[str, int | None], FormatError]
+
+
+@dataclass(slots=True)
+class PigFiles:
+    """All arrays that were found."""
+
+    parts: dict[str, Part] = field(default_factory=dict)
+    part_names: tuple[str, ...] = ()
+    ignored: tuple[str, ...] = ()
+
+
+def open_parts(source: Source) -> PigFiles:
+    """Read every array of a text folder, pickle or ``.npz``.
+
+    Raises
+    ------
+    FormatError
+        If one of the core is missing; all that are missing are named.
+    """
+    return _from_folder(source) if source.is_folder else _from_archive(source)
+
+
+def _from_folder(source: Source) -> PigFiles:
+    present = {path.name for path in source.path.iterdir()}
+    missing = [f"{name}.txt" for name in CORE if f"{name}.txt" not in present]
+    if missing:
+        raise source.error(f"expected a PIG folder, found no {', '.join(missing)}")
+    files = PigFiles()
+    for name, columns in _WIDTHS.items():
+        if f"{name}.txt" in present:
+            files.parts[name] = _text_part(source.inside(f"{name}.txt"), name, columns)
+    if "body_part_defs.txt" in present:
+        text = source.inside("body_part_defs.txt").data.decode("utf-8", "replace")
+        files.part_names = tuple(line.strip() for line in text.split() if line.strip())
+    known = {f"{name}.txt" for name in (*_WIDTHS, "body_part_defs")}
+    files.ignored = tuple(sorted(name for name in present - known if not name.startswith(".")))
+    return files
+
+
+def _text_part(source: Source, name: str, columns: int) -> Part:
+    def error(message: str, row: int | None) -> FormatError:
+        return source.error(message) if row is None else row_error(source, row, columns, message)
+
+    return Part(f"{name}.txt", read_table(source, columns), error)
+
+
+def _from_archive(source: Source) -> PigFiles:
+    archive = archive_of(source)
+    missing = [name for name in CORE if not archive.has(name)]
+    if missing:
+        found = ", ".join(printable(key, 40) for key in archive.keys[:12]) or "none"
+        raise source.error(
+            f"expected a PIG model; keys missing: {', '.join(missing)}; keys found: {found}"
+        )
+    files = PigFiles()
+    for name, columns in _WIDTHS.items():
+        if archive.has(name):
+            files.parts[name] = _archive_part(source, name, columns)
+    if archive.has("body_part_defs"):
+        files.part_names = _names(source)
+    files.ignored = tuple(key for key in archive.keys if key not in (*_WIDTHS, "body_part_defs"))
+    return files
+
+
+def _archive_part(source: Source, name: str, columns: int) -> Part:
+    archive = archive_of(source)
+
+    def error(message: str, row: int | None) -> FormatError:
+        return archive.error(name, message if row is None else f"row {row}: {message}")
+
+    if name in _SPARSE and not _is_entries(source, name):
+        matrix = archive.sparse(name)
+        rows, vertices, weights = matrix.entries()
+        return Part(name, np.stack([rows, vertices, weights], axis=1), error)
+    shape = (None,) if columns == 1 else (None, columns)
+    if columns == 1 and len(getattr(archive.get(name), "shape", ())) == 2:
+        shape = (None, 1)
+    values = archive.array(name, shape).values().reshape(-1, columns)
+    if not np.isfinite(values).all():
+        raise error("expected finite numbers", int((~np.isfinite(values)).any(axis=1).argmax()))
+    return Part(name, values, error)
+
+
+def _is_entries(source: Source, name: str) -> bool:
+    """Return whether a matrix is stored as rows of (joint, vertex, weight), as in the folder."""
+    shape: tuple[int, ...] = getattr(archive_of(source).get(name), "shape", ())
+    joints = archive_of(source).array("parents").shape[0]
+    return len(shape) == 2 and shape[1] == 3 and shape[0] != joints
+
+
+def _names(source: Source) -> tuple[str, ...]:
+    archive = archive_of(source)
+    value = archive.get("body_part_defs")
+    if isinstance(value, list | tuple):
+        return tuple(printable(name, 60) for name in value if isinstance(name, str))
+    names = archive.array("body_part_defs", (None,), "SU").values()
+    return tuple(printable(name, 60) for name in names.astype(str).tolist())

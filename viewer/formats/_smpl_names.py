@@ -1,0 +1,67 @@
+"""Joint names and parents of the SMPL family (shared by SMPL, SMPL+H, SMPL-X, MANO, FLAME)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+__all__ = ["FAMILY", "Member", "member_of"]
+
+_BODY_NAMES = (
+    "pelvis left_hip right_hip spine1 left_knee right_knee spine2 left_ankle right_ankle spine3 "
+    "left_foot right_foot neck left_collar right_collar head left_shoulder right_shoulder "
+    "left_elbow right_elbow left_wrist right_wrist"
+)
+_BODY = _BODY_NAMES.split()
+_BODY_PARENTS = (-1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19)
+_FINGERS = ("index", "middle", "pinky", "ring", "thumb")
+_FACE = ["jaw", "left_eye", "right_eye"]
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """One model of the family: its title, its joints, and the joints of its hands."""
+
+    title: str
+    names: tuple[str, ...]
+    parents: tuple[int, ...]
+    hands: tuple[tuple[str, int], ...] = ()  # side, first of fifteen joints
+    has_expressions: bool = False
+
+
+def _hand(side: str) -> list[str]:
+    return [f"{side}{finger}{number}" for finger in _FINGERS for number in (1, 2, 3)]
+
+
+def _hand_parents(wrist: int, first: int) -> list[int]:
+    return [wrist if index % 3 == 0 else first + index - 1 for index in range(15)]
+
+
+FAMILY = {
+    24: Member("SMPL", (*_BODY, "left_hand", "right_hand"), (*_BODY_PARENTS, 20, 21)),
+    52: Member(
+        "SMPL+H",
+        (*_BODY, *_hand("left_"), *_hand("right_")),
+        (*_BODY_PARENTS, *_hand_parents(20, 22), *_hand_parents(21, 37)),
+        (("left", 22), ("right", 37)),
+    ),
+    55: Member(
+        "SMPL-X",
+        (*_BODY, *_FACE, *_hand("left_"), *_hand("right_")),
+        (*_BODY_PARENTS, 15, 15, 15, *_hand_parents(20, 25), *_hand_parents(21, 40)),
+        (("left", 25), ("right", 40)),
+        has_expressions=True,
+    ),
+    16: Member("MANO", ("wrist", *_hand("")), (-1, *_hand_parents(0, 1)), (("", 1),)),
+    5: Member("FLAME", ("global", "neck", *_FACE), (-1, 0, 1, 1, 1), has_expressions=True),
+}
+"""Members by their number of joints."""
+
+
+def member_of(parents: tuple[int, ...]) -> Member | None:
+    """Return the member with exactly this hierarchy, None for other models of the same layout.
+
+    >>> member_of((-1, 0, 1, 1, 1)).title
+    'FLAME'
+    """
+    member = FAMILY.get(len(parents))
+    return member if member is not None and member.parents == parents else None

@@ -1,0 +1,139 @@
+"""The optional parts of a body model: shapes, hands, landmarks, texture coordinates, symmetry."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.formats._archive import Archive
+from viewer.formats._smpl_names import Member
+from viewer.formats._source import Source
+from viewer.rig.annotations import Keypoints
+from viewer.rig.arrays import Deferred, Floats, Ints
+from viewer.rig.blendshapes import BlendShapes
+from viewer.rig.hands import Hand
+from viewer.rig.mesh import Mesh
+
+__all__ = [
+    "IGNORED",
+    "model_hands",
+    "model_keypoints",
+    "model_shapes",
+    "model_symmetry",
+    "model_uvs",
+]
+
+_NOT_NEEDED = (
+    "J bs_style bs_type J_regressor_prior weights_prior pose_training_info trans pose betas "
+    "v_shaped v_posed r hands_coeffs hands_coeffsl hands_coeffsr dynamic_lmk_faces_idx "
+    "dynamic_lmk_bary_coords joint2num part2num allow_pickle gender"
+)
+IGNORED = frozenset(_NOT_NEEDED.split())
+"""Keys that models have and posing does not need."""
+
+_SHAPES = 300  # of models with at least 400 columns; the expressions follow
+_FEW_SHAPES = 10  # of the older models
+
+
+def model_shapes(
+    source: Source, archive: Archive, n_vertices: int, member: Member | None, used: list[str]
+) -> BlendShapes | None:
+    """Return shape and expression directions, read when first used."""
+    if not archive.has("shapedirs"):
+        source.warn("no `shapedirs`: one fixed shape")
+        return None
+    array = archive.array("shapedirs", (n_vertices, 3, "S"))
+    count = array.shape[2]
+    n_shapes = count
+    if member is not None and member.has_expressions:
+        n_shapes = _SHAPES if count >= _SHAPES + 100 else min(_FEW_SHAPES, count)
+
+    def load() -> Floats:
+        offsets = np.ascontiguousarray(np.moveaxis(array.values(), 2, 0), dtype=np.float64)
+        if not np.isfinite(offsets).all():
+            raise archive.error("shapedirs", "expected finite numbers")
+        return offsets
+
+    used.append("shapedirs")
+    if count == 0:
+        return None
+    names = _shape_names(archive, n_shapes, used)
+    names += tuple(f"expression {k}" for k in range(count - n_shapes))
+    groups = ("shape",) * n_shapes + ("expression",) * (count - n_shapes)
+    return BlendShapes(names, Deferred((count, n_vertices, 3), np.float64, load), groups)
+
+
+def _shape_names(archive: Archive, count: int, used: list[str]) -> tuple[str, ...]:
+    """Return what the coefficients mean where a file says so, as the bundled body does."""
+    if archive.has("shape_names"):
+        values = archive.array("shape_names", (count,), "SU").values()
+        used.append("shape_names")
+        return tuple(str(name) for name in values.tolist())
+    return tuple(f"shape {k}" for k in range(count))
+
+
+def model_hands(archive: Archive, member: Member | None, used: list[str]) -> tuple[Hand, ...]:
+    """Return the hands whose components are in the file."""
+    hands = []
+    for side, first in member.hands if member else ():
+        components, mean = f"hands_components{side[:1]}", f"hands_mean{side[:1]}"
+        if archive.has(components) and archive.has(mean):
+            joints = np.arange(first, first + 15, dtype=np.int32)
+            rows = archive.array(components, (None, 45)).values()
+            hands.append(Hand(side, joints, rows, archive.array(mean, (45,)).values()))
+            used += [components, mean]
+    return tuple(hands)
+
+
+def model_uvs(
+    source: Source, archive: Archive, n_triangles: int, used: list[str]
+) -> tuple[Floats | None, Ints | None]:
+    """Return texture coordinates and the triangles over them, if the file has both."""
+    if not (archive.has("vt") and archive.has("ft")):
+        return None, None
+    uvs = archive.array("vt", ("U", 2)).values()
+    corners = archive.array("ft", (n_triangles, 3)).values()
+    is_outside = corners.size and (corners.min() < 0 or corners.max() >= len(uvs))
+    if is_outside or not np.isfinite(uvs).all():
+        source.warn("`vt` and `ft` do not fit each other: left out")
+        return None, None
+    used += ["vt", "ft"]
+    return uvs.astype(np.float64), corners.astype(np.int32)
+
+
+def model_symmetry(
+    source: Source, archive: Archive, n_vertices: int, used: list[str]
+) -> Ints | None:
+    """Return each vertex's mirror partner, if the file has a map that is one."""
+    if not archive.has("vert_sym_idxs"):
+        return None
+    partners = archive.array("vert_sym_idxs", (n_vertices,)).values()
+    inside = partners.size and partners.min() >= 0 and partners.max() < n_vertices
+    if not inside or (partners % 1).any():
+        source.warn("`vert_sym_idxs` refers to vertices that do not exist: left out")
+        return None
+    indices = partners.astype(np.int32)
+    if (indices[indices] != np.arange(n_vertices)).any():
+        source.warn("`vert_sym_idxs` does not pair vertices: left out")
+        return None
+    used.append("vert_sym_idxs")
+    return indices
+
+
+def model_keypoints(
+    source: Source, archive: Archive, mesh: Mesh, used: list[str]
+) -> Keypoints | None:
+    """Return the static face landmarks as keypoints."""
+    if not (archive.has("lmk_faces_idx") and archive.has("lmk_bary_coords")):
+        return None
+    faces = archive.array("lmk_faces_idx", ("L",)).values()
+    weights = archive.array("lmk_bary_coords", (len(faces), 3)).values()
+    if faces.size and (faces.min() < 0 or faces.max() >= mesh.n_triangles):
+        source.warn("`lmk_faces_idx` refers to triangles that do not exist: left out")
+        return None
+    used += ["lmk_faces_idx", "lmk_bary_coords"]
+    return Keypoints(
+        names=tuple(f"landmark {number}" for number in range(len(faces))),
+        joints=np.full(len(faces), -1, dtype=np.int32),
+        vertices=mesh.triangles[faces.astype(np.int64)],
+        weights=weights,
+    )

@@ -1,0 +1,113 @@
+"""Text tables without header: numbers in columns, one row a line."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.errors import FormatError
+from viewer.formats._numbers import parse_numbers
+from viewer.formats._source import Source, shown
+from viewer.rig.arrays import Floats, Ints
+
+__all__ = ["read_indices", "read_table", "row_error"]
+
+
+def read_table(source: Source, columns: int) -> Floats:
+    """Read a table of numbers.
+
+    Parameters
+    ----------
+    source : Source
+        The file; blank lines are skipped.
+    columns : int
+        Numbers in every row.
+
+    Returns
+    -------
+    (N, columns)
+        As written.
+
+    Raises
+    ------
+    FormatError
+        With the line of a row that has more or fewer numbers, or a word that is none.
+    """
+    data = source.data
+    values, bad = parse_numbers(data, 0, len(data))
+    if bad >= 0:
+        offset = source.word_offset(0, bad)
+        word = source.next_word(offset)
+        found = shown(word.group()) if word else "the end of the file"
+        raise source.error(f"expected a number, found {found}", offset)
+    if len(values) == 0:
+        raise source.error(f"expected rows of {columns} numbers, found {source.looks_like()}")
+    _check_rows(source, columns, len(values))
+    return values.reshape(-1, columns)
+
+
+def _check_rows(source: Source, columns: int, count: int) -> None:
+    """Hold every line to its number of words; lines end with LF, CR or both."""
+    letters = np.frombuffer(source.data, dtype=np.uint8)
+    is_space = letters <= 32  # control characters were refused with the numbers
+    begins = np.flatnonzero(~is_space & np.concatenate([[True], is_space[:-1]]))
+    # Each run of `columns` words must lie on a line of its own.
+    ends = np.flatnonzero((letters == 10) | (letters == 13))
+    lines = np.searchsorted(ends, begins)
+    if count % columns == 0:
+        rows = lines.reshape(-1, columns)
+        if (rows[:, 0] == rows[:, -1]).all() and (rows[1:, 0] > rows[:-1, -1]).all():
+            return
+    _, first, counts = np.unique(lines, return_index=True, return_counts=True)
+    wrong = int(np.flatnonzero(counts != columns)[0])
+    raise source.error(
+        f"expected {columns} numbers in a row, found {counts[wrong]}", int(begins[first[wrong]])
+    )
+
+
+def row_error(source: Source, row: int, columns: int, message: str) -> FormatError:
+    """Return an error with the line of a row."""
+    return source.error(message, source.word_offset(0, row * columns))
+
+
+def read_indices(source: Source, columns: int, what: str, low: int, end: int) -> Ints:
+    """Read a table of whole numbers from ``low`` to ``end - 1``.
+
+    Parameters
+    ----------
+    source : Source
+        The file.
+    columns : int
+        Numbers in every row.
+    what : str
+        What they count, for messages: ``"vertex"``.
+    low, end : int
+        Smallest, and one more than the largest.
+
+    Returns
+    -------
+    (N, columns) int32
+        As written.
+
+    Raises
+    ------
+    FormatError
+        As ``read_table``, and with the line of a number that is not whole or out of range.
+    """
+    values = read_table(source, columns)
+    check_indices(source, values, what, low, end)
+    return values.astype(np.int32)
+
+
+def check_indices(
+    source: Source, values: Floats, what: str, low: int, end: int, total: int | None = None
+) -> None:
+    """Hold columns of a table to whole numbers in a range; ``total`` columns are in the file."""
+    wrong = np.argwhere((values < low) | (values >= end) | (values != np.floor(values)))
+    if len(wrong):
+        row, column = wrong[0]
+        raise row_error(
+            source,
+            int(row),
+            total or values.shape[1],
+            f"expected a {what} from {low} to {end - 1}, found {values[row, column]:g}",
+        )

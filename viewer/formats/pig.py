@@ -1,0 +1,269 @@
+"""Read the PIG animal model (github.com/anl13/PIG_model): a folder of tables, or an archive.
+
+::
+
+    vertices.txt          V x 3   x y z             metres, x forward, y left, z up
+    t_pose_joints.txt     J x 3   x y z             in figure space
+    parents.txt           J x 1   parent, -1 for the root
+    skinning_weights.txt  N x 3   joint vertex weight     used as they are, not normalised
+    faces_vert.txt        T x 3   vertex indices
+    textures.txt U x 2, faces_tex.txt T x 3, J_regressor.txt N x 3         optional
+    body_parts.txt V x 1, body_part_defs.txt, sym.txt V x 1                 optional
+    reduced_ids.txt R x 1, reduced_faces.txt N x 3                          optional
+
+A pose is 190 numbers: translation (3), 62 x 3 rotations, scale. The root's are angles about z, y
+and x, all others are rotation vectors. Scale and translation come last, about the origin.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.formats._pig_names import JOINTS, KEYPOINTS
+from viewer.formats._pig_parts import Part, PigFiles, open_parts
+from viewer.formats._source import Source
+from viewer.rig.annotations import BodyParts, Keypoints, ReducedMesh
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.blendshapes import JointRegressor, regress_joints
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import Mesh, vertex_normals
+from viewer.rig.pose_vector import PoseLayout
+from viewer.rig.skeleton import ball_skeleton
+from viewer.rig.skin import Skin, has_influence, skin_from_entries, weight_sums
+from viewer.rig.transform import translation_matrix
+
+__all__ = ["read"]
+
+_ODD_SUM = 0.01  # the authors' rounding stays well below
+
+
+def read(source: Source) -> Figure:
+    """Read the model.
+
+    Parameters
+    ----------
+    source : Source
+        The folder, pickle or ``.npz``; what is odd but readable is added to its warnings.
+
+    Returns
+    -------
+    Figure
+        With z up, in metres.
+
+    Raises
+    ------
+    FormatError
+        With file and line where there are lines.
+    """
+    files = open_parts(source)
+    parts = files.parts
+    positions = parts["vertices"].values
+    n_vertices, n_joints = len(positions), len(parts["t_pose_joints"].values)
+    if len(parts["parents"].values) != n_joints:
+        raise parts["parents"].error(
+            f"expected {n_joints} rows as in {parts['t_pose_joints'].name}, "
+            f"found {len(parts['parents'].values)}",
+            None,
+        )
+    parents = _parents(parts["parents"])
+    joints = parts["t_pose_joints"].values
+    names = JOINTS if n_joints == len(JOINTS) else tuple(f"joint_{j}" for j in range(n_joints))
+    regressor = _regressor(parts, n_joints, n_vertices)
+    skin = _skin(source, parts, joints, n_vertices)
+    mesh = _mesh(source, parts, positions)
+    return Figure(
+        name=source.path.name if source.is_folder else source.path.stem,
+        mesh=mesh,
+        skeleton=ball_skeleton(names, parents, joints),
+        skin=skin,
+        up="z",
+        unit="m",
+        joint_regressor=regressor,
+        pose_layout=_layout(n_joints),
+        body_parts=_body_parts(source, files, n_vertices),
+        keypoints=_keypoints(n_vertices, n_joints),
+        reduced=_reduced(source, parts, n_vertices),
+        symmetry=_symmetry(source, parts, n_vertices),
+        facts=_facts(files, mesh, skin, joints, regressor),
+    )
+
+
+def _layout(n_joints: int) -> PoseLayout:
+    is_euler = np.zeros(n_joints, dtype=bool)
+    is_euler[0] = True
+    starts = 3 + 3 * np.arange(n_joints, dtype=np.int32)
+    return PoseLayout(4 + 3 * n_joints, starts, is_euler, translation=0, scale=3 + 3 * n_joints)
+
+
+def _indices(part: Part, column: int, end: int, what: str, proof: str = "") -> Ints:
+    """Return a column of whole numbers from 0 to ``end - 1``."""
+    values = part.values[:, column]
+    wrong = np.flatnonzero((values < 0) | (values >= end) | (values != np.floor(values)))
+    if len(wrong):
+        found = f"found {values[wrong[0]]:g}{proof}"
+        raise part.error(f"expected a {what} from 0 to {end - 1}, {found}", int(wrong[0]))
+    return values.astype(np.int32)
+
+
+def _corners(part: Part, end: int, what: str, proof: str = "") -> Ints:
+    return np.stack([_indices(part, axis, end, what, proof) for axis in range(3)], axis=1)
+
+
+def _parents(part: Part) -> Ints:
+    parents = part.values[:, 0]
+    for joint, parent in enumerate(parents.tolist()):
+        if parent == -1.0 and joint > 0:
+            raise part.error(f"joint {joint}: expected one root, found another", joint)
+        if joint == 0 and parent != -1.0:
+            raise part.error(f"joint 0: expected -1, the root, found {parent:g}", 0)
+        if joint > 0 and not (0 <= parent < joint and parent == int(parent)):
+            raise part.error(f"joint {joint}: expected a parent before it, found {parent:g}", joint)
+    return parents.astype(np.int32)
+
+
+def _mesh(source: Source, parts: dict[str, Part], positions: Floats) -> Mesh:
+    proof = f": {parts['vertices'].name} has {len(positions)} rows"
+    triangles = _corners(parts["faces_vert"], len(positions), "vertex", proof)
+    uvs, uv_triangles = None, None
+    if "textures" in parts and "faces_tex" in parts:
+        uvs = parts["textures"].values
+        uv_triangles = _corners(parts["faces_tex"], len(uvs), "texture coordinate")
+        if len(uv_triangles) != len(triangles):
+            raise parts["faces_tex"].error(
+                f"expected {len(triangles)} rows as in {parts['faces_vert'].name}, "
+                f"found {len(uv_triangles)}",
+                None,
+            )
+    else:
+        source.warn("no textures or faces_tex: shown without texture")
+    # Normals of the unsplit vertices, or seams would show.
+    normals = vertex_normals(positions, triangles)
+    return Mesh(positions, normals, triangles, uvs, uv_triangles=uv_triangles)
+
+
+def _skin(source: Source, parts: dict[str, Part], joints: Floats, n_vertices: int) -> Skin:
+    part = parts["skinning_weights"]
+    columns = _indices(part, 0, len(joints), "joint")
+    vertices = _indices(part, 1, n_vertices, "vertex")
+    weights = part.values[:, 2]
+    keys = columns.astype(np.int64) * n_vertices + vertices
+    order = np.argsort(keys, kind="stable")
+    twice = np.flatnonzero(np.diff(keys[order]) == 0)
+    if len(twice):
+        row = int(order[twice + 1].min())
+        raise part.error(
+            f"expected each pair once, found joint {columns[row]} and vertex {vertices[row]} again",
+            row,
+        )
+    skin = skin_from_entries(n_vertices, vertices, columns, weights, translation_matrix(-joints))
+    _check_weights(source, part, skin)
+    return skin
+
+
+def _check_weights(source: Source, part: Part, skin: Skin) -> None:
+    bare = np.flatnonzero(~has_influence(skin))
+    if len(bare):
+        source.warn(
+            f"{part.name}: {len(bare)} vertices without weights, first {bare[0]}: they stay at rest"
+        )
+    negative = np.flatnonzero(skin.weights < 0.0)
+    if len(negative):
+        source.warn(f"{part.name}: {len(negative)} negative weights, kept as they are")
+    sums = np.where(has_influence(skin), weight_sums(skin), 1.0)
+    off = np.abs(sums - 1.0)
+    if off.max() > _ODD_SUM:
+        worst = int(off.argmax())
+        source.warn(
+            f"{part.name}: {int((off > _ODD_SUM).sum())} weight sums differ from 1 by more than "
+            f"{_ODD_SUM}, most vertex {worst} with {sums[worst]:.4g}"
+        )
+
+
+def _regressor(parts: dict[str, Part], n_joints: int, n_vertices: int) -> JointRegressor | None:
+    if "J_regressor" not in parts:
+        return None
+    part = parts["J_regressor"]
+    joints = _indices(part, 0, n_joints, "joint")
+    vertices = _indices(part, 1, n_vertices, "vertex")
+    return JointRegressor(n_joints, joints, vertices, part.values[:, 2].astype(np.float64))
+
+
+def _column(source: Source, parts: dict[str, Part], name: str, rows: int, end: int) -> Ints | None:
+    """Return an optional column with one number a vertex."""
+    if name not in parts:
+        return None
+    part = parts[name]
+    if len(part.values) != rows:
+        raise part.error(f"expected {rows} rows, found {len(part.values)}", None)
+    return _indices(part, 0, end, "number")
+
+
+def _body_parts(source: Source, files: PigFiles, n_vertices: int) -> BodyParts | None:
+    names = files.part_names
+    of_vertex = _column(source, files.parts, "body_parts", n_vertices, len(names) or 1000)
+    if of_vertex is None:
+        return None
+    count = len(names) or int(of_vertex.max(initial=0)) + 1
+    return BodyParts(names or tuple(f"part {number}" for number in range(count)), of_vertex)
+
+
+def _symmetry(source: Source, parts: dict[str, Part], n_vertices: int) -> Ints | None:
+    partners = _column(source, parts, "sym", n_vertices, n_vertices)
+    if partners is None:
+        return None
+    wrong = np.flatnonzero(partners[partners] != np.arange(n_vertices))
+    if len(wrong):
+        vertex = int(wrong[0])
+        raise parts["sym"].error(
+            f"expected partners in pairs, found {vertex} -> {partners[vertex]} -> "
+            f"{partners[partners[vertex]]}",
+            vertex,
+        )
+    return partners
+
+
+def _reduced(source: Source, parts: dict[str, Part], n_vertices: int) -> ReducedMesh | None:
+    if "reduced_ids" not in parts or "reduced_faces" not in parts:
+        return None
+    vertices = _indices(parts["reduced_ids"], 0, n_vertices, "vertex")
+    return ReducedMesh(vertices, _corners(parts["reduced_faces"], len(vertices), "reduced vertex"))
+
+
+def _keypoints(n_vertices: int, n_joints: int) -> Keypoints | None:
+    """Return the authors' keypoints; they are known for the published mesh only."""
+    if n_joints != len(JOINTS) or n_vertices <= max(i for _, kind, i in KEYPOINTS if kind == "v"):
+        return None
+    count = len(KEYPOINTS)
+    joints = np.array([index if kind == "j" else -1 for _, kind, index in KEYPOINTS])
+    vertices = np.array([index if kind == "v" else 0 for _, kind, index in KEYPOINTS])
+    return Keypoints(
+        names=tuple(name for name, _, _ in KEYPOINTS),
+        joints=joints,
+        vertices=np.repeat(vertices[:, None], 3, axis=1),
+        weights=np.tile([1.0, 0.0, 0.0], (count, 1)),
+    )
+
+
+def _facts(
+    files: PigFiles, mesh: Mesh, skin: Skin, joints: Floats, regressor: JointRegressor | None
+) -> tuple[tuple[str, str], ...]:
+    """Put what matters into words: raw weights, regressed joints, parts, what was ignored."""
+    sums = weight_sums(skin)
+    facts = [("weights", f"raw; their sums are {sums.min():.3f} to {sums.max():.3f}")]
+    # At rest normalised weights return the mesh itself; raw ones scale each vertex by its sum.
+    moved = np.linalg.norm(mesh.positions * (sums - 1.0)[:, None], axis=1)
+    facts.append(
+        ("normalising", f"would move rest vertices by up to {1000.0 * moved.max():.2f} mm")
+    )
+    if regressor is not None:
+        off = np.linalg.norm(regress_joints(regressor, mesh.positions) - joints, axis=1)
+        facts.append(
+            (
+                "joint regressor",
+                f"{1000.0 * off.mean():.2f} mm from the file's joints on average, "
+                f"{1000.0 * off.max():.2f} mm at most; used when the rest mesh changes",
+            )
+        )
+    if files.ignored:
+        facts.append(("not needed", ", ".join(files.ignored)))
+    return tuple(facts)

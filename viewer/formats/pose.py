@@ -1,0 +1,250 @@
+"""Read and write single poses: ``.json``, ``.npz``, or plain numbers in a text file.
+
+::
+
+    .json  {"viewer_pose": 1, "figure": name, "dofs": {"left_knee.x": radians, …},
+            "shape": […], "expression": […], "translation": [x, y, z], "scale": s,
+            "own_numbers": […]}
+    .npz   dof_names, dofs, shape, expression, translation, scale, own_numbers
+    .txt   the model's own numbers, separated by blanks: 190 for PIG, 72 for SMPL …
+
+Both kinds of named values may instead hold one frame of what smplx takes: ``global_orient``,
+``body_pose``, ``left_hand_pose``, ``right_hand_pose``, ``jaw_pose``, ``leye_pose``, ``reye_pose``,
+``poses``, ``betas``, ``expression``, ``transl`` or ``trans``.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from viewer.errors import RigError, UnsupportedFormatError, printable
+from viewer.formats._container import archive_of
+from viewer.formats._save import save_arrays, save_text
+from viewer.formats._source import Source
+from viewer.formats._table import read_table
+from viewer.rig.arrays import Deferred, Floats, frozen
+from viewer.rig.clip import Clip
+from viewer.rig.figure import Figure
+from viewer.rig.pose_record import PARTS, PoseRecord
+
+__all__ = ["parse_json", "pose_text", "read", "write"]
+
+_HANDS = ("left_hand_pose", "right_hand_pose", "hand_pose")
+_VECTORS = ("own_numbers", "poses", "pose", "fullpose")
+_NAMES = {
+    "shape": ("shape", "betas", "shapes"),
+    "expression": ("expression", "expressions"),
+    "translation": ("translation", "transl", "trans"),
+}
+_VERSION = 1
+
+
+def read(source: Source) -> PoseRecord:
+    """Read one pose.
+
+    Parameters
+    ----------
+    source : Source
+        The file; keys that mean nothing here are added to its warnings.
+
+    Returns
+    -------
+    PoseRecord
+        To be applied to a figure.
+
+    Raises
+    ------
+    FormatError
+        If a value is no number, or there are several poses in it.
+    """
+    if source.peek(2).startswith((b"PK", b"\x80")) or source.archive is not None:
+        return _from_values(source, _archive_values(source))
+    if source.head(1) == b"{":
+        return _from_values(source, parse_json(source))
+    # All numbers of a text file, one or several a line.
+    return PoseRecord(vector=_numbers(source))
+
+
+def _numbers(source: Source) -> Floats:
+    text = source.data.split()
+    one_a_line = Source(source.path, b"\n".join(text))
+    return read_table(one_a_line, 1)[:, 0] if len(text) > 1 else read_table(source, 1)[:, 0]
+
+
+def parse_json(source: Source) -> dict[str, Any]:
+    """Return the object in a JSON file; numbers like NaN are refused.
+
+    Raises
+    ------
+    FormatError
+        With the line of what is no JSON.
+    """
+
+    def refuse(word: str) -> None:
+        raise ValueError(f"expected a finite number, found {word}")
+
+    try:
+        values = json.loads(source.data.decode("utf-8", "replace"), parse_constant=refuse)
+    except json.JSONDecodeError as problem:
+        raise source.error(f"expected JSON, found {problem.msg.lower()}", problem.pos) from None
+    except (ValueError, RecursionError) as problem:
+        reason = "too deep a nesting" if isinstance(problem, RecursionError) else str(problem)
+        raise source.error(f"{printable(reason)}") from None
+    if not isinstance(values, dict):
+        raise source.error(f"expected an object with names, found a {type(values).__name__}")
+    return values
+
+
+def _archive_values(source: Source) -> dict[str, Any]:
+    archive = archive_of(source)
+    values: dict[str, Any] = {}
+    for key in archive.keys:
+        value = archive.get(key)
+        values[key] = value.values() if isinstance(value, Deferred) else value
+    names, dofs = values.pop("dof_names", None), values.get("dofs")
+    if names is not None and dofs is not None:
+        if np.shape(names) != np.shape(dofs):
+            raise source.error(
+                f"dof_names: expected {np.size(dofs)} names as in dofs, found {np.size(names)}"
+            )
+        values["dofs"] = dict(zip(map(str, names.tolist()), dofs.tolist(), strict=True))
+    return values
+
+
+def _from_values(source: Source, values: Mapping[str, Any]) -> PoseRecord:
+    version = values.get("viewer_pose", _VERSION)
+    if version != _VERSION:
+        raise source.error(f"viewer_pose: expected {_VERSION}, found {printable(version, 40)}")
+    found: dict[str, Floats | None] = {
+        name: _first(source, values, keys) for name, keys in _NAMES.items()
+    }
+    parts = {
+        key: array
+        for key in (*PARTS, "body_pose", *_HANDS)
+        if (array := _array(source, values, key)) is not None
+    }
+    scale = _array(source, values, "scale")
+    record = PoseRecord(
+        dofs=_dofs(source, values.get("dofs", {})),
+        vector=_first(source, values, _VECTORS),
+        parts=parts,
+        shape=found["shape"],
+        expression=found["expression"],
+        translation=found["translation"],
+        scale=None if scale is None else _single(source, "scale", scale),
+        flat_hands=_flag(values, "flat_hand_mean"),
+        hand_coefficients=_flag(values, "use_pca"),
+    )
+    is_empty = not record.dofs and not record.parts and record.vector is None
+    if is_empty and all(value is None for value in (*found.values(), scale)):
+        keys = ", ".join(printable(key, 40) for key in list(values)[:12]) or "none"
+        raise source.error(f"expected a pose (dofs, poses, body_pose, betas …), found keys {keys}")
+    if record.translation is not None and len(record.translation) != 3:
+        raise source.error(f"translation: expected 3 numbers, found {len(record.translation)}")
+    if record.scale is not None and record.scale <= 0.0:
+        source.warn(f"scale: expected more than 0, found {record.scale:g}")
+    return record
+
+
+def _flag(values: Mapping[str, Any], key: str) -> bool | None:
+    return bool(np.all(values[key])) if key in values else None
+
+
+def _single(source: Source, key: str, values: Floats) -> float:
+    if len(values) != 1:
+        raise source.error(f"{key}: expected one number, found {len(values)}")
+    return float(values[0])
+
+
+def _first(source: Source, values: Mapping[str, Any], keys: tuple[str, ...]) -> Floats | None:
+    arrays = (_array(source, values, key) for key in keys)
+    return next((array for array in arrays if array is not None), None)
+
+
+def _array(source: Source, values: Mapping[str, Any], key: str) -> Floats | None:
+    """Return the numbers of a key in one row; several frames are refused."""
+    if values.get(key) is None:
+        return None
+    try:
+        array = np.atleast_1d(frozen(key, np.asarray(values[key]), np.shape(values[key])))
+    except (RigError, ValueError) as problem:
+        reason = str(problem).removeprefix(f"{key}: ")
+        raise source.error(f"{key}: {printable(reason)}") from None
+    if key in ("pose", "poses", "fullpose") and array.ndim == 2 and len(array) > 1:
+        raise source.error(f"{key}: expected one pose, found {len(array)} frames")
+    return array.ravel()
+
+
+def _dofs(source: Source, given: object) -> dict[str, float]:
+    if not isinstance(given, Mapping):
+        raise source.error("dofs: expected names with numbers")
+    dofs: dict[str, float] = {}
+    for name, value in given.items():
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not is_number or not abs(value) < 1e9:
+            raise source.error(
+                f"dofs: {printable(name, 60)}: expected a number, found {printable(value, 40)}"
+            )
+        dofs[str(name)] = float(value)
+    return dofs
+
+
+def pose_text(record: PoseRecord, figure: str = "") -> str:
+    """Return a pose as JSON, one DOF a line."""
+    values = {"viewer_pose": _VERSION, "figure": figure, **_named(record)}
+    return json.dumps(values, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+
+
+def _named(record: PoseRecord) -> dict[str, Any]:
+    named: dict[str, Any] = {"dofs": dict(record.dofs)}
+    for name, array in (
+        ("shape", record.shape),
+        ("expression", record.expression),
+        ("translation", record.translation),
+        ("own_numbers", record.vector),
+    ):
+        if array is not None:
+            named[name] = array.tolist()
+    if record.scale is not None:
+        named["scale"] = record.scale
+    return named
+
+
+def write(content: Figure | Clip | PoseRecord, path: str | Path) -> None:
+    """Write one pose, as the suffix asks.
+
+    Parameters
+    ----------
+    content : PoseRecord
+        What to write; anything else is refused.
+    path : str or Path
+        ``.json``, ``.npz``, or ``.txt`` for the model's own numbers alone.
+
+    Raises
+    ------
+    UnsupportedFormatError
+        If it is no pose.
+    OutputError
+        If the file cannot be written.
+    """
+    suffix = Path(path).suffix.lower()
+    if not isinstance(content, PoseRecord):
+        raise UnsupportedFormatError(f"{suffix} holds a pose, not a figure or clip")
+    if suffix == ".json":
+        save_text(path, pose_text(content))
+    elif suffix == ".txt":
+        if content.vector is None:
+            raise UnsupportedFormatError("the pose has no numbers of its own to write as .txt")
+        save_text(path, "".join(f"{number!r}\n" for number in content.vector.tolist()))
+    else:
+        named = _named(content)
+        dofs = named.pop("dofs")
+        arrays = {key: np.asarray(value) for key, value in named.items()}
+        arrays["dof_names"] = np.array(list(dofs))
+        arrays["dofs"] = np.array(list(dofs.values()))
+        save_arrays(path, arrays)

@@ -1,0 +1,262 @@
+"""Read body models of the SMPL family: SMPL, SMPL+H, SMPL-X, MANO, FLAME, and kin.
+
+An archive (``.pkl`` as published, or ``.npz``) of named arrays; V, J, S come from their shapes::
+
+    v_template (V, 3)        f (F, 3)             weights (V, J)
+    J_regressor (J, V)       kintree_table (2, J) or (J,)
+    shapedirs (V, 3, S)      posedirs (V, 3, 9 (J - 1)) or (9 (J - 1), 3 V)
+    hands_components[l|r] (C, 45)   hands_mean[l|r] (45,)
+    vt (U, 2)   ft (F, 3)    vert_sym_idxs (V,)   lmk_faces_idx (L,)   lmk_bary_coords (L, 3)
+
+Loper et al. 2015 (SMPL), Romero et al. 2017 (MANO, SMPL+H), Li et al. 2017 (FLAME), Pavlakos et
+al. 2019 (SMPL-X). Nothing in a file is executed: see ``_archive.py``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.errors import printable
+from viewer.formats._archive import Archive
+from viewer.formats._container import archive_of
+from viewer.formats._smpl_names import Member, member_of
+from viewer.formats._smpl_parts import (
+    IGNORED,
+    model_hands,
+    model_keypoints,
+    model_shapes,
+    model_symmetry,
+    model_uvs,
+)
+from viewer.formats._source import Source
+from viewer.rig.arrays import Deferred, Floats, Ints
+from viewer.rig.blendshapes import BlendShapes, Correctives, JointRegressor, regress_joints
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import Mesh, vertex_normals
+from viewer.rig.pose_vector import PoseLayout
+from viewer.rig.skeleton import ball_skeleton
+from viewer.rig.skin import Skin, skin_from_entries
+from viewer.rig.transform import translation_matrix
+
+__all__ = ["KEYS", "read"]
+
+KEYS = ("v_template", "f", "weights", "J_regressor", "kintree_table")
+"""Without these a file is no such model."""
+
+_ROUNDED = 1e-3  # how far weights may be from a sum of 1 and are scaled to it
+_ROOTS = (-1.0, 4294967295.0, 4294967296.0)  # -1, as uint32, and that through float32
+
+
+def read(source: Source) -> Figure:
+    """Read a body model.
+
+    Parameters
+    ----------
+    source : Source
+        The archive; what is odd but readable is added to its warnings.
+
+    Returns
+    -------
+    Figure
+        With mesh, skeleton and skin; blend shapes and correctives are read when first used.
+
+    Raises
+    ------
+    FormatError
+        If an array is missing, has a wrong shape, or numbers that make no sense.
+    """
+    archive = archive_of(source)
+    missing = [key for key in KEYS if not archive.has(key)]
+    if missing:
+        found = ", ".join(printable(key, 40) for key in archive.keys[:12]) or "none"
+        raise source.error(
+            f"expected a body model; keys missing: {', '.join(missing)}; keys found: {found}"
+        )
+    used: list[str] = []
+    mesh = _mesh(source, archive, used)
+    parents = _parents(archive, used)
+    regressor = _regressor(archive, len(parents), mesh.n_vertices, used)
+    joints = regress_joints(regressor, mesh.positions)
+    member = member_of(tuple(parents.tolist()))
+    names = member.names if member else tuple(f"joint_{j}" for j in range(len(parents)))
+    shapes = model_shapes(source, archive, mesh.n_vertices, member, used)
+    correctives = _correctives(source, archive, mesh.n_vertices, len(parents), used)
+    return Figure(
+        name=source.path.stem,
+        mesh=mesh,
+        skeleton=ball_skeleton(names, parents, joints),
+        skin=_skin(source, archive, joints, mesh.n_vertices, used),
+        unit="m",
+        blend_shapes=shapes,
+        correctives=correctives,
+        joint_regressor=regressor,
+        hands=model_hands(archive, member, used),
+        pose_layout=_layout(len(parents)),
+        keypoints=model_keypoints(source, archive, mesh, used),
+        symmetry=model_symmetry(source, archive, mesh.n_vertices, used),
+        facts=_facts(archive, member, shapes, correctives, used),
+    )
+
+
+def _layout(n_joints: int) -> PoseLayout:
+    starts = 3 * np.arange(n_joints, dtype=np.int32)
+    return PoseLayout(3 * n_joints, starts, np.zeros(n_joints, dtype=bool))
+
+
+def finite(archive: Archive, key: str, array: Deferred) -> Floats:
+    """Return an array's values as float64, all of them finite."""
+    values = array.values().astype(np.float64)
+    if not np.isfinite(values).all():
+        count = int((~np.isfinite(values)).sum())
+        raise archive.error(key, f"expected finite numbers, found {count} that are not")
+    return values
+
+
+def _mesh(source: Source, archive: Archive, used: list[str]) -> Mesh:
+    positions = finite(archive, "v_template", archive.array("v_template", ("V", 3)))
+    if len(positions) == 0:
+        raise archive.error("v_template", "expected at least one vertex, found none")
+    triangles = _indices(archive, "f", (None, 3), len(positions), "vertex")
+    used += ["v_template", "f"]
+    uvs, uv_triangles = model_uvs(source, archive, len(triangles), used)
+    return Mesh(
+        positions=positions,
+        normals=vertex_normals(positions, triangles),
+        triangles=triangles,
+        uvs=uvs,
+        uv_triangles=uv_triangles,
+    )
+
+
+def _indices(
+    archive: Archive, key: str, shape: tuple[int | None, ...], end: int, what: str
+) -> Ints:
+    values = archive.array(key, shape).values()
+    if values.size and (values.min() < 0 or values.max() >= end or (values % 1).any()):
+        raise archive.error(
+            key, f"expected a {what} from 0 to {end - 1}, found {values.min()} to {values.max()}"
+        )
+    return values.astype(np.int32)
+
+
+def _parents(archive: Archive, used: list[str]) -> Ints:
+    """Return each joint's parent; the root's is written in four ways."""
+    table = archive.array("kintree_table").values()
+    if table.ndim not in (1, 2) or (table.ndim == 2 and len(table) != 2) or table.size == 0:
+        raise archive.error(
+            "kintree_table", f"expected 2 x J numbers, found {' x '.join(map(str, table.shape))}"
+        )
+    rows = np.atleast_2d(table).astype(np.float64)
+    ids = rows[1] if len(rows) == 2 else np.arange(rows.shape[1])
+    if (ids != np.arange(len(ids))).any():
+        raise archive.error("kintree_table", "expected joints 0, 1, 2 … in order in its second row")
+    parents = rows[0].copy()
+    if np.isin(parents[0], (*_ROOTS, 0.0)):
+        parents[0] = -1.0
+    for joint, parent in enumerate(parents):
+        if joint and np.isin(parent, _ROOTS):
+            raise archive.error("kintree_table", f"expected one root, found joints 0 and {joint}")
+        if not (parent == -1 if joint == 0 else 0 <= parent < joint and parent % 1 == 0):
+            raise archive.error(
+                "kintree_table",
+                f"joint {joint}: expected a parent before it, found {printable(f'{parent:g}')}",
+            )
+    used.append("kintree_table")
+    return parents.astype(np.int32)
+
+
+def _regressor(archive: Archive, n_joints: int, n_vertices: int, used: list[str]) -> JointRegressor:
+    matrix = archive.sparse("J_regressor", (n_joints, n_vertices))
+    joints, vertices, weights = matrix.entries()
+    if not np.isfinite(weights).all():
+        raise archive.error("J_regressor", "expected finite numbers")
+    sums = np.bincount(joints, weights, minlength=n_joints)
+    worst = int(np.abs(sums - 1.0).argmax())
+    if abs(sums[worst] - 1.0) > 0.05:
+        raise archive.error(
+            "J_regressor",
+            f"joint {worst}: expected weights with the sum 1, found {sums[worst]:.4g}",
+        )
+    used.append("J_regressor")
+    return JointRegressor(
+        n_joints, joints.astype(np.int32), vertices.astype(np.int32), weights.astype(np.float64)
+    )
+
+
+def _skin(
+    source: Source, archive: Archive, joints: Floats, n_vertices: int, used: list[str]
+) -> Skin:
+    matrix = archive.sparse("weights", (n_vertices, len(joints)))
+    vertices, columns, weights = matrix.entries()
+    weights = weights.astype(np.float64)
+    if not np.isfinite(weights).all():
+        raise archive.error("weights", "expected finite numbers")
+    if (weights < 0.0).any():
+        vertex = int(vertices[weights.argmin()])
+        raise archive.error(
+            "weights", f"vertex {vertex}: expected no negative weight, found {weights.min():.4g}"
+        )
+    sums = np.bincount(vertices, weights, minlength=n_vertices)
+    worst = int(np.abs(sums - 1.0).argmax())
+    if abs(sums[worst] - 1.0) > _ROUNDED:
+        raise archive.error(
+            "weights", f"vertex {worst}: expected weights with the sum 1, found {sums[worst]:.4g}"
+        )
+    used.append("weights")
+    kept = weights != 0.0
+    return skin_from_entries(
+        n_vertices,
+        vertices[kept].astype(np.int32),
+        columns[kept].astype(np.int32),
+        (weights / sums[vertices])[kept],
+        translation_matrix(-joints),
+    )
+
+
+def _correctives(
+    source: Source, archive: Archive, n_vertices: int, n_joints: int, used: list[str]
+) -> Correctives | None:
+    if not archive.has("posedirs"):
+        source.warn("no `posedirs`: plain linear blend skinning")
+        return None
+    array = archive.array("posedirs")
+    count = 9 * (n_joints - 1)
+    is_flat = array.shape == (count, 3 * n_vertices)
+    if not is_flat and array.shape != (n_vertices, 3, count):
+        array = archive.array("posedirs", (n_vertices, 3, count))
+
+    def load() -> Floats:
+        values = array.values()
+        rows = values if is_flat else np.moveaxis(values, 2, 0)
+        offsets = np.ascontiguousarray(rows, dtype=np.float64).reshape(count, n_vertices, 3)
+        if not np.isfinite(offsets).all():
+            raise archive.error("posedirs", "expected finite numbers")
+        return offsets
+
+    used.append("posedirs")
+    return Correctives(Deferred((count, n_vertices, 3), np.float64, load)) if count else None
+
+
+def _facts(
+    archive: Archive,
+    member: Member | None,
+    shapes: BlendShapes | None,
+    correctives: Correctives | None,
+    used: list[str],
+) -> tuple[tuple[str, str], ...]:
+    groups = [] if shapes is None else list(shapes.groups)
+    counts = [f"{groups.count(group)} {group}" for group in ("shape", "expression")]
+    ignored = [key for key in archive.keys if key not in used]
+    unknown = [printable(key, 40) for key in ignored if key not in IGNORED]
+    known = [key for key in ignored if key in IGNORED]
+    facts = [
+        ("model", member.title if member else "a model in SMPL's layout"),
+        ("coefficients", ", ".join(counts)),
+        ("correctives", f"{correctives.offsets.shape[0] if correctives else 0} columns"),
+        ("keys used", ", ".join(used)),
+    ]
+    if known:
+        facts.append(("keys not needed", ", ".join(known)))
+    if unknown:
+        facts.append(("keys unknown", ", ".join(unknown)))
+    return tuple(facts)

@@ -1,0 +1,151 @@
+"""Body models that a person has on disk: one folder, remembered, searched by published names."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from pathlib import Path
+
+import platformdirs
+
+from viewer.errors import OutputError, ViewerError, printable
+from viewer.formats import save_bytes
+
+__all__ = [
+    "find_model",
+    "known_models",
+    "load_model_folder",
+    "resolve",
+    "save_model_folder",
+]
+
+_DEEPEST = 4  # folders below the model folder that are searched
+_MOST_FILES = 20_000  # entries looked at: a home folder by mistake must not take minutes
+_SUFFIXES = (".npz", ".pkl")
+_SEX = {"f": "female", "m": "male", "neutral": "neutral", "female": "female", "male": "male"}
+# Published file names, and the "kind:variant" by which they can be asked for.
+_PUBLISHED = (
+    (r"smpl_(?P<sex>neutral|male|female)", "smpl"),
+    (r"basicmodel_(?P<sex>neutral|m|f)_lbs_10_207_0_v\d\.\d\.\d", "smpl"),
+    (r"smplh_(?P<sex>neutral|male|female)", "smplh"),
+    (r"smplx_(?P<sex>neutral|male|female)(_\w+)?", "smplx"),
+    (r"mano_(?P<sex>left|right)", "mano"),
+    (r"flame_?(?P<sex>neutral|male|female)(_\w+)?", "flame"),
+    (r"flame20\d\d(_no_jaw)?|generic_model", "flame"),
+    (r"pig_(core|full)?(model)?", "pig"),
+)
+
+
+def _settings_file() -> Path:
+    return Path(platformdirs.user_config_dir("viewer", appauthor=False)) / "models.json"
+
+
+def load_model_folder() -> Path | None:
+    """Return the folder that was remembered, None if none was or it cannot be read."""
+    try:
+        folder = json.loads(_settings_file().read_text("utf-8"))["folder"]
+    except (OSError, ValueError, TypeError, KeyError, RecursionError):
+        return None
+    return Path(folder) if isinstance(folder, str) else None
+
+
+def save_model_folder(folder: str | Path) -> Path:
+    """Remember a folder of body models.
+
+    Raises
+    ------
+    ViewerError
+        If it is no folder.
+    OutputError
+        If it cannot be remembered.
+    """
+    path = Path(folder).expanduser()
+    if not path.is_dir():
+        raise ViewerError(f"--model-path: expected a folder, found {printable(path, 300)}")
+    try:
+        _settings_file().parent.mkdir(parents=True, exist_ok=True)
+    except OSError as problem:
+        raise OutputError(f"{printable(_settings_file(), 300)}: {problem.strerror}") from None
+    text = json.dumps({"folder": str(path.resolve())}, indent=1)
+    save_bytes(_settings_file(), text.encode("utf-8", "replace"))
+    return path
+
+
+def known_models(folder: Path) -> dict[str, Path]:
+    """Return the models in a folder and those below, by the name they can be asked for.
+
+    Parameters
+    ----------
+    folder : Path
+        Searched a few levels deep.
+
+    Returns
+    -------
+    dict
+        ``"smplx:neutral"`` to its file; an ``.npz`` goes before a ``.pkl`` of the same name.
+    """
+    found: dict[str, Path] = {}
+    for path in _files(folder):
+        name = _name_of(path)
+        if name is not None and (name not in found or path.suffix == ".npz"):
+            found[name] = path
+    return dict(sorted(found.items()))
+
+
+def _files(folder: Path) -> list[Path]:
+    paths, looked = [], 0
+    for root, folders, names in os.walk(folder):
+        depth = len(Path(root).relative_to(folder).parts)
+        folders[:] = sorted(folders) if depth < _DEEPEST else []
+        looked += len(names) + len(folders)
+        paths += [Path(root) / name for name in sorted(names) if name.lower().endswith(_SUFFIXES)]
+        if looked > _MOST_FILES:
+            break
+    return paths
+
+
+def _name_of(path: Path) -> str | None:
+    """Return ``kind:variant`` of a published file name, None for others."""
+    stem, above = path.stem.lower(), path.parent.name.lower()
+    if stem == "model" and above in _SEX and path.parent.parent.name.lower() == "smplh":
+        return f"smplh:{_SEX[above]}"  # as AMASS asks to unpack them
+    for pattern, kind in _PUBLISHED:
+        match = re.fullmatch(pattern, stem)
+        if match:
+            variant = match.groupdict().get("sex")
+            return f"{kind}:{_SEX.get(variant, variant)}" if variant else kind
+    return None
+
+
+def find_model(name: str, folder: Path | None) -> Path | None:
+    """Return a model's file by its name: ``smplx:neutral``, ``smplx`` or ``SMPLX_NEUTRAL.npz``.
+
+    Parameters
+    ----------
+    name : str
+        In any case of letters; a kind alone means its neutral or only model.
+    folder : Path or None
+        Where models are.
+    """
+    if folder is None or not folder.is_dir():
+        return None
+    wanted = name.lower()
+    for path in _files(folder):
+        if path.name.lower() == wanted:
+            return path
+    models = known_models(folder)
+    of_kind = [path for key, path in models.items() if key.partition(":")[0] == wanted]
+    return (
+        models.get(wanted)
+        or models.get(f"{wanted}:neutral")
+        or (of_kind[0] if len(of_kind) == 1 else None)
+    )
+
+
+def resolve(file: str | Path) -> Path:
+    """Return a path as it is if it exists, else the model of this name in the model folder."""
+    path = Path(file)
+    if path.exists() or len(path.parts) != 1:
+        return path
+    return find_model(str(file), load_model_folder()) or path

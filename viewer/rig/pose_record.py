@@ -1,0 +1,256 @@
+"""A pose on its own, as files and the clipboard hold it, and how a figure takes it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.figure import Figure
+from viewer.rig.hands import Hand, hand_vectors
+from viewer.rig.pose import Pose
+from viewer.rig.pose_vector import read_vector, set_joint_rotations, write_vector
+from viewer.rig.rotation import rotation_vector_to_matrix
+from viewer.rig.skeleton import clamp_dofs, dof_label, find_dof
+
+__all__ = ["PARTS", "PoseRecord", "apply_record", "record_of"]
+
+PARTS = {
+    "global_orient": ("pelvis", "wrist", "global"),
+    "neck_pose": ("neck",),
+    "jaw_pose": ("jaw",),
+    "leye_pose": ("left_eye",),
+    "reye_pose": ("right_eye",),
+}
+"""Rotation vectors of single joints under the names that smplx gives them."""
+
+_HAND_PARTS = {"left_hand_pose": "left", "right_hand_pose": "right", "hand_pose": ""}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PoseRecord:
+    """What a pose file says; parts that it does not have leave the pose at rest.
+
+    Attributes
+    ----------
+    dofs : mapping of str to float
+        By label, ``"left_knee.x"``: lengths and radians.
+    vector : (N,) or None
+        The model's own pose numbers.
+    parts : mapping of str to array
+        Rotation vectors or hand coefficients by smplx's names: ``global_orient``,
+        ``body_pose``, ``left_hand_pose`` …
+    shape, expression : (N,) or None
+        Weights of the first blend shapes of each group.
+    translation : (3,) or None
+        Of the figure, after skinning.
+    scale : float or None
+        Of the figure, after skinning.
+    flat_hands : bool or None
+        Whether hand poses leave the mean hand out. None: only coefficients add it.
+    hand_coefficients : bool or None
+        Whether hand poses are coefficients; None: all but 45 numbers are.
+    """
+
+    dofs: Mapping[str, float] = field(default_factory=dict)
+    vector: Floats | None = None
+    parts: Mapping[str, Floats] = field(default_factory=dict)
+    shape: Floats | None = None
+    expression: Floats | None = None
+    translation: Floats | None = None
+    scale: float | None = None
+    flat_hands: bool | None = None
+    hand_coefficients: bool | None = None
+
+
+def record_of(figure: Figure, pose: Pose) -> PoseRecord:
+    """Return a pose in words and in the model's own numbers, both complete.
+
+    Parameters
+    ----------
+    figure : Figure
+        With a skeleton.
+    pose : Pose
+        Of that figure.
+    """
+    skeleton = figure.skeleton
+    assert skeleton is not None  # whoever has a pose has a skeleton
+    groups = figure.blend_shapes.groups if figure.blend_shapes else ()
+    weights = np.zeros(len(groups))
+    weights[: len(pose.shape_weights)] = pose.shape_weights
+    is_shape = np.array([group == "shape" for group in groups], dtype=bool)
+    return PoseRecord(
+        dofs={dof_label(skeleton, dof): float(v) for dof, v in enumerate(pose.dofs)},
+        vector=write_vector(figure.pose_layout, skeleton, pose),
+        shape=weights[is_shape] if is_shape.any() else None,
+        expression=weights[~is_shape] if (~is_shape).any() else None,
+        translation=pose.figure_translation.copy(),
+        scale=pose.figure_scale,
+    )
+
+
+def apply_record(record: PoseRecord, figure: Figure, pose: Pose) -> list[str]:
+    """Pose a figure by a record, in place.
+
+    Parameters
+    ----------
+    record : PoseRecord
+        What to take over.
+    figure : Figure
+        With a skeleton.
+    pose : Pose
+        Changed; what the record does not mention stays.
+
+    Returns
+    -------
+    list of str
+        What could not be taken over exactly, one line each.
+
+    Raises
+    ------
+    RigError
+        If the record is for another figure; the pose is then as it was.
+    """
+    skeleton = figure.skeleton
+    if skeleton is None:
+        raise RigError(f"figure {figure.name} has no skeleton to pose")
+    work, notes = pose.copy(), []
+    if record.dofs:
+        notes += _apply_dofs(record.dofs, figure, work)
+    elif record.vector is not None:
+        notes += _apply_vector(record.vector, figure, work)
+    for name, values in record.parts.items():
+        notes += _apply_part(name, values, record, figure, work)
+    _apply_weights("shape", record.shape, figure, work)
+    _apply_weights("expression", record.expression, figure, work)
+    if record.translation is not None:
+        work.figure_translation = np.array(record.translation, dtype=np.float64)
+    if record.scale is not None:
+        work.figure_scale = float(record.scale)
+    for name in Pose.__slots__:
+        setattr(pose, name, getattr(work, name))
+    return notes
+
+
+def _apply_dofs(dofs: Mapping[str, float], figure: Figure, pose: Pose) -> list[str]:
+    skeleton = figure.skeleton
+    assert skeleton is not None
+    for label, value in dofs.items():
+        pose.dofs[find_dof(skeleton, label)] = value
+    clamped = clamp_dofs(skeleton, pose.dofs)
+    count = int((clamped != pose.dofs).sum())
+    pose.dofs[:] = clamped
+    return [f"{count} DOFs of the pose were beyond their limits and clamped"] if count else []
+
+
+def _apply_vector(vector: Floats, figure: Figure, pose: Pose) -> list[str]:
+    """Take the model's own numbers, or the vector of another member of the SMPL family."""
+    skeleton = figure.skeleton
+    assert skeleton is not None
+    layout = figure.pose_layout
+    own = skeleton.n_dofs if layout is None else layout.n_numbers
+    if len(vector) == own:
+        read_vector(layout, skeleton, pose, vector)
+        return []
+    is_family = "pelvis" in skeleton.names and layout is not None and layout.translation < 0
+    if not is_family or len(vector) % 3 or len(vector) < 66:
+        raise RigError(f"expected {own} pose numbers for {figure.name}, found {len(vector)}")
+    # All members share the first 22 joints; only those can be taken over without a mapping.
+    rest = vector[66:]
+    joints = np.arange(22, dtype=np.int32)
+    _turn(figure, pose, joints, vector[:66])
+    if rest.any():
+        count = int(rest.reshape(-1, 3).any(axis=1).sum())
+        return [f"{count} joints of the pose beyond the body's 22 were left out"]
+    return []
+
+
+def _apply_part(
+    name: str, values: Floats, record: PoseRecord, figure: Figure, pose: Pose
+) -> list[str]:
+    skeleton = figure.skeleton
+    assert skeleton is not None
+    values = np.asarray(values, dtype=np.float64).ravel()
+    if name == "body_pose":
+        count = len(values) // 3
+        if len(values) % 3 or count >= skeleton.n_joints:
+            raise RigError(
+                f"body_pose: expected at most {3 * (skeleton.n_joints - 1)} numbers, "
+                f"found {len(values)}"
+            )
+        _turn(figure, pose, np.arange(1, count + 1, dtype=np.int32), values)
+        return []
+    if name in _HAND_PARTS:
+        return _apply_hand(_hand(figure, name), name, values, record, figure, pose)
+    known = [joint for joint in PARTS[name] if joint in skeleton.names]
+    if not known:
+        if values.any():
+            return [f"{name}: {figure.name} has no such joint, left out"]
+        return []
+    if len(values) != 3:
+        raise RigError(f"{name}: expected 3 numbers, found {len(values)}")
+    _turn(figure, pose, np.array([skeleton.names.index(known[0])], dtype=np.int32), values)
+    return []
+
+
+def _hand(figure: Figure, name: str) -> Hand | None:
+    return next((hand for hand in figure.hands if hand.side == _HAND_PARTS[name]), None)
+
+
+def _apply_hand(
+    hand: Hand | None,
+    name: str,
+    values: Floats,
+    record: PoseRecord,
+    figure: Figure,
+    pose: Pose,
+) -> list[str]:
+    skeleton = figure.skeleton
+    assert skeleton is not None
+    side = _HAND_PARTS[name]
+    first = f"{side}_index1" if side else "index1"
+    if hand is None and len(values) == 45 and first in skeleton.names:
+        start = skeleton.names.index(first)
+        _turn(figure, pose, np.arange(start, start + 15, dtype=np.int32), values)
+        return []
+    if hand is None:
+        if values.any():
+            return [f"{name}: {figure.name} has no hand components, left out"]
+        return []
+    as_coefficients = record.hand_coefficients
+    if as_coefficients is None:
+        as_coefficients = len(values) != 45
+    flat = record.flat_hands if record.flat_hands is not None else not as_coefficients
+    if as_coefficients:
+        vectors = hand_vectors(hand, values, flat)
+    elif len(values) == 45:
+        vectors = (values + (0.0 if flat else hand.mean)).reshape(-1, 3)
+    else:
+        raise RigError(f"{name}: expected 45 numbers, found {len(values)}")
+    _turn(figure, pose, hand.joints, vectors.ravel())
+    return []
+
+
+def _turn(figure: Figure, pose: Pose, joints: Ints, numbers: Floats) -> None:
+    assert figure.skeleton is not None  # the callers looked
+    rotations = rotation_vector_to_matrix(numbers.reshape(-1, 3))
+    set_joint_rotations(figure.skeleton, pose, joints, rotations)
+
+
+def _apply_weights(group: str, values: Floats | None, figure: Figure, pose: Pose) -> None:
+    if values is None or len(values) == 0:
+        return
+    groups = figure.blend_shapes.groups if figure.blend_shapes else ()
+    rows = [index for index, name in enumerate(groups) if name == group]
+    values = np.asarray(values, dtype=np.float64).ravel()
+    if len(values) > len(rows) and values[len(rows) :].any():
+        raise RigError(f"{figure.name} has {len(rows)} {group} coefficients, found {len(values)}")
+    weights = np.zeros(len(groups))
+    weights[: len(pose.shape_weights)] = pose.shape_weights
+    count = min(len(rows), len(values))
+    weights[rows] = 0.0
+    weights[rows[:count]] = values[:count]
+    pose.shape_weights = weights
