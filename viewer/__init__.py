@@ -17,24 +17,29 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from viewer.app.window import show
     from viewer.errors import ViewerError
+    from viewer.export import export
     from viewer.formats import write
     from viewer.loading import load
     from viewer.rendering.camera import Camera
     from viewer.rendering.offscreen import render
     from viewer.rendering.options import DisplayOptions, Light, Lights
+    from viewer.rig.blendshapes import BlendShapes
     from viewer.rig.clip import Channel, Clip, evaluate, sample
     from viewer.rig.figure import Figure
     from viewer.rig.mesh import Material, Mesh
     from viewer.rig.pose import Pose, rest_pose
+    from viewer.rig.pose_record import PoseRecord, apply_record, record_of
     from viewer.rig.scene import Actor, Scene
+    from viewer.rig.shape import shaped
     from viewer.rig.skeleton import Skeleton
     from viewer.rig.skin import Skin
-    from viewer.rig.skinning import deform
+    from viewer.rig.skinning import Skinning, deform, deform_frames, joint_matrices
 
 __version__ = "0.1.0"
 
 __all__ = [
     "Actor",
+    "BlendShapes",
     "Camera",
     "Channel",
     "Clip",
@@ -45,22 +50,31 @@ __all__ = [
     "Material",
     "Mesh",
     "Pose",
+    "PoseRecord",
     "Scene",
     "Skeleton",
     "Skin",
+    "Skinning",
     "ViewerError",
+    "apply_record",
     "deform",
+    "deform_frames",
     "evaluate",
+    "export",
+    "joint_matrices",
     "load",
+    "record_of",
     "render",
     "rest_pose",
     "sample",
+    "shaped",
     "show",
     "write",
 ]
 
 _HOMES = {
     "Actor": "rig.scene",
+    "BlendShapes": "rig.blendshapes",
     "Camera": "rendering.camera",
     "Channel": "rig.clip",
     "Clip": "rig.clip",
@@ -71,16 +85,24 @@ _HOMES = {
     "Material": "rig.mesh",
     "Mesh": "rig.mesh",
     "Pose": "rig.pose",
+    "PoseRecord": "rig.pose_record",
     "Scene": "rig.scene",
     "Skeleton": "rig.skeleton",
     "Skin": "rig.skin",
+    "Skinning": "rig.skinning",
     "ViewerError": "errors",
+    "apply_record": "rig.pose_record",
     "deform": "rig.skinning",
+    "deform_frames": "rig.skinning",
     "evaluate": "rig.clip",
+    "export": "export",
+    "joint_matrices": "rig.skinning",
     "load": "loading",
+    "record_of": "rig.pose_record",
     "render": "rendering.offscreen",
     "rest_pose": "rig.pose",
     "sample": "rig.clip",
+    "shaped": "rig.shape",
     "show": "app.window",
     "write": "formats",
 }

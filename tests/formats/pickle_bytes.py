@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from viewer.errors import FormatError
 from viewer.formats._archive import Archive, open_archive
 from viewer.formats._source import Source
+from viewer.rig.arrays import Deferred
 
 PATH = Path("model.pkl")
 
@@ -30,7 +31,7 @@ def refusal(data: bytes) -> str:
         archive = opened(data)
         for key in archive.keys:
             value = archive.get(key)
-            if hasattr(value, "values") and not isinstance(value, dict):
+            if isinstance(value, Deferred):
                 value.values()
     line = str(caught.value)
     assert "\n" not in line

@@ -17,8 +17,9 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from viewer.errors import FormatError
-from viewer.formats._archive import Archive, Deferred, Opaque, open_archive
+from viewer.formats._archive import Archive, Opaque, open_archive
 from viewer.formats._source import Source
+from viewer.rig.arrays import Deferred
 
 BOUND = 64 << 20  # bytes that a refusal may take
 ROWS = np.arange(12.0).reshape(4, 3) / 8

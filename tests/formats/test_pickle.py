@@ -33,9 +33,9 @@ from pickle_bytes import (
 )
 
 from viewer.errors import FormatError
-from viewer.formats._archive import Deferred, Opaque, Sparse, open_archive
+from viewer.formats._archive import Opaque, Sparse, open_archive
 from viewer.formats._source import Source
-from viewer.rig.arrays import frozen
+from viewer.rig.arrays import Deferred, frozen
 
 ROWS = np.arange(12.0).reshape(4, 3) / 8
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"

@@ -34,6 +34,7 @@ from pickle_bytes import (
 
 from viewer.errors import FormatError
 from viewer.formats._archive import Opaque
+from viewer.rig.arrays import Deferred
 
 BOUND = 64 << 20  # bytes that a refusal may take
 PATIENCE = 5.0  # seconds for what should take a fraction of one, on a busy machine
@@ -81,9 +82,9 @@ def test_element_types_without_numbers_are_not_evaluated(code: str) -> None:
     assert isinstance(found, Opaque)
 
 
-@pytest.mark.parametrize("axis", [1 << 20, 33])
-def test_too_many_axes(axis: int) -> None:
-    line = refusal(saved(v=array_of((1,) * axis, b"12345678")))
+@pytest.mark.parametrize("sides", [(1,) * 33, (1,) * 100_000, (1 << 62,), (1 << 2000,)])
+def test_shapes_beyond_numpy(sides: tuple[int, ...]) -> None:
+    line = refusal(saved(v=array_of(sides, b"12345678")))
     assert line == "expected the state of an array, found a tuple"
 
 
@@ -92,7 +93,7 @@ def test_too_many_axes(axis: int) -> None:
     [
         ({"sides": (1 << 31, 3)}, "at most 134217728 rows and columns, found 2147483648 x 3"),
         ({"sides": (2, 1 << 27)}, "134217729 starts in a sparse matrix 2 x 134217728, found 4"),
-        ({"sides": (2, 1 << 62)}, f"at most 134217728 rows and columns, found 2 x {1 << 62}"),
+        ({"sides": (2, 1 << 61)}, f"at most 134217728 rows and columns, found 2 x {1 << 61}"),
         ({"indices": (0, 2, 0)}, "indices 0 to 1 in a sparse matrix, found 0 to 2"),
         ({"indices": (0, -1, 0)}, "indices 0 to 1 in a sparse matrix, found -1 to 0"),
         ({"indices": (0, 1)}, "3 indices in a sparse matrix, found 2"),
@@ -139,6 +140,10 @@ def selection(indices: list[int], *sides: int) -> bytes:
         (selection([0, 6], 2), "indices 0 to 5, found 0 to 6"),
         (selection([-1, 0], 2), "indices 0 to 5, found -1 to 0"),
         (selection([0, 1], 1 << 40), "1099511627776 indices in chumpy.reordering.Select, found 2"),
+        (
+            selection([0, 1], *[1 << 61] * 32),
+            "407897962615157369808412540087403635887… indices in chumpy.reordering.Select, found 2",
+        ),
         (selection([0, 1], 3, 1), "3 indices in chumpy.reordering.Select, found 2"),
     ],
 )
@@ -207,14 +212,14 @@ def test_sets_of_the_same_list_again_and_again() -> None:
     items = b"](" + b"N" * 100_000 + b"eq\x01"
     again = named("__builtin__", "set") + b"(h\x01tR"
     data = saved(v=b"](" + items + again * 1000 + b"e")
-    assert refusal(data).startswith("expected at most 2000000 steps in a pickle, found more at ")
+    assert refusal(data).startswith("expected at most 1000000 steps in a pickle, found more at ")
 
 
 def test_pairs_of_the_same_key_again_and_again() -> None:
     items = b"](" + (text("k") + b"N\x86") * 100_000 + b"eq\x01"
     again = named("collections", "OrderedDict") + b"(h\x01tR"
     data = saved(v=b"](" + items + again * 1000 + b"e")
-    assert refusal(data).startswith("expected at most 2000000 steps in a pickle, found more at ")
+    assert refusal(data).startswith("expected at most 1000000 steps in a pickle, found more at ")
 
 
 def test_long_text_used_again_and_again() -> None:
@@ -229,7 +234,7 @@ def test_long_text_used_again_and_again() -> None:
     packed = saved(v=b"](" + encoded + encode * 1000 + b"e")
     assert opened(packed).get("v") == ENDLESS
     repeated = saved(v=b"](" + long + scalar * 1000 + b"e")
-    assert refusal(repeated).startswith("expected at most 2000000 steps")
+    assert refusal(repeated).startswith("expected at most 1000000 steps")
     for data in (plain, packed, repeated):
         assert cost(lambda data=data: self_contained(data)) < BOUND
 
@@ -245,7 +250,7 @@ def self_contained(data: bytes) -> None:
         for look in (archive.get, archive.array, archive.sparse, archive.text):
             try:
                 found: Any = look(key)
-                if hasattr(found, "values") and not isinstance(found, dict):
+                if isinstance(found, Deferred):
                     found.values()
             except FormatError as problem:
                 assert "\n" not in str(problem)
@@ -266,7 +271,7 @@ def test_memo_with_a_huge_number_costs_nothing() -> None:
 @pytest.mark.parametrize("step", [b"N", b"(", b"]", b"}", b"2", b")"])
 def test_endless_steps_end(step: bytes) -> None:
     data = b"\x80\x02]" + step * 3_000_000
-    assert refusal(data) == "expected at most 2000000 steps in a pickle, found more at byte 2000001"
+    assert refusal(data) == "expected at most 1000000 steps in a pickle, found more at byte 1000001"
 
 
 def test_huge_declared_lengths_cost_nothing() -> None:

@@ -369,7 +369,6 @@ def open_archive(source: Source, max_size: int = MAX_SIZE) -> Archive:
         found = "a Git LFS pointer, not the file itself (`git lfs pull` fetches it)"
         raise source.error(f"expected a pickle, .npz or .npy file, found {found}")
     if not is_archive(head):
-        looks = source.looks_like()
-        if looks is not None:
-            raise source.error(f"expected a pickle, .npz or .npy file, found {looks}")
+        looks = source.looks_like() or "something else"
+        raise source.error(f"expected a pickle, .npz or .npy file, found {looks}")
     return open_pickle(source)

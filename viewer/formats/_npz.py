@@ -314,7 +314,7 @@ def _parse_header(
         return Opaque("object array" if code.endswith("O") else f"array of type {printable(code)}")
     n_items = item_count(shape, dtype.itemsize)
     if n_items is None or n_items * dtype.itemsize != size - offset:
-        sides = " x ".join(map(str, shape)) or "one"
+        sides = printable(" x ".join(map(str, shape)), 80) or "one"
         raise storage.error(
             key, f"expected {sides} {dtype.name}, found {max(size - offset, 0)} bytes"
         )

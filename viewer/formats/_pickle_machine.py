@@ -15,7 +15,7 @@ from viewer.formats._source import Source, shown
 
 __all__ = ["Machine"]
 
-_MAX_STEPS = 2_000_000  # a body model takes a few hundred, a motion in plain lists some 100,000
+_MAX_STEPS = 1_000_000  # a body model takes a few hundred, a motion in plain lists some 100,000
 _LONGEST_LINE = 256  # letters of a name or number in the text protocols
 _INTEGER = re.compile(rb"[+-]?[0-9]+")
 

@@ -148,10 +148,9 @@ class _Resolver:
         if chosen is None or chosen.dtype.kind not in "iu" or whole.dtype.kind not in _NUMBERS:
             return Opaque(f"{name} without plain indices")
         wanted = shape if is_sizes(shape) else chosen.shape
-        if math.prod(wanted) != math.prod(chosen.shape):
-            raise self.fail(
-                f"expected {math.prod(wanted)} indices in {name}, found {math.prod(chosen.shape)}"
-            )
+        count, found = math.prod(wanted), math.prod(chosen.shape)
+        if count != found:
+            raise self.fail(f"expected {printable(count, 40)} indices in {name}, found {found}")
         return Deferred(wanted, whole.dtype, partial(self.take, whole, chosen, wanted))
 
     def take(self, whole: Deferred, chosen: Deferred, shape: tuple[int, ...]) -> NDArray[Any]:

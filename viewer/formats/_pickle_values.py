@@ -14,12 +14,14 @@ from typing import Any, TypeGuard
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.errors import printable
 from viewer.formats._npz import array_dtype, item_count, shaped
 from viewer.rig.arrays import Deferred
 
 __all__ = ["Array", "Dtype", "Instance", "Span", "StandIn", "is_sizes", "noun"]
 
 _MOST_AXES = 32
+_LONGEST_SIDE = 1 << 62  # so that a product of them can still be printed
 
 
 class Span:
@@ -150,7 +152,7 @@ class Array:
         packed = payload.packed()
         n_items = item_count(shape, found.itemsize)
         if n_items is None or n_items * found.itemsize != len(packed):
-            sides = " x ".join(map(str, shape[:8])) or "one"
+            sides = printable(" x ".join(map(str, shape)), 80) or "one"
             raise ValueError(f"expected {sides} {found.name}, found {len(packed)} bytes")
         self.shape, self.dtype, self.payload = shape, found, packed
         self.is_fortran = is_fortran
@@ -193,7 +195,7 @@ def is_sizes(value: object) -> TypeGuard[tuple[int, ...]]:
     return (
         isinstance(value, tuple)
         and len(value) <= _MOST_AXES
-        and all(type(side) is int and side >= 0 for side in value)
+        and all(type(side) is int and 0 <= side < _LONGEST_SIDE for side in value)
     )
 
 

@@ -15,7 +15,7 @@ from viewer.rig.memo import Memo
 from viewer.rig.mesh import Mesh
 from viewer.rig.pose import Pose
 from viewer.rig.shape import shaped
-from viewer.rig.skin import Skin
+from viewer.rig.skin import Skin, skin_rows
 from viewer.rig.skinning import Skinning, deform, joint_matrices
 
 __all__ = ["posed_keypoints", "some_vertices"]
@@ -89,7 +89,7 @@ def some_vertices(figure: Figure, vertices: Ints) -> Figure:
         name=figure.name,
         mesh=Mesh(mesh.positions[vertices], mesh.normals[vertices], np.zeros((0, 3), np.int32)),
         skeleton=figure.skeleton,
-        skin=None if figure.skin is None else _rows_of(figure.skin, vertices),
+        skin=None if figure.skin is None else skin_rows(figure.skin, vertices),
         blend_shapes=None
         if shapes is None
         else BlendShapes(shapes.names, _columns(shapes.offsets, vertices), shapes.groups),
@@ -104,10 +104,3 @@ def _columns(offsets: Floats | Deferred, vertices: Ints) -> Floats | Deferred:
         return offsets[:, vertices]
     shape = (offsets.shape[0], len(vertices), 3)
     return Deferred(shape, offsets.dtype, lambda: offsets.values()[:, vertices])
-
-
-def _rows_of(skin: Skin, vertices: Ints) -> Skin:
-    counts = np.diff(skin.starts)[vertices]
-    starts = np.concatenate([[0], np.cumsum(counts)])
-    index = np.repeat(skin.starts[vertices] - starts[:-1], counts) + np.arange(starts[-1])
-    return Skin(starts.astype(np.int32), skin.joints[index], skin.weights[index], skin.inverse_bind)

@@ -19,6 +19,7 @@ __all__ = [
     "normalized",
     "skin_from_entries",
     "skin_from_lists",
+    "skin_rows",
     "strongest_first",
     "weight_sums",
 ]
@@ -172,6 +173,14 @@ def skin_from_entries(
         weights=np.asarray(weights, dtype=np.float64)[order],
         inverse_bind=inverse_bind,
     )
+
+
+def skin_rows(skin: Skin, vertices: Ints) -> Skin:
+    """Return the skin of some vertices, or of copies of them, in the order given."""
+    counts = np.diff(skin.starts)[vertices]
+    starts = np.concatenate([[0], np.cumsum(counts)])
+    index = np.repeat(skin.starts[vertices] - starts[:-1], counts) + np.arange(starts[-1])
+    return Skin(starts.astype(np.int32), skin.joints[index], skin.weights[index], skin.inverse_bind)
 
 
 def strongest_first(skin: Skin) -> Skin:

@@ -1,0 +1,83 @@
+"""Exporters: a posed figure into a file that other programs read; one module each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+
+from viewer.errors import RigError, UnsupportedFormatError
+from viewer.rig.scene import Actor
+from viewer.rig.skinning import Skinning
+
+__all__ = ["EXPORTERS", "Exporter", "export", "exporter_for"]
+
+
+@dataclass(frozen=True, slots=True)
+class Exporter:
+    """What menus must know before an exporter's module is imported: its title and suffixes."""
+
+    title: str
+    suffixes: tuple[str, ...]
+
+
+EXPORTERS = {
+    "obj": Exporter("Wavefront OBJ: the posed mesh", (".obj",)),
+    "ply": Exporter("PLY: the posed mesh", (".ply",)),
+    "npz": Exporter("NumPy arrays: posed vertices and joints", (".npz",)),
+    "rig": Exporter("course rig: .skel and .skin", (".skel", ".skin")),
+}
+"""Modules in this folder, each with ``export(actor, path, skinning)``."""
+
+
+def exporter_for(path: str | Path) -> str:
+    """Return the key in ``EXPORTERS`` that writes files of this suffix.
+
+    Raises
+    ------
+    UnsupportedFormatError
+        If none does; the message lists those there are.
+    """
+    suffix = Path(path).suffix.lower()
+    for key, kind in EXPORTERS.items():
+        if suffix in kind.suffixes:
+            return key
+    known = ", ".join(suffix for kind in EXPORTERS.values() for suffix in kind.suffixes)
+    raise UnsupportedFormatError(f'no exporter for "{suffix}"; there are: {known}')
+
+
+def export(actor: Actor, path: str | Path, skinning: Skinning | None = None) -> list[str]:
+    """Write an actor as it is posed; its placement in the scene is left out.
+
+    Parameters
+    ----------
+    actor : Actor
+        Figure and pose.
+    path : str or Path
+        Its suffix chooses the exporter; files of that name are replaced.
+    skinning : Skinning, optional
+        How joints move the mesh.
+
+    Returns
+    -------
+    list of str
+        What was written, then what the format cannot hold and by how much that is off.
+
+    Raises
+    ------
+    UnsupportedFormatError
+        If no exporter has this suffix.
+    RigError
+        If the figure lacks what the format is made of.
+    OutputError
+        If a file cannot be written.
+    """
+    module = import_module(f"{__name__}.{exporter_for(path)}")
+    notes: list[str] = module.export(actor, Path(path), skinning or Skinning())
+    return notes
+
+
+def require_mesh(actor: Actor, what: str) -> None:
+    """Refuse a figure without a mesh in words that name the format."""
+    if actor.figure.mesh is None:
+        raise RigError(f"figure {actor.figure.name} has no mesh to write as {what}")

@@ -1,0 +1,85 @@
+"""Write a posed mesh as Wavefront ``.obj``, with a ``.mtl`` and picture if it has a texture.
+
+Vertices keep the file's numbering: along seams a face refers to several ``vt`` for one ``v``.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from viewer.errors import printable
+from viewer.export import require_mesh
+from viewer.formats import free_path, save_image, save_text
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.mesh import Material, Mesh
+from viewer.rig.scene import Actor
+from viewer.rig.skinning import Skinning, deform
+
+__all__ = ["export"]
+
+
+def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
+    """Write ``v``, ``vt``, ``vn`` and triangles; see ``viewer.export.export``."""
+    require_mesh(actor, ".obj")
+    mesh = actor.figure.mesh
+    assert mesh is not None  # as was required
+    positions, normals = deform(actor.figure, actor.pose, skinning)
+    name = "_".join(printable(actor.figure.name, 100).split()) or "figure"
+    pictures = [material for material in mesh.materials if material.image is not None]
+    parts = [f"# {name}: {actor.figure.up} up{', metres' * (actor.figure.unit == 'm')}\n"]
+    if pictures and mesh.uvs is not None:
+        parts.append(f"mtllib {path.stem}.mtl\n")
+    parts += [f"o {name}\n", _rows("v", positions)]
+    if mesh.uvs is not None:
+        parts.append(_rows("vt", mesh.uvs))
+    parts.append(_rows("vn", normals))
+    parts += _faces(mesh, bool(pictures))
+    notes = []
+    if pictures and mesh.uvs is not None:
+        notes += _save_materials(mesh.materials, path)
+    save_text(path, "".join(parts))
+    counts = f"{mesh.n_vertices} vertices, {mesh.n_triangles} triangles"
+    return [f"{printable(path, 300)}: {counts}", *notes]
+
+
+def _rows(keyword: str, rows: Floats) -> str:
+    # One format for all rows: many times faster than one call a row.
+    line = f"{keyword}{' %.9g' * rows.shape[1]}\n"
+    return line * len(rows) % tuple((rows + 0.0).ravel().tolist())
+
+
+def _faces(mesh: Mesh, with_materials: bool) -> list[str]:
+    """Write triangles, ``usemtl`` before each run of a material."""
+    corners = [mesh.triangles + 1]
+    if mesh.uvs is not None:
+        uv = mesh.triangles if mesh.uv_triangles is None else mesh.uv_triangles
+        corners.append(uv + 1)
+    corners.append(mesh.triangles + 1)
+    separator = "/" if mesh.uvs is not None else "//"
+    line = "f" + f" {separator.join(['%d'] * len(corners))}" * 3 + "\n"
+    table: Ints = np.stack(corners, axis=2).reshape(mesh.n_triangles, -1)
+    edges = np.flatnonzero(np.diff(mesh.material_indices)) + 1
+    parts = []
+    for first, last in zip([0, *edges], [*edges, mesh.n_triangles], strict=True):
+        index = int(mesh.material_indices[first]) if mesh.n_triangles else -1
+        if with_materials and index >= 0:
+            parts.append(f"usemtl material{index}\n")
+        rows = table[first:last]
+        parts.append(line * len(rows) % tuple(rows.ravel().tolist()))
+    return parts
+
+
+def _save_materials(materials: tuple[Material, ...], path: Path) -> list[str]:
+    """Write the ``.mtl`` and its pictures, under names that are free."""
+    parts, notes = [], []
+    for index, material in enumerate(materials):
+        parts.append(f"newmtl material{index}\nKd 1 1 1\n")
+        if material.image is not None:
+            picture = free_path(path.parent, f"{path.stem}_{index}", ".png")
+            save_image(picture, material.image)
+            parts.append(f"map_Kd {picture.name}\n")
+            notes.append(f"{printable(picture, 300)}: its texture")
+    save_text(path.with_suffix(".mtl"), "".join(parts))
+    return notes

@@ -1,0 +1,54 @@
+"""Write a posed mesh as binary ``.ply``; texture coordinates belong to the triangles' corners."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from viewer.errors import printable
+from viewer.export import require_mesh
+from viewer.formats import save_bytes
+from viewer.rig.mesh import Mesh
+from viewer.rig.scene import Actor
+from viewer.rig.skinning import Skinning, deform
+
+__all__ = ["export"]
+
+
+def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
+    """Write positions and normals as float32, and triangles; see ``viewer.export.export``."""
+    require_mesh(actor, ".ply")
+    mesh = actor.figure.mesh
+    assert mesh is not None  # as was required
+    positions, normals = deform(actor.figure, actor.pose, skinning)
+    vertices = np.concatenate([positions, normals], axis=1).astype("<f4")
+    faces = _faces(mesh)
+    header = [
+        "ply",
+        "format binary_little_endian 1.0",
+        f"comment {printable(actor.figure.name, 60)}, {actor.figure.up} up",
+        f"element vertex {mesh.n_vertices}",
+        *(f"property float {name}" for name in ("x", "y", "z", "nx", "ny", "nz")),
+        f"element face {mesh.n_triangles}",
+        "property list uchar int vertex_indices",
+        *(["property list uchar float texcoord"] if mesh.uvs is not None else []),
+        "end_header\n",
+    ]
+    text = "\n".join(header).encode("ascii", "backslashreplace")
+    save_bytes(path, text + vertices.tobytes() + faces.tobytes())
+    return [
+        f"{printable(path, 300)}: {mesh.n_vertices} vertices, {mesh.n_triangles} triangles",
+    ]
+
+
+def _faces(mesh: Mesh) -> np.ndarray:
+    fields: list[tuple[str, str] | tuple[str, str, int]] = [("n", "u1"), ("corners", "<i4", 3)]
+    if mesh.uvs is not None:
+        fields += [("n_uv", "u1"), ("uv", "<f4", 6)]
+    faces = np.zeros(mesh.n_triangles, dtype=fields)
+    faces["n"], faces["corners"] = 3, mesh.triangles
+    if mesh.uvs is not None:
+        corners = mesh.triangles if mesh.uv_triangles is None else mesh.uv_triangles
+        faces["n_uv"], faces["uv"] = 6, mesh.uvs[corners].reshape(-1, 6)
+    return faces

@@ -1,0 +1,128 @@
+"""Write any figure as a course rig: a ``.skel`` and a ``.skin`` beside each other."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from viewer.errors import RigError, printable
+from viewer.formats import Source, read, write
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import Mesh, split_seams
+from viewer.rig.pose import Pose, rest_pose
+from viewer.rig.rotation import quaternion_to_matrix
+from viewer.rig.scalars import length_unit
+from viewer.rig.scene import Actor
+from viewer.rig.shape import shaped
+from viewer.rig.skin import skin_rows
+from viewer.rig.skinning import Skinning, deform, skin_used
+
+__all__ = ["export"]
+
+_CUBE = 0.01  # of the figure's size: boxes of joints that have none
+
+
+def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
+    """Write skeleton and skin, read them back, and say how far the posed mesh is off.
+
+    The shape becomes the rest mesh, the pose the skeleton's own; the figure's translation goes
+    to the root's offset.
+    """
+    figure, pose = actor.figure, actor.pose
+    if figure.skeleton is None or pose is None:
+        raise RigError(f"figure {figure.name} has no skeleton to write as .skel")
+    whole = shaped(figure, pose.shape_weights)
+    rig, sources = _as_rig(whole, pose, skinning)
+    skel, skin = path.with_suffix(".skel"), path.with_suffix(".skin")
+    write(rig, skel)
+    notes = [f"{printable(skel, 300)}: {figure.skeleton.n_joints} joints"]
+    if rig.mesh is not None:
+        write(rig, skin)
+        notes.append(f"{printable(skin, 300)}: {rig.mesh.n_vertices} vertices")
+        if figure.mesh is not None and rig.mesh.n_vertices != figure.mesh.n_vertices:
+            notes.append(
+                f"split at texture seams: {figure.mesh.n_vertices} vertices are "
+                f"{rig.mesh.n_vertices} in the .skin"
+            )
+    return notes + _lost(figure, pose) + _error(actor, skel, skin, sources, skinning)
+
+
+def _as_rig(figure: Figure, pose: Pose, skinning: Skinning) -> tuple[Figure, np.ndarray | None]:
+    """Return what the two files hold of a shaped figure, and the vertex of each split one."""
+    skeleton, mesh, skin = figure.skeleton, figure.mesh, figure.skin
+    assert skeleton is not None  # the caller looked
+    _check_rotations(figure)
+    translations = skeleton.rest_translations.copy()
+    translations[skeleton.parents < 0] += pose.figure_translation
+    boxes = skeleton.boxes
+    if boxes is None:
+        spread = np.ptp(skeleton.rest_translations, axis=0).max() or 1.0
+        boxes = np.tile([[-_CUBE * spread] * 3, [_CUBE * spread] * 3], (skeleton.n_joints, 1, 1))
+    posed = replace(skeleton, rest_translations=translations, rest_dofs=pose.dofs, boxes=boxes)
+    if mesh is None:
+        return Figure(figure.name, skeleton=posed), None
+    sources, uv_indices, triangles = split_seams(mesh)
+    split = Mesh(
+        positions=mesh.positions[sources],
+        normals=mesh.normals[sources],
+        triangles=triangles,
+        uvs=None if mesh.uvs is None else mesh.uvs[uv_indices],
+        materials=mesh.materials,
+        triangle_materials=mesh.material_indices,
+    )
+    used = None if skin is None else skin_rows(skin_used(skin, skinning), sources)
+    return Figure(figure.name, split, posed, used), sources
+
+
+def _check_rotations(figure: Figure) -> None:
+    skeleton = figure.skeleton
+    assert skeleton is not None
+    turned = np.abs(quaternion_to_matrix(skeleton.rest_rotations) - np.eye(3)).max(axis=(1, 2))
+    scaled = np.abs(skeleton.rest_scales - 1.0).max(axis=1)
+    worst = int(np.maximum(turned, scaled).argmax())
+    if max(turned[worst], scaled[worst]) > 1e-9:
+        raise RigError(
+            f".skel cannot hold the rest rotation or scale of joint {skeleton.names[worst]}"
+        )
+
+
+def _lost(figure: Figure, pose: Pose) -> list[str]:
+    """Say in words what the formats have no place for."""
+    lost = []
+    if figure.blend_shapes is not None:
+        lost.append(f"{figure.n_shapes} shape directions (the present shape is kept)")
+    if figure.correctives is not None:
+        lost.append("pose correctives")
+    if pose.figure_scale != 1.0:
+        lost.append(f"the figure's scale of {pose.figure_scale:g}")
+    if figure.up != "y":
+        lost.append(f"that {figure.up} is up")
+    extras = {
+        "body parts": figure.body_parts,
+        "keypoints": figure.keypoints,
+        "the symmetry map": figure.symmetry,
+        "the reduced mesh": figure.reduced,
+        "the joint regressor": figure.joint_regressor,
+    }
+    lost += [name for name, part in extras.items() if part is not None]
+    return [f"not held by .skel and .skin: {', '.join(lost)}"] if lost else []
+
+
+def _error(
+    actor: Actor, skel: Path, skin: Path, sources: np.ndarray | None, skinning: Skinning
+) -> list[str]:
+    """Read the files back, pose them as they say, and compare with the figure's own vertices."""
+    skeleton = read(Source.open(skel))
+    assert isinstance(skeleton, Figure) and skeleton.skeleton is not None
+    if sources is None:
+        return []
+    mesh = read(Source.open(skin))
+    assert isinstance(mesh, Figure)
+    again = Figure("again", mesh.mesh, skeleton.skeleton, mesh.skin)
+    found = deform(again, rest_pose(skeleton.skeleton))[0]
+    wanted = deform(actor.figure, actor.pose, skinning)[0][sources]
+    worst = float(np.linalg.norm(found - wanted, axis=1).max())
+    factor, unit = length_unit(actor.figure)
+    return [f"largest error of this pose when read back: {factor * worst:.3g} {unit}"]
