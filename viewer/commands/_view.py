@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 import re
 
-from viewer.commands._scene import number
+from viewer.commands._numbers import number
+from viewer.commands._pose import add_skinning_arguments, skinning_of
 from viewer.errors import ViewerError
 from viewer.rendering.camera import Camera, fit
 from viewer.rendering.ground_pass import parse_color
@@ -13,6 +14,7 @@ from viewer.rendering.options import BACKGROUNDS, SHOWN, DisplayOptions
 from viewer.rendering.program import SHADING
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import bounding_box, box_size
+from viewer.rig.scalars import SCALARS
 from viewer.rig.scene import Scene
 
 __all__ = [
@@ -20,6 +22,7 @@ __all__ = [
     "add_display_arguments",
     "camera_of",
     "display_of",
+    "hide_parts",
     "parse_size",
 ]
 
@@ -51,6 +54,19 @@ def add_display_arguments(parser: argparse.ArgumentParser) -> None:
         ("no-grid", "leave out the ground grid"),
     ):
         parser.add_argument(f"--{name}", action="store_true", help=text)
+    parser.add_argument(
+        "--scalar", choices=SCALARS, help="show a number of each vertex as a colour"
+    )
+    parser.add_argument("--keypoints", action="store_true", help="keypoints as markers")
+    parser.add_argument("--reduced", action="store_true", help="the coarser mesh, if there is one")
+    parser.add_argument(
+        "--hide-part",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="leave out a body part; may be repeated",
+    )
+    add_skinning_arguments(parser)
 
 
 def parse_size(text: str) -> tuple[int, int]:
@@ -97,7 +113,8 @@ def display_of(arguments: argparse.Namespace) -> DisplayOptions:
         raise ViewerError(f"--samples: expected at least 1, found {arguments.samples}")
     return DisplayOptions(
         show=arguments.show,
-        shading=arguments.shading,
+        shading="scalar" if arguments.scalar else arguments.shading,
+        scalar=arguments.scalar or DisplayOptions().scalar,
         flat=arguments.flat,
         wireframe=arguments.wireframe,
         normals=arguments.normals,
@@ -105,4 +122,31 @@ def display_of(arguments: argparse.Namespace) -> DisplayOptions:
         grid=not arguments.no_grid,
         background=arguments.background,
         samples=arguments.samples,
+        skinning=skinning_of(arguments),
+        keypoints=arguments.keypoints,
+        reduced=arguments.reduced,
     )
+
+
+def hide_parts(arguments: argparse.Namespace, scene: Scene, options: DisplayOptions) -> None:
+    """Set the body parts that are left out, by name or index, of the first figure that has any.
+
+    Raises
+    ------
+    ViewerError
+        If no figure has a part of this name; the message lists those there are.
+    """
+    if not arguments.hide_part:
+        return
+    parts = next((a.figure.body_parts for a in scene.actors if a.figure.body_parts), None)
+    if parts is None:
+        raise ViewerError("--hide-part: no figure has body parts")
+    names = [name.lower() for name in parts.names]
+    hidden = []
+    for wanted in arguments.hide_part:
+        if wanted.lower() not in names:
+            raise ViewerError(
+                f'--hide-part: no part "{wanted}"; there are: {", ".join(parts.names)}'
+            )
+        hidden.append(names.index(wanted.lower()))
+    options.hidden_parts = tuple(sorted(set(hidden)))

@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from viewer.commands._model_info import describe_model, model_lines
+from viewer.commands._pose import add_skinning_arguments, skinning_of
 from viewer.commands._scene import add_scene_arguments, open_scene
 from viewer.errors import printable
 from viewer.rig.clip import Clip
@@ -17,6 +19,7 @@ from viewer.rig.mesh import Mesh, bounding_box, box_size, triangle_areas
 from viewer.rig.scene import Actor, Scene, actor_points
 from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_labels
 from viewer.rig.skin import Skin, has_influence, influence_counts, weight_sums
+from viewer.rig.skinning import Skinning
 
 __all__ = ["add_arguments", "describe", "run"]
 
@@ -24,30 +27,38 @@ __all__ = ["add_arguments", "describe", "run"]
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     add_scene_arguments(parser)
+    add_skinning_arguments(parser)
     parser.add_argument("--json", action="store_true", help="everything, for programs")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Print what the files hold."""
+    skinning = skinning_of(arguments)
     scene = open_scene(arguments)
+    found = describe(scene, skinning)
     if arguments.json:
-        print(json.dumps(describe(scene), indent=1, allow_nan=False))
+        print(json.dumps(found, indent=1, allow_nan=False))
     else:
-        for actor in describe(scene)["actors"]:
-            print("\n".join(_lines(actor)))
+        for actor, parts in zip(scene.actors, found["actors"], strict=True):
+            print("\n".join(_lines(parts) + model_lines(parts["model"], actor.figure)))
     return 0
 
 
-def describe(scene: Scene) -> dict[str, Any]:
+def describe(scene: Scene, skinning: Skinning | None = None) -> dict[str, Any]:
     """Return everything ``info`` tells, ready for JSON; lengths in figure units, angles in rad.
 
     Parameters
     ----------
     scene : Scene
         Figures and poses.
+    skinning : Skinning, optional
+        How joints move the meshes.
     """
+    how = skinning or Skinning()
     return {
-        "actors": [_describe_actor(actor) for actor in scene.actors],
+        "actors": [
+            _describe_actor(actor) | {"model": describe_model(actor, how)} for actor in scene.actors
+        ],
         "warnings": list(scene.warnings),
     }
 

@@ -6,12 +6,14 @@ import argparse
 import sys
 from pathlib import Path
 
+from viewer.commands._output import STDOUT, check_output
 from viewer.commands._scene import add_scene_arguments, open_scene, print_warnings
 from viewer.commands._view import (
     add_camera_arguments,
     add_display_arguments,
     camera_of,
     display_of,
+    hide_parts,
     parse_size,
 )
 from viewer.errors import OutputError, ViewerError, printable
@@ -25,7 +27,6 @@ __all__ = ["add_arguments", "run"]
 
 _PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".ppm", ".tga", ".tif", ".tiff", ".webp")
 _OPAQUE = (".jpg", ".jpeg", ".bmp", ".ppm")
-_STDOUT = ("/dev/stdout", "/dev/fd/1", "/proc/self/fd/1")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -45,10 +46,12 @@ def run(arguments: argparse.Namespace) -> int:
     size = parse_size(arguments.size)
     output = Path(arguments.output)
     check_output(output, [Path(file) for file in arguments.files], arguments.force)
+    _check_suffix(output)
     options = display_of(arguments)
     if options.background == "transparent" and output.suffix.lower() in _OPAQUE:
         print_warnings([f"{printable(output)}: this format knows no transparency"])
     scene = open_scene(arguments)
+    hide_parts(arguments, scene, options)
     points = scene_points(scene, options.show)
     camera = camera_of(arguments, scene, points, size)
     box = bounding_box(points)
@@ -60,36 +63,23 @@ def run(arguments: argparse.Namespace) -> int:
     save_picture(output, pixels)
     grid = f", grid {_grid_step(points):g}" if options.grid else ""
     # A picture on its way through a pipe must not be followed by words.
-    stream = sys.stderr if str(output) in _STDOUT else sys.stdout
+    stream = sys.stderr if str(output) in STDOUT else sys.stdout
     print(f"{printable(output)}: {size[0]} x {size[1]}{grid}", file=stream)
     return 0
 
 
-def check_output(output: Path, inputs: list[Path], force: bool) -> None:
-    """Refuse, before anything is drawn, to replace a file nobody said may be replaced.
-
-    Raises
-    ------
-    OutputError
-        If the output is one of the inputs, a folder, or exists without ``--force``.
-    """
-    shown = printable(output, 300)
+def _check_suffix(output: Path) -> None:
+    """Refuse a suffix that no picture has."""
+    suffix = output.suffix.lower()
     try:
-        if output.is_dir():
-            raise OutputError(f"{shown}: is a folder")
-        if any(path.exists() and output.exists() and path.samefile(output) for path in inputs):
-            raise OutputError(f"{shown}: is an input file, which is never replaced")
-        suffix = output.suffix.lower()
-        if suffix not in ("", *_PICTURES) and (output.is_file() or not output.exists()):
-            raise OutputError(
-                f"{shown}: pictures cannot be written as {suffix}; there are: "
-                f"{', '.join(_PICTURES)}"
-            )
-        if output.is_file() and not force and str(output) not in _STDOUT:
-            raise OutputError(f"{shown}: exists already (--force replaces it)")
-    except (OSError, ValueError) as problem:
-        reason = getattr(problem, "strerror", None) or problem
-        raise OutputError(f"{shown}: {reason}") from None
+        is_ours = output.is_file() or not output.exists()
+    except (OSError, ValueError):
+        return  # check_output says what is wrong
+    if suffix not in ("", *_PICTURES) and is_ours:
+        raise OutputError(
+            f"{printable(output, 300)}: pictures cannot be written as {suffix}; there are: "
+            f"{', '.join(_PICTURES)}"
+        )
 
 
 def draw_scene(
@@ -134,7 +124,7 @@ def save_picture(path: Path, pixels: Bytes) -> None:
     from viewer.formats._image import encode_png
 
     try:
-        if str(path) in _STDOUT:
+        if str(path) in STDOUT:
             sys.stdout.buffer.write(encode_png(pixels))
             return
         save_image(path, pixels)

@@ -5,12 +5,14 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from viewer.commands._scene import add_scene_arguments, number, open_scene
+from viewer.commands._numbers import number
+from viewer.commands._scene import add_scene_arguments, open_scene, scene_files
 from viewer.commands._view import (
     add_camera_arguments,
     add_display_arguments,
     camera_of,
     display_of,
+    hide_parts,
 )
 from viewer.errors import printable
 from viewer.formats import free_path
@@ -45,6 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Open the window, or write the picture that it would show."""
     options = display_of(arguments)
     scene = open_scene(arguments)
+    hide_parts(arguments, scene, options)
     points = scene_points(scene, options.show)
     camera = camera_of(arguments, scene, points, SIZE)
     from viewer.app.display import NoDisplay, find_display
@@ -59,7 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
         scene,
         camera=camera,
         options=options,
-        paths=arguments.files,
+        paths=scene_files(arguments),
         scale=arguments.scale,
         fit_distance=arguments.distance is None,
     )

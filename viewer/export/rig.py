@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from viewer.errors import RigError, printable
+from viewer.export._course_rig import course_skeleton
 from viewer.formats import Source, read, write
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh, split_seams
 from viewer.rig.pose import Pose, rest_pose
-from viewer.rig.rotation import quaternion_to_matrix
 from viewer.rig.scalars import length_unit
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
@@ -20,8 +20,6 @@ from viewer.rig.skin import skin_rows
 from viewer.rig.skinning import Skinning, deform, skin_used
 
 __all__ = ["export"]
-
-_CUBE = 0.01  # of the figure's size: boxes of joints that have none
 
 
 def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
@@ -53,14 +51,7 @@ def _as_rig(figure: Figure, pose: Pose, skinning: Skinning) -> tuple[Figure, np.
     """Return what the two files hold of a shaped figure, and the vertex of each split one."""
     skeleton, mesh, skin = figure.skeleton, figure.mesh, figure.skin
     assert skeleton is not None  # the caller looked
-    _check_rotations(figure)
-    translations = skeleton.rest_translations.copy()
-    translations[skeleton.parents < 0] += pose.figure_translation
-    boxes = skeleton.boxes
-    if boxes is None:
-        spread = np.ptp(skeleton.rest_translations, axis=0).max() or 1.0
-        boxes = np.tile([[-_CUBE * spread] * 3, [_CUBE * spread] * 3], (skeleton.n_joints, 1, 1))
-    posed = replace(skeleton, rest_translations=translations, rest_dofs=pose.dofs, boxes=boxes)
+    posed, order = course_skeleton(skeleton, pose)
     if mesh is None:
         return Figure(figure.name, skeleton=posed), None
     sources, uv_indices, triangles = split_seams(mesh)
@@ -72,20 +63,12 @@ def _as_rig(figure: Figure, pose: Pose, skinning: Skinning) -> tuple[Figure, np.
         materials=mesh.materials,
         triangle_materials=mesh.material_indices,
     )
-    used = None if skin is None else skin_rows(skin_used(skin, skinning), sources)
-    return Figure(figure.name, split, posed, used), sources
-
-
-def _check_rotations(figure: Figure) -> None:
-    skeleton = figure.skeleton
-    assert skeleton is not None
-    turned = np.abs(quaternion_to_matrix(skeleton.rest_rotations) - np.eye(3)).max(axis=(1, 2))
-    scaled = np.abs(skeleton.rest_scales - 1.0).max(axis=1)
-    worst = int(np.maximum(turned, scaled).argmax())
-    if max(turned[worst], scaled[worst]) > 1e-9:
-        raise RigError(
-            f".skel cannot hold the rest rotation or scale of joint {skeleton.names[worst]}"
-        )
+    if skin is None:
+        return Figure(figure.name, split, posed), sources
+    used = skin_rows(skin_used(skin, skinning), sources)
+    place = np.argsort(order).astype(np.int32)
+    moved = replace(used, joints=place[used.joints], inverse_bind=used.inverse_bind[order])
+    return Figure(figure.name, split, posed, moved), sources
 
 
 def _lost(figure: Figure, pose: Pose) -> list[str]:

@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.errors import FormatError, printable
-from viewer.formats._container import archive_of
+from viewer.formats._archive import Archive
+from viewer.formats._container import archive_of, finite
 from viewer.formats._source import Source
 from viewer.formats._table import read_table, row_error
+from viewer.rig.arrays import Floats
 
 __all__ = ["CORE", "OPTIONAL", "Part", "PigFiles", "open_parts"]
 
@@ -90,7 +92,9 @@ def _from_folder(source: Source) -> PigFiles:
             files.parts[name] = _text_part(source.inside(f"{name}.txt"), name, columns)
     if "body_part_defs.txt" in present:
         text = source.inside("body_part_defs.txt").data.decode("utf-8", "replace")
-        files.part_names = tuple(line.strip() for line in text.split() if line.strip())
+        files.part_names = tuple(
+            printable(line.strip(), 60) for line in text.splitlines() if line.strip()
+        )
     known = {f"{name}.txt" for name in (*_WIDTHS, "body_part_defs")}
     files.ignored = tuple(sorted(name for name in present - known if not name.startswith(".")))
     return files
@@ -127,24 +131,36 @@ def _archive_part(source: Source, name: str, columns: int) -> Part:
     def error(message: str, row: int | None) -> FormatError:
         return archive.error(name, message if row is None else f"row {row}: {message}")
 
-    if name in _SPARSE and not _is_entries(source, name):
-        matrix = archive.sparse(name)
-        rows, vertices, weights = matrix.entries()
-        return Part(name, np.stack([rows, vertices, weights], axis=1), error)
+    if name in _SPARSE and not _is_entries(archive, name):
+        joints, vertices, weights = _entries(archive, name)
+        return Part(name, np.stack([joints, vertices, weights], axis=1), error)
     shape = (None,) if columns == 1 else (None, columns)
     if columns == 1 and len(getattr(archive.get(name), "shape", ())) == 2:
         shape = (None, 1)
-    values = archive.array(name, shape).values().reshape(-1, columns)
-    if not np.isfinite(values).all():
-        raise error("expected finite numbers", int((~np.isfinite(values)).any(axis=1).argmax()))
+    values = finite(archive, name, archive.array(name, shape).values()).reshape(-1, columns)
+    if len(values) == 0:
+        raise archive.error(name, "expected at least one row, found none")
     return Part(name, values, error)
 
 
-def _is_entries(source: Source, name: str) -> bool:
+def _entries(archive: Archive, name: str) -> tuple[NDArray[Any], NDArray[Any], Floats]:
+    """Return joint, vertex and weight of each entry of a J x V matrix, or a V x J one."""
+    n_joints, n_vertices = _rows(archive, "t_pose_joints"), _rows(archive, "vertices")
+    is_turned = getattr(archive.get(name), "shape", ()) == (n_vertices, n_joints) != (n_joints,) * 2
+    sides = (n_vertices, n_joints) if is_turned else (n_joints, n_vertices)
+    rows, columns, numbers = archive.sparse(name, sides).entries()
+    weights = finite(archive, name, numbers)
+    return (columns, rows, weights) if is_turned else (rows, columns, weights)
+
+
+def _is_entries(archive: Archive, name: str) -> bool:
     """Return whether a matrix is stored as rows of (joint, vertex, weight), as in the folder."""
-    shape: tuple[int, ...] = getattr(archive_of(source).get(name), "shape", ())
-    joints = archive_of(source).array("parents").shape[0]
-    return len(shape) == 2 and shape[1] == 3 and shape[0] != joints
+    shape: tuple[int, ...] = getattr(archive.get(name), "shape", ())
+    return len(shape) == 2 and shape[1] == 3 and shape[0] != _rows(archive, "t_pose_joints")
+
+
+def _rows(archive: Archive, name: str) -> int:
+    return archive.array(name, (None, 3)).shape[0]
 
 
 def _names(source: Source) -> tuple[str, ...]:

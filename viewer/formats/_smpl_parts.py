@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.formats._archive import Archive
+from viewer.formats._container import are_indices, finite
 from viewer.formats._smpl_names import Member
 from viewer.formats._source import Source
 from viewer.rig.annotations import Keypoints
@@ -48,10 +49,8 @@ def model_shapes(
         n_shapes = _SHAPES if count >= _SHAPES + 100 else min(_FEW_SHAPES, count)
 
     def load() -> Floats:
-        offsets = np.ascontiguousarray(np.moveaxis(array.values(), 2, 0), dtype=np.float64)
-        if not np.isfinite(offsets).all():
-            raise archive.error("shapedirs", "expected finite numbers")
-        return offsets
+        rows = np.moveaxis(array.values(), 2, 0)
+        return finite(archive, "shapedirs", np.ascontiguousarray(rows, np.float64))
 
     used.append("shapedirs")
     if count == 0:
@@ -78,8 +77,9 @@ def model_hands(archive: Archive, member: Member | None, used: list[str]) -> tup
         components, mean = f"hands_components{side[:1]}", f"hands_mean{side[:1]}"
         if archive.has(components) and archive.has(mean):
             joints = np.arange(first, first + 15, dtype=np.int32)
-            rows = archive.array(components, (None, 45)).values()
-            hands.append(Hand(side, joints, rows, archive.array(mean, (45,)).values()))
+            rows = finite(archive, components, archive.array(components, (None, 45)).values())
+            middle = finite(archive, mean, archive.array(mean, (45,)).values())
+            hands.append(Hand(side, joints, rows, middle))
             used += [components, mean]
     return tuple(hands)
 
@@ -90,14 +90,13 @@ def model_uvs(
     """Return texture coordinates and the triangles over them, if the file has both."""
     if not (archive.has("vt") and archive.has("ft")):
         return None, None
-    uvs = archive.array("vt", ("U", 2)).values()
+    uvs = finite(archive, "vt", archive.array("vt", ("U", 2)).values())
     corners = archive.array("ft", (n_triangles, 3)).values()
-    is_outside = corners.size and (corners.min() < 0 or corners.max() >= len(uvs))
-    if is_outside or not np.isfinite(uvs).all():
+    if not are_indices(corners, len(uvs)):
         source.warn("`vt` and `ft` do not fit each other: left out")
         return None, None
     used += ["vt", "ft"]
-    return uvs.astype(np.float64), corners.astype(np.int32)
+    return uvs, corners.astype(np.int32)
 
 
 def model_symmetry(
@@ -107,8 +106,7 @@ def model_symmetry(
     if not archive.has("vert_sym_idxs"):
         return None
     partners = archive.array("vert_sym_idxs", (n_vertices,)).values()
-    inside = partners.size and partners.min() >= 0 and partners.max() < n_vertices
-    if not inside or (partners % 1).any():
+    if not are_indices(partners, n_vertices):
         source.warn("`vert_sym_idxs` refers to vertices that do not exist: left out")
         return None
     indices = partners.astype(np.int32)
@@ -126,8 +124,9 @@ def model_keypoints(
     if not (archive.has("lmk_faces_idx") and archive.has("lmk_bary_coords")):
         return None
     faces = archive.array("lmk_faces_idx", ("L",)).values()
-    weights = archive.array("lmk_bary_coords", (len(faces), 3)).values()
-    if faces.size and (faces.min() < 0 or faces.max() >= mesh.n_triangles):
+    shares = archive.array("lmk_bary_coords", (len(faces), 3)).values()
+    weights = finite(archive, "lmk_bary_coords", shares)
+    if not are_indices(faces, mesh.n_triangles):
         source.warn("`lmk_faces_idx` refers to triangles that do not exist: left out")
         return None
     used += ["lmk_faces_idx", "lmk_bary_coords"]

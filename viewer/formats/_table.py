@@ -9,7 +9,7 @@ from viewer.formats._numbers import parse_numbers
 from viewer.formats._source import Source, shown
 from viewer.rig.arrays import Floats, Ints
 
-__all__ = ["read_indices", "read_table", "row_error"]
+__all__ = ["read_indices", "read_numbers", "read_table", "row_error"]
 
 
 def read_table(source: Source, columns: int) -> Floats:
@@ -32,6 +32,21 @@ def read_table(source: Source, columns: int) -> Floats:
     FormatError
         With the line of a row that has more or fewer numbers, or a word that is none.
     """
+    values = read_numbers(source)
+    if len(values) == 0:
+        raise source.error(f"expected rows of {columns} numbers, found {source.looks_like()}")
+    _check_rows(source, columns, len(values))
+    return values.reshape(-1, columns)
+
+
+def read_numbers(source: Source) -> Floats:
+    """Read all numbers of a text, no matter how they are spread over lines: (N,).
+
+    Raises
+    ------
+    FormatError
+        With the line of a word that is no number.
+    """
     data = source.data
     values, bad = parse_numbers(data, 0, len(data))
     if bad >= 0:
@@ -39,10 +54,7 @@ def read_table(source: Source, columns: int) -> Floats:
         word = source.next_word(offset)
         found = shown(word.group()) if word else "the end of the file"
         raise source.error(f"expected a number, found {found}", offset)
-    if len(values) == 0:
-        raise source.error(f"expected rows of {columns} numbers, found {source.looks_like()}")
-    _check_rows(source, columns, len(values))
-    return values.reshape(-1, columns)
+    return values
 
 
 def _check_rows(source: Source, columns: int, count: int) -> None:

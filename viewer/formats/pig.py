@@ -68,9 +68,9 @@ def read(source: Source) -> Figure:
     parents = _parents(parts["parents"])
     joints = parts["t_pose_joints"].values
     names = JOINTS if n_joints == len(JOINTS) else tuple(f"joint_{j}" for j in range(n_joints))
-    regressor = _regressor(parts, n_joints, n_vertices)
-    skin = _skin(source, parts, joints, n_vertices)
     mesh = _mesh(source, parts, positions)
+    skin = _skin(source, parts, joints, n_vertices)
+    regressor = _regressor(parts, n_joints, n_vertices)
     return Figure(
         name=source.path.name if source.is_folder else source.path.stem,
         mesh=mesh,
@@ -80,10 +80,10 @@ def read(source: Source) -> Figure:
         unit="m",
         joint_regressor=regressor,
         pose_layout=_layout(n_joints),
-        body_parts=_body_parts(source, files, n_vertices),
+        body_parts=_body_parts(files, n_vertices),
         keypoints=_keypoints(n_vertices, n_joints),
-        reduced=_reduced(source, parts, n_vertices),
-        symmetry=_symmetry(source, parts, n_vertices),
+        reduced=_reduced(parts, n_vertices),
+        symmetry=_symmetry(parts, n_vertices),
         facts=_facts(files, mesh, skin, joints, regressor),
     )
 
@@ -95,18 +95,20 @@ def _layout(n_joints: int) -> PoseLayout:
     return PoseLayout(4 + 3 * n_joints, starts, is_euler, translation=0, scale=3 + 3 * n_joints)
 
 
-def _indices(part: Part, column: int, end: int, what: str, proof: str = "") -> Ints:
-    """Return a column of whole numbers from 0 to ``end - 1``."""
+def _indices(part: Part, column: int, end: int, what: str, rows_of: Part | None = None) -> Ints:
+    """Return a column of whole numbers from 0 to ``end - 1``, the rows of another part."""
     values = part.values[:, column]
     wrong = np.flatnonzero((values < 0) | (values >= end) | (values != np.floor(values)))
     if len(wrong):
-        found = f"found {values[wrong[0]]:g}{proof}"
+        proof = f": {rows_of.name} has {end} rows" if rows_of else ""
+        found = f"found {values[wrong[0]]:.10g}{proof}"
         raise part.error(f"expected a {what} from 0 to {end - 1}, {found}", int(wrong[0]))
     return values.astype(np.int32)
 
 
-def _corners(part: Part, end: int, what: str, proof: str = "") -> Ints:
-    return np.stack([_indices(part, axis, end, what, proof) for axis in range(3)], axis=1)
+def _corners(part: Part, what: str, rows_of: Part) -> Ints:
+    end = len(rows_of.values)
+    return np.stack([_indices(part, axis, end, what, rows_of) for axis in range(3)], axis=1)
 
 
 def _parents(part: Part) -> Ints:
@@ -122,12 +124,11 @@ def _parents(part: Part) -> Ints:
 
 
 def _mesh(source: Source, parts: dict[str, Part], positions: Floats) -> Mesh:
-    proof = f": {parts['vertices'].name} has {len(positions)} rows"
-    triangles = _corners(parts["faces_vert"], len(positions), "vertex", proof)
+    triangles = _corners(parts["faces_vert"], "vertex", parts["vertices"])
     uvs, uv_triangles = None, None
     if "textures" in parts and "faces_tex" in parts:
         uvs = parts["textures"].values
-        uv_triangles = _corners(parts["faces_tex"], len(uvs), "texture coordinate")
+        uv_triangles = _corners(parts["faces_tex"], "texture coordinate", parts["textures"])
         if len(uv_triangles) != len(triangles):
             raise parts["faces_tex"].error(
                 f"expected {len(triangles)} rows as in {parts['faces_vert'].name}, "
@@ -143,8 +144,8 @@ def _mesh(source: Source, parts: dict[str, Part], positions: Floats) -> Mesh:
 
 def _skin(source: Source, parts: dict[str, Part], joints: Floats, n_vertices: int) -> Skin:
     part = parts["skinning_weights"]
-    columns = _indices(part, 0, len(joints), "joint")
-    vertices = _indices(part, 1, n_vertices, "vertex")
+    columns = _indices(part, 0, len(joints), "joint", parts["t_pose_joints"])
+    vertices = _indices(part, 1, n_vertices, "vertex", parts["vertices"])
     weights = part.values[:, 2]
     keys = columns.astype(np.int64) * n_vertices + vertices
     order = np.argsort(keys, kind="stable")
@@ -183,32 +184,32 @@ def _regressor(parts: dict[str, Part], n_joints: int, n_vertices: int) -> JointR
     if "J_regressor" not in parts:
         return None
     part = parts["J_regressor"]
-    joints = _indices(part, 0, n_joints, "joint")
-    vertices = _indices(part, 1, n_vertices, "vertex")
+    joints = _indices(part, 0, n_joints, "joint", parts["t_pose_joints"])
+    vertices = _indices(part, 1, n_vertices, "vertex", parts["vertices"])
     return JointRegressor(n_joints, joints, vertices, part.values[:, 2].astype(np.float64))
 
 
-def _column(source: Source, parts: dict[str, Part], name: str, rows: int, end: int) -> Ints | None:
+def _column(parts: dict[str, Part], name: str, rows: int, end: int, what: str) -> Ints | None:
     """Return an optional column with one number a vertex."""
     if name not in parts:
         return None
     part = parts[name]
     if len(part.values) != rows:
         raise part.error(f"expected {rows} rows, found {len(part.values)}", None)
-    return _indices(part, 0, end, "number")
+    return _indices(part, 0, end, what)
 
 
-def _body_parts(source: Source, files: PigFiles, n_vertices: int) -> BodyParts | None:
+def _body_parts(files: PigFiles, n_vertices: int) -> BodyParts | None:
     names = files.part_names
-    of_vertex = _column(source, files.parts, "body_parts", n_vertices, len(names) or 1000)
+    of_vertex = _column(files.parts, "body_parts", n_vertices, len(names) or 1000, "body part")
     if of_vertex is None:
         return None
     count = len(names) or int(of_vertex.max(initial=0)) + 1
     return BodyParts(names or tuple(f"part {number}" for number in range(count)), of_vertex)
 
 
-def _symmetry(source: Source, parts: dict[str, Part], n_vertices: int) -> Ints | None:
-    partners = _column(source, parts, "sym", n_vertices, n_vertices)
+def _symmetry(parts: dict[str, Part], n_vertices: int) -> Ints | None:
+    partners = _column(parts, "sym", n_vertices, n_vertices, "vertex")
     if partners is None:
         return None
     wrong = np.flatnonzero(partners[partners] != np.arange(n_vertices))
@@ -222,11 +223,12 @@ def _symmetry(source: Source, parts: dict[str, Part], n_vertices: int) -> Ints |
     return partners
 
 
-def _reduced(source: Source, parts: dict[str, Part], n_vertices: int) -> ReducedMesh | None:
+def _reduced(parts: dict[str, Part], n_vertices: int) -> ReducedMesh | None:
     if "reduced_ids" not in parts or "reduced_faces" not in parts:
         return None
-    vertices = _indices(parts["reduced_ids"], 0, n_vertices, "vertex")
-    return ReducedMesh(vertices, _corners(parts["reduced_faces"], len(vertices), "reduced vertex"))
+    vertices = _indices(parts["reduced_ids"], 0, n_vertices, "vertex", parts["vertices"])
+    corners = _corners(parts["reduced_faces"], "reduced vertex", parts["reduced_ids"])
+    return ReducedMesh(vertices, corners)
 
 
 def _keypoints(n_vertices: int, n_joints: int) -> Keypoints | None:
@@ -248,7 +250,7 @@ def _facts(
     files: PigFiles, mesh: Mesh, skin: Skin, joints: Floats, regressor: JointRegressor | None
 ) -> tuple[tuple[str, str], ...]:
     """Put what matters into words: raw weights, regressed joints, parts, what was ignored."""
-    sums = weight_sums(skin)
+    sums = np.where(has_influence(skin), weight_sums(skin), 1.0)  # others stay at rest
     facts = [("weights", f"raw; their sums are {sums.min():.3f} to {sums.max():.3f}")]
     # At rest normalised weights return the mesh itself; raw ones scale each vertex by its sum.
     moved = np.linalg.norm(mesh.positions * (sums - 1.0)[:, None], axis=1)

@@ -10,24 +10,29 @@
 
 Both kinds of named values may instead hold one frame of what smplx takes: ``global_orient``,
 ``body_pose``, ``left_hand_pose``, ``right_hand_pose``, ``jaw_pose``, ``leye_pose``, ``reye_pose``,
-``poses``, ``betas``, ``expression``, ``transl`` or ``trans``.
+``poses``, ``betas``, ``expression``, ``transl`` or ``trans``; beside them ``use_pca`` and
+``flat_hand_mean``.
 """
 
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from viewer.errors import RigError, UnsupportedFormatError, printable
+from viewer.errors import UnsupportedFormatError, printable
+from viewer.formats._archive import describe
 from viewer.formats._container import archive_of
+from viewer.formats._numbers import LARGEST
 from viewer.formats._save import save_arrays, save_text
 from viewer.formats._source import Source
-from viewer.formats._table import read_table
-from viewer.rig.arrays import Deferred, Floats, frozen
+from viewer.formats._table import read_numbers
+from viewer.rig.arrays import Deferred, Floats
 from viewer.rig.clip import Clip
 from viewer.rig.figure import Figure
 from viewer.rig.pose_record import PARTS, PoseRecord
@@ -41,6 +46,16 @@ _NAMES = {
     "expression": ("expression", "expressions"),
     "translation": ("translation", "transl", "trans"),
 }
+_ALIASES = (key for keys in _NAMES.values() for key in keys)
+_PARTS = (*PARTS, "body_pose", *_HANDS)
+_FLAGS = ("flat_hand_mean", "use_pca")
+_KNOWN = ("viewer_pose", "dofs", "dof_names", "scale", *_ALIASES, *_PARTS, *_VECTORS, *_FLAGS)
+_NOT_NEEDED = (
+    "figure gender model model_type surface_model_type num_betas fps mocap_framerate "
+    "mocap_frame_rate mocap_time_length dmpls marker_data marker_labels markers labels vids "
+    "markers_latent latent_labels markers_latent_vids"
+).split()
+_PER_JOINT = ("body_pose", *_HANDS, *_VECTORS)  # J x 3 numbers are one pose, not J frames
 _VERSION = 1
 
 
@@ -64,16 +79,12 @@ def read(source: Source) -> PoseRecord:
     """
     if source.peek(2).startswith((b"PK", b"\x80")) or source.archive is not None:
         return _from_values(source, _archive_values(source))
-    if source.head(1) == b"{":
+    if source.head(1) == b"{" or source.path.suffix.lower() == ".json":
         return _from_values(source, parse_json(source))
-    # All numbers of a text file, one or several a line.
-    return PoseRecord(vector=_numbers(source))
-
-
-def _numbers(source: Source) -> Floats:
-    text = source.data.split()
-    one_a_line = Source(source.path, b"\n".join(text))
-    return read_table(one_a_line, 1)[:, 0] if len(text) > 1 else read_table(source, 1)[:, 0]
+    numbers = read_numbers(source)
+    if len(numbers) == 0:
+        raise source.error(f"expected the numbers of a pose, found {source.looks_like()}")
+    return PoseRecord(vector=numbers)
 
 
 def parse_json(source: Source) -> dict[str, Any]:
@@ -89,9 +100,12 @@ def parse_json(source: Source) -> dict[str, Any]:
         raise ValueError(f"expected a finite number, found {word}")
 
     try:
-        values = json.loads(source.data.decode("utf-8", "replace"), parse_constant=refuse)
+        text = source.data.decode("utf-8", "surrogateescape")
+        values = json.loads(text, parse_constant=refuse)
     except json.JSONDecodeError as problem:
-        raise source.error(f"expected JSON, found {problem.msg.lower()}", problem.pos) from None
+        offset = len(problem.doc[: problem.pos].encode("utf-8", "surrogateescape"))
+        what = printable(problem.msg, 100)
+        raise source.error(f"expected JSON, found a mistake: {what}", offset) from None
     except (ValueError, RecursionError) as problem:
         reason = "too deep a nesting" if isinstance(problem, RecursionError) else str(problem)
         raise source.error(f"{printable(reason)}") from None
@@ -101,23 +115,27 @@ def parse_json(source: Source) -> dict[str, Any]:
 
 
 def _archive_values(source: Source) -> dict[str, Any]:
+    """Return what a pose needs; the other keys, which may be large, stay unread."""
     archive = archive_of(source)
-    values: dict[str, Any] = {}
-    for key in archive.keys:
+    values: dict[str, Any] = dict.fromkeys(archive.keys)
+    for key in set(_KNOWN).intersection(archive.keys):
         value = archive.get(key)
         values[key] = value.values() if isinstance(value, Deferred) else value
     names, dofs = values.pop("dof_names", None), values.get("dofs")
     if names is not None and dofs is not None:
-        if np.shape(names) != np.shape(dofs):
+        labels = _checked(source, "dof_names", names, "U", "names")
+        numbers = _checked(source, "dofs", dofs, "iuf", "numbers")
+        if labels.ndim != 1 or labels.shape != numbers.shape:
             raise source.error(
-                f"dof_names: expected {np.size(dofs)} names as in dofs, found {np.size(names)}"
+                f"dof_names: expected {numbers.size} names as in dofs, found {labels.size}"
             )
-        values["dofs"] = dict(zip(map(str, names.tolist()), dofs.tolist(), strict=True))
+        values["dofs"] = dict(zip(labels.tolist(), numbers.tolist(), strict=True))
     return values
 
 
 def _from_values(source: Source, values: Mapping[str, Any]) -> PoseRecord:
     version = values.get("viewer_pose", _VERSION)
+    version = version.tolist() if isinstance(version, np.ndarray) else version
     if version != _VERSION:
         raise source.error(f"viewer_pose: expected {_VERSION}, found {printable(version, 40)}")
     found: dict[str, Floats | None] = {
@@ -125,7 +143,7 @@ def _from_values(source: Source, values: Mapping[str, Any]) -> PoseRecord:
     }
     parts = {
         key: array
-        for key in (*PARTS, "body_pose", *_HANDS)
+        for key in _PARTS
         if (array := _array(source, values, key)) is not None
     }
     scale = _array(source, values, "scale")
@@ -137,8 +155,8 @@ def _from_values(source: Source, values: Mapping[str, Any]) -> PoseRecord:
         expression=found["expression"],
         translation=found["translation"],
         scale=None if scale is None else _single(source, "scale", scale),
-        flat_hands=_flag(values, "flat_hand_mean"),
-        hand_coefficients=_flag(values, "use_pca"),
+        flat_hands=_flag(source, values, "flat_hand_mean"),
+        hand_coefficients=_flag(source, values, "use_pca"),
     )
     is_empty = not record.dofs and not record.parts and record.vector is None
     if is_empty and all(value is None for value in (*found.values(), scale)):
@@ -146,13 +164,16 @@ def _from_values(source: Source, values: Mapping[str, Any]) -> PoseRecord:
         raise source.error(f"expected a pose (dofs, poses, body_pose, betas …), found keys {keys}")
     if record.translation is not None and len(record.translation) != 3:
         raise source.error(f"translation: expected 3 numbers, found {len(record.translation)}")
-    if record.scale is not None and record.scale <= 0.0:
-        source.warn(f"scale: expected more than 0, found {record.scale:g}")
+    odd = [printable(key, 40) for key in values if key not in (*_KNOWN, *_NOT_NEEDED)]
+    if odd:
+        source.warn(f"keys that mean nothing in a pose: {', '.join(odd[:12])}")
     return record
 
 
-def _flag(values: Mapping[str, Any], key: str) -> bool | None:
-    return bool(np.all(values[key])) if key in values else None
+def _flag(source: Source, values: Mapping[str, Any], key: str) -> bool | None:
+    if values.get(key) is None:
+        return None
+    return bool(_checked(source, key, values[key], "bi", "true or false").all())
 
 
 def _single(source: Source, key: str, values: Floats) -> float:
@@ -170,14 +191,28 @@ def _array(source: Source, values: Mapping[str, Any], key: str) -> Floats | None
     """Return the numbers of a key in one row; several frames are refused."""
     if values.get(key) is None:
         return None
-    try:
-        array = np.atleast_1d(frozen(key, np.asarray(values[key]), np.shape(values[key])))
-    except (RigError, ValueError) as problem:
-        reason = str(problem).removeprefix(f"{key}: ")
-        raise source.error(f"{key}: {printable(reason)}") from None
-    if key in ("pose", "poses", "fullpose") and array.ndim == 2 and len(array) > 1:
-        raise source.error(f"{key}: expected one pose, found {len(array)} frames")
+    array = _checked(source, key, values[key], "iuf", "numbers").astype(np.float64)
+    wrong = array[~(np.abs(array) <= LARGEST)]
+    if len(wrong):
+        raise source.error(f"{key}: expected finite numbers, found {wrong[0]:g}")
+    is_per_joint = key in _PER_JOINT and array.shape[-1:] == (3,)
+    frames = math.prod(array.shape[: -2 if is_per_joint else -1])
+    if frames > 1:
+        raise source.error(f"{key}: expected one pose, found {frames} frames")
     return array.ravel()
+
+
+def _checked(source: Source, key: str, value: object, kinds: str, what: str) -> NDArray[Any]:
+    """Return an array of some kinds of values, written as an array or as lists."""
+    try:
+        array = np.asarray(value)
+    except ValueError:  # lists of different lengths, or more deeply nested than arrays can be
+        array = np.zeros(0, dtype=object)
+    if array.dtype.kind in kinds or (array.size == 0 and array.dtype.kind == "f"):
+        return array
+    found = value if isinstance(value, str | int | float | list) else None
+    shown = printable(found, 40) if found is not None else describe(_value(value))
+    raise source.error(f"{key}: expected {what}, found {shown}")
 
 
 def _dofs(source: Source, given: object) -> dict[str, float]:
@@ -210,8 +245,14 @@ def _named(record: PoseRecord) -> dict[str, Any]:
     ):
         if array is not None:
             named[name] = array.tolist()
-    if record.scale is not None:
-        named["scale"] = record.scale
+    named |= {key: np.asarray(array).tolist() for key, array in record.parts.items()}
+    for name, single in (
+        ("scale", record.scale),
+        ("flat_hand_mean", record.flat_hands),
+        ("use_pca", record.hand_coefficients),
+    ):
+        if single is not None:
+            named[name] = single
     return named
 
 
@@ -245,6 +286,6 @@ def write(content: Figure | Clip | PoseRecord, path: str | Path) -> None:
         named = _named(content)
         dofs = named.pop("dofs")
         arrays = {key: np.asarray(value) for key, value in named.items()}
-        arrays["dof_names"] = np.array(list(dofs))
+        arrays["dof_names"] = np.array(list(dofs), dtype=np.str_)
         arrays["dofs"] = np.array(list(dofs.values()))
         save_arrays(path, arrays)

@@ -17,8 +17,8 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.errors import printable
-from viewer.formats._archive import Archive
-from viewer.formats._container import archive_of
+from viewer.formats._archive import Archive, describe
+from viewer.formats._container import archive_of, are_indices, finite
 from viewer.formats._smpl_names import Member, member_of
 from viewer.formats._smpl_parts import (
     IGNORED,
@@ -103,17 +103,8 @@ def _layout(n_joints: int) -> PoseLayout:
     return PoseLayout(3 * n_joints, starts, np.zeros(n_joints, dtype=bool))
 
 
-def finite(archive: Archive, key: str, array: Deferred) -> Floats:
-    """Return an array's values as float64, all of them finite."""
-    values = array.values().astype(np.float64)
-    if not np.isfinite(values).all():
-        count = int((~np.isfinite(values)).sum())
-        raise archive.error(key, f"expected finite numbers, found {count} that are not")
-    return values
-
-
 def _mesh(source: Source, archive: Archive, used: list[str]) -> Mesh:
-    positions = finite(archive, "v_template", archive.array("v_template", ("V", 3)))
+    positions = finite(archive, "v_template", archive.array("v_template", ("V", 3)).values())
     if len(positions) == 0:
         raise archive.error("v_template", "expected at least one vertex, found none")
     triangles = _indices(archive, "f", (None, 3), len(positions), "vertex")
@@ -132,10 +123,9 @@ def _indices(
     archive: Archive, key: str, shape: tuple[int | None, ...], end: int, what: str
 ) -> Ints:
     values = archive.array(key, shape).values()
-    if values.size and (values.min() < 0 or values.max() >= end or (values % 1).any()):
-        raise archive.error(
-            key, f"expected a {what} from 0 to {end - 1}, found {values.min()} to {values.max()}"
-        )
+    if not are_indices(values, end):
+        wrong = values[~((values >= 0) & (values < end) & (values == np.floor(values)))]
+        raise archive.error(key, f"expected a {what} from 0 to {end - 1}, found {wrong[0]:g}")
     return values.astype(np.int32)
 
 
@@ -143,9 +133,8 @@ def _parents(archive: Archive, used: list[str]) -> Ints:
     """Return each joint's parent; the root's is written in four ways."""
     table = archive.array("kintree_table").values()
     if table.ndim not in (1, 2) or (table.ndim == 2 and len(table) != 2) or table.size == 0:
-        raise archive.error(
-            "kintree_table", f"expected 2 x J numbers, found {' x '.join(map(str, table.shape))}"
-        )
+        found = describe(archive.get("kintree_table"))
+        raise archive.error("kintree_table", f"expected 2 x J numbers, found {found}")
     rows = np.atleast_2d(table).astype(np.float64)
     ids = rows[1] if len(rows) == 2 else np.arange(rows.shape[1])
     if (ids != np.arange(len(ids))).any():
@@ -157,9 +146,9 @@ def _parents(archive: Archive, used: list[str]) -> Ints:
         if joint and np.isin(parent, _ROOTS):
             raise archive.error("kintree_table", f"expected one root, found joints 0 and {joint}")
         if not (parent == -1 if joint == 0 else 0 <= parent < joint and parent % 1 == 0):
+            wanted = "a parent before it" if joint else "the root, whose parent is -1"
             raise archive.error(
-                "kintree_table",
-                f"joint {joint}: expected a parent before it, found {printable(f'{parent:g}')}",
+                "kintree_table", f"joint {joint}: expected {wanted}, found {parent:g}"
             )
     used.append("kintree_table")
     return parents.astype(np.int32)
@@ -167,9 +156,8 @@ def _parents(archive: Archive, used: list[str]) -> Ints:
 
 def _regressor(archive: Archive, n_joints: int, n_vertices: int, used: list[str]) -> JointRegressor:
     matrix = archive.sparse("J_regressor", (n_joints, n_vertices))
-    joints, vertices, weights = matrix.entries()
-    if not np.isfinite(weights).all():
-        raise archive.error("J_regressor", "expected finite numbers")
+    joints, vertices, numbers = matrix.entries()
+    weights = finite(archive, "J_regressor", numbers)
     sums = np.bincount(joints, weights, minlength=n_joints)
     worst = int(np.abs(sums - 1.0).argmax())
     if abs(sums[worst] - 1.0) > 0.05:
@@ -178,19 +166,15 @@ def _regressor(archive: Archive, n_joints: int, n_vertices: int, used: list[str]
             f"joint {worst}: expected weights with the sum 1, found {sums[worst]:.4g}",
         )
     used.append("J_regressor")
-    return JointRegressor(
-        n_joints, joints.astype(np.int32), vertices.astype(np.int32), weights.astype(np.float64)
-    )
+    return JointRegressor(n_joints, joints.astype(np.int32), vertices.astype(np.int32), weights)
 
 
 def _skin(
     source: Source, archive: Archive, joints: Floats, n_vertices: int, used: list[str]
 ) -> Skin:
     matrix = archive.sparse("weights", (n_vertices, len(joints)))
-    vertices, columns, weights = matrix.entries()
-    weights = weights.astype(np.float64)
-    if not np.isfinite(weights).all():
-        raise archive.error("weights", "expected finite numbers")
+    vertices, columns, numbers = matrix.entries()
+    weights = finite(archive, "weights", numbers)
     if (weights < 0.0).any():
         vertex = int(vertices[weights.argmin()])
         raise archive.error(
@@ -228,10 +212,8 @@ def _correctives(
     def load() -> Floats:
         values = array.values()
         rows = values if is_flat else np.moveaxis(values, 2, 0)
-        offsets = np.ascontiguousarray(rows, dtype=np.float64).reshape(count, n_vertices, 3)
-        if not np.isfinite(offsets).all():
-            raise archive.error("posedirs", "expected finite numbers")
-        return offsets
+        offsets = finite(archive, "posedirs", np.ascontiguousarray(rows, np.float64))
+        return offsets.reshape(count, n_vertices, 3)
 
     used.append("posedirs")
     return Correctives(Deferred((count, n_vertices, 3), np.float64, load)) if count else None

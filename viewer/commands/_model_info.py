@@ -1,0 +1,134 @@
+"""What ``info`` says of body models beyond skeleton, mesh and skin."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from viewer.errors import printable
+from viewer.rig.figure import Figure
+from viewer.rig.measure import measure
+from viewer.rig.mirror import asymmetry
+from viewer.rig.pose import Pose
+from viewer.rig.pose_vector import write_vector
+from viewer.rig.scalars import compute, length_unit, strongest
+from viewer.rig.scene import Actor
+from viewer.rig.shape import shaped
+from viewer.rig.skinning import Skinning
+
+__all__ = ["describe_model", "model_lines"]
+
+_CUTS = (4, 8)  # influences of common engines
+
+
+def describe_model(actor: Actor, skinning: Skinning) -> dict[str, Any]:
+    """Return what a body model has, ready for JSON; empty for a plain rig.
+
+    Parameters
+    ----------
+    actor : Actor
+        Shaped and posed.
+    skinning : Skinning
+        How joints move its mesh.
+    """
+    figure, pose = actor.figure, actor.pose
+    model: dict[str, Any] = {"facts": dict(figure.facts)} if figure.facts else {}
+    if figure.blend_shapes is not None:
+        shapes = figure.blend_shapes
+        model["shapes"] = [
+            {"name": name, "group": group}
+            for name, group in zip(shapes.names, shapes.groups, strict=True)
+        ]
+    if figure.mesh is not None and figure.unit == "m":
+        model["rest"] = _rest(figure, pose)
+    if pose is not None:
+        model |= _place(pose)
+        if figure.pose_layout is not None and figure.skeleton is not None:
+            numbers = write_vector(figure.pose_layout, figure.skeleton, pose)
+            model["own_numbers"] = numbers.tolist()
+    model |= _annotations(figure)
+    model["effects"] = _effects(figure, pose, skinning)
+    return model
+
+
+def _rest(figure: Figure, pose: Pose | None) -> dict[str, Any]:
+    found = measure(figure if pose is None else shaped(figure, pose.shape_weights))
+    return {"height": found.height, "volume": found.volume, "mass": found.mass}
+
+
+def _place(pose: Pose) -> dict[str, Any]:
+    return {
+        "shape_weights": pose.shape_weights.tolist(),
+        "figure_translation": pose.figure_translation.tolist(),
+        "figure_scale": pose.figure_scale,
+    }
+
+
+def _annotations(figure: Figure) -> dict[str, Any]:
+    parts: dict[str, Any] = {}
+    if figure.body_parts is not None:
+        names = figure.body_parts.names
+        counts = np.bincount(figure.body_parts.of_vertex, minlength=len(names))
+        parts["body_parts"] = dict(zip(names, counts.tolist(), strict=True))
+    if figure.keypoints is not None:
+        parts["keypoints"] = list(figure.keypoints.names)
+    if figure.reduced is not None:
+        parts["reduced"] = {
+            "vertices": len(figure.reduced.vertices),
+            "triangles": len(figure.reduced.triangles),
+        }
+    if figure.symmetry is not None:
+        parts["asymmetry"] = float(asymmetry(figure).max())
+    return parts
+
+
+def _effects(figure: Figure, pose: Pose | None, skinning: Skinning) -> dict[str, float]:
+    """Return by how much each way of skinning differs from the other, at most, in this pose."""
+    if not figure.is_attached or pose is None:
+        return {}
+    effects: dict[str, float] = {}
+    for count in _CUTS:
+        if strongest(figure) > count:
+            cut = Skinning(max_influences=count, correctives=skinning.correctives)
+            effects[f"cut to {count} influences"] = float(compute("cut", figure, pose, cut).max())
+    for name, text in (("normalized", "normalised weights"), ("correctives", "pose correctives")):
+        effects[text] = float(compute(name, figure, pose, skinning).max())
+    effects["DQS against LBS"] = float(compute("methods", figure, pose, skinning).max())
+    return {text: value for text, value in effects.items() if value > 0.0}
+
+
+def model_lines(model: dict[str, Any], figure: Figure) -> list[str]:
+    """Return the lines for people."""
+    lines = [f"  {name:<10} {printable(text, 400)}" for name, text in _facts(model)]
+    if "rest" in model:
+        rest = model["rest"]
+        lines.append(
+            f"  rest       {rest['height']:.3f} m high, {1000.0 * rest['volume']:.2f} litres, "
+            f"{rest['mass']:.1f} kg at 985 kg/m3"
+        )
+    if any(model.get("shape_weights", [])):
+        weights = ", ".join(f"{weight:g}" for weight in model["shape_weights"])
+        lines.append(f"  shape      {weights}")
+    if "body_parts" in model:
+        counts = ", ".join(f"{printable(n)} {c}" for n, c in model["body_parts"].items())
+        lines.append(f"  parts      {counts}")
+    if "reduced" in model:
+        reduced = model["reduced"]
+        lines.append(
+            f"  reduced    {reduced['vertices']} vertices, {reduced['triangles']} triangles"
+        )
+    if "keypoints" in model:
+        lines.append(f"  keypoints  {len(model['keypoints'])}")
+    factor, unit = length_unit(figure)
+    if "asymmetry" in model:
+        lines.append(
+            f"  symmetry   left and right differ by {factor * model['asymmetry']:.3g} {unit}"
+        )
+    for text, value in model.get("effects", {}).items():
+        lines.append(f"  effect     {text}: up to {factor * value:.3g} {unit} in this pose")
+    return lines
+
+
+def _facts(model: dict[str, Any]) -> list[tuple[str, str]]:
+    return list(model.get("facts", {}).items())

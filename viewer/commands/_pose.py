@@ -1,0 +1,270 @@
+"""Options that shape and pose what was opened; shared by the commands that open files."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from viewer.commands._numbers import number
+from viewer.errors import RigError, ViewerError, printable
+from viewer.rig.arrays import Floats
+from viewer.rig.clip import sample
+from viewer.rig.hands import hand_vectors
+from viewer.rig.mirror import mirror_pose
+from viewer.rig.pose_record import PoseRecord, apply_record
+from viewer.rig.pose_vector import set_joint_rotations
+from viewer.rig.rotation import rotation_vector_to_matrix
+from viewer.rig.scene import Actor, Scene
+from viewer.rig.skeleton import clamp_dofs, dof_label, find_dof
+from viewer.rig.skinning import METHODS, Skinning
+
+__all__ = ["add_pose_arguments", "add_skinning_arguments", "apply_pose", "skinning_of"]
+
+_FIGURE = "figure."  # label of the DOFs that a figure has as a whole
+_MOST_FRAMES = 1_000_000_000
+
+
+def add_pose_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options that shape and pose."""
+    group = parser.add_argument_group("shape and pose, in this order")
+    group.add_argument(
+        "--time", type=number, metavar="S", help="pose by the clip at S seconds (default its start)"
+    )
+    group.add_argument(
+        "--frame", type=int, metavar="N", help="pose by the clip at frame N, counted from 0"
+    )
+    group.add_argument(
+        "--fps", type=number, default=30.0, metavar="R", help="frames a second (default 30)"
+    )
+    group.add_argument(
+        "--shape", metavar="A,B,…", help="shape coefficients (betas) of a body model"
+    )
+    group.add_argument("--expression", metavar="A,B,…", help="expression coefficients")
+    group.add_argument("--hands", choices=("flat", "mean"), help="start from flat or mean hands")
+    group.add_argument(
+        "--pose",
+        metavar="FILE|A,B,…",
+        help="a pose file (.json, .npz, .txt), or the model's own numbers",
+    )
+    group.add_argument(
+        "--dof",
+        action="append",
+        default=[],
+        metavar="NAME.X=VALUE",
+        help="set a DOF: joint (or #index) and x, y, z for a rotation (radians as in the file, or "
+        "30deg) or tx, ty, tz for the root's translation; figure.tx, .ty, .tz, .scale place a "
+        "whole figure; may be repeated",
+    )
+    group.add_argument("--mirror", action="store_true", help="exchange left and right")
+
+
+def add_skinning_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options that choose how joints move the mesh."""
+    group = parser.add_argument_group("skinning")
+    group.add_argument("--method", choices=METHODS, default="lbs", help="default: lbs")
+    group.add_argument(
+        "--dqs-share", type=number, default=0.5, metavar="S", help="of DQS with --method mix"
+    )
+    group.add_argument(
+        "--influences", type=int, default=0, metavar="N", help="only each vertex's N strongest"
+    )
+    group.add_argument(
+        "--normalize", action="store_true", help="scale each vertex's weights to a sum of 1"
+    )
+    group.add_argument("--no-correctives", action="store_true", help="leave out pose correctives")
+
+
+def skinning_of(arguments: argparse.Namespace) -> Skinning:
+    """Return how joints are asked to move the mesh."""
+    if not 0.0 <= arguments.dqs_share <= 1.0:
+        raise ViewerError(f"--dqs-share: expected 0 to 1, found {arguments.dqs_share:g}")
+    if arguments.influences < 0:
+        raise ViewerError(f"--influences: expected 0 or more, found {arguments.influences}")
+    return Skinning(
+        method=arguments.method,
+        share=arguments.dqs_share,
+        max_influences=arguments.influences,
+        normalize=arguments.normalize,
+        correctives=not arguments.no_correctives,
+    )
+
+
+def apply_pose(scene: Scene, arguments: argparse.Namespace) -> list[str]:
+    """Shape and pose a scene as asked.
+
+    Returns
+    -------
+    list of str
+        What could not be taken over exactly, one line each.
+
+    Raises
+    ------
+    ViewerError
+        If an option makes no sense for what was opened.
+    """
+    _apply_time(scene, _time(arguments))
+    notes: list[str] = []
+    weights = PoseRecord(
+        shape=_numbers("--shape", arguments.shape),
+        expression=_numbers("--expression", arguments.expression),
+    )
+    if weights.shape is not None or weights.expression is not None:
+        notes += _apply_record("--shape", weights, scene)
+    if arguments.hands:
+        _apply_hands(scene, arguments.hands)
+    if arguments.pose and _is_numbers(arguments.pose):
+        vector = _numbers("--pose", arguments.pose)
+        notes += _apply_record("--pose", PoseRecord(vector=vector), scene)
+    notes += _apply_dofs(scene, arguments.dof)
+    if arguments.mirror:
+        for actor in scene.actors:
+            if actor.pose is not None:
+                actor.pose = mirror_pose(actor.figure, actor.pose)
+    return notes
+
+
+def pose_files(arguments: argparse.Namespace) -> list[str]:
+    """Return the pose file that is asked for, to be opened with the others."""
+    return [arguments.pose] if arguments.pose and not _is_numbers(arguments.pose) else []
+
+
+def _is_numbers(text: str) -> bool:
+    return re.fullmatch(r"[-+.\deE,\s]+", text) is not None
+
+
+def _numbers(option: str, text: str | None) -> Floats | None:
+    if text is None:
+        return None
+    words = re.split(r"[,\s]+", text.strip().strip(","))
+    try:
+        return np.array([number(word) for word in words])
+    except (ValueError, argparse.ArgumentTypeError):
+        raise ViewerError(
+            f'{option}: expected numbers separated by commas, found "{printable(text, 60)}"'
+        ) from None
+
+
+def _time(arguments: argparse.Namespace) -> tuple[float, bool] | None:
+    """Return seconds, and whether they count from the clip's start."""
+    if arguments.frame is None:
+        return None if arguments.time is None else (arguments.time, False)
+    if arguments.time is not None:
+        raise ViewerError("--frame and --time: expected one of them")
+    if arguments.fps <= 0.0:
+        raise ViewerError(f"--fps: expected more than 0, found {arguments.fps:g}")
+    if not 0 <= arguments.frame <= _MOST_FRAMES:
+        raise ViewerError(f"--frame: expected 0 or more, found {arguments.frame}")
+    return arguments.frame / arguments.fps, True
+
+
+def _apply_time(scene: Scene, time: tuple[float, bool] | None) -> None:
+    """Pose every actor that has a clip as it is at a time."""
+    if time is None:
+        return
+    moving = [actor for actor in scene.actors if actor.clip is not None]
+    if not moving:
+        raise ViewerError("--time: no file is a clip")
+    for actor in moving:
+        if actor.clip and actor.figure.skeleton and actor.pose:
+            seconds, from_start = time
+            seconds += actor.clip.start if from_start else 0.0
+            sample(actor.clip, actor.figure.skeleton, seconds, out=actor.pose)
+
+
+def _apply_record(option: str, record: PoseRecord, scene: Scene) -> list[str]:
+    """Apply a record to the first actor that takes it."""
+    problem: RigError | None = None
+    for actor in scene.actors:
+        if actor.pose is not None:
+            try:
+                return apply_record(record, actor.figure, actor.pose)
+            except RigError as found:
+                problem = problem or found
+    raise ViewerError(f"{option}: {problem or 'no file has a skeleton'}")
+
+
+def _apply_hands(scene: Scene, which: str) -> None:
+    handed = [actor for actor in scene.actors if actor.figure.hands and actor.pose is not None]
+    if not handed:
+        raise ViewerError("--hands: no file has hand components")
+    for actor in handed:
+        for hand in actor.figure.hands:
+            vectors = hand_vectors(hand, np.zeros(0), flat=which == "flat")
+            assert actor.figure.skeleton is not None and actor.pose is not None
+            turned = rotation_vector_to_matrix(vectors)
+            set_joint_rotations(actor.figure.skeleton, actor.pose, hand.joints, turned)
+
+
+def _apply_dofs(scene: Scene, settings: Sequence[str]) -> list[str]:
+    """Set DOFs given as ``NAME.X=VALUE``, on the first actor that has such a joint."""
+    notes: list[str] = []
+    for setting in settings:
+        label, equals, text = setting.partition("=")
+        if not equals:
+            raise ViewerError(f'--dof: expected NAME.X=VALUE, found "{setting}"')
+        if label.lower().startswith(_FIGURE) and _place(scene, label, setting, text):
+            continue
+        actor, dof, note = _find(scene, label)
+        skeleton = actor.figure.skeleton
+        assert skeleton is not None and actor.pose is not None  # _find looked
+        notes += note
+        is_rotation = skeleton.dof_kinds[dof] >= 3
+        wanted = actor.pose.dofs.copy()
+        wanted[dof] = _dof_value(setting, text, is_rotation)
+        clamped = clamp_dofs(skeleton, wanted)
+        if clamped[dof] != wanted[dof]:
+            low, high = skeleton.dof_limits[dof]
+            name, unit = dof_label(skeleton, dof), " rad" if is_rotation else ""
+            limits = f"{low:g} to {high:g}{unit}"
+            how = f"locked at {low:g}{unit}" if low == high else f"clamped to its limits {limits}"
+            notes.append(f"{name}={text} is {how}")
+        actor.pose.dofs[:] = clamped
+    return notes
+
+
+def _place(scene: Scene, label: str, setting: str, text: str) -> bool:
+    """Move or scale the first posed figure as a whole; return whether the label says so."""
+    part = label[len(_FIGURE) :].lower()
+    actor = next((actor for actor in scene.actors if actor.pose is not None), None)
+    if part not in ("tx", "ty", "tz", "scale") or actor is None or actor.pose is None:
+        return False
+    value = _dof_value(setting, text, False)
+    if part == "scale":
+        if value <= 0.0:
+            raise ViewerError(f"--dof: expected a scale above 0, found {value:g}")
+        actor.pose.figure_scale = value
+    else:
+        actor.pose.figure_translation["xyz".index(part[1])] = value
+    return True
+
+
+def _find(scene: Scene, label: str) -> tuple[Actor, int, list[str]]:
+    problem: RigError | None = None
+    found: list[tuple[Actor, int]] = []
+    for actor in scene.actors:
+        if actor.figure.skeleton is not None:
+            try:
+                found.append((actor, find_dof(actor.figure.skeleton, label)))
+            except RigError as error:
+                problem = problem or error
+    if not found:
+        raise ViewerError(f"--dof: {problem or 'no file has a skeleton'}")
+    note = []
+    if len(found) > 1:
+        first = printable(found[0][0].figure.name)
+        note = [f"{len(found)} figures have {label}; the first, {first}, is posed"]
+    return (*found[0], note)
+
+
+def _dof_value(setting: str, text: str, is_rotation: bool) -> float:
+    found = re.fullmatch(r"(.*?)(rad|deg)?", text.strip())
+    assert found is not None  # the pattern matches everything
+    try:
+        value = number(found[1])
+    except (ValueError, argparse.ArgumentTypeError):
+        raise ViewerError(f'--dof: expected a number after "=", found "{setting}"') from None
+    return math.radians(value) if found[2] == "deg" and is_rotation else value

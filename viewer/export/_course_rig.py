@@ -1,0 +1,125 @@
+"""A skeleton as ``.skel`` holds it: joints depth-first, three rotations each, a moving root."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.pose import Pose
+from viewer.rig.rotation import quaternion_to_matrix
+from viewer.rig.skeleton import Skeleton, joint_label
+
+__all__ = ["course_skeleton"]
+
+_CUBE = 0.01  # of the skeleton's size: half a side of boxes where a file has none
+
+
+def course_skeleton(skeleton: Skeleton, pose: Pose) -> tuple[Skeleton, Ints]:
+    """Return the skeleton in the form of the course files, posed as its own rest.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Without rest rotations and scales.
+    pose : Pose
+        Becomes the file's pose; the figure's translation goes to the roots' offsets.
+
+    Returns
+    -------
+    skeleton : Skeleton
+        Joints in depth-first order.
+    order : (J,) int32
+        The old index of each new joint.
+
+    Raises
+    ------
+    RigError
+        If a joint has what the format cannot hold.
+    """
+    _check(skeleton, pose)
+    order = depth_first(skeleton.parents)
+    place = np.empty_like(order)
+    place[order] = np.arange(len(order))
+    above = skeleton.parents[order]
+    offsets = (skeleton.rest_translations + pose.translations)[order]
+    offsets[above < 0] += pose.figure_translation
+    rows = _rotation_rows(skeleton)[order].ravel()
+    values = np.where(rows >= 0, pose.dofs[rows], 0.0)
+    limits = np.where(rows[:, None] >= 0, skeleton.dof_limits[rows], 0.0)
+    offsets[0] += _root_shift(skeleton, pose)
+    count = skeleton.n_joints
+    return Skeleton(
+        names=tuple(skeleton.names[joint] for joint in order),
+        parents=np.where(above >= 0, place[above], -1).astype(np.int32),
+        rest_translations=offsets,
+        rest_rotations=skeleton.rest_rotations[order],
+        rest_scales=skeleton.rest_scales[order],
+        dof_joints=np.concatenate([np.zeros(3, int), np.repeat(np.arange(count), 3)]),
+        dof_kinds=np.concatenate([np.arange(3), np.tile([3, 4, 5], count)]),
+        rest_dofs=np.concatenate([np.zeros(3), values]),
+        dof_limits=np.concatenate([np.tile([-np.inf, np.inf], (3, 1)), limits]),
+        boxes=_boxes(skeleton)[order],
+    ), order
+
+
+def depth_first(parents: Ints) -> Ints:
+    """Return joints in the order in which a file that nests them lists them: (J,) int32."""
+    children: list[list[int]] = [[] for _ in parents]
+    stack: list[int] = []
+    for joint, parent in enumerate(parents.tolist()):
+        (children[parent] if parent >= 0 else stack).append(joint)
+    stack.reverse()
+    order = []
+    while stack:
+        joint = stack.pop()
+        order.append(joint)
+        stack.extend(reversed(children[joint]))
+    return np.array(order, dtype=np.int32)
+
+
+def _check(skeleton: Skeleton, pose: Pose) -> None:
+    turned = quaternion_to_matrix(pose.rotations) - np.eye(3)
+    for what, off in (
+        ("rest rotation", np.abs(turned).max(axis=(1, 2))),
+        ("scale", np.abs(pose.scales - 1.0).max(axis=1)),
+    ):
+        worst = int(off.argmax())
+        if off[worst] > 1e-12:
+            raise RigError(f".skel cannot hold the {what} of joint {joint_label(skeleton, worst)}")
+
+
+def _rotation_rows(skeleton: Skeleton) -> Ints:
+    """Return each joint's rows about x, y and z, -1 for one that it lacks: (J, 3)."""
+    rows = np.full((skeleton.n_joints, 3), -1, dtype=np.int32)
+    turns = np.flatnonzero(skeleton.dof_kinds >= 3)
+    for row in turns.tolist():
+        joint, axis = int(skeleton.dof_joints[row]), int(skeleton.dof_kinds[row]) - 3
+        if rows[joint, axis:].max() >= 0:
+            raise RigError(
+                f".skel turns joints about x, then y, then z; joint "
+                f"{joint_label(skeleton, joint)} turns otherwise"
+            )
+        rows[joint, axis] = row
+    return rows
+
+
+def _root_shift(skeleton: Skeleton, pose: Pose) -> Floats:
+    """Return how far DOFs move the first joint; others must not translate."""
+    shift = np.zeros(3)
+    for row in np.flatnonzero(skeleton.dof_kinds < 3).tolist():
+        joint = int(skeleton.dof_joints[row])
+        if joint == 0:
+            shift[skeleton.dof_kinds[row]] += pose.dofs[row]
+        elif pose.dofs[row] != 0.0:
+            raise RigError(
+                f".skel cannot hold a translation of joint {joint_label(skeleton, joint)}"
+            )
+    return shift
+
+
+def _boxes(skeleton: Skeleton) -> Floats:
+    if skeleton.boxes is not None:
+        return skeleton.boxes
+    half = _CUBE * (float(np.abs(skeleton.rest_translations).max()) or 1.0)
+    return np.tile([[-half] * 3, [half] * 3], (skeleton.n_joints, 1, 1))

@@ -1,0 +1,55 @@
+"""Read-outs of a body: height, volume and what it would weigh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from viewer.errors import RigError
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import bounding_box, volume
+
+__all__ = ["DENSITY", "Measures", "measure"]
+
+DENSITY = 985.0
+"""Of a human body, kg per cubic metre."""
+
+
+@dataclass(frozen=True, slots=True)
+class Measures:
+    """Of a rest mesh, in its own unit.
+
+    Attributes
+    ----------
+    height : float
+        Along the up axis.
+    volume : float
+        Enclosed, cubed units.
+    mass : float or None
+        Volume times ``DENSITY``, kilograms; None unless the unit is metres.
+    """
+
+    height: float
+    volume: float
+    mass: float | None
+
+
+def measure(figure: Figure) -> Measures:
+    """Measure a figure's rest mesh; shape it before.
+
+    Parameters
+    ----------
+    figure : Figure
+        With a mesh.
+
+    Raises
+    ------
+    RigError
+        If it has none.
+    """
+    if figure.mesh is None:
+        raise RigError(f"figure {figure.name} has no mesh to measure")
+    box = bounding_box(figure.mesh.positions)
+    axis = 2 if figure.up == "z" else 1
+    inside = abs(volume(figure.mesh.positions, figure.mesh.triangles))
+    mass = DENSITY * inside if figure.unit == "m" else None
+    return Measures(float(box[1, axis] - box[0, axis]), inside, mass)
