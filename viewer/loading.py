@@ -15,6 +15,7 @@ from viewer.rig.arrays import Bytes
 from viewer.rig.clip import Clip, sample
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Material
+from viewer.rig.pose import Pose
 from viewer.rig.pose_record import PoseRecord, apply_record
 from viewer.rig.scene import Actor, Scene, scene_box
 from viewer.rig.transform import rotation_transform, translation_matrix
@@ -161,13 +162,19 @@ def add_to_actor(contents: Contents, actor: Actor) -> tuple[Actor, list[str]]:
         If a pose or picture does not fit; the actor is then as it was.
     """
     notes: list[str] = []
+    trial = replace(actor, pose=None if actor.pose is None else actor.pose.copy())
     for path, pixels in contents.pictures:
-        actor = replace(actor, figure=with_texture(actor.figure, path, pixels))
+        trial.figure = with_texture(trial.figure, path, pixels)
     for path, record in contents.poses:
-        if actor.pose is None:
+        if trial.pose is None:
             raise RigError(f"{printable(path, 300)} is a pose, {actor.figure.name} has no skeleton")
-        notes += _apply(path, record, actor)
-    return actor, notes
+        notes += _apply(path, record, trial)
+    # Nothing fails from here on.
+    if actor.pose is not None and trial.pose is not None:
+        for name in Pose.__slots__:
+            setattr(actor.pose, name, getattr(trial.pose, name))
+    is_same = trial.figure is actor.figure
+    return actor if is_same else replace(actor, figure=trial.figure), notes
 
 
 def with_texture(figure: Figure, path: Path, pixels: Bytes) -> Figure:
@@ -205,7 +212,11 @@ def _with_own_picture(source: Source, figure: Figure) -> Figure:
         source.warn(f"{len(pictures)} pictures in the folder: name the texture to show it")
     if len(pictures) != 1:
         return figure
-    return with_texture(figure, pictures[0].path, read_picture(pictures[0]))
+    try:
+        return with_texture(figure, pictures[0].path, read_picture(pictures[0]))
+    except FormatError as problem:
+        source.warn(f"texture {problem}; drawn untextured")
+        return figure
 
 
 def _pairs(figures: Sequence[Figure]) -> list[tuple[int, ...]]:

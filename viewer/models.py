@@ -88,7 +88,8 @@ def known_models(folder: Path) -> dict[str, Path]:
     found: dict[str, Path] = {}
     for path in _files(folder):
         name = _name_of(path)
-        if name is not None and (name not in found or path.suffix == ".npz"):
+        is_better = name in found and (_is_npz(path) and not _is_npz(found[name]))
+        if name is not None and (name not in found or is_better):
             found[name] = path
     return dict(sorted(found.items()))
 
@@ -103,6 +104,10 @@ def _files(folder: Path) -> list[Path]:
         if looked > _MOST_FILES:
             break
     return paths
+
+
+def _is_npz(path: Path) -> bool:
+    return path.suffix.lower() == ".npz"
 
 
 def _name_of(path: Path) -> str | None:
@@ -146,6 +151,7 @@ def find_model(name: str, folder: Path | None) -> Path | None:
 def resolve(file: str | Path) -> Path:
     """Return a path as it is if it exists, else the model of this name in the model folder."""
     path = Path(file)
-    if path.exists() or len(path.parts) != 1:
+    # Path.exists() would raise for a name that is too long.
+    if os.path.exists(path) or len(path.parts) != 1:  # noqa: PTH110
         return path
     return find_model(str(file), load_model_folder()) or path

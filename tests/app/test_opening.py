@@ -11,7 +11,7 @@ from app.tiny import SKEL, skin_text, write_rig
 import viewer.app.loader
 from viewer.app.recent import load_recent, remember, state_folder
 from viewer.errors import RenderError
-from viewer.loading import load
+from viewer.loading import load, read_files
 
 
 def _open(hand, *paths):
@@ -138,11 +138,11 @@ def test_warnings_of_a_file_are_shown(hand, tmp_path):
 def test_slow_reading_can_be_cancelled(hand, rig, monkeypatch):
     gate = threading.Event()
 
-    def slow(*paths):
+    def slow(paths):
         gate.wait(10)
-        return load(*paths)
+        return read_files(paths)
 
-    monkeypatch.setattr(viewer.app.loader, "load", slow)
+    monkeypatch.setattr(viewer.app.loader, "read_files", slow)
     scene = hand.state.scene
     hand.app.frame.open(list(rig))
     loader = hand.state.loader
@@ -161,7 +161,9 @@ def test_slow_reading_can_be_cancelled(hand, rig, monkeypatch):
 
 def test_escape_cancels_reading(hand, rig, monkeypatch):
     gate = threading.Event()
-    monkeypatch.setattr(viewer.app.loader, "load", lambda *paths: (gate.wait(10), load(*paths))[1])
+    monkeypatch.setattr(
+        viewer.app.loader, "read_files", lambda paths: (gate.wait(10), read_files(paths))[1]
+    )
     hand.app.frame.open(list(rig))
     loader = hand.state.loader
     hand.key("escape")

@@ -25,10 +25,12 @@ __all__ = [
 
 
 def reset_pose(state: AppState) -> None:
-    """Set every DOF of every actor back to the file's pose."""
+    """Set every DOF of every actor back to the file's pose; shapes stay."""
     for actor in state.scene.actors:
-        if actor.figure.skeleton is not None:
+        if actor.figure.skeleton is not None and actor.pose is not None:
+            weights = actor.pose.shape_weights
             actor.pose = rest_pose(actor.figure.skeleton)
+            actor.pose.shape_weights = weights
     state.say_status("Pose reset")
 
 

@@ -1,7 +1,11 @@
-"""A dialog to choose files, drawn in the window: the same on every system, and testable."""
+"""A dialog to choose files, drawn in the window: the same on every system, and testable.
+
+It opens files, chooses a folder, or asks where to save; what follows is up to who asked.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from imgui_bundle import imgui
@@ -11,9 +15,18 @@ from viewer.app.widgets import button, note_item
 from viewer.errors import printable
 from viewer.formats import FORMATS
 
-__all__ = ["FileDialog", "draw_file_dialog"]
+__all__ = ["FileDialog", "draw_file_dialog", "folder_of"]
 
-_TITLE = "Open files"
+_HINTS = {
+    "open": "Ctrl+click chooses several: a .skel and its .skin",
+    "folder": "",
+    "save": "",
+}
+
+
+def open_chosen(state: AppState, paths: list[Path]) -> None:
+    """Open what was chosen, after the frame."""
+    state.wants_open = paths
 
 
 class FileDialog:
@@ -23,9 +36,30 @@ class FileDialog:
     ----------
     folder : Path
         Where to start.
+    done : callable
+        Called with the state and what was chosen: files, one folder, or one file to write.
+        Opens them if omitted.
+    purpose : str
+        ``"open"``, ``"folder"`` or ``"save"``.
+    title : str
+        Of the dialog.
+    suffixes : tuple of str
+        Files that are listed; all that can be opened if empty.
+    name : str
+        Suggested name of the file to write.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        done: Callable[[AppState, list[Path]], None] = open_chosen,
+        purpose: str = "open",
+        title: str = "Open files",
+        suffixes: tuple[str, ...] = (),
+        name: str = "",
+    ) -> None:
+        self.done, self.purpose, self.title, self.name = done, purpose, title, name
+        self.suffixes = set(suffixes or opened_suffixes())
         self.folder = folder
         self.chosen: set[Path] = set()
         self.shows_all = False
@@ -60,22 +94,28 @@ class FileDialog:
 
     def listed(self) -> list[Path]:
         """Return folders, and the files that can be opened or all files."""
-        suffixes = {suffix for kind in FORMATS.values() for suffix in kind.suffixes}
         return [
             path
             for path in self.entries
             if not path.name.startswith(".")
-            and (path.is_dir() or self.shows_all or path.suffix.lower() in suffixes)
+            and (path.is_dir() or self.shows_all or path.suffix.lower() in self.suffixes)
         ]
 
 
-def draw_file_dialog(state: AppState) -> list[Path]:
-    """Draw the dialog if there is one; return the files to open when the user has chosen."""
+def opened_suffixes() -> set[str]:
+    """Return the suffixes of files that can be opened, textures among them."""
+    suffixes = {suffix for kind in FORMATS.values() for suffix in kind.suffixes}
+    # Most .txt files are no poses; the check box lists them too.
+    return suffixes - {".txt"} | {".png", ".jpg", ".jpeg"}
+
+
+def draw_file_dialog(state: AppState) -> None:
+    """Draw the dialog if there is one; when the user has chosen, do what was asked for."""
     dialog = state.dialog
     if dialog is None:
-        return []
+        return
     if dialog.is_new:
-        imgui.open_popup(_TITLE)
+        imgui.open_popup(dialog.title)
         dialog.is_new = False
     size = imgui.get_main_viewport().size
     room = (min(620.0, 0.95 * size.x), min(460.0, 0.92 * size.y))
@@ -83,13 +123,14 @@ def draw_file_dialog(state: AppState) -> list[Path]:
     center = imgui.get_main_viewport().get_center()
     imgui.set_next_window_pos(center, imgui.Cond_.appearing, (0.5, 0.5))
     result: list[Path] = []
-    opened, stays = imgui.begin_popup_modal(_TITLE, True)
+    opened, stays = imgui.begin_popup_modal(dialog.title, True)
     if opened:
         result = _draw_content(state, dialog)
         imgui.end_popup()
     if result or not stays:
         state.dialog = None
-    return result
+    if result:
+        dialog.done(state, result)
 
 
 def _draw_content(state: AppState, dialog: FileDialog) -> list[Path]:
@@ -100,7 +141,7 @@ def _draw_content(state: AppState, dialog: FileDialog) -> list[Path]:
     note_item(state, "Folder")
     if entered:
         path = dialog.typed(text)
-        if path is not None:
+        if path is not None and dialog.purpose == "open":
             return [path]
     if button(state, "Up"):
         dialog.enter(dialog.folder.parent)
@@ -112,18 +153,50 @@ def _draw_content(state: AppState, dialog: FileDialog) -> list[Path]:
     if dialog.problem:
         imgui.text_wrapped(dialog.problem)
     result = _draw_list(state, dialog)
-    count = len(dialog.chosen)
+    return result or _draw_buttons(state, dialog)
+
+
+def _draw_buttons(state: AppState, dialog: FileDialog) -> list[Path]:
+    """Draw what confirms and cancels; return what was confirmed."""
+    result: list[Path] = []
+    if dialog.purpose == "save":
+        imgui.set_next_item_width(0.5 * imgui.get_content_region_avail().x)
+        dialog.name = imgui.input_text("##name", dialog.name)[1]
+        note_item(state, "Name")
+        imgui.same_line()
+    count, label = _confirmation(dialog)
     imgui.begin_disabled(count == 0)
-    pressed = button(state, f"Open {count} files###Open" if count > 1 else "Open###Open")
-    if pressed or (count and imgui.is_key_pressed(imgui.Key.enter, False)):
-        result = sorted(dialog.chosen)
+    pressed = button(state, label)
+    by_key = count and dialog.purpose == "open" and imgui.is_key_pressed(imgui.Key.enter, False)
+    if pressed or by_key:
+        result = _confirmed(dialog)
     imgui.end_disabled()
     imgui.same_line()
     if button(state, "Cancel"):
         state.dialog = None
     imgui.same_line()
-    imgui.text_disabled("Ctrl+click chooses several: a .skel and its .skin")
+    imgui.text_disabled(_HINTS[dialog.purpose])
     return result
+
+
+def _confirmation(dialog: FileDialog) -> tuple[int, str]:
+    """Return how many files would be confirmed, and the label of the button that does."""
+    if dialog.purpose == "folder":
+        return 1, "Use this folder"
+    if dialog.purpose == "save":
+        target = dialog.folder / dialog.name
+        return len(dialog.name.strip()), "Replace###Save" if target.is_file() else "Save###Save"
+    count = len(dialog.chosen)
+    return count, f"Open {count} files###Open" if count > 1 else "Open###Open"
+
+
+def _confirmed(dialog: FileDialog) -> list[Path]:
+    if dialog.purpose == "folder":
+        return [dialog.folder]
+    if dialog.purpose == "save":
+        path = dialog.folder / dialog.name.strip()
+        return [path if path.suffix else path.with_suffix(min(dialog.suffixes))]
+    return sorted(dialog.chosen)
 
 
 def _draw_list(state: AppState, dialog: FileDialog) -> list[Path]:
@@ -143,10 +216,16 @@ def _draw_list(state: AppState, dialog: FileDialog) -> list[Path]:
             imgui.text_unformatted(name)
             if not pressed:
                 continue
-            if is_folder:
+            if is_folder and _is_model_folder(dialog, path):
+                dialog.chosen = {path}
+            elif is_folder:
                 dialog.enter(path)
                 break
-            if imgui.is_mouse_double_clicked(imgui.MouseButton_.left):
+            elif dialog.purpose == "save":
+                dialog.name = path.name
+            elif dialog.purpose == "folder":
+                continue
+            elif imgui.is_mouse_double_clicked(imgui.MouseButton_.left):
                 result = [path]
             elif imgui.get_io().key_ctrl:
                 dialog.chosen ^= {path}
@@ -154,3 +233,19 @@ def _draw_list(state: AppState, dialog: FileDialog) -> list[Path]:
                 dialog.chosen = {path}
     imgui.end_child()
     return result
+
+
+def _is_model_folder(dialog: FileDialog, path: Path) -> bool:
+    """Return whether a folder is itself what can be opened; a double click looks into it."""
+    if dialog.purpose != "open" or imgui.is_mouse_double_clicked(imgui.MouseButton_.left):
+        return False
+    names = {name for kind in FORMATS.values() for name in kind.files}
+    return any((path / name).is_file() for name in names)
+
+
+def folder_of(paths: Sequence[Path]) -> Path:
+    """Return where a dialog begins: beside the first file, else the current folder, else home."""
+    try:
+        return paths[0].resolve().parent if paths else Path.cwd()
+    except (OSError, RuntimeError):  # the folder is gone
+        return Path.home()

@@ -10,7 +10,7 @@ from pathlib import Path
 import moderngl
 from imgui_bundle import imgui
 
-from viewer.app.file_dialog import FileDialog, draw_file_dialog
+from viewer.app.file_dialog import FileDialog, draw_file_dialog, folder_of
 from viewer.app.interface import draw_hints, draw_interface
 from viewer.app.keys import handle_keys
 from viewer.app.loader import Loader
@@ -19,11 +19,12 @@ from viewer.app.recent import remember
 from viewer.app.state import AppState
 from viewer.errors import RenderError, ViewerError, printable
 from viewer.formats import free_path, save_image
-from viewer.loading import bundled_files
+from viewer.loading import Contents, add_to_actor, bundled_body, bundled_files
 from viewer.rendering.renderer import Renderer
 from viewer.rendering.target import Target
 from viewer.rig.arrays import Bytes
 from viewer.rig.pose import pose_key
+from viewer.rig.scene import Scene
 
 __all__ = ["Frame"]
 
@@ -73,7 +74,9 @@ class Frame:
         started = time.perf_counter()
         state = self.state
         self.open(draw_interface(state))
-        self.open(draw_file_dialog(state))
+        draw_file_dialog(state)
+        self.open(state.wants_open)
+        state.wants_open = []
         handle_keys(state)
         handle_mouse(state)
         state.limit_camera()
@@ -119,10 +122,18 @@ class Frame:
             )
             target.resolve()
             state.stats.samples = target.samples
+            state.stats.scalar_range = self._scalar_range()
         except ViewerError as problem:
             state.error = str(problem)
         state.say(*self.renderer.notes)
         self.renderer.notes.clear()
+
+    def _scalar_range(self) -> tuple[float, float]:
+        """Return lowest and highest number of the chosen actor's scalar view."""
+        actor = self.state.actor
+        if self.state.options.shading != "scalar" or actor.figure.mesh is None:
+            return 0.0, 0.0
+        return self.renderer.posed_mesh(actor).scalars.range
 
     def _scene_key(self, size: tuple[int, int]) -> object:
         """Return everything the picture of the scene depends on."""
@@ -174,29 +185,50 @@ class Frame:
         if loader is None or not loader.is_done:
             return
         state.loader = None
-        if loader.scene is None:
+        if loader.addition is not None:
+            self._add(loader.addition)
+        elif loader.scene is None:
             state.error = loader.error
-            return
+        else:
+            self._show(loader.scene, loader.paths)
+
+    def _show(self, scene: Scene, paths: tuple[Path, ...]) -> None:
+        state = self.state
         try:
-            self.renderer.prepare(loader.scene)
+            self.renderer.prepare(scene)
         except RenderError as problem:
             state.error = str(problem)
             return
-        state.show_scene(loader.scene, loader.paths)
+        state.show_scene(scene, paths)
         if self.keeps_recent:
-            problem_text = remember(state.recent, loader.paths)
+            problem_text = remember(state.recent, paths)
             if problem_text:
                 state.say(problem_text)
+
+    def _add(self, contents: Contents) -> None:
+        """Apply poses and pictures to the chosen actor."""
+        state = self.state
+        try:
+            actor, notes = add_to_actor(contents, state.actor)
+        except ViewerError as problem:
+            state.error = str(problem)
+            return
+        state.scene.actors[state.chosen_actor] = actor
+        added = [*contents.poses, *contents.pictures]
+        state.say(*contents.warnings, *notes)
+        state.say_status(f"Applied {', '.join(printable(path.name, 60) for path, _ in added)}")
 
     def _do_wanted(self) -> None:
         state = self.state
         if "open dialog" in state.wants:
-            state.dialog = FileDialog(_folder_of(state.paths))
+            state.dialog = FileDialog(folder_of(state.paths))
         if "open bundled" in state.wants:
             self.open(bundled_files())
+        if "open body" in state.wants:
+            self.open([bundled_body()])
         if "screenshot" in state.wants:
             self._save_screenshot()
-        state.wants -= {"open dialog", "open bundled", "screenshot"}
+        state.wants -= {"open dialog", "open bundled", "open body", "screenshot"}
 
     def _save_screenshot(self) -> None:
         """Save the scene, without panels, under a new name in the current folder."""
@@ -220,11 +252,3 @@ class Frame:
         if self.target is not None:
             self.target.release()
         self.renderer.release()
-
-
-def _folder_of(paths: Sequence[Path]) -> Path:
-    """Return where a dialog begins: beside the first file, else the current folder, else home."""
-    try:
-        return paths[0].resolve().parent if paths else Path.cwd()
-    except (OSError, RuntimeError):  # the folder is gone
-        return Path.home()

@@ -6,13 +6,16 @@ from pathlib import Path
 
 from imgui_bundle import imgui
 
-from viewer.app.actions import cancel, redo, reset_pose, undo
+from viewer.app.actions import cancel
 from viewer.app.keys import KEYS, MOUSE
-from viewer.app.panels import PANELS, panel_module
+from viewer.app.menus import draw_menus
+from viewer.app.panels import PANELS, Panel, panel_module
 from viewer.app.state import AppState
-from viewer.app.widgets import begin_menu, button, menu_item, note_item
+from viewer.app.widgets import button
 from viewer.errors import printable
+from viewer.rendering.colormap import color_at
 from viewer.rendering.ground_pass import grid_step
+from viewer.rig.scalars import SCALARS, length_unit
 
 __all__ = ["draw_hints", "draw_interface"]
 
@@ -27,17 +30,18 @@ def draw_interface(state: AppState) -> list[Path]:
     """Draw everything but the scene; return files that a menu asked to open."""
     state.item_rects.clear()
     if state.panels_visible:
-        chosen = _draw_menu(state)
+        chosen = draw_menus(state)
         dock = _draw_dock(state)
         for name, panel in PANELS.items():
-            if name not in state.closed_panels:
-                _draw_panel(state, name, panel.title)
+            if name not in state.closed_panels and _is_needed(state, panel):
+                _draw_panel(state, name, panel)
         node = imgui.internal.dock_builder_get_central_node(dock)
         state.view_rect = (node.pos.x, node.pos.y, node.size.x, node.size.y)
     else:
         chosen = []
         viewport = imgui.get_main_viewport()
         state.view_rect = (viewport.pos.x, viewport.pos.y, viewport.size.x, viewport.size.y)
+    _draw_legend(state)
     _draw_notes(state)
     _draw_keys(state)
     _draw_progress(state)
@@ -89,8 +93,14 @@ def _share(side: tuple[float, float, float]) -> float:
     return max(usual, min(largest, wanted * imgui.get_font_size() / width))
 
 
-def _draw_panel(state: AppState, name: str, title: str) -> None:
-    shown, stays = imgui.begin(title, True)
+def _is_needed(state: AppState, panel: Panel) -> bool:
+    return not panel.needs or getattr(state.actor.figure, panel.needs) is not None
+
+
+def _draw_panel(state: AppState, name: str, panel: Panel) -> None:
+    # A panel that comes with a figure does not push itself in front of the others.
+    flags = imgui.WindowFlags_.no_focus_on_appearing if panel.needs else imgui.WindowFlags_.none
+    shown, stays = imgui.begin(panel.title, True, flags)
     if shown:
         # Labels stand right of their widgets and must not be cut off.
         imgui.push_item_width(-7.5 * imgui.get_font_size())
@@ -99,60 +109,6 @@ def _draw_panel(state: AppState, name: str, title: str) -> None:
     imgui.end()
     if not stays:
         state.closed_panels.add(name)
-
-
-def _draw_menu(state: AppState) -> list[Path]:
-    chosen: list[Path] = []
-    if not imgui.begin_main_menu_bar():
-        return chosen
-    if begin_menu(state, "File"):
-        chosen = _draw_file_menu(state)
-        imgui.end_menu()
-    if begin_menu(state, "Edit"):
-        if menu_item(state, "Undo", "Ctrl+Z", enabled=state.history.can_undo):
-            undo(state)
-        if menu_item(state, "Redo", "Ctrl+Shift+Z", enabled=state.history.can_redo):
-            redo(state)
-        if menu_item(state, "Reset pose", "R"):
-            reset_pose(state)
-        imgui.end_menu()
-    if begin_menu(state, "Window"):
-        for name, panel in PANELS.items():
-            if menu_item(state, panel.title, "", name not in state.closed_panels):
-                state.closed_panels ^= {name}
-        imgui.separator()
-        if menu_item(state, "Reset layout"):
-            state.wants_layout_reset = True
-        imgui.end_menu()
-    if begin_menu(state, "Help"):
-        if menu_item(state, "Keys", "H", state.keys_visible):
-            state.keys_visible = not state.keys_visible
-        imgui.end_menu()
-    imgui.end_main_menu_bar()
-    return chosen
-
-
-def _draw_file_menu(state: AppState) -> list[Path]:
-    chosen: list[Path] = []
-    if menu_item(state, "Open…", "Ctrl+O"):
-        state.wants.add("open dialog")
-    if begin_menu(state, "Open recent", bool(state.recent)):
-        for number, group in enumerate(state.recent):
-            text = printable(" + ".join(Path(path).name for path in group), 80)
-            if imgui.menu_item(f"{text}##recent{number}", "", False)[0]:
-                chosen = [Path(path) for path in group]
-            note_item(state, f"recent {number}")
-            if imgui.is_item_hovered():
-                imgui.set_tooltip("\n".join(printable(path, 200) for path in group))
-        imgui.end_menu()
-    if menu_item(state, "Bundled figure"):
-        state.wants.add("open bundled")
-    imgui.separator()
-    if menu_item(state, "Save screenshot", "F12"):
-        state.wants.add("screenshot")
-    if menu_item(state, "Quit", "Ctrl+Q"):
-        state.wants.add("quit")
-    return chosen
 
 
 def _overlay(name: str, x: float, y: float, pivot: tuple[float, float]) -> bool:
@@ -179,6 +135,32 @@ def draw_hints(state: AppState) -> None:
     shadow, color = imgui.get_color_u32((0, 0, 0, 0.5)), imgui.get_color_u32((1, 1, 1, 0.85))
     draw_list.add_text((place[0] + 1, place[1] + 1), shadow, text)
     draw_list.add_text(place, color, text)
+
+
+def _draw_legend(state: AppState) -> None:
+    """Say what the colours of a scalar view stand for, at the top of the view."""
+    x, y, width, _ = state.view_rect
+    if state.options.shading != "scalar" or width < 200:
+        return
+    factor, unit = length_unit(state.actor.figure)
+    view = SCALARS[state.options.scalar]
+    low, high = view.shown(*state.stats.scalar_range)
+    if _overlay("##legend", x + width / 2, y + 10, (0.5, 0.0)):
+        imgui.text_unformatted(f"{view.title}, {unit}")
+        place, bar = imgui.get_cursor_screen_pos(), (min(260.0, width - 60), 12.0)
+        draw_list, steps = imgui.get_window_draw_list(), 64
+        for step in range(steps):
+            # Whole pixels: edges between them would be blended with the background.
+            left = round(place.x + bar[0] * step / steps)
+            right = round(place.x + bar[0] * (step + 1) / steps)
+            color = imgui.get_color_u32((*color_at((step + 0.5) / steps), 1.0))
+            draw_list.add_rect_filled((left, place.y), (right, place.y + bar[1]), color)
+        imgui.dummy(bar)
+        imgui.text_unformatted(f"{factor * low:.3g}")
+        text = f"{factor * high:.3g}"
+        imgui.same_line(bar[0] - imgui.calc_text_size(text).x + imgui.get_style().window_padding.x)
+        imgui.text_unformatted(text)
+    imgui.end()
 
 
 def _draw_notes(state: AppState) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from imgui_bundle import imgui
 
-from viewer.app import actions
+from viewer.app import actions, pose_actions
 from viewer.app.state import AppState
 
 __all__ = ["KEYS", "Shortcut", "handle_keys"]
@@ -66,6 +66,15 @@ KEYS = (
     Shortcut((_CTRL | _K.o,), "Ctrl+O", "open files", _want("open dialog")),
     Shortcut((_CTRL | _K.z,), "Ctrl+Z", "undo", actions.undo),
     Shortcut((_CTRL | _SHIFT | _K.z, _CTRL | _K.y), "Ctrl+Shift+Z", "redo", actions.redo),
+    Shortcut((_K.m,), "M", "mirror the pose left to right", pose_actions.mirror),
+    Shortcut((_CTRL | _K.c,), "Ctrl+C", "copy the pose", pose_actions.copy_pose),
+    Shortcut(
+        (_CTRL | _SHIFT | _K.c,),
+        "Ctrl+Shift+C",
+        "copy the pose as the file's own numbers",
+        pose_actions.copy_numbers,
+    ),
+    Shortcut((_CTRL | _K.v,), "Ctrl+V", "paste a pose", pose_actions.paste_pose),
     Shortcut((_K.escape,), "Esc", "close what is on top", actions.cancel),
     Shortcut((_CTRL | _K.q,), "Ctrl+Q", "quit", _want("quit")),
 )

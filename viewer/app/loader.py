@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from viewer.errors import ViewerError
-from viewer.loading import load
+from viewer.loading import Contents, assemble, read_files
 from viewer.rig.scene import Scene
 
 __all__ = ["Loader"]
@@ -32,6 +32,8 @@ class Loader:
     ----------
     scene : Scene or None
         What was read.
+    addition : Contents or None
+        Poses and pictures for the figure that is open, if there was nothing else.
     error : str
         Why nothing was read; empty if nothing is wrong.
     """
@@ -44,6 +46,7 @@ class Loader:
     ) -> None:
         self.paths: tuple[Path, ...] = tuple(paths)
         self.scene: Scene | None = None
+        self.addition: Contents | None = None
         self.error = ""
         self._attempts, self._wake = attempts, wake
         self._started = time.monotonic()
@@ -53,7 +56,12 @@ class Loader:
     def _read(self) -> None:
         for paths in self._attempts:
             try:
-                self.scene, self.paths, self.error = load(*paths), tuple(paths), ""
+                contents = read_files(paths)
+                if contents.is_addition:
+                    self.addition = contents
+                else:
+                    self.scene = assemble(contents)
+                self.paths, self.error = tuple(paths), ""
                 break
             except ViewerError as problem:
                 self.error = str(problem)

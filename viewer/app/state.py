@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from viewer.app.file_dialog import FileDialog
     from viewer.app.loader import Loader
 
-__all__ = ["AppState", "Note", "Stats"]
+__all__ = ["AppState", "HeldVector", "Note", "Stats"]
 
 _NOTE_SECONDS = 4.0
 _FARTHEST = 1e4  # sizes of the scene
@@ -37,6 +37,15 @@ class Note:
 
 
 @dataclass(slots=True)
+class HeldVector:
+    """A joint's rotation vector as it was typed: beyond half a turn its rotation has another."""
+
+    joint: int
+    vector: Floats
+    rotation: Floats
+
+
+@dataclass(slots=True)
 class Stats:
     """What the last frame took and who drew it."""
 
@@ -45,6 +54,7 @@ class Stats:
     version: str = ""
     samples: int = 0
     skin_updates: int = 0
+    scalar_range: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(slots=True)
@@ -65,6 +75,14 @@ class AppState:
         Of the chosen actor; -1 for none.
     in_degrees : bool
         Whether rotations are shown in degrees or radians.
+    as_vectors : bool
+        Whether ball joints are edited as rotation vectors instead of angles about x, y, z.
+    held_vector : HeldVector or None
+        The rotation vector being edited.
+    shape_seed : int
+        Of the next random shape.
+    models : dict
+        Body models in the model folder, by name; looked for when the menu opens.
     held_modifiers : int
         Ctrl, Shift and so on in the frame before, as ImGui's bits.
     view_rect : (x, y, width, height)
@@ -73,6 +91,8 @@ class AppState:
         Where each labelled widget was drawn last: (x0, y0, x1, y1). Tests aim by it.
     wants : set of str
         What the window has to do after the frame: "screenshot", "quit", "open dialog".
+    wants_open : list of Path
+        Files to open after the frame.
     """
 
     scene: Scene
@@ -83,6 +103,10 @@ class AppState:
     chosen_actor: int = 0
     selected_joint: int = -1
     in_degrees: bool = True
+    as_vectors: bool = False
+    held_vector: HeldVector | None = None
+    shape_seed: int = 0
+    models: dict[str, Path] = field(default_factory=dict)
     panels_visible: bool = True
     keys_visible: bool = False
     held_modifiers: int = 0
@@ -93,6 +117,7 @@ class AppState:
     view_rect: tuple[float, float, float, float] = (0.0, 0.0, 1.0, 1.0)
     item_rects: dict[str, tuple[float, float, float, float]] = field(default_factory=dict)
     wants: set[str] = field(default_factory=set)
+    wants_open: list[Path] = field(default_factory=list)
     error: str = ""
     notes: list[Note] = field(default_factory=list)
     stats: Stats = field(default_factory=Stats)

@@ -22,7 +22,13 @@ from viewer.rig.scene import Actor, Scene
 from viewer.rig.skeleton import clamp_dofs, dof_label, find_dof
 from viewer.rig.skinning import METHODS, Skinning
 
-__all__ = ["add_pose_arguments", "add_skinning_arguments", "apply_pose", "skinning_of"]
+__all__ = [
+    "add_pose_arguments",
+    "add_skinning_arguments",
+    "apply_dofs",
+    "apply_pose",
+    "skinning_of",
+]
 
 _FIGURE = "figure."  # label of the DOFs that a figure has as a whole
 _MOST_FRAMES = 1_000_000_000
@@ -119,7 +125,7 @@ def apply_pose(scene: Scene, arguments: argparse.Namespace) -> list[str]:
     if arguments.pose and _is_numbers(arguments.pose):
         vector = _numbers("--pose", arguments.pose)
         notes += _apply_record("--pose", PoseRecord(vector=vector), scene)
-    notes += _apply_dofs(scene, arguments.dof)
+    notes += apply_dofs(scene, arguments.dof)
     if arguments.mirror:
         for actor in scene.actors:
             if actor.pose is not None:
@@ -199,8 +205,19 @@ def _apply_hands(scene: Scene, which: str) -> None:
             set_joint_rotations(actor.figure.skeleton, actor.pose, hand.joints, turned)
 
 
-def _apply_dofs(scene: Scene, settings: Sequence[str]) -> list[str]:
-    """Set DOFs given as ``NAME.X=VALUE``, on the first actor that has such a joint."""
+def apply_dofs(scene: Scene, settings: Sequence[str]) -> list[str]:
+    """Set DOFs given as ``NAME.X=VALUE``, on the first actor that has such a joint.
+
+    Returns
+    -------
+    list of str
+        What was clamped, and which of several figures was posed.
+
+    Raises
+    ------
+    ViewerError
+        If the text, the joint or the value is wrong.
+    """
     notes: list[str] = []
     for setting in settings:
         label, equals, text = setting.partition("=")

@@ -93,7 +93,7 @@ FORMATS = {
     "pose": Format(
         "pose",
         (".json", ".npz", ".txt"),
-        rb"\A\{|\A[-+.\d][-+.\deE\s]*\Z",
+        rb"\A\{|\A[-+]?\.?\d[-+.\deE]*(?:\s|\Z)",
         keys=("poses", "pose", "fullpose", "global_orient", "body_pose", "dofs", "betas"),
     ),
 }
@@ -132,6 +132,8 @@ def detect(source: Source) -> str:
             if by_suffix:
                 source.warn(f"is a {kind.suffixes[0]}, named {suffix}")
             return key
+    if suffix in _ARCHIVES:
+        return _detect_archive(source)  # says what it is instead
     looks = source.looks_like()
     if by_suffix and looks is None:
         return by_suffix  # its reader knows best what is missing
@@ -166,7 +168,7 @@ def _is_archive(source: Source) -> bool:
         return False  # most text files, before the module for archives is loaded
     from viewer.formats._archive import is_archive
 
-    return is_archive(head) or source.path.suffix.lower() in _ARCHIVES
+    return is_archive(head)
 
 
 def _detect_archive(source: Source) -> str:

@@ -156,7 +156,8 @@ def _entries(archive: Archive, name: str) -> tuple[NDArray[Any], NDArray[Any], F
 def _is_entries(archive: Archive, name: str) -> bool:
     """Return whether a matrix is stored as rows of (joint, vertex, weight), as in the folder."""
     shape: tuple[int, ...] = getattr(archive.get(name), "shape", ())
-    return len(shape) == 2 and shape[1] == 3 and shape[0] != _rows(archive, "t_pose_joints")
+    sides = _rows(archive, "t_pose_joints"), _rows(archive, "vertices")
+    return shape[1:] == (3,) and shape not in (sides, sides[::-1])
 
 
 def _rows(archive: Archive, name: str) -> int:

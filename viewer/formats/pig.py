@@ -97,18 +97,22 @@ def _layout(n_joints: int) -> PoseLayout:
 
 def _indices(part: Part, column: int, end: int, what: str, rows_of: Part | None = None) -> Ints:
     """Return a column of whole numbers from 0 to ``end - 1``, the rows of another part."""
-    values = part.values[:, column]
-    wrong = np.flatnonzero((values < 0) | (values >= end) | (values != np.floor(values)))
-    if len(wrong):
-        proof = f": {rows_of.name} has {end} rows" if rows_of else ""
-        found = f"found {values[wrong[0]]:.10g}{proof}"
-        raise part.error(f"expected a {what} from 0 to {end - 1}, {found}", int(wrong[0]))
-    return values.astype(np.int32)
+    return _columns(part, slice(column, column + 1), end, what, rows_of)[:, 0]
 
 
 def _corners(part: Part, what: str, rows_of: Part) -> Ints:
-    end = len(rows_of.values)
-    return np.stack([_indices(part, axis, end, what, rows_of) for axis in range(3)], axis=1)
+    return _columns(part, slice(0, 3), len(rows_of.values), what, rows_of)
+
+
+def _columns(part: Part, columns: slice, end: int, what: str, rows_of: Part | None) -> Ints:
+    values = part.values[:, columns]
+    wrong = np.argwhere((values < 0) | (values >= end) | (values != np.floor(values)))
+    if len(wrong):
+        row, column = wrong[0].tolist()
+        proof = f": {rows_of.name} has {end} rows" if rows_of else ""
+        found = f"found {values[row, column]:.16g}{proof}"
+        raise part.error(f"expected a {what} from 0 to {end - 1}, {found}", row)
+    return values.astype(np.int32)
 
 
 def _parents(part: Part) -> Ints:

@@ -50,11 +50,12 @@ _ALIASES = (key for keys in _NAMES.values() for key in keys)
 _PARTS = (*PARTS, "body_pose", *_HANDS)
 _FLAGS = ("flat_hand_mean", "use_pca")
 _KNOWN = ("viewer_pose", "dofs", "dof_names", "scale", *_ALIASES, *_PARTS, *_VECTORS, *_FLAGS)
-_NOT_NEEDED = (
+_BESIDES = (
     "figure gender model model_type surface_model_type num_betas fps mocap_framerate "
     "mocap_frame_rate mocap_time_length dmpls marker_data marker_labels markers labels vids "
     "markers_latent latent_labels markers_latent_vids"
-).split()
+)
+_NOT_NEEDED = _BESIDES.split()  # what files of poses and motions have, and posing does not need
 _PER_JOINT = ("body_pose", *_HANDS, *_VECTORS)  # J x 3 numbers are one pose, not J frames
 _VERSION = 1
 
@@ -137,18 +138,14 @@ def _from_values(source: Source, values: Mapping[str, Any]) -> PoseRecord:
     version = values.get("viewer_pose", _VERSION)
     version = version.tolist() if isinstance(version, np.ndarray) else version
     if version != _VERSION:
-        raise source.error(f"viewer_pose: expected {_VERSION}, found {printable(version, 40)}")
+        raise source.error(f"viewer_pose: expected {_VERSION}, found {describe(version)}")
     found: dict[str, Floats | None] = {
         name: _first(source, values, keys) for name, keys in _NAMES.items()
     }
-    parts = {
-        key: array
-        for key in _PARTS
-        if (array := _array(source, values, key)) is not None
-    }
+    parts = {key: array for key in _PARTS if (array := _array(source, values, key)) is not None}
     scale = _array(source, values, "scale")
     record = PoseRecord(
-        dofs=_dofs(source, values.get("dofs", {})),
+        dofs=_dofs(source, values.get("dofs")),
         vector=_first(source, values, _VECTORS),
         parts=parts,
         shape=found["shape"],
@@ -202,7 +199,7 @@ def _array(source: Source, values: Mapping[str, Any], key: str) -> Floats | None
     return array.ravel()
 
 
-def _checked(source: Source, key: str, value: object, kinds: str, what: str) -> NDArray[Any]:
+def _checked(source: Source, key: str, value: Any, kinds: str, what: str) -> NDArray[Any]:
     """Return an array of some kinds of values, written as an array or as lists."""
     try:
         array = np.asarray(value)
@@ -210,20 +207,21 @@ def _checked(source: Source, key: str, value: object, kinds: str, what: str) -> 
         array = np.zeros(0, dtype=object)
     if array.dtype.kind in kinds or (array.size == 0 and array.dtype.kind == "f"):
         return array
-    found = value if isinstance(value, str | int | float | list) else None
-    shown = printable(found, 40) if found is not None else describe(_value(value))
-    raise source.error(f"{key}: expected {what}, found {shown}")
+    found = "a list of other things" if isinstance(value, list | tuple) else describe(value)
+    raise source.error(f"{key}: expected {what}, found {found}")
 
 
-def _dofs(source: Source, given: object) -> dict[str, float]:
+def _dofs(source: Source, given: Any) -> dict[str, float]:
+    if given is None:
+        return {}
     if not isinstance(given, Mapping):
-        raise source.error("dofs: expected names with numbers")
+        raise source.error(f"dofs: expected names with numbers, found {describe(given)}")
     dofs: dict[str, float] = {}
     for name, value in given.items():
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
         if not is_number or not abs(value) < 1e9:
             raise source.error(
-                f"dofs: {printable(name, 60)}: expected a number, found {printable(value, 40)}"
+                f"dofs: {printable(name, 60)}: expected a number, found {describe(value)}"
             )
         dofs[str(name)] = float(value)
     return dofs

@@ -7,7 +7,7 @@ import numpy as np
 
 from viewer.rendering.mesh_buffers import MeshBuffers
 from viewer.rendering.upload import float32
-from viewer.rig.pose import Pose, skinning_key
+from viewer.rig.pose import Pose, pose_key
 from viewer.rig.scalars import SCALARS, compute
 from viewer.rig.skinning import Skinning
 
@@ -52,7 +52,7 @@ class ScalarBuffer:
         skinning : Skinning
             How the mesh is drawn.
         """
-        key = (name, repr(skinning), None if pose is None else skinning_key(pose))
+        key = (name, repr(skinning), None if pose is None else pose_key(pose))
         if key == self._key:
             return
         numbers = compute(name, self.mesh.figure, pose, skinning)

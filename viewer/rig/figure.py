@@ -111,7 +111,7 @@ class Figure:
                 )
         indices: dict[str, Ints | None] = {
             "joint regressor": self.joint_regressor.vertices if self.joint_regressor else None,
-            "keypoints": self.keypoints.vertices if self.keypoints else None,
+            "list of keypoints": self.keypoints.vertices if self.keypoints else None,
             "reduced mesh": self.reduced.vertices if self.reduced else None,
             "symmetry map": self.symmetry,
         }

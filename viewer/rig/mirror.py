@@ -11,6 +11,7 @@ from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.pose import Pose, joint_rotations, rest_pose
 from viewer.rig.pose_vector import set_joint_rotations
 from viewer.rig.shape import rest_joints
+from viewer.rig.skeleton import Skeleton, clamp_dofs
 
 __all__ = ["asymmetry", "joint_partners", "mirror_axis", "mirror_pose"]
 
@@ -120,23 +121,27 @@ def mirror_pose(figure: Figure, pose: Pose) -> Pose:
     local[below] = np.swapaxes(wanted[skeleton.parents[below]], 1, 2) @ wanted[below]
     mirrored = pose.copy()
     set_joint_rotations(skeleton, mirrored, np.arange(skeleton.n_joints, dtype=np.int32), local)
-    _mirror_moves(figure, pose, mirrored, partners, flip)
+    _mirror_moves(skeleton, pose, mirrored, partners, flip, rest)
     return mirrored
 
 
-def _mirror_moves(figure: Figure, pose: Pose, mirrored: Pose, partners: Ints, flip: Floats) -> None:
-    """Mirror translations: of the figure, and of joints that translate."""
-    skeleton = figure.skeleton
-    assert skeleton is not None  # the caller looked
+def _mirror_moves(
+    skeleton: Skeleton, pose: Pose, mirrored: Pose, partners: Ints, flip: Floats, rest: Floats
+) -> None:
+    """Mirror translations, of the figure and of joints, and exchange scales."""
     mirrored.figure_translation[:] = pose.figure_translation * flip
     mirrored.scales[:] = pose.scales[partners]
-    for dof in np.flatnonzero(skeleton.dof_kinds < 3):
-        joint, kind = skeleton.dof_joints[dof], skeleton.dof_kinds[dof]
-        source = np.flatnonzero(
-            (skeleton.dof_joints == partners[joint]) & (skeleton.dof_kinds == kind)
-        )
-        if len(source):
-            mirrored.dofs[dof] = pose.dofs[source[0]] * flip[kind]
+    # A joint's translation counts in its parent's frame: t' = P'^T F P t.
+    parents = skeleton.parents
+    frames = np.where((parents >= 0)[:, None, None], rest[parents], np.eye(3))
+    carry = np.swapaxes(frames, 1, 2) @ (flip[:, None] * frames[partners])
+    mirrored.translations[:] = np.einsum("jab,jb->ja", carry, pose.translations[partners])
+    rows = np.flatnonzero(skeleton.dof_kinds < 3)
+    joints, kinds = skeleton.dof_joints[rows], skeleton.dof_kinds[rows]
+    moves = np.zeros((skeleton.n_joints, 3))
+    moves[joints, kinds] = pose.dofs[rows]
+    mirrored.dofs[rows] = np.einsum("jab,jb->ja", carry, moves[partners])[joints, kinds]
+    mirrored.dofs[:] = clamp_dofs(skeleton, mirrored.dofs)
 
 
 def _world_rotations(parents: Ints, local: Floats) -> Floats:

@@ -27,6 +27,8 @@ PARTS = {
 }
 """Rotation vectors of single joints under the names that smplx gives them."""
 
+_BODY = 21  # joints of body_pose in models with fingers or a face; SMPL alone has two more
+_LONGEST_BODY = 23
 _HAND_PARTS = {"left_hand_pose": "left", "right_hand_pose": "right", "hand_pose": ""}
 
 
@@ -130,6 +132,8 @@ def apply_record(record: PoseRecord, figure: Figure, pose: Pose) -> list[str]:
         work.figure_translation = np.array(record.translation, dtype=np.float64)
     if record.scale is not None:
         work.figure_scale = float(record.scale)
+    if work.figure_scale <= 0.0:
+        notes.append(f"scale: expected more than 0, found {work.figure_scale:g}")
     for name in Pose.__slots__:
         setattr(pose, name, getattr(work, name))
     return notes
@@ -162,10 +166,7 @@ def _apply_vector(vector: Floats, figure: Figure, pose: Pose) -> list[str]:
     rest = vector[66:]
     joints = np.arange(22, dtype=np.int32)
     _turn(figure, pose, joints, vector[:66])
-    if rest.any():
-        count = int(rest.reshape(-1, 3).any(axis=1).sum())
-        return [f"{count} joints of the pose beyond the body's 22 were left out"]
-    return []
+    return [_left_out(rest, 22)] if rest.any() else []
 
 
 def _apply_part(
@@ -175,14 +176,7 @@ def _apply_part(
     assert skeleton is not None
     values = np.asarray(values, dtype=np.float64).ravel()
     if name == "body_pose":
-        count = len(values) // 3
-        if len(values) % 3 or count >= skeleton.n_joints:
-            raise RigError(
-                f"body_pose: expected at most {3 * (skeleton.n_joints - 1)} numbers, "
-                f"found {len(values)}"
-            )
-        _turn(figure, pose, np.arange(1, count + 1, dtype=np.int32), values)
-        return []
+        return _apply_body(values, figure, pose)
     if name in _HAND_PARTS:
         return _apply_hand(_hand(figure, name), name, values, record, figure, pose)
     known = [joint for joint in PARTS[name] if joint in skeleton.names]
@@ -194,6 +188,25 @@ def _apply_part(
         raise RigError(f"{name}: expected 3 numbers, found {len(values)}")
     _turn(figure, pose, np.array([skeleton.names.index(known[0])], dtype=np.int32), values)
     return []
+
+
+def _apply_body(values: Floats, figure: Figure, pose: Pose) -> list[str]:
+    """Turn the joints after the root; the two hands of SMPL mean nothing to its kin."""
+    skeleton = figure.skeleton
+    assert skeleton is not None
+    has_more = "left_wrist" in skeleton.names and "left_hand" not in skeleton.names
+    own = _BODY if has_more else skeleton.n_joints - 1
+    most = _LONGEST_BODY if has_more else own
+    if len(values) % 3 or len(values) > 3 * most:
+        raise RigError(f"body_pose: expected at most {3 * own} numbers, found {len(values)}")
+    taken = values[: 3 * own]
+    _turn(figure, pose, np.arange(1, len(taken) // 3 + 1, dtype=np.int32), taken)
+    return [_left_out(values[3 * own :], own)] if values[3 * own :].any() else []
+
+
+def _left_out(rest: Floats, own: int) -> str:
+    count = int(rest.reshape(-1, 3).any(axis=1).sum())
+    return f"{count} joints of the pose beyond the body's {own} were left out"
 
 
 def _hand(figure: Figure, name: str) -> Hand | None:

@@ -85,7 +85,7 @@ def set_joint_rotations(
     """Turn joints within their parents, in place.
 
     A ball joint's DOFs take the rotation as angles about x, y, z; a joint with fewer DOFs keeps
-    them at 0 and takes it as its quaternion.
+    them as near to 0 as its limits allow and takes the rest as its quaternion.
 
     Parameters
     ----------
@@ -108,12 +108,15 @@ def set_joint_rotations(
     within = np.swapaxes(base, -1, -2) @ rotations
     pose.dofs[rows[is_ball]] = matrix_to_euler(within[is_ball])
     others = joints[~is_ball]
-    if len(others):
-        turns = np.isin(skeleton.dof_joints, others) & (skeleton.dof_kinds >= 3)
-        pose.dofs[turns] = 0.0
-        pose.rotations[others] = matrix_to_quaternion(rotations[~is_ball])
+    pose.dofs[np.isin(skeleton.dof_joints, others) & (skeleton.dof_kinds >= 3)] = 0.0
     if clamp:
         pose.dofs[:] = clamp_dofs(skeleton, pose.dofs)
+    if len(others):
+        # Limits may hold DOFs away from 0: the quaternion takes the rest.
+        pose.rotations[others] = 0.0, 0.0, 0.0, 1.0
+        held = joint_rotations(skeleton, pose)[others]
+        left = rotations[~is_ball] @ np.swapaxes(held, -1, -2)
+        pose.rotations[others] = matrix_to_quaternion(left)
 
 
 def own_numbers(layout: PoseLayout, rotations: Floats) -> Floats:

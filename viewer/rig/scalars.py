@@ -106,6 +106,8 @@ def _asymmetry(figure: Figure, pose: Pose | None, skinning: Skinning) -> Floats:
     positions = deform(figure, pose, skinning)[0]
     if figure.symmetry is None:
         return np.zeros(len(positions))
+    if pose is not None:
+        positions -= pose.figure_translation  # a figure that stands aside is no less symmetric
     mirrored = positions[figure.symmetry].copy()
     mirrored[:, mirror_axis(figure)] *= -1.0
     return np.linalg.norm(positions - mirrored, axis=1)

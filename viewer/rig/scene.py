@@ -59,7 +59,7 @@ def figure_pose(figure: Figure) -> Pose:
     return pose
 
 
-@dataclass(slots=True, eq=False)
+@dataclass(slots=True, eq=False, weakref_slot=True)
 class Scene:
     """Everything that is shown together.
 

@@ -89,13 +89,14 @@ def with_rest_mesh(figure: Figure, positions: Floats) -> Figure:
 
 
 def _moved_skeleton(skeleton: Skeleton, joints: Floats) -> Skeleton:
-    rotations = world_matrices(skeleton, _undeflected(skeleton))[:, :3, :3]
+    linear = world_matrices(skeleton, _undeflected(skeleton))[:, :3, :3]
     parents = skeleton.parents
     has_parent = parents >= 0
     above = parents[has_parent]
     translations = joints.copy()
     offsets = joints[has_parent] - joints[above]
-    translations[has_parent] = np.einsum("jba,jb->ja", rotations[above], offsets)
+    # Solved, not transposed: rest transforms may scale.
+    translations[has_parent] = np.linalg.solve(linear[above], offsets[..., None])[..., 0]
     return replace(skeleton, rest_translations=translations)
 
 

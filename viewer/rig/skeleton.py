@@ -25,7 +25,7 @@ DOF_KINDS = ("tx", "ty", "tz", "x", "y", "z")
 """Kinds of DOF by code: translations along x, y, z, then rotations about x, y, z."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Skeleton:
     """Joints as parallel arrays, parents before children.
 

@@ -11,15 +11,28 @@ __all__ = ["PANELS", "Panel", "panel_module"]
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """A panel's title and its place at first: "left", or "right 1" to "right 3" downwards."""
+    """What the layout must know of a panel.
+
+    Attributes
+    ----------
+    title : str
+        Of its tab.
+    place : str
+        At first: ``"left"``, or ``"right 1"`` to ``"right 3"`` downwards.
+    needs : str
+        A part of ``Figure`` without which the panel is left out; empty for none.
+    """
 
     title: str
     place: str
+    needs: str = ""
 
 
 PANELS = {
     "joints": Panel("Joints", "left"),
+    "shape": Panel("Shape", "left", needs="blend_shapes"),
     "display": Panel("Display", "right 1"),
+    "skinning": Panel("Skinning", "right 1"),
     "camera": Panel("Camera", "right 2"),
     "lights": Panel("Lights", "right 2"),
     "stats": Panel("Stats", "right 3"),

@@ -7,9 +7,12 @@ from imgui_bundle import imgui
 from viewer.app.actions import show
 from viewer.app.state import AppState
 from viewer.app.widgets import checkbox, choice, note_item, slider
+from viewer.errors import printable
 from viewer.rendering.ground_pass import grid_step, parse_color
 from viewer.rendering.options import SHOWN
+from viewer.rendering.part_colors import part_colors
 from viewer.rendering.program import SHADING
+from viewer.rig.annotations import BodyParts
 
 __all__ = ["draw"]
 
@@ -29,6 +32,7 @@ def draw(state: AppState) -> None:
         )
     imgui.separator()
     options.shading = choice(state, "Shading", options.shading, SHADING)
+    _draw_extras(state)
     options.flat = checkbox(state, "Flat", options.flat)
     _beside("Wireframe")
     options.wireframe = checkbox(state, "Wireframe", options.wireframe)
@@ -42,6 +46,38 @@ def draw(state: AppState) -> None:
 
 
 _CLAMP = imgui.SliderFlags_.always_clamp
+
+
+def _draw_extras(state: AppState) -> None:
+    """Draw what only some figures have: keypoints, a coarser mesh, body parts."""
+    options, figure = state.options, state.actor.figure
+    if figure.keypoints is not None:
+        options.keypoints = checkbox(state, "Keypoints", options.keypoints)
+        if figure.reduced is not None:
+            _beside("Reduced mesh")
+    if figure.reduced is not None:
+        options.reduced = checkbox(state, "Reduced mesh", options.reduced)
+    if figure.body_parts is not None:
+        _draw_parts(state, figure.body_parts)
+
+
+def _draw_parts(state: AppState, parts: BodyParts) -> None:
+    """Draw a check box for every body part that has vertices, with its colour."""
+    is_open = imgui.tree_node("Body parts")
+    note_item(state, "Body parts")
+    if not is_open:
+        return
+    hidden, present = set(state.options.hidden_parts), set(parts.of_vertex.tolist())
+    colors = part_colors(len(parts.names)) ** (1 / 2.2)
+    for index in sorted(present):
+        r, g, b = (float(channel) for channel in colors[index])
+        flags = imgui.ColorEditFlags_.no_tooltip | imgui.ColorEditFlags_.no_drag_drop
+        imgui.color_button(f"##part{index}", (r, g, b, 1.0), flags)
+        imgui.same_line()
+        shown = checkbox(state, printable(parts.names[index], 40), index not in hidden)
+        hidden = hidden - {index} if shown else hidden | {index}
+    state.options.hidden_parts = tuple(sorted(hidden))
+    imgui.tree_pop()
 
 
 def _beside(text: str) -> None:

@@ -1,27 +1,38 @@
-"""Joints: the tree with a filter, and a slider per DOF within its limits."""
+"""Joints: the tree with a filter, a slider per DOF within its limits, and the pose as a whole."""
 
 from __future__ import annotations
 
 import math
-from functools import lru_cache
+from typing import TypeAlias
 
 import numpy as np
 from imgui_bundle import imgui
 
 from viewer.app.actions import reset_pose
+from viewer.app.panels._ball_joint import draw_own_numbers, draw_vector_component, is_ball
+from viewer.app.panels._figure_place import draw_figure_place
+from viewer.app.pose_actions import copy_numbers, copy_pose, mirror, paste_pose
 from viewer.app.state import AppState
-from viewer.app.widgets import button, menu_item, note_item, same_line_if_room
+from viewer.app.widgets import button, checkbox, menu_item, note_item, same_line_if_room
 from viewer.errors import printable
+from viewer.rig.memo import Memo
 from viewer.rig.mesh import box_size
 from viewer.rig.pose import Pose
 from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_labels
 
 __all__ = ["draw", "rows"]
 
+Rows: TypeAlias = tuple[tuple[int, int, int], ...]
+
+OWN_NUMBERS = -2
+"""In place of a DOF: the row with the numbers that the model's own files would hold."""
+
 _FIRST_ROTATION = 3
 _INDENT = 9.0  # points a level
 _DEEPEST = 14  # levels that are indented: chains of thousands must stay readable
 _AXIS_COLORS = ((0.95, 0.45, 0.42, 1.0), (0.48, 0.85, 0.45, 1.0), (0.45, 0.65, 1.0, 1.0))
+_known_labels: Memo[Skeleton, tuple[str, ...]] = Memo()
+_known_rows: Memo[Skeleton, Rows] = Memo(kept=4)
 _MAY_TYPE_BEYOND = imgui.SliderFlags_.none
 _STAYS_WITHIN = imgui.SliderFlags_.always_clamp
 
@@ -38,7 +49,9 @@ def draw(state: AppState) -> None:
     if not imgui.begin_child("joints", (0.0, 0.0)):
         imgui.end_child()
         return
-    shown = rows(skeleton, frozenset(state.opened_joints), state.joint_filter)
+    draw_figure_place(state, actor.pose)
+    has_own = actor.figure.pose_layout is not None
+    shown = rows(skeleton, frozenset(state.opened_joints), state.joint_filter, has_own)
     labels = _labels(skeleton)
     if not shown:
         imgui.text_disabled("no joint has this in its name")
@@ -46,7 +59,10 @@ def draw(state: AppState) -> None:
     clipper.begin(len(shown))
     while clipper.step():
         for joint, dof, depth in shown[clipper.display_start : clipper.display_end]:
-            if dof < 0:
+            if dof == OWN_NUMBERS:
+                _indent(depth)
+                draw_own_numbers(state, actor.figure, actor.pose, joint)
+            elif dof < 0:
                 _draw_joint(state, skeleton, joint, depth, labels[joint])
             else:
                 _draw_dof(state, skeleton, actor.pose, dof, depth, labels[joint])
@@ -77,6 +93,10 @@ def _draw_head(state: AppState) -> None:
     note_item(state, "Filter")
     if button(state, "Reset (R)"):
         reset_pose(state)
+    same_line_if_room("Pose…")
+    if button(state, "Pose…"):
+        imgui.open_popup("pose menu")
+    _draw_pose_menu(state)
     same_line_if_room("degrees")
     if imgui.radio_button("degrees", state.in_degrees):
         state.in_degrees = True
@@ -85,17 +105,31 @@ def _draw_head(state: AppState) -> None:
     if imgui.radio_button("radians", not state.in_degrees):
         state.in_degrees = False
     note_item(state, "radians")
+    if state.actor.figure.pose_layout is not None:
+        state.as_vectors = checkbox(state, "Rotation vectors", state.as_vectors)
 
 
-@lru_cache(maxsize=4)
+def _draw_pose_menu(state: AppState) -> None:
+    """Draw what can be done to the pose as a whole."""
+    if not imgui.begin_popup("pose menu"):
+        return
+    for text, action in (
+        ("Copy as JSON", copy_pose),
+        ("Copy as the file's numbers", copy_numbers),
+        ("Paste", paste_pose),
+        ("Mirror", mirror),
+    ):
+        if menu_item(state, text):
+            action(state)
+    imgui.end_popup()
+
+
 def _labels(skeleton: Skeleton) -> tuple[str, ...]:
-    return tuple(printable(label, 60) for label in joint_labels(skeleton))
+    names = joint_labels(skeleton)
+    return _known_labels.get(skeleton, None, lambda: tuple(printable(label, 60) for label in names))
 
 
-@lru_cache(maxsize=4)
-def rows(
-    skeleton: Skeleton, opened: frozenset[int], wanted: str
-) -> tuple[tuple[int, int, int], ...]:
+def rows(skeleton: Skeleton, opened: frozenset[int], wanted: str, has_own: bool = False) -> Rows:
     """Return what is listed, as (joint, DOF or -1 for the joint's own row, depth).
 
     Parameters
@@ -106,7 +140,14 @@ def rows(
         Joints whose DOFs and children are listed.
     wanted : str
         If not empty, only joints whose name contains it are listed, without hierarchy.
+    has_own : bool
+        Whether a row with the file's own numbers, ``OWN_NUMBERS``, follows each joint's DOFs.
     """
+    key = (opened, wanted, has_own)
+    return _known_rows.get(skeleton, key, lambda: _rows(skeleton, opened, wanted, has_own))
+
+
+def _rows(skeleton: Skeleton, opened: frozenset[int], wanted: str, has_own: bool) -> Rows:
     dofs: list[list[int]] = [[] for _ in range(skeleton.n_joints)]
     for dof, joint in enumerate(skeleton.dof_joints.tolist()):
         dofs[joint].append(dof)
@@ -123,6 +164,8 @@ def rows(
             listed.append((joint, -1, depths[joint]))
             if wanted or joint in opened:
                 listed += [(joint, dof, depths[joint] + 1) for dof in dofs[joint]]
+                if has_own:
+                    listed.append((joint, OWN_NUMBERS, depths[joint] + 1))
     # Parents come before children in a skeleton, but not always right before them.
     order = _depth_first(skeleton.parents.tolist())
     return tuple(sorted(listed, key=lambda row: order[row[0]]))
@@ -180,6 +223,10 @@ def _draw_dof(
     imgui.set_next_item_width(-1.0)
     low, high = skeleton.dof_limits[dof]
     locked = low == high
+    joint, figure = int(skeleton.dof_joints[dof]), state.actor.figure
+    if state.as_vectors and kind >= _FIRST_ROTATION and is_ball(figure, joint):
+        draw_vector_component(state, figure, pose, joint, kind - _FIRST_ROTATION, label)
+        return
     imgui.begin_disabled(bool(locked))
     value = _dof_slider(state, skeleton, pose, dof)
     imgui.end_disabled()

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 from imgui_bundle import imgui
 
 from viewer.app.state import AppState
 from viewer.errors import printable
+from viewer.rig.memo import Memo
 from viewer.rig.scene import Scene
 from viewer.rig.skin import influence_counts
 
 __all__ = ["draw"]
 
+_known: Memo[Scene, tuple[tuple[str, str], ...]] = Memo()
+
 
 def draw(state: AppState) -> None:
     """Draw the panel."""
     for name, value in (
-        *_counts(state.scene),
+        *_known.get(state.scene, None, lambda: _counts(state.scene)),
         ("Frame", f"{state.stats.frame_ms:.1f} ms" if state.stats.frame_ms else "not measured"),
         ("Renderer", state.stats.renderer),
         ("OpenGL", state.stats.version),
@@ -28,7 +29,6 @@ def draw(state: AppState) -> None:
         imgui.text_wrapped(value)
 
 
-@lru_cache(maxsize=1)
 def _counts(scene: Scene) -> tuple[tuple[str, str], ...]:
     figures = [actor.figure for actor in scene.actors]
     skeletons = [figure.skeleton for figure in figures if figure.skeleton is not None]

@@ -1,0 +1,162 @@
+"""The menus: files, edits, panels, help."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from imgui_bundle import imgui
+
+from viewer.app.actions import redo, reset_pose, undo
+from viewer.app.file_dialog import FileDialog, folder_of
+from viewer.app.panels import PANELS
+from viewer.app.pose_actions import (
+    copy_numbers,
+    copy_pose,
+    mirror,
+    paste_pose,
+    save_export,
+    save_pose,
+)
+from viewer.app.state import AppState
+from viewer.app.widgets import begin_menu, menu_item, note_item
+from viewer.errors import ViewerError, printable
+from viewer.export import EXPORTERS
+from viewer.formats import FORMATS
+from viewer.models import known_models, load_model_folder, save_model_folder
+
+__all__ = ["draw_menus"]
+
+
+def draw_menus(state: AppState) -> list[Path]:
+    """Draw the menu bar; return files that were asked for."""
+    chosen: list[Path] = []
+    if not imgui.begin_main_menu_bar():
+        return chosen
+    if begin_menu(state, "File"):
+        chosen = _draw_file_menu(state)
+        imgui.end_menu()
+    if begin_menu(state, "Edit"):
+        _draw_edit_menu(state)
+        imgui.end_menu()
+    if begin_menu(state, "Window"):
+        for name, panel in PANELS.items():
+            if menu_item(state, panel.title, "", name not in state.closed_panels):
+                state.closed_panels ^= {name}
+        imgui.separator()
+        if menu_item(state, "Reset layout"):
+            state.wants_layout_reset = True
+        imgui.end_menu()
+    if begin_menu(state, "Help"):
+        if menu_item(state, "Keys", "H", state.keys_visible):
+            state.keys_visible = not state.keys_visible
+        imgui.end_menu()
+    imgui.end_main_menu_bar()
+    return chosen
+
+
+def _draw_file_menu(state: AppState) -> list[Path]:
+    chosen: list[Path] = []
+    if menu_item(state, "Open…", "Ctrl+O"):
+        state.wants.add("open dialog")
+    if begin_menu(state, "Open recent", bool(state.recent)):
+        for number, group in enumerate(state.recent):
+            text = printable(" + ".join(Path(path).name for path in group), 80)
+            if imgui.menu_item(f"{text}##recent{number}", "", False)[0]:
+                chosen = [Path(path) for path in group]
+            note_item(state, f"recent {number}")
+            if imgui.is_item_hovered():
+                imgui.set_tooltip("\n".join(printable(path, 200) for path in group))
+        imgui.end_menu()
+    if menu_item(state, "Bundled figure"):
+        state.wants.add("open bundled")
+    if menu_item(state, "Bundled body"):
+        state.wants.add("open body")
+    if begin_menu(state, "Body models"):
+        chosen = _draw_models(state) or chosen
+        imgui.end_menu()
+    imgui.separator()
+    has_pose = state.actor.pose is not None
+    if menu_item(state, "Save pose…", enabled=has_pose):
+        _ask_for_pose(state)
+    if menu_item(state, "Export…"):
+        _ask_for_export(state)
+    if menu_item(state, "Save screenshot", "F12"):
+        state.wants.add("screenshot")
+    imgui.separator()
+    if menu_item(state, "Quit", "Ctrl+Q"):
+        state.wants.add("quit")
+    return chosen
+
+
+def _draw_models(state: AppState) -> list[Path]:
+    """Draw the models of the model folder, looked for when the menu opens."""
+    if imgui.is_window_appearing():
+        folder = load_model_folder()
+        state.models = known_models(folder) if folder is not None and folder.is_dir() else {}
+    chosen: list[Path] = []
+    for name, path in state.models.items():
+        if menu_item(state, name):
+            chosen = [path]
+        if imgui.is_item_hovered():
+            imgui.set_tooltip(printable(path, 200))
+    if not state.models:
+        imgui.text_disabled("none found; choose the folder where they are")
+    imgui.separator()
+    if menu_item(state, "Choose model folder…"):
+        start = load_model_folder() or folder_of(state.paths)
+        state.dialog = FileDialog(start, _set_model_folder, "folder", "Folder of body models")
+    return chosen
+
+
+def _set_model_folder(state: AppState, paths: list[Path]) -> None:
+    try:
+        folder = save_model_folder(paths[0])
+    except ViewerError as problem:
+        state.error = str(problem)
+        return
+    count = len(known_models(folder))
+    state.say(f"{count} body models in {printable(folder, 200)}")
+
+
+def _ask_for_pose(state: AppState) -> None:
+    name = f"{printable(state.actor.figure.name, 60)}_pose.json"
+    suffixes = FORMATS["pose"].suffixes
+    state.dialog = FileDialog(
+        folder_of(state.paths),
+        lambda state, paths: save_pose(state, paths[0]),
+        "save",
+        "Save pose: .json, .npz or .txt",
+        suffixes,
+        name,
+    )
+
+
+def _ask_for_export(state: AppState) -> None:
+    suffixes = tuple(suffix for kind in EXPORTERS.values() for suffix in kind.suffixes)
+    state.dialog = FileDialog(
+        folder_of(state.paths),
+        lambda state, paths: save_export(state, paths[0]),
+        "save",
+        f"Export: {', '.join(suffixes)}",
+        suffixes,
+        f"{printable(state.actor.figure.name, 60)}.obj",
+    )
+
+
+def _draw_edit_menu(state: AppState) -> None:
+    if menu_item(state, "Undo", "Ctrl+Z", enabled=state.history.can_undo):
+        undo(state)
+    if menu_item(state, "Redo", "Ctrl+Shift+Z", enabled=state.history.can_redo):
+        redo(state)
+    imgui.separator()
+    has_pose = state.actor.pose is not None
+    if menu_item(state, "Reset pose", "R"):
+        reset_pose(state)
+    if menu_item(state, "Mirror pose", "M", enabled=has_pose):
+        mirror(state)
+    if menu_item(state, "Copy pose", "Ctrl+C", enabled=has_pose):
+        copy_pose(state)
+    if menu_item(state, "Copy pose as numbers", "Ctrl+Shift+C", enabled=has_pose):
+        copy_numbers(state)
+    if menu_item(state, "Paste pose", "Ctrl+V", enabled=has_pose):
+        paste_pose(state)

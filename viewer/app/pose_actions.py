@@ -1,0 +1,132 @@
+"""What is done to a pose as a whole: copied, pasted, saved, mirrored, shaped at random."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from imgui_bundle import imgui
+
+from viewer.app.state import AppState
+from viewer.errors import ViewerError, printable
+from viewer.export import export
+from viewer.formats import Source, write
+from viewer.rig.mirror import mirror_pose
+from viewer.rig.pose_record import PoseRecord, apply_record, record_of
+from viewer.rig.pose_vector import write_vector
+from viewer.rig.scene import figure_pose
+
+__all__ = [
+    "copy_numbers",
+    "copy_pose",
+    "mirror",
+    "paste_pose",
+    "random_shape",
+    "reset_shape",
+    "save_export",
+    "save_pose",
+]
+
+_RANDOM = 10  # leading coefficients, which vary most, that a random body varies
+
+
+def _record(state: AppState) -> PoseRecord | None:
+    actor = state.actor
+    return None if actor.pose is None else record_of(actor.figure, actor.pose)
+
+
+def copy_pose(state: AppState) -> None:
+    """Put the chosen actor's pose on the clipboard as JSON."""
+    from viewer.formats.pose import pose_text
+
+    record = _record(state)
+    if record is not None:
+        imgui.set_clipboard_text(pose_text(record, printable(state.actor.figure.name)))
+        state.say_status("Pose copied as JSON")
+
+
+def copy_numbers(state: AppState) -> None:
+    """Put the pose on the clipboard as the model's own numbers."""
+    actor = state.actor
+    if actor.pose is None or actor.figure.skeleton is None:
+        return
+    numbers = write_vector(actor.figure.pose_layout, actor.figure.skeleton, actor.pose)
+    imgui.set_clipboard_text(" ".join(f"{number!r}" for number in numbers.tolist()))
+    state.say_status(f"Pose copied as {len(numbers)} numbers")
+
+
+def paste_pose(state: AppState) -> None:
+    """Pose the chosen actor by what is on the clipboard: JSON, or the model's own numbers."""
+    from viewer.formats import pose
+
+    actor = state.actor
+    if actor.pose is None:
+        return
+    text = imgui.get_clipboard_text() or ""
+    try:
+        # Numbers may come with commas, from a list in a program.
+        words = text if "{" in text else re.sub(r"[\[\],;]", " ", text)
+        source = Source("clipboard", words.encode("utf-8", "replace"))
+        if not text.strip():
+            raise source.error("expected a pose, found nothing")
+        notes = apply_record(pose.read(source), actor.figure, actor.pose)
+    except ViewerError as problem:
+        state.error = str(problem)
+        return
+    state.say(*source.warnings, *notes)
+    state.say_status("Pose pasted")
+
+
+def save_pose(state: AppState, path: Path) -> None:
+    """Write the chosen actor's pose; the suffix chooses the form."""
+    record = _record(state)
+    if record is not None:
+        _save(state, lambda: write(record, path), path)
+
+
+def save_export(state: AppState, path: Path) -> None:
+    """Write the chosen actor as it is posed, for other programs."""
+    _save(state, lambda: state.say(*export(state.actor, path, state.options.skinning)), path)
+
+
+def _save(state: AppState, act: Callable[[], None], path: Path) -> None:
+    try:
+        act()
+        state.say(f"Saved {printable(path, 200)}")
+    except ViewerError as problem:
+        state.error = str(problem)
+
+
+def mirror(state: AppState) -> None:
+    """Exchange left and right of the chosen actor's pose."""
+    actor = state.actor
+    if actor.pose is None:
+        return
+    try:
+        actor.pose = mirror_pose(actor.figure, actor.pose)
+        state.say_status("Pose mirrored")
+    except ViewerError as problem:
+        state.say(str(problem))
+
+
+def random_shape(state: AppState) -> None:
+    """Draw the first shape coefficients from a normal distribution, by the seed that is shown."""
+    actor = state.actor
+    shapes = actor.figure.blend_shapes
+    if shapes is None or actor.pose is None:
+        return
+    weights = np.zeros(shapes.n_shapes)
+    rows = [row for row, group in enumerate(shapes.groups) if group == "shape"][:_RANDOM]
+    weights[rows] = np.random.default_rng(state.shape_seed).standard_normal(len(rows))
+    actor.pose.shape_weights = weights
+    state.say_status(f"Random shape, seed {state.shape_seed}")
+
+
+def reset_shape(state: AppState) -> None:
+    """Set every coefficient of the chosen actor to 0."""
+    actor = state.actor
+    if actor.pose is not None:
+        actor.pose.shape_weights = figure_pose(actor.figure).shape_weights
+        state.say_status("Shape reset")
