@@ -17,6 +17,7 @@ from fox_generator.boxes import fit_boxes
 from fox_generator.files import write_skel, write_skin
 from fox_generator.skeleton import joints
 from fox_generator.weights import diffuse_weights
+from generator_tools.surface import mirror, normals
 from PIL import Image
 
 BAKED_SIZE = 1024
@@ -28,17 +29,17 @@ def main() -> None:
     folder = Path(__file__).resolve().parent / "samples"
     table = joints()
     half, half_triangles = surface.model_half()
-    welded, welded_triangles, source = surface.mirror(half, half_triangles)
-    normals = surface.normals(welded, welded_triangles)
+    welded, welded_triangles, source = mirror(half, half_triangles)
+    directions = normals(welded, welded_triangles)
     weights = diffuse_weights(welded, welded_triangles, table)
 
     cut, cut_triangles, texcoords = unwrap(half, half_triangles, BAKED_SIZE)
-    image = texture.bake(half[cut], normals[cut], texcoords, cut_triangles, BAKED_SIZE)
+    image = texture.bake(half[cut], directions[cut], texcoords, cut_triangles, BAKED_SIZE)
     write_skel(folder / "fox.skel", table, fit_boxes(welded, weights, table))
     image = image.resize((TEXTURE_SIZE, TEXTURE_SIZE), Image.Resampling.BOX)
     texture.save(image, folder / "fox.png")
 
-    split, triangles, copied = surface.mirror(half[cut], cut_triangles)
+    split, triangles, copied = mirror(half[cut], cut_triangles)
     # Both numberings list the left half first, then the mirrored rest in the same order.
     right = np.full(len(half), -1)
     right[source[len(half) :]] = np.arange(len(half), len(welded))
@@ -47,7 +48,7 @@ def main() -> None:
     write_skin(
         folder / "fox.skin",
         split,
-        normals[origin],
+        directions[origin],
         texcoords[copied],
         weights[origin],
         triangles,

@@ -2,8 +2,7 @@
 
 import numpy as np
 import xatlas
-
-from .shapes import Floats
+from generator_tools.shapes import Floats
 
 HEAD = np.array([0.01, 0.485, 0.300])
 HEAD_SCALE = 1.1  # extra texels per metre at the face

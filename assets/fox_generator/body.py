@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-
-from .shapes import Ellipsoid, Floats, Tube, fold, smooth_max, smooth_min, tube
+from generator_tools.shapes import Ellipsoid, Floats, Tube, fold, smooth_max, smooth_min, tube
 
 REGIONS = ("torso", "neck", "head", "jaw", "ear", "tail", "fore", "hind")
 EYE = np.array([0.0340, 0.5010, 0.2940])

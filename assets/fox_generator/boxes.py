@@ -1,8 +1,8 @@
 """The boxes drawn for the joints: each hugs the vertices that follow its joint most."""
 
 import numpy as np
+from generator_tools.shapes import Floats
 
-from .shapes import Floats
 from .skeleton import Joint
 
 TRIM = 6.0  # percent of the vertices left outside at each side

@@ -1,10 +1,10 @@
 """The colour of the fox at any point of its surface; sRGB in 0..1."""
 
 import numpy as np
+from generator_tools.shapes import Floats
 
 from .body import EYE, EYE_RADIUS, NOSE
 from .noise import fur_direction, noise, rise, strokes
-from .shapes import Floats
 
 RUST = np.array([0.62, 0.215, 0.055])
 ORANGE = np.array([0.86, 0.42, 0.12])

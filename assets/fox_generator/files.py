@@ -3,8 +3,8 @@
 from pathlib import Path
 
 import numpy as np
+from generator_tools.shapes import Floats
 
-from .shapes import Floats
 from .skeleton import POSE, Joint
 
 

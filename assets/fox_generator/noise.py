@@ -1,9 +1,8 @@
 """Noise drawn out along the fur: it gives the strokes and frays the edges between colours."""
 
 import numpy as np
+from generator_tools.shapes import Floats
 from scipy.ndimage import map_coordinates
-
-from .shapes import Floats
 
 LATTICE = np.random.default_rng(20).standard_normal((48, 48, 48))
 

@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-
-from .shapes import Floats
+from generator_tools.shapes import Floats
 
 Limits = tuple[tuple[float, float], tuple[float, float], tuple[float, float]]
 

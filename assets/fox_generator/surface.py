@@ -1,11 +1,12 @@
 """The fox's closed triangle mesh: half polygonised, remeshed, mirrored."""
 
 import numpy as np
+from generator_tools.remesh import drop_unused, remesh
+from generator_tools.shapes import Floats
+from generator_tools.surface import graded_length, project
 
 from .body import distance, gradient
-from .polygonise import polygonise
-from .remesh import drop_unused, face_normals, remesh
-from .shapes import Floats
+from .polygonise import polygonise_half
 
 LARGEST = 0.0174  # metres; edge length on the torso and tail
 GROWTH = 0.22  # metres of edge length per metre from the nearest detail
@@ -30,43 +31,15 @@ DETAILS = (
 
 def wanted_length(points: Floats) -> Floats:
     """Return the edge length (N,) wanted at each point."""
-    length = np.full(len(points), LARGEST)
-    for centre, radius, fine in DETAILS:
-        away = np.linalg.norm(points - np.asarray(centre), axis=1) - radius
-        length = np.minimum(length, fine + GROWTH * np.maximum(away, 0))
-    return length
+    return graded_length(points, LARGEST, GROWTH, DETAILS)
 
 
-def project(points: Floats) -> Floats:
-    """Move points to the zero level of the distance, a few damped Newton steps."""
-    for _ in range(3):
-        step = np.clip(distance(points), -0.003, 0.003)
-        points = points - step[:, None] * gradient(points)
-    return points
-
-
-def mirror(vertices: Floats, triangles: np.ndarray) -> tuple[Floats, np.ndarray, np.ndarray]:
-    """Close a half mesh; also return the half's vertex that each vertex copies."""
-    on_rim = vertices[:, 0] == 0
-    others = np.nonzero(~on_rim)[0]
-    image = np.arange(len(vertices))
-    image[others] = len(vertices) + np.arange(len(others))
-    both = np.concatenate([vertices, vertices[others] * [-1, 1, 1]])
-    source = np.concatenate([np.arange(len(vertices)), others])
-    return both, np.concatenate([triangles, image[triangles][:, ::-1]]), source
+def _to_surface(points: Floats) -> Floats:
+    return project(points, distance, gradient)
 
 
 def model_half() -> tuple[Floats, np.ndarray]:
     """Return vertices and triangles of the left half, its rim exactly on x = 0."""
-    vertices, triangles = polygonise()
+    vertices, triangles = polygonise_half()
     vertices, triangles = drop_unused(vertices, triangles)
-    return remesh(vertices, triangles, wanted_length, project)
-
-
-def normals(vertices: Floats, triangles: np.ndarray) -> Floats:
-    """Return unit normals (V, 3): area-weighted face normals, exact mirror images."""
-    total = np.zeros_like(vertices)
-    faces = face_normals(vertices, triangles)
-    for corner in range(3):
-        np.add.at(total, triangles[:, corner], faces)
-    return total / np.linalg.norm(total, axis=1, keepdims=True)
+    return remesh(vertices, triangles, wanted_length, _to_surface)

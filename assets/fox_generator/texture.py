@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+from generator_tools.shapes import Floats
 from PIL import Image
 from scipy.cluster.vq import kmeans2
 from scipy.ndimage import distance_transform_edt
@@ -10,7 +11,6 @@ from scipy.spatial import cKDTree
 
 from .body import distance
 from .colours import paint
-from .shapes import Floats
 
 MARGIN = 14  # texels that the edge colours spread beyond the charts
 COLOURS = 256  # palette size

@@ -5,11 +5,12 @@ Baran and Popovic 2007, "Automatic Rigging and Animation of 3D Characters", sect
 """
 
 import numpy as np
-from scipy.sparse import coo_matrix, csr_matrix, diags
+from generator_tools.diffusion import cotangent_stiffness, segment_distances
+from generator_tools.shapes import Floats
+from scipy.sparse import diags
 from scipy.sparse.linalg import splu
 
 from .body import REGIONS, regions
-from .shapes import Floats
 from .skeleton import Joint, segments
 
 CONTRAST = 1.3  # exponent that thins out the long faint ends of the diffusion
@@ -17,35 +18,6 @@ INNER_LEG = 0.022  # metres from the midline where legs begin
 SMALLEST = 0.006  # weights under this are dropped
 # How far a region's joints blend into each other, in limb radii.
 SPREAD = {"torso": 0.75, "neck": 0.8, "head": 0.5, "jaw": 0.35, "ear": 0.8, "tail": 0.8}
-
-
-def _segment_distances(points: Floats, starts: Floats, ends: Floats) -> Floats:
-    """Return the distance (V, J) from each point to each segment."""
-    along = ends - starts
-    offset = points[:, None] - starts
-    t = np.einsum("vjk,jk->vj", offset, along) / np.einsum("jk,jk->j", along, along)
-    offset -= np.clip(t, 0, 1)[..., None] * along
-    return np.linalg.norm(offset, axis=2)
-
-
-def _stiffness(vertices: Floats, triangles: np.ndarray) -> tuple[csr_matrix, Floats]:
-    """Return the cotangent Laplacian (V, V), positive semidefinite, and the areas (V,)."""
-    n = len(vertices)
-    rows, columns, values = [], [], []
-    for corner in range(3):
-        i, j, k = (triangles[:, (corner + s) % 3] for s in range(3))
-        u, v = vertices[i] - vertices[k], vertices[j] - vertices[k]
-        double_area = np.linalg.norm(np.cross(u, v), axis=1)
-        cotangent = np.maximum(np.einsum("ti,ti->t", u, v) / double_area, 0.02)
-        rows += [i, j]
-        columns += [j, i]
-        values += [0.5 * cotangent] * 2
-    links = coo_matrix(
-        (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=(n, n)
-    ).tocsr()
-    stiffness = diags(np.asarray(links.sum(axis=1)).ravel()) - links
-    areas = np.bincount(triangles.ravel(), np.repeat(double_area / 6, 3), minlength=n)
-    return stiffness.tocsr(), areas
 
 
 def _allowed(vertices: Floats, table: list[Joint]) -> np.ndarray:
@@ -62,7 +34,7 @@ def _allowed(vertices: Floats, table: list[Joint]) -> np.ndarray:
 
 def diffuse_weights(vertices: Floats, triangles: np.ndarray, table: list[Joint]) -> Floats:
     """Return weights (V, J) that sum to 1, for a closed mesh of vertices welded at seams."""
-    reach = _segment_distances(vertices, *segments(table))
+    reach = segment_distances(vertices, *segments(table))
     allowed = _allowed(vertices, table)
     # A vertex on the midline in a paired region falls to whatever is nearest in the middle.
     alone = ~allowed.any(axis=1)
@@ -70,7 +42,7 @@ def diffuse_weights(vertices: Floats, triangles: np.ndarray, table: list[Joint])
     owner = np.where(allowed, reach, np.inf).argmin(axis=1)
     radius = reach[np.arange(len(vertices)), owner]
     spread = np.array([SPREAD.get(joint.region, 0.7) for joint in table])[owner]
-    stiffness, areas = _stiffness(vertices, triangles)
+    stiffness, areas = cotangent_stiffness(vertices, triangles)
     heat = areas / (spread * np.maximum(radius, 0.004)) ** 2
     source = np.zeros_like(reach)
     source[np.arange(len(vertices)), owner] = heat

@@ -28,8 +28,10 @@ def interleaved(work: Mapping[str, Callable[[], object]], rounds: int) -> dict[s
     return times
 
 
-def report(title: str, times: Mapping[str, Sequence[float]], ratio: tuple[str, str], goal: float):
-    """Print medians with their spread, and the median of the ratios within a round."""
+def report(
+    title: str, times: Mapping[str, Sequence[float]], ratio: tuple[str, str], goal: float = 0.0
+):
+    """Print medians with their spread, and the median of the ratios; a goal of 0 is none."""
     print(title)
     for name, values in times.items():
         ordered = sorted(values)
@@ -37,7 +39,8 @@ def report(title: str, times: Mapping[str, Sequence[float]], ratio: tuple[str, s
         print(f"  {name:<44} {statistics.median(values):9.2f} ms  ({low:.2f}..{high:.2f})")
     measured = median_ratio(times, *ratio)
     verdict = "met" if measured <= goal else "MISSED"
-    print(f"  {ratio[0]} / {ratio[1]}: {measured:.2f} (goal: at most {goal:g}, {verdict})\n")
+    wanted = f" (goal: at most {goal:g}, {verdict})" if goal else ""
+    print(f"  {ratio[0]} / {ratio[1]}: {measured:.2f}{wanted}\n")
 
 
 def median_ratio(times: Mapping[str, Sequence[float]], first: str, second: str) -> float:

@@ -6,9 +6,10 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
-NAMES = ("start", "memory", "skinning", "read")
+NAMES = ("start", "memory", "models", "skinning", "bodies", "deform", "read")
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "formats")]
 
 for name in sys.argv[1:] or NAMES:
     import_module(f"bench_{name}").main()

@@ -108,8 +108,9 @@ def parse_json(source: Source) -> dict[str, Any]:
         what = printable(problem.msg, 100)
         raise source.error(f"expected JSON, found a mistake: {what}", offset) from None
     except (ValueError, RecursionError) as problem:
-        reason = "too deep a nesting" if isinstance(problem, RecursionError) else str(problem)
-        raise source.error(f"{printable(reason)}") from None
+        is_deep = isinstance(problem, RecursionError)
+        reason = "expected JSON, found too deep a nesting" if is_deep else printable(problem)
+        raise source.error(reason) from None
     if not isinstance(values, dict):
         raise source.error(f"expected an object with names, found a {type(values).__name__}")
     return values
@@ -207,15 +208,20 @@ def _checked(source: Source, key: str, value: Any, kinds: str, what: str) -> NDA
         array = np.zeros(0, dtype=object)
     if array.dtype.kind in kinds or (array.size == 0 and array.dtype.kind == "f"):
         return array
-    found = "a list of other things" if isinstance(value, list | tuple) else describe(value)
+    found = "a list of other things" if isinstance(value, list | tuple) else _described(value)
     raise source.error(f"{key}: expected {what}, found {found}")
+
+
+def _described(value: Any) -> str:
+    is_array = isinstance(value, np.ndarray)
+    return describe(Deferred(value.shape, value.dtype, lambda: value) if is_array else value)
 
 
 def _dofs(source: Source, given: Any) -> dict[str, float]:
     if given is None:
         return {}
     if not isinstance(given, Mapping):
-        raise source.error(f"dofs: expected names with numbers, found {describe(given)}")
+        raise source.error(f"dofs: expected names with numbers, found {_described(given)}")
     dofs: dict[str, float] = {}
     for name, value in given.items():
         is_number = isinstance(value, int | float) and not isinstance(value, bool)

@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.errors import printable
-from viewer.formats._archive import Archive, describe
+from viewer.formats._archive import Archive, Opaque, Sparse, describe
 from viewer.formats._container import archive_of, are_indices, finite
 from viewer.formats._smpl_names import Member, member_of
 from viewer.formats._smpl_parts import (
@@ -154,8 +154,20 @@ def _parents(archive: Archive, used: list[str]) -> Ints:
     return parents.astype(np.int32)
 
 
+def _matrix(archive: Archive, key: str, shape: tuple[int, int]) -> Sparse:
+    value = archive.get(key)
+    if isinstance(value, Opaque):
+        # numpy pickles a sparse matrix in an .npz, and pickles are programs.
+        raise archive.error(
+            key,
+            f"expected {shape[0]} x {shape[1]} numbers, found an unread value ({value.what}): "
+            "save it as a dense array (`.toarray()`)",
+        )
+    return archive.sparse(key, shape)
+
+
 def _regressor(archive: Archive, n_joints: int, n_vertices: int, used: list[str]) -> JointRegressor:
-    matrix = archive.sparse("J_regressor", (n_joints, n_vertices))
+    matrix = _matrix(archive, "J_regressor", (n_joints, n_vertices))
     joints, vertices, numbers = matrix.entries()
     weights = finite(archive, "J_regressor", numbers)
     sums = np.bincount(joints, weights, minlength=n_joints)
@@ -172,7 +184,7 @@ def _regressor(archive: Archive, n_joints: int, n_vertices: int, used: list[str]
 def _skin(
     source: Source, archive: Archive, joints: Floats, n_vertices: int, used: list[str]
 ) -> Skin:
-    matrix = archive.sparse("weights", (n_vertices, len(joints)))
+    matrix = _matrix(archive, "weights", (n_vertices, len(joints)))
     vertices, columns, numbers = matrix.entries()
     weights = finite(archive, "weights", numbers)
     if (weights < 0.0).any():

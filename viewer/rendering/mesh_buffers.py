@@ -54,7 +54,9 @@ class MeshBuffers:
         self.center: Floats = bounding_box(mesh.positions).mean(axis=0)
         self.positions = self.upload(mesh.positions - self.center)
         self.normals = self.upload(mesh.normals)
-        self.uvs = None if mesh.uvs is None else buffer(context, mesh.uvs[uv_indices], "f4")
+        self.uvs: moderngl.Buffer | None = None
+        if mesh.uvs is not None and len(mesh.uvs):
+            self.uvs = buffer(context, mesh.uvs[uv_indices], "f4")
         self.source_ids = buffer(context, self.sources, "i4")
         self._textures = [
             None

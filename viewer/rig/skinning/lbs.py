@@ -13,7 +13,7 @@ from viewer.rig.vectors import unit
 
 __all__ = ["blended_matrices", "deform", "move"]
 
-_CHUNK = 1 << 16  # matrices at a time, which bounds the memory that large meshes take
+_CHUNK = 1 << 14  # matrices at a time: they stay in the cache, and bound the memory
 _IDENTITY = np.eye(3, 4).reshape(12)
 
 
@@ -103,7 +103,8 @@ def blended_matrices(skin: Skin, palette: Floats) -> Floats:
 def _blended(skin: Skin, palettes: Floats) -> Iterator[tuple[slice, Floats]]:
     """Yield the blended matrices, (F, 3, 4, n), of a run of vertices after the other."""
     frames, joints = palettes.shape[:2]
-    rows = palettes[:, :, :3, :].transpose(0, 2, 3, 1).reshape(12 * frames, joints)
+    # A joint's numbers lie together, so that choosing a block's joints copies whole rows.
+    rows = palettes[:, :, :3, :].transpose(1, 0, 2, 3).reshape(joints, 12 * frames)
     most = max(_CHUNK // frames, 1)
     run: list[Block] = []
     for block in blocks_of(skin):
@@ -120,7 +121,7 @@ def _run(run: list[Block], rows: Floats, frames: int) -> tuple[slice, Floats]:
     blended = np.empty((12 * frames, last - first))
     for block in run:
         part = blended[:, block.rows.start - first : block.rows.stop - first]
-        np.matmul(rows[:, block.joints], block.weights, out=part)
+        np.matmul(rows[block.joints].T, block.weights, out=part)
         if len(block.free):
             part[:, block.free] = np.tile(_IDENTITY, frames)[:, None]
     return slice(first, last), blended.reshape(frames, 3, 4, last - first)

@@ -1,4 +1,4 @@
-"""Signed distances of the shapes that the body is blended from.
+"""Signed distances of the shapes that a figure is blended from.
 
 Every shape maps points (N, 3) in metres to distances (N,): negative inside, zero on the surface.
 """

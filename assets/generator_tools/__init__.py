@@ -1,0 +1,1 @@
+"""What the generators of the bundled figures share: shapes, polygons, remeshing, diffusion."""
