@@ -144,7 +144,8 @@ def _memory(folder: Path) -> None:
     extra = (posed[1] - least[1]) / size
     verdict = "met" if extra <= MEMORY_GOAL else "MISSED"
     print(
-        f"  above the bundled figure / arrays: {extra:.2f} (goal: at most {MEMORY_GOAL:g}, {verdict})\n"
+        f"  above the bundled figure / arrays: {extra:.2f} "
+        f"(goal: at most {MEMORY_GOAL:g}, {verdict})\n"
     )
 
 

@@ -112,7 +112,7 @@ def deform(
 def deform_frames(
     figure: Figure, poses: Sequence[Pose], skinning: Skinning | None = None
 ) -> Floats:
-    """Return the vertices of many poses of one shape, linearly blended, in few products.
+    """Return the vertices of many poses of one shape, linearly blended, without normals.
 
     Parameters
     ----------
@@ -142,19 +142,13 @@ def deform_frames(
     mesh, skeleton, skin = figure.mesh, figure.skeleton, figure.skin
     assert mesh is not None and skeleton is not None and skin is not None  # it is attached
     used = skin_used(skin, how)
-    palettes = np.stack(
-        [skinning_matrices(world_matrices(skeleton, pose), skin.inverse_bind) for pose in poses]
-    )
-    if figure.correctives is not None and how.correctives:
-        rests = (rest_positions(figure, mesh, pose) for pose in poses)
-        pairs = zip(rests, palettes, strict=True)
-        moved = np.concatenate([lbs.move(rest, used, palette[None])[0] for rest, palette in pairs])
-    else:
-        moved = lbs.move(mesh.positions, used, palettes)[0]
-    for frame, pose in zip(moved, poses, strict=True):
-        frame *= pose.figure_scale
+    frames = np.empty((len(poses), mesh.n_vertices, 3))
+    for frame, pose in zip(frames, poses, strict=True):
+        palette = skinning_matrices(world_matrices(skeleton, pose), skin.inverse_bind)
+        moved, _ = lbs.move(rest_positions(figure, mesh, pose, how.correctives), used, palette)
+        np.multiply(moved, pose.figure_scale, out=frame)
         frame += pose.figure_translation
-    return moved
+    return frames
 
 
 def joint_matrices(figure: Figure, pose: Pose) -> Floats:

@@ -42,15 +42,18 @@ def deform(
     normals : (V, 3)
         Unit length.
     """
-    moved, turned = move(positions, skin, palette[None], normals)
+    moved, turned = move(positions, skin, palette, normals)
     assert turned is not None  # normals were given
-    return moved[0], unit(turned[0])
+    return moved, unit(turned)
 
 
 def move(
-    positions: Floats, skin: Skin, palettes: Floats, normals: Floats | None = None
+    positions: Floats, skin: Skin, palette: Floats, normals: Floats | None = None
 ) -> tuple[Floats, Floats | None]:
-    """Skin one mesh by many palettes: one product a block for all frames.
+    """Move positions, and turn normals if there are any, by blended matrices.
+
+    Frames of a clip are best moved one by one: their matrices stay in the processor's cache, and
+    that is twice as fast as one large product (``tests/bench/bench_deform.py``).
 
     Parameters
     ----------
@@ -58,24 +61,24 @@ def move(
         Binding space.
     skin : Skin
         Of V vertices.
-    palettes : (F, J, 4, 4)
-        Skinning matrices of each frame.
+    palette : (J, 4, 4)
+        Skinning matrices.
     normals : (V, 3), optional
-        Turned as well if given; they double the work.
+        They double the work.
 
     Returns
     -------
-    positions : (F, V, 3)
+    positions : (V, 3)
         Figure units.
-    normals : (F, V, 3) or None
+    normals : (V, 3) or None
         Any length.
     """
-    moved = np.empty((len(palettes), *positions.shape))
-    turned = None if normals is None else np.empty_like(moved)
-    for rows, matrices in _blended(skin, palettes):
-        moved[:, rows] = _last(_product(matrices, positions[rows]) + matrices[:, :, 3])
+    moved = np.empty(positions.shape)
+    turned = None if normals is None else np.empty(positions.shape)
+    for rows, matrices in _blended(skin, palette):
+        moved[rows] = (_product(matrices, positions[rows]) + matrices[:, 3]).T
         if normals is not None and turned is not None:
-            turned[:, rows] = _last(_product(matrices, normals[rows]))
+            turned[rows] = _product(matrices, normals[rows]).T
     return moved, turned
 
 
@@ -95,46 +98,40 @@ def blended_matrices(skin: Skin, palette: Floats) -> Floats:
         The affine part of the blended matrices.
     """
     result = np.empty((skin.n_vertices, 3, 4))
-    for rows, matrices in _blended(skin, palette[None]):
-        result[rows] = matrices[0].transpose(2, 0, 1)
+    for rows, matrices in _blended(skin, palette):
+        result[rows] = matrices.transpose(2, 0, 1)
     return result
 
 
-def _blended(skin: Skin, palettes: Floats) -> Iterator[tuple[slice, Floats]]:
-    """Yield the blended matrices, (F, 3, 4, n), of a run of vertices after the other."""
-    frames, joints = palettes.shape[:2]
+def _blended(skin: Skin, palette: Floats) -> Iterator[tuple[slice, Floats]]:
+    """Yield the blended matrices, (3, 4, n), of one run of vertices after the other."""
     # A joint's numbers lie together, so that choosing a block's joints copies whole rows.
-    rows = palettes[:, :, :3, :].transpose(1, 0, 2, 3).reshape(joints, 12 * frames)
-    most = max(_CHUNK // frames, 1)
+    rows = palette[:, :3, :].reshape(len(palette), 12)
     run: list[Block] = []
     for block in blocks_of(skin):
-        if run and block.rows.stop - run[0].rows.start > most:
-            yield _run(run, rows, frames)
+        if run and block.rows.stop - run[0].rows.start > _CHUNK:
+            yield _run(run, rows)
             run = []
         run.append(block)
     if run:
-        yield _run(run, rows, frames)
+        yield _run(run, rows)
 
 
-def _run(run: list[Block], rows: Floats, frames: int) -> tuple[slice, Floats]:
+def _run(run: list[Block], rows: Floats) -> tuple[slice, Floats]:
     first, last = run[0].rows.start, run[-1].rows.stop
-    blended = np.empty((12 * frames, last - first))
+    blended = np.empty((12, last - first))
     for block in run:
         part = blended[:, block.rows.start - first : block.rows.stop - first]
         np.matmul(rows[block.joints].T, block.weights, out=part)
         if len(block.free):
-            part[:, block.free] = np.tile(_IDENTITY, frames)[:, None]
-    return slice(first, last), blended.reshape(frames, 3, 4, last - first)
+            part[:, block.free] = _IDENTITY[:, None]
+    return slice(first, last), blended.reshape(3, 4, last - first)
 
 
 def _product(matrices: Floats, vectors: Floats) -> Floats:
-    """Multiply (F, 3, 4, n) matrices with (n, 3) vectors: (F, 3, n)."""
+    """Multiply (3, 4, n) matrices with (n, 3) vectors: (3, n)."""
     x, y, z = np.ascontiguousarray(vectors.T)
-    product = matrices[:, :, 0] * x
-    product += matrices[:, :, 1] * y
-    product += matrices[:, :, 2] * z
+    product = matrices[:, 0] * x
+    product += matrices[:, 1] * y
+    product += matrices[:, 2] * z
     return product
-
-
-def _last(columns: Floats) -> Floats:
-    return columns.transpose(0, 2, 1)
