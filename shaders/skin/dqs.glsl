@@ -14,11 +14,12 @@ void skin(inout vec3 position, inout vec3 normal) {
     vec4 real = vec4(0.0), dual = vec4(0.0), first = vec4(0.0);
     vec4 x = vec4(0.0), y = vec4(0.0), z = vec4(0.0);
     uint end = in_influences.x + in_influences.y;
-    float scale = 1.0 / (1.0 + in_excess);  // weights count relative to their sum
+    float sum = 0.0;  // weights count relative to it
     for (uint index = in_influences.x; index < end; ++index) {
         vec2 pair = influence(index);
         int joint = int(pair.x);
-        float weight = pair.y * scale;
+        float weight = pair.y;
+        sum += weight;
         vec4 q = rigid_texel(joint, 0);
         // Quaternions are added on the strongest influence's side of the sphere; it comes first.
         first = index == in_influences.x ? q : first;
@@ -30,12 +31,16 @@ void skin(inout vec3 position, inout vec3 normal) {
         z += weight * rigid_texel(joint, 4);
     }
     float size = length(real);
-    if (abs(1.0 + in_excess) < 1e-12 || size < 1e-12) {
+    if (abs(1.0 + in_excess) < 1e-12 || size < 1e-12 * abs(sum)) {
         position += u_rest_shift;  // influences that cancel out give no rotation
         return;
     }
+    // A negative sum turns the blended quaternion around, which is the same rotation.
     real /= size;
     dual /= size;
+    x /= sum;
+    y /= sum;
+    z /= sum;
     vec4 point = vec4(position, 1.0);
     vec3 stretched = vec3(dot(x, point), dot(y, point), dot(z, point));
     vec3 shift = 2.0 * (real.w * dual.xyz - dual.w * real.xyz + cross(real.xyz, dual.xyz));

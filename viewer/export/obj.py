@@ -27,20 +27,22 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
     assert mesh is not None  # as was required
     positions, normals = deform(actor.figure, actor.pose, skinning)
     name = "_".join(printable(actor.figure.name, 100).split()) or "figure"
-    pictures = [material for material in mesh.materials if material.image is not None]
+    beside = _materials(mesh, path)
     parts = [f"# {name}: {actor.figure.up} up{', metres' * (actor.figure.unit == 'm')}\n"]
-    if pictures and mesh.uvs is not None:
-        parts.append(f"mtllib {path.stem}.mtl\n")
+    if beside:
+        parts.append(f"mtllib {list(beside)[-1].name}\n")
     parts += [f"o {name}\n", _rows("v", positions)]
     if mesh.uvs is not None:
         parts.append(_rows("vt", mesh.uvs))
     parts.append(_rows("vn", normals))
-    parts += _faces(mesh, bool(pictures))
-    notes = []
-    if pictures and mesh.uvs is not None:
-        notes += _save_materials(mesh.materials, path)
-    save_text(path, "".join(parts))
+    parts += _faces(mesh, bool(beside))
+    missing = [file for file in beside if not file.exists()]  # others hold the same already
+    with all_or_none(missing):
+        for file in missing:
+            save_bytes(file, beside[file])
+        save_text(path, "".join(parts))
     counts = f"{mesh.n_vertices} vertices, {mesh.n_triangles} triangles"
+    notes = [f"{printable(file, 300)}: its texture" for file in beside if file.suffix == ".png"]
     return [f"{printable(path, 300)}: {counts}", *notes]
 
 
@@ -59,7 +61,7 @@ def _faces(mesh: Mesh, with_materials: bool) -> list[str]:
     corners.append(mesh.triangles + 1)
     separator = "/" if mesh.uvs is not None else "//"
     line = "f" + f" {separator.join(['%d'] * len(corners))}" * 3 + "\n"
-    table: Ints = np.stack(corners, axis=2).reshape(mesh.n_triangles, -1)
+    table: Ints = np.concatenate(np.stack(corners, axis=2))
     edges = np.flatnonzero(np.diff(mesh.material_indices)) + 1
     parts = []
     for first, last in zip([0, *edges], [*edges, mesh.n_triangles], strict=True):
@@ -71,15 +73,19 @@ def _faces(mesh: Mesh, with_materials: bool) -> list[str]:
     return parts
 
 
-def _save_materials(materials: tuple[Material, ...], path: Path) -> list[str]:
-    """Write the ``.mtl`` and its pictures, under names that are free."""
-    parts, notes = [], []
-    for index, material in enumerate(materials):
+def _materials(mesh: Mesh, path: Path) -> dict[Path, bytes]:
+    """Return the pictures and, last, the ``.mtl`` that names them; nothing without a picture."""
+    files: dict[Path, bytes] = {}
+    parts = [f"newmtl {_PLAIN}\nKd 1 1 1\n"]
+    stem = path.stem[:80]  # long ones would be cut behind the number
+    for index, material in enumerate(mesh.materials if mesh.uvs is not None else ()):
         parts.append(f"newmtl material{index}\nKd 1 1 1\n")
         if material.image is not None:
-            picture = free_path(path.parent, f"{path.stem}_{index}", ".png")
-            save_image(picture, material.image)
+            data = encode_png(material.image)
+            picture = free_path(path.parent, f"{stem}_{index}", ".png", data)
+            files[picture] = data
             parts.append(f"map_Kd {picture.name}\n")
-            notes.append(f"{printable(picture, 300)}: its texture")
-    save_text(path.with_suffix(".mtl"), "".join(parts))
-    return notes
+    if files:
+        library = "".join(parts).encode()
+        files[free_path(path.parent, stem, ".mtl", library)] = library
+    return files

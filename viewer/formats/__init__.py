@@ -10,7 +10,7 @@ from pathlib import Path
 
 from viewer.errors import FormatError, UnsupportedFormatError, printable
 from viewer.formats._image import is_picture, read_picture, save_image
-from viewer.formats._save import free_path, save_arrays, save_bytes, save_text
+from viewer.formats._save import all_or_none, free_path, save_arrays, save_bytes, save_text
 from viewer.formats._source import MAX_SIZE, Source
 from viewer.rig.clip import Clip
 from viewer.rig.figure import Figure
@@ -22,6 +22,7 @@ __all__ = [
     "MAX_SIZE",
     "Format",
     "Source",
+    "all_or_none",
     "claims",
     "detect",
     "free_path",

@@ -5,10 +5,11 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import shutil
 import stat
 import tempfile
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 
 from viewer.errors import OutputError, printable
 
-__all__ = ["as_words", "free_path", "save_arrays", "save_bytes", "save_text"]
+__all__ = ["all_or_none", "as_words", "free_path", "save_arrays", "save_bytes", "save_text"]
 
 
 def as_words(name: str) -> list[bytes] | None:
@@ -35,7 +36,7 @@ def as_words(name: str) -> list[bytes] | None:
     return words if comes_back and not set(text) & set(b"{}") else None
 
 
-def free_path(folder: Path, stem: str, suffix: str) -> Path:
+def free_path(folder: Path, stem: str, suffix: str, data: bytes | None = None) -> Path:
     """Return a path that no file has: ``fox.png``, then ``fox-2.png``, and so on.
 
     Parameters
@@ -44,13 +45,22 @@ def free_path(folder: Path, stem: str, suffix: str) -> Path:
         Where to look.
     stem, suffix : str
         Of the name; what could confuse a shell becomes an underscore.
+    data : bytes, optional
+        A file that holds just these is as good as none.
     """
     safe = "".join(letter if letter.isalnum() or letter in "-_." else "_" for letter in stem)[:100]
     path, number = folder / f"{safe or 'picture'}{suffix}", 1
-    while path.exists():
+    while path.exists() and not _holds(path, data):
         number += 1
         path = folder / f"{safe or 'picture'}-{number}{suffix}"
     return path
+
+
+def _holds(path: Path, data: bytes | None) -> bool:
+    with contextlib.suppress(OSError):
+        is_as_long = data is not None and path.is_file() and path.stat().st_size == len(data)
+        return is_as_long and path.read_bytes() == data
+    return False
 
 
 def save_text(path: str | Path, text: str) -> None:
@@ -98,6 +108,53 @@ def save_bytes(path: str | Path, data: bytes) -> None:
             _write_through(path, data)  # not resolved: /dev/stdout may lead to a nameless pipe
         else:
             _replace(path.resolve(), data, stat.S_IMODE(mode))
+    except (OSError, ValueError, RuntimeError) as problem:
+        reason = getattr(problem, "strerror", None) or problem
+        raise OutputError(f"{printable(path, 300)}: {reason}") from None
+
+
+@contextlib.contextmanager
+def all_or_none(paths: Iterable[Path]) -> Iterator[None]:
+    """Put several files that belong together back as they were if writing one of them fails.
+
+    Parameters
+    ----------
+    paths : iterable of Path
+        Those that the block creates or replaces.
+
+    Raises
+    ------
+    OutputError
+        If there is no room to keep what they hold.
+    """
+    copies: dict[Path, Path | None] = {}
+    try:
+        for path in paths:
+            _keep_copy(path, copies)
+        yield
+    except BaseException:
+        for target, copy in copies.items():
+            with contextlib.suppress(OSError):
+                target.unlink(missing_ok=True) if copy is None else copy.replace(target)
+        raise
+    finally:
+        for copy in copies.values():
+            if copy is not None:
+                with contextlib.suppress(OSError):
+                    copy.unlink(missing_ok=True)
+
+
+def _keep_copy(path: Path, copies: dict[Path, Path | None]) -> None:
+    """Copy what a path leads to; None stands for no file. Devices and the like are left alone."""
+    try:
+        target = path.resolve()
+        if not target.exists():
+            copies[target] = None
+        elif target.is_file():
+            handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name[:40]}.")
+            os.close(handle)
+            copies[target] = Path(name)
+            shutil.copy2(target, name)
     except (OSError, ValueError, RuntimeError) as problem:
         reason = getattr(problem, "strerror", None) or problem
         raise OutputError(f"{printable(path, 300)}: {reason}") from None

@@ -12,7 +12,7 @@ from viewer.rendering.index_sets import IndexSet
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.program import Programs, set_uniforms
 from viewer.rendering.skin_pass import PosedMesh
-from viewer.rendering.upload import picture_texture
+from viewer.rendering.upload import ramp_texture
 from viewer.rendering.view import View, set_lights, set_model
 from viewer.rig.arrays import Floats
 
@@ -39,7 +39,7 @@ class MeshPass:
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
         self.context, self.programs = context, programs
         self._arrays: dict[tuple[int, int, int], tuple[PosedMesh, moderngl.VertexArray]] = {}
-        self._colormap = picture_texture(context, colormap()[None], [])
+        self._colormap = ramp_texture(context, colormap())
 
     def draw(self, mesh: PosedMesh, placement: Floats, view: View, options: DisplayOptions) -> None:
         """Draw the surface.

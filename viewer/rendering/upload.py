@@ -22,6 +22,7 @@ __all__ = [
     "offset_texture",
     "pair_texture",
     "picture_texture",
+    "ramp_texture",
     "rigid_texture",
     "write_matrices",
     "write_pairs",
@@ -140,6 +141,15 @@ def picture_texture(context: moderngl.Context, pixels: Bytes, notes: list[str]) 
     if not is_software(context):
         texture.anisotropy = 8.0  # without a GPU it doubles the time of a picture
     check_errors(context, f"a texture of {size[0]} x {size[1]} pixels")
+    return texture
+
+
+def ramp_texture(context: moderngl.Context, pixels: Bytes) -> moderngl.Texture:
+    """Return an sRGB texture of one row without smaller copies: a colour map stays itself."""
+    size = (len(pixels), 1)
+    texture = context.texture(size, 4, pixels.tobytes(), internal_format=_SRGB8_ALPHA8)
+    texture.repeat_x = texture.repeat_y = False
+    texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
     return texture
 
 

@@ -1,0 +1,51 @@
+"""Pictures of small scenes from the front, parallel, unlit or evenly lit: pixels can be named."""
+
+from __future__ import annotations
+
+import numpy as np
+from drawn_figures import skeleton
+
+from viewer.rendering.camera import Camera
+from viewer.rendering.options import DisplayOptions
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import Mesh
+from viewer.rig.scene import Actor, Scene, scene_box
+from viewer.rig.skin import skin_from_lists
+
+PIXELS = 80  # a side; x and y from -2 to 2, so a unit is 20 pixels
+
+
+def front_view(offscreen, scene: Scene, **options) -> np.ndarray:
+    """Return the picture of a scene seen from +z, transparent where nothing is."""
+    camera = Camera(azimuth=0.0, inclination=0.0, fov=90.0, distance=2.0, orthographic=True)
+    shown = DisplayOptions(background="transparent", grid=False, samples=1)
+    for name, value in options.items():
+        setattr(shown, name, value)
+    return offscreen.render(scene, (PIXELS, PIXELS), camera, shown, scene_box(scene))
+
+
+def pixel(picture, x, y) -> list[int]:
+    """Return the colour at a place of the z = 0 plane."""
+    return picture[int(PIXELS * (0.5 - y / 4)), int(PIXELS * (0.5 + x / 4))].tolist()
+
+
+def drawn(picture) -> np.ndarray:
+    """Return which pixels show anything: (H, W) bool."""
+    return picture[..., 3] > 0
+
+
+def grid_figure(n=4, **parts) -> Figure:
+    """Return a square from -1.5 to 1.5 of n x n cells, bound to a root; joint 1 moves nothing."""
+    places = np.linspace(-1.5, 1.5, n + 1)
+    y, x = np.meshgrid(places, places, indexing="ij")
+    points = np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], axis=1)
+    first = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).ravel()
+    corners = np.stack([first, first + 1, first + n + 2, first, first + n + 2, first + n + 1], 1)
+    mesh = Mesh(points, np.tile([0.0, 0.0, 1.0], (len(points), 1)), corners.reshape(-1, 3))
+    skin = skin_from_lists([[(0, 1.0)]] * len(points), np.tile(np.eye(4), (2, 1, 1)))
+    return Figure("grid", mesh, skeleton([-1, 0], np.zeros((2, 3))), skin, **parts)
+
+
+def alone(figure) -> Scene:
+    """Return a scene of one figure at rest."""
+    return Scene([Actor(figure)])

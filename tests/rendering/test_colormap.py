@@ -1,0 +1,71 @@
+"""The colour map: lightness rises from one end to the other, as the eye sees it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from viewer.rendering.colormap import color_at, colormap
+
+# sRGB to CIE XYZ, IEC 61966-2-1; then OKLab's lightness (Ottosson 2020), from XYZ.
+TO_XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
+TO_LMS = np.array(
+    [
+        [0.8189330101, 0.3618667424, -0.1288597137],
+        [0.0329845436, 0.9293118715, 0.0361456387],
+        [0.0482003018, 0.2643662691, 0.6338517070],
+    ]
+)
+TO_LIGHTNESS = np.array([0.2104542553, 0.7936177850, -0.0040720468])
+
+
+def linear(pixels):
+    """Decode sRGB."""
+    share = pixels[:, :3] / 255.0
+    return np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+
+
+def luminance(pixels):
+    return linear(pixels) @ TO_XYZ[1]
+
+
+def lightness(pixels):
+    return np.cbrt(linear(pixels) @ TO_XYZ.T @ TO_LMS.T) @ TO_LIGHTNESS
+
+
+def test_luminance_rises_with_every_colour():
+    assert (np.diff(luminance(colormap())) > 0.0).all()
+
+
+def test_lightness_rises_evenly_from_dark_to_bright():
+    found = lightness(colormap())
+    assert found[0] < 0.25
+    assert found[-1] > 0.9
+    assert (np.diff(found) > 0.0).all()
+    # A step of one in 255 of one channel is up to 0.01 in the dark.
+    even = np.linspace(found[0], found[-1], len(found))
+    assert np.abs(found - even).max() < 0.03
+
+
+def test_no_two_colours_are_the_same_and_all_are_opaque():
+    pixels = colormap()
+    assert pixels.shape == (256, 4)
+    assert pixels.dtype == np.uint8
+    assert len(np.unique(pixels, axis=0)) == 256
+    assert (pixels[:, 3] == 255).all()
+
+
+def test_any_number_of_colours_spans_the_same_map():
+    whole = colormap(256)
+    for count in (2, 4, 16, 52):
+        step = 255 / (count - 1)
+        if step == int(step):
+            assert np.array_equal(colormap(count), whole[:: int(step)])
+
+
+@pytest.mark.parametrize(
+    ("share", "row"), [(0.0, 0), (1.0, 255), (-3.0, 0), (7.0, 255), (0.2, 51), (0.4, 102)]
+)
+def test_color_at_a_place_is_that_of_the_map(share, row):
+    expected = colormap()[row, :3] / 255.0
+    assert color_at(share) == pytest.approx(tuple(expected))
