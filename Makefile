@@ -32,10 +32,11 @@ bench: $(READY) system
 golden: $(READY) system
 	@VIEWER_UPDATE_GOLDEN=1 $(BIN)/python -m pytest -q tests/rendering tests/app
 
-# Makes the bundled figure anew; it needs scipy and scikit-image beside the rest.
+# Makes the bundled figures anew; they need scipy and scikit-image beside the rest.
 figure: $(READY)
 	@$(BIN)/pip install --quiet scipy scikit-image xatlas
 	@$(BIN)/python assets/make_fox.py
+	@$(BIN)/python assets/make_body.py
 
 # The environment, made anew when the dependencies change.
 $(READY): pyproject.toml

@@ -9,7 +9,8 @@ import moderngl
 import pytest
 from hypothesis import settings
 
-SHARED = Path(__file__).resolve().parents[2] / "shared" / "data" / "cse169"
+SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
+SHARED = SHARED_DATA / "cse169"
 
 # Every run tries the same examples, and takes as long as it takes.
 settings.register_profile("fixed", derandomize=True, deadline=None, database=None)
@@ -22,6 +23,14 @@ def shared() -> Path:
     if not SHARED.is_dir():
         pytest.skip(f"no real files in {SHARED}")
     return SHARED
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """The folder of all real and large files, if it lies beside the checkout."""
+    if not SHARED_DATA.is_dir():
+        pytest.skip(f"no real files in {SHARED_DATA}")
+    return SHARED_DATA
 
 
 @pytest.fixture(scope="session")

@@ -6,5 +6,5 @@ vec3 shade(vec3 position, vec3 normal, vec3 to_eye) {
     float width = max(u_scalar_range.y - u_scalar_range.x, 1e-30);
     float share = clamp((v_scalar - u_scalar_range.x) / width, 0.0, 1.0);
     vec3 color = texture(u_colormap, vec2((0.5 + 255.0 * share) / 256.0, 0.5)).rgb;
-    return color * (0.7 + 0.3 * max(dot(normal, to_eye), 0.0));
+    return color * (0.6 + 0.4 * max(dot(normal, to_eye), 0.0));
 }

@@ -11,7 +11,7 @@ from viewer.app.keys import KEYS, MOUSE
 from viewer.app.menus import draw_menus
 from viewer.app.panels import PANELS, Panel, panel_module
 from viewer.app.state import AppState
-from viewer.app.widgets import button
+from viewer.app.widgets import button, number_text
 from viewer.errors import printable
 from viewer.rendering.colormap import color_at
 from viewer.rendering.ground_pass import grid_step
@@ -138,16 +138,16 @@ def draw_hints(state: AppState) -> None:
 
 
 def _draw_legend(state: AppState) -> None:
-    """Say what the colours of a scalar view stand for, at the top of the view."""
+    """Say what the colours of a scalar view stand for, in a corner of the view."""
     x, y, width, _ = state.view_rect
     if state.options.shading != "scalar" or width < 200:
         return
     factor, unit = length_unit(state.actor.figure)
     view = SCALARS[state.options.scalar]
     low, high = view.shown(*state.stats.scalar_range)
-    if _overlay("##legend", x + width / 2, y + 10, (0.5, 0.0)):
+    if _overlay("##legend", x + 10, y + 10, (0.0, 0.0)):
         imgui.text_unformatted(f"{view.title}, {unit}")
-        place, bar = imgui.get_cursor_screen_pos(), (min(260.0, width - 60), 12.0)
+        place, bar = imgui.get_cursor_screen_pos(), (min(180.0, width - 60), 12.0)
         draw_list, steps = imgui.get_window_draw_list(), 64
         for step in range(steps):
             # Whole pixels: edges between them would be blended with the background.
@@ -156,8 +156,9 @@ def _draw_legend(state: AppState) -> None:
             color = imgui.get_color_u32((*color_at((step + 0.5) / steps), 1.0))
             draw_list.add_rect_filled((left, place.y), (right, place.y + bar[1]), color)
         imgui.dummy(bar)
-        imgui.text_unformatted(f"{factor * low:.3g}")
-        text = f"{factor * high:.3g}"
+        is_flat = state.stats.scalar_range[1] <= 0.0
+        imgui.text_unformatted("0 everywhere" if is_flat else number_text(factor * low))
+        text = "" if is_flat else number_text(factor * high)
         imgui.same_line(bar[0] - imgui.calc_text_size(text).x + imgui.get_style().window_padding.x)
         imgui.text_unformatted(text)
     imgui.end()

@@ -7,7 +7,7 @@ import numpy as np
 from viewer.errors import FormatError
 from viewer.formats._numbers import parse_numbers
 from viewer.formats._source import Source, shown
-from viewer.rig.arrays import Floats, Ints
+from viewer.rig.arrays import Floats
 
 __all__ = ["read_indices", "read_numbers", "read_table", "row_error"]
 
@@ -79,47 +79,3 @@ def _check_rows(source: Source, columns: int, count: int) -> None:
 def row_error(source: Source, row: int, columns: int, message: str) -> FormatError:
     """Return an error with the line of a row."""
     return source.error(message, source.word_offset(0, row * columns))
-
-
-def read_indices(source: Source, columns: int, what: str, low: int, end: int) -> Ints:
-    """Read a table of whole numbers from ``low`` to ``end - 1``.
-
-    Parameters
-    ----------
-    source : Source
-        The file.
-    columns : int
-        Numbers in every row.
-    what : str
-        What they count, for messages: ``"vertex"``.
-    low, end : int
-        Smallest, and one more than the largest.
-
-    Returns
-    -------
-    (N, columns) int32
-        As written.
-
-    Raises
-    ------
-    FormatError
-        As ``read_table``, and with the line of a number that is not whole or out of range.
-    """
-    values = read_table(source, columns)
-    check_indices(source, values, what, low, end)
-    return values.astype(np.int32)
-
-
-def check_indices(
-    source: Source, values: Floats, what: str, low: int, end: int, total: int | None = None
-) -> None:
-    """Hold columns of a table to whole numbers in a range; ``total`` columns are in the file."""
-    wrong = np.argwhere((values < low) | (values >= end) | (values != np.floor(values)))
-    if len(wrong):
-        row, column = wrong[0]
-        raise row_error(
-            source,
-            int(row),
-            total or values.shape[1],
-            f"expected a {what} from {low} to {end - 1}, found {values[row, column]:g}",
-        )
