@@ -135,7 +135,10 @@ def all_or_none(paths: Iterable[Path]) -> Iterator[None]:
     except BaseException:
         for target, copy in copies.items():
             with contextlib.suppress(OSError):
-                target.unlink(missing_ok=True) if copy is None else copy.replace(target)
+                if copy is None:
+                    target.unlink(missing_ok=True)
+                else:
+                    copy.replace(target)
         raise
     finally:
         for copy in copies.values():

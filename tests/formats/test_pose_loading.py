@@ -1,0 +1,201 @@
+"""Files that change a figure opened beside them: poses and pictures."""
+
+import json
+
+import numpy as np
+import pytest
+from pig_text import CORE
+from pig_text import write as write_pig
+from synthetic_smpl import model
+
+import viewer
+from viewer.errors import FormatError, RigError
+from viewer.formats import save_image
+from viewer.loading import add_to_actor, read_files
+from viewer.rig.pose import pose_key
+
+SKEL = "balljoint hip { rotxlimit -1 1 balljoint knee { offset 0 -1 0 } }"
+RED = np.full((2, 2, 4), (255, 0, 0, 255), np.uint8)
+BLUE = np.full((2, 2, 4), (0, 0, 255, 255), np.uint8)
+
+
+@pytest.fixture
+def files(tmp_path):
+    """One file of each kind, by the name without suffix."""
+    paths = {"pig": write_pig(tmp_path / "pig")}
+    paths["bare"] = write_pig(tmp_path / "bare", {**CORE, "textures.txt": None})
+    for name, text in {
+        "legs.skel": SKEL,
+        "kick.json": json.dumps({"dofs": {"knee.x": 0.5, "hip.x": 0.25}}),
+        "far.json": json.dumps({"dofs": {"knee.x": 0.5, "hip.x": 2.0, "hip.ty": 1e8}}),
+        "tail.json": json.dumps({"dofs": {"tail.x": 0.5}}),
+        "bend.txt": "0 0 0 0 0 0.5 0 0 0 0 0 0 1",
+        "short.txt": "0 0 0",
+        "shape.json": json.dumps({"betas": [1, 2], "body_pose": [0] * 69}),
+        "long.json": json.dumps({"betas": [1] * 11}),
+        "zero.json": json.dumps({"scale": 0}),
+    }.items():
+        paths[name.partition(".")[0]] = tmp_path / name
+        (tmp_path / name).write_text(text)
+    paths["smpl"] = tmp_path / "smpl.npz"
+    np.savez(paths["smpl"], **model("smpl", 32))
+    for name, pixels in (("red", RED), ("blue", BLUE)):
+        paths[name] = tmp_path / f"{name}.png"
+        save_image(paths[name], pixels)
+    return paths
+
+
+def refusal(*paths):
+    with pytest.raises((FormatError, RigError)) as caught:
+        viewer.load(*paths)
+    assert str(caught.value).isprintable()
+    return str(caught.value)
+
+
+# Poses
+
+
+@pytest.mark.parametrize("order", [("legs", "kick"), ("kick", "legs")])
+def test_pose_goes_to_the_figure_beside_it(files, order):
+    scene = viewer.load(*(files[name] for name in order))
+    assert scene.warnings == ()
+    assert scene.actors[0].pose.dofs.tolist() == [0, 0, 0, 0.25, 0, 0, 0.5, 0, 0]
+
+
+def test_pose_goes_to_the_first_figure_that_it_fits(files):
+    scene = viewer.load(files["smpl"], files["pig"], files["legs"], files["kick"], files["bend"])
+    smpl, pig, legs = scene.actors
+    assert not smpl.pose.dofs.any()
+    assert np.round(pig.pose.dofs, 12).tolist() == [0.5, 0, 0, *[0] * 6]
+    assert legs.pose.dofs[[3, 6]].tolist() == [0.25, 0.5]
+
+
+def test_values_beyond_limits_are_clamped_with_a_note(files):
+    scene = viewer.load(files["legs"], files["far"])
+    assert scene.warnings == (
+        f"{files['far']}: 1 DOFs of the pose were beyond their limits and clamped",
+    )
+    assert scene.actors[0].pose.dofs[[1, 3, 6]].tolist() == [1e8, 1, 0.5]
+
+
+def test_shape_goes_to_a_body(files):
+    scene = viewer.load(files["smpl"], files["shape"])
+    assert scene.warnings == ()
+    assert scene.actors[0].pose.shape_weights.tolist() == [1, 2, *[0] * 8]
+
+
+def test_scale_of_0_is_noted(files):
+    scene = viewer.load(files["pig"], files["zero"])
+    assert scene.warnings == (f"{files['zero']}: scale: expected more than 0, found 0",)
+
+
+def test_pose_alone_is_refused(files):
+    wanted = "is a pose: open it together with a figure"
+    assert refusal(files["kick"]) == f"{files['kick']} {wanted}"
+    skin = files["kick"].with_name("a.skin")
+    skin.write_text("positions 1 { 0 0 0 } normals 1 { 0 0 1 } triangles 1 { 0 0 0 }")
+    assert refusal(skin, files["kick"]) == f"{files['kick']} {wanted}"
+
+
+@pytest.mark.parametrize(
+    ("figure", "pose", "message"),
+    [
+        ("legs", "short", "expected 9 pose numbers for legs, found 3"),
+        ("pig", "short", "expected 13 pose numbers for pig, found 3"),
+        ("smpl", "bend", "expected 72 pose numbers for smpl, found 13"),
+        ("legs", "tail", 'no joint is called "tail"; there are 2: hip, knee'),
+        ("smpl", "long", "smpl has 10 shape coefficients, found 11"),
+    ],
+)
+def test_pose_of_another_figure_is_refused_with_both(files, figure, pose, message):
+    assert refusal(files[figure], files[pose]) == f"{files[pose]}: {message}"
+
+
+# Pictures
+
+
+def test_picture_goes_to_the_first_figure_without_a_texture(files):
+    scene = viewer.load(files["legs"], files["pig"], files["red"])
+    (material,) = scene.actors[1].figure.mesh.materials
+    assert (material.name, material.texture) == ("red", "red.png")
+    assert material.image.tolist() == RED.tolist()
+
+
+def test_second_picture_goes_to_the_second_figure(files):
+    scene = viewer.load(files["pig"], files["pig"], files["red"], files["blue"])
+    textures = [actor.figure.mesh.materials[0].texture for actor in scene.actors]
+    assert textures == ["red.png", "blue.png"]
+
+
+@pytest.mark.parametrize("names", [["legs"], ["smpl"], ["bare"], ["legs", "smpl"]])
+def test_picture_for_figures_without_texture_coordinates_is_refused(files, names):
+    listed = ", ".join(names)
+    assert refusal(files["red"], *(files[name] for name in names)) == (
+        f"{files['red']} is a picture: {listed} has no texture coordinates"
+    )
+
+
+def test_picture_alone_is_refused(files):
+    assert refusal(files["red"]) == f"{files['red']} is a picture: open it with a figure"
+
+
+def test_broken_picture_is_refused(files):
+    files["red"].write_bytes(b"\x89PNG\r\n\x1a\nnothing")
+    assert refusal(files["pig"], files["red"]).startswith(f"{files['red']}: a picture that cannot")
+
+
+# A figure that is open already
+
+
+def additions(files, *names):
+    contents = read_files([files[name] for name in names])
+    assert contents.is_addition
+    return contents
+
+
+def test_pose_is_added_to_an_actor_in_place(files):
+    actor = viewer.load(files["legs"]).actors[0]
+    pose = actor.pose
+    again, notes = add_to_actor(additions(files, "kick"), actor)
+    assert again is actor
+    assert actor.pose is pose
+    assert pose.dofs[[3, 6]].tolist() == [0.25, 0.5]
+    assert notes == []
+    assert add_to_actor(additions(files, "far"), actor)[1] == [
+        f"{files['far']}: 1 DOFs of the pose were beyond their limits and clamped"
+    ]
+
+
+def test_picture_makes_an_actor_with_the_same_pose(files):
+    actor = viewer.load(files["pig"]).actors[0]
+    other, notes = add_to_actor(additions(files, "red", "bend"), actor)
+    assert notes == []
+    assert other is not actor
+    assert other.pose is actor.pose
+    assert other.figure.mesh.materials[0].texture == "red.png"
+    assert actor.figure.mesh.materials == ()
+    assert round(other.pose.dofs[0], 12) == 0.5
+
+
+@pytest.mark.parametrize("names", [("bend", "short"), ("bend", "kick"), ("red", "bend", "tail")])
+def test_what_does_not_fit_leaves_the_actor_as_it_was(files, names):
+    actor = viewer.load(files["pig"]).actors[0]
+    figure, before = actor.figure, pose_key(actor.pose)
+    with pytest.raises(RigError):
+        add_to_actor(additions(files, *names), actor)
+    assert actor.figure is figure
+    assert pose_key(actor.pose) == before
+
+
+def test_pose_for_an_actor_without_a_skeleton_is_refused(files):
+    skin = files["kick"].with_name("a.skin")
+    skin.write_text("positions 1 { 0 0 0 } normals 1 { 0 0 1 } triangles 1 { 0 0 0 }")
+    actor = viewer.load(skin).actors[0]
+    with pytest.raises(RigError) as caught:
+        add_to_actor(additions(files, "kick"), actor)
+    assert str(caught.value) == f"{files['kick']} is a pose, a has no skeleton"
+
+
+def test_figures_and_clips_are_no_additions(files):
+    assert not read_files([files["pig"], files["bend"]]).is_addition
+    assert not read_files([]).is_addition
