@@ -27,10 +27,11 @@ if TYPE_CHECKING:
     from viewer.rig.clip import Channel, Clip, evaluate, sample
     from viewer.rig.figure import Figure
     from viewer.rig.mesh import Material, Mesh
+    from viewer.rig.mirror import mirror_pose
     from viewer.rig.pose import Pose, rest_pose
     from viewer.rig.pose_record import PoseRecord, apply_record, record_of
     from viewer.rig.scene import Actor, Scene
-    from viewer.rig.shape import shaped
+    from viewer.rig.shape import shaped, with_rest_mesh
     from viewer.rig.skeleton import Skeleton
     from viewer.rig.skin import Skin
     from viewer.rig.skinning import Skinning, deform, deform_frames, joint_matrices
@@ -63,12 +64,14 @@ __all__ = [
     "export",
     "joint_matrices",
     "load",
+    "mirror_pose",
     "record_of",
     "render",
     "rest_pose",
     "sample",
     "shaped",
     "show",
+    "with_rest_mesh",
     "write",
 ]
 
@@ -98,12 +101,14 @@ _HOMES = {
     "export": "export",
     "joint_matrices": "rig.skinning",
     "load": "loading",
+    "mirror_pose": "rig.mirror",
     "record_of": "rig.pose_record",
     "render": "rendering.offscreen",
     "rest_pose": "rig.pose",
     "sample": "rig.clip",
     "shaped": "rig.shape",
     "show": "app.window",
+    "with_rest_mesh": "rig.shape",
     "write": "formats",
 }
 

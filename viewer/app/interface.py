@@ -94,7 +94,7 @@ def _share(side: tuple[float, float, float]) -> float:
 
 
 def _is_needed(state: AppState, panel: Panel) -> bool:
-    return not panel.needs or getattr(state.actor.figure, panel.needs) is not None
+    return not panel.needs or getattr(state.actor.figure, panel.needs) not in (None, ())
 
 
 def _draw_panel(state: AppState, name: str, panel: Panel) -> None:

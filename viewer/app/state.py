@@ -80,7 +80,9 @@ class AppState:
     held_vector : HeldVector or None
         The rotation vector being edited.
     shape_seed : int
-        Of the next random shape.
+        Of the random shape drawn last.
+    n_hand_components : int
+        How many principal components of the hands have sliders.
     models : dict
         Body models in the model folder, by name; looked for when the menu opens.
     held_modifiers : int
@@ -106,6 +108,7 @@ class AppState:
     as_vectors: bool = False
     held_vector: HeldVector | None = None
     shape_seed: int = 0
+    n_hand_components: int = 6
     models: dict[str, Path] = field(default_factory=dict)
     panels_visible: bool = True
     keys_visible: bool = False

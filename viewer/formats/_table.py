@@ -9,7 +9,7 @@ from viewer.formats._numbers import parse_numbers
 from viewer.formats._source import Source, shown
 from viewer.rig.arrays import Floats
 
-__all__ = ["read_indices", "read_numbers", "read_table", "row_error"]
+__all__ = ["read_numbers", "read_table", "row_error"]
 
 
 def read_table(source: Source, columns: int) -> Floats:

@@ -12,7 +12,7 @@ from viewer.rig.arrays import Floats, Ints, frozen
 __all__ = ["Hand", "hand_coefficients", "hand_vectors"]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Hand:
     """One hand's joints and the directions in which they usually bend together.
 

@@ -31,6 +31,7 @@ class Panel:
 PANELS = {
     "joints": Panel("Joints", "left"),
     "shape": Panel("Shape", "left", needs="blend_shapes"),
+    "hands": Panel("Hands", "left", needs="hands"),
     "display": Panel("Display", "right 1"),
     "skinning": Panel("Skinning", "right 1"),
     "camera": Panel("Camera", "right 2"),
