@@ -3,6 +3,7 @@
 import json
 import os
 
+import platformdirs
 import pytest
 
 from viewer import models
@@ -27,7 +28,7 @@ def folder(tmp_path):
 def settings(tmp_path, monkeypatch):
     """A settings folder of its own for each test."""
     monkeypatch.setattr(
-        models.platformdirs, "user_config_dir", lambda *_, **__: str(tmp_path / "settings")
+        platformdirs, "user_config_dir", lambda *_, **__: str(tmp_path / "settings")
     )
     return tmp_path / "settings" / "models.json"
 

@@ -7,8 +7,6 @@ import os
 import re
 from pathlib import Path
 
-import platformdirs
-
 from viewer.errors import OutputError, ViewerError, printable
 from viewer.formats import save_bytes
 
@@ -38,6 +36,8 @@ _PUBLISHED = (
 
 
 def _settings_file() -> Path:
+    import platformdirs  # only where models are looked for
+
     return Path(platformdirs.user_config_dir("viewer", appauthor=False)) / "models.json"
 
 
