@@ -8,6 +8,7 @@ import moderngl
 import numpy as np
 
 from viewer.rendering.options import DisplayOptions
+from viewer.rendering.ownership import Owner
 from viewer.rendering.program import Programs, set_uniforms
 from viewer.rendering.upload import buffer, matrix_texture, write_matrices
 from viewer.rendering.view import View, in_front, set_lights, set_model
@@ -51,10 +52,13 @@ class SkeletonBuffers:
         self.n_joints = skeleton.n_joints
         boxes = skeleton.boxes if skeleton.boxes is not None else _cubes(skeleton)
         self._boxes = boxes
-        self._low = buffer(context, boxes[:, 0], "f4")
-        self._high = buffer(context, boxes[:, 1], "f4")
-        self._colors = buffer(context, joint_colors(skeleton.n_joints), "f4")
-        self.world = matrix_texture(context, skeleton.n_joints)
+        self._owner = Owner()
+        with self._owner.guard():
+            keep = self._owner.keep
+            self._low = keep(buffer(context, boxes[:, 0], "f4"))
+            self._high = keep(buffer(context, boxes[:, 1], "f4"))
+            self._colors = keep(buffer(context, joint_colors(skeleton.n_joints), "f4"))
+            self.world = keep(matrix_texture(context, skeleton.n_joints))
         self.center: Floats = np.zeros(3)
         self._array: moderngl.VertexArray | None = None
         self._key: tuple[bytes, ...] | None = None
@@ -99,9 +103,9 @@ class SkeletonBuffers:
 
     def release(self) -> None:
         """Free every buffer."""
-        for item in (self._array, self._low, self._high, self._colors, self.world):
-            if item is not None:
-                item.release()
+        if self._array is not None:
+            self._array.release()
+        self._owner.release()
 
 
 class JointPass:

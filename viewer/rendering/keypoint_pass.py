@@ -7,6 +7,7 @@ import numpy as np
 
 from viewer.rendering.joint_pass import JointPass, draw_boxes, joint_colors
 from viewer.rendering.options import DisplayOptions
+from viewer.rendering.ownership import Owner
 from viewer.rendering.upload import buffer, matrix_texture, write_matrices
 from viewer.rendering.view import View, in_front
 from viewer.rig.arrays import Floats
@@ -40,10 +41,13 @@ class KeypointBuffers:
         assert figure.keypoints is not None and figure.mesh is not None  # the caller looked
         self.count = len(figure.keypoints.names)
         half = _CUBE_SIZE * box_size(bounding_box(figure.mesh.positions))
-        self.low = buffer(context, np.full((self.count, 3), -half), "f4")
-        self.high = buffer(context, np.full((self.count, 3), half), "f4")
-        self.colors = buffer(context, joint_colors(self.count), "f4")
-        self.world = matrix_texture(context, self.count)
+        self._owner = Owner()
+        with self._owner.guard():
+            keep = self._owner.keep
+            self.low = keep(buffer(context, np.full((self.count, 3), -half), "f4"))
+            self.high = keep(buffer(context, np.full((self.count, 3), half), "f4"))
+            self.colors = keep(buffer(context, joint_colors(self.count), "f4"))
+            self.world = keep(matrix_texture(context, self.count))
         self.center: Floats = np.zeros(3)
         self._arrays: dict[int, moderngl.VertexArray] = {}
         self._key: tuple[object, ...] | None = None
@@ -73,8 +77,7 @@ class KeypointBuffers:
         """Free every buffer."""
         for array in self._arrays.values():
             array.release()
-        for item in (self.low, self.high, self.colors, self.world):
-            item.release()
+        self._owner.release()
 
 
 class KeypointPass:

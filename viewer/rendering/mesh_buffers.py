@@ -6,12 +6,13 @@ import moderngl
 import numpy as np
 
 from viewer.rendering.index_sets import IndexSet, index_set, kept_triangles
+from viewer.rendering.ownership import Owner
 from viewer.rendering.part_colors import part_colors
 from viewer.rendering.skin_buffers import SkinBuffers
 from viewer.rendering.upload import buffer, float32, offset_texture, picture_texture
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
-from viewer.rig.mesh import bounding_box, split_seams
+from viewer.rig.mesh import Mesh, bounding_box, split_seams
 from viewer.rig.skinning import Skinning, skin_used
 
 __all__ = ["MeshBuffers"]
@@ -52,29 +53,35 @@ class MeshBuffers:
         self.copies: Ints = np.empty(mesh.n_vertices, dtype=np.int32)
         self.copies[self.sources] = np.arange(self.n_vertices)
         self.center: Floats = bounding_box(mesh.positions).mean(axis=0)
-        self.positions = self.upload(mesh.positions - self.center)
-        self.normals = self.upload(mesh.normals)
-        self.uvs: moderngl.Buffer | None = None
-        if mesh.uvs is not None and len(mesh.uvs):
-            self.uvs = buffer(context, mesh.uvs[uv_indices], "f4")
-        self.source_ids = buffer(context, self.sources, "i4")
-        self._textures = [
-            None
-            if material.image is None or self.uvs is None
-            else picture_texture(context, material.image, notes)
-            for material in mesh.materials
-        ]
+        self._owner = Owner()
         self._index_sets: dict[tuple[bool, tuple[int, ...]], IndexSet] = {}
         self._skins: dict[tuple[int, bool], SkinBuffers] = {}
         self._colors: moderngl.Buffer | None = None
         self._offsets: moderngl.Texture | None = None
         self._product: np.ndarray | None = None
+        with self._owner.guard():
+            self._upload(mesh, uv_indices, notes)
+
+    def _upload(self, mesh: Mesh, uv_indices: Ints, notes: list[str]) -> None:
+        keep = self._owner.keep
+        self.positions = self.upload(mesh.positions - self.center)
+        self.normals = self.upload(mesh.normals)
+        self.uvs: moderngl.Buffer | None = None
+        if mesh.uvs is not None and len(mesh.uvs):
+            self.uvs = keep(buffer(self.context, mesh.uvs[uv_indices], "f4"))
+        self.source_ids = keep(buffer(self.context, self.sources, "i4"))
+        self._textures = [
+            None
+            if material.image is None or self.uvs is None
+            else keep(picture_texture(self.context, material.image, notes))
+            for material in mesh.materials
+        ]
         self.index_set(False, ())
         self.skin(Skinning())
 
     def upload(self, rows: Floats) -> moderngl.Buffer:
         """Return a buffer with one row of (V, 3) for every split vertex."""
-        return buffer(self.context, rows[self.sources], "f4")
+        return self._owner.keep(buffer(self.context, rows[self.sources], "f4"))
 
     def index_set(self, reduced: bool, hidden: tuple[int, ...]) -> IndexSet:
         """Return the triangles of the full or the reduced mesh, without hidden body parts."""
@@ -93,7 +100,9 @@ class MeshBuffers:
         else:
             of_figure, split, materials = mesh.triangles, self.triangles, mesh.material_indices
         kept = kept_triangles(self.figure, hidden, of_figure)
-        return index_set(self.context, split[kept], materials[kept], self._textures)
+        made = index_set(self.context, split[kept], materials[kept], self._textures)
+        self._owner.keep(made.indices)
+        return made
 
     def skin(self, skinning: Skinning) -> SkinBuffers:
         """Return the influences that count."""
@@ -101,7 +110,8 @@ class MeshBuffers:
         if key not in self._skins:
             skin = self.figure.skin
             used = None if skin is None else skin_used(skin, skinning)
-            self._skins[key] = SkinBuffers(self.context, used, self.sources)
+            buffers = SkinBuffers(self.context, used, self.sources)
+            self._skins[key] = self._owner.keep(buffers)
         return self._skins[key]
 
     @property
@@ -118,7 +128,7 @@ class MeshBuffers:
         if self._offsets is None:
             correctives = self.figure.correctives
             assert correctives is not None  # the caller looked
-            self._offsets = offset_texture(self.context, correctives.values())
+            self._offsets = self._owner.keep(offset_texture(self.context, correctives.values()))
         return self._offsets
 
     @property
@@ -133,8 +143,4 @@ class MeshBuffers:
 
     def release(self) -> None:
         """Free every buffer and texture."""
-        owned = [self.positions, self.normals, self.uvs, self.source_ids, self._colors]
-        owned += [kept.indices for kept in self._index_sets.values()]
-        for item in [*owned, *self._textures, self._offsets, *self._skins.values()]:
-            if item is not None:
-                item.release()
+        self._owner.release()

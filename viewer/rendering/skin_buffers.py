@@ -5,6 +5,7 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 
+from viewer.rendering.ownership import Owner
 from viewer.rendering.upload import buffer, pair_texture
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.skin import Skin, has_influence, strongest_first, weight_sums
@@ -31,23 +32,28 @@ class SkinBuffers:
     """
 
     def __init__(self, context: moderngl.Context, skin: Skin | None, sources: Ints) -> None:
+        self._owner = Owner()
+        with self._owner.guard():
+            self._upload(context, skin, sources)
+
+    def _upload(self, context: moderngl.Context, skin: Skin | None, sources: Ints) -> None:
+        keep = self._owner.keep
         if skin is None:
             self.joint_shares: Floats = np.zeros(0)
-            ranges, self.pairs = np.zeros((len(sources), 2)), pair_texture(context, [], [])
-            excess = np.zeros(len(sources))
+            ranges, excess = np.zeros((len(sources), 2)), np.zeros(len(sources))
+            self.pairs = keep(pair_texture(context, [], []))
         else:
             skin = strongest_first(skin)
             counts = np.where(has_influence(skin), np.diff(skin.starts), 0)
             ranges = np.stack([skin.starts[:-1], counts], axis=1)[sources]
-            self.pairs = pair_texture(context, skin.joints, skin.weights)
+            self.pairs = keep(pair_texture(context, skin.joints, skin.weights))
             sums = np.bincount(skin.joints, np.abs(skin.weights), minlength=skin.n_joints)
             self.joint_shares = sums / (sums.sum() or 1.0)
             # Summed in float64: in float32 even thirds miss 1, which far away moves a vertex.
             excess = (weight_sums(skin) - 1.0)[sources]
-        self.influences = buffer(context, ranges, "u4")
-        self.excess = buffer(context, excess, "f4")
+        self.influences = keep(buffer(context, ranges, "u4"))
+        self.excess = keep(buffer(context, excess, "f4"))
 
     def release(self) -> None:
         """Free everything."""
-        for item in (self.pairs, self.influences, self.excess):
-            item.release()
+        self._owner.release()

@@ -9,13 +9,19 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 
-from viewer.rendering.context import check_errors
 from viewer.rendering.mesh_buffers import MeshBuffers
+from viewer.rendering.ownership import Owner
 from viewer.rendering.program import Programs, set_uniforms
 from viewer.rendering.rest_buffers import RestBuffers
 from viewer.rendering.scalar_buffer import ScalarBuffer
 from viewer.rendering.skin_buffers import SkinBuffers
-from viewer.rendering.upload import matrix_texture, rigid_texture, write_matrices, write_rigid
+from viewer.rendering.upload import (
+    checked,
+    matrix_texture,
+    rigid_texture,
+    write_matrices,
+    write_rigid,
+)
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.kinematics import skinning_matrices, world_matrices
@@ -59,16 +65,20 @@ class PosedMesh:
         self, context: moderngl.Context, programs: Programs, mesh: MeshBuffers, way: str = ""
     ) -> None:
         self.context, self.programs, self.mesh = context, programs, mesh
+        self._owner = Owner()
         size = _BYTES_PER_VERTEX * mesh.n_vertices
-        self.posed = context.buffer(reserve=size)
-        check_errors(context, f"a posed mesh of {size / 1e6:.1f} MB")
+        posed = checked(
+            context, context.buffer(reserve=size), f"a posed mesh of {size / 1e6:.1f} MB"
+        )
+        self.posed = self._owner.keep(posed)
         self.center: Floats = mesh.center
         skin = mesh.figure.skin
         self._n_joints = skin.n_joints if skin else 0
-        self._palette = matrix_texture(context, self._n_joints)
+        with self._owner.guard():
+            self._palette = self._owner.keep(matrix_texture(context, self._n_joints))
         self._rigid: moderngl.Texture | None = None
-        self._rest = RestBuffers(context, mesh, way)
-        self.scalars = ScalarBuffer(context, mesh)
+        self._rest = self._owner.keep(RestBuffers(context, mesh, way))
+        self.scalars = self._owner.keep(ScalarBuffer(context, mesh))
         self._arrays: dict[tuple[object, ...], moderngl.VertexArray] = {}
         self._key: tuple[object, ...] | None = None
         self.n_updates = 0
@@ -135,7 +145,8 @@ class PosedMesh:
         if how.method != "dqs":
             write_matrices(self._palette, palette)
         if how.method != "lbs":
-            self._rigid = self._rigid or rigid_texture(self.context, self._n_joints)
+            if self._rigid is None:
+                self._rigid = self._owner.keep(rigid_texture(self.context, self._n_joints))
             centers = bind_positions(skin) - self.mesh.center
             write_rigid(self._rigid, *split_palette(palette, centers))
 
@@ -171,9 +182,7 @@ class PosedMesh:
         """Free what belongs to this actor alone."""
         for array in self._arrays.values():
             array.release()
-        for item in (self.posed, self._palette, self._rigid, self._rest, self.scalars):
-            if item is not None:
-                item.release()
+        self._owner.release()
 
 
 def _skinning_words(how: Skinning) -> tuple[object, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeVar
 
 import moderngl
 import numpy as np
@@ -16,6 +16,7 @@ from viewer.rig.arrays import Bytes, Floats
 __all__ = [
     "as_uniform",
     "buffer",
+    "checked",
     "float32",
     "matrix_rows",
     "matrix_texture",
@@ -29,6 +30,8 @@ __all__ = [
     "write_rigid",
 ]
 
+_Item = TypeVar("_Item", moderngl.Buffer, moderngl.Texture)
+
 # Every driver takes textures 1024 wide, and those with OpenGL 3.3 4096; the shaders count on
 # these.
 _MATRICES_PER_ROW = 256  # three texels each
@@ -41,9 +44,17 @@ _SRGB8_ALPHA8 = 0x8C43
 def buffer(context: moderngl.Context, values: Any, dtype: str) -> moderngl.Buffer:
     """Return a vertex or index buffer; one byte long if there is nothing to hold."""
     data = np.ascontiguousarray(values, dtype=dtype).tobytes() or b"\0"
-    result = context.buffer(data)
-    check_errors(context, f"a mesh buffer of {len(data) / 1e6:.1f} MB")
-    return result
+    return checked(context, context.buffer(data), f"a mesh buffer of {len(data) / 1e6:.1f} MB")
+
+
+def checked(context: moderngl.Context, item: _Item, what: str) -> _Item:
+    """Return an object that the driver made without complaint; else free it and say so."""
+    try:
+        check_errors(context, what)
+    except RenderError:
+        item.release()
+        raise
+    return item
 
 
 def float32(values: Floats) -> NDArray[np.float32]:
@@ -94,8 +105,7 @@ def pair_texture(context: moderngl.Context, indices: Any, weights: Any) -> moder
     height = _height(count, _PAIRS_PER_ROW)
     texture = _data_texture(context, (_PAIRS_PER_ROW, height), 2, f"{count} influences")
     write_pairs(texture, indices, weights)
-    check_errors(context, f"{count} influences")
-    return texture
+    return checked(context, texture, f"{count} influences")
 
 
 def write_pairs(texture: moderngl.Texture, indices: Any, weights: Any) -> None:
@@ -115,8 +125,7 @@ def offset_texture(context: moderngl.Context, offsets: Floats) -> moderngl.Textu
     texels[:count] = offsets.reshape(-1, 3)
     texture = _data_texture(context, (_OFFSETS_PER_ROW, height), 3, f"{count} offsets")
     texture.write(texels.tobytes())
-    check_errors(context, f"{count} offsets")
-    return texture
+    return checked(context, texture, f"{count} offsets")
 
 
 def picture_texture(context: moderngl.Context, pixels: Bytes, notes: list[str]) -> moderngl.Texture:
@@ -140,8 +149,7 @@ def picture_texture(context: moderngl.Context, pixels: Bytes, notes: list[str]) 
     texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
     if not is_software(context):
         texture.anisotropy = 8.0  # without a GPU it doubles the time of a picture
-    check_errors(context, f"a texture of {size[0]} x {size[1]} pixels")
-    return texture
+    return checked(context, texture, f"a texture of {size[0]} x {size[1]} pixels")
 
 
 def ramp_texture(context: moderngl.Context, pixels: Bytes) -> moderngl.Texture:
@@ -168,5 +176,4 @@ def _data_texture(
         )
     texture = context.texture(size, components, dtype="f4")
     texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-    check_errors(context, what)
-    return texture
+    return checked(context, texture, what)
