@@ -60,9 +60,11 @@ def save_model_folder(folder: str | Path) -> Path:
     OutputError
         If it cannot be remembered.
     """
-    path = Path(folder).expanduser()
-    if not path.is_dir():
-        raise ViewerError(f"--model-path: expected a folder, found {printable(path, 300)}")
+    # Those of Path raise for names that are too long, and for people who do not exist.
+    path = Path(os.path.expanduser(folder))  # noqa: PTH111
+    if not str(folder) or not os.path.isdir(path):  # noqa: PTH112
+        found = printable(folder, 300) or "an empty name"
+        raise ViewerError(f"--model-path: expected a folder, found {found}")
     try:
         _settings_file().parent.mkdir(parents=True, exist_ok=True)
     except OSError as problem:
@@ -96,6 +98,9 @@ def known_models(folder: Path) -> dict[str, Path]:
 
 def _files(folder: Path) -> list[Path]:
     paths, looked = [], 0
+    # The settings may name anything; Path.is_dir() would raise for some of it.
+    if not os.path.isdir(folder):  # noqa: PTH112
+        return []
     for root, folders, names in os.walk(folder):
         depth = len(Path(root).relative_to(folder).parts)
         folders[:] = sorted(folders) if depth < _DEEPEST else []
@@ -133,7 +138,7 @@ def find_model(name: str, folder: Path | None) -> Path | None:
     folder : Path or None
         Where models are.
     """
-    if folder is None or not folder.is_dir():
+    if folder is None:
         return None
     wanted = name.lower()
     for path in _files(folder):

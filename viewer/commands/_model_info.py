@@ -12,7 +12,7 @@ from viewer.rig.measure import measure
 from viewer.rig.mirror import asymmetry
 from viewer.rig.pose import Pose
 from viewer.rig.pose_vector import write_vector
-from viewer.rig.scalars import compute, length_unit, strongest
+from viewer.rig.scalars import compute, length_text, strongest
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
 from viewer.rig.skinning import Skinning
@@ -120,13 +120,12 @@ def model_lines(model: dict[str, Any], figure: Figure) -> list[str]:
         )
     if "keypoints" in model:
         lines.append(f"  keypoints  {len(model['keypoints'])}")
-    factor, unit = length_unit(figure)
     if "asymmetry" in model:
         lines.append(
-            f"  symmetry   left and right differ by {factor * model['asymmetry']:.3g} {unit}"
+            f"  symmetry   left and right differ by {length_text(figure, model['asymmetry'])}"
         )
     for text, value in model.get("effects", {}).items():
-        lines.append(f"  effect     {text}: up to {factor * value:.3g} {unit} in this pose")
+        lines.append(f"  effect     {text}: up to {length_text(figure, value)} in this pose")
     return lines
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from viewer.commands._numbers import number
 from viewer.errors import RigError, ViewerError, printable
+from viewer.formats import Source, read
 from viewer.rig.arrays import Floats
 from viewer.rig.clip import sample
 from viewer.rig.hands import hand_vectors
@@ -46,16 +47,16 @@ def add_pose_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--fps", type=number, default=30.0, metavar="R", help="frames a second (default 30)"
     )
-    group.add_argument(
-        "--shape", metavar="A,B,…", help="shape coefficients (betas) of a body model"
-    )
-    group.add_argument("--expression", metavar="A,B,…", help="expression coefficients")
     group.add_argument("--hands", choices=("flat", "mean"), help="start from flat or mean hands")
     group.add_argument(
         "--pose",
         metavar="FILE|A,B,…",
         help="a pose file (.json, .npz, .txt), or the model's own numbers",
     )
+    group.add_argument(
+        "--shape", metavar="A,B,…", help="shape coefficients (betas) of a body model"
+    )
+    group.add_argument("--expression", metavar="A,B,…", help="expression coefficients")
     group.add_argument(
         "--dof",
         action="append",
@@ -112,30 +113,40 @@ def apply_pose(scene: Scene, arguments: argparse.Namespace) -> list[str]:
     ViewerError
         If an option makes no sense for what was opened.
     """
-    _apply_time(scene, _time(arguments))
+    _apply_time(scene, arguments)
     notes: list[str] = []
-    weights = PoseRecord(
-        shape=_numbers("--shape", arguments.shape),
-        expression=_numbers("--expression", arguments.expression),
-    )
-    if weights.shape is not None or weights.expression is not None:
-        notes += _apply_record("--shape", weights, scene)
     if arguments.hands:
         _apply_hands(scene, arguments.hands)
-    if arguments.pose and _is_numbers(arguments.pose):
-        vector = _numbers("--pose", arguments.pose)
-        notes += _apply_record("--pose", PoseRecord(vector=vector), scene)
+    if arguments.pose:
+        record, warnings = _pose(arguments.pose)
+        notes += [*warnings, *_apply_record("--pose", record, scene)]
+    # What is asked for here counts more than what a pose file says.
+    shape = _numbers("--shape", arguments.shape)
+    if shape is not None:
+        notes += _apply_record("--shape", PoseRecord(shape=shape), scene)
+    expression = _numbers("--expression", arguments.expression)
+    if expression is not None:
+        notes += _apply_record("--expression", PoseRecord(expression=expression), scene)
     notes += apply_dofs(scene, arguments.dof)
     if arguments.mirror:
-        for actor in scene.actors:
-            if actor.pose is not None:
-                actor.pose = mirror_pose(actor.figure, actor.pose)
+        _mirror(scene)
     return notes
 
 
 def pose_files(arguments: argparse.Namespace) -> list[str]:
-    """Return the pose file that is asked for, to be opened with the others."""
+    """Return the pose file that is asked for: an input that must not be written over."""
     return [arguments.pose] if arguments.pose and not _is_numbers(arguments.pose) else []
+
+
+def _pose(text: str) -> tuple[PoseRecord, list[str]]:
+    """Return the pose that a file or the numbers themselves hold, and what its reader noticed."""
+    if _is_numbers(text):
+        return PoseRecord(vector=_numbers("--pose", text)), []
+    source = Source.open(text)
+    record = read(source)
+    if not isinstance(record, PoseRecord):
+        raise source.error("--pose: expected a pose, found a figure or clip")
+    return record, source.warnings
 
 
 def _is_numbers(text: str) -> bool:
@@ -145,7 +156,8 @@ def _is_numbers(text: str) -> bool:
 def _numbers(option: str, text: str | None) -> Floats | None:
     if text is None:
         return None
-    words = re.split(r"[,\s]+", text.strip().strip(","))
+    # A comma at the end is forgiven; two in a row would shift what follows.
+    words = re.split(r"\s*,\s*|\s+", text.strip().removesuffix(",").rstrip())
     try:
         return np.array([number(word) for word in words])
     except (ValueError, argparse.ArgumentTypeError):
@@ -159,7 +171,7 @@ def _time(arguments: argparse.Namespace) -> tuple[float, bool] | None:
     if arguments.frame is None:
         return None if arguments.time is None else (arguments.time, False)
     if arguments.time is not None:
-        raise ViewerError("--frame and --time: expected one of them")
+        raise ViewerError("--frame and --time: expected one of them, found both")
     if arguments.fps <= 0.0:
         raise ViewerError(f"--fps: expected more than 0, found {arguments.fps:g}")
     if not 0 <= arguments.frame <= _MOST_FRAMES:
@@ -167,13 +179,15 @@ def _time(arguments: argparse.Namespace) -> tuple[float, bool] | None:
     return arguments.frame / arguments.fps, True
 
 
-def _apply_time(scene: Scene, time: tuple[float, bool] | None) -> None:
+def _apply_time(scene: Scene, arguments: argparse.Namespace) -> None:
     """Pose every actor that has a clip as it is at a time."""
+    time = _time(arguments)
     if time is None:
         return
     moving = [actor for actor in scene.actors if actor.clip is not None]
     if not moving:
-        raise ViewerError("--time: no file is a clip")
+        option = "--time" if arguments.frame is None else "--frame"
+        raise ViewerError(f"{option}: no file is a clip")
     for actor in moving:
         if actor.clip and actor.figure.skeleton and actor.pose:
             seconds, from_start = time
@@ -203,6 +217,15 @@ def _apply_hands(scene: Scene, which: str) -> None:
             assert actor.figure.skeleton is not None and actor.pose is not None
             turned = rotation_vector_to_matrix(vectors)
             set_joint_rotations(actor.figure.skeleton, actor.pose, hand.joints, turned)
+
+
+def _mirror(scene: Scene) -> None:
+    for actor in scene.actors:
+        if actor.pose is not None:
+            try:
+                actor.pose = mirror_pose(actor.figure, actor.pose)
+            except RigError as problem:
+                raise ViewerError(f"--mirror: {problem}") from None
 
 
 def apply_dofs(scene: Scene, settings: Sequence[str]) -> list[str]:

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from viewer.commands._pose import add_pose_arguments, apply_pose, pose_files
+from viewer.commands._pose import add_pose_arguments, apply_pose
 from viewer.errors import FormatError, ViewerError, printable
 from viewer.loading import bundled_body, load
 from viewer.models import known_models, load_model_folder, resolve, save_model_folder
@@ -48,11 +48,11 @@ def _parse_bytes(text: str) -> int:
 
 
 def scene_files(arguments: argparse.Namespace) -> list[str | Path]:
-    """Return what is opened: the files as given or found by name, the bundled body, a pose."""
+    """Return what is opened: the files as given or found by name, and the bundled body."""
     files: list[str | Path] = [resolve(file) for file in arguments.files]
     if arguments.body:
         files.append(bundled_body())
-    return [*files, *pose_files(arguments)]
+    return files
 
 
 def open_scene(arguments: argparse.Namespace) -> Scene:

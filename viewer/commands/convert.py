@@ -6,10 +6,11 @@ import argparse
 from pathlib import Path
 
 from viewer.commands._output import check_output
-from viewer.commands._pose import add_skinning_arguments, skinning_of
+from viewer.commands._pose import add_skinning_arguments, pose_files, skinning_of
 from viewer.commands._scene import add_scene_arguments, open_scene, scene_files
 from viewer.errors import OutputError, printable
 from viewer.export import EXPORTERS, export, exporter_for
+from viewer.formats import all_or_none
 
 __all__ = ["add_arguments", "run"]
 
@@ -27,22 +28,28 @@ def run(arguments: argparse.Namespace) -> int:
     """Write one file for each actor, and say what was written and what was lost."""
     output = Path(arguments.output)
     exporter_for(output)
-    inputs = [Path(file) for file in scene_files(arguments)]
     for path in _written(output):
-        check_output(path, inputs, arguments.force)
+        check_output(path, _inputs(arguments), arguments.force)
     skinning = skinning_of(arguments)
     scene = open_scene(arguments)
+    inputs = _inputs(arguments)  # --model-path counts from now on
     paths = [output] + [
         output.with_name(f"{output.stem}-{number}{output.suffix}")
         for number in range(2, len(scene.actors) + 1)
     ]
-    for path in paths[1:]:
-        for beside in _written(path):
-            check_output(beside, inputs, arguments.force)
-    for actor, path in zip(scene.actors, paths, strict=True):
-        for line in export(actor, path, skinning):
-            print(line)
+    files = [file for path in paths for file in _written(path)]
+    for file in files:
+        check_output(file, inputs, arguments.force)
+    lines = []
+    with all_or_none(files):
+        for actor, path in zip(scene.actors, paths, strict=True):
+            lines += export(actor, path, skinning)
+    print("\n".join(lines))
     return 0
+
+
+def _inputs(arguments: argparse.Namespace) -> list[Path]:
+    return [Path(file) for file in (*scene_files(arguments), *pose_files(arguments))]
 
 
 def _written(path: Path) -> list[Path]:

@@ -11,13 +11,16 @@ import numpy as np
 
 from viewer.errors import printable
 from viewer.export import require_mesh
-from viewer.formats import free_path, save_image, save_text
+from viewer.formats import all_or_none, free_path, save_bytes, save_text
+from viewer.formats._image import encode_png
 from viewer.rig.arrays import Floats, Ints
-from viewer.rig.mesh import Material, Mesh
+from viewer.rig.mesh import Mesh
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import Skinning, deform
 
 __all__ = ["export"]
+
+_PLAIN = "plain"  # the material of triangles that have none
 
 
 def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
@@ -61,13 +64,13 @@ def _faces(mesh: Mesh, with_materials: bool) -> list[str]:
     corners.append(mesh.triangles + 1)
     separator = "/" if mesh.uvs is not None else "//"
     line = "f" + f" {separator.join(['%d'] * len(corners))}" * 3 + "\n"
-    table: Ints = np.concatenate(np.stack(corners, axis=2))
+    table: Ints = np.stack(corners, axis=2).reshape(mesh.n_triangles, 3 * len(corners))
     edges = np.flatnonzero(np.diff(mesh.material_indices)) + 1
     parts = []
     for first, last in zip([0, *edges], [*edges, mesh.n_triangles], strict=True):
         index = int(mesh.material_indices[first]) if mesh.n_triangles else -1
-        if with_materials and index >= 0:
-            parts.append(f"usemtl material{index}\n")
+        if with_materials:
+            parts.append(f"usemtl {f'material{index}' if index >= 0 else _PLAIN}\n")
         rows = table[first:last]
         parts.append(line * len(rows) % tuple(rows.ravel().tolist()))
     return parts

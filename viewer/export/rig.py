@@ -9,11 +9,11 @@ import numpy as np
 
 from viewer.errors import RigError, printable
 from viewer.export._course_rig import course_skeleton
-from viewer.formats import Source, read, write
+from viewer.formats import Source, all_or_none, read, write
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh, split_seams
 from viewer.rig.pose import Pose, rest_pose
-from viewer.rig.scalars import length_unit
+from viewer.rig.scalars import length_text
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
 from viewer.rig.skin import skin_rows
@@ -34,17 +34,28 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
     whole = shaped(figure, pose.shape_weights)
     rig, sources = _as_rig(whole, pose, skinning)
     skel, skin = path.with_suffix(".skel"), path.with_suffix(".skin")
-    write(rig, skel)
     notes = [f"{printable(skel, 300)}: {figure.skeleton.n_joints} joints"]
+    with all_or_none(_files(rig, skel, skin)):
+        write(rig, skel)
+        if rig.mesh is not None:
+            write(rig, skin)
+        error = _error(actor, skel, skin, sources, skinning)
     if rig.mesh is not None:
-        write(rig, skin)
         notes.append(f"{printable(skin, 300)}: {rig.mesh.n_vertices} vertices")
         if figure.mesh is not None and rig.mesh.n_vertices != figure.mesh.n_vertices:
             notes.append(
                 f"split at texture seams: {figure.mesh.n_vertices} vertices are "
                 f"{rig.mesh.n_vertices} in the .skin"
             )
-    return notes + _lost(figure, pose) + _error(actor, skel, skin, sources, skinning)
+    return notes + _lost(figure, pose) + error
+
+
+def _files(rig: Figure, skel: Path, skin: Path) -> list[Path]:
+    """Return what is written: the pictures too, which the writer puts where they are named."""
+    if rig.mesh is None:
+        return [skel]
+    pictures = [material.texture for material in rig.mesh.materials if material.image is not None]
+    return [skel, skin, *(skin.parent / name.replace("\\", "/") for name in pictures if name)]
 
 
 def _as_rig(figure: Figure, pose: Pose, skinning: Skinning) -> tuple[Figure, np.ndarray | None]:
@@ -107,5 +118,4 @@ def _error(
     found = deform(again, rest_pose(skeleton.skeleton))[0]
     wanted = deform(actor.figure, actor.pose, skinning)[0][sources]
     worst = float(np.linalg.norm(found - wanted, axis=1).max())
-    factor, unit = length_unit(actor.figure)
-    return [f"largest error of this pose when read back: {factor * worst:.3g} {unit}"]
+    return [f"largest error of this pose when read back: {length_text(actor.figure, worst)}"]

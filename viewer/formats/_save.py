@@ -141,10 +141,9 @@ def all_or_none(paths: Iterable[Path]) -> Iterator[None]:
                     copy.replace(target)
         raise
     finally:
-        for copy in copies.values():
-            if copy is not None:
-                with contextlib.suppress(OSError):
-                    copy.unlink(missing_ok=True)
+        for copy in filter(None, copies.values()):
+            with contextlib.suppress(OSError):
+                copy.unlink(missing_ok=True)
 
 
 def _keep_copy(path: Path, copies: dict[Path, Path | None]) -> None:
@@ -154,13 +153,22 @@ def _keep_copy(path: Path, copies: dict[Path, Path | None]) -> None:
         if not target.exists():
             copies[target] = None
         elif target.is_file():
-            handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name[:40]}.")
-            os.close(handle)
-            copies[target] = Path(name)
-            shutil.copy2(target, name)
+            copies[target] = _copy(target)
     except (OSError, ValueError, RuntimeError) as problem:
         reason = getattr(problem, "strerror", None) or problem
         raise OutputError(f"{printable(path, 300)}: {reason}") from None
+
+
+def _copy(target: Path) -> Path:
+    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name[:40]}.")
+    os.close(handle)
+    try:
+        shutil.copy2(target, name)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            Path(name).unlink()
+        raise
+    return Path(name)
 
 
 def _mode(target: Path) -> int:

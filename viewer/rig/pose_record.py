@@ -14,7 +14,7 @@ from viewer.rig.hands import Hand, hand_vectors
 from viewer.rig.pose import Pose
 from viewer.rig.pose_vector import read_vector, set_joint_rotations, write_vector
 from viewer.rig.rotation import rotation_vector_to_matrix
-from viewer.rig.skeleton import clamp_dofs, dof_label, find_dof
+from viewer.rig.skeleton import Skeleton, clamp_dofs, dof_label, find_dof
 
 __all__ = ["PARTS", "PoseRecord", "apply_record", "record_of"]
 
@@ -144,9 +144,13 @@ def _apply_dofs(dofs: Mapping[str, float], figure: Figure, pose: Pose) -> list[s
     assert skeleton is not None
     for label, value in dofs.items():
         pose.dofs[find_dof(skeleton, label)] = value
-    clamped = clamp_dofs(skeleton, pose.dofs)
-    count = int((clamped != pose.dofs).sum())
-    pose.dofs[:] = clamped
+    notes = _beyond_limits(skeleton, pose.dofs)
+    pose.dofs[:] = clamp_dofs(skeleton, pose.dofs)
+    return notes
+
+
+def _beyond_limits(skeleton: Skeleton, dofs: Floats) -> list[str]:
+    count = int((clamp_dofs(skeleton, dofs) != dofs).sum())
     return [f"{count} DOFs of the pose were beyond their limits and clamped"] if count else []
 
 
@@ -158,7 +162,7 @@ def _apply_vector(vector: Floats, figure: Figure, pose: Pose) -> list[str]:
     own = skeleton.n_dofs if layout is None else layout.n_numbers
     if len(vector) == own:
         read_vector(layout, skeleton, pose, vector)
-        return []
+        return _beyond_limits(skeleton, vector) if layout is None else []
     is_family = "pelvis" in skeleton.names and layout is not None and layout.translation < 0
     if not is_family or len(vector) % 3 or len(vector) < 66:
         raise RigError(f"expected {own} pose numbers for {figure.name}, found {len(vector)}")

@@ -15,8 +15,9 @@ from viewer.rig.mirror import mirror_axis
 from viewer.rig.pose import Pose
 from viewer.rig.skinning import Skinning, deform
 
-__all__ = ["SCALARS", "Scalar", "compute", "length_unit", "strongest"]
+__all__ = ["SCALARS", "Scalar", "compute", "length_text", "length_unit", "strongest"]
 
+_NOISE = 1e-9  # of the figure's size
 _FOUR = 4  # influences of most engines, if no other number is chosen
 
 
@@ -72,7 +73,10 @@ def compute(name: str, figure: Figure, pose: Pose | None, skinning: Skinning) ->
     assert figure.mesh is not None  # the caller draws it
     if pose is None or not figure.is_attached:
         return np.zeros(figure.mesh.n_vertices)
-    return SCALARS[name].values(figure, pose, skinning)
+    values = SCALARS[name].values(figure, pose, skinning)
+    # Rounding is no effect, and must not fill the colour map where there is nothing else.
+    values[values < _NOISE * box_size(bounding_box(figure.mesh.positions))] = 0.0
+    return values
 
 
 def _distance(figure: Figure, pose: Pose | None, one: Skinning, other: Skinning) -> Floats:
@@ -129,6 +133,13 @@ def length_unit(figure: Figure) -> tuple[float, str]:
         return 1000.0, "mm"
     size = 0.0 if figure.mesh is None else box_size(bounding_box(figure.mesh.positions))
     return (100.0 / size, "% of the size") if size > 0.0 else (1.0, "units")
+
+
+def length_text(figure: Figure, length: float) -> str:
+    """Return a small length in words, to three digits: ``"12.3 mm"``."""
+    factor, unit = length_unit(figure)
+    number = factor * length
+    return f"{number:.0f} {unit}" if number >= 999.5 else f"{number:.3g} {unit}"
 
 
 def strongest(figure: Figure) -> int:

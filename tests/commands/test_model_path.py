@@ -1,0 +1,234 @@
+"""``--model-path``: a folder of body models, remembered, and models opened by name."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from export.plain_readers import read_obj
+from formats.synthetic_smpl import model
+from numpy.testing import assert_allclose
+
+from viewer import models
+from viewer.cli import run
+
+FILES = {
+    "smplx/SMPLX_NEUTRAL.npz": "smplx:neutral",
+    "smplx/SMPLX_FEMALE.npz": "smplx:female",
+    "smpl/basicModel_f_lbs_10_207_0_v1.0.0.npz": "smpl:female",
+    "smpl/basicmodel_neutral_lbs_10_207_0_v1.1.0.npz": "smpl:neutral",
+    "smplh/male/model.npz": "smplh:male",
+    "mano/MANO_LEFT.npz": "mano:left",
+    "mano/MANO_RIGHT.npz": "mano:right",
+    "flame/generic_model.npz": "flame",
+}
+
+
+@pytest.fixture(autouse=True)
+def settings(tmp_path, monkeypatch):
+    """The file that remembers is this test's own."""
+    path = tmp_path / "settings" / "deeper" / "models.json"
+    monkeypatch.setattr(models, "_settings_file", lambda: path)
+    monkeypatch.chdir(tmp_path)
+    return path
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Models under their published names."""
+    base = tmp_path / "body models"
+    for file, name in FILES.items():
+        (base / file).parent.mkdir(parents=True, exist_ok=True)
+        np.savez(base / file, **model(name.partition(":")[0], 32))
+    (base / "notes.txt").write_text("not a model")
+    return base
+
+
+def told(capsys, *arguments):
+    """Return the name and the kind of the first figure that ``info`` opens."""
+    assert run(["info", *arguments, "--json"]) == 0
+    actor = json.loads(capsys.readouterr().out)["actors"][0]
+    return actor["name"], actor["model"]["facts"]["model"]
+
+
+def refused(capsys, *arguments, code=2):
+    assert run([*arguments]) == code
+    captured = capsys.readouterr()
+    assert captured.out == "" and captured.err.count("\n") == 1
+    return captured.err.removesuffix("\n")
+
+
+def test_folder_is_remembered(folder, settings, capsys):
+    assert models.load_model_folder() is None
+    arguments = ["smplx:neutral", "--model-path", str(folder)]
+    assert told(capsys, *arguments) == ("SMPLX_NEUTRAL", "SMPL-X")
+    assert json.loads(settings.read_text()) == {"folder": str(folder.resolve())}
+    assert told(capsys, "smplx:neutral") == ("SMPLX_NEUTRAL", "SMPL-X")
+    assert told(capsys, "mano:left") == ("MANO_LEFT", "MANO")
+
+
+def test_relative_folder_is_remembered_from_anywhere(folder, tmp_path, capsys, monkeypatch):
+    assert run(["info", "smplx:neutral", "--model-path", folder.name]) == 0
+    capsys.readouterr()
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    assert told(capsys, "smplx:neutral")[1] == "SMPL-X"
+
+
+def test_another_folder_takes_its_place(folder, tmp_path, capsys):
+    (tmp_path / "other").mkdir()
+    np.savez(tmp_path / "other" / "SMPL_MALE.npz", **model("smpl", 32))
+    assert told(capsys, "mano:left", "--model-path", str(folder))
+    assert told(capsys, "smpl:male", "--model-path", str(tmp_path / "other"))
+    assert "smpl:male" in refused(capsys, "info", "mano:left")
+
+
+@pytest.mark.parametrize(
+    ("name", "stem"),
+    [
+        ("smplx:female", "SMPLX_FEMALE"),
+        ("SMPLX:Female", "SMPLX_FEMALE"),
+        ("SMPLX_FEMALE.npz", "SMPLX_FEMALE"),
+        ("smplx_female.npz", "SMPLX_FEMALE"),
+        ("smplx", "SMPLX_NEUTRAL"),
+        ("smpl", "basicmodel_neutral_lbs_10_207_0_v1.1.0"),
+        ("smpl:female", "basicModel_f_lbs_10_207_0_v1.0.0"),
+        ("smplh", "model"),  # the only one
+        ("smplh:male", "model"),
+        ("flame", "generic_model"),
+    ],
+)
+def test_model_is_found_by_its_published_name(folder, capsys, name, stem):
+    assert told(capsys, name, "--model-path", str(folder))[0] == stem
+
+
+def test_kind_of_which_there_are_several_must_be_told(folder, capsys):
+    line = refused(capsys, "info", "mano", "--model-path", str(folder))
+    assert "mano:left, mano:right" in line
+
+
+def test_unknown_name_lists_what_is_there(folder, capsys):
+    line = refused(capsys, "info", "smplx:male", "--model-path", str(folder))
+    names = ", ".join(sorted(FILES.values()))
+    assert line == (
+        f"smplx:male: no such file, and no such model in {folder.resolve()}; models there: {names}"
+    )
+
+
+def test_empty_folder_says_so(tmp_path, capsys):
+    (tmp_path / "empty").mkdir()
+    line = refused(capsys, "info", "smplx", "--model-path", str(tmp_path / "empty"))
+    assert line.endswith("; models there: none")
+
+
+def test_without_a_folder_a_name_is_a_missing_file(capsys):
+    assert refused(capsys, "info", "smplx") == "smplx: cannot be read: No such file or directory"
+
+
+def test_file_that_exists_goes_before_a_model(folder, tmp_path, capsys):
+    np.savez(tmp_path / "smplx", **model("flame", 32))  # numpy adds .npz
+    (tmp_path / "smplx.npz").rename(tmp_path / "smplx")
+    assert told(capsys, "smplx", "--model-path", str(folder))[1] == "FLAME"
+
+
+def test_path_with_folders_is_never_a_model(folder, capsys):
+    line = refused(capsys, "info", "./x/smplx", "--model-path", str(folder))
+    assert line == "x/smplx: cannot be read: No such file or directory"
+
+
+@pytest.mark.parametrize("what", ["missing", "file.txt"])
+def test_what_is_no_folder_is_refused_and_not_remembered(folder, tmp_path, settings, capsys, what):
+    (tmp_path / "file.txt").write_text("x")
+    assert run(["info", "smplx", "--model-path", str(folder)]) == 0
+    capsys.readouterr()
+    before = settings.read_bytes()
+    line = refused(capsys, "info", "smplx", "--model-path", what)
+    assert line == f"viewer: --model-path: expected a folder, found {what}"
+    assert settings.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("name", "shown"),
+    [
+        ("a\0b", "a\\x00b"),
+        ("two\nlines", "two\\nlines"),
+        ("x" * 280, "x" * 280),
+        ("", "an empty name"),
+        ("~nobody-of-this-name", "~nobody-of-this-name"),
+    ],
+)
+def test_impossible_folder_is_refused(settings, capsys, name, shown):
+    line = refused(capsys, "info", "smplx", f"--model-path={name}")
+    assert line == f"viewer: --model-path: expected a folder, found {shown}"
+    assert not settings.exists()
+
+
+def test_settings_that_cannot_be_written_are_exit_code_5(folder, tmp_path, capsys):
+    (tmp_path / "settings").write_text("in the way")
+    line = refused(capsys, "info", "smplx", "--model-path", str(folder), code=5)
+    assert line.startswith(f"viewer: {tmp_path / 'settings'}")
+
+
+@pytest.mark.parametrize(
+    "folder", ["5", '"gone"', '""', '"a\\u0000b"', '"\\ud800"', f'"{"x" * 5000}"', "[]"]
+)
+def test_remembered_folder_that_cannot_be_is_as_none(settings, capsys, folder):
+    settings.parent.mkdir(parents=True)
+    settings.write_text(f'{{"folder": {folder}}}')
+    assert "smplx: " in refused(capsys, "info", "smplx")
+
+
+@pytest.mark.parametrize("text", ["", "[]", "null", "{}", "{", "\udcff", "[" * 100_000])
+def test_settings_that_make_no_sense_are_as_none(settings, capsys, text):
+    settings.parent.mkdir(parents=True)
+    settings.write_bytes(text.encode("utf-8", "surrogateescape"))
+    assert "smplx: " in refused(capsys, "info", "smplx")
+
+
+def test_npz_goes_before_pkl(tmp_path):
+    for name in ("a/SMPL_NEUTRAL.pkl", "b/SMPL_NEUTRAL.npz", "c/SMPL_NEUTRAL.pkl"):
+        (tmp_path / name).parent.mkdir()
+        (tmp_path / name).touch()
+    assert models.known_models(tmp_path) == {"smpl:neutral": tmp_path / "b" / "SMPL_NEUTRAL.npz"}
+
+
+def test_deep_and_unknown_files_are_left_alone(tmp_path):
+    deep = tmp_path / "1" / "2" / "3" / "4"
+    (deep / "5").mkdir(parents=True)
+    (deep / "SMPL_MALE.npz").touch()
+    (deep / "5" / "SMPL_FEMALE.npz").touch()
+    for name in ("SMPL_OTHER.npz", "my_smpl_male.npz", "SMPL_NEUTRAL.txt"):
+        (tmp_path / name).touch()
+    assert models.known_models(tmp_path) == {"smpl:male": deep / "SMPL_MALE.npz"}
+
+
+# With other commands
+
+
+def test_named_model_is_converted(folder, tmp_path, capsys):
+    out = tmp_path / "left.obj"
+    assert run(["convert", "mano:left", "--model-path", str(folder), "-o", str(out)]) == 0
+    expected = model("mano", 32)["v_template"]
+    assert_allclose(read_obj(out).v, expected, rtol=0, atol=1e-9)
+
+
+def test_named_model_is_an_input_and_never_replaced(folder, capsys):
+    target = folder / "mano" / "MANO_LEFT.npz"
+    before = target.read_bytes()
+    first = ["convert", "mano:left", "--model-path", str(folder), "--force", "-o", str(target)]
+    for arguments in (first, ["convert", "mano:left", "--force", "-o", str(target)]):
+        line = refused(capsys, *arguments, code=5)
+        assert line == f"viewer: {target}: is an input file, which is never replaced"
+    assert target.read_bytes() == before
+
+
+def test_body_opens_the_bundled_one(capsys):
+    assert told(capsys, "--body") == ("body", "SMPL")
+
+
+def test_body_stands_beside_other_files(folder, capsys):
+    arguments = ["mano:left", "--body", "--model-path", str(folder), "--json"]
+    assert run(["info", *arguments]) == 0
+    actors = json.loads(capsys.readouterr().out)["actors"]
+    assert [actor["name"] for actor in actors] == ["MANO_LEFT", "body"]

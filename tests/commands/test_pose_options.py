@@ -1,0 +1,226 @@
+"""Options that shape, pose and skin, given wrongly: one line each, with what was expected."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from export.small_rigs import ARMS_SKEL, LOPSIDED_SKEL, clip_text, write_box, write_twist
+from formats.synthetic_smpl import model
+
+from viewer.cli import run
+from viewer.rig.scalars import SCALARS
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """Figures of all kinds in the current folder."""
+    monkeypatch.chdir(tmp_path)
+    write_twist(tmp_path)
+    write_box(tmp_path / "pig")
+    np.savez(tmp_path / "smpl.npz", **model("smpl", 32))
+    np.savez(tmp_path / "mano.npz", **model("mano", 32))
+    (tmp_path / "arms.skel").write_text(ARMS_SKEL)
+    (tmp_path / "lopsided.skel").write_text(LOPSIDED_SKEL)
+    (tmp_path / "move.anim").write_text(clip_text())
+    return tmp_path
+
+
+def refused(capsys, *arguments):
+    """Return the one line that ``info`` ends with."""
+    assert run(["info", *arguments]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == "" and captured.err.count("\n") == 1
+    return captured.err.removesuffix("\n")
+
+
+def described(capsys, *arguments):
+    """Return what ``info --json`` says of the first actor, and the warnings on the way."""
+    assert run(["info", *arguments, "--json"]) == 0
+    captured = capsys.readouterr()
+    return json.loads(captured.out)["actors"][0], captured.err.splitlines()
+
+
+NUMBERS_WANTED = "expected numbers separated by commas, found"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        # Shape and expression
+        ("smpl.npz --shape fat", f'--shape: {NUMBERS_WANTED} "fat"'),
+        ("smpl.npz --shape 1,,2", f'--shape: {NUMBERS_WANTED} "1,,2"'),
+        ("smpl.npz --shape=", f'--shape: {NUMBERS_WANTED} ""'),
+        ("smpl.npz --shape 1,nan", f'--shape: {NUMBERS_WANTED} "1,nan"'),
+        ("smpl.npz --shape 1,inf", f'--shape: {NUMBERS_WANTED} "1,inf"'),
+        ("smpl.npz --shape 1;2", f'--shape: {NUMBERS_WANTED} "1;2"'),
+        (
+            "smpl.npz --shape 0,0,0,0,0,0,0,0,0,0,1",
+            "--shape: smpl has 10 shape coefficients, found 11",
+        ),
+        ("smpl.npz --expression 1", "--expression: smpl has 0 expression coefficients, found 1"),
+        ("smpl.npz --expression smile", f'--expression: {NUMBERS_WANTED} "smile"'),
+        ("arms.skel --shape 1", "--shape: arms has 0 shape coefficients, found 1"),
+        ("twist.skin --shape 1", "--shape: no file has a skeleton"),
+        # Poses
+        ("smpl.npz --pose 1,2,3", "--pose: expected 72 pose numbers for smpl, found 3"),
+        ("mano.npz --pose 1,2,3", "--pose: expected 48 pose numbers for mano, found 3"),
+        ("pig --pose 1,2", "--pose: expected 22 pose numbers for pig, found 2"),
+        ("arms.skel --pose 1", "--pose: expected 18 pose numbers for arms, found 1"),
+        ("smpl.npz --pose 1,,2", f'--pose: {NUMBERS_WANTED} "1,,2"'),
+        ("smpl.npz --pose 1-2", f'--pose: {NUMBERS_WANTED} "1-2"'),
+        ("twist.skin --pose 1,2", "--pose: no file has a skeleton"),
+        # DOFs
+        (
+            "arms.skel --dof knee.x=1",
+            '--dof: no joint is called "knee"; there are 5: root, left, left_hand, right, '
+            "right_hand",
+        ),
+        ("arms.skel --dof left.tx=1", "--dof: joint left has no DOF tx"),
+        ("arms.skel --dof left.x", '--dof: expected NAME.X=VALUE, found "left.x"'),
+        ("arms.skel --dof left.x=far", '--dof: expected a number after "=", found "left.x=far"'),
+        ("arms.skel --dof figure.scale=0", "--dof: expected a scale above 0, found 0"),
+        ("arms.skel --dof figure.scale=-1", "--dof: expected a scale above 0, found -1"),
+        (
+            "arms.skel --dof figure.scale=big",
+            '--dof: expected a number after "=", found "figure.scale=big"',
+        ),
+        (
+            "arms.skel --dof figure.rx=1",
+            '--dof: "figure.rx": expected JOINT.KIND with KIND one of tx, ty, tz, x, y, z',
+        ),
+        # Clips
+        ("arms.skel --time 1", "--time: no file is a clip"),
+        ("arms.skel --frame 1", "--frame: no file is a clip"),
+        ("twist.skel move.anim --frame -1", "--frame: expected 0 or more, found -1"),
+        ("twist.skel move.anim --frame 1 --fps 0", "--fps: expected more than 0, found 0"),
+        (
+            "twist.skel move.anim --frame 1 --time 1",
+            "--frame and --time: expected one of them, found both",
+        ),
+        # Skinning
+        ("smpl.npz --dqs-share -0.1", "--dqs-share: expected 0 to 1, found -0.1"),
+        ("smpl.npz --dqs-share 1.5", "--dqs-share: expected 0 to 1, found 1.5"),
+        ("smpl.npz --influences -1", "--influences: expected 0 or more, found -1"),
+        # Hands, mirror
+        ("smpl.npz --hands mean", "--hands: no file has hand components"),
+        ("arms.skel --hands flat", "--hands: no file has hand components"),
+        (
+            "lopsided.skel --mirror",
+            "--mirror: left has no partner on the other side: the skeleton is not symmetric",
+        ),
+    ],
+)
+def test_wrong_value_is_refused_in_one_line(folder, capsys, arguments, message):
+    assert refused(capsys, *arguments.split(" ")) == f"viewer: {message}"
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        "--method cubic",
+        "--hands fist",
+        "--influences many",
+        "--dqs-share half",
+        "--dqs-share nan",
+        "--frame 1.5",
+        "--fps fast",
+        "--time soon",
+        "--pose",
+        "--shape",
+    ],
+)
+def test_wrong_kind_of_value_names_the_help(folder, capsys, arguments):
+    line = refused(capsys, "smpl.npz", *arguments.split(" "))
+    assert arguments.split(" ")[0] in line and "--help" in line
+
+
+@pytest.mark.parametrize("command", ["render", "convert", "view"])
+@pytest.mark.parametrize("options", ["--influences -1", "--shape fat", "--dof nose.x=1"])
+def test_every_command_refuses_alike(folder, capsys, monkeypatch, command, options):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    out = {"render": ["-o", "x.png"], "convert": ["-o", "x.obj"], "view": []}[command]
+    before = sorted(folder.iterdir())
+    assert run([command, "smpl.npz", *options.split(" "), *out]) == 2
+    expected = capsys.readouterr().err
+    assert expected == refused(capsys, "smpl.npz", *options.split(" ")) + "\n"
+    assert sorted(folder.iterdir()) == before
+
+
+def test_long_nonsense_is_cut(folder, capsys):
+    assert len(refused(capsys, "smpl.npz", "--shape", "x" * 10_000)) < 200
+
+
+def test_coefficients_of_0_beyond_the_last_are_no_fault(folder, capsys):
+    actor, notes = described(capsys, "smpl.npz", "--shape", "1" + 15 * ",0")
+    assert actor["model"]["shape_weights"] == [1, 0, 0, 0, 0, 0, 0, 0, 0, 0] and notes == []
+
+
+@pytest.mark.parametrize("text", ["1,-2", "1 -2", " 1, -2 ", "1,-2,", "+1,-2e0"])
+def test_numbers_may_be_written_in_any_way(folder, capsys, text):
+    actor, _ = described(capsys, "smpl.npz", f"--shape={text}")
+    assert actor["model"]["shape_weights"][:3] == [1, -2, 0]
+
+
+def test_negative_number_first_is_no_option(folder, capsys):
+    actor, _ = described(capsys, "smpl.npz", "--shape", "-1,2")
+    assert actor["model"]["shape_weights"][:2] == [-1, 2]
+
+
+def test_dofs_beyond_limits_are_clamped_and_told(folder, capsys):
+    (folder / "hinge.skel").write_text("balljoint hinge { rotxlimit -1 0.5 rotylimit 0 0 }")
+    actor, notes = described(capsys, "hinge.skel", "--dof", "hinge.x=2", "--dof", "hinge.y=1")
+    assert notes == [
+        "warning: hinge.x=2 is clamped to its limits -1 to 0.5 rad",
+        "warning: hinge.y=1 is locked at 0 rad",
+    ]
+    assert actor["skeleton"]["dof_table"][3]["value"] == 0.5
+
+
+def test_pose_numbers_beyond_limits_are_clamped_and_told(folder, capsys):
+    (folder / "hinge.skel").write_text("balljoint hinge { rotxlimit -1 0.5 }")
+    actor, notes = described(capsys, "hinge.skel", "--pose", "0,0,0,2,0,0")
+    assert actor["skeleton"]["dof_table"][3]["value"] == 0.5
+    assert notes == ["warning: 1 DOFs of the pose were beyond their limits and clamped"]
+
+
+def test_the_figure_is_placed(folder, capsys):
+    options = ["--dof", "figure.tx=1.5", "--dof", "FIGURE.tz=-2", "--dof", "figure.scale=0.5"]
+    actor, _ = described(capsys, "smpl.npz", *options)
+    assert actor["model"]["figure_translation"] == [1.5, 0, -2]
+    assert actor["model"]["figure_scale"] == 0.5
+
+
+def test_first_figure_that_fits_is_posed(folder, capsys):
+    assert run(["info", "arms.skel", "smpl.npz", "--shape", "1", "--json"]) == 0
+    actors = json.loads(capsys.readouterr().out)["actors"]
+    assert actors[1]["model"]["shape_weights"][0] == 1
+
+
+# Options of what is drawn
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ("pig --hide-part TAIL", '--hide-part: no part "TAIL"; there are: NOT_BODY, FEET, BACK'),
+        ("smpl.npz --hide-part HEAD", "--hide-part: no figure has body parts"),
+        ("arms.skel --hide-part HEAD", "--hide-part: no figure has body parts"),
+    ],
+)
+def test_unknown_part_is_refused_before_anything_is_drawn(folder, capsys, arguments, message):
+    assert run(["render", *arguments.split(" "), "-o", "x.png"]) == 2
+    assert capsys.readouterr().err == f"viewer: {message}\n"
+    assert not (folder / "x.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("option", "known"), [("--scalar", SCALARS), ("--shading", ["phong", "parts", "scalar"])]
+)
+def test_unknown_view_lists_what_there_is(folder, capsys, option, known):
+    assert run(["render", "pig", option, "beauty", "-o", "x.png"]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith(f"viewer: argument {option}: ") and error.count("\n") == 1
+    assert all(name in error for name in known)

@@ -1,0 +1,60 @@
+"""The forward pass of the SMPL family as its paper writes it, loop by loop (Loper et al. 2015)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+
+def rotation(vector: np.ndarray) -> np.ndarray:
+    """Return Rodrigues' formula, exp of the cross-product matrix."""
+    angle = math.sqrt(sum(n * n for n in vector))
+    if angle == 0.0:
+        return np.eye(3)
+    x, y, z = np.asarray(vector) / angle
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * cross @ cross
+
+
+def smpl_forward(
+    arrays: dict, shape=(), pose=None, columns=None, correct=True
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return posed vertices (V, 3) and joints (J, 3).
+
+    Parameters
+    ----------
+    arrays
+        As ``synthetic_smpl.model`` makes them.
+    shape
+        Weights of the columns of ``shapedirs``: of the first, or of ``columns``.
+    pose
+        (J, 3) rotation vectors.
+    columns
+        Which columns ``shape`` is for.
+    correct
+        Whether pose blend shapes are added.
+    """
+    parents = arrays["kintree_table"][0].astype(np.int64)
+    n_joints = len(parents)
+    pose = np.zeros((n_joints, 3)) if pose is None else np.reshape(pose, (n_joints, 3))
+    vertices = arrays["v_template"].copy()
+    for weight, column in zip(shape, columns or range(len(shape)), strict=True):
+        vertices += weight * arrays["shapedirs"][:, :, column]
+    joints = arrays["J_regressor"] @ vertices
+    turns = [rotation(vector) for vector in pose]
+    if correct:
+        blend = np.concatenate([(turn - np.eye(3)).ravel() for turn in turns[1:]])
+        vertices = vertices + arrays["posedirs"] @ blend
+    world: list[np.ndarray] = []
+    for joint in range(n_joints):
+        local = np.eye(4)
+        local[:3, :3] = turns[joint]
+        local[:3, 3] = joints[joint] - (joints[parents[joint]] if joint else 0.0)
+        world.append(world[parents[joint]] @ local if joint else local)
+    posed = np.zeros_like(vertices)
+    for vertex, point in enumerate(vertices):
+        for joint in np.flatnonzero(arrays["weights"][vertex]):
+            from_joint = np.append(point - joints[joint], 1.0)
+            posed[vertex] += arrays["weights"][vertex, joint] * (world[joint] @ from_joint)[:3]
+    return posed, np.array([matrix[:3, 3] for matrix in world])

@@ -1,0 +1,114 @@
+"""Posed arrays as ``.npz``: what is in them, for a program that knows nothing of the viewer."""
+
+import zipfile
+
+import numpy as np
+import pytest
+from formats.pig_text import write as write_pig
+from formats.synthetic_smpl import model
+from numpy.testing import assert_allclose, assert_array_equal
+from plain_smpl import smpl_forward
+from seamed import POSITIONS, TRIANGLES, UV_TRIANGLES, UVS, seamed_actor, seamed_mesh
+
+import viewer
+from viewer.export import export
+from viewer.rig.figure import Figure
+from viewer.rig.scene import Actor
+from viewer.rig.skeleton import ball_skeleton
+
+EXACT = 1e-12  # metres; sums of a few dozen numbers below 2
+
+
+def write(tmp_path, actor, name="out.npz"):
+    """Return the arrays; those with Python objects in them cannot be read."""
+    export(actor, tmp_path / name)
+    with np.load(tmp_path / name, allow_pickle=False) as archive:
+        return dict(archive)
+
+
+def test_every_part_is_named(tmp_path):
+    arrays = write(tmp_path, seamed_actor(up="z", unit="m"))
+    assert (str(arrays["name"]), str(arrays["up"]), str(arrays["unit"])) == ("roof", "z", "m")
+    assert_array_equal(arrays["vertices"], POSITIONS)
+    assert_array_equal(arrays["triangles"], TRIANGLES)
+    assert_array_equal(arrays["uvs"], UVS)
+    assert_array_equal(arrays["uv_triangles"], UV_TRIANGLES)
+    assert_allclose(arrays["normals"][1], [0, 0.6, 0.8], rtol=0, atol=EXACT)
+    assert arrays["joint_names"].tolist() == ["root", "tip"]
+    assert arrays["parents"].tolist() == [-1, 0]
+    assert_array_equal(arrays["joints"], [[0, 0, 0], [1, 0, 0]])
+    assert arrays["vertices"].dtype == arrays["world"].dtype == np.float64
+    assert arrays["own_numbers"].tolist() == [0] * 6  # DOFs, where a file has no other numbers
+
+
+def test_world_matrices_hold_the_joints(tmp_path):
+    actor = seamed_actor()
+    actor.pose.dofs[:] = 0, 0, np.pi / 2, 0, np.pi / 2, 0  # root about z, tip about y
+    actor.pose.figure_scale, actor.pose.figure_translation[:] = 2.0, [0, 0, 3]
+    arrays = write(tmp_path, actor)
+    # The tip is at (1, 0, 0), turned to (0, 1, 0), twice as far, and 3 higher.
+    assert_allclose(arrays["joints"], [[0, 0, 3], [0, 2, 3]], rtol=0, atol=EXACT)
+    assert_array_equal(arrays["world"][:, :3, 3], arrays["joints"])
+    about_z = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    about_y = np.array([[0, 0, 1], [0, 1, 0], [-1, 0, 0]])
+    turns = [2 * about_z, 2 * about_z @ about_y]
+    assert_allclose(arrays["world"][:, :3, :3], turns, rtol=0, atol=EXACT)
+    assert_array_equal(arrays["world"][:, 3], [[0, 0, 0, 1]] * 2)
+
+
+def test_body_model_gives_its_own_numbers(tmp_path):
+    body = model("smpl", 32)
+    np.savez(tmp_path / "body.npz", **body)
+    actor = viewer.load(tmp_path / "body.npz").actors[0]
+    actor.pose.shape_weights[:2] = 1.5, -2.0
+    actor.pose.dofs[3 * 4 : 3 * 4 + 3] = 0.4, 0, 0  # left_knee
+    arrays = write(tmp_path, actor)
+    numbers = np.zeros(72)
+    numbers[12] = 0.4
+    assert_allclose(arrays["own_numbers"], numbers, rtol=0, atol=EXACT)
+    assert arrays["shape_weights"].tolist() == [1.5, -2, 0, 0, 0, 0, 0, 0, 0, 0]
+    vertices, joints = smpl_forward(body, [1.5, -2.0], numbers)
+    assert_allclose(arrays["vertices"], vertices, rtol=0, atol=EXACT)
+    assert_allclose(arrays["joints"], joints, rtol=0, atol=EXACT)
+    assert arrays["joint_names"][4] == "left_knee"
+    assert "uvs" not in arrays and str(arrays["unit"]) == "m"
+
+
+def test_animal_gives_translation_rotations_and_scale(tmp_path):
+    actor = viewer.load(write_pig(tmp_path / "pig")).actors[0]
+    actor.pose.dofs[:3] = 0.1, 0.2, 0.3
+    actor.pose.dofs[6] = 0.5  # joint 2 about x
+    actor.pose.figure_scale, actor.pose.figure_translation[:] = 1.25, [1, 2, 3]
+    numbers = [1, 2, 3, 0.3, 0.2, 0.1, 0, 0, 0, 0.5, 0, 0, 1.25]  # the root's angles about z, y, x
+    arrays = write(tmp_path, actor)
+    assert_allclose(arrays["own_numbers"], numbers, rtol=0, atol=EXACT)
+
+
+def test_skeleton_alone_has_joints_and_no_mesh(tmp_path):
+    joints = ball_skeleton(("root",), np.array([-1]), np.array([[1.0, 2, 3]]))
+    arrays = write(tmp_path, Actor(Figure("bones", skeleton=joints)))
+    assert not {"vertices", "normals", "triangles", "uvs"} & set(arrays)
+    assert_array_equal(arrays["joints"], [[1, 2, 3]])
+
+
+def test_mesh_alone_has_no_joints(tmp_path):
+    arrays = write(tmp_path, Actor(Figure("roof", seamed_mesh(uvs=False))))
+    assert set(arrays) == {"name", "up", "unit", "vertices", "normals", "triangles"}
+
+
+@pytest.mark.parametrize("name", ["é 文", "two\nlines", "a\udcffb", ""])
+def test_odd_names_are_kept(tmp_path, name):
+    assert str(write(tmp_path, seamed_actor(name))["name"]) == name
+
+
+def test_the_same_pose_gives_the_same_bytes(tmp_path):
+    write(tmp_path, seamed_actor(), "a.npz")
+    write(tmp_path, seamed_actor(), "b.npz")
+    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
+    with zipfile.ZipFile(tmp_path / "a.npz") as archive:
+        assert {entry.date_time for entry in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
+
+
+def test_arrays_are_listed(tmp_path):
+    (note,) = export(seamed_actor(), tmp_path / "out.npz")
+    assert note.startswith(f"{tmp_path / 'out.npz'}: name, up, unit, vertices, normals, triangles")

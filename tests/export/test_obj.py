@@ -1,0 +1,245 @@
+"""Wavefront ``.obj``, read back by a parser of the tests."""
+
+import numpy as np
+import pytest
+from export.plain_readers import read_mtl, read_obj
+from numpy.testing import assert_allclose, assert_array_equal
+from PIL import Image
+from seamed import (
+    NORMALS,
+    OTHER_PICTURE,
+    PICTURE,
+    POSITIONS,
+    TRIANGLES,
+    UV_TRIANGLES,
+    UVS,
+    seamed_actor,
+    seamed_mesh,
+)
+
+from viewer.errors import RigError
+from viewer.export import export
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import Mesh
+from viewer.rig.scene import Actor
+from viewer.rig.skeleton import ball_skeleton
+from viewer.rig.skinning import Skinning
+
+
+def write(tmp_path, actor, name="out.obj", **skinning):
+    notes = export(actor, tmp_path / name, Skinning(**skinning))
+    return read_obj(tmp_path / name), notes
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def corners(obj):
+    """Return the faces as three arrays of indices counted from 0."""
+    table = np.array([face for _, face in obj.faces], dtype=float)  # None becomes nan
+    return table[..., 0] - 1, table[..., 1] - 1, table[..., 2] - 1
+
+
+def test_mesh_at_rest_comes_back(tmp_path):
+    obj, notes = write(tmp_path, seamed_actor())
+    assert_array_equal(obj.v, POSITIONS)
+    assert_array_equal(obj.vt, UVS)
+    assert_array_equal(corners(obj), [TRIANGLES, UV_TRIANGLES, TRIANGLES])
+    assert notes == [f"{tmp_path / 'out.obj'}: 5 vertices, 3 triangles"]
+    assert names(tmp_path) == ["out.obj"]
+
+
+def test_indices_are_counted_from_1(tmp_path):
+    write(tmp_path, seamed_actor())
+    lines = (tmp_path / "out.obj").read_text().splitlines()
+    # Vertex 0 with coordinate 0, vertex 1 with 1 in the first and with 3 in the second triangle.
+    assert lines[-3:] == ["f 1/1/1 2/2/2 3/3/3", "f 2/4/2 4/5/4 3/6/3", "f 1/1/1 4/5/4 2/4/2"]
+
+
+def test_seam_gives_one_vertex_several_texture_coordinates(tmp_path):
+    obj, _ = write(tmp_path, seamed_actor())
+    vertices, coordinates, _ = corners(obj)
+    assert sorted(set(coordinates[vertices == 1])) == [1, 3]
+    assert sorted(set(coordinates[vertices == 2])) == [2, 5]
+    assert len(obj.v) == 5  # none was doubled
+
+
+def test_mesh_with_a_coordinate_a_vertex_repeats_its_index(tmp_path):
+    mesh = Mesh(POSITIONS, NORMALS, TRIANGLES, UVS[:5])
+    obj, _ = write(tmp_path, seamed_actor(mesh=mesh))
+    assert_array_equal(corners(obj), [TRIANGLES] * 3)
+    assert_array_equal(obj.vt, UVS[:5])
+
+
+def test_mesh_without_coordinates_has_faces_of_vertex_and_normal(tmp_path):
+    obj, _ = write(tmp_path, seamed_actor(mesh=seamed_mesh(uvs=False)))
+    assert len(obj.vt) == 0
+    lines = (tmp_path / "out.obj").read_text().splitlines()
+    assert next(line for line in lines if line[0] == "f") == "f 1//1 2//2 3//3"
+    assert_array_equal(corners(obj)[0], TRIANGLES)
+
+
+def test_normals_have_length_1_whatever_the_mesh_stores(tmp_path):
+    obj, _ = write(tmp_path, seamed_actor())
+    expected = [[0, 0, 1], [0, 0.6, 0.8], [1, 0, 0], [0, 0, -1], [0, 1, 0]]
+    assert_allclose(obj.vn, expected, rtol=0, atol=1e-9)  # nine digits are written
+
+
+def test_posed_vertices_and_normals_are_written(tmp_path):
+    actor = seamed_actor()
+    actor.pose.dofs[5] = np.pi / 2  # tip about z: joint 1, the sixth DOF
+    obj, _ = write(tmp_path, actor)
+    # Vertex 3 is half the root's (1, 2, 1), half (0, 2) from the tip turned to (-2, 0).
+    expected = POSITIONS.copy()
+    expected[3] = [(1 + 1 - 2) / 2, (2 + 0) / 2, (1 + 1) / 2]
+    assert_allclose(obj.v, expected, rtol=0, atol=1e-9)
+    assert_allclose(obj.vn[1], [-0.6, 0, 0.8], rtol=0, atol=1e-9)  # all of it the tip's
+
+
+def test_placed_figure_is_scaled_then_moved(tmp_path):
+    actor = seamed_actor()
+    actor.pose.figure_scale, actor.pose.figure_translation[:] = 2.0, [10, 0, -1]
+    actor.placement = np.diag([7.0, 7, 7, 1])  # where it stands in the scene is no part of it
+    obj, _ = write(tmp_path, actor)
+    assert_allclose(obj.v, 2 * POSITIONS + [10, 0, -1], rtol=0, atol=1e-9)
+
+
+def test_numbers_keep_nine_digits(tmp_path):
+    values = np.array([1 / 3, -2e6 / 7, 1.23456789012e-5, 123456789.123, -0.0, 1e-300])
+    positions = np.concatenate([POSITIONS[:3], values.reshape(2, 3)])
+    mesh = Mesh(positions, np.tile([0.0, 0, 1], (5, 1)), TRIANGLES)
+    figure = Figure("numbers", mesh)
+    obj, _ = write(tmp_path, Actor(figure))
+    assert_allclose(obj.v[3:].ravel(), values, rtol=5e-9, atol=0)
+    text = (tmp_path / "out.obj").read_text()
+    assert "v 0.333333333 -285714.286 1.23456789e-05\n" in text
+    assert "v 123456789 0 1e-300\n" in text  # no -0
+
+
+def test_name_says_what_it_is(tmp_path):
+    obj, _ = write(tmp_path, seamed_actor("a fat\tcat\n", up="z", unit="m"))
+    assert len(obj.objects) == 1 and " " not in obj.objects[0]
+    assert obj.comments == [f"{obj.objects[0]}: z up, metres"]
+    obj, _ = write(tmp_path, seamed_actor("roof"), "other.obj")
+    assert (obj.objects, obj.comments) == (["roof"], ["roof: y up"])
+    obj, _ = write(tmp_path, seamed_actor(" "), "third.obj")
+    assert obj.objects == ["figure"]
+
+
+@pytest.mark.parametrize("name", ["v 1 2 3\nv 4 5 6", "a\rb", "\u2028", "é\udcff", "x" * 5000])
+def test_no_name_can_add_a_line(tmp_path, name):
+    obj, _ = write(tmp_path, seamed_actor(name))
+    assert len(obj.v) == 5 and len(obj.objects) == 1
+    data = (tmp_path / "out.obj").read_bytes()
+    assert b"\r" not in data and len(data) < 2000
+
+
+# Materials
+
+
+def textured(*pictures, of_triangle=(0, 0, 0)):
+    return seamed_actor(mesh=seamed_mesh(pictures=pictures, of_triangle=np.array(of_triangle)))
+
+
+def pixels(path):
+    with Image.open(path) as picture:
+        return np.array(picture.convert("RGBA"))
+
+
+def test_texture_is_written_beside_it(tmp_path):
+    obj, notes = write(tmp_path, textured(PICTURE))
+    assert names(tmp_path) == ["out.mtl", "out.obj", "out_0.png"]
+    assert obj.libraries == ["out.mtl"]
+    assert [material for material, _ in obj.faces] == ["material0"] * 3
+    material = read_mtl(tmp_path / "out.mtl")["material0"]
+    assert material == {"Kd": "1 1 1", "map_Kd": "out_0.png"}
+    assert_array_equal(pixels(tmp_path / "out_0.png"), PICTURE)
+    assert f"{tmp_path / 'out_0.png'}: its texture" in notes
+
+
+def test_each_run_of_triangles_names_its_material(tmp_path):
+    actor = textured(PICTURE, OTHER_PICTURE, None, of_triangle=(1, 0, 1))
+    obj, _ = write(tmp_path, actor)
+    assert [material for material, _ in obj.faces] == ["material1", "material0", "material1"]
+    materials = read_mtl(tmp_path / "out.mtl")
+    assert list(materials) == ["plain", "material0", "material1", "material2"]
+    assert "map_Kd" not in materials["material2"]
+    assert_array_equal(pixels(tmp_path / materials["material1"]["map_Kd"]), OTHER_PICTURE)
+
+
+def test_triangles_without_material_do_not_inherit_one(tmp_path):
+    obj, _ = write(tmp_path, textured(PICTURE, of_triangle=(0, -1, 0)))
+    assert [material for material, _ in obj.faces] == ["material0", "plain", "material0"]
+    assert read_mtl(tmp_path / "out.mtl")["plain"] == {"Kd": "1 1 1"}
+
+
+@pytest.mark.parametrize("pictures", [(), (None,)])
+def test_without_a_picture_there_is_no_material(tmp_path, pictures):
+    of_triangle = [len(pictures) - 1] * 3
+    obj, _ = write(tmp_path, textured(*pictures, of_triangle=of_triangle))
+    assert names(tmp_path) == ["out.obj"] and obj.libraries == []
+    assert [material for material, _ in obj.faces] == [None] * 3
+
+
+def test_files_that_are_there_already_stay(tmp_path):
+    for name in ("out.mtl", "out_0.png"):
+        (tmp_path / name).write_bytes(b"precious")
+    obj, _ = write(tmp_path, textured(PICTURE))
+    assert (tmp_path / "out.mtl").read_bytes() == b"precious"
+    assert (tmp_path / "out_0.png").read_bytes() == b"precious"
+    (library,) = obj.libraries
+    picture = read_mtl(tmp_path / library)["material0"]["map_Kd"]
+    assert_array_equal(pixels(tmp_path / picture), PICTURE)
+
+
+def test_the_same_files_are_used_again(tmp_path):
+    for _ in range(3):
+        write(tmp_path, textured(PICTURE))
+    assert names(tmp_path) == ["out.mtl", "out.obj", "out_0.png"]
+    write(tmp_path, textured(OTHER_PICTURE))
+    write(tmp_path, textured(OTHER_PICTURE))
+    assert names(tmp_path) == ["out-2.mtl", "out.mtl", "out.obj", "out_0-2.png", "out_0.png"]
+
+
+def test_long_names_of_two_pictures_stay_apart(tmp_path):
+    obj, _ = write(tmp_path, textured(PICTURE, OTHER_PICTURE), f"{'x' * 200}.obj")
+    materials = read_mtl(tmp_path / obj.libraries[0])
+    for index, picture in enumerate((PICTURE, OTHER_PICTURE)):
+        found = pixels(tmp_path / materials[f"material{index}"]["map_Kd"])
+        assert_array_equal(found, picture)
+
+
+@pytest.mark.parametrize("stem", ["a fat cat", "two\nlines", "ünï", "semi;colon", ".hidden", "#"])
+def test_files_beside_it_have_names_without_blanks(tmp_path, stem):
+    obj, _ = write(tmp_path, textured(PICTURE), f"{stem}.obj")
+    (library,) = obj.libraries  # one word
+    picture = read_mtl(tmp_path / library)["material0"]["map_Kd"]
+    assert len(picture.split()) == 1
+    assert names(tmp_path) == sorted([f"{stem}.obj", library, picture])
+
+
+# Figures that lack something
+
+
+def test_mesh_without_joints_is_written_as_it_is(tmp_path):
+    obj, _ = write(tmp_path, Actor(Figure("roof", seamed_mesh())))
+    assert_array_equal(obj.v, POSITIONS)
+
+
+def test_points_without_triangles_are_written(tmp_path):
+    mesh = Mesh(POSITIONS, NORMALS, np.zeros((0, 3), np.int32))
+    obj, notes = write(tmp_path, Actor(Figure("points", mesh)))
+    assert_array_equal(obj.v, POSITIONS)
+    assert obj.faces == [] and "5 vertices, 0 triangles" in notes[0]
+
+
+def test_figure_without_mesh_is_refused(tmp_path):
+    joints = ball_skeleton(("root",), np.array([-1]), np.zeros((1, 3)))
+    with pytest.raises(RigError, match=r"^figure bones has no mesh to write as \.obj$"):
+        write(tmp_path, Actor(Figure("bones", skeleton=joints)))
+    assert names(tmp_path) == []
+
+
+def test_suffix_may_have_capitals(tmp_path):
+    assert len(write(tmp_path, seamed_actor(), "OUT.OBJ")[0].v) == 5

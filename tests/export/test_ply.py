@@ -1,0 +1,113 @@
+"""Binary ``.ply``: header and every byte behind it, read back by a parser of the tests."""
+
+import numpy as np
+import pytest
+from export.plain_readers import columns, read_ply
+from numpy.testing import assert_allclose, assert_array_equal
+from seamed import (
+    NORMALS,
+    PICTURE,
+    POSITIONS,
+    TRIANGLES,
+    UV_TRIANGLES,
+    UVS,
+    seamed_actor,
+    seamed_mesh,
+)
+
+from viewer.errors import RigError
+from viewer.export import export
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import Mesh
+from viewer.rig.scene import Actor
+from viewer.rig.skeleton import ball_skeleton
+
+FLOAT32 = 2.0**-24  # half a unit in the last place, relative
+
+
+def write(tmp_path, actor):
+    notes = export(actor, tmp_path / "out.ply")
+    return read_ply(tmp_path / "out.ply"), notes
+
+
+def test_header_is_as_the_format_wants_it(tmp_path):
+    write(tmp_path, seamed_actor(up="z"))
+    head = (tmp_path / "out.ply").read_bytes().partition(b"end_header\n")[0]
+    assert head.decode("ascii").split("\n") == [
+        "ply",
+        "format binary_little_endian 1.0",
+        "comment roof, z up",
+        "element vertex 5",
+        *[f"property float {name}" for name in ("x", "y", "z", "nx", "ny", "nz")],
+        "element face 3",
+        "property list uchar int vertex_indices",
+        "property list uchar float texcoord",
+        "",
+    ]
+
+
+def test_mesh_comes_back(tmp_path):
+    ply, notes = write(tmp_path, seamed_actor())
+    vertices, faces = ply.elements["vertex"], ply.elements["face"]
+    assert_array_equal(columns(vertices, "x", "y", "z"), POSITIONS)
+    normals = [[0, 0, 1], [0, 0.6, 0.8], [1, 0, 0], [0, 0, -1], [0, 1, 0]]
+    assert_allclose(columns(vertices, "nx", "ny", "nz"), normals, rtol=0, atol=FLOAT32)
+    assert_array_equal([face["vertex_indices"] for face in faces], TRIANGLES)
+    assert notes == [f"{tmp_path / 'out.ply'}: 5 vertices, 3 triangles"]
+
+
+def test_corners_have_texture_coordinates_along_seams_too(tmp_path):
+    ply, _ = write(tmp_path, seamed_actor())
+    found = np.array([face["texcoord"] for face in ply.elements["face"]])
+    assert found.shape == (3, 6)
+    assert_array_equal(found.reshape(3, 3, 2), UVS[UV_TRIANGLES])  # exact in float32
+
+
+def test_one_coordinate_a_vertex_is_spread_to_the_corners(tmp_path):
+    mesh = Mesh(POSITIONS, NORMALS, TRIANGLES, UVS[:5])
+    ply, _ = write(tmp_path, seamed_actor(mesh=mesh))
+    found = np.array([face["texcoord"] for face in ply.elements["face"]])
+    assert_array_equal(found.reshape(3, 3, 2), UVS[TRIANGLES])
+
+
+def test_mesh_without_coordinates_has_no_such_property(tmp_path):
+    ply, _ = write(tmp_path, seamed_actor(mesh=seamed_mesh(uvs=False)))
+    assert [list(face) for face in ply.elements["face"]] == [["vertex_indices"]] * 3
+    assert_array_equal([face["vertex_indices"] for face in ply.elements["face"]], TRIANGLES)
+    assert b"texcoord" not in (tmp_path / "out.ply").read_bytes()
+
+
+def test_posed_vertices_are_written(tmp_path):
+    actor = seamed_actor()
+    actor.pose.dofs[2] = np.pi / 2  # root about z: (x, y) becomes (-y, x)
+    actor.pose.figure_translation[:] = 0, 0, 8
+    ply, _ = write(tmp_path, actor)
+    x, y, z = POSITIONS.T
+    expected = np.stack([-y, x, z + 8], axis=1)
+    assert_allclose(columns(ply.elements["vertex"], "x", "y", "z"), expected, rtol=0, atol=1e-6)
+
+
+def test_pictures_are_left_out(tmp_path):
+    mesh = seamed_mesh(pictures=(PICTURE,), of_triangle=np.zeros(3, np.int32))
+    write(tmp_path, seamed_actor(mesh=mesh))
+    assert [path.name for path in tmp_path.iterdir()] == ["out.ply"]
+
+
+@pytest.mark.parametrize("name", ["two\nlines", "end_header\n", "é\udcff 文", "", "x" * 5000, "\r"])
+def test_no_name_breaks_the_header(tmp_path, name):
+    ply, _ = write(tmp_path, seamed_actor(name))
+    assert len(ply.elements["vertex"]) == 5 and len(ply.comments) == 1
+
+
+def test_points_without_triangles_are_written(tmp_path):
+    mesh = Mesh(POSITIONS, NORMALS, np.zeros((0, 3), np.int32))
+    ply, _ = write(tmp_path, Actor(Figure("points", mesh)))
+    assert_array_equal(columns(ply.elements["vertex"], "x", "y", "z"), POSITIONS)
+    assert ply.elements["face"] == []
+
+
+def test_figure_without_mesh_is_refused(tmp_path):
+    joints = ball_skeleton(("root",), np.array([-1]), np.zeros((1, 3)))
+    with pytest.raises(RigError, match=r"^figure bones has no mesh to write as \.ply$"):
+        write(tmp_path, Actor(Figure("bones", skeleton=joints)))
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,364 @@
+"""Any figure as ``.skel`` and ``.skin``: read back, it stands as it stood, or the error is told."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from formats.pig_text import write as write_pig
+from formats.synthetic_smpl import model
+from numpy.testing import assert_allclose, assert_array_equal
+from plain_smpl import smpl_forward
+from rig.hand_made import skeleton
+from seamed import JOINTS, PICTURE, POSITIONS, TRIANGLES, UVS, seamed_actor, seamed_mesh
+
+import viewer
+from viewer.errors import OutputError, RigError, UnsupportedFormatError
+from viewer.export import export
+from viewer.rig.figure import Figure
+from viewer.rig.pose_record import PoseRecord, apply_record
+from viewer.rig.rotation import matrix_to_quaternion
+from viewer.rig.scene import Actor
+from viewer.rig.skeleton import ball_skeleton
+from viewer.rig.skinning import Skinning, deform, joint_matrices
+
+EXACT = 1e-12  # metres; sums of a few dozen numbers below 2
+
+
+def there_and_back(actor, folder, **skinning):
+    """Return the actor that the two files hold, and what the exporter said."""
+    notes = export(actor, folder / "rig.skel", Skinning(**skinning))
+    scene = viewer.load(*sorted(folder.glob("rig.sk*")))
+    known = re.compile("drawn untextured$|do not add up to 1 and are used as stored")
+    assert all(known.search(warning) for warning in scene.warnings), scene.warnings
+    return scene.actors[0], notes
+
+
+def told_error(notes):
+    """Return the number and the unit of the last note."""
+    found = re.fullmatch(r"largest error of this pose when read back: (\S+) (.+)", notes[-1])
+    return float(found[1]), found[2]
+
+
+def vertices(actor):
+    return deform(actor.figure, actor.pose)[0]
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+@pytest.fixture
+def body(tmp_path):
+    """A model of SMPL's layout, shaped and posed, with its arrays."""
+    folder = tmp_path / "model"
+    folder.mkdir()
+    arrays = model("smpl", 48)
+    np.savez(folder / "body.npz", **arrays)
+    actor = viewer.load(folder / "body.npz").actors[0]
+    actor.pose.shape_weights[:3] = 1.5, -1.0, 0.5
+    numbers = 0.3 * np.sin(np.arange(72.0))
+    assert apply_record(PoseRecord(vector=numbers), actor.figure, actor.pose) == []
+    return actor, arrays, numbers
+
+
+SHAPE = [1.5, -1.0, 0.5]
+
+
+def test_posed_body_comes_back_without_its_correctives(tmp_path, body):
+    actor, arrays, numbers = body
+    again, notes = there_and_back(actor, tmp_path, correctives=False)
+    expected, joints = smpl_forward(arrays, SHAPE, numbers, correct=False)
+    assert_allclose(vertices(again), expected, rtol=0, atol=EXACT)
+    found = joint_matrices(again.figure, again.pose)[:, :3, 3]
+    place = [again.figure.skeleton.names.index(name) for name in actor.figure.skeleton.names]
+    assert_allclose(found[place], joints, rtol=0, atol=EXACT)
+    error, unit = told_error(notes)
+    assert error < 1e-9 and unit == "mm"
+
+
+def test_error_is_that_of_the_correctives_left_out(tmp_path, body):
+    actor, arrays, numbers = body
+    again, notes = there_and_back(actor, tmp_path)
+    whole = smpl_forward(arrays, SHAPE, numbers)[0]
+    plain = smpl_forward(arrays, SHAPE, numbers, correct=False)[0]
+    worst = 1000 * np.linalg.norm(whole - plain, axis=1).max()
+    assert worst > 1
+    assert told_error(notes) == (pytest.approx(worst, rel=5e-3), "mm")  # three digits are told
+    assert_allclose(vertices(again), plain, rtol=0, atol=EXACT)
+
+
+def test_shape_is_baked_into_the_rest_mesh(tmp_path, body):
+    actor, arrays, _ = body
+    again, notes = there_and_back(actor, tmp_path)
+    shaped, joints = smpl_forward(arrays, SHAPE)
+    assert_allclose(again.figure.mesh.positions, shaped, rtol=0, atol=EXACT)
+    # Bound where the shaped body's joints are.
+    place = [again.figure.skeleton.names.index(name) for name in actor.figure.skeleton.names]
+    inverse_bind = again.figure.skin.inverse_bind[place]
+    assert_allclose(inverse_bind[:, :3, 3], -joints, rtol=0, atol=EXACT)
+    assert again.figure.n_shapes == 0
+    (lost,) = [note for note in notes if note.startswith("not held")]
+    assert "10 shape directions (the present shape is kept)" in lost
+    assert "pose correctives" in lost and "the joint regressor" in lost
+
+
+def test_weights_follow_their_joints_into_the_new_order(tmp_path, body):
+    actor, arrays, _ = body
+    again, _ = there_and_back(actor, tmp_path)
+    skin, old = again.figure.skin, actor.figure.skeleton.names
+    dense = np.zeros((48, 24))
+    rows = np.repeat(np.arange(48), np.diff(skin.starts))
+    columns = [old.index(again.figure.skeleton.names[joint]) for joint in skin.joints]
+    dense[rows, columns] = skin.weights
+    assert_array_equal(dense, arrays["weights"])
+
+
+# Order, offsets, limits
+
+
+def test_joints_are_listed_depth_first(tmp_path):
+    # 0 has 1 and 2; 1 has 3 and 5; 2 has 4: breadth-first in, depth-first out.
+    joints = ball_skeleton(tuple("abcdef"), np.array([-1, 0, 0, 1, 2, 1]), np.eye(6, 3))
+    actor = Actor(Figure("tree", skeleton=joints))
+    again, _ = there_and_back(actor, tmp_path)
+    assert again.figure.skeleton.names == ("a", "b", "d", "f", "c", "e")
+    assert again.figure.skeleton.parents.tolist() == [-1, 0, 1, 1, 0, 4]
+
+
+def test_several_roots_stay_roots(tmp_path):
+    joints = ball_skeleton(tuple("abc"), np.array([-1, -1, 0]), np.eye(3))
+    actor = Actor(Figure("two", skeleton=joints))
+    actor.pose.figure_translation[:] = 5, 6, 7
+    again, _ = there_and_back(actor, tmp_path)
+    assert again.figure.skeleton.names == ("a", "c", "b")
+    found = joint_matrices(again.figure, again.pose)[:, :3, 3]
+    # a and c as they were, then b, all moved.
+    assert_allclose(found, [[6, 6, 7], [5, 6, 8], [5, 7, 7]], rtol=0, atol=EXACT)
+
+
+def test_skeleton_without_mesh_writes_one_file(tmp_path):
+    actor = Actor(Figure("bones", skeleton=ball_skeleton(("hip",), np.array([-1]), np.eye(1, 3))))
+    notes = export(actor, tmp_path / "rig.skin")
+    assert names(tmp_path) == ["rig.skel"]
+    assert notes == [f"{tmp_path / 'rig.skel'}: 1 joints"]
+
+
+def test_either_suffix_writes_both(tmp_path):
+    for suffix in (".skel", ".skin", ".SKEL"):
+        folder = tmp_path / suffix
+        folder.mkdir()
+        export(seamed_actor(), folder / f"rig{suffix}")
+        assert names(folder) == ["rig.skel", "rig.skin"]
+
+
+def test_limits_and_missing_dofs_are_kept(tmp_path):
+    joints = skeleton(
+        [-1, 0],
+        [(0, "ty", 0.5), (0, "x", 0.2, -1, 1), (1, "z", 0.3, 0, 2)],
+        offsets=[[0, 0, 0], [0, 1, 0]],
+    )
+    again, _ = there_and_back(Actor(Figure("hinge", skeleton=joints)), tmp_path)
+    found = again.figure.skeleton
+    # The root's translation by its DOF is now in its offset.
+    assert_array_equal(found.rest_translations, [[0, 0.5, 0], [0, 1, 0]])
+    assert_array_equal(found.rest_dofs, [0, 0, 0, 0.2, 0, 0, 0, 0, 0.3])
+    inf = np.inf
+    limits = [[-inf, inf]] * 3 + [[-1, 1], [0, 0], [0, 0], [0, 0], [0, 0], [0, 2]]
+    assert_array_equal(found.dof_limits, limits)
+
+
+def test_boxes_are_kept_or_made(tmp_path):
+    boxes = np.array([[[-1, -2, -3], [1, 2, 3]]], dtype=float)
+    joints = skeleton([-1], [(0, "x", 0)], boxes=boxes)
+    again, _ = there_and_back(Actor(Figure("box", skeleton=joints)), tmp_path)
+    assert_array_equal(again.figure.skeleton.boxes, boxes)
+    again, _ = there_and_back(seamed_actor(), tmp_path)
+    sizes = again.figure.skeleton.boxes[:, 1] - again.figure.skeleton.boxes[:, 0]
+    assert (sizes > 0).all() and (sizes < 0.2).all()  # small beside a bone of length 1
+
+
+# Place
+
+
+def test_figure_translation_goes_to_the_root(tmp_path):
+    actor = seamed_actor()
+    actor.pose.figure_translation[:] = 5, 6, 7
+    again, notes = there_and_back(actor, tmp_path)
+    assert_array_equal(again.figure.skeleton.rest_translations, [[5, 6, 7], [1, 0, 0]])
+    # Split along the seam: vertices 1 and 2 twice, vertex 4 of no triangle last.
+    split = POSITIONS[[0, 1, 1, 2, 2, 3, 4]] + [5, 6, 7]
+    assert_allclose(vertices(again), split, rtol=0, atol=EXACT)
+    assert told_error(notes)[0] == 0
+
+
+def test_scale_is_said_to_be_lost_with_the_error_it_makes(tmp_path):
+    actor = seamed_actor(unit="m")
+    actor.pose.figure_scale = 1.5
+    _, notes = there_and_back(actor, tmp_path)
+    assert "not held by .skel and .skin: the figure's scale of 1.5" in notes
+    # The farthest vertex is sqrt(27) m from the origin: half of that is missing.
+    assert told_error(notes) == (pytest.approx(500 * 27**0.5, rel=5e-3), "mm")
+
+
+def test_error_of_a_figure_without_unit_is_a_share_of_its_size(tmp_path):
+    actor = seamed_actor()
+    actor.pose.figure_scale = 1.5
+    _, notes = there_and_back(actor, tmp_path)
+    # The box of the mesh reaches from (0, 0, 0) to (3, 3, 3): its diagonal is sqrt(27), too.
+    assert told_error(notes) == (pytest.approx(50, rel=5e-3), "% of the size")
+
+
+def test_up_axis_is_said_to_be_lost(tmp_path):
+    _, notes = there_and_back(seamed_actor(up="z"), tmp_path)
+    assert "not held by .skel and .skin: that z is up" in notes
+
+
+# Weights and seams
+
+
+def test_raw_weights_are_kept(tmp_path):
+    actor = viewer.load(
+        write_pig(tmp_path / "pig", skinning_weights="0 0 0.5\n1 1 1\n0 2 1\n2 3 1\n2 4 0.75\n")
+    ).actors[0]
+    actor.pose.dofs[3:6] = 0.1, 0.2, 0.3
+    again, notes = there_and_back(actor, tmp_path)
+    assert told_error(notes)[0] < 1e-9
+    sums = np.add.reduceat(again.figure.skin.weights, again.figure.skin.starts[:-1])
+    assert_array_equal(sums, [0.5, 1, 1, 1, 1, 1, 0.75])  # vertices 1 and 2 are split
+    assert "5 vertices are 7 in the .skin" in " ".join(notes)
+
+
+def test_raw_weights_scale_the_translation_and_the_error_says_so(tmp_path):
+    rows = "0 0 0.5\n1 1 1\n0 2 1\n2 3 1\n2 4 0.75\n"
+    actor = viewer.load(write_pig(tmp_path / "pig", skinning_weights=rows)).actors[0]
+    actor.pose.figure_translation[:] = 3, 4, 0
+    _, notes = there_and_back(actor, tmp_path)
+    # As part of the skin only half of the 5 m reach vertex 0.
+    assert told_error(notes) == (pytest.approx(2500, rel=5e-3), "mm")
+    lost = " ".join(notes)
+    for words in ("that z is up", "body parts", "the symmetry map", "the reduced mesh"):
+        assert words in lost
+
+
+@pytest.mark.parametrize(
+    ("options", "sums"), [({"normalize": True}, [1, 1]), ({"max_influences": 1}, [1, 1])]
+)
+def test_weights_are_written_as_they_are_used(tmp_path, options, sums):
+    weights = [[0.5, 0], [0, 1], [1, 0], [0.5, 0.75], [1, 0]]
+    again, notes = there_and_back(seamed_actor(weights=weights), tmp_path, **options)
+    skin = again.figure.skin
+    found = np.add.reduceat(skin.weights, skin.starts[:-1])
+    assert_allclose(found[[0, 5]], sums, rtol=0, atol=EXACT)
+    assert told_error(notes)[0] < 1e-9
+    assert np.diff(skin.starts)[5] == (1 if "max_influences" in options else 2)
+
+
+def test_dual_quaternions_are_no_part_of_a_skin(tmp_path):
+    weights = [[0.5, 0.5]] * 5
+    actor = seamed_actor(weights=weights, unit="m")
+    actor.pose.dofs[3] = np.pi / 2  # the tip about x, the line through both joints
+    _, notes = there_and_back(actor, tmp_path, method="dqs")
+    # DQS turns by 45 degrees and keeps the distance r from the line, LBS draws in to r cos 45;
+    # farthest out is vertex 4, sqrt(18) from the line.
+    gap = 18**0.5 * (1 - 0.5**0.5)
+    assert told_error(notes) == (pytest.approx(1000 * gap, rel=5e-3), "mm")
+
+
+def test_seams_are_split(tmp_path):
+    again, notes = there_and_back(seamed_actor(), tmp_path)
+    mesh = again.figure.mesh
+    assert_array_equal(mesh.positions[mesh.triangles], POSITIONS[TRIANGLES])
+    corners = np.array([[0, 1, 2], [3, 4, 5], [0, 4, 3]])
+    assert_array_equal(mesh.uvs[mesh.triangles], UVS[corners])
+    assert "split at texture seams: 5 vertices are 7 in the .skin" in notes
+
+
+def test_texture_goes_along(tmp_path):
+    mesh = seamed_mesh(pictures=(PICTURE,), of_triangle=np.zeros(3, np.int32))
+    again, _ = there_and_back(seamed_actor(mesh=mesh), tmp_path)
+    assert names(tmp_path) == ["cloth0.png", "rig.skel", "rig.skin"]
+    assert_array_equal(again.figure.mesh.materials[0].image, PICTURE)
+
+
+# What the format cannot hold
+
+
+def refused(actor, folder, error=RigError):
+    with pytest.raises(error) as caught:
+        export(actor, folder / "rig.skel")
+    assert names(folder) == []
+    return str(caught.value)
+
+
+def test_other_orders_of_rotation_are_refused(tmp_path):
+    joints = skeleton([-1, 0], [(0, "x", 0), (1, "z", 0), (1, "x", 0)], names=["hip", "knee"])
+    assert refused(Actor(Figure("a", skeleton=joints)), tmp_path) == (
+        ".skel turns joints about x, then y, then z; joint knee turns otherwise"
+    )
+
+
+def test_two_rotations_about_one_axis_are_refused(tmp_path):
+    joints = skeleton([-1], [(0, "x", 0), (0, "x", 0)], names=["hip"])
+    assert "joint hip turns otherwise" in refused(Actor(Figure("a", skeleton=joints)), tmp_path)
+
+
+def test_rest_rotations_are_refused(tmp_path):
+    about_z = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]], dtype=float)
+    joints = ball_skeleton(("hip", "knee"), np.array([-1, 0]), JOINTS)
+    turned = joints.rest_rotations.copy()
+    turned[1] = matrix_to_quaternion(about_z[None])[0]
+    actor = Actor(Figure("a", skeleton=replace(joints, rest_rotations=turned)))
+    assert refused(actor, tmp_path) == ".skel cannot hold the rest rotation of joint knee"
+
+
+def test_scaled_joints_are_refused(tmp_path):
+    actor = seamed_actor()
+    actor.pose.scales[1] = 1, 1, 1.5
+    assert refused(actor, tmp_path) == ".skel cannot hold the scale of joint tip"
+
+
+def test_translations_of_joints_below_the_root_are_refused_unless_they_are_0(tmp_path):
+    joints = skeleton([-1, 0], [(1, "ty", 0)], names=["hip", "knee"])
+    actor = Actor(Figure("a", skeleton=joints))
+    actor.pose.dofs[0] = 1e-3
+    assert refused(actor, tmp_path) == ".skel cannot hold a translation of joint knee"
+    actor.pose.dofs[0] = 0
+    export(actor, tmp_path / "rig.skel")
+    assert names(tmp_path) == ["rig.skel"]
+
+
+def test_mesh_without_skeleton_is_refused(tmp_path):
+    actor = Actor(Figure("roof", seamed_mesh()))
+    assert refused(actor, tmp_path) == "figure roof has no skeleton to write as .skel"
+
+
+@pytest.mark.parametrize("name", ["a{b", "two\nlines", "offset"])
+def test_names_that_would_be_read_otherwise_are_refused(tmp_path, name):
+    joints = ball_skeleton((name,), np.array([-1]), np.zeros((1, 3)))
+    actor = Actor(Figure("a", skeleton=joints))
+    assert "joint name" in refused(actor, tmp_path, UnsupportedFormatError)
+
+
+def test_refusal_of_the_skin_takes_the_skeleton_back(tmp_path):
+    mesh = replace(seamed_mesh(), triangles=np.zeros((0, 3), np.int32), uvs=None,
+                   uv_triangles=None, triangle_materials=None)  # fmt: skip
+    actor = seamed_actor(mesh=mesh)
+    text = refused(actor, tmp_path, UnsupportedFormatError)
+    assert text == "figure roof has no triangles to write as .skin"
+    for name in ("rig.skel", "rig.skin"):
+        (tmp_path / name).write_text(f"precious {name}")
+    with pytest.raises(UnsupportedFormatError):
+        export(actor, tmp_path / "rig.skel")
+    assert (tmp_path / "rig.skel").read_text() == "precious rig.skel"
+    assert names(tmp_path) == ["rig.skel", "rig.skin"]
+
+
+def test_picture_of_another_content_is_never_replaced(tmp_path):
+    (tmp_path / "cloth0.png").write_bytes(b"precious")
+    mesh = seamed_mesh(pictures=(PICTURE,), of_triangle=np.zeros(3, np.int32))
+    with pytest.raises(OutputError) as caught:
+        export(seamed_actor(mesh=mesh), tmp_path / "rig.skel")
+    assert str(caught.value).startswith(f"{tmp_path / 'cloth0.png'}")
+    assert names(tmp_path) == ["cloth0.png"]
+    assert (tmp_path / "cloth0.png").read_bytes() == b"precious"

@@ -1,0 +1,252 @@
+"""Exporters whose disk is full, whose folder is locked, whose target is odd: nothing is lost."""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from itertools import count
+from pathlib import Path
+
+import numpy as np
+import pytest
+from export.plain_readers import read_obj
+from seamed import OTHER_PICTURE, PICTURE, seamed_actor, seamed_mesh
+
+from viewer.cli import run
+from viewer.errors import OutputError
+from viewer.export import EXPORTERS, export
+from viewer.formats import _save, all_or_none, save_text
+
+SUFFIXES = [kind.suffixes[0] for kind in EXPORTERS.values()]
+# Files that each one writes for the figure below, which has two pictures.
+SAVES = {".obj": 4, ".ply": 1, ".npz": 1, ".skel": 4}
+# What is there already, by the suffix of the output.
+BESIDE = {".skel": (".skin",)}
+
+
+@pytest.fixture
+def rig(tmp_path):
+    """A figure with two textures, as files."""
+    folder = tmp_path / "in"
+    folder.mkdir()
+    of_triangle = np.array([0, 0, 1])
+    mesh = seamed_mesh(pictures=(PICTURE, OTHER_PICTURE), of_triangle=of_triangle)
+    export(seamed_actor(mesh=mesh), folder / "roof.skel")
+    return [str(folder / "roof.skel"), str(folder / "roof.skin")]
+
+
+def contents(folder):
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+class Fault:
+    """Lets the n-th call of a step fail, and all after it where a disk stays full."""
+
+    def __init__(self, monkeypatch, step: str, number: int) -> None:
+        self.calls, self.number, self.step = 0, number, step
+        self.stays = step in ("open", "write", "flush")
+        wrapped = {
+            "open": (_save.tempfile, "mkstemp"),
+            "flush": (_save.os, "fsync"),
+            "rights": (Path, "chmod"),
+            "rename": (Path, "replace"),
+        }
+        if step == "write":
+            monkeypatch.setattr(_save.os, "fdopen", self._stream(os.fdopen))
+        else:
+            owner, name = wrapped[step]
+            original = getattr(owner, name)
+            monkeypatch.setattr(owner, name, lambda *a, **k: self._meet() or original(*a, **k))
+
+    @property
+    def has_struck(self) -> bool:
+        return self.calls >= self.number
+
+    def _meet(self) -> None:
+        self.calls += 1
+        if self.calls == self.number or (self.stays and self.has_struck):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    def _stream(self, original):
+        def opened(*arguments):
+            stream = original(*arguments)
+            return HalfWay(stream, self._meet)
+
+        return opened
+
+
+class HalfWay:
+    """A stream that calls something when half of the bytes are written."""
+
+    def __init__(self, stream, meet) -> None:
+        self.stream, self.meet = stream, meet
+        self.flush, self.fileno = stream.flush, stream.fileno
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *problem):
+        self.stream.close()
+
+    def write(self, data):
+        self.stream.write(data[: len(data) // 2])
+        self.meet()
+        self.stream.write(data[len(data) // 2 :])
+
+
+@pytest.mark.parametrize("step", ["open", "write", "flush", "rights", "rename"])
+@pytest.mark.parametrize("is_there", [False, True], ids=["new", "replaced"])
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_full_disk_at_every_step_changes_nothing(
+    rig, tmp_path, monkeypatch, capsys, suffix, is_there, step
+):
+    folder = tmp_path / "out"
+    folder.mkdir()
+    for name in (suffix, *BESIDE.get(suffix, ())) if is_there else ():
+        (folder / f"person{name}").write_text(f"precious {name}")
+    before = contents(folder)
+    for number in count(1):
+        with monkeypatch.context() as patch:
+            fault = Fault(patch, step, number)
+            code = run(["convert", *rig, "-o", str(folder / f"person{suffix}"), "--force"])
+        captured = capsys.readouterr()
+        if not fault.has_struck:
+            break
+        assert code == 5 and captured.out == ""
+        assert captured.err.startswith(f"viewer: {folder}{os.sep}")
+        assert captured.err.endswith(": No space left on device\n")
+        assert captured.err.count("\n") == 1
+        assert contents(folder) == before
+    assert code == 0 and captured.err == ""
+    assert number > SAVES[suffix]  # every one of them has failed once
+    written = contents(folder)
+    assert len(written) == SAVES[suffix] and b"precious" not in b"".join(written.values())
+    assert not [name for name in written if name.startswith(".")]
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_interrupt_leaves_what_was_there(rig, tmp_path, monkeypatch, capsys, suffix):
+    folder = tmp_path / "out"
+    folder.mkdir()
+    (folder / f"person{suffix}").write_text("precious")
+    before, calls = contents(folder), []
+
+    def interrupt(*_):
+        calls.append(1)
+        if len(calls) == SAVES[suffix]:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(_save.os, "fsync", interrupt)
+    assert run(["convert", *rig, "-o", str(folder / f"person{suffix}"), "--force"]) == 130
+    assert capsys.readouterr().err == "viewer: interrupted\n"
+    assert contents(folder) == before
+
+
+# Odd targets
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_target_that_is_a_folder_is_refused(rig, tmp_path, capsys, suffix):
+    target = tmp_path / f"person{suffix}"
+    target.mkdir()
+    assert run(["convert", *rig, "-o", str(target), "--force"]) == 5
+    assert capsys.readouterr().err == f"viewer: {target}: is a folder\n"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["in", target.name]
+
+
+def test_second_file_of_a_rig_that_is_a_folder_is_refused(rig, tmp_path, capsys):
+    (tmp_path / "person.skin").mkdir()
+    assert run(["convert", *rig, "-o", str(tmp_path / "person.skel")]) == 5
+    assert capsys.readouterr().err == f"viewer: {tmp_path / 'person.skin'}: is a folder\n"
+    assert not (tmp_path / "person.skel").exists()
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_folder_that_cannot_be_written_is_refused(rig, tmp_path, capsys, suffix):
+    folder = tmp_path / "locked"
+    folder.mkdir()
+    folder.chmod(0o555)
+    if os.access(folder, os.W_OK):
+        folder = Path("/proc")  # root writes anywhere but into a file system of the kernel's own
+    assert run(["convert", *rig, "-o", str(folder / f"person{suffix}")]) == 5
+    error = capsys.readouterr().err
+    assert error.startswith(f"viewer: {folder}/") and error.count("\n") == 1
+    assert not list(folder.glob("*person*"))
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_link_is_followed_and_stays(rig, tmp_path, suffix):
+    kept = tmp_path / "kept"
+    kept.mkdir()
+    target = kept / f"real{suffix}"
+    target.write_text("old")
+    target.chmod(0o640)
+    link = tmp_path / f"person{suffix}"
+    link.symlink_to(f"kept/real{suffix}")
+    assert run(["convert", *rig, "-o", str(link), "--force"]) == 0
+    assert link.is_symlink() and len(target.read_bytes()) > 100
+    assert stat.S_IMODE(target.stat().st_mode) == 0o640
+    assert [path.name for path in kept.iterdir()] == [target.name]
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="only Linux has /dev/full")
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_full_device_is_reported_and_takes_no_file_with_it(rig, tmp_path, capsys, suffix):
+    folder = tmp_path / "out"
+    folder.mkdir()
+    link = folder / f"person{suffix}"
+    link.symlink_to("/dev/full")
+    assert run(["convert", *rig, "-o", str(link)]) == 5
+    assert capsys.readouterr().err == f"viewer: {link}: No space left on device\n"
+    assert [path.name for path in folder.iterdir()] == [link.name]
+    assert link.is_symlink() and stat.S_ISCHR(Path("/dev/full").stat().st_mode)
+
+
+def test_link_to_nothing_creates_what_it_names(rig, tmp_path):
+    link = tmp_path / "person.obj"
+    link.symlink_to("real.obj")
+    assert run(["convert", *rig, "-o", str(link)]) == 0
+    assert link.is_symlink() and len(read_obj(tmp_path / "real.obj").v) == 7
+
+
+# Several files at once
+
+
+def test_all_or_none_keeps_what_was_written():
+    with all_or_none([]):
+        pass
+
+
+def test_all_or_none_puts_back_what_was_there(tmp_path):
+    old, new, link = tmp_path / "old", tmp_path / "new", tmp_path / "link"
+    old.write_text("old")
+    link.symlink_to("new")
+    with pytest.raises(OutputError, match="full"), all_or_none([old, new, link]):
+        save_text(old, "changed")
+        save_text(link, "written")
+        raise OutputError("full")
+    assert old.read_text() == "old" and not new.exists() and link.is_symlink()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["link", "old"]
+
+
+def test_all_or_none_leaves_no_copies(tmp_path):
+    old = tmp_path / "old"
+    old.write_text("old")
+    with all_or_none([old]):
+        save_text(old, "changed")
+    assert contents(tmp_path) == {"old": b"changed"}
+
+
+def test_all_or_none_refuses_before_anything_changes(tmp_path, monkeypatch):
+    old = tmp_path / "old"
+    old.write_text("old")
+
+    def full(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(_save.shutil, "copy2", full)
+    with pytest.raises(OutputError) as caught, all_or_none([tmp_path / "new", old]):
+        pytest.fail("the block must not run")
+    assert str(caught.value) == f"{old}: No space left on device"
+    assert contents(tmp_path) == {"old": b"old"}
