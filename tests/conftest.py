@@ -33,6 +33,14 @@ def shared_data() -> Path:
     return SHARED_DATA
 
 
+@pytest.fixture(autouse=True)
+def own_settings(tmp_path_factory, monkeypatch) -> None:
+    """No test reads or changes what the person who runs it has remembered."""
+    folder = tmp_path_factory.getbasetemp() / "settings"
+    for name in ("XDG_CONFIG_HOME", "XDG_STATE_HOME"):
+        monkeypatch.setenv(name, str(folder / name))
+
+
 @pytest.fixture(scope="session")
 def gl_framebuffer() -> Iterator[moderngl.Framebuffer]:
     """A framebuffer of a context without a window, for all tests; use ``ctx``, which checks it."""
