@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
+from app import box_body
 from app.driver import Driver
 from app.tiny import write_rig
+from formats.synthetic_smpl import model
+from imgui_bundle import imgui
 
 
 @pytest.fixture(autouse=True)
 def _own_state_folder(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    settings = tmp_path / "state" / "models.json"
+    monkeypatch.setattr("viewer.models._settings_file", lambda: settings)
 
 
 @pytest.fixture
@@ -36,3 +42,39 @@ def drive():
 def hand(drive, rig):
     """A hand on an app that shows the tiny figure."""
     return drive(*rig)
+
+
+@pytest.fixture
+def drive_body(drive, tmp_path):
+    """Open apps that show a made-up body model: "box" or a kind of the SMPL family."""
+
+    def open_body(kind="box", size=(900, 1000), **columns):
+        arrays = box_body.arrays() if kind == "box" else model(kind, **columns)
+        path = tmp_path / f"{kind}.npz"
+        np.savez(path, **arrays)
+        return drive(path, size=size, samples=1)
+
+    return open_body
+
+
+@pytest.fixture
+def box(drive_body):
+    """A hand on an app that shows the box, with all of its panels in reach."""
+    return drive_body()
+
+
+@pytest.fixture
+def texts(monkeypatch):
+    """What panels write as plain text, in the order of writing; empty the list to read anew."""
+    written = []
+
+    def recorder(write):
+        def record(text):
+            written.append(text)
+            write(text)
+
+        return record
+
+    for name in ("text_unformatted", "text_disabled", "text_wrapped"):
+        monkeypatch.setattr(imgui, name, recorder(getattr(imgui, name)))
+    return written

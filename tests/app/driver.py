@@ -22,12 +22,13 @@ MODIFIERS = {
 }
 
 
-def make_state(scene: Scene, paths=()) -> AppState:
+def make_state(scene: Scene, paths=(), samples=4) -> AppState:
     """Return the state that the window starts with."""
     camera = Camera(up=scene.up)
     fit(camera, scene_points(scene), 1.0)
     files = tuple(map(Path, paths))
-    return AppState(scene, camera, DisplayOptions(), scene_box(scene), files)
+    options = DisplayOptions(samples=samples)
+    return AppState(scene, camera, options, scene_box(scene), files)
 
 
 class Driver:
@@ -39,11 +40,21 @@ class Driver:
         What to open; the bundled figure if none.
     size, scale, pixels_per_point
         As for ``HeadlessApp``.
+    samples : int
+        Of multisampling; without a graphics card, 1 draws ten times as fast as the usual 4.
     """
 
-    def __init__(self, *paths, size=(900, 640), scale=1.0, pixels_per_point=1.0, scene=None):
+    def __init__(
+        self,
+        *paths,
+        size=(900, 640),
+        scale=1.0,
+        pixels_per_point=1.0,
+        samples=4,
+        scene=None,
+    ):
         scene = scene or viewer.load(*paths)
-        self.state = make_state(scene, paths)
+        self.state = make_state(scene, paths, samples)
         self.app = HeadlessApp(self.state, size, scale=scale, pixels_per_point=pixels_per_point)
         self.io = imgui.get_io()
         # Clicks of a test follow each other quickly: only double_click means two as one.
@@ -163,6 +174,31 @@ class Driver:
             self.click(title)
             self.step(2)
 
+    def show_panel(self, title):
+        """Click the tab of a panel that others may lie over."""
+        rect = imgui.internal.find_window_by_name(title).dc.dock_tab_item_rect
+        # Left of the cross that closes it.
+        self.click((rect.min.x + 0.3 * (rect.max.x - rect.min.x), (rect.min.y + rect.max.y) / 2))
+        self.step(2)
+
+    def pick(self, label, number):
+        """Choose an entry of a drop-down list."""
+        self.click(label)
+        x, _y = self.place(label, 0.1)
+        self.step(2)
+        line = imgui.get_style().item_spacing.y + imgui.get_font_size()
+        self.click((x, self.state.item_rects[label][3] + 8 + (number + 0.4) * line))
+        self.step(2)
+
+    def open(self, *paths):
+        """Drop files on the window and wait for them."""
+        self.app.frame.open(list(paths))
+        self.wait_for_loader()
+
+    def says(self, text):
+        """Return whether a message that goes away by itself contains a text."""
+        return any(text in note.text for note in self.state.notes)
+
     # What is shown
 
     def dof(self, label):
@@ -206,6 +242,9 @@ class Driver:
                 assert np.isfinite(actor.pose.dofs).all()
                 assert (limits[:, 0] <= actor.pose.dofs).all()
                 assert (actor.pose.dofs <= limits[:, 1]).all()
+                assert np.isfinite(actor.pose.shape_weights).all()
+                assert np.isfinite(actor.pose.figure_translation).all()
+                assert 0 < actor.pose.figure_scale < np.inf
 
 
 class _Held:

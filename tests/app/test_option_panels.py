@@ -63,29 +63,16 @@ def test_skin_opacity_is_a_slider_while_both_are_shown(tall):
     assert (tall.scene_picture() != before).any()
 
 
-def _pick(hand, label, number):
-    """Choose an entry of a drop-down list."""
-    hand.click(label)
-    x, _y = hand.place(label, 0.1)
-    hand.step(2)
-    from imgui_bundle import imgui
-
-    line = imgui.get_style().item_spacing.y + imgui.get_font_size()
-    rect = hand.state.item_rects[label]
-    hand.click((x, rect[3] + 8 + (number + 0.4) * line))
-    hand.step(2)
-
-
 def test_shading_is_chosen_from_a_list(tall):
     for number, name in enumerate(SHADING):
-        _pick(tall, "Shading", number)
+        tall.pick("Shading", number)
         assert tall.state.options.shading == name
 
 
 def test_background_is_chosen_from_a_list(tall):
-    _pick(tall, "Background", 1)
+    tall.pick("Background", 1)
     assert tall.state.options.background == "transparent"
-    _pick(tall, "Background", 2)
+    tall.pick("Background", 2)
     assert tall.state.options.background == "#ffffff"
     assert "Colour" in tall.state.item_rects
     tall.click(tall.place("Colour", 0.35), held="ctrl")
@@ -93,7 +80,7 @@ def test_background_is_chosen_from_a_list(tall):
     tall.key("enter")
     tall.step(2)
     assert tall.state.options.background == "#ff00ff"
-    _pick(tall, "Background", 0)
+    tall.pick("Background", 0)
     assert tall.state.options.background == "gradient"
 
 

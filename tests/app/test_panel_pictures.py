@@ -14,6 +14,7 @@ from PIL import Image, ImageFilter
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden"
 SIZE = (560, 420)
+BODY_SIZE = (760, 680)
 MOST_MEAN, MOST_LOCAL = 3.0, 40.0  # of 255, after blurring away letters and hinting
 
 
@@ -55,6 +56,37 @@ STATES = {
 }
 
 
+def _shape(hand):
+    hand.show_panel("Shape")
+    pose = hand.state.actor.pose
+    pose.shape_weights[[0, 1, 2, 10]] = 1.0, -2.0, 2.5, -5.0
+    pose.dofs[hand.dof_index("neck.y")] = 0.5
+    hand.state.shape_seed = 7
+
+
+def _skinning(hand):
+    hand.show_panel("Skinning")
+    pose, options = hand.state.actor.pose, hand.state.options
+    for number, joint in enumerate(("left_hip", "spine1", "left_shoulder")):
+        pose.dofs[hand.dof_index(f"{joint}.z")] = 0.4 - 0.3 * number
+    options.skinning.max_influences = 2
+    options.shading, options.scalar = "scalar", "cut"
+
+
+def _vectors(hand):
+    hand.click("Rotation vectors")
+    pose = hand.state.actor.pose
+    pose.dofs[hand.dof_index("joint_1.x")], pose.dofs[hand.dof_index("joint_1.z")] = 0.0, -0.3
+    pose.figure_translation[1] = 0.5
+
+
+BODIES = {
+    "shape": ("flame", _shape),
+    "skinning": ("smpl", _skinning),
+    "vectors": ("box", _vectors),
+}
+
+
 def _coarse(pixels):
     picture = Image.fromarray(pixels).filter(ImageFilter.GaussianBlur(4))
     return np.asarray(picture.reduce(4), dtype=float)
@@ -70,8 +102,8 @@ def _is_like(first, second):
     return mean <= MOST_MEAN and local <= MOST_LOCAL
 
 
-def _shown(hand, name):
-    STATES[name](hand)
+def _shown(hand, prepare):
+    prepare(hand)
     hand.step(3)
     hand.state.notes.clear()
     hand.state.stats.renderer = hand.state.stats.version = "driver"
@@ -82,7 +114,19 @@ def _shown(hand, name):
 
 @pytest.mark.parametrize("name", STATES)
 def test_interface_looks_as_it_did(drive, rig, name):
-    pixels = _shown(drive(*rig, size=SIZE), name)
+    _compare(_shown(drive(*rig, size=SIZE), STATES[name]), name)
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_panels_of_bodies_look_as_they_did(drive_body, name):
+    kind, prepare = BODIES[name]
+    hand = drive_body(kind, size=BODY_SIZE)
+    hand.state.closed_panels.add("stats")  # its times are others every time
+    hand.step(2)
+    _compare(_shown(hand, prepare), name)
+
+
+def _compare(pixels, name):
     path = GOLDEN / f"app_{name}.png"
     if os.environ.get("VIEWER_UPDATE_GOLDEN") == "1":
         Image.fromarray(pixels).save(path)
@@ -94,7 +138,7 @@ def test_interface_looks_as_it_did(drive, rig, name):
 
 def test_comparison_tells_states_apart(drive, rig):
     hand = drive(*rig, size=SIZE)
-    start = _shown(hand, "start")
+    start = _shown(hand, _nothing)
     hand.state.closed_panels.add("stats")
     without_panel = hand.screen()
     hand.state.closed_panels.clear()
@@ -103,4 +147,4 @@ def test_comparison_tells_states_apart(drive, rig):
     assert _is_like(start, start)
     assert not _is_like(start, without_panel)
     assert not _is_like(start, without_skin)
-    assert not _is_like(start, _shown(hand, "message"))
+    assert not _is_like(start, _shown(hand, _message))

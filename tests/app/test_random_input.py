@@ -5,14 +5,22 @@ VIEWER_MONKEY_EVENTS=20000 tries more by hand.
 
 from __future__ import annotations
 
+import json
 import os
 import random
 
+import numpy as np
+import pytest
 from app.tiny import SKEL, write_rig
+from formats.pig_text import write as write_pig
+from formats.synthetic_smpl import model
 from imgui_bundle import imgui
+from PIL import Image
+
+from viewer.app import menus
 
 KEYS = [
-    *"rskwntgfhzyoa",
+    *"rskwntgfhzyoamcv",
     *("_1", "_3", "_5", "_7", "tab", "escape", "f1", "f12", "enter", "backspace", "delete"),
     *("left_arrow", "right_arrow", "up_arrow", "down_arrow", "space", "keypad5", "page_down"),
 ]
@@ -75,15 +83,57 @@ class Monkey:
         self.hand.step()
 
 
-def test_random_input_raises_nothing_and_keeps_numbers_finite(drive, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    rig = write_rig(tmp_path)
-    bad = tmp_path / "bad.skel"
+def _rig_files(folder):
+    """Return what to open and what to drop: the tiny rig, parts of it, and what is broken."""
+    rig = write_rig(folder)
+    bad = folder / "bad.skel"
     bad.write_text(SKEL[:100])
-    files = [list(rig), [rig[0]], [rig[1]], [bad], [tmp_path / "missing.skel"], []]
-    hand = drive(*rig, size=(640, 480))
-    hand.state.options.samples = 1
-    monkey = Monkey(hand, files, seed=len("skinned"))
+    return list(rig), [list(rig), [rig[0]], [rig[1]], [bad], [folder / "missing.skel"], []]
+
+
+def _body_files(folder):
+    """Return what to open and what to drop: a body, its poses and textures, and what is broken."""
+    body, broken, empty = folder / "smplx.npz", folder / "broken.npz", folder / "empty"
+    np.savez(body, **model("smplx"))
+    broken.write_bytes(body.read_bytes()[:4000])
+    empty.mkdir()
+    Image.new("RGB", (8, 8), (200, 90, 10)).save(folder / "skin.jpg")
+    texts = {
+        "bend.json": '{"dofs": {"left_knee.x": 1.5}, "betas": [1, -2], "scale": 1.2}',
+        "hands.json": json.dumps({"left_hand_pose": [0.4] * 6, "use_pca": True}),
+        "tail.json": '{"dofs": {"tail.x": 1}}',
+        "halved.json": '{"dofs": {"left_knee',
+        "numbers.txt": "0.1 " * 165,
+        "few.txt": "1 2 3",
+        "picture.png": "no picture",
+    }
+    for name, text in texts.items():
+        (folder / name).write_text(text)
+    dropped = [body, broken, empty, folder / "skin.jpg", *(folder / name for name in texts)]
+    pair = [folder / "skin.jpg", folder / "bend.json"]
+    return [body], [*([path] for path in dropped), pair, [write_pig(folder / "pig")], []]
+
+
+def _keep_inside(folder, monkeypatch):
+    """Let dialogs wander wherever they like, but write into this folder only."""
+    monkeypatch.setenv("HOME", str(folder))
+    for name in ("save_pose", "save_export"):
+        save = getattr(menus, name)
+
+        def save_inside(state, path, save=save):
+            if path.resolve().is_relative_to(folder.resolve()):
+                save(state, path)
+
+        monkeypatch.setattr(menus, name, save_inside)
+
+
+@pytest.mark.parametrize("files", [_rig_files, _body_files], ids=["rig", "body"])
+def test_random_input_raises_nothing_and_keeps_numbers_finite(drive, tmp_path, monkeypatch, files):
+    monkeypatch.chdir(tmp_path)
+    _keep_inside(tmp_path, monkeypatch)
+    opened, dropped = files(tmp_path)
+    hand = drive(*opened, size=(640, 480), samples=1)
+    monkey = Monkey(hand, dropped, seed=len("skinned"))
     for number in range(EVENTS):
         monkey.act()
         if number % 4 == 0:

@@ -5,6 +5,7 @@ It opens files, chooses a folder, or asks where to save; what follows is up to w
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -15,7 +16,10 @@ from viewer.app.widgets import button, note_item
 from viewer.errors import printable
 from viewer.formats import FORMATS
 
-__all__ = ["FileDialog", "draw_file_dialog", "folder_of"]
+__all__ = ["PICTURES", "FileDialog", "draw_file_dialog", "folder_of"]
+
+PICTURES = (".png", ".jpg", ".jpeg")
+"""Suffixes of textures."""
 
 _HINTS = {
     "open": "Ctrl+click chooses several: a .skel and its .skin",
@@ -46,7 +50,7 @@ class FileDialog:
     suffixes : tuple of str
         Files that are listed; all that can be opened if empty.
     name : str
-        Suggested name of the file to write.
+        Suggested name of the file to write; its suffix is added to names that have none.
     """
 
     def __init__(
@@ -60,6 +64,7 @@ class FileDialog:
     ) -> None:
         self.done, self.purpose, self.title, self.name = done, purpose, title, name
         self.suffixes = set(suffixes or opened_suffixes())
+        self.suffix = Path(name).suffix
         self.folder = folder
         self.chosen: set[Path] = set()
         self.shows_all = False
@@ -92,6 +97,14 @@ class FileDialog:
         self.enter(path)
         return None
 
+    def target(self) -> Path | None:
+        """Return the file to write, by its name with a suffix; None if it has no name."""
+        name = Path(self.name.strip())
+        if not name.name.strip("."):
+            return None
+        path = self.folder / name
+        return path if path.suffix else path.with_name(path.name + self.suffix)
+
     def listed(self) -> list[Path]:
         """Return folders, and the files that can be opened or all files."""
         return [
@@ -106,7 +119,7 @@ def opened_suffixes() -> set[str]:
     """Return the suffixes of files that can be opened, textures among them."""
     suffixes = {suffix for kind in FORMATS.values() for suffix in kind.suffixes}
     # Most .txt files are no poses; the check box lists them too.
-    return suffixes - {".txt"} | {".png", ".jpg", ".jpeg"}
+    return suffixes - {".txt"} | set(PICTURES)
 
 
 def draw_file_dialog(state: AppState) -> None:
@@ -184,8 +197,10 @@ def _confirmation(dialog: FileDialog) -> tuple[int, str]:
     if dialog.purpose == "folder":
         return 1, "Use this folder"
     if dialog.purpose == "save":
-        target = dialog.folder / dialog.name
-        return len(dialog.name.strip()), "Replace###Save" if target.is_file() else "Save###Save"
+        target = dialog.target()
+        # Path.is_file() would raise for a name that is too long.
+        exists = target is not None and os.path.isfile(target)  # noqa: PTH113
+        return int(target is not None), "Replace###Save" if exists else "Save###Save"
     count = len(dialog.chosen)
     return count, f"Open {count} files###Open" if count > 1 else "Open###Open"
 
@@ -194,8 +209,8 @@ def _confirmed(dialog: FileDialog) -> list[Path]:
     if dialog.purpose == "folder":
         return [dialog.folder]
     if dialog.purpose == "save":
-        path = dialog.folder / dialog.name.strip()
-        return [path if path.suffix else path.with_suffix(min(dialog.suffixes))]
+        target = dialog.target()
+        return [] if target is None else [target]
     return sorted(dialog.chosen)
 
 

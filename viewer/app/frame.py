@@ -10,7 +10,7 @@ from pathlib import Path
 import moderngl
 from imgui_bundle import imgui
 
-from viewer.app.file_dialog import FileDialog, draw_file_dialog, folder_of
+from viewer.app.file_dialog import PICTURES, FileDialog, draw_file_dialog, folder_of
 from viewer.app.interface import draw_hints, draw_interface
 from viewer.app.keys import handle_keys
 from viewer.app.loader import Loader
@@ -18,7 +18,7 @@ from viewer.app.mouse import handle_mouse
 from viewer.app.recent import remember
 from viewer.app.state import AppState
 from viewer.errors import RenderError, ViewerError, printable
-from viewer.formats import free_path, save_image
+from viewer.formats import FORMATS, free_path, save_image
 from viewer.loading import Contents, add_to_actor, bundled_body, bundled_files
 from viewer.rendering.renderer import Renderer
 from viewer.rendering.target import Target
@@ -27,6 +27,9 @@ from viewer.rig.pose import pose_key
 from viewer.rig.scene import Scene
 
 __all__ = ["Frame"]
+
+_ADDED = {*FORMATS["pose"].suffixes, *PICTURES}
+"""Suffixes of poses and pictures, which are applied to the figure that is open."""
 
 
 class Frame:
@@ -175,7 +178,8 @@ class Frame:
         figures = [actor.figure for actor in state.scene.actors]
         is_part = len(figures) == 1 and (figures[0].mesh is None or figures[0].skeleton is None)
         suffixes = {path.suffix.lower() for path in (*paths, *state.paths)}
-        if is_part and len(paths) == 1 and len(state.paths) == 1 and len(suffixes) == 2:
+        is_part &= len(paths) == 1 and len(state.paths) == 1 and len(suffixes) == 2
+        if is_part and paths[0].suffix.lower() not in _ADDED:
             attempts.insert(0, [*state.paths, *paths])
         state.loader = Loader(paths, attempts, self.wake)
 

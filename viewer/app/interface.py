@@ -23,7 +23,7 @@ _DOCK = "viewer dock"
 _LEFT, _RIGHT = (0.235, 0.30, 14.0), (0.27, 0.36, 17.0)
 """Usual and largest share of the window's width, and the letters' heights wanted across."""
 _SHOW_PROGRESS_AFTER = 0.3  # seconds
-_ERROR_TITLE = "Could not open"
+_ERROR_TITLE = "This did not work"
 
 
 def draw_interface(state: AppState) -> list[Path]:
@@ -183,9 +183,13 @@ def _draw_keys(state: AppState) -> None:
     lines = [*((key.label, key.text) for key in KEYS), *MOUSE]
     viewport = imgui.get_main_viewport()
     fits = (len(lines) + 3) * imgui.get_text_line_height_with_spacing() <= viewport.size.y
-    gap = imgui.get_style().item_spacing
-    # In a low window the lines move together rather than out of it.
-    imgui.push_style_var(imgui.StyleVar_.item_spacing, (gap.x, gap.y if fits else 0.0))
+    style = imgui.get_style()
+    # In a low window the lines move together and get smaller rather than go out of it.
+    room = (viewport.size.y - 3 * style.window_padding.y) / len(lines)
+    share = 1.0 if fits else max(min(room / imgui.get_text_line_height(), 1.0), 0.5)
+    gap = (style.item_spacing.x, style.item_spacing.y if fits else 0.0)
+    imgui.push_style_var(imgui.StyleVar_.item_spacing, gap)
+    imgui.push_font(None, share * style.font_size_base)
     center = viewport.get_center()
     if _overlay("##keys", center.x, center.y, (0.5, 0.5)):
         for label, text in lines:
@@ -193,6 +197,7 @@ def _draw_keys(state: AppState) -> None:
             imgui.same_line(11 * imgui.get_font_size())
             imgui.text_unformatted(text)
     imgui.end()
+    imgui.pop_font()
     imgui.pop_style_var()
 
 

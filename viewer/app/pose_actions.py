@@ -112,14 +112,16 @@ def mirror(state: AppState) -> None:
 
 
 def random_shape(state: AppState) -> None:
-    """Draw the first shape coefficients from a normal distribution, by the seed that is shown."""
+    """Draw the first shape coefficients from a normal distribution; expressions stay."""
     actor = state.actor
     shapes = actor.figure.blend_shapes
     if shapes is None or actor.pose is None:
         return
-    weights = np.zeros(shapes.n_shapes)
-    rows = [row for row, group in enumerate(shapes.groups) if group == "shape"][:_RANDOM]
-    weights[rows] = np.random.default_rng(state.shape_seed).standard_normal(len(rows))
+    weights = actor.pose.shape_weights.copy()
+    rows = [row for row, group in enumerate(shapes.groups) if group == "shape"]
+    chosen = rows[:_RANDOM]
+    weights[rows] = 0.0
+    weights[chosen] = np.random.default_rng(state.shape_seed).standard_normal(len(chosen))
     actor.pose.shape_weights = weights
     state.say_status(f"Random shape, seed {state.shape_seed}")
 

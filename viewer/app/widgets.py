@@ -15,6 +15,7 @@ __all__ = [
     "choice",
     "menu_item",
     "note_item",
+    "number_text",
     "same_line_if_room",
     "slider",
 ]
@@ -89,3 +90,12 @@ def choice(state: AppState, label: str, value: str, texts: dict[str, str]) -> st
     changed, chosen = imgui.combo(label, index, list(texts.values()))
     note_item(state, label)
     return keys[chosen] if changed else value
+
+
+def number_text(value: float) -> str:
+    """Return a number with three digits, or with all before the point if there are more.
+
+    >>> number_text(0.012345), number_text(1234.5)
+    ('0.0123', '1,234')
+    """
+    return f"{value:.3g}" if abs(value) < 999.5 else f"{value:,.0f}"

@@ -21,9 +21,10 @@ _SAME = 1e-9  # rotations nearer to each other are one
 
 
 def is_ball(figure: Figure, joint: int) -> bool:
-    """Return whether a joint turns about x, y and z, without limits, and may be a vector."""
+    """Return whether a joint may be a vector: of a body model, about x, y and z, unlimited."""
     skeleton = figure.skeleton
-    assert skeleton is not None  # the panel looked
+    if skeleton is None or figure.pose_layout is None:
+        return False
     rows = rotation_rows(skeleton)[joint]
     return rows[0] >= 0 and bool(np.isinf(skeleton.dof_limits[rows]).all())
 

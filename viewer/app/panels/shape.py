@@ -18,6 +18,7 @@ from viewer.rig.shape import shaped
 __all__ = ["draw"]
 
 _REACH = 5.0  # standard deviations that a slider covers; more can be typed
+_WIDEST = 20.0  # a slider, in heights of the letters
 _HEADINGS = {"shape": "Shape", "expression": "Expression"}
 _measured: Memo[Figure, tuple[tuple[str, str], ...]] = Memo(kept=4)
 
@@ -35,8 +36,7 @@ def draw(state: AppState) -> None:
     same_line_if_room("Reset shape")
     if button(state, "Reset shape"):
         reset_shape(state)
-    imgui.same_line()
-    imgui.set_next_item_width(6.0 * imgui.get_font_size())
+    imgui.set_next_item_width(_width_beside("seed", 8.0))
     changed, seed = imgui.input_int("seed", state.shape_seed)
     note_item(state, "seed")
     if changed and seed != state.shape_seed:
@@ -47,8 +47,18 @@ def draw(state: AppState) -> None:
         skinning.correctives = checkbox(state, "Pose correctives", skinning.correctives)
     imgui.separator()
     if imgui.begin_child("coefficients", (0.0, 0.0)):
+        longest = max(figure.blend_shapes.names, key=len)
+        imgui.push_item_width(_width_beside(printable(longest, 40), _WIDEST))
         _draw_coefficients(state, figure, pose)
+        imgui.pop_item_width()
     imgui.end_child()
+
+
+def _width_beside(label: str, most: float) -> float:
+    """Return the width of a widget whose label fits beside it, if there is room for both."""
+    room = imgui.get_content_region_avail().x
+    taken = imgui.calc_text_size(label).x + imgui.get_style().item_inner_spacing.x
+    return min(max(room - taken, 0.35 * room), most * imgui.get_font_size())
 
 
 def _draw_measures(figure: Figure, pose: Pose) -> None:

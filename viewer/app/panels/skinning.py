@@ -5,7 +5,7 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from viewer.app.state import AppState
-from viewer.app.widgets import checkbox, choice, note_item, slider
+from viewer.app.widgets import checkbox, choice, note_item, number_text, slider
 from viewer.rig.figure import Figure
 from viewer.rig.scalars import SCALARS, length_unit, strongest
 from viewer.rig.skinning import METHODS, Skinning
@@ -78,4 +78,5 @@ def _draw_heat_map(state: AppState, figure: Figure) -> None:
     options.scalar = choice(state, "##Heat map of", options.scalar, titles)
     if shows:
         factor, unit = length_unit(figure)
-        imgui.text_wrapped(f"up to {factor * state.stats.scalar_range[1]:.3g} {unit} in this pose")
+        most = number_text(factor * state.stats.scalar_range[1])
+        imgui.text_wrapped(f"up to {most} {unit} in this pose")
