@@ -53,6 +53,7 @@ def display():
         "-screen",
         "0",
         "1400x900x24",
+        "-noreset",  # a server that starts over when its last client leaves refuses the next
         "-nolisten",
         "tcp",
     ]

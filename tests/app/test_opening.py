@@ -275,3 +275,10 @@ def test_driver_that_refuses_while_drawing_becomes_a_message(hand, monkeypatch):
     hand.state.options.wireframe = False
     hand.step(3)
     assert hand.state.error == "" and (hand.dofs() == pose).all()
+
+
+def test_parts_hidden_on_one_model_hide_nothing_of_the_next(hand, rig):
+    hand.state.options.hidden_parts, hand.state.options.reduced = (1,), True
+    _open(hand, *rig)
+    assert hand.state.options.hidden_parts == ()
+    assert hand.state.options.reduced is False

@@ -283,3 +283,37 @@ def test_export_writes_the_posed_mesh(box, tmp_path, suffix):
         rows = [line.split() for line in path.read_text().splitlines()]
         heights = [float(row[2]) for row in rows if row and row[0] == "v"]
         assert (min(heights), max(heights)) == (2, 4)
+
+
+def test_what_is_open_is_never_written_over(drive_body, tmp_path):
+    from viewer.app.pose_actions import save_export, save_pose
+
+    hand = drive_body()
+    model = tmp_path / "open.npz"
+    model.write_bytes(b"precious")
+    hand.state.paths = (model,)
+    for save in (save_export, save_pose):
+        hand.state.error = ""
+        save(hand.state, model)
+        assert hand.state.error == f"{model}: is an input file, which is never replaced"
+    assert model.read_bytes() == b"precious"
+
+
+def test_shape_that_turns_out_unreadable_is_taken_back_with_a_message(tmp_path):
+    from driver import Driver
+    from formats.synthetic_smpl import model
+
+    arrays = model("smpl")
+    arrays["shapedirs"] = arrays["shapedirs"].astype(float)
+    arrays["shapedirs"][3, 1, 2] = np.nan
+    path = tmp_path / "bad.npz"
+    np.savez(path, **arrays)
+    hand = Driver(path, size=(1280, 800))
+    hand.state.actor.pose.shape_weights[2] = 1.0
+    hand.step(3)
+    assert hand.state.error == f"{path}: shapedirs: expected finite numbers, found 1 that are not"
+    assert not hand.state.actor.pose.shape_weights.any()
+    hand.state.error = ""
+    hand.step(3)
+    assert hand.state.error == ""
+    hand.close()

@@ -304,8 +304,12 @@ def test_actor_that_cannot_be_written_takes_the_others_back(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("out", "code", "message"),
     [
-        ("x.fbx", 2, 'no exporter for ".fbx"; there are: .obj, .ply, .npz, .skel, .skin'),
-        ("x", 2, 'no exporter for ""; there are: .obj, .ply, .npz, .skel, .skin'),
+        (
+            "x.fbx",
+            2,
+            'no exporter for ".fbx"; there are: .obj, .ply, .npz, .json, .txt, .skel, .skin',
+        ),
+        ("x", 2, 'no exporter for ""; there are: .obj, .ply, .npz, .json, .txt, .skel, .skin'),
         ("missing/x.obj", 5, "{folder}/missing/x.obj: the folder does not exist"),
         ("missing/x.skel", 5, "{folder}/missing/x.skel: the folder does not exist"),
         ("twist.skel/x.obj", 5, "{folder}/twist.skel/x.obj: the folder does not exist"),

@@ -80,8 +80,11 @@ NUMBERS_WANTED = "expected numbers separated by commas, found"
         ("arms.skel --dof left.tx=1", "--dof: joint left has no DOF tx"),
         ("arms.skel --dof left.x", '--dof: expected NAME.X=VALUE, found "left.x"'),
         ("arms.skel --dof left.x=far", '--dof: expected a number after "=", found "left.x=far"'),
-        ("arms.skel --dof figure.scale=0", "--dof: expected a scale above 0, found 0"),
-        ("arms.skel --dof figure.scale=-1", "--dof: expected a scale above 0, found -1"),
+        (
+            "arms.skel --dof figure.scale=0",
+            "--dof: scale: expected more than 0, found 0",
+        ),
+        ("arms.skel --dof figure.scale=-1", "--dof: scale: expected more than 0, found -1"),
         (
             "arms.skel --dof figure.scale=big",
             '--dof: expected a number after "=", found "figure.scale=big"',

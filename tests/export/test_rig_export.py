@@ -192,16 +192,21 @@ def test_figure_translation_goes_to_the_root(tmp_path):
     assert told_error(notes)[0] == 0
 
 
-def test_scale_is_said_to_be_lost_with_the_error_it_makes(tmp_path):
+def test_scale_becomes_part_of_all_lengths(tmp_path):
     actor = seamed_actor(unit="m")
     actor.pose.figure_scale = 1.5
-    _, notes = there_and_back(actor, tmp_path)
-    assert "not held by .skel and .skin: the figure's scale of 1.5" in notes
-    # The farthest vertex is sqrt(27) m from the origin: half of that is missing.
-    assert told_error(notes) == (pytest.approx(500 * 27**0.5, rel=5e-3), "mm")
+    again, notes = there_and_back(actor, tmp_path)
+    assert not [note for note in notes if "not held" in note and "scale" in note]
+    assert told_error(notes)[0] < 1e-9
+    wanted = 1.5 * actor.figure.mesh.positions
+    found = viewer.deform(again.figure, again.pose)[0]
+    assert np.allclose(found.max(axis=0), wanted.max(axis=0), atol=1e-12)
+    assert np.allclose(found.min(axis=0), wanted.min(axis=0), atol=1e-12)
 
 
-def test_error_of_a_figure_without_unit_is_a_share_of_its_size(tmp_path):
+def test_error_of_a_figure_without_unit_is_a_share_of_its_size(tmp_path, monkeypatch):
+    # As if the scale were lost.
+    monkeypatch.setattr("viewer.export.rig.scaled", lambda figure, factor: figure)
     actor = seamed_actor()
     actor.pose.figure_scale = 1.5
     _, notes = there_and_back(actor, tmp_path)

@@ -170,7 +170,7 @@ def test_scale_of_0_or_less_is_noted(folder):
     figure = silent(write(folder))
     pose = rest_pose(figure.skeleton)
     notes = apply_record(PoseRecord(vector=np.array([0.0] * 12 + [-2])), figure, pose)
-    assert notes == ["scale: expected more than 0, found -2"]
+    assert notes == ["scale: expected more than 0, found -2; left at 1"]
 
 
 # Seams

@@ -207,7 +207,7 @@ def test_vector_of_a_relative_poses_the_body(figures):
     figure = figures["smplx"]
     posed = rest_pose(figure.skeleton)
     notes = apply_record(PoseRecord(vector=waves(72)), figure, posed)
-    assert notes == ["2 joints of the pose beyond the body's 22 were left out"]
+    assert notes == [f"2 joints of the pose that {figure.name} lacks were left out"]
     expected = rotation_vector_to_matrix(waves(66).reshape(-1, 3))
     assert_allclose(turns(figure, posed)[:22], expected, rtol=0, atol=1e-15)
     assert_array_equal(turns(figure, posed)[22:], [np.eye(3)] * 33)

@@ -86,7 +86,7 @@ def test_shape_goes_to_a_body(files):
 
 def test_scale_of_0_is_noted(files):
     scene = viewer.load(files["pig"], files["zero"])
-    assert scene.warnings == (f"{files['zero']}: scale: expected more than 0, found 0",)
+    assert scene.warnings == (f"{files['zero']}: scale: expected more than 0, found 0; left at 1",)
 
 
 def test_pose_alone_is_refused(files):

@@ -99,18 +99,65 @@ def test_own_vector_turns_every_joint(family, kind):
     assert notes == []
 
 
+# Joints beyond the 22 of the body that both models have: first in the vector, in the figure, count.
 @pytest.mark.parametrize(
-    ("kind", "count", "left_out"),
-    [("smplx", 72, 2), ("smplx", 156, 30), ("smpl", 165, 33), ("smplh", 66, 0), ("smpl", 66, 0)],
+    ("kind", "count", "shared", "left_out"),
+    [
+        ("smplx", 72, None, 2),
+        ("smplx", 156, (22, 25, 30), 0),
+        ("smplh", 165, (25, 22, 30), 3),
+        ("smpl", 165, None, 33),
+        ("smplh", 66, None, 0),
+        ("smpl", 66, None, 0),
+    ],
 )
-def test_vector_of_another_member_gives_the_body(family, kind, count, left_out):
+def test_vector_of_another_member_goes_by_joint_names(family, kind, count, shared, left_out):
     figure = family(kind)
     wanted = np.random.default_rng(1).uniform(-1, 1, (count // 3, 3))
+    expected = np.zeros((figure.skeleton.n_joints, 3))
+    expected[:22] = wanted[:22]
+    if shared:
+        source, target, joints = shared
+        expected[target : target + joints] = wanted[source : source + joints]
     found, notes = applied(figure, vector=wanted.ravel())
-    assert_allclose(found[:22], wanted[:22], atol=1e-13)
-    assert not found[22:].any()
-    said = [f"{left_out} joints of the pose beyond the body's 22 were left out"]
+    assert_allclose(found, expected, atol=1e-13)
+    said = [f"{left_out} joints of the pose that {figure.name} lacks were left out"]
     assert notes == (said if left_out else [])
+
+
+def test_joints_that_the_vector_lacks_go_to_rest(family):
+    figure = family("smplx")
+    pose = figure_pose(figure)
+    pose.dofs[:] = 0.1
+    apply_record(PoseRecord(vector=np.zeros(72)), figure, pose)
+    assert not pose.dofs.any()
+
+
+def test_mano_takes_a_hand_of_either_side(family):
+    wanted = np.random.default_rng(7).uniform(-0.5, 0.5, 45)
+    found, notes = applied(family("mano"), parts={"left_hand_pose": wanted})
+    assert_allclose(found[1:].ravel(), wanted, atol=1e-13)
+    assert notes == []
+
+
+@pytest.mark.parametrize("scale", [0.0, -2.0, 1e-300, 1e300])
+def test_scale_that_cannot_be_drawn_is_left_out(family, scale):
+    figure = family("smpl")
+    pose = figure_pose(figure)
+    pose.figure_scale = 1.5
+    notes = apply_record(PoseRecord(scale=scale), figure, pose)
+    assert pose.figure_scale == 1.5
+    assert len(notes) == 1 and notes[0].startswith("scale: expected") and "left at 1.5" in notes[0]
+
+
+def test_place_and_shape_beyond_all_measure_are_left_out_or_refused(family):
+    figure = family("smpl")
+    pose = figure_pose(figure)
+    notes = apply_record(PoseRecord(translation=np.array([1e300, 0, 0])), figure, pose)
+    assert notes == ["translation: expected at most 1e+09, found 1e+300; left as it was"]
+    assert not pose.figure_translation.any()
+    message = refusal(figure, shape=np.array([1e300]))
+    assert message == "shape coefficients: expected at most 1e+06, found 1e+300"
 
 
 def test_hands_at_rest_of_another_member_are_not_worth_a_note(family):

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import moderngl
+import numpy as np
 from imgui_bundle import imgui
 
 from viewer.app.file_dialog import PICTURES, FileDialog, draw_file_dialog, folder_of
@@ -25,6 +26,7 @@ from viewer.rendering.target import Target
 from viewer.rig.arrays import Bytes
 from viewer.rig.pose import pose_key
 from viewer.rig.scene import Scene
+from viewer.rig.shape import shaped
 
 __all__ = ["Frame"]
 
@@ -76,6 +78,7 @@ class Frame:
         """
         started = time.perf_counter()
         state = self.state
+        self._check_shapes()
         self.open(draw_interface(state))
         draw_file_dialog(state)
         self.open(state.wants_open)
@@ -93,6 +96,19 @@ class Frame:
         framebuffer.clear(0.10, 0.11, 0.12, 1.0)
         imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
         state.stats.frame_ms = 1e3 * (time.perf_counter() - started)
+
+    def _check_shapes(self) -> None:
+        """Take back a shape whose directions turn out to be unreadable, before panels use it."""
+        state = self.state
+        try:
+            for actor in state.scene.actors:
+                if actor.pose is not None:
+                    shaped(actor.figure, actor.pose.shape_weights)
+        except ViewerError as problem:
+            state.error = str(problem)
+            for actor in state.scene.actors:
+                if actor.pose is not None:
+                    actor.pose.shape_weights = np.zeros(actor.figure.n_shapes)
 
     def _draw_scene(self, scale: float) -> None:
         """Draw the scene if anything about it changed, and put it behind the panels."""
@@ -125,18 +141,11 @@ class Frame:
             )
             target.resolve()
             state.stats.samples = target.samples
-            state.stats.scalar_range = self._scalar_range()
+            state.stats.scalar_range = self.renderer.scalar_range
         except ViewerError as problem:
             state.error = str(problem)
         state.say(*self.renderer.notes)
         self.renderer.notes.clear()
-
-    def _scalar_range(self) -> tuple[float, float]:
-        """Return lowest and highest number of the chosen actor's scalar view."""
-        actor = self.state.actor
-        if self.state.options.shading != "scalar" or actor.figure.mesh is None:
-            return 0.0, 0.0
-        return self.renderer.posed_mesh(actor).scalars.range
 
     def _scene_key(self, size: tuple[int, int]) -> object:
         """Return everything the picture of the scene depends on."""

@@ -15,7 +15,7 @@ from viewer.app.widgets import button, number_text
 from viewer.errors import printable
 from viewer.rendering.colormap import color_at
 from viewer.rendering.ground_pass import grid_step
-from viewer.rig.scalars import SCALARS, length_unit
+from viewer.rig.scalars import SCALARS, length_unit, missing_part
 
 __all__ = ["draw_hints", "draw_interface"]
 
@@ -140,10 +140,20 @@ def draw_hints(state: AppState) -> None:
 def _draw_legend(state: AppState) -> None:
     """Say what the colours of a scalar view stand for, in a corner of the view."""
     x, y, width, _ = state.view_rect
-    if state.options.shading != "scalar" or width < 200:
+    shows_mesh = any(
+        actor.visible and actor.figure.mesh is not None and state.options.show != "skeleton"
+        for actor in state.scene.actors
+    )
+    if state.options.shading != "scalar" or width < 200 or not shows_mesh:
         return
     factor, unit = length_unit(state.actor.figure)
     view = SCALARS[state.options.scalar]
+    missing = missing_part(state.options.scalar, state.actor.figure)
+    if missing:
+        if _overlay("##legend", x + 10, y + 10, (0.0, 0.0)):
+            imgui.text_unformatted(f"{view.title}: this figure has not {missing}")
+        imgui.end()
+        return
     low, high = view.shown(*state.stats.scalar_range)
     if _overlay("##legend", x + 10, y + 10, (0.0, 0.0)):
         imgui.text_unformatted(f"{view.title}, {unit}")

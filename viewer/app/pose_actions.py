@@ -11,7 +11,7 @@ from imgui_bundle import imgui
 
 from viewer.app.state import AppState
 from viewer.errors import ViewerError, printable
-from viewer.export import export
+from viewer.export import export, files_written, refuse_inputs
 from viewer.formats import Source, write
 from viewer.rig.mirror import mirror_pose
 from viewer.rig.pose_record import PoseRecord, apply_record, record_of
@@ -83,18 +83,24 @@ def save_pose(state: AppState, path: Path) -> None:
     """Write the chosen actor's pose; the suffix chooses the form."""
     record = _record(state)
     if record is not None:
-        _save(state, lambda: write(record, path), path)
+        _save(state, lambda: write(record, path), [path])
 
 
 def save_export(state: AppState, path: Path) -> None:
     """Write the chosen actor as it is posed, for other programs."""
-    _save(state, lambda: state.say(*export(state.actor, path, state.options.skinning)), path)
-
-
-def _save(state: AppState, act: Callable[[], None], path: Path) -> None:
     try:
+        files = files_written(path)
+    except ViewerError as problem:
+        state.error = str(problem)
+        return
+    _save(state, lambda: state.say(*export(state.actor, path, state.options.skinning)), files)
+
+
+def _save(state: AppState, act: Callable[[], None], files: list[Path]) -> None:
+    try:
+        refuse_inputs(files, state.paths)
         act()
-        state.say(f"Saved {printable(path, 200)}")
+        state.say(f"Saved {', '.join(printable(file, 200) for file in files)}")
     except ViewerError as problem:
         state.error = str(problem)
 

@@ -142,6 +142,7 @@ class AppState:
         """Let panels act on another actor."""
         self.chosen_actor = index
         self.selected_joint = -1
+        self.held_vector = None
         self.joint_filter = ""
         self.opened_joints = _first_opened(self.actor)
 
@@ -158,6 +159,8 @@ class AppState:
         self.box = bounding_box(points)
         self.camera.up = scene.up
         fit(self.camera, points, self.aspect)
+        # Body parts and levels of detail mean something else on another model.
+        self.options.hidden_parts, self.options.reduced = (), False
         self.choose_actor(0)
         self.history.start(scene, self.options)
         self.say(*scene.warnings)

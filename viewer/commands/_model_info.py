@@ -88,7 +88,7 @@ def _effects(figure: Figure, pose: Pose | None, skinning: Skinning) -> dict[str,
     if not figure.is_attached or pose is None:
         return {}
     effects: dict[str, float] = {}
-    for count in _CUTS:
+    for count in sorted({*_CUTS, skinning.max_influences} - {0}):
         if strongest(figure) > count:
             cut = Skinning(max_influences=count, correctives=skinning.correctives)
             effects[f"cut to {count} influences"] = float(compute("cut", figure, pose, cut).max())

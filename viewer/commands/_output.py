@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from viewer.errors import OutputError, printable
+from viewer.export import refuse_inputs
 
 __all__ = ["STDOUT", "check_output"]
 
@@ -24,8 +25,7 @@ def check_output(output: Path, inputs: list[Path], force: bool) -> None:
     try:
         if output.is_dir():
             raise OutputError(f"{shown}: is a folder")
-        if any(path.exists() and output.exists() and path.samefile(output) for path in inputs):
-            raise OutputError(f"{shown}: is an input file, which is never replaced")
+        refuse_inputs([output], inputs)
         if output.is_file() and not force and str(output) not in STDOUT:
             raise OutputError(f"{shown}: exists already (--force replaces it)")
     except (OSError, ValueError) as problem:

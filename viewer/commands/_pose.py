@@ -273,12 +273,13 @@ def _place(scene: Scene, label: str, setting: str, text: str) -> bool:
     if part not in ("tx", "ty", "tz", "scale") or actor is None or actor.pose is None:
         return False
     value = _dof_value(setting, text, False)
-    if part == "scale":
-        if value <= 0.0:
-            raise ViewerError(f"--dof: expected a scale above 0, found {value:g}")
-        actor.pose.figure_scale = value
-    else:
-        actor.pose.figure_translation["xyz".index(part[1])] = value
+    place = actor.pose.figure_translation.copy()
+    if part != "scale":
+        place["xyz".index(part[1])] = value
+    record = PoseRecord(translation=place, scale=value if part == "scale" else None)
+    refused = apply_record(record, actor.figure, actor.pose)
+    if refused:
+        raise ViewerError(f"--dof: {refused[0].partition(';')[0]}")
     return True
 
 

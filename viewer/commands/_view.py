@@ -14,7 +14,7 @@ from viewer.rendering.options import BACKGROUNDS, SHOWN, DisplayOptions
 from viewer.rendering.program import SHADING
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.scalars import SCALARS
+from viewer.rig.scalars import SCALARS, compute, length_text, missing_part
 from viewer.rig.scene import Scene
 
 __all__ = [
@@ -24,6 +24,8 @@ __all__ = [
     "display_of",
     "hide_parts",
     "parse_size",
+    "scalar_text",
+    "warn_of_missing",
 ]
 
 
@@ -150,3 +152,32 @@ def hide_parts(arguments: argparse.Namespace, scene: Scene, options: DisplayOpti
             )
         hidden.append(names.index(wanted.lower()))
     options.hidden_parts = tuple(sorted(set(hidden)))
+
+
+def warn_of_missing(scene: Scene, options: DisplayOptions) -> list[str]:
+    """Return what was asked to be shown and no figure has, one line each."""
+    figures = [actor.figure for actor in scene.actors]
+    notes = []
+    if options.shading == "scalar":
+        missing = [missing_part(options.scalar, figure) for figure in figures]
+        if all(missing):
+            title = SCALARS[options.scalar].title
+            notes.append(f"--scalar {options.scalar}: {title}: no figure has {missing[0]}")
+    if options.reduced and not any(figure.reduced for figure in figures):
+        notes.append("--reduced: no figure has a reduced mesh")
+    if options.keypoints and not any(figure.keypoints for figure in figures):
+        notes.append("--keypoints: no figure has keypoints")
+    return notes
+
+
+def scalar_text(scene: Scene, options: DisplayOptions) -> str:
+    """Return what the ends of the colour map stand for, for the line that names the picture."""
+    if options.shading != "scalar" or options.show == "skeleton":
+        return ""
+    largest = [
+        float(compute(options.scalar, actor.figure, actor.pose, options.skinning).max())
+        for actor in scene.actors
+        if actor.figure.mesh is not None and actor.visible
+    ]
+    text = length_text(scene.actors[0].figure, max(largest, default=0.0))
+    return f", {SCALARS[options.scalar].title}: 0 to {text}"

@@ -9,7 +9,7 @@ from viewer.commands._output import check_output
 from viewer.commands._pose import add_skinning_arguments, pose_files, skinning_of
 from viewer.commands._scene import add_scene_arguments, open_scene, scene_files
 from viewer.errors import OutputError, printable
-from viewer.export import EXPORTERS, export, exporter_for
+from viewer.export import EXPORTERS, export, exporter_for, files_written
 from viewer.formats import all_or_none
 
 __all__ = ["add_arguments", "run"]
@@ -53,10 +53,7 @@ def _inputs(arguments: argparse.Namespace) -> list[Path]:
 
 
 def _written(path: Path) -> list[Path]:
-    """Return all that is written for one output: a rig is two files."""
+    """Return all that is written for one output, in a folder that exists."""
     if not path.parent.is_dir():
         raise OutputError(f"{printable(path, 300)}: the folder does not exist")
-    suffixes = EXPORTERS[exporter_for(path)].suffixes
-    if suffixes == (".skel", ".skin"):
-        return [path.with_suffix(suffix) for suffix in suffixes]
-    return [path]
+    return files_written(path)

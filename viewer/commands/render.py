@@ -15,6 +15,8 @@ from viewer.commands._view import (
     display_of,
     hide_parts,
     parse_size,
+    scalar_text,
+    warn_of_missing,
 )
 from viewer.errors import OutputError, ViewerError, printable
 from viewer.rendering.camera import Camera
@@ -52,6 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
         print_warnings([f"{printable(output)}: this format knows no transparency"])
     scene = open_scene(arguments)
     hide_parts(arguments, scene, options)
+    print_warnings(warn_of_missing(scene, options))
     points = scene_points(scene, options.show)
     camera = camera_of(arguments, scene, points, size)
     box = bounding_box(points)
@@ -64,7 +67,8 @@ def run(arguments: argparse.Namespace) -> int:
     grid = f", grid {_grid_step(points):g}" if options.grid else ""
     # A picture on its way through a pipe must not be followed by words.
     stream = sys.stderr if str(output) in STDOUT else sys.stdout
-    print(f"{printable(output)}: {size[0]} x {size[1]}{grid}", file=stream)
+    colors = scalar_text(scene, options)
+    print(f"{printable(output)}: {size[0]} x {size[1]}{grid}{colors}", file=stream)
     return 0
 
 

@@ -6,13 +6,14 @@ import argparse
 from pathlib import Path
 
 from viewer.commands._numbers import number
-from viewer.commands._scene import add_scene_arguments, open_scene, scene_files
+from viewer.commands._scene import add_scene_arguments, open_scene, print_warnings, scene_files
 from viewer.commands._view import (
     add_camera_arguments,
     add_display_arguments,
     camera_of,
     display_of,
     hide_parts,
+    warn_of_missing,
 )
 from viewer.errors import printable
 from viewer.formats import free_path
@@ -48,6 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
     options = display_of(arguments)
     scene = open_scene(arguments)
     hide_parts(arguments, scene, options)
+    print_warnings(warn_of_missing(scene, options))
     points = scene_points(scene, options.show)
     camera = camera_of(arguments, scene, points, SIZE)
     from viewer.app.display import NoDisplay, find_display

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 
-from viewer.errors import RigError, UnsupportedFormatError
+from viewer.errors import OutputError, RigError, UnsupportedFormatError, printable
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import Skinning
 
-__all__ = ["EXPORTERS", "Exporter", "export", "exporter_for"]
+__all__ = [
+    "EXPORTERS",
+    "Exporter",
+    "export",
+    "exporter_for",
+    "files_written",
+    "refuse_inputs",
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +33,7 @@ EXPORTERS = {
     "obj": Exporter("Wavefront OBJ: the posed mesh", (".obj",)),
     "ply": Exporter("PLY: the posed mesh", (".ply",)),
     "npz": Exporter("NumPy arrays: posed vertices and joints", (".npz",)),
+    "pose": Exporter("pose: joints by name and own numbers", (".json", ".txt")),
     "rig": Exporter("course rig: .skel and .skin", (".skel", ".skin")),
 }
 """Modules in this folder, each with ``export(actor, path, skinning)``."""
@@ -75,6 +84,41 @@ def export(actor: Actor, path: str | Path, skinning: Skinning | None = None) -> 
     module = import_module(f"{__name__}.{exporter_for(path)}")
     notes: list[str] = module.export(actor, Path(path), skinning or Skinning())
     return notes
+
+
+def files_written(path: str | Path) -> list[Path]:
+    """Return all files that an export to ``path`` writes: a rig is two.
+
+    Raises
+    ------
+    UnsupportedFormatError
+        If no exporter has this suffix.
+    """
+    suffixes = EXPORTERS[exporter_for(path)].suffixes
+    if exporter_for(path) == "rig":
+        return [Path(path).with_suffix(suffix) for suffix in suffixes]
+    return [Path(path)]
+
+
+def refuse_inputs(files: Sequence[Path], inputs: Sequence[Path]) -> None:
+    """Refuse to replace what was opened, or a file inside an opened folder.
+
+    Raises
+    ------
+    OutputError
+        With the file's name.
+    """
+    for file in files:
+        for opened in inputs:
+            try:
+                inside = opened.is_dir() and file.exists() and file.parent.samefile(opened)
+                same = opened.exists() and file.exists() and file.samefile(opened)
+            except (OSError, ValueError):
+                continue  # what cannot be looked at cannot be replaced either
+            if same or inside:
+                raise OutputError(
+                    f"{printable(file, 300)}: is an input file, which is never replaced"
+                )
 
 
 def require_mesh(actor: Actor, what: str) -> None:

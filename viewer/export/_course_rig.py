@@ -21,7 +21,7 @@ def course_skeleton(skeleton: Skeleton, pose: Pose) -> tuple[Skeleton, Ints]:
     Parameters
     ----------
     skeleton : Skeleton
-        Without rest rotations and scales.
+        Without rest rotations and scales; the figure's scale is part of its lengths already.
     pose : Pose
         Becomes the file's pose; the figure's translation goes to the roots' offsets.
 
@@ -42,12 +42,13 @@ def course_skeleton(skeleton: Skeleton, pose: Pose) -> tuple[Skeleton, Ints]:
     place = np.empty_like(order)
     place[order] = np.arange(len(order))
     above = skeleton.parents[order]
-    offsets = (skeleton.rest_translations + pose.translations)[order]
+    scale = pose.figure_scale  # of the skeleton already
+    offsets = (skeleton.rest_translations + scale * pose.translations)[order]
     offsets[above < 0] += pose.figure_translation
     rows = _rotation_rows(skeleton)[order].ravel()
     values = np.where(rows >= 0, pose.dofs[rows], 0.0)
     limits = np.where(rows[:, None] >= 0, skeleton.dof_limits[rows], 0.0)
-    offsets[0] += _root_shift(skeleton, pose)
+    offsets[0] += scale * _root_shift(skeleton, pose)
     count = skeleton.n_joints
     return Skeleton(
         names=tuple(skeleton.names[joint] for joint in order),

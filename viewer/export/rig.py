@@ -31,7 +31,7 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
     figure, pose = actor.figure, actor.pose
     if figure.skeleton is None or pose is None:
         raise RigError(f"figure {figure.name} has no skeleton to write as .skel")
-    whole = shaped(figure, pose.shape_weights)
+    whole = scaled(shaped(figure, pose.shape_weights), pose.figure_scale)
     rig, sources = _as_rig(whole, pose, skinning)
     skel, skin = path.with_suffix(".skel"), path.with_suffix(".skin")
     notes = [f"{printable(skel, 300)}: {figure.skeleton.n_joints} joints"]
@@ -82,6 +82,24 @@ def _as_rig(figure: Figure, pose: Pose, skinning: Skinning) -> tuple[Figure, np.
     return Figure(figure.name, split, posed, moved), sources
 
 
+def scaled(figure: Figure, factor: float) -> Figure:
+    """Return a figure with all its lengths scaled about its origin: mesh, joints, bindings."""
+    if factor == 1.0:
+        return figure
+    mesh, skeleton, skin = figure.mesh, figure.skeleton, figure.skin
+    if mesh is not None:
+        mesh = replace(mesh, positions=mesh.positions * factor)
+    if skeleton is not None:
+        boxes = None if skeleton.boxes is None else skeleton.boxes * factor
+        moves = skeleton.rest_translations * factor
+        skeleton = replace(skeleton, rest_translations=moves, boxes=boxes)
+    if skin is not None:
+        inverse_bind = skin.inverse_bind.copy()
+        inverse_bind[:, :3, 3] *= factor
+        skin = replace(skin, inverse_bind=inverse_bind)
+    return replace(figure, mesh=mesh, skeleton=skeleton, skin=skin, blend_shapes=None)
+
+
 def _lost(figure: Figure, pose: Pose) -> list[str]:
     """Say in words what the formats have no place for."""
     lost = []
@@ -89,8 +107,6 @@ def _lost(figure: Figure, pose: Pose) -> list[str]:
         lost.append(f"{figure.n_shapes} shape directions (the present shape is kept)")
     if figure.correctives is not None:
         lost.append("pose correctives")
-    if pose.figure_scale != 1.0:
-        lost.append(f"the figure's scale of {pose.figure_scale:g}")
     if figure.up != "y":
         lost.append(f"that {figure.up} is up")
     extras = {

@@ -6,6 +6,8 @@ of the classes here, made anew for each file, so nothing a pickle does to them o
 
 from __future__ import annotations
 
+import codecs
+import io
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -21,6 +23,7 @@ from viewer.rig.arrays import Deferred
 __all__ = ["Array", "Dtype", "Instance", "Span", "StandIn", "is_sizes", "noun"]
 
 _MOST_AXES = 32
+_PIECE = 1 << 20  # bytes recoded at a time
 _LONGEST_SIDE = 1 << 62  # so that a product of them can still be printed
 
 
@@ -74,9 +77,19 @@ class Span:
         if self.coding in (None, "latin-1"):
             return self
         if self._packed is None:
-            data = self._decoded().encode("latin-1")
+            data = self._recoded()
             self._packed = Span(data, 0, len(data))
         return self._packed
+
+    def _recoded(self) -> bytes:
+        """Return the letters as bytes, piece by piece: a whole text would double the memory."""
+        decoder = codecs.getincrementaldecoder(self.coding or "latin-1")()
+        packed = io.BytesIO()
+        for start in range(self.start, self.stop, _PIECE):
+            stop = min(start + _PIECE, self.stop)
+            letters = decoder.decode(self.data[start:stop], stop == self.stop)
+            packed.write(letters.encode("latin-1"))
+        return packed.getvalue()
 
     def _decoded(self) -> str:
         errors = "surrogatepass" if self.coding == "utf-8" else "strict"

@@ -6,13 +6,13 @@ import numpy as np
 
 from viewer.formats._archive import Archive
 from viewer.formats._container import are_indices, finite
-from viewer.formats._smpl_names import Member
 from viewer.formats._source import Source
 from viewer.rig.annotations import Keypoints
 from viewer.rig.arrays import Deferred, Floats, Ints
 from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.hands import Hand
 from viewer.rig.mesh import Mesh
+from viewer.rig.smpl_family import Member
 
 __all__ = [
     "IGNORED",

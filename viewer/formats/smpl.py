@@ -19,7 +19,6 @@ import numpy as np
 from viewer.errors import printable
 from viewer.formats._archive import Archive, Opaque, Sparse, describe
 from viewer.formats._container import archive_of, are_indices, finite
-from viewer.formats._smpl_names import Member, member_of
 from viewer.formats._smpl_parts import (
     IGNORED,
     model_hands,
@@ -36,6 +35,7 @@ from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.pose_vector import PoseLayout
 from viewer.rig.skeleton import ball_skeleton
 from viewer.rig.skin import Skin, skin_from_entries
+from viewer.rig.smpl_family import Member, member_of
 from viewer.rig.transform import translation_matrix
 
 __all__ = ["KEYS", "read"]

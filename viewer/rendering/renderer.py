@@ -19,6 +19,7 @@ from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.pose import placement_matrix
+from viewer.rig.scalars import SCALARS
 from viewer.rig.scene import Actor, Scene
 
 __all__ = ["Renderer"]
@@ -36,11 +37,14 @@ class Renderer:
     ----------
     notes : list of str
         What the driver could not do as asked, one line each.
+    scalar_range : (float, float)
+        Lowest and highest number of the scalar view drawn last, over all figures.
     """
 
     def __init__(self, context: moderngl.Context) -> None:
         self.context = context
         self.notes: list[str] = []
+        self.scalar_range = 0.0, 0.0
         self.programs = Programs(context)
         self.mesh_pass = MeshPass(context, self.programs)
         self.joint_pass = JointPass(context, self.programs)
@@ -137,7 +141,17 @@ class Renderer:
                 if options.shading == "scalar":
                     mesh.scalars.update(options.scalar, pose, options.skinning)
                 meshes.append((actor, mesh))
+        if options.shading == "scalar" and meshes:
+            self._share_range(options.scalar, [mesh for _, mesh in meshes])
         return meshes
+
+    def _share_range(self, name: str, meshes: list[PosedMesh]) -> None:
+        """Let the same colour mean the same number on all figures."""
+        ranges = [mesh.scalars.range for mesh in meshes]
+        low, high = min(low for low, _ in ranges), max(high for _, high in ranges)
+        self.scalar_range = low, high
+        for mesh in meshes:
+            mesh.scalars.shown = SCALARS[name].shown(low, high)
 
     def _draw_mesh(
         self, actor: Actor, mesh: PosedMesh, view: View, options: DisplayOptions

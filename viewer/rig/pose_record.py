@@ -15,6 +15,7 @@ from viewer.rig.pose import Pose
 from viewer.rig.pose_vector import read_vector, set_joint_rotations, write_vector
 from viewer.rig.rotation import rotation_vector_to_matrix
 from viewer.rig.skeleton import Skeleton, clamp_dofs, dof_label, find_dof
+from viewer.rig.smpl_family import members_by_numbers
 
 __all__ = ["PARTS", "PoseRecord", "apply_record", "record_of"]
 
@@ -29,6 +30,9 @@ PARTS = {
 
 _BODY = 21  # joints of body_pose in models with fingers or a face; SMPL alone has two more
 _LONGEST_BODY = 23
+_SMALLEST, _LARGEST = 1e-6, 1e6  # scales that float32 can draw
+_FARTHEST = 1e9  # figure units
+_MOST_SIGMA = 1e6  # of a shape coefficient: beyond it the mesh has no shape
 _HAND_PARTS = {"left_hand_pose": "left", "right_hand_pose": "right", "hand_pose": ""}
 
 
@@ -132,10 +136,28 @@ def apply_record(record: PoseRecord, figure: Figure, pose: Pose) -> list[str]:
         work.figure_translation = np.array(record.translation, dtype=np.float64)
     if record.scale is not None:
         work.figure_scale = float(record.scale)
-    if work.figure_scale <= 0.0:
-        notes.append(f"scale: expected more than 0, found {work.figure_scale:g}")
+    notes += _keep_drawable(pose, work)
     for name in Pose.__slots__:
         setattr(pose, name, getattr(work, name))
+    return notes
+
+
+def _keep_drawable(before: Pose, pose: Pose) -> list[str]:
+    """Undo a place or scale that no camera could show, and say so."""
+    notes = []
+    if not _SMALLEST <= pose.figure_scale <= _LARGEST:
+        notes.append(
+            f"scale: expected more than 0, found {pose.figure_scale:g}; "
+            f"left at {before.figure_scale:g}"
+            if pose.figure_scale <= 0.0
+            else f"scale: expected {_SMALLEST:g} to {_LARGEST:g}, found {pose.figure_scale:g}; "
+            f"left at {before.figure_scale:g}"
+        )
+        pose.figure_scale = before.figure_scale
+    far = float(np.abs(pose.figure_translation).max())
+    if far > _FARTHEST:
+        notes.append(f"translation: expected at most {_FARTHEST:g}, found {far:g}; left as it was")
+        pose.figure_translation = before.figure_translation.copy()
     return notes
 
 
@@ -164,13 +186,23 @@ def _apply_vector(vector: Floats, figure: Figure, pose: Pose) -> list[str]:
         read_vector(layout, skeleton, pose, vector)
         return _beyond_limits(skeleton, vector) if layout is None else []
     is_family = "pelvis" in skeleton.names and layout is not None and layout.translation < 0
-    if not is_family or len(vector) % 3 or len(vector) < 66:
+    if not is_family:
         raise RigError(f"expected {own} pose numbers for {figure.name}, found {len(vector)}")
-    # All members share the first 22 joints; only those can be taken over without a mapping.
-    rest = vector[66:]
-    joints = np.arange(22, dtype=np.int32)
-    _turn(figure, pose, joints, vector[:66])
-    return [_left_out(rest, 22)] if rest.any() else []
+    names = members_by_numbers().get(len(vector))
+    if names is None:
+        raise RigError(f"expected {own} pose numbers for {figure.name}, found {len(vector)}")
+    # Joints that this model has and the vector's model has not go to rest.
+    joints = np.arange(skeleton.n_joints, dtype=np.int32)
+    wanted = np.zeros((skeleton.n_joints, 3))
+    rows = vector.reshape(-1, 3)
+    lost = 0
+    for name, row in zip(names, rows, strict=True):
+        if name in skeleton.names:
+            wanted[skeleton.names.index(name)] = row
+        else:
+            lost += bool(row.any())
+    _turn(figure, pose, joints, wanted.ravel())
+    return [f"{lost} joints of the pose that {figure.name} lacks were left out"] if lost else []
 
 
 def _apply_part(
@@ -228,6 +260,8 @@ def _apply_hand(
     skeleton = figure.skeleton
     assert skeleton is not None
     side = _HAND_PARTS[name]
+    if hand is None and side and len(figure.hands) == 1 and not figure.hands[0].side:
+        hand = figure.hands[0]  # MANO is one hand, whatever its side is called
     first = f"{side}_index1" if side else "index1"
     if hand is None and len(values) == 45 and first in skeleton.names:
         start = skeleton.names.index(first)
@@ -265,6 +299,11 @@ def _apply_weights(group: str, values: Floats | None, figure: Figure, pose: Pose
     values = np.asarray(values, dtype=np.float64).ravel()
     if len(values) > len(rows) and values[len(rows) :].any():
         raise RigError(f"{figure.name} has {len(rows)} {group} coefficients, found {len(values)}")
+    if np.abs(values).max() > _MOST_SIGMA:
+        raise RigError(
+            f"{group} coefficients: expected at most {_MOST_SIGMA:g}, "
+            f"found {np.abs(values).max():g}"
+        )
     weights = np.zeros(len(groups))
     weights[: len(pose.shape_weights)] = pose.shape_weights
     count = min(len(rows), len(values))

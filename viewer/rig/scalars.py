@@ -15,7 +15,15 @@ from viewer.rig.mirror import mirror_axis
 from viewer.rig.pose import Pose
 from viewer.rig.skinning import Skinning, deform
 
-__all__ = ["SCALARS", "Scalar", "compute", "length_text", "length_unit", "strongest"]
+__all__ = [
+    "SCALARS",
+    "Scalar",
+    "compute",
+    "length_text",
+    "length_unit",
+    "missing_part",
+    "strongest",
+]
 
 _NOISE = 1e-9  # of the figure's size
 _FOUR = 4  # influences of most engines, if no other number is chosen
@@ -86,7 +94,8 @@ def _distance(figure: Figure, pose: Pose | None, one: Skinning, other: Skinning)
 
 def _cut(figure: Figure, pose: Pose | None, skinning: Skinning) -> Floats:
     count = skinning.max_influences or _FOUR
-    whole = replace(skinning, max_influences=0)
+    # Against normalised weights: what scaling alone does is a view of its own.
+    whole = replace(skinning, max_influences=0, normalize=True)
     return _distance(figure, pose, whole, replace(skinning, max_influences=count))
 
 
@@ -125,6 +134,17 @@ SCALARS = {
     "asymmetry": Scalar("Asymmetry", "a symmetry map", _asymmetry),
 }
 """Views by name, in the order of menus."""
+
+
+def missing_part(name: str, figure: Figure) -> str:
+    """Return what a figure lacks for a view, in words; empty if it has it."""
+    needs = SCALARS[name].needs
+    has = {
+        "a skin": figure.is_attached,
+        "pose correctives": figure.is_attached and figure.correctives is not None,
+        "a symmetry map": figure.is_attached and figure.symmetry is not None,
+    }
+    return "" if has[needs] else needs
 
 
 def length_unit(figure: Figure) -> tuple[float, str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["FAMILY", "Member", "member_of"]
+__all__ = ["FAMILY", "Member", "member_of", "members_by_numbers"]
 
 _BODY_NAMES = (
     "pelvis left_hip right_hip spine1 left_knee right_knee spine2 left_ankle right_ankle spine3 "
@@ -65,3 +65,14 @@ def member_of(parents: tuple[int, ...]) -> Member | None:
     """
     member = FAMILY.get(len(parents))
     return member if member is not None and member.parents == parents else None
+
+
+def members_by_numbers() -> dict[int, tuple[str, ...]]:
+    """Return the joints that pose vectors of the family turn, by the vector's length.
+
+    >>> members_by_numbers()[66][-1]
+    'right_wrist'
+    """
+    found = {3 * len(member.names): member.names for member in FAMILY.values()}
+    found[3 * len(_BODY)] = tuple(_BODY)
+    return {count: names for count, names in found.items() if names[0] == "pelvis"}

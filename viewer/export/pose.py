@@ -1,0 +1,22 @@
+"""Write the pose alone, by joint names (``.json``) or as the model's own numbers (``.txt``)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from viewer.errors import RigError, printable
+from viewer.formats import write
+from viewer.rig.pose_record import record_of
+from viewer.rig.scene import Actor
+from viewer.rig.skinning import Skinning
+
+__all__ = ["export"]
+
+
+def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
+    """Write a pose that ``--pose`` and the window read; see ``viewer.export.export``."""
+    figure, pose = actor.figure, actor.pose
+    if figure.skeleton is None or pose is None:
+        raise RigError(f"figure {figure.name} has no skeleton, and so no pose")
+    write(record_of(figure, pose), path)
+    return [f"{printable(path, 300)}: {figure.skeleton.n_dofs} DOFs"]
