@@ -8,6 +8,7 @@ import pytest
 import viewer
 from viewer.app.panels import PANELS
 from viewer.commands import COMMANDS
+from viewer.export import EXPORTERS
 from viewer.formats import FORMATS
 from viewer.rendering.program import SHADING
 from viewer.resources import resource
@@ -27,8 +28,9 @@ def modules(folder: str) -> set[str]:
         ("rig/skinning", METHODS),
         ("app/panels", PANELS),
         ("commands", COMMANDS),
+        ("export", EXPORTERS),
     ],
-    ids=["formats", "skinning", "panels", "commands"],
+    ids=["formats", "skinning", "panels", "commands", "export"],
 )
 def test_registry_is_exactly_its_folder(folder: str, registry: dict[str, object]) -> None:
     assert modules(folder) == set(registry)
@@ -46,6 +48,13 @@ def test_formats_can_read_and_those_that_say_so_write() -> None:
         module = import_module(f"viewer.formats.{name}")
         assert callable(module.read)
         assert hasattr(module, "write") == FORMATS[name].writes
+
+
+def test_exporters_write_what_they_say() -> None:
+    for name, kind in EXPORTERS.items():
+        module = import_module(f"viewer.export.{name}")
+        assert hasattr(module, "export") == kind.writes_pose
+        assert hasattr(module, "export_take") == kind.writes_motion
 
 
 def test_panels_can_draw() -> None:

@@ -13,9 +13,9 @@ from viewer.commands._numbers import number
 from viewer.errors import RigError, ViewerError, printable
 from viewer.formats import Source, read
 from viewer.rig.arrays import Floats
-from viewer.rig.clip import sample
 from viewer.rig.hands import hand_vectors
 from viewer.rig.mirror import mirror_pose
+from viewer.rig.motion import pose_actor
 from viewer.rig.pose_record import PoseRecord, apply_record
 from viewer.rig.pose_vector import set_joint_rotations
 from viewer.rig.rotation import rotation_vector_to_matrix
@@ -189,10 +189,10 @@ def _apply_time(scene: Scene, arguments: argparse.Namespace) -> None:
         option = "--time" if arguments.frame is None else "--frame"
         raise ViewerError(f"{option}: no file is a clip")
     for actor in moving:
-        if actor.clip and actor.figure.skeleton and actor.pose:
-            seconds, from_start = time
-            seconds += actor.clip.start if from_start else 0.0
-            sample(actor.clip, actor.figure.skeleton, seconds, out=actor.pose)
+        assert actor.clip is not None  # it moves
+        seconds, from_start = time
+        seconds += actor.clip.start if from_start else 0.0
+        pose_actor(actor, seconds + actor.offset)
 
 
 def _apply_record(option: str, record: PoseRecord, scene: Scene) -> list[str]:

@@ -5,16 +5,15 @@ from __future__ import annotations
 import argparse
 import json
 import math
-from collections import Counter
 from typing import Any
 
 import numpy as np
 
+from viewer.commands._clip_info import clip_lines, describe_clip
 from viewer.commands._model_info import describe_model, model_lines
 from viewer.commands._pose import add_skinning_arguments, skinning_of
 from viewer.commands._scene import add_scene_arguments, open_scene
 from viewer.errors import printable
-from viewer.rig.clip import Clip
 from viewer.rig.mesh import Mesh, bounding_box, box_size, triangle_areas
 from viewer.rig.scene import Actor, Scene, actor_points
 from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_labels
@@ -75,7 +74,7 @@ def _describe_actor(actor: Actor) -> dict[str, Any]:
     if figure.skin is not None:
         parts["skin"] = _describe_skin(figure.skin)
     if actor.clip is not None:
-        parts["clip"] = _describe_clip(actor.clip)
+        parts["clip"] = describe_clip(actor.clip)
     return parts
 
 
@@ -153,19 +152,6 @@ def _describe_skin(skin: Skin) -> dict[str, Any]:
     }
 
 
-def _describe_clip(clip: Clip) -> dict[str, Any]:
-    times = [time for channel in clip.channels for time in channel.times[[0, -1]].tolist()]
-    modes = Counter(mode for channel in clip.channels for mode in channel.extrapolation)
-    return {
-        "name": clip.name,
-        "range": [clip.start, clip.end],
-        "channels": len(clip.channels),
-        "keys": sum(len(channel.times) for channel in clip.channels),
-        "key_times": [min(times), max(times)] if times else [],
-        "extrapolation": dict(sorted(modes.items())),
-    }
-
-
 def _lines(actor: dict[str, Any]) -> list[str]:
     low, high = actor["box"]
     lines = [
@@ -179,20 +165,7 @@ def _lines(actor: dict[str, Any]) -> list[str]:
     if "skin" in actor:
         lines += _skin_lines(actor["skin"])
     if "clip" in actor:
-        lines += _clip_lines(actor["clip"])
-    return lines
-
-
-def _clip_lines(clip: dict[str, Any]) -> list[str]:
-    start, end = clip["range"]
-    modes = ", ".join(f"{mode} {count}" for mode, count in clip["extrapolation"].items())
-    lines = [
-        f"  clip       {printable(clip['name'])}: {start:g} to {end:g} s, "
-        f"{clip['channels']} channels, {clip['keys']} keys"
-    ]
-    if clip["key_times"]:
-        first, last = clip["key_times"]
-        lines.append(f"    keys from {first:g} to {last:g} s; beyond them {modes}")
+        lines += clip_lines(actor["clip"])
     return lines
 
 

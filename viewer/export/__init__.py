@@ -8,25 +8,44 @@ from importlib import import_module
 from pathlib import Path
 
 from viewer.errors import OutputError, RigError, UnsupportedFormatError, printable
+from viewer.export._options import MotionOptions
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import Skinning
+from viewer.rig.take import Take
 
 __all__ = [
     "EXPORTERS",
     "Exporter",
+    "MotionOptions",
     "export",
+    "export_take",
     "exporter_for",
     "files_written",
+    "motion_exporters",
     "refuse_inputs",
 ]
 
 
 @dataclass(frozen=True, slots=True)
 class Exporter:
-    """What menus must know before an exporter's module is imported: its title and suffixes."""
+    """What menus must know before an exporter's module is imported.
+
+    Attributes
+    ----------
+    title : str
+        For menus.
+    suffixes : tuple of str
+        With their dots; ``"/"`` stands for a folder.
+    writes_pose : bool
+        Whether its module has ``export(actor, path, skinning)``.
+    writes_motion : bool
+        Whether its module has ``export_take(take, path, options)``.
+    """
 
     title: str
     suffixes: tuple[str, ...]
+    writes_pose: bool = True
+    writes_motion: bool = False
 
 
 EXPORTERS = {
@@ -48,10 +67,11 @@ def exporter_for(path: str | Path) -> str:
         If none does; the message lists those there are.
     """
     suffix = Path(path).suffix.lower()
-    for key, kind in EXPORTERS.items():
+    kinds = {key: kind for key, kind in EXPORTERS.items() if kind.writes_pose}
+    for key, kind in kinds.items():
         if suffix in kind.suffixes:
             return key
-    known = ", ".join(suffix for kind in EXPORTERS.values() for suffix in kind.suffixes)
+    known = ", ".join(suffix for kind in kinds.values() for suffix in kind.suffixes)
     raise UnsupportedFormatError(f'no exporter for "{suffix}"; there are: {known}')
 
 
@@ -83,6 +103,54 @@ def export(actor: Actor, path: str | Path, skinning: Skinning | None = None) -> 
     """
     module = import_module(f"{__name__}.{exporter_for(path)}")
     notes: list[str] = module.export(actor, Path(path), skinning or Skinning())
+    return notes
+
+
+def motion_exporters(path: str | Path) -> list[str]:
+    """Return the keys in ``EXPORTERS`` that write motions to files of this suffix.
+
+    Raises
+    ------
+    UnsupportedFormatError
+        If none does; the message lists those there are.
+    """
+    suffix = Path(path).suffix.lower() or "/"
+    kinds = {key: kind for key, kind in EXPORTERS.items() if kind.writes_motion}
+    found = [key for key, kind in kinds.items() if suffix in kind.suffixes]
+    if not found:
+        known = ", ".join(dict.fromkeys(s for kind in kinds.values() for s in kind.suffixes))
+        raise UnsupportedFormatError(f'no motion exporter for "{suffix}"; there are: {known}')
+    return found
+
+
+def export_take(take: Take, path: str | Path, key: str, options: MotionOptions) -> list[str]:
+    """Write a motion; the actor's placement in the scene is left out.
+
+    Parameters
+    ----------
+    take : Take
+        A figure in many poses.
+    path : str or Path
+        Files of that name are replaced; all of an export's files appear, or none.
+    key : str
+        Of ``EXPORTERS``, see ``motion_exporters``.
+    options : MotionOptions
+        How.
+
+    Returns
+    -------
+    list of str
+        What was written, then what the format cannot hold and by how much that is off.
+
+    Raises
+    ------
+    RigError
+        If the figure or motion lacks what the format is made of.
+    OutputError
+        If a file cannot be written.
+    """
+    module = import_module(f"{__name__}.{key}")
+    notes: list[str] = module.export_take(take, Path(path), options)
     return notes
 
 

@@ -70,7 +70,7 @@ class Channel:
             raise RigError("times: expected seconds that never fall")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Clip:
     """A motion of one skeleton.
 
@@ -211,8 +211,10 @@ def sample(clip: Clip, skeleton: Skeleton, time: float, out: Pose) -> None:
     out : Pose
         Changed in place.
     """
-    for channel in clip.channels:
-        out.dofs[channel.target] = evaluate(channel, np.array(time))
+    from viewer.rig.clip_table import evaluate_all
+
+    targets, values = evaluate_all(clip, np.array([time]))
+    out.dofs[targets] = values[0]
     out.dofs[:] = clamp_dofs(skeleton, out.dofs)
 
 

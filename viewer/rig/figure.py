@@ -14,6 +14,7 @@ from viewer.rig.blendshapes import BlendShapes, Correctives, JointRegressor
 from viewer.rig.hands import Hand
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.mesh import Mesh
+from viewer.rig.points import PointLayout
 from viewer.rig.pose import Pose
 from viewer.rig.pose_vector import PoseLayout
 from viewer.rig.skeleton import Skeleton
@@ -54,6 +55,8 @@ class Figure:
         What else the file says about the mesh.
     symmetry : (V,) int32 or None
         Each vertex's mirror partner.
+    points : PointLayout or None
+        Of a figure that is nothing but captured keypoints.
     facts : tuple of (str, str)
         What the reader found out, for ``viewer info``: a heading and a text each.
     """
@@ -73,10 +76,11 @@ class Figure:
     keypoints: Keypoints | None = None
     reduced: ReducedMesh | None = None
     symmetry: Ints | None = None
+    points: PointLayout | None = None
     facts: tuple[tuple[str, str], ...] = ()
 
     def __post_init__(self) -> None:
-        if self.mesh is None and self.skeleton is None:
+        if self.mesh is None and self.skeleton is None and self.points is None:
             raise RigError(f"figure {self.name}: expected a mesh or a skeleton, found neither")
         self._check_vertices()
         if self.skin is None:

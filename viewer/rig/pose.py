@@ -13,6 +13,7 @@ from viewer.rig.skeleton import Skeleton, clamp_dofs
 
 __all__ = [
     "Pose",
+    "dof_rotations",
     "joint_rotations",
     "local_matrices",
     "placement_matrix",
@@ -137,20 +138,34 @@ def local_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
 
 def joint_rotations(skeleton: Skeleton, pose: Pose) -> Floats:
     """Return each joint's rotation within its parent, R(quaternion) R(DOFs): (J, 3, 3)."""
-    return quaternion_to_matrix(pose.rotations) @ _dof_rotations(skeleton, pose.dofs)
+    return quaternion_to_matrix(pose.rotations) @ dof_rotations(skeleton, pose.dofs)
 
 
-def _dof_rotations(skeleton: Skeleton, dofs: Floats) -> Floats:
-    """Multiply every joint's rotation DOFs, k-th rows of all joints at once: (J, 3, 3)."""
-    rotations = np.broadcast_to(np.eye(3), (skeleton.n_joints, 3, 3)).copy()
+def dof_rotations(skeleton: Skeleton, dofs: Floats) -> Floats:
+    """Multiply every joint's rotation DOFs, k-th rows of all joints at once.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Gives the DOF table.
+    dofs : (..., D)
+        Lengths and radians, of any number of poses.
+
+    Returns
+    -------
+    (..., J, 3, 3)
+        The first row of a joint is applied first.
+    """
+    shape = (*dofs.shape[:-1], skeleton.n_joints, 3, 3)
+    rotations = np.broadcast_to(np.eye(3), shape).copy()
     rows = np.flatnonzero(skeleton.dof_kinds >= _FIRST_ROTATION)
     for rank_rows in _rows_by_rank(skeleton.dof_joints[rows], rows):
         joints = skeleton.dof_joints[rank_rows]
         axes = skeleton.dof_kinds[rank_rows] - _FIRST_ROTATION
         for axis in range(3):
             chosen = axes == axis
-            turn = axis_rotations(axis, dofs[rank_rows[chosen]])
-            rotations[joints[chosen]] = turn @ rotations[joints[chosen]]
+            turn = axis_rotations(axis, dofs[..., rank_rows[chosen]])
+            rotations[..., joints[chosen], :, :] = turn @ rotations[..., joints[chosen], :, :]
     return rotations
 
 

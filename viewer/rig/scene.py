@@ -8,15 +8,21 @@ from typing import Literal
 import numpy as np
 
 from viewer.rig.arrays import Floats
+from viewer.rig.camera_view import CameraView
 from viewer.rig.clip import Clip
 from viewer.rig.figure import Figure, skeleton_points
 from viewer.rig.mesh import bounding_box, box_size
+from viewer.rig.points import PointClip
 from viewer.rig.pose import Pose, placement_matrix, rest_pose
+from viewer.rig.sampled_clip import SampledClip
 from viewer.rig.shape import shaped
 from viewer.rig.skinning import deform
 from viewer.rig.transform import apply_transform
 
-__all__ = ["Actor", "Scene", "actor_points", "figure_pose", "scene_box", "scene_points"]
+__all__ = ["Actor", "Motion", "Scene", "actor_points", "figure_pose", "scene_box", "scene_points"]
+
+Motion = Clip | SampledClip | PointClip
+"""Whatever moves an actor; all have ``name``, ``start`` and ``end`` in seconds."""
 
 _OUTLIER_SHARE = 0.001  # the camera fits the box of the other 99.9 % of the points
 _OUTLIER_RATIO = 100.0  # ... if the whole box is this much larger
@@ -32,19 +38,45 @@ class Actor:
         Shared, never changed.
     pose : Pose or None
         This actor's own; None if the figure has no skeleton.
-    clip : Clip or None
-        Its motion; ``sample`` poses the actor by it.
+    clip : Motion or None
+        Its motion; ``viewer.rig.motion.pose_actor`` poses the actor by it.
     placement : (4, 4)
         Figure space to scene.
     visible : bool
         Whether it is drawn.
+    offset : float
+        Seconds by which its clip starts later than the scene's clock.
+    person : int or None
+        Its number in a capture of several people.
+    color : (r, g, b) or None
+        Its own, linear, 0 to 1; None for the usual one.
+    points : (K, 4) or None
+        Of figures that are captured points: x, y, z and confidence, right now.
+    is_present : bool
+        Whether its clip has it at the time that is shown.
     """
 
     figure: Figure
     pose: Pose | None = None
-    clip: Clip | None = None
+    clip: Motion | None = None
     placement: Floats = field(default_factory=lambda: np.eye(4))
     visible: bool = True
+    offset: float = 0.0
+    person: int | None = None
+    color: tuple[float, float, float] | None = None
+    points: Floats | None = None
+    is_present: bool = True
+
+    @property
+    def name(self) -> str:
+        """What menus and files call it: its figure's name, and the person's number."""
+        name = self.figure.name
+        return name if self.person is None else f"{name} {self.person}"
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether it is to be seen: visible, and there at the time that is shown."""
+        return self.visible and self.is_present
 
     def __post_init__(self) -> None:
         if self.pose is None and self.figure.skeleton is not None:
@@ -69,14 +101,22 @@ class Scene:
         In drawing order.
     warnings : tuple of str
         What the readers noticed, one line each.
+    world_up : "y", "z" or None
+        The axis that points up; None for that of the first figure.
+    views : tuple of CameraView
+        Calibrated cameras of a capture.
     """
 
     actors: list[Actor]
     warnings: tuple[str, ...] = ()
+    world_up: Literal["y", "z"] | None = None
+    views: tuple[CameraView, ...] = ()
 
     @property
     def up(self) -> Literal["y", "z"]:
-        """The first figure's up axis, ``"y"`` or ``"z"``."""
+        """The axis that points up, ``"y"`` or ``"z"``."""
+        if self.world_up is not None:
+            return self.world_up
         return self.actors[0].figure.up if self.actors else "y"
 
 
@@ -97,7 +137,8 @@ def scene_points(scene: Scene, show: str = "skin") -> Floats:
     (N, 3)
         Scene space; the origin alone if nothing is visible.
     """
-    clouds = [actor_points(actor, show) for actor in scene.actors if actor.visible]
+    clouds = [actor_points(actor, show) for actor in scene.actors if actor.is_drawn]
+    clouds = [cloud for cloud in clouds if len(cloud)]
     points = np.concatenate(clouds) if clouds else np.zeros((1, 3))
     if len(points) < 1.0 / _OUTLIER_SHARE:
         return points
@@ -130,7 +171,7 @@ def actor_points(actor: Actor, show: str = "skin") -> Floats:
         Scene space.
     """
     figure = actor.figure
-    parts = []
+    parts = [] if actor.points is None else [actor.points[actor.points[:, 3] > 0.0, :3]]
     shows_skeleton = show in ("skeleton", "both") or figure.mesh is None
     if figure.skeleton is not None and actor.pose is not None and shows_skeleton:
         shape = shaped(figure, actor.pose.shape_weights).skeleton
@@ -140,4 +181,4 @@ def actor_points(actor: Actor, show: str = "skin") -> Floats:
     if figure.mesh is not None and (show != "skeleton" or figure.skeleton is None):
         is_bound = show == "binding"
         parts.append(figure.mesh.positions if is_bound else deform(figure, actor.pose)[0])
-    return apply_transform(actor.placement, np.concatenate(parts))
+    return apply_transform(actor.placement, np.concatenate(parts or [np.zeros((0, 3))]))

@@ -17,7 +17,14 @@ from viewer.rig.skeleton import Skeleton
 from viewer.rig.skin import Skin
 from viewer.rig.transform import translation_matrix
 
-__all__ = ["rest_joints", "rest_positions", "shaped", "with_rest_mesh"]
+__all__ = [
+    "joint_directions",
+    "moved_rest_translations",
+    "rest_joints",
+    "rest_positions",
+    "shaped",
+    "with_rest_mesh",
+]
 
 _shaped: Memo[Figure, Figure] = Memo(kept=8)
 
@@ -89,15 +96,33 @@ def with_rest_mesh(figure: Figure, positions: Floats) -> Figure:
 
 
 def _moved_skeleton(skeleton: Skeleton, joints: Floats) -> Skeleton:
+    return replace(skeleton, rest_translations=moved_rest_translations(skeleton, joints))
+
+
+def moved_rest_translations(skeleton: Skeleton, joints: Floats) -> Floats:
+    """Return the rest translations that put joints elsewhere, rest rotations and scales as before.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Gives rest rotations and scales.
+    joints : (..., J, 3)
+        Figure units.
+
+    Returns
+    -------
+    (..., J, 3)
+        Each within its parent.
+    """
     linear = world_matrices(skeleton, _undeflected(skeleton))[:, :3, :3]
     parents = skeleton.parents
     has_parent = parents >= 0
     above = parents[has_parent]
     translations = joints.copy()
-    offsets = joints[has_parent] - joints[above]
+    offsets = joints[..., has_parent, :] - joints[..., above, :]
     # Solved, not transposed: rest transforms may scale.
-    translations[has_parent] = np.linalg.solve(linear[above], offsets[..., None])[..., 0]
-    return replace(skeleton, rest_translations=translations)
+    translations[..., has_parent, :] = np.linalg.solve(linear[above], offsets[..., None])[..., 0]
+    return translations
 
 
 def _moved_skin(skin: Skin, shifts: Floats) -> Skin:
@@ -114,6 +139,39 @@ def rest_joints(figure: Figure) -> Floats:
     """Return where the joints are with all DOFs at 0: (J, 3), figure units."""
     assert figure.skeleton is not None  # the caller looked
     return world_matrices(figure.skeleton, _undeflected(figure.skeleton))[:, :3, 3]
+
+
+_directions: Memo[Figure, Floats] = Memo()
+
+
+def joint_directions(figure: Figure) -> Floats:
+    """Return how far each blend shape moves each rest joint: J(beta) = J(0) + sum_s beta_s D_s.
+
+    Parameters
+    ----------
+    figure : Figure
+        With or without blend shapes and joint regressor.
+
+    Returns
+    -------
+    (S, J, 3)
+        Figure units per weight of 1; zeros where joints do not follow the mesh.
+    """
+    assert figure.skeleton is not None  # the caller looked
+    regressor, shapes, mesh = figure.joint_regressor, figure.blend_shapes, figure.mesh
+    directions = np.zeros((figure.n_shapes, figure.skeleton.n_joints, 3))
+    if regressor is None or shapes is None or mesh is None:
+        return directions
+
+    def make() -> Floats:
+        one, still = np.zeros(figure.n_shapes), np.zeros_like(mesh.positions)
+        for row in range(figure.n_shapes):
+            one[:] = 0.0
+            one[row] = 1.0
+            directions[row] = regress_joints(regressor, still + shapes.displacement(one))
+        return directions
+
+    return _directions.get(figure, (), make)
 
 
 def rest_positions(figure: Figure, mesh: Mesh, pose: Pose, correct: bool = True) -> Floats:

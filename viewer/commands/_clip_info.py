@@ -1,0 +1,97 @@
+"""What ``viewer info`` says of motions."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+import numpy as np
+
+from viewer.errors import printable
+from viewer.rig.clip import Clip
+from viewer.rig.points import PointClip
+from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.scene import Motion
+from viewer.rig.timing import Timing
+
+__all__ = ["clip_lines", "describe_clip"]
+
+_SHOWN_GAPS = 6
+
+
+def describe_clip(clip: Motion) -> dict[str, Any]:
+    """Return what there is to say of a motion, as JSON has it."""
+    facts: dict[str, Any] = {"name": clip.name, "range": [clip.start, clip.end]}
+    if isinstance(clip, Clip):
+        return facts | _describe_keys(clip)
+    facts["kind"] = "points" if isinstance(clip, PointClip) else "sampled"
+    return facts | _describe_timing(clip.timing) | _describe_rows(clip)
+
+
+def _describe_keys(clip: Clip) -> dict[str, Any]:
+    times = [time for channel in clip.channels for time in channel.times[[0, -1]].tolist()]
+    modes = Counter(mode for channel in clip.channels for mode in channel.extrapolation)
+    return {
+        "channels": len(clip.channels),
+        "keys": sum(len(channel.times) for channel in clip.channels),
+        "key_times": [min(times), max(times)] if times else [],
+        "extrapolation": dict(sorted(modes.items())),
+    }
+
+
+def _describe_timing(timing: Timing) -> dict[str, Any]:
+    return {
+        "frame_rate": timing.frame_rate,
+        "frames": timing.n_frames,
+        "first_frame": timing.first_frame,
+        "present_frames": int(timing.present.sum()),
+        "gaps": gaps_of(timing),
+    }
+
+
+def _describe_rows(clip: SampledClip | PointClip) -> dict[str, Any]:
+    if isinstance(clip, PointClip):
+        seen = clip.points[..., 3] > 0.0
+        return {"points": clip.points.shape[1], "seen": float(seen.mean()) if seen.size else 0.0}
+    shapes = 0 if clip.shape_weights is None else clip.shape_weights.shape[1]
+    varies = clip.shape_weights is not None and len(clip.shape_weights) > 1
+    return {"joints": clip.n_joints, "shape_weights": shapes, "shape_varies": varies}
+
+
+def gaps_of(timing: Timing) -> list[list[int]]:
+    """Return the first and last number of every run of missing frames."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[True], timing.present, [True]])))
+    pairs = edges.reshape(-1, 2) + np.array([timing.first_frame, timing.first_frame - 1])
+    return [[int(first), int(last)] for first, last in pairs]
+
+
+def clip_lines(clip: dict[str, Any]) -> list[str]:
+    """Return the same as lines of text."""
+    start, end = clip["range"]
+    head = f"  clip       {printable(clip['name'])}: {start:g} to {end:g} s, "
+    if "kind" in clip:
+        return [head + _rows_text(clip), *_gap_lines(clip)]
+    modes = ", ".join(f"{mode} {count}" for mode, count in clip["extrapolation"].items())
+    lines = [f"{head}{clip['channels']} channels, {clip['keys']} keys"]
+    if clip["key_times"]:
+        first, last = clip["key_times"]
+        lines.append(f"    keys from {first:g} to {last:g} s; beyond them {modes}")
+    return lines
+
+
+def _rows_text(clip: dict[str, Any]) -> str:
+    frames = f"{clip['frames']} frames at {clip['frame_rate']:g} a second"
+    if clip["kind"] == "points":
+        return f"{frames}, {clip['points']} points, {100 * clip['seen']:.1f} % of them seen"
+    shape = "a shape of its own in each frame" if clip["shape_varies"] else "one shape"
+    return f"{frames}, {clip['joints']} joints, {shape}"
+
+
+def _gap_lines(clip: dict[str, Any]) -> list[str]:
+    missing = clip["frames"] - clip["present_frames"]
+    if not missing:
+        return []
+    shown = [f"{first} to {last}" for first, last in clip["gaps"][:_SHOWN_GAPS]]
+    more = len(clip["gaps"]) - len(shown)
+    tail = f" and {more} more" if more else ""
+    return [f"    {missing} frames are missing: {', '.join(shown)}{tail}"]

@@ -1,0 +1,93 @@
+"""Quaternions (x, y, z, w): products, vectors to quaternions, and the shorter arc between two."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.rig.arrays import Floats
+
+__all__ = ["multiply", "rotation_vector_to_quaternion", "slerp"]
+
+_PARALLEL = 1e-6  # sine of the angle below which sin(u t) / sin(t) is u to the last digit
+
+
+def rotation_vector_to_quaternion(vectors: Floats) -> Floats:
+    """Return q = (sin(t/2) r / t, cos(t/2)) of rotation vectors r with angle t = |r|.
+
+    Parameters
+    ----------
+    vectors : (..., 3)
+        Axis times angle, radians.
+
+    Returns
+    -------
+    (..., 4)
+        Unit quaternions (x, y, z, w).
+
+    >>> rotation_vector_to_quaternion(np.array([0.0, 0.0, np.pi])).round(12).tolist()
+    [0.0, 0.0, 1.0, 0.0]
+    """
+    vectors = np.asarray(vectors, dtype=np.float64)
+    half = 0.5 * np.sqrt(np.einsum("...a,...a->...", vectors, vectors))[..., None]
+    # sinc has no hole at 0: np.sinc(x) = sin(pi x) / (pi x).
+    return np.concatenate([0.5 * np.sinc(half / np.pi) * vectors, np.cos(half)], axis=-1)
+
+
+def multiply(first: Floats, second: Floats) -> Floats:
+    """Return the Hamilton product: the rotation ``second`` followed by ``first``.
+
+    Parameters
+    ----------
+    first, second : (..., 4)
+        (x, y, z, w).
+
+    Returns
+    -------
+    (..., 4)
+        R(first) R(second) as a quaternion.
+    """
+    a, b = np.broadcast_arrays(np.asarray(first, float), np.asarray(second, float))
+    result = np.empty(a.shape)
+    result[..., :3] = (
+        a[..., 3:] * b[..., :3] + b[..., 3:] * a[..., :3] + np.cross(a[..., :3], b[..., :3])
+    )
+    result[..., 3] = a[..., 3] * b[..., 3] - np.einsum("...a,...a->...", a[..., :3], b[..., :3])
+    return result
+
+
+def slerp(start: Floats, end: Floats, share: Floats | float) -> Floats:
+    """Return rotations between two, at even speed on the shorter arc (Shoemake 1985).
+
+    q(u) = (sin((1 - u) t) q0 + sin(u t) q1) / sin(t), q1 negated where q0 . q1 < 0.
+
+    Parameters
+    ----------
+    start, end : (..., 4)
+        Unit quaternions (x, y, z, w).
+    share : (...)
+        0 gives ``start``, 1 gives ``end`` (or its negative, the same rotation).
+
+    Returns
+    -------
+    (..., 4)
+        Unit quaternions.
+
+    >>> half = np.sqrt(0.5)
+    >>> quarter = slerp(np.array([0, 0, 0, 1.0]), np.array([0, 0, 1.0, 0]), 0.5)
+    >>> bool(np.allclose(quarter, [0, 0, half, half]))
+    True
+    """
+    start, end = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
+    cosine = np.einsum("...a,...a->...", start, end)
+    end = np.where(cosine[..., None] < 0.0, -end, end)
+    # The chord gives small angles exactly, where the cosine has lost them.
+    half_chord = 0.5 * np.linalg.norm(end - start, axis=-1)
+    angle = 2.0 * np.arcsin(np.minimum(half_chord, 1.0))
+    sine = np.sin(angle)
+    share = np.broadcast_to(np.asarray(share, dtype=np.float64), cosine.shape)
+    near = sine < _PARALLEL
+    divisor = np.where(near, 1.0, sine)
+    first = np.where(near, 1.0 - share, np.sin((1.0 - share) * angle) / divisor)
+    second = np.where(near, share, np.sin(share * angle) / divisor)
+    mixed = first[..., None] * start + second[..., None] * end
+    return mixed / np.linalg.norm(mixed, axis=-1, keepdims=True)

@@ -1,0 +1,85 @@
+"""A take: one actor's frames, ready for an exporter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.rig.arrays import Floats
+from viewer.rig.clip import Clip
+from viewer.rig.figure import Figure
+from viewer.rig.motion import DEFAULT_RATE, Frames, frame_rate, frames_of
+from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.scene import Actor
+
+__all__ = ["Take", "take_of"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Take:
+    """A figure in many poses.
+
+    Attributes
+    ----------
+    name : str
+        What the actor is called.
+    figure : Figure
+        Unshaped; ``frames`` holds the shape.
+    frame_rate : float
+        Frames a second.
+    first_frame : int
+        What the first frame is called.
+    frames : Frames
+        Poses, in time order; gaps are in ``frames.present``.
+    motion : Clip or SampledClip
+        What the frames were sampled from.
+    """
+
+    name: str
+    figure: Figure
+    frame_rate: float
+    first_frame: int
+    frames: Frames
+    motion: Clip | SampledClip
+
+
+def take_of(
+    actor: Actor,
+    rate: float | None = None,
+    frames: tuple[int, int] | None = None,
+    fill: bool = False,
+) -> Take:
+    """Sample an actor's clip at a fixed rate.
+
+    Parameters
+    ----------
+    actor : Actor
+        With a clip.
+    rate : float, optional
+        Frames a second; the clip's own if omitted, so that captured frames come back exactly.
+    frames : (int, int), optional
+        First frame and the one behind the last, counted from the clip's start at that rate; all
+        if omitted.
+    fill : bool
+        Bridge gaps: rotations on the shorter arc.
+
+    Raises
+    ------
+    RigError
+        If there is no clip, or no frame in that range.
+    """
+    motion, figure = actor.clip, actor.figure
+    if not isinstance(motion, Clip | SampledClip) or figure.skeleton is None:
+        raise RigError(f"{actor.name} has no motion of joints")
+    own = frame_rate(motion) if isinstance(motion, SampledClip) else DEFAULT_RATE
+    rate = own if rate is None else rate
+    count = int(np.floor((motion.end - motion.start) * rate + 1e-6)) + 1
+    first, stop = (0, count) if frames is None else frames
+    if not 0 <= first < stop:
+        raise RigError(f"frames: expected a range within 0 to {count}, found {first} to {stop}")
+    times: Floats = motion.start + np.arange(first, stop) / rate
+    shift = motion.timing.first_frame if isinstance(motion, SampledClip) and rate == own else 0
+    sampled = frames_of(figure, motion, times, actor.pose, fill)
+    return Take(actor.name, figure, rate, first + shift, sampled, motion)
