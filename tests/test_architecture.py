@@ -18,7 +18,7 @@ ALLOWED = {
     "formats": {"formats", "rig", "errors"},
     "rendering": {"rendering", "rig", "errors", "resources"},
     "export": {"export", "formats", "rig", "errors"},
-    "loading": {"formats", "rig", "errors", "resources"},
+    "loading": {"loading", "formats", "rig", "errors", "resources"},
     "app": {
         "app",
         "export",

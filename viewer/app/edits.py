@@ -1,13 +1,16 @@
-"""Every change of pose or display as an undoable edit; a slider drag is one."""
+"""Every change of pose, clip or display as an undoable edit; a slider drag is one."""
 
 from __future__ import annotations
 
 import copy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from viewer.rendering.options import DisplayOptions
+from viewer.rig.clip import Clip
 from viewer.rig.pose import Pose, pose_key
-from viewer.rig.scene import Scene
+from viewer.rig.scene import Actor, Motion, Scene
 
 __all__ = ["History"]
 
@@ -16,10 +19,23 @@ _MOST = 500  # steps kept
 
 @dataclass(frozen=True, slots=True)
 class _Snapshot:
-    """All that can be undone: the pose of each actor, and what is shown how."""
+    """All that can be undone: each actor's pose, clip and way to be shown; what is shown how."""
 
     poses: tuple[Pose | None, ...]
+    looks: tuple[_Look, ...]
     options: DisplayOptions
+    time: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Look:
+    """What an actor is, beside its pose."""
+
+    clip: Motion | None
+    offset: float
+    visible: bool
+    color: tuple[float, float, float] | None
+    placement: bytes
 
 
 @dataclass(slots=True)
@@ -27,16 +43,23 @@ class History:
     """Notices changes instead of being told of them, so no panel or key can forget to.
 
     ``observe`` compares the state after each frame with the last one it kept. While a widget is
-    held nothing is kept: the whole drag becomes one step.
+    held nothing is kept: the whole drag becomes one step. What the scene's clock does to poses is
+    no change: see ``follow``.
+
+    Attributes
+    ----------
+    time : float
+        Seconds that are shown; undoing goes back to the time of the change.
     """
 
+    time: float = 0.0
     _now: _Snapshot | None = None
     _undo: list[_Snapshot] = field(default_factory=list)
     _redo: list[_Snapshot] = field(default_factory=list)
 
     def start(self, scene: Scene, options: DisplayOptions) -> None:
         """Forget everything; the scene as it is becomes the first state."""
-        self._now = _take(scene, options)
+        self._now = _take(scene, options, self.time)
         self._undo.clear()
         self._redo.clear()
 
@@ -47,8 +70,40 @@ class History:
         self._undo.append(self._now)
         del self._undo[:-_MOST]
         self._redo.clear()
-        self._now = _take(scene, options)
+        self._now = _take(scene, options, self.time)
         return True
+
+    def follow(self, scene: Scene, time: float) -> None:
+        """Take over poses that the clock has set, without a step; edits keep their steps."""
+        self.time = time
+        if self._now is not None:
+            poses = tuple(actor.pose.copy() if actor.pose else None for actor in scene.actors)
+            self._now = replace(self._now, poses=poses, time=time)
+
+    def add_actors(self, scene: Scene, options: DisplayOptions) -> None:
+        """Go on with a scene to which actors were added at its end, as captures are read."""
+        whole = _take(scene, options, self.time)
+
+        def extended(one: _Snapshot) -> _Snapshot:
+            count = len(one.poses)
+            clips = [look.clip for look in whole.looks]
+            looks = (
+                replace(look, clip=clip) if is_grown(look.clip, clip) else look
+                for look, clip in zip(one.looks, clips[:count], strict=True)
+            )
+            return replace(
+                one,
+                poses=(*one.poses, *whole.poses[count:]),
+                looks=(*looks, *whole.looks[count:]),
+            )
+
+        def is_grown(old: Motion | None, new: Motion | None) -> bool:
+            return type(old) is type(new) and not isinstance(old, Clip) and old is not None
+
+        self._undo[:] = map(extended, self._undo)
+        self._redo[:] = map(extended, self._redo)
+        if self._now is not None:
+            self._now = extended(self._now)
 
     @property
     def can_undo(self) -> bool:
@@ -81,17 +136,27 @@ class History:
         destination.append(self._now)
         self._now = source.pop()
         _restore(self._now, scene, options)
+        self.time = self._now.time
         return True
 
 
-def _take(scene: Scene, options: DisplayOptions) -> _Snapshot:
+def _take(scene: Scene, options: DisplayOptions, time: float) -> _Snapshot:
     poses = tuple(actor.pose.copy() if actor.pose else None for actor in scene.actors)
-    return _Snapshot(poses, copy.deepcopy(options))
+    looks = tuple(map(_look, scene.actors))
+    return _Snapshot(poses, looks, copy.deepcopy(options), time)
+
+
+def _look(actor: Actor) -> _Look:
+    placement = actor.placement.tobytes()
+    return _Look(actor.clip, actor.offset, actor.visible, actor.color, placement)
 
 
 def _restore(snapshot: _Snapshot, scene: Scene, options: DisplayOptions) -> None:
-    for actor, pose in zip(scene.actors, snapshot.poses, strict=True):
+    for actor, pose, look in zip(scene.actors, snapshot.poses, snapshot.looks, strict=True):
         actor.pose = pose.copy() if pose else None
+        actor.clip, actor.offset, actor.visible = look.clip, look.offset, look.visible
+        actor.color = look.color
+        actor.placement = np.frombuffer(look.placement).reshape(4, 4).copy()
     kept = copy.deepcopy(snapshot.options)
     for name in DisplayOptions.__slots__:
         setattr(options, name, getattr(kept, name))
@@ -99,6 +164,9 @@ def _restore(snapshot: _Snapshot, scene: Scene, options: DisplayOptions) -> None
 
 def _is_same(snapshot: _Snapshot, scene: Scene, options: DisplayOptions) -> bool:
     if snapshot.options != options:
+        return False
+    # Clips are compared by identity: they are never changed, only replaced.
+    if any(_look(actor) != look for actor, look in zip(scene.actors, snapshot.looks, strict=True)):
         return False
     pairs = zip(snapshot.poses, (actor.pose for actor in scene.actors), strict=True)
     return all(_same_pose(old, new) for old, new in pairs)

@@ -1,0 +1,209 @@
+"""The scene's clock: which time is shown, and how it moves on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from viewer.rig.clip import Clip
+from viewer.rig.motion import DEFAULT_RATE, frame_rate, pose_actor, time_span
+from viewer.rig.scene import Actor, Scene
+
+__all__ = ["FASTEST", "MODES", "Playback"]
+
+MODES = {
+    "loop": "Loop",
+    "once": "Once",
+    "ping-pong": "Ping-pong",
+    "run on": "Run on",
+}
+"""What happens at the end of the range, with the name that menus show."""
+
+FASTEST = 4.0
+"""Largest speed, forwards and backwards."""
+
+
+@dataclass(slots=True)
+class Playback:
+    """Keeps to the wall clock: a slow machine drops frames, never time.
+
+    Attributes
+    ----------
+    time : float
+        Seconds that are shown.
+    playing : bool
+        Whether time moves on.
+    speed : float
+        Seconds of motion a second, -4 to 4.
+    mode : str
+        A key of ``MODES``.
+    start, end : float
+        The range that is played, seconds.
+    whole : (float, float)
+        The range of all clips.
+    frame_rate : float
+        Frames a second by which one steps and counts.
+    first_frame : int
+        What the frame at ``whole[0]`` is called.
+    has_frames : bool
+        Whether some motion consists of frames: each is then shown for its whole duration.
+    fill_gaps : bool
+        Show captures in their gaps too, in between the frames around them.
+    """
+
+    time: float = 0.0
+    playing: bool = False
+    speed: float = 1.0
+    mode: str = "loop"
+    start: float = 0.0
+    end: float = 0.0
+    whole: tuple[float, float] = (0.0, 0.0)
+    frame_rate: float = DEFAULT_RATE
+    first_frame: int = 0
+    has_frames: bool = False
+    fill_gaps: bool = False
+    has_motion: bool = False
+    _over: float = 0.0  # seconds since the last frame of the range became due
+    _turned: bool = False  # on the way back of ping-pong
+    _posed: tuple[float, bool] | None = None
+
+    def show(self, scene: Scene) -> None:
+        """Take over the range of a scene's clips, and go to its start."""
+        self.playing, self.mode, self.speed = False, "loop", 1.0
+        self.follow(scene.actors)
+        self.start, self.end = self.whole
+        self.seek(self.start)
+
+    def follow(self, actors: Sequence[Actor]) -> None:
+        """Keep up with clips that changed or grew; a range that was all of them stays all."""
+        was_whole = (self.start, self.end) == self.whole
+        moving = [actor for actor in actors if actor.clip is not None]
+        sampled = [
+            actor.clip for actor in moving if actor.clip and not isinstance(actor.clip, Clip)
+        ]
+        self.has_motion, self.has_frames = bool(moving), bool(sampled)
+        self.whole = time_span(moving)
+        longest = max(sampled, key=lambda clip: clip.end - clip.start, default=None)
+        self.frame_rate = frame_rate(longest)
+        self.first_frame = longest.timing.first_frame if longest is not None else 0
+        if was_whole:
+            self.start, self.end = self.whole
+        else:
+            self.set_range(self.start, self.end)
+
+    @property
+    def n_frames(self) -> int:
+        """Number of frames of the whole range."""
+        low, high = self.whole
+        return math.floor((high - low) * self.frame_rate + 1e-6) + 1
+
+    @property
+    def frame(self) -> int:
+        """The frame that is shown, counted from 0 at the start of the whole range."""
+        return math.floor((self.time - self.whole[0]) * self.frame_rate + 1e-6)
+
+    def frame_time(self, frame: int) -> float:
+        """Return the seconds of a frame."""
+        return self.whole[0] + frame / self.frame_rate
+
+    def seek(self, time: float) -> None:
+        """Go to a time; within the range unless playing runs on."""
+        is_free = self.mode == "run on"
+        self.time = time if is_free else min(max(time, self.whole[0]), self.whole[1])
+        self._over, self._turned = 0.0, False
+
+    def step(self, frames: int) -> None:
+        """Stop, and go to another frame: a whole one, however time stood before."""
+        self.playing = False
+        place = (self.time - self.whole[0]) * self.frame_rate
+        nearest = round(place)
+        if abs(place - nearest) < 1e-6:
+            target = nearest + frames
+        else:
+            target = (math.floor(place) if frames < 0 else math.ceil(place)) + frames
+            target += 1 if frames < 0 else -1
+        self.seek(self.frame_time(target))
+
+    def toggle(self) -> None:
+        """Play or pause; at the end of a range that is played once, from its start."""
+        self.playing = not self.playing
+        if self.playing and self.mode == "once":
+            if self.speed >= 0.0 and self.time >= self.end - 1e-9:
+                self.seek(self.start)
+            elif self.speed < 0.0 and self.time <= self.start + 1e-9:
+                self.seek(self.end)
+
+    def set_range(self, start: float, end: float) -> None:
+        """Play only a part; start and end are put in order and into the whole range."""
+        low, high = self.whole
+        start, end = sorted((min(max(start, low), high), min(max(end, low), high)))
+        self.start, self.end = start, end
+
+    def advance(self, seconds: float) -> None:
+        """Move on by so much wall clock time, if playing.
+
+        Parameters
+        ----------
+        seconds : float
+            Since the last call.
+        """
+        if not self.playing or not self.has_motion:
+            return
+        step = seconds * self.speed
+        if self.mode == "run on":
+            self.time += step
+        elif self.mode == "ping-pong":
+            self._bounce(step)
+        else:
+            self._run(step)
+
+    def _run(self, step: float) -> None:
+        """Move within the range; at its end start over, or stop."""
+        # The last frame is due for as long as every other one.
+        hold = 1.0 / self.frame_rate if self.has_frames and self.end > self.start else 0.0
+        period = self.end - self.start + hold
+        if period <= 0.0:
+            self.time, self.playing = self.start, self.playing and self.mode != "once"
+            return
+        place = self.time - self.start + self._over + step
+        if not 0.0 <= place < period:
+            if self.mode == "once":
+                self.playing, self._over = False, 0.0
+                self.time = self.end if place > 0.0 else self.start
+                return
+            place %= period
+        self.time = min(self.start + place, self.end)
+        self._over = max(self.start + place - self.end, 0.0)
+
+    def _bounce(self, step: float) -> None:
+        length = self.end - self.start
+        if length <= 0.0:
+            self.time = self.start
+            return
+        place = min(max(self.time - self.start, 0.0), length)
+        place = ((2.0 * length - place if self._turned else place) + step) % (2.0 * length)
+        self._turned = place > length
+        self.time = self.start + (2.0 * length - place if self._turned else place)
+
+    def pose(self, scene: Scene, again: bool = False) -> bool:
+        """Pose all actors as they are at the time shown, if it changed; return whether it did.
+
+        Parameters
+        ----------
+        scene : Scene
+            Its actors' poses are changed in place.
+        again : bool
+            Also if time did not change: clips did.
+        """
+        key = self.time, self.fill_gaps
+        if key == self._posed and not again:
+            return False
+        self._posed = key
+        for actor in scene.actors:
+            pose_actor(actor, self.time, self.fill_gaps)
+        return True
+
+    def accept(self) -> None:
+        """Take the present poses for those of the time shown: they were edited, or undone."""
+        self._posed = self.time, self.fill_gaps

@@ -1,0 +1,88 @@
+"""Poses and pictures, applied to an actor."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from viewer.errors import RigError, printable
+from viewer.loading.contents import Contents
+from viewer.rig.arrays import Bytes
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import Material
+from viewer.rig.pose import Pose
+from viewer.rig.pose_record import PoseRecord, apply_record
+from viewer.rig.scene import Actor
+
+__all__ = ["add_to_actor", "apply_pose", "with_texture"]
+
+
+def add_to_actor(contents: Contents, actor: Actor) -> tuple[Actor, list[str]]:
+    """Apply poses and pictures to an actor that is open already.
+
+    Parameters
+    ----------
+    contents : Contents
+        Figures and clips in it are left alone.
+    actor : Actor
+        Its pose is changed; it stays itself unless it gets another texture.
+
+    Returns
+    -------
+    actor : Actor
+        A new one, with the same pose, if it has another texture.
+    notes : list of str
+        What could not be taken over exactly.
+
+    Raises
+    ------
+    RigError
+        If a pose or picture does not fit; the actor is then as it was.
+    """
+    notes: list[str] = []
+    trial = replace(actor, pose=None if actor.pose is None else actor.pose.copy())
+    for path, pixels in contents.pictures:
+        trial.figure = with_texture(trial.figure, path, pixels)
+    for path, record in contents.poses:
+        if trial.pose is None:
+            raise RigError(f"{printable(path, 300)} is a pose, {actor.figure.name} has no skeleton")
+        notes += apply_pose(path, record, trial)
+    # Nothing fails from here on.
+    if actor.pose is not None and trial.pose is not None:
+        for name in Pose.__slots__:
+            setattr(actor.pose, name, getattr(trial.pose, name))
+    is_same = trial.figure is actor.figure
+    return actor if is_same else replace(actor, figure=trial.figure), notes
+
+
+def with_texture(figure: Figure, path: Path, pixels: Bytes) -> Figure:
+    """Return a figure covered with one picture.
+
+    Raises
+    ------
+    RigError
+        If it has no texture coordinates.
+    """
+    mesh = figure.mesh
+    if mesh is None or mesh.uvs is None:
+        raise RigError(
+            f"{printable(path, 300)} is a picture, {figure.name} has no texture coordinates"
+        )
+    covered = replace(
+        mesh,
+        materials=(Material(name=path.stem, texture=path.name, image=pixels),),
+        triangle_materials=np.zeros(mesh.n_triangles, dtype=np.int32),
+    )
+    return replace(figure, mesh=covered)
+
+
+def apply_pose(path: Path, record: PoseRecord, actor: Actor) -> list[str]:
+    """Pose an actor by a record that came from a file; return what could not be taken over."""
+    assert actor.pose is not None  # the callers looked
+    shown = printable(path, 300)
+    try:
+        return [f"{shown}: {note}" for note in apply_record(record, actor.figure, actor.pose)]
+    except RigError as problem:
+        raise RigError(f"{shown}: {problem}") from None

@@ -1,0 +1,198 @@
+"""Put files together: skeletons with skins, then clips, poses and pictures to the actors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from viewer.errors import FormatError, RigError, printable
+from viewer.loading.additions import apply_pose, with_texture
+from viewer.loading.capturing import Builder
+from viewer.loading.contents import Contents
+from viewer.loading.driving import Cast, drive
+from viewer.loading.settings import MotionSettings
+from viewer.rig.arrays import Bytes
+from viewer.rig.figure import Figure
+from viewer.rig.motion import pose_actor, time_span
+from viewer.rig.pose_record import PoseRecord
+from viewer.rig.scene import Actor, Scene, scene_box
+from viewer.rig.transform import rotation_transform, translation_matrix
+
+__all__ = ["assemble", "begin"]
+
+_GAP = 0.25  # between actors side by side, in widths of the wider one
+
+
+def assemble(contents: Contents, settings: MotionSettings | None = None) -> Scene:
+    """Make actors of figures and motions, and read captures to their end; see ``load``."""
+    scene, builders = begin(contents, settings)
+    notes: list[str] = []
+    for builder in builders:
+        while not builder.is_done:
+            new, more = builder.read_some()
+            scene.actors += new
+            notes += more
+    if notes:
+        scene.warnings = (*scene.warnings, *notes)
+    return scene
+
+
+def begin(
+    contents: Contents, settings: MotionSettings | None = None
+) -> tuple[Scene, list[Builder]]:
+    """Make a scene that can be shown, and what is left to read of its captures.
+
+    Parameters
+    ----------
+    contents : Contents
+        What the files hold.
+    settings : MotionSettings, optional
+        How motions are taken.
+
+    Returns
+    -------
+    scene : Scene
+        Posed as at the start of its motions.
+    builders : list of Builder
+        Captures whose first frames are in the scene; people who come later are not.
+
+    Raises
+    ------
+    FormatError, RigError
+        As ``load``.
+    """
+    figures = contents.figures
+    pairs = _pairs([figure for _, figure in figures])
+    cast = Cast([])
+    for pair in pairs:
+        actor = Actor(_join([figures[index] for index in pair]))
+        cast.add(actor, actor.figure.up, placed=False)
+    drive(contents, cast, settings or MotionSettings())
+    start = time_span(cast.actors)[0]
+    for actor in cast.actors:
+        pose_actor(actor, start)
+    for path, record in contents.poses:
+        cast.notes += _assign_pose(path, record, cast.actors)
+    for path, pixels in contents.pictures:
+        _assign_picture(path, pixels, cast.actors)
+    world_up = next((up for up, placed in zip(cast.ups, cast.placed, strict=True) if placed), None)
+    world_up = world_up or next(iter(cast.ups), "y")
+    _stand_up(cast, world_up)
+    _place_side_by_side(cast)
+    warnings = (*contents.warnings, *cast.notes)
+    views = tuple(view for _, capture in contents.captures for view in capture.views)
+    scene = Scene(cast.actors, warnings, "z" if world_up == "z" else "y", views)
+    return scene, cast.builders
+
+
+def _pairs(figures: Sequence[Figure]) -> list[tuple[int, ...]]:
+    """Match skeletons with skins: by joints and name, then by joints, then whatever is left."""
+    complete = [(index,) for index, figure in enumerate(figures) if _is_complete(figure)]
+    parts = [(index, figure) for index, figure in enumerate(figures) if not _is_complete(figure)]
+    skeletons = [index for index, figure in parts if figure.skeleton is not None]
+    skins = [index for index, figure in parts if figure.skeleton is None]
+    pairs: list[tuple[int, ...]] = [*complete]
+    for fits in (_fits_by_name, _fits, lambda skeleton, skin: True):
+        for index in [*skeletons]:
+            partner = next((skin for skin in skins if fits(figures[index], figures[skin])), None)
+            if partner is not None:
+                skeletons.remove(index)
+                skins.remove(partner)
+                pairs.append((index, partner))
+    pairs += [(index,) for index in skeletons + skins]
+    return sorted(pairs, key=min)
+
+
+def _is_complete(figure: Figure) -> bool:
+    return figure.skeleton is not None and figure.mesh is not None
+
+
+def _fits(skeleton: Figure, skin: Figure) -> bool:
+    bound, joints = skin.skin, skeleton.skeleton
+    return bound is not None and joints is not None and bound.n_joints == joints.n_joints
+
+
+def _fits_by_name(skeleton: Figure, skin: Figure) -> bool:
+    return skeleton.name == skin.name and _fits(skeleton, skin)
+
+
+def _assign_pose(path: Path, record: PoseRecord, actors: list[Actor]) -> list[str]:
+    """Pose the first actor that a record fits."""
+    problem: RigError | None = None
+    for actor in actors:
+        if actor.pose is not None:
+            try:
+                return apply_pose(path, record, actor)
+            except RigError as found:
+                problem = problem or found
+    raise problem or RigError(f"{printable(path, 300)} is a pose: open it together with a figure")
+
+
+def _assign_picture(path: Path, pixels: Bytes, actors: list[Actor]) -> None:
+    """Cover the first actor that can show a texture and has none."""
+    open_for_it = [
+        actor
+        for actor in actors
+        if actor.figure.mesh is not None and actor.figure.mesh.uvs is not None
+    ]
+    bare = [a for a in open_for_it if a.figure.mesh is not None and not a.figure.mesh.materials]
+    chosen = next(iter(bare or open_for_it), None)
+    if chosen is None:
+        names = ", ".join(actor.figure.name for actor in actors)
+        missing = f"{names} has no texture coordinates" if names else "open it with a figure"
+        raise RigError(f"{printable(path, 300)} is a picture: {missing}")
+    chosen.figure = with_texture(chosen.figure, path, pixels)
+
+
+def _join(parts: list[tuple[Path, Figure]]) -> Figure:
+    """Attach a skin to its skeleton, or return the figure that stands alone."""
+    if len(parts) == 1:
+        return parts[0][1]
+    paths, figures = [path for path, _ in parts], [figure for _, figure in parts]
+    skeleton, skin = figures[0].skeleton, figures[1].skin
+    skel_path, skin_path = (printable(path, 300) for path in paths)
+    assert skeleton is not None  # the pairs put it first
+    if skin is None:
+        raise FormatError(
+            paths[1],
+            f"expected weights and bindings to follow the {skeleton.n_joints} joints of "
+            f"{skel_path}, found none",
+        )
+    if skin.n_joints != skeleton.n_joints:
+        raise RigError(
+            f"{skin_path} has {skin.n_joints} binding matrices, "
+            f"{skel_path} has {skeleton.n_joints} joints"
+        )
+    return Figure(paths[1].stem, figures[1].mesh, skeleton, skin)
+
+
+def _stand_up(cast: Cast, world_up: str) -> None:
+    """Turn actors whose files have another up axis than the scene."""
+    for actor, up in zip(cast.actors, cast.ups, strict=True):
+        if up != world_up:
+            quarter = np.pi / 2 if world_up == "z" else -np.pi / 2
+            actor.placement = rotation_transform(0, quarter) @ actor.placement
+
+
+def _place_side_by_side(cast: Cast) -> None:
+    """Move actors whose files do not place them to the right of those before them."""
+    loose = [a for a, placed in zip(cast.actors, cast.placed, strict=True) if not placed]
+    placed = [a for a, placed in zip(cast.actors, cast.placed, strict=True) if placed]
+    if len(cast.actors) < 2 or not loose:
+        return
+    # A stray vertex far outside must not send the next actor there.
+    spans = [scene_box(Scene([actor]))[:, 0] for actor in loose]
+    if placed:
+        before = scene_box(Scene(placed))[:, 0]
+    else:
+        before, loose, spans = spans[0], loose[1:], spans[1:]
+    edge = before[1]
+    for actor, span in zip(loose, spans, strict=True):
+        low, high = span
+        gap = _GAP * max(high - low, before[1] - before[0])
+        shift = translation_matrix(np.array([edge + gap - low, 0.0, 0.0]))
+        actor.placement = shift @ actor.placement
+        edge += gap + high - low
+        before = span

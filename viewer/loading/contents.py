@@ -1,0 +1,127 @@
+"""What files hold, by kind, before anything is put together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from viewer.errors import FormatError
+from viewer.formats import MAX_SIZE, Source, claims, detect, is_picture, read, read_picture
+from viewer.loading.settings import MotionSettings
+from viewer.rig.arrays import Bytes
+from viewer.rig.body_motion import BodyMotion
+from viewer.rig.capture import Capture
+from viewer.rig.clip import Clip
+from viewer.rig.figure import Figure
+from viewer.rig.motion import DEFAULT_RATE
+from viewer.rig.pose_record import PoseRecord
+from viewer.rig.skeleton_motion import SkeletonMotion
+
+__all__ = ["Contents", "read_files"]
+
+Content = Figure | Clip | PoseRecord | BodyMotion | SkeletonMotion | Capture
+
+_PEEK = 16  # bytes that tell a picture
+
+
+@dataclass(slots=True)
+class Contents:
+    """What several files hold, by kind, with the path of each."""
+
+    figures: list[tuple[Path, Figure]] = field(default_factory=list)
+    clips: list[tuple[Path, Clip]] = field(default_factory=list)
+    poses: list[tuple[Path, PoseRecord]] = field(default_factory=list)
+    pictures: list[tuple[Path, Bytes]] = field(default_factory=list)
+    body_motions: list[tuple[Path, BodyMotion]] = field(default_factory=list)
+    skeleton_motions: list[tuple[Path, SkeletonMotion]] = field(default_factory=list)
+    captures: list[tuple[Path, Capture]] = field(default_factory=list)
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def has_motion(self) -> bool:
+        """Whether anything moves."""
+        return bool(self.clips or self.body_motions or self.skeleton_motions or self.captures)
+
+    @property
+    def is_addition(self) -> bool:
+        """Whether there are only poses and pictures, for a figure that is open already."""
+        return not self.figures and not self.has_motion and bool(self.poses or self.pictures)
+
+
+def read_files(
+    paths: Sequence[str | Path], max_size: int = MAX_SIZE, settings: MotionSettings | None = None
+) -> Contents:
+    """Read files without putting them together; see ``viewer.loading.load``."""
+    contents = Contents()
+    sources = [Source.open(path, max_size) for path in paths]
+    for source in sources:
+        if _is_picture(source):
+            contents.pictures.append((source.path, read_picture(source)))
+        else:
+            _sort(source, contents, settings or MotionSettings())
+    contents.warnings = tuple(text for source in sources for text in source.warnings)
+    return contents
+
+
+def _sort(source: Source, contents: Contents, settings: MotionSettings) -> None:
+    """Read a file and put what it holds where its kind belongs."""
+    content, path = _read(source, settings), source.path
+    if isinstance(content, Clip):
+        contents.clips.append((path, content))
+    elif isinstance(content, PoseRecord):
+        contents.poses.append((path, content))
+    elif isinstance(content, BodyMotion):
+        contents.body_motions.append((path, content))
+    elif isinstance(content, SkeletonMotion):
+        contents.skeleton_motions.append((path, content))
+    elif isinstance(content, Capture):
+        contents.captures.append((path, content))
+    else:
+        figure = _with_own_picture(source, content) if source.is_folder else content
+        contents.figures.append((path, figure))
+
+
+def _read(source: Source, settings: MotionSettings) -> Content:
+    """Read a file; what was asked for counts more than what a capture says of itself."""
+    kind = detect(source)
+    if kind == "easymocap":
+        from viewer.formats.easymocap import open_capture
+
+        return open_capture(
+            source,
+            frame_rate=settings.frame_rate or DEFAULT_RATE,
+            flat_hands=settings.flat_hands,
+            up=settings.up,
+            legacy_expression=settings.legacy_expression,
+        )
+    return read(source)
+
+
+def _is_picture(source: Source) -> bool:
+    if source.is_folder or claims(source.path.suffix):
+        return False
+    return is_picture(source.peek(_PEEK))
+
+
+def _with_own_picture(source: Source, figure: Figure) -> Figure:
+    """Cover a figure from a folder with the picture in it, if there is exactly one."""
+    mesh = figure.mesh
+    if mesh is None or mesh.uvs is None or mesh.materials:
+        return figure
+    from viewer.loading.additions import with_texture
+
+    pictures = []
+    for path in sorted(source.path.iterdir()):
+        inside = source.inside(path.name)
+        if path.is_file() and _is_picture(inside):
+            pictures.append(inside)
+    if len(pictures) > 1:
+        source.warn(f"{len(pictures)} pictures in the folder: name the texture to show it")
+    if len(pictures) != 1:
+        return figure
+    try:
+        return with_texture(figure, pictures[0].path, read_picture(pictures[0]))
+    except FormatError as problem:
+        source.warn(f"texture {problem}; drawn untextured")
+        return figure

@@ -1,0 +1,40 @@
+"""What may be asked for when motions are opened."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+__all__ = ["MotionSettings"]
+
+
+@dataclass(frozen=True, slots=True)
+class MotionSettings:
+    """How motions are read and what they move; the defaults are what their files say.
+
+    Attributes
+    ----------
+    model : Path or None
+        The figure that captured bodies are drawn with; None for one among the files, or the
+        bundled body.
+    frame_rate : float or None
+        Frames a second; None for the file's own, or 30 where it does not say.
+    up : "y", "z", "-y", "-z" or ""
+        The axis that points up in captures and BVH; empty to judge by the bodies.
+    unit : "m", "cm", "mm" or ""
+        Of BVH lengths; empty to judge by the skeleton's height.
+    flat_hands : bool or None
+        Whether hand components leave the mean hand out; None for the model's custom.
+    legacy_expression : bool
+        Whether expressions drive SMPL-X columns 10 to 19, as EasyMocap has it.
+    drives : bool
+        Whether a BVH drives a figure that is opened with it, instead of standing beside it.
+    """
+
+    model: Path | None = None
+    frame_rate: float | None = None
+    up: str = ""
+    unit: str = ""
+    flat_hands: bool | None = None
+    legacy_expression: bool = False
+    drives: bool = True
