@@ -138,7 +138,7 @@ def test_warnings_of_a_file_are_shown(hand, tmp_path):
 def test_slow_reading_can_be_cancelled(hand, rig, monkeypatch):
     gate = threading.Event()
 
-    def slow(paths):
+    def slow(paths, **_):
         gate.wait(10)
         return read_files(paths)
 
@@ -162,7 +162,7 @@ def test_slow_reading_can_be_cancelled(hand, rig, monkeypatch):
 def test_escape_cancels_reading(hand, rig, monkeypatch):
     gate = threading.Event()
     monkeypatch.setattr(
-        viewer.app.loader, "read_files", lambda paths: (gate.wait(10), read_files(paths))[1]
+        viewer.app.loader, "read_files", lambda paths, **_: (gate.wait(10), read_files(paths))[1]
     )
     hand.app.frame.open(list(rig))
     loader = hand.state.loader

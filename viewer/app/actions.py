@@ -3,19 +3,29 @@
 from __future__ import annotations
 
 from viewer.app.state import AppState
+from viewer.errors import printable
 from viewer.rendering.camera import VIEWS, fit
 from viewer.rendering.options import SHOWN, Lights
+from viewer.rig.follow import followed_point
 from viewer.rig.pose import rest_pose
 from viewer.rig.scene import scene_points
 
 __all__ = [
     "cancel",
     "fit_view",
+    "follow_actor",
+    "go_to_end",
     "look",
+    "play",
+    "range_in",
+    "range_out",
     "redo",
     "reset_lights",
     "reset_pose",
     "show",
+    "start_following",
+    "step",
+    "stop_following",
     "toggle_binding",
     "toggle_option",
     "toggle_projection",
@@ -91,6 +101,69 @@ def redo(state: AppState) -> None:
         state.say_status("Nothing to redo")
 
 
+def play(state: AppState) -> None:
+    """Play or pause."""
+    if state.playback.has_motion:
+        state.playback.toggle()
+        state.say_status("Playing" if state.playback.playing else "Paused")
+
+
+def step(state: AppState, frames: int) -> None:
+    """Go some frames on, or back."""
+    if state.playback.has_motion:
+        state.playback.step(frames)
+
+
+def go_to_end(state: AppState, last: bool) -> None:
+    """Go to the first or last frame of the range that is played."""
+    playback = state.playback
+    if playback.has_motion:
+        playback.seek(playback.end if last else playback.start)
+
+
+def range_in(state: AppState) -> None:
+    """Let the range that is played start at the present time."""
+    playback = state.playback
+    if playback.has_motion:
+        playback.set_range(playback.time, max(playback.end, playback.time))
+        state.say_status(f"The range starts at {playback.start:.3f} s")
+
+
+def range_out(state: AppState) -> None:
+    """Let the range that is played end at the present time."""
+    playback = state.playback
+    if playback.has_motion:
+        playback.set_range(min(playback.start, playback.time), playback.time)
+        state.say_status(f"The range ends at {playback.end:.3f} s")
+
+
+def follow_actor(state: AppState) -> None:
+    """Keep the camera's target on the followed actor or joint, as far from it as before."""
+    if state.followed is None:
+        return
+    index, joint = state.followed
+    place = None
+    if index < len(state.scene.actors):
+        place = followed_point(state.scene.actors[index], joint)
+    if place is not None:
+        if state.followed_from is not None:
+            state.camera.target = state.camera.target + place - state.followed_from
+        state.followed_from = place
+
+
+def start_following(state: AppState, actor: int, joint: int) -> None:
+    """Let the camera follow an actor's joint, or its middle (-1), from where it is now."""
+    state.followed = actor, joint
+    state.followed_from = followed_point(state.scene.actors[actor], joint)
+    name = state.scene.actors[actor].name
+    state.say_status(f"The camera follows {printable(name, 60)}")
+
+
+def stop_following(state: AppState) -> None:
+    """Leave the camera where it is."""
+    state.followed = state.followed_from = None
+
+
 def cancel(state: AppState) -> None:
     """Close what lies on top: message, dialog, key list; else drop the selection."""
     if state.error:
@@ -100,6 +173,10 @@ def cancel(state: AppState) -> None:
     elif state.loader is not None:
         state.loader = None
         state.say_status("Opening was cancelled")
+    elif state.stream is not None:
+        state.stream.cancel()
+        state.stream = None
+        state.say_status("Reading was cancelled; what was read stays")
     elif state.keys_visible:
         state.keys_visible = False
     else:

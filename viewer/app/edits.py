@@ -50,9 +50,12 @@ class History:
     ----------
     time : float
         Seconds that are shown; undoing goes back to the time of the change.
+    has_restored : bool
+        Whether poses were brought back that the clock has not been told of.
     """
 
     time: float = 0.0
+    has_restored: bool = False
     _now: _Snapshot | None = None
     _undo: list[_Snapshot] = field(default_factory=list)
     _redo: list[_Snapshot] = field(default_factory=list)
@@ -136,7 +139,7 @@ class History:
         destination.append(self._now)
         self._now = source.pop()
         _restore(self._now, scene, options)
-        self.time = self._now.time
+        self.time, self.has_restored = self._now.time, True
         return True
 
 

@@ -11,6 +11,7 @@ import moderngl
 import numpy as np
 from imgui_bundle import imgui
 
+from viewer.app.actions import follow_actor
 from viewer.app.file_dialog import PICTURES, FileDialog, draw_file_dialog, folder_of
 from viewer.app.interface import draw_hints, draw_interface
 from viewer.app.keys import handle_keys
@@ -18,9 +19,10 @@ from viewer.app.loader import Loader
 from viewer.app.mouse import handle_mouse
 from viewer.app.recent import remember
 from viewer.app.state import AppState
+from viewer.app.stream import Stream
 from viewer.errors import RenderError, ViewerError, printable
 from viewer.formats import FORMATS, free_path, save_image
-from viewer.loading import Contents, add_to_actor, bundled_body, bundled_files
+from viewer.loading import Builder, Contents, add_to_actor, bundled_body, bundled_files
 from viewer.rendering.renderer import Renderer
 from viewer.rendering.target import Target
 from viewer.rig.arrays import Bytes
@@ -61,6 +63,8 @@ class Frame:
         self.renderer = Renderer(context)
         self.target: Target | None = None
         self._drawn: object = None
+        self._clips: tuple[object, ...] = ()
+        self._is_first = True
         state.stats.renderer = context.info["GL_RENDERER"]
         state.stats.version = context.info["GL_VERSION"]
 
@@ -78,6 +82,7 @@ class Frame:
         """
         started = time.perf_counter()
         state = self.state
+        self._play()
         self._check_shapes()
         self.open(draw_interface(state))
         draw_file_dialog(state)
@@ -88,6 +93,8 @@ class Frame:
         state.limit_camera()
         self._do_wanted()
         self._take_loaded()
+        self._take_streamed()
+        self._pose()
         state.history.observe(state.scene, state.options, imgui.is_any_item_active())
         self._draw_scene(scale)
         imgui.render()
@@ -96,6 +103,52 @@ class Frame:
         framebuffer.clear(0.10, 0.11, 0.12, 1.0)
         imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
         state.stats.frame_ms = 1e3 * (time.perf_counter() - started)
+
+    def _play(self) -> None:
+        """Let the clock run on, by the time since the last frame was begun."""
+        self.state.playback.advance(imgui.get_io().delta_time)
+
+    def _pose(self) -> None:
+        """Pose the actors for the time that is shown, if it or their clips changed."""
+        state = self.state
+        clips = tuple((actor.clip, actor.offset) for actor in state.scene.actors)
+        changed = clips != self._clips
+        if changed:
+            self._clips = clips
+            state.playback.follow(state.scene.actors)
+        if state.history.has_restored:
+            # Undoing has brought back poses with their time: they stay as they were.
+            state.playback.seek(state.history.time)
+            state.playback.accept()
+            state.history.has_restored = False
+        elif state.playback.pose(state.scene, again=changed and not self._is_first):
+            state.history.follow(state.scene, state.playback.time)
+            follow_actor(state)
+        self._is_first = False
+
+    def _take_streamed(self) -> None:
+        """Add what was read of captures since the last frame."""
+        state, stream = self.state, self.state.stream
+        if stream is None:
+            return
+        try:
+            new, notes, grew = stream.take()
+        except ViewerError as problem:
+            state.error, state.stream = str(problem), None
+            stream.cancel()
+            return
+        if grew:
+            state.scene.actors += new
+            self._clips = tuple((actor.clip, actor.offset) for actor in state.scene.actors)
+            state.playback.follow(state.scene.actors)
+            state.playback.pose(state.scene, again=True)
+            state.history.add_actors(state.scene, state.options)
+            state.history.follow(state.scene, state.playback.time)
+        state.say(*notes)
+        if stream.is_done:
+            state.stream = None
+            if stream.error:
+                state.error = stream.error
 
     def _check_shapes(self) -> None:
         """Take back a shape whose directions turn out to be unreadable, before panels use it."""
@@ -153,7 +206,9 @@ class Frame:
         poses = tuple(
             (
                 id(actor),
-                actor.visible,
+                actor.is_drawn,
+                actor.color,
+                b"" if actor.points is None else actor.points.tobytes(),
                 actor.placement.tobytes(),
                 *(pose_key(actor.pose) if actor.pose else ()),
             )
@@ -203,20 +258,31 @@ class Frame:
         elif loader.scene is None:
             state.error = loader.error
         else:
-            self._show(loader.scene, loader.paths)
+            self._show(loader.scene, loader.paths, loader.builders)
 
-    def _show(self, scene: Scene, paths: tuple[Path, ...]) -> None:
+    def _show(
+        self, scene: Scene, paths: tuple[Path, ...], builders: Sequence[Builder] = ()
+    ) -> None:
         state = self.state
         try:
             self.renderer.prepare(scene)
         except RenderError as problem:
             state.error = str(problem)
             return
+        if state.stream is not None:
+            state.stream.cancel()
         state.show_scene(scene, paths)
+        self._is_first = True
+        self.stream(builders)
         if self.keeps_recent:
             problem_text = remember(state.recent, paths)
             if problem_text:
                 state.say(problem_text)
+
+    def stream(self, builders: Sequence[Builder]) -> None:
+        """Read on what is left of captures."""
+        left = [builder for builder in builders if not builder.is_done]
+        self.state.stream = Stream(left, self.wake) if left else None
 
     def _add(self, contents: Contents) -> None:
         """Apply poses and pictures to the chosen actor."""

@@ -22,6 +22,8 @@ __all__ = ["draw_hints", "draw_interface"]
 _DOCK = "viewer dock"
 _LEFT, _RIGHT = (0.235, 0.30, 14.0), (0.27, 0.36, 17.0)
 """Usual and largest share of the window's width, and the letters' heights wanted across."""
+_BOTTOM, _LOWEST = 0.2, 10.0
+"""Share of the window's height for what lies at the bottom, and the letters' heights it wants."""
 _SHOW_PROGRESS_AFTER = 0.3  # seconds
 _ERROR_TITLE = "This did not work"
 
@@ -69,7 +71,10 @@ def _build_layout(dock: int) -> None:
     builder.dock_builder_add_node(dock, imgui.internal.DockNodeFlagsPrivate_.dock_space)
     builder.dock_builder_set_node_size(dock, imgui.get_main_viewport().size)
     left_share, right_share = _share(_LEFT), _share(_RIGHT)
-    split = builder.dock_builder_split_node(dock, imgui.Dir.left, left_share)
+    height = imgui.get_main_viewport().size.y
+    share = min(max(_BOTTOM, _LOWEST * imgui.get_font_size() / max(height, 1.0)), 0.4)
+    whole = builder.dock_builder_split_node(dock, imgui.Dir.down, share)
+    split = builder.dock_builder_split_node(whole.id_at_opposite_dir, imgui.Dir.left, left_share)
     left, rest = split.id_at_dir, split.id_at_opposite_dir
     share = right_share / (1.0 - left_share)
     right = builder.dock_builder_split_node(rest, imgui.Dir.right, share).id_at_dir
@@ -77,6 +82,7 @@ def _build_layout(dock: int) -> None:
     bottom = builder.dock_builder_split_node(middle.id_at_dir, imgui.Dir.down, 0.48)
     places = {
         "left": left,
+        "bottom": whole.id_at_dir,
         "right 1": middle.id_at_opposite_dir,
         "right 2": bottom.id_at_opposite_dir,
         "right 3": bottom.id_at_dir,
@@ -94,6 +100,9 @@ def _share(side: tuple[float, float, float]) -> float:
 
 
 def _is_needed(state: AppState, panel: Panel) -> bool:
+    if panel.needs in ("motion", "actors"):
+        several = panel.needs == "actors" and len(state.scene.actors) > 1
+        return state.playback.has_motion or several
     return not panel.needs or getattr(state.actor.figure, panel.needs) not in (None, ())
 
 
@@ -212,18 +221,32 @@ def _draw_keys(state: AppState) -> None:
 
 
 def _draw_progress(state: AppState) -> None:
-    loader = state.loader
-    if loader is None or loader.seconds < _SHOW_PROGRESS_AFTER:
-        return
+    loader, stream = state.loader, state.stream
     x, y, width, height = state.view_rect
-    imgui.set_next_window_pos((x + width / 2, y + height / 2), imgui.Cond_.always, (0.5, 0.5))
+    if loader is not None and loader.seconds >= _SHOW_PROGRESS_AFTER:
+        # Negative fractions make ImGui draw a bar of unknown length that moves.
+        share, text = -loader.seconds, f"{loader.seconds:.0f} s"
+        title, place = (
+            f"Opening {printable(loader.paths[-1].name, 60)}",
+            (x + width / 2, y + height / 2),
+        )
+        label, pivot = "Cancel opening", (0.5, 0.5)
+    elif stream is not None:
+        read, total = stream.progress
+        share, text = read / max(total, 1), f"{read:,} of {total:,} frames"
+        names = ", ".join(builder.capture.name for builder in stream.builders)
+        title, label = f"Reading {printable(names, 60)}", "Cancel reading"
+        place, pivot = (x + width - 10, y + height - 10), (1.0, 1.0)
+    else:
+        return
+    imgui.set_next_window_pos(place, imgui.Cond_.always, pivot)
     flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.always_auto_resize
     flags |= imgui.WindowFlags_.no_docking | imgui.WindowFlags_.no_saved_settings
+    flags |= imgui.WindowFlags_.no_focus_on_appearing
     if imgui.begin("##progress", None, flags)[0]:
-        imgui.text_unformatted(f"Opening {printable(loader.paths[-1].name, 60)}")
-        # Negative fractions make ImGui draw a bar of unknown length that moves.
-        imgui.progress_bar(-loader.seconds, (260.0, 0.0), f"{loader.seconds:.0f} s")
-        if button(state, "Cancel opening"):
+        imgui.text_unformatted(title)
+        imgui.progress_bar(share, (260.0, 0.0), text)
+        if button(state, label):
             cancel(state)
     imgui.end()
 

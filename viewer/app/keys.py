@@ -33,6 +33,14 @@ def _look(name: str) -> Callable[[AppState], None]:
     return lambda state: actions.look(state, name)
 
 
+def _step(frames: int) -> Callable[[AppState], None]:
+    return lambda state: actions.step(state, frames)
+
+
+def _end(last: bool) -> Callable[[AppState], None]:
+    return lambda state: actions.go_to_end(state, last)
+
+
 def _want(what: str) -> Callable[[AppState], None]:
     return lambda state: state.wants.add(what)
 
@@ -75,10 +83,20 @@ KEYS = (
         pose_actions.copy_numbers,
     ),
     Shortcut((_CTRL | _K.v,), "Ctrl+V", "paste a pose", pose_actions.paste_pose),
+    Shortcut((_K.space,), "Space", "play or pause", actions.play),
+    Shortcut((_K.left_arrow,), "Left", "one frame back", _step(-1)),
+    Shortcut((_K.right_arrow,), "Right", "one frame on", _step(1)),
+    Shortcut((_SHIFT | _K.left_arrow,), "Shift+Left", "ten frames back", _step(-10)),
+    Shortcut((_SHIFT | _K.right_arrow,), "Shift+Right", "ten frames on", _step(10)),
+    Shortcut((_K.home,), "Home", "first frame of the range", _end(False)),
+    Shortcut((_K.end,), "End", "last frame of the range", _end(True)),
+    Shortcut((_K.i,), "I", "the range starts here", actions.range_in),
+    Shortcut((_K.o,), "O", "the range ends here", actions.range_out),
     Shortcut((_K.escape,), "Esc", "close what is on top", actions.cancel),
     Shortcut((_CTRL | _K.q,), "Ctrl+Q", "quit", _want("quit")),
 )
 
+_REPEATED = (_K.left_arrow, _K.right_arrow)  # go on while they are held
 _ALWAYS = ("Esc", "Ctrl+Q")  # also while a message or dialog lies over everything
 
 MOUSE = (
@@ -122,4 +140,5 @@ def _close_menus() -> bool:
 def _is_pressed(chord: int, held: int) -> bool:
     """Return whether a key went down with exactly the modifiers of the chord."""
     modifiers = chord & imgui.Key.mod_mask_
-    return held == modifiers and imgui.is_key_pressed(imgui.Key(chord & ~modifiers), False)
+    key = imgui.Key(chord & ~modifiers)
+    return held == modifiers and imgui.is_key_pressed(key, key in _REPEATED)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from viewer.errors import ViewerError
-from viewer.loading import Contents, assemble, read_files
+from viewer.loading import Builder, Contents, MotionSettings, begin, read_files
 from viewer.rig.scene import Scene
 
 __all__ = ["Loader"]
@@ -27,11 +27,15 @@ class Loader:
         Tried in order; the first that loads counts, the last one's error does.
     wake : callable
         Called from the thread when it is done.
+    settings : MotionSettings, optional
+        How motions are taken.
 
     Attributes
     ----------
     scene : Scene or None
         What was read.
+    builders : list of Builder
+        Captures whose first frames are in the scene.
     addition : Contents or None
         Poses and pictures for the figure that is open, if there was nothing else.
     error : str
@@ -43,12 +47,14 @@ class Loader:
         paths: Sequence[Path],
         attempts: Sequence[Sequence[Path]],
         wake: Callable[[], None],
+        settings: MotionSettings | None = None,
     ) -> None:
         self.paths: tuple[Path, ...] = tuple(paths)
         self.scene: Scene | None = None
+        self.builders: list[Builder] = []
         self.addition: Contents | None = None
         self.error = ""
-        self._attempts, self._wake = attempts, wake
+        self._attempts, self._wake, self._settings = attempts, wake, settings
         self._started = time.monotonic()
         self._thread = threading.Thread(target=self._read, daemon=True)
         self._thread.start()
@@ -56,11 +62,11 @@ class Loader:
     def _read(self) -> None:
         for paths in self._attempts:
             try:
-                contents = read_files(paths)
+                contents = read_files(paths, settings=self._settings)
                 if contents.is_addition:
                     self.addition = contents
                 else:
-                    self.scene = assemble(contents)
+                    self.scene, self.builders = begin(contents, self._settings)
                 self.paths, self.error = tuple(paths), ""
                 break
             except ViewerError as problem:

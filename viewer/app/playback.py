@@ -69,11 +69,11 @@ class Playback:
     _posed: tuple[float, bool] | None = None
 
     def show(self, scene: Scene) -> None:
-        """Take over the range of a scene's clips, and go to its start."""
+        """Take over the range of a scene's clips, and go to its start, or where it is."""
         self.playing, self.mode, self.speed = False, "loop", 1.0
         self.follow(scene.actors)
         self.start, self.end = self.whole
-        self.seek(self.start)
+        self.seek(self.start if scene.time is None else scene.time)
 
     def follow(self, actors: Sequence[Actor]) -> None:
         """Keep up with clips that changed or grew; a range that was all of them stays all."""

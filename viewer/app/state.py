@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from viewer.app.edits import History
+from viewer.app.playback import Playback
 from viewer.rendering.camera import Camera, fit
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.arrays import Floats
@@ -20,6 +21,7 @@ from viewer.rig.scene import Actor, Scene, scene_points
 if TYPE_CHECKING:
     from viewer.app.file_dialog import FileDialog
     from viewer.app.loader import Loader
+    from viewer.app.stream import Stream
 
 __all__ = ["AppState", "HeldVector", "Note", "Stats"]
 
@@ -95,6 +97,14 @@ class AppState:
         What the window has to do after the frame: "screenshot", "quit", "open dialog".
     wants_open : list of Path
         Files to open after the frame.
+    playback : Playback
+        The scene's clock.
+    stream : Stream or None
+        Captures that are still being read.
+    followed : (int, int) or None
+        The actor, and the joint of it (-1 for its middle), that the camera follows.
+    followed_from : (3,) or None
+        Where that was when the camera was moved last.
     """
 
     scene: Scene
@@ -125,11 +135,17 @@ class AppState:
     notes: list[Note] = field(default_factory=list)
     stats: Stats = field(default_factory=Stats)
     history: History = field(default_factory=History)
+    playback: Playback = field(default_factory=Playback)
+    stream: Stream | None = None
+    followed: tuple[int, int] | None = None
+    followed_from: Floats | None = None
     recent: list[tuple[str, ...]] = field(default_factory=list)
     dialog: FileDialog | None = None
     loader: Loader | None = None
 
     def __post_init__(self) -> None:
+        self.playback.show(self.scene)
+        self.history.time = self.playback.time
         self.history.start(self.scene, self.options)
         self.opened_joints = _first_opened(self.actor)
 
@@ -161,7 +177,11 @@ class AppState:
         fit(self.camera, points, self.aspect)
         # Body parts and levels of detail mean something else on another model.
         self.options.hidden_parts, self.options.reduced = (), False
+        self.options.trail_joints = ()
+        self.followed = self.followed_from = None
         self.choose_actor(0)
+        self.playback.show(scene)
+        self.history.time = self.playback.time
         self.history.start(scene, self.options)
         self.say(*scene.warnings)
 

@@ -26,6 +26,7 @@ from viewer.app.recent import (  # noqa: E402
 from viewer.app.state import AppState  # noqa: E402
 from viewer.app.theme import apply_theme, change_scale  # noqa: E402
 from viewer.errors import RenderError, printable  # noqa: E402
+from viewer.loading import Builder  # noqa: E402
 from viewer.rendering.camera import Camera, fit  # noqa: E402
 from viewer.rendering.context import explain  # noqa: E402
 from viewer.rendering.options import DisplayOptions  # noqa: E402
@@ -47,6 +48,8 @@ def show(
     paths: Sequence[str | Path] = (),
     scale: float | None = None,
     fit_distance: bool = True,
+    builders: Sequence[Builder] = (),
+    plays: bool = False,
 ) -> None:
     """Open a window and return when it is closed.
 
@@ -64,6 +67,10 @@ def show(
         Size of the interface; the screen's own if omitted.
     fit_distance : bool
         Whether the camera steps back until the scene fills the view.
+    builders : sequence of Builder
+        Captures of the scene that are still to be read.
+    plays : bool
+        Whether motions play at once.
 
     Raises
     ------
@@ -83,8 +90,10 @@ def show(
     state.recent = load_recent()
     state.closed_panels = load_closed_panels()
     state.say(*scene.warnings, *filter(None, [remember(state.recent, files)]))
+    state.playback.playing = plays and state.playback.has_motion
     window = _Window(state, scale)
     try:
+        window.frame.stream(builders)
         window.run(fit_distance)
     finally:
         window.release()
@@ -189,12 +198,17 @@ class _Window:
         """
         self._is_dirty = False
         state = self.state
-        if is_settling:
+        if is_settling or state.playback.playing:
             glfw.poll_events()
         else:
-            glfw.wait_events_timeout(_BUSY_SECONDS if state.loader else _IDLE_SECONDS)
+            glfw.wait_events_timeout(
+                _BUSY_SECONDS if state.loader or state.stream else _IDLE_SECONDS
+            )
             # Messages that time out, the bar of a file being read, a text cursor that blinks.
-            self._is_dirty |= bool(state.notes or state.loader or imgui.get_io().want_text_input)
+            self._is_dirty |= bool(
+                state.notes or state.loader or state.stream or imgui.get_io().want_text_input
+            )
+        self._is_dirty |= state.playback.playing
         return self._is_dirty or bool(self._dropped) or len(self._imgui.input_events_queue) > 0
 
     def _draw(self) -> bool:

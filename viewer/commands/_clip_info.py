@@ -29,7 +29,7 @@ def describe_clip(clip: Motion) -> dict[str, Any]:
 
 
 def _describe_keys(clip: Clip) -> dict[str, Any]:
-    times = [time for channel in clip.channels for time in channel.times[[0, -1]].tolist()]
+    times = [time for channel in clip.channels for time in channel.times.tolist()]
     modes = Counter(mode for channel in clip.channels for mode in channel.extrapolation)
     return {
         "channels": len(clip.channels),

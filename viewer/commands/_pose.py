@@ -15,7 +15,7 @@ from viewer.formats import Source, read
 from viewer.rig.arrays import Floats
 from viewer.rig.hands import hand_vectors
 from viewer.rig.mirror import mirror_pose
-from viewer.rig.motion import pose_actor
+from viewer.rig.motion import pose_actor, scene_rate, time_span
 from viewer.rig.pose_record import PoseRecord, apply_record
 from viewer.rig.pose_vector import set_joint_rotations
 from viewer.rig.rotation import rotation_vector_to_matrix
@@ -45,7 +45,11 @@ def add_pose_arguments(parser: argparse.ArgumentParser) -> None:
         "--frame", type=int, metavar="N", help="pose by the clip at frame N, counted from 0"
     )
     group.add_argument(
-        "--fps", type=number, default=30.0, metavar="R", help="frames a second (default 30)"
+        "--fps",
+        type=_rate,
+        metavar="R",
+        help="frames a second; of captures that do not say, and what --frame counts "
+        "(default: the file's own, or 30)",
     )
     group.add_argument("--hands", choices=("flat", "mean"), help="start from flat or mean hands")
     group.add_argument(
@@ -166,33 +170,31 @@ def _numbers(option: str, text: str | None) -> Floats | None:
         ) from None
 
 
-def _time(arguments: argparse.Namespace) -> tuple[float, bool] | None:
-    """Return seconds, and whether they count from the clip's start."""
-    if arguments.frame is None:
-        return None if arguments.time is None else (arguments.time, False)
-    if arguments.time is not None:
-        raise ViewerError("--frame and --time: expected one of them, found both")
-    if arguments.fps <= 0.0:
-        raise ViewerError(f"--fps: expected more than 0, found {arguments.fps:g}")
-    if not 0 <= arguments.frame <= _MOST_FRAMES:
-        raise ViewerError(f"--frame: expected 0 or more, found {arguments.frame}")
-    return arguments.frame / arguments.fps, True
+def _rate(text: str) -> float:
+    value = number(text)
+    if not 0.0 < value < 1e6:
+        raise argparse.ArgumentTypeError(f"expected more than 0, found {text}")
+    return value
 
 
 def _apply_time(scene: Scene, arguments: argparse.Namespace) -> None:
     """Pose every actor that has a clip as it is at a time."""
-    time = _time(arguments)
-    if time is None:
+    if arguments.frame is None and arguments.time is None:
         return
-    moving = [actor for actor in scene.actors if actor.clip is not None]
-    if not moving:
-        option = "--time" if arguments.frame is None else "--frame"
+    option = "--time" if arguments.frame is None else "--frame"
+    if arguments.frame is not None and arguments.time is not None:
+        raise ViewerError("--frame and --time: expected one of them, found both")
+    if all(actor.clip is None for actor in scene.actors):
         raise ViewerError(f"{option}: no file is a clip")
-    for actor in moving:
-        assert actor.clip is not None  # it moves
-        seconds, from_start = time
-        seconds += actor.clip.start if from_start else 0.0
-        pose_actor(actor, seconds + actor.offset)
+    time = arguments.time
+    if arguments.frame is not None:
+        if not 0 <= arguments.frame <= _MOST_FRAMES:
+            raise ViewerError(f"--frame: expected 0 or more, found {arguments.frame}")
+        rate = arguments.fps or scene_rate(scene.actors)
+        time = time_span(scene.actors)[0] + arguments.frame / rate
+    scene.time = time
+    for actor in scene.actors:
+        pose_actor(actor, time, arguments.fill_gaps)
 
 
 def _apply_record(option: str, record: PoseRecord, scene: Scene) -> list[str]:

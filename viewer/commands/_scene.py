@@ -10,12 +10,21 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from viewer.commands._pose import add_pose_arguments, apply_pose
+from viewer.commands._progress import Progress
 from viewer.errors import FormatError, ViewerError, printable
-from viewer.loading import bundled_body, load
+from viewer.loading import Builder, MotionSettings, begin, bundled_body, bundled_files, read_files
 from viewer.models import known_models, load_model_folder, resolve, save_model_folder
 from viewer.rig.scene import Scene
 
-__all__ = ["add_scene_arguments", "open_scene", "print_warnings", "scene_files"]
+__all__ = [
+    "add_scene_arguments",
+    "begin_scene",
+    "finish",
+    "motion_settings",
+    "open_scene",
+    "print_warnings",
+    "scene_files",
+]
 
 _SLOW_BYTES = 60e6  # about a second of reading
 _UNITS = {"k": 1 << 10, "m": 1 << 20, "g": 1 << 30}
@@ -27,8 +36,9 @@ def add_scene_arguments(parser: argparse.ArgumentParser) -> None:
         "files",
         nargs="*",
         metavar="FILES",
-        help=".skel, .skin, .anim files; body models (.npz, .pkl) or their names in the model "
-        "folder, as smplx:neutral; PIG folders; poses; a texture picture",
+        help=".skel, .skin, .anim, .morph files; body models (.npz, .pkl) or their names in the "
+        "model folder, as smplx:neutral; PIG folders; EasyMocap folders, AMASS and BVH files; "
+        "poses; a texture picture",
     )
     parser.add_argument("--body", action="store_true", help="open the bundled human body too")
     parser.add_argument(
@@ -37,7 +47,46 @@ def add_scene_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--max-size", default="2G", metavar="SIZE", help="refuse larger files (default 2G)"
     )
+    _add_motion_arguments(parser)
     add_pose_arguments(parser)
+
+
+def _add_motion_arguments(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("motion")
+    group.add_argument(
+        "--model",
+        metavar="FIGURE",
+        help="draw captured bodies with this model (default: one among FILES, or the bundled body)",
+    )
+    group.add_argument(
+        "--up", choices=("y", "z", "-y", "-z"), help="the axis that points up in captures and BVH"
+    )
+    group.add_argument("--unit", choices=("m", "cm", "mm"), help="of BVH lengths")
+    group.add_argument(
+        "--legacy-expression",
+        action="store_true",
+        help="expressions drive SMPL-X columns 10 to 19, as EasyMocap has it",
+    )
+    group.add_argument(
+        "--beside", action="store_true", help="a BVH stands beside figures instead of driving one"
+    )
+    group.add_argument(
+        "--fill-gaps", action="store_true", help="show captures in their gaps too, in between"
+    )
+
+
+def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
+    """Return how motions are asked to be taken."""
+    model = None if arguments.model is None else resolve(arguments.model)
+    return MotionSettings(
+        model=None if model is None else Path(model),
+        frame_rate=arguments.fps,
+        up=arguments.up or "",
+        unit=arguments.unit or "",
+        flat_hands=None if arguments.hands is None else arguments.hands == "flat",
+        legacy_expression=arguments.legacy_expression,
+        drives=not arguments.beside,
+    )
 
 
 def _parse_bytes(text: str) -> int:
@@ -56,18 +105,40 @@ def scene_files(arguments: argparse.Namespace) -> list[str | Path]:
 
 
 def open_scene(arguments: argparse.Namespace) -> Scene:
-    """Load the files, print what their readers noticed, and pose them as asked."""
+    """Load the files whole, print what their readers noticed, and pose them as asked."""
+    scene, builders = begin_scene(arguments)
+    for builder in builders:
+        finish(builder, scene)
+    print_warnings(apply_pose(scene, arguments))
+    return scene
+
+
+def finish(builder: Builder, scene: Scene) -> None:
+    """Read a capture to its end, with progress at a terminal, and print what was noticed."""
+    notes: list[str] = []
+    with Progress(f"reading {builder.capture.name}", builder.capture.n_frames) as progress:
+        while not builder.is_done:
+            new, said = builder.read_some()
+            scene.actors += new
+            notes += said
+            progress.show(builder.n_read)
+    print_warnings(notes)
+
+
+def begin_scene(arguments: argparse.Namespace) -> tuple[Scene, list[Builder]]:
+    """Load what is needed for a first picture, and print what was noticed; not posed yet."""
     if arguments.model_path is not None:
         save_model_folder(arguments.model_path)
     files = scene_files(arguments)
     _announce(files)
+    settings = motion_settings(arguments)
     try:
-        scene = load(*files, max_size=_parse_bytes(arguments.max_size))
+        contents = read_files(files or bundled_files(), _parse_bytes(arguments.max_size), settings)
+        scene, builders = begin(contents, settings)
     except FormatError as problem:
         raise _with_models(problem, arguments.files) from None
     print_warnings(scene.warnings)
-    print_warnings(apply_pose(scene, arguments))
-    return scene
+    return scene, builders
 
 
 def _with_models(problem: FormatError, files: Sequence[str]) -> ViewerError:

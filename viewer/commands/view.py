@@ -6,7 +6,14 @@ import argparse
 from pathlib import Path
 
 from viewer.commands._numbers import number
-from viewer.commands._scene import add_scene_arguments, open_scene, print_warnings, scene_files
+from viewer.commands._pose import apply_pose
+from viewer.commands._scene import (
+    add_scene_arguments,
+    begin_scene,
+    finish,
+    print_warnings,
+    scene_files,
+)
 from viewer.commands._view import (
     add_camera_arguments,
     add_display_arguments,
@@ -34,6 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_scene_arguments(parser)
     add_camera_arguments(parser)
     add_display_arguments(parser)
+    parser.add_argument("--play", action="store_true", help="let motions play at once")
     parser.add_argument("--scale", type=_scale, metavar="S", help="size of the interface, e.g. 1.5")
 
 
@@ -47,7 +55,11 @@ def _scale(text: str) -> float:
 def run(arguments: argparse.Namespace) -> int:
     """Open the window, or write the picture that it would show."""
     options = display_of(arguments)
-    scene = open_scene(arguments)
+    scene, builders = begin_scene(arguments)
+    if arguments.time is not None or arguments.frame is not None:
+        for builder in builders:
+            finish(builder, scene)  # who is there at that time is not known before
+    print_warnings(apply_pose(scene, arguments))
     hide_parts(arguments, scene, options)
     print_warnings(warn_of_missing(scene, options))
     points = scene_points(scene, options.show)
@@ -57,6 +69,8 @@ def run(arguments: argparse.Namespace) -> int:
     try:
         find_display()
     except NoDisplay as problem:
+        for builder in builders:
+            finish(builder, scene)
         return _draw_instead(str(problem), scene, camera, options, bounding_box(points))
     from viewer.app.window import show
 
@@ -67,6 +81,8 @@ def run(arguments: argparse.Namespace) -> int:
         paths=scene_files(arguments),
         scale=arguments.scale,
         fit_distance=arguments.distance is None,
+        builders=builders,
+        plays=arguments.play,
     )
     return 0
 

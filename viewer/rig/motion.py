@@ -31,6 +31,7 @@ __all__ = [
     "pose_actor",
     "pose_of",
     "rest_translations_of",
+    "scene_rate",
     "time_span",
     "world_frames",
 ]
@@ -90,6 +91,12 @@ def time_span(actors: Iterable[Actor]) -> tuple[float, float]:
 def frame_rate(motion: Motion | None) -> float:
     """Return a motion's frames a second; ``DEFAULT_RATE`` for keyed clips, which have none."""
     return motion.timing.frame_rate if isinstance(motion, SampledClip | PointClip) else DEFAULT_RATE
+
+
+def scene_rate(actors: Iterable[Actor]) -> float:
+    """Return the frames a second by which a scene is counted: those of its longest capture."""
+    clips = [actor.clip for actor in actors if isinstance(actor.clip, SampledClip | PointClip)]
+    return frame_rate(max(clips, key=lambda clip: clip.end - clip.start, default=None))
 
 
 def pose_actor(actor: Actor, time: float, fill: bool = False) -> None:

@@ -105,12 +105,15 @@ class Scene:
         The axis that points up; None for that of the first figure.
     views : tuple of CameraView
         Calibrated cameras of a capture.
+    time : float or None
+        Seconds at which its motions are shown; None for their start.
     """
 
     actors: list[Actor]
     warnings: tuple[str, ...] = ()
     world_up: Literal["y", "z"] | None = None
     views: tuple[CameraView, ...] = ()
+    time: float | None = None
 
     @property
     def up(self) -> Literal["y", "z"]:

@@ -18,9 +18,10 @@ class Panel:
     title : str
         Of its tab.
     place : str
-        At first: ``"left"``, or ``"right 1"`` to ``"right 3"`` downwards.
+        At first: ``"left"``, ``"bottom"``, or ``"right 1"`` to ``"right 3"`` downwards.
     needs : str
-        A part of ``Figure`` without which the panel is left out; empty for none.
+        A part of ``Figure`` without which the panel is left out; ``"motion"`` or ``"actors"``:
+        something that moves, or that or several actors; empty for nothing.
     """
 
     title: str
@@ -37,6 +38,8 @@ PANELS = {
     "camera": Panel("Camera", "right 2"),
     "lights": Panel("Lights", "right 2"),
     "stats": Panel("Stats", "right 3"),
+    "actors": Panel("Actors", "right 3", needs="actors"),
+    "timeline": Panel("Timeline", "bottom", needs="motion"),
 }
 """Modules in this folder."""
 

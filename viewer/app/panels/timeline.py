@@ -1,0 +1,115 @@
+"""Timeline: the clock's buttons, a ruler to scrub, and a track per actor with its gaps."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from viewer.app.actions import go_to_end, play, step
+from viewer.app.playback import FASTEST, MODES
+from viewer.app.state import AppState
+from viewer.app.tracks import draw_tracks
+from viewer.app.widgets import button, checkbox, choice, note_item, same_line_if_room, slider
+
+__all__ = ["draw"]
+
+_CLAMP = imgui.SliderFlags_.always_clamp
+
+
+def draw(state: AppState) -> None:
+    """Draw the panel."""
+    if not state.playback.has_motion:
+        imgui.text_disabled("nothing moves: open a clip, a capture or a BVH")
+        return
+    _draw_transport(state)
+    same_line_if_room("000000")
+    _draw_place(state)
+    _draw_settings(state)
+    draw_tracks(state)
+
+
+def _draw_transport(state: AppState) -> None:
+    playback = state.playback
+    if button(state, "|<"):
+        go_to_end(state, last=False)
+    _explain("first frame (Home)")
+    imgui.same_line()
+    if button(state, "<"):
+        step(state, -1)
+    _explain("one frame back (Left)")
+    imgui.same_line()
+    # One width for both words, or the buttons behind it would jump.
+    width = imgui.calc_text_size("Pause").x + 2 * imgui.get_style().frame_padding.x
+    if imgui.button("Pause###play" if playback.playing else "Play###play", (width, 0.0)):
+        play(state)
+    note_item(state, "Play")
+    _explain("play or pause (Space)")
+    imgui.same_line()
+    if button(state, ">"):
+        step(state, 1)
+    _explain("one frame on (Right)")
+    imgui.same_line()
+    if button(state, ">|"):
+        go_to_end(state, last=True)
+    _explain("last frame (End)")
+
+
+def _draw_place(state: AppState) -> None:
+    playback = state.playback
+    imgui.set_next_item_width(6.5 * imgui.get_font_size())
+    shown = playback.frame + playback.first_frame
+    changed, frame = imgui.input_int("##frame", shown, 0, 0)
+    note_item(state, "Frame")
+    if changed and frame != shown:
+        playback.playing = False
+        playback.seek(playback.frame_time(frame - playback.first_frame))
+    last = playback.first_frame + playback.n_frames - 1
+    text = f"of {playback.first_frame} to {last}    {playback.time:.3f} s"
+    same_line_if_room(text)
+    imgui.text_unformatted(text)
+
+
+def _draw_settings(state: AppState) -> None:
+    playback = state.playback
+    size = imgui.get_font_size()
+    imgui.set_next_item_width(8 * size)
+    playback.mode = choice(state, "Mode", playback.mode, MODES)
+    if playback.mode != "run on":
+        playback.time = min(max(playback.time, playback.whole[0]), playback.whole[1])
+    same_line_if_room("M" * 12)
+    imgui.set_next_item_width(8 * size)
+    playback.speed = slider(state, "Speed", playback.speed, -FASTEST, FASTEST, "%.2f x", _CLAMP)
+    if imgui.is_item_clicked(imgui.MouseButton_.right):
+        playback.speed = 1.0
+    _explain("seconds of motion a second; a right click sets 1")
+    same_line_if_room("M" * 14)
+    _draw_range(state)
+    same_line_if_room("Fill gaps")
+    playback.fill_gaps = checkbox(state, "Fill gaps", playback.fill_gaps)
+    _explain("show captures in their gaps too, on the way from the frame before to the one after")
+
+
+def _draw_range(state: AppState) -> None:
+    """Draw the frames at which playing starts and ends."""
+    playback = state.playback
+    rate, whole = playback.frame_rate, playback.whole[0]
+    first = round((playback.start - whole) * rate) + playback.first_frame
+    last = round((playback.end - whole) * rate) + playback.first_frame
+    imgui.set_next_item_width(9 * imgui.get_font_size())
+    changed, low, high = imgui.drag_int_range2(
+        "Range", first, last, 0.3, playback.first_frame,
+        playback.first_frame + playback.n_frames - 1,
+    )  # fmt: skip
+    note_item(state, "Range")
+    _explain("frames that are played; I and O set them to the present one, a right click to all")
+    if imgui.is_item_clicked(imgui.MouseButton_.right):
+        playback.set_range(*playback.whole)
+    elif changed:
+        # What was not touched keeps its exact time.
+        start = playback.frame_time(low - playback.first_frame) if low != first else playback.start
+        end = playback.frame_time(high - playback.first_frame) if high != last else playback.end
+        playback.set_range(start, end)
+
+
+def _explain(text: str) -> None:
+    if imgui.is_item_hovered(imgui.HoveredFlags_.delay_normal):
+        imgui.set_tooltip(text)
