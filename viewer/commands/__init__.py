@@ -7,7 +7,7 @@ __all__ = ["COMMANDS"]
 COMMANDS = {
     "view": "open files in a window (the default)",
     "render": "draw files into a picture, without a window",
-    "convert": "write the posed figure as .obj, .ply, .npz or .skel + .skin",
+    "convert": "write poses and motions: .obj, .ply, .npz, .bvh, .anim, .skel + .skin",
     "info": "say what is in files",
     "doctor": "say what this machine offers, and the cure for what it lacks",
 }

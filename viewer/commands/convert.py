@@ -1,16 +1,27 @@
-"""Write a posed figure into a file for other programs: mesh, arrays, or a course rig."""
+"""Write poses and motions into files for other programs."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
 
+from viewer.commands._motion_export import (
+    add_motion_arguments,
+    check_frame_field,
+    is_motion,
+    motion_paths,
+    write_motions,
+)
 from viewer.commands._output import check_output
 from viewer.commands._pose import add_skinning_arguments, pose_files, skinning_of
 from viewer.commands._scene import add_scene_arguments, open_scene, scene_files
-from viewer.errors import OutputError, printable
-from viewer.export import EXPORTERS, export, exporter_for, files_written
+from viewer.errors import OutputError, UnsupportedFormatError, printable
+from viewer.export import EXPORTERS, export, files_written
 from viewer.formats import all_or_none
+from viewer.rig.clip import Clip
+from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.scene import Scene
+from viewer.rig.skinning import Skinning
 
 __all__ = ["add_arguments", "run"]
 
@@ -18,34 +29,71 @@ __all__ = ["add_arguments", "run"]
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     add_scene_arguments(parser)
-    kinds = ", ".join(suffix for kind in EXPORTERS.values() for suffix in kind.suffixes)
-    parser.add_argument("-o", "--output", required=True, metavar="FILE", help=kinds)
+    kinds = dict.fromkeys(suffix for kind in EXPORTERS.values() for suffix in kind.suffixes)
+    parser.add_argument("-o", "--output", required=True, metavar="FILE", help=", ".join(kinds))
     parser.add_argument("--force", action="store_true", help="replace existing files")
+    add_motion_arguments(parser)
     add_skinning_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Write one file for each actor, and say what was written and what was lost."""
+    """Write poses or motions, and say what was written and what was lost."""
     output = Path(arguments.output)
-    exporter_for(output)
-    for path in _written(output):
-        check_output(path, _inputs(arguments), arguments.force)
+    _check_suffix(arguments, output)
     skinning = skinning_of(arguments)
     scene = open_scene(arguments)
+    write = _write_motions if is_motion(arguments, output, scene) else _write_poses
+    lines = write(arguments, scene, output, skinning)
+    print("\n".join(lines))
+    return 0
+
+
+def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:
+    """Refuse what can be refused before anything is read."""
+    suffix = output.suffix.lower() or "/"
+    kinds = [kind for kind in EXPORTERS.values() if suffix in kind.suffixes]
+    if not kinds:
+        known = dict.fromkeys(suffix for kind in EXPORTERS.values() for suffix in kind.suffixes)
+        raise UnsupportedFormatError(f'no exporter for "{suffix}"; there are: {", ".join(known)}')
+    if all(kind.writes_pose for kind in kinds) and "{frame" not in output.name:
+        for path in _written(output):
+            check_output(path, _inputs(arguments), arguments.force)
+    elif suffix != "/" and "{frame" not in output.name:
+        _check_folder(output)
+        check_output(output, _inputs(arguments), arguments.force)
+
+
+def _write_poses(
+    arguments: argparse.Namespace, scene: Scene, output: Path, skinning: Skinning
+) -> list[str]:
     inputs = _inputs(arguments)  # --model-path counts from now on
+    actors = [actor for actor in scene.actors if actor.is_present]
     paths = [output] + [
         output.with_name(f"{output.stem}-{number}{output.suffix}")
-        for number in range(2, len(scene.actors) + 1)
+        for number in range(2, len(actors) + 1)
     ]
     files = [file for path in paths for file in _written(path)]
     for file in files:
         check_output(file, inputs, arguments.force)
     lines = []
     with all_or_none(files):
-        for actor, path in zip(scene.actors, paths, strict=True):
+        for actor, path in zip(actors, paths, strict=True):
             lines += export(actor, path, skinning)
-    print("\n".join(lines))
-    return 0
+    return lines
+
+
+def _write_motions(
+    arguments: argparse.Namespace, scene: Scene, output: Path, skinning: Skinning
+) -> list[str]:
+    inputs = _inputs(arguments)
+    moving = [actor for actor in scene.actors if isinstance(actor.clip, Clip | SampledClip)]
+    if "{frame" in output.name or (arguments.frames and output.suffix.lower() == ".obj"):
+        check_frame_field(output)
+    elif output.suffix:
+        for path in motion_paths(output, moving):
+            _check_folder(path)
+            check_output(path, inputs, arguments.force)
+    return write_motions(arguments, scene, output, skinning)
 
 
 def _inputs(arguments: argparse.Namespace) -> list[Path]:
@@ -54,6 +102,10 @@ def _inputs(arguments: argparse.Namespace) -> list[Path]:
 
 def _written(path: Path) -> list[Path]:
     """Return all that is written for one output, in a folder that exists."""
+    _check_folder(path)
+    return files_written(path)
+
+
+def _check_folder(path: Path) -> None:
     if not path.parent.is_dir():
         raise OutputError(f"{printable(path, 300)}: the folder does not exist")
-    return files_written(path)

@@ -5,6 +5,11 @@
     vertices (V, 3)   normals (V, 3)   triangles (T, 3)   uvs (U, 2)   uv_triangles (T, 3)
     joints (J, 3)     world (J, 4, 4)  joint_names (J,)   parents (J,)
     own_numbers (N,)  shape_weights (S,)   up   unit   name
+
+Of a motion, F frames: ``vertices`` (F, V, 3), ``joints`` (F, J, 3), ``world`` (F, J, 4, 4),
+``rotations`` (F, J, 4) within the parents as (x, y, z, w), ``shape_weights`` (F, S) or (1, S),
+``times`` (F,), ``frames`` (F,), ``present`` (F,), ``frame_rate``; where a frame is not present its
+rows are NaN.
 """
 
 from __future__ import annotations
@@ -14,12 +19,15 @@ from pathlib import Path
 import numpy as np
 
 from viewer.errors import printable
+from viewer.export import MotionOptions
 from viewer.formats import save_arrays
+from viewer.rig.motion import pose_of, world_frames
 from viewer.rig.pose_vector import write_vector
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import Skinning, deform, joint_matrices
+from viewer.rig.take import Take
 
-__all__ = ["export"]
+__all__ = ["export", "export_take"]
 
 
 def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
@@ -48,3 +56,41 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
         }
     save_arrays(path, arrays)
     return [f"{printable(path, 300)}: {', '.join(arrays)}"]
+
+
+def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
+    """Write float64 arrays of all frames; see ``viewer.export.export_take``."""
+    figure, frames = take.figure, take.frames
+    skeleton = figure.skeleton
+    assert skeleton is not None  # whoever has a take has a skeleton
+    world = world_frames(figure, frames)
+    world[~frames.present] = np.nan
+    rotations = frames.rotations.copy()
+    rotations[~frames.present] = np.nan
+    arrays = {
+        "name": np.array(take.name),
+        "up": np.array(options.world_up),
+        "unit": np.array(figure.unit),
+        "frame_rate": np.array(take.frame_rate),
+        "times": frames.times,
+        "frames": take.first_frame + np.arange(frames.n_frames),
+        "present": frames.present,
+        "joints": world[:, :, :3, 3],
+        "world": world,
+        "rotations": rotations,
+        "joint_names": np.array(skeleton.names),
+        "parents": skeleton.parents,
+        "shape_weights": frames.shape_weights,
+    }
+    if figure.mesh is not None:
+        arrays["triangles"] = figure.mesh.triangles
+        vertices = np.full((frames.n_frames, figure.mesh.n_vertices, 3), np.nan)
+        for frame in np.flatnonzero(frames.present):
+            pose = pose_of(figure, frames, int(frame))
+            vertices[frame] = deform(figure, pose, options.skinning)[0]
+        arrays["vertices"] = vertices
+    save_arrays(path, arrays)
+    missing = int((~frames.present).sum())
+    gaps = f"; {missing} of them missing, NaN" if missing else ""
+    count = f"{frames.n_frames} frames at {take.frame_rate:g} a second{gaps}"
+    return [f"{printable(path, 300)}: {count}: {', '.join(arrays)}"]

@@ -9,16 +9,18 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.errors import printable
-from viewer.export import require_mesh
+from viewer.errors import OutputError, printable
+from viewer.export import MotionOptions, require_mesh
 from viewer.formats import all_or_none, free_path, save_bytes, save_text
 from viewer.formats._image import encode_png
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.mesh import Mesh
+from viewer.rig.motion import pose_of
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import Skinning, deform
+from viewer.rig.take import Take
 
-__all__ = ["export"]
+__all__ = ["export", "export_take"]
 
 _PLAIN = "plain"  # the material of triangles that have none
 
@@ -47,6 +49,30 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
     counts = f"{mesh.n_vertices} vertices, {mesh.n_triangles} triangles"
     notes = [f"{printable(file, 300)}: its texture" for file in beside if file.suffix == ".png"]
     return [f"{printable(path, 300)}: {counts}", *notes]
+
+
+def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
+    """Write one numbered file a frame; see ``viewer.export.export_take``.
+
+    ``{frame}`` in the name becomes the frame's number, as in ``walk_{frame:05}.obj``.
+    """
+    frames = np.flatnonzero(take.frames.present)
+    files = [
+        path.with_name(path.name.format(frame=int(frame) + take.first_frame)) for frame in frames
+    ]
+    if len(set(files)) < len(files):
+        raise OutputError(f"{printable(path, 300)}: expected a name with {{frame}}")
+    written: list[str] = []
+    with all_or_none(files):
+        for frame, file in zip(frames, files, strict=True):
+            pose = pose_of(take.figure, take.frames, int(frame))
+            written += export(Actor(take.figure, pose), file, options.skinning)
+    missing = take.frames.n_frames - len(files)
+    if not files:
+        return [f"{printable(path, 300)}: nobody is there in these frames, nothing was written"]
+    name = printable(path, 300)
+    gaps = f"; {missing} frames are missing in the motion, and have no file" if missing else ""
+    return [f"{name}: {len(files)} files, {files[0].name} to {files[-1].name}{gaps}"]
 
 
 def _rows(keyword: str, rows: Floats) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,11 +10,12 @@ from viewer.errors import RigError
 from viewer.rig.arrays import Floats
 from viewer.rig.clip import Clip
 from viewer.rig.figure import Figure
-from viewer.rig.motion import DEFAULT_RATE, Frames, frame_rate, frames_of
+from viewer.rig.motion import DEFAULT_RATE, Frames, frame_rate, frames_of, rest_translations_of
+from viewer.rig.quaternion import multiply
 from viewer.rig.sampled_clip import SampledClip
-from viewer.rig.scene import Actor
+from viewer.rig.scene import Actor, Scene
 
-__all__ = ["Take", "take_of"]
+__all__ = ["Take", "take_of", "upright_take"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,3 +84,53 @@ def take_of(
     shift = motion.timing.first_frame if isinstance(motion, SampledClip) and rate == own else 0
     sampled = frames_of(figure, motion, times, actor.pose, fill)
     return Take(actor.name, figure, rate, first + shift, sampled, motion)
+
+
+def upright_take(
+    scene: Scene,
+    actor: Actor,
+    rate: float | None = None,
+    frames: tuple[int, int] | None = None,
+    fill: bool = False,
+) -> tuple[Take, str]:
+    """Sample an actor's clip, stood up where its own world hangs head down.
+
+    Parameters
+    ----------
+    scene : Scene
+        Says what is up.
+    actor, rate, frames, fill
+        As for ``take_of``. Where the actor stands in the scene is left out.
+
+    Returns
+    -------
+    take : Take
+        Its frames.
+    up : "y" or "z"
+        The axis that points up in them.
+    """
+    take = take_of(actor, rate, frames, fill)
+    up = np.zeros(3)
+    up["xyz".index(scene.up)] = 1.0
+    own = np.linalg.solve(actor.placement[:3, :3], up)
+    axis = int(np.abs(own).argmax())
+    if own[axis] < 0.0:
+        take = replace(take, frames=_turned_over(take))
+    return take, "xyz"[axis] if axis else scene.up
+
+
+def _turned_over(take: Take) -> Frames:
+    """Return the frames turned by half a turn about x: the root, and the way to it.
+
+    With the root joint at p = s (rest + t) + T in the figure, R' = Q R and T' = Q p - s (rest + t).
+    """
+    frames = take.frames
+    half = np.array([1.0, 0.0, 0.0, 0.0])
+    rotations = frames.rotations.copy()
+    assert take.figure.skeleton is not None  # whoever has a take has a skeleton
+    roots = np.flatnonzero(take.figure.skeleton.parents < 0)
+    rotations[:, roots] = multiply(half, rotations[:, roots])
+    rest = rest_translations_of(take.figure, frames.shape_weights)[:, 0]
+    inner = frames.figure_scales[:, None] * (rest + frames.translations[:, 0])
+    place = (inner + frames.figure_translations) * np.array([1.0, -1.0, -1.0]) - inner
+    return replace(frames, rotations=rotations, figure_translations=place)
