@@ -250,7 +250,10 @@ def test_missing_file_is_named(tmp_path):
 
 
 def test_folder_is_refused(tmp_path):
-    wanted = "expected a file, or a folder with a PIG model's tables, found a folder"
+    wanted = (
+        "expected a file, or a folder with a PIG model's tables or EasyMocap's frames, found a "
+        "folder"
+    )
     assert refusal(tmp_path) == f"{tmp_path}: {wanted}"
     assert refusal("") == f".: {wanted}"
 

@@ -8,7 +8,10 @@ from app import box_body
 from imgui_bundle import imgui
 from numpy.testing import assert_allclose, assert_array_equal
 
+import viewer
 from viewer.rig.measure import measure
+from viewer.rig.morph_target import MorphTarget, with_morphs
+from viewer.rig.scene import Actor
 from viewer.rig.shape import rest_joints, shaped
 
 
@@ -260,3 +263,42 @@ def test_shape_panel_goes_and_comes_with_the_figure(shape, rig):
     assert not _is_absent("Shape")
     shape.open(*rig)
     assert _is_absent("Shape")
+
+
+@pytest.fixture
+def morphed(drive, rig):
+    """The tiny rig with two morphs, one that lifts a vertex and one that spreads all."""
+    scene = viewer.load(*rig)
+    figure = scene.actors[0].figure
+    mesh = figure.mesh
+    lifted = mesh.positions[:1] + [0.0, 1.0, 0.0]
+    targets = [
+        MorphTarget("lift", [0], lifted, mesh.normals[:1]),
+        MorphTarget("spread", np.arange(mesh.n_vertices), 2.0 * mesh.positions, mesh.normals),
+    ]
+    scene.actors[0] = Actor(with_morphs(figure, targets))
+    hand = drive(scene=scene, size=(900, 1000), samples=1)
+    hand.show_panel("Shape")
+    return hand
+
+
+def test_morphs_have_sliders_from_0_to_1_by_their_names(morphed, texts):
+    texts.clear()
+    morphed.step()
+    assert "Morphs" in texts and "Shape" not in texts
+    assert not {"Random", "seed"} & set(morphed.state.item_rects)
+    for fraction in (0.25, 1.0, 1.3):
+        _drag(morphed, 0, fraction)
+        assert _weights(morphed)[0] == pytest.approx(min(fraction, 1.0), abs=0.02)
+    assert morphed.undo_steps == 2  # beyond the end nothing changes any more
+    height = _rest(morphed).mesh.positions[0] - morphed.state.actor.figure.mesh.positions[0]
+    assert_allclose(height, [0, 1, 0], atol=1e-6)
+
+
+def test_typed_weight_of_a_morph_is_free_and_resets(morphed):
+    before = morphed.scene_picture()
+    morphed.enter_value("coefficient 1", "-1.5")
+    assert _weights(morphed).tolist() == [0, -1.5]
+    assert (morphed.scene_picture() != before).any()
+    morphed.click("Reset shape")
+    assert _weights(morphed).tolist() == [0, 0]

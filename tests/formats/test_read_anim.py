@@ -90,7 +90,40 @@ def test_channel_without_keys_warns() -> None:
         ),
         (
             GOOD.split("keys")[0],
-            'walk.anim:1: channel 0: expected "}", found the end of the file',
+            'walk.anim:1: channel 0: expected "}", found the end of the file '
+            "(channel 0 begins in line 1)",
+        ),
+        (
+            GOOD.replace("channel {", "\nchannel {").replace(" linear", "").split("-0.5")[0],
+            "walk.anim:2: channel 0, key 1: tangent: expected flat, linear, smooth or a number, "
+            "found the end of the file (channel 0 begins in line 2)",
+        ),
+        (
+            GOOD.replace("} }", "} keys 0 { } }", 1),
+            "walk.anim:1: channel 0: expected one list of keys, found another",
+        ),
+        (
+            GOOD.replace("numchannels 1 channel", "numchannels 1 chanel"),
+            'walk.anim:1: animation: expected a channel, found "chanel"',
+        ),
+        (
+            GOOD.replace("numchannels 1", "numchannels -1"),
+            "walk.anim:1: animation: numchannels: expected a count that the file can hold, "
+            f'found "-1" with {len(GOOD.split("numchannels 1")[1])} bytes left',
+        ),
+        (
+            GOOD.replace("numchannels 1", "numchannels 1.5"),
+            "walk.anim:1: animation: numchannels: expected a count that the file can hold, "
+            f'found "1.5" with {len(GOOD.split("numchannels 1")[1])} bytes left',
+        ),
+        (
+            GOOD.replace("range -1 4", "range -1 up"),
+            'walk.anim:1: animation: range: expected a number, found "up"',
+        ),
+        ("", "walk.anim: expected a .anim file, found an empty file"),
+        (
+            GOOD.replace("numchannels 1 ", ""),
+            "walk.anim:1: animation: expected numchannels, found 1",
         ),
     ],
 )
@@ -120,6 +153,57 @@ def test_write_then_read_gives_the_clip_back(tmp_path: Path) -> None:
         np.testing.assert_array_equal(old.times, new.times)
         np.testing.assert_array_equal(old.values, new.values)
         assert (old.tangents, old.extrapolation) == (new.tangents, new.extrapolation)
+
+
+def test_tangents_mix_rules_and_numbers_on_the_two_sides() -> None:
+    keys = "0 1 13.7 -0.22 1 2 flat -.75 2 3 +1e-1 linear 3 4 smooth 5."
+    channel = f"channel {{ extrapolate linear cycle keys 4 {{ {keys} }} }}"
+    clip, warnings = parse(f"animation {{ range 0 1 numchannels 1 {channel} }}")
+    assert warnings == []
+    assert clip.channels[0].tangents == (
+        (13.7, -0.22),
+        ("flat", -0.75),
+        (0.1, "linear"),
+        ("smooth", 5.0),
+    )
+
+
+def test_range_may_differ_from_the_keys_and_channels_from_each_other() -> None:
+    channels = (
+        "channel 0{extrapolate constant cycle keys 2{-1 1 flat flat 1 2 flat flat}}"
+        "channel 1{extrapolate linear bounce keys 1{2 7 flat flat}}"
+    )
+    clip, warnings = parse(f"animation{{range 0 4 numchannels 2 {channels}}}")
+    assert warnings == [] and (clip.start, clip.end) == (0.0, 4.0)
+    assert [channel.times.tolist() for channel in clip.channels] == [[-1.0, 1.0], [2.0]]
+    assert [channel.target for channel in clip.channels] == [0, 1]
+
+
+def test_keys_at_one_time_are_both_kept() -> None:
+    clip, warnings = parse(GOOD.replace("{ 0 1", "{ 2 1"))
+    assert warnings == [] and clip.channels[0].times.tolist() == [2.0, 2.0]
+
+
+def test_reversed_range_is_put_in_order_with_a_warning() -> None:
+    clip, warnings = parse(GOOD.replace("range -1 4", "range 4 -1"))
+    assert (clip.start, clip.end) == (-1.0, 4.0)
+    assert warnings == ["walk.anim:1: range ends before it begins: read as -1 to 4"]
+
+
+def test_missing_range_is_that_of_the_keys() -> None:
+    clip, warnings = parse(GOOD.replace("range -1 4 ", ""))
+    assert (clip.start, clip.end) == (0.0, 2.0)
+    assert warnings == ["walk.anim: no range: that of the keys is played, 0 to 2"]
+
+
+def test_numbers_of_numpy_are_written_as_numbers(tmp_path: Path) -> None:
+    tangents = ((np.float64(0.1), "flat"),)
+    channel = Channel(0, np.array([1 / 3]), np.array([2 / 3]), tangents)
+    write(Clip("c", (channel,), np.float64(0.1), np.float64(1e-17 + 0.3)), tmp_path / "c.anim")
+    assert " ".join((tmp_path / "c.anim").read_text().split()) == (
+        "animation { range 0.1 0.3 numchannels 1 channel { extrapolate constant constant "
+        "keys 1 { 0.3333333333333333 0.6666666666666666 0.1 flat } } }"
+    )
 
 
 def test_write_refuses_channels_out_of_order(tmp_path: Path) -> None:

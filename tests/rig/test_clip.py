@@ -3,6 +3,7 @@
 import itertools
 from pathlib import Path
 
+import hand_made
 import numpy as np
 import pytest
 
@@ -15,6 +16,7 @@ from viewer.rig.clip import (
     Clip,
     check_fit,
     evaluate,
+    is_course_rig,
     slopes,
 )
 
@@ -139,6 +141,42 @@ def test_check_fit_names_both_numbers() -> None:
     assert skeleton is not None
     with pytest.raises(RigError, match=rf"has 0 channels, the skeleton needs {skeleton.n_dofs} "):
         check_fit(Clip("empty", (), 0.0, 1.0), skeleton)
+
+
+def test_check_fit_refuses_skeletons_that_move_otherwise() -> None:
+    """A body of 24 ball joints has 72 DOFs too, as the wasp's 23 joints and root have."""
+    skeleton = hand_made.skeleton([-1, 0], [(j, axis, 0.0) for j in (0, 1) for axis in "xyz"])
+    assert not is_course_rig(skeleton)
+    with pytest.raises(RigError, match="moves a root and three angles of each joint, which is not"):
+        check_fit(Clip("walk", (), 0.0, 1.0), skeleton)
+
+
+def test_course_rigs_list_translation_then_rotations_joint_by_joint() -> None:
+    rows = [(0, kind, 0.0) for kind in ("tx", "ty", "tz", "x", "y", "z")]
+    rows += [(1, kind, 0.0) for kind in "xyz"]
+    assert is_course_rig(hand_made.skeleton([-1, 0], rows))
+    swapped = [*rows[:4], rows[5], rows[4], *rows[6:]]
+    assert not is_course_rig(hand_made.skeleton([-1, 0], swapped))
+
+
+@pytest.mark.parametrize(
+    ("tangents", "modes", "message"),
+    [
+        ((("steep", "flat"),), ("cycle",) * 2, "flat, linear, smooth or a number, found steep"),
+        (((0.0, float("nan")),), ("cycle",) * 2, "flat, linear, smooth or a number, found nan"),
+        ((("flat", "flat"),), ("cycle", "jump"), r"two of constant, .*, found \('cycle', 'jump'\)"),
+        ((("flat", "flat"),), ("cycle",), "expected two of constant"),
+    ],
+)
+def test_channel_refuses_unknown_words(tangents, modes, message) -> None:
+    with pytest.raises(RigError, match=message):
+        Channel(0, np.zeros(1), np.zeros(1), tangents, modes)
+
+
+@pytest.mark.parametrize(("start", "end"), [(2.0, 1.0), (float("nan"), 1.0), (0.0, float("inf"))])
+def test_clip_refuses_a_range_that_is_none(start, end) -> None:
+    with pytest.raises(RigError, match="clip odd: expected a range, found"):
+        Clip("odd", (), start, end)
 
 
 @pytest.mark.skipif(not SHARED.exists(), reason="needs the shared data")

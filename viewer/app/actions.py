@@ -173,6 +173,9 @@ def cancel(state: AppState) -> None:
     elif state.loader is not None:
         state.loader = None
         state.say_status("Opening was cancelled")
+    elif state.job is not None and state.job.can_cancel:
+        state.job.cancel()
+        state.say_status("Cancelled")
     elif state.stream is not None:
         state.stream.cancel()
         state.stream = None

@@ -94,6 +94,7 @@ class Frame:
         self._do_wanted()
         self._take_loaded()
         self._take_streamed()
+        self._work()
         self._pose()
         state.history.observe(state.scene, state.options, imgui.is_any_item_active())
         self._draw_scene(scale)
@@ -125,6 +126,17 @@ class Frame:
             state.history.follow(state.scene, state.playback.time)
             follow_actor(state)
         self._is_first = False
+
+    def _work(self) -> None:
+        """Go on with what takes longer than a frame, and say how it ended."""
+        state, job = self.state, self.state.job
+        if job is None:
+            return
+        job.step()
+        if job.is_done:
+            state.job = None
+            state.say(*job.lines)
+            state.error = job.error or state.error
 
     def _take_streamed(self) -> None:
         """Add what was read of captures since the last frame."""
@@ -327,7 +339,10 @@ class Frame:
         return self.target.read()
 
     def release(self) -> None:
-        """Free everything that was made for drawing."""
+        """Free everything that was made for drawing; what goes on beside ends."""
+        for work in (self.state.job, self.state.stream):
+            if work is not None:
+                work.cancel()
         if self.target is not None:
             self.target.release()
         self.renderer.release()

@@ -237,6 +237,12 @@ def _draw_progress(state: AppState) -> None:
         names = ", ".join(builder.capture.name for builder in stream.builders)
         title, label = f"Reading {printable(names, 60)}", "Cancel reading"
         place, pivot = (x + width - 10, y + height - 10), (1.0, 1.0)
+    elif state.job is not None:
+        done, total = state.job.progress
+        title, label = state.job.title, "Cancel" if state.job.can_cancel else ""
+        # Negative fractions make ImGui draw a bar of unknown length that moves.
+        share, text = (done / total, f"{done:,} of {total:,}") if total else (-imgui.get_time(), "")
+        place, pivot = (x + width / 2, y + height / 2), (0.5, 0.5)
     else:
         return
     imgui.set_next_window_pos(place, imgui.Cond_.always, pivot)
@@ -246,7 +252,7 @@ def _draw_progress(state: AppState) -> None:
     if imgui.begin("##progress", None, flags)[0]:
         imgui.text_unformatted(title)
         imgui.progress_bar(share, (260.0, 0.0), text)
-        if button(state, label):
+        if label and button(state, label):
             cancel(state)
     imgui.end()
 

@@ -8,6 +8,7 @@ from imgui_bundle import imgui
 
 from viewer.app.actions import redo, reset_pose, undo
 from viewer.app.file_dialog import FileDialog, folder_of
+from viewer.app.motion_actions import motion_suffixes, moving_actors, save_motion
 from viewer.app.panels import PANELS
 from viewer.app.pose_actions import (
     copy_numbers,
@@ -80,6 +81,8 @@ def _draw_file_menu(state: AppState) -> list[Path]:
         _ask_for_pose(state)
     if menu_item(state, "Export…"):
         _ask_for_export(state)
+    if menu_item(state, "Export motion…", enabled=state.actor in moving_actors(state)):
+        _ask_for_motion(state)
     if menu_item(state, "Save screenshot", "F12"):
         state.wants.add("screenshot")
     imgui.separator()
@@ -132,7 +135,8 @@ def _ask_for_pose(state: AppState) -> None:
 
 
 def _ask_for_export(state: AppState) -> None:
-    suffixes = tuple(suffix for kind in EXPORTERS.values() for suffix in kind.suffixes)
+    kinds = [kind for kind in EXPORTERS.values() if kind.writes_pose]
+    suffixes = tuple(suffix for kind in kinds for suffix in kind.suffixes)
     state.dialog = FileDialog(
         folder_of(state.paths),
         lambda state, paths: save_export(state, paths[0]),
@@ -140,6 +144,18 @@ def _ask_for_export(state: AppState) -> None:
         f"Export: {', '.join(suffixes)}",
         suffixes,
         f"{printable(state.actor.figure.name, 60)}.obj",
+    )
+
+
+def _ask_for_motion(state: AppState) -> None:
+    suffixes = motion_suffixes()
+    state.dialog = FileDialog(
+        folder_of(state.paths),
+        lambda state, paths: save_motion(state, paths[0]),
+        "save",
+        f"Export motion: {', '.join(suffixes)}",
+        suffixes,
+        f"{printable(state.actor.name, 60).replace(' ', '_')}.bvh",
     )
 
 

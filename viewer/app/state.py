@@ -20,6 +20,7 @@ from viewer.rig.scene import Actor, Scene, scene_points
 
 if TYPE_CHECKING:
     from viewer.app.file_dialog import FileDialog
+    from viewer.app.jobs import Job
     from viewer.app.loader import Loader
     from viewer.app.stream import Stream
 
@@ -99,6 +100,8 @@ class AppState:
         Files to open after the frame.
     playback : Playback
         The scene's clock.
+    job : Job or None
+        Work that goes on beside the frame loop.
     stream : Stream or None
         Captures that are still being read.
     followed : (int, int) or None
@@ -136,6 +139,7 @@ class AppState:
     stats: Stats = field(default_factory=Stats)
     history: History = field(default_factory=History)
     playback: Playback = field(default_factory=Playback)
+    job: Job | None = None
     stream: Stream | None = None
     followed: tuple[int, int] | None = None
     followed_from: Floats | None = None

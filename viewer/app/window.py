@@ -198,7 +198,7 @@ class _Window:
         """
         self._is_dirty = False
         state = self.state
-        if is_settling or state.playback.playing:
+        if is_settling or state.playback.playing or state.job:
             glfw.poll_events()
         else:
             glfw.wait_events_timeout(
@@ -208,7 +208,7 @@ class _Window:
             self._is_dirty |= bool(
                 state.notes or state.loader or state.stream or imgui.get_io().want_text_input
             )
-        self._is_dirty |= state.playback.playing
+        self._is_dirty |= state.playback.playing or state.job is not None
         return self._is_dirty or bool(self._dropped) or len(self._imgui.input_events_queue) > 0
 
     def _draw(self) -> bool:

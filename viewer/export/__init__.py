@@ -49,11 +49,21 @@ class Exporter:
 
 
 EXPORTERS = {
-    "obj": Exporter("Wavefront OBJ: the posed mesh", (".obj",)),
+    "obj": Exporter("Wavefront OBJ: the posed mesh", (".obj",), writes_motion=True),
     "ply": Exporter("PLY: the posed mesh", (".ply",)),
-    "npz": Exporter("NumPy arrays: posed vertices and joints", (".npz",)),
+    "npz": Exporter("NumPy arrays: posed vertices and joints", (".npz",), writes_motion=True),
     "pose": Exporter("pose: joints by name and own numbers", (".json", ".txt")),
     "rig": Exporter("course rig: .skel and .skin", (".skel", ".skin")),
+    "anim": Exporter(
+        "clip: keys of a course rig", (".anim",), writes_pose=False, writes_motion=True
+    ),
+    "bvh": Exporter("BVH: skeleton and motion", (".bvh",), writes_pose=False, writes_motion=True),
+    "amass": Exporter(
+        "AMASS: parameters of the SMPL family", (".npz",), writes_pose=False, writes_motion=True
+    ),
+    "easymocap": Exporter(
+        "EasyMocap: a folder of frames", ("/",), writes_pose=False, writes_motion=True
+    ),
 }
 """Modules in this folder, each with ``export(actor, path, skinning)``."""
 

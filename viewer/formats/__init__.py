@@ -7,6 +7,7 @@ import re
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from viewer.errors import FormatError, UnsupportedFormatError, printable
 from viewer.formats._image import is_picture, read_picture, save_image
@@ -15,6 +16,12 @@ from viewer.formats._source import MAX_SIZE, Source
 from viewer.rig.clip import Clip
 from viewer.rig.figure import Figure
 from viewer.rig.pose_record import PoseRecord
+from viewer.rig.skeleton_motion import SkeletonMotion
+
+if TYPE_CHECKING:
+    from viewer.formats._archive import Archive
+    from viewer.rig.body_motion import BodyMotion
+    from viewer.rig.capture import Capture
 
 __all__ = [
     "FORMATS",
@@ -78,6 +85,12 @@ FORMATS = {
         rb"(?:^|[\s}])(?:positions|normals|texcoords|skinweights|triangles|bindings)\s+[-+\w]",
     ),
     "anim": Format("clip (CSE169)", (".anim",), rb"(?:^|\s)animation\s*\{"),
+    # After the skin, whose sections have the same names: a .morph is known by its suffix.
+    "morph": Format(
+        "morph (CSE169)", (".morph",), rb"(?:^|[\s}])(?:positions|normals)\s+\d", writes=False
+    ),
+    "rig": Format("rig (CSE169)", (".rig",), rb"\Arig\b[^{}]*\{", writes=False),
+    "bvh": Format("BVH motion", (".bvh",), rb"(?i:\A\s*HIERARCHY\b)", writes=False),
     "smpl": Format(
         "SMPL family",
         (".npz", ".pkl"),
@@ -89,6 +102,22 @@ FORMATS = {
         (".npz", ".pkl"),
         keys=("t_pose_joints", "skinning_weights", "faces_vert"),
         files=("vertices.txt", "t_pose_joints.txt", "skinning_weights.txt", "faces_vert.txt"),
+        writes=False,
+    ),
+    "amass": Format(
+        "motion of the SMPL family (AMASS)",
+        (".npz", ".pkl"),
+        keys=(
+            *("mocap_framerate", "mocap_frame_rate", "mocap_time_length", "dmpls", "smpl_poses"),
+            *("root_orient", "pose_body", "markers_latent"),
+        ),
+        writes=False,
+    ),
+    "easymocap": Format(
+        "EasyMocap recording",
+        (".json",),
+        rb"\A\[\s*[\]{]|\A\{(?s:.*?)\"annots\"\s*:",
+        files=("smpl_full", "smplfull", "smpl", "keypoints3d"),
         writes=False,
     ),
     "pose": Format(
@@ -119,14 +148,16 @@ def detect(source: Source) -> str:
     suffix = source.path.suffix.lower()
     texts = {key: kind for key, kind in FORMATS.items() if kind.signature}
     claimed = suffix if suffix not in (*_ARCHIVES, *_ANY_TEXT) else ""
-    by_suffix = next((key for key, kind in texts.items() if claimed in kind.suffixes), None)
+    owners = [key for key, kind in texts.items() if claimed in kind.suffixes]
+    by_suffix = owners[-1] if owners else None
     if _is_archive(source):
         # A text format's suffix on a broken archive: say what it is, not how it is broken.
         with contextlib.nullcontext() if by_suffix is None else contextlib.suppress(FormatError):
             return _detect_archive(source)
     head = source.head(_HEAD)
-    if by_suffix and re.search(FORMATS[by_suffix].signature, head):
-        return by_suffix
+    for key in owners:
+        if re.search(FORMATS[key].signature, head):
+            return key
     for key, kind in texts.items():
         # Numbers alone are a pose only where no other suffix says otherwise.
         if re.search(kind.signature, head) and not (by_suffix and key == "pose"):
@@ -160,7 +191,13 @@ def _detect_folder(source: Source) -> str:
     for key, kind in FORMATS.items():
         if names.intersection(kind.files):
             return key
-    raise source.error("expected a file, or a folder with a PIG model's tables, found a folder")
+    is_frames = any(name.lower().endswith(".json") for name in names)
+    if is_frames or source.path.name in FORMATS["easymocap"].files:
+        return "easymocap"
+    raise source.error(
+        "expected a file, or a folder with a PIG model's tables or EasyMocap's frames, found a "
+        "folder"
+    )
 
 
 def _is_archive(source: Source) -> bool:
@@ -175,10 +212,11 @@ def _is_archive(source: Source) -> bool:
 def _detect_archive(source: Source) -> str:
     from viewer.formats._container import archive_of
 
-    keys = archive_of(source).keys
+    archive = archive_of(source)
+    keys = archive.keys
     for kind, form in FORMATS.items():
         if set(keys).intersection(form.keys):
-            return kind
+            return kind if kind not in ("amass", "pose") else _pose_or_motion(archive)
     found = ", ".join(printable(key, 40) for key in keys[:12]) or "none"
     wanted = "; ".join(
         f"{form.title}: {', '.join(form.keys)}" for form in FORMATS.values() if form.keys
@@ -186,7 +224,16 @@ def _detect_archive(source: Source) -> str:
     raise source.error(f"expected a model or pose ({wanted}), found the keys {found}")
 
 
-def read(source: Source) -> Figure | Clip | PoseRecord:
+def _pose_or_motion(archive: Archive) -> str:
+    """Tell one pose from many; the keys are the same."""
+    from viewer.formats.amass import has_frames
+
+    is_pose = set(archive.keys).intersection(FORMATS["pose"].keys)
+    is_other = set(archive.keys).intersection(("markers_latent", "smpl_poses"))
+    return "pose" if is_pose and not is_other and not has_frames(archive) else "amass"
+
+
+def read(source: Source) -> Figure | Clip | PoseRecord | SkeletonMotion | BodyMotion | Capture:
     """Read whatever the file holds; see the format modules for what they raise."""
     return import_module(f"{__name__}.{detect(source)}").read(source)
 

@@ -18,7 +18,15 @@ from numpy.typing import NDArray
 
 from viewer.errors import OutputError, printable
 
-__all__ = ["all_or_none", "as_words", "free_path", "save_arrays", "save_bytes", "save_text"]
+__all__ = [
+    "Replacement",
+    "all_or_none",
+    "as_words",
+    "free_path",
+    "save_arrays",
+    "save_bytes",
+    "save_text",
+]
 
 
 def as_words(name: str) -> list[bytes] | None:
@@ -113,6 +121,75 @@ def save_bytes(path: str | Path, data: bytes) -> None:
         raise OutputError(f"{printable(path, 300)}: {reason}") from None
 
 
+class Replacement:
+    """A file that a library writes by its name: next to the target first, then in its place.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file to create or replace; a link is followed.
+
+    Raises
+    ------
+    OutputError
+        If it is a folder or device, or its folder does not exist.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+        self.temporary: Path | None = None
+        try:
+            mode = _mode(self.path)
+            if stat.S_ISDIR(mode):
+                raise IsADirectoryError(None, "is a folder")
+            if not stat.S_ISREG(mode):
+                raise ValueError("is not a regular file, which a video must be written to")
+            self._target, self._permissions = self.path.resolve(), stat.S_IMODE(mode)
+            _require_folder(self._target)
+        except (OSError, ValueError, RuntimeError) as problem:
+            raise self.error(problem) from None
+
+    def error(self, problem: Exception) -> OutputError:
+        """Return what went wrong as the one line to show, with the path."""
+        reason = getattr(problem, "strerror", None) or problem
+        return OutputError(f"{printable(self.path, 300)}: {printable(reason)}")
+
+    def begin(self) -> Path:
+        """Create the temporary file, of the target's suffix, and return its name."""
+        target = self._target
+        try:
+            handle, name = tempfile.mkstemp(
+                dir=target.parent, prefix=f".{target.stem[:40]}.", suffix=target.suffix
+            )
+        except OSError as problem:
+            raise self.error(problem) from None
+        os.close(handle)
+        self.temporary = Path(name)
+        return self.temporary
+
+    def commit(self) -> int:
+        """Put the temporary file in the target's place; return its number of bytes."""
+        assert self.temporary is not None  # begin() made it
+        try:
+            with self.temporary.open("rb+") as stream:
+                os.fsync(stream.fileno())
+            size = self.temporary.stat().st_size
+            self.temporary.chmod(self._permissions)
+            self.temporary.replace(self._target)
+        except OSError as problem:
+            self.discard()
+            raise self.error(problem) from None
+        self.temporary = None
+        return size
+
+    def discard(self) -> None:
+        """Remove the temporary file, if there is one."""
+        if self.temporary is not None:
+            with contextlib.suppress(OSError):
+                self.temporary.unlink(missing_ok=True)
+            self.temporary = None
+
+
 @contextlib.contextmanager
 def all_or_none(paths: Iterable[Path]) -> Iterator[None]:
     """Put several files that belong together back as they were if writing one of them fails.
@@ -188,8 +265,7 @@ def _write_through(target: Path, data: bytes) -> None:
 
 
 def _replace(target: Path, data: bytes, permissions: int) -> None:
-    if not target.parent.is_dir():
-        raise FileNotFoundError(None, f"the folder {printable(target.parent, 300)} does not exist")
+    _require_folder(target)
     handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name[:40]}.")
     try:
         with os.fdopen(handle, "wb") as stream:
@@ -202,3 +278,8 @@ def _replace(target: Path, data: bytes, permissions: int) -> None:
         with contextlib.suppress(OSError):
             Path(name).unlink()
         raise
+
+
+def _require_folder(target: Path) -> None:
+    if not target.parent.is_dir():
+        raise FileNotFoundError(None, f"the folder {printable(target.parent, 300)} does not exist")

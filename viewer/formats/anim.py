@@ -64,20 +64,21 @@ class _Parser:
         self.words = source.words()
         self.word: Word | None = None
         self.what = "animation"
+        self.began = 0  # where that begins
 
     def clip(self) -> Clip:
         """Return the whole file as a clip."""
         self._advance()
         self._expect(b"animation")
         self._expect(b"{")
-        start = end = 0.0
+        span: tuple[float, float] | None = None
         count: int | None = None
         channels: list[Channel] = []
         while self.word is not None and self.word.group() != b"}":
             text = self.word.group()
             if text == b"range":
                 self._advance()
-                start, end = self._number("range"), self._number("range")
+                span = self._range()
             elif text == b"numchannels":
                 self._advance()
                 count = self._count("numchannels")
@@ -86,10 +87,23 @@ class _Parser:
             else:
                 raise self._error(f"expected a channel, found {shown(text)}")
         self._finish(count, len(channels))
-        return Clip(self.source.path.stem, tuple(channels), start, end)
+        return Clip(self.source.path.stem, tuple(channels), *(span or self._key_span(channels)))
+
+    def _range(self) -> tuple[float, float]:
+        word, start, end = self.word, self._number("range"), self._number("range")
+        if start > end:
+            where = None if word is None else word.start()
+            self.source.warn(f"range ends before it begins: read as {end:g} to {start:g}", where)
+        return min(start, end), max(start, end)
+
+    def _key_span(self, channels: list[Channel]) -> tuple[float, float]:
+        times = np.concatenate([np.zeros(0), *(channel.times for channel in channels)])
+        span = (float(times.min()), float(times.max())) if len(times) else (0.0, 0.0)
+        self.source.warn(f"no range: that of the keys is played, {span[0]:g} to {span[1]:g}")
+        return span
 
     def _finish(self, count: int | None, found: int) -> None:
-        self.what = "animation"
+        self.what, self.began = "animation", 0
         if self.word is None:
             self.source.warn('the last "}" is missing')
         if count != found:
@@ -104,25 +118,28 @@ class _Parser:
 
     def _channel(self, index: int) -> Channel:
         self.what = f"channel {index}"
+        self.began = self.word.start() if self.word else 0
         self._advance()
         # Some files number their channels; the order counts, not the number.
         while self.word is not None and self.word.group() not in (b"{", b"}", b"extrapolate"):
             self._advance()
         self._expect(b"{")
         extrapolation: tuple[Extrapolation, Extrapolation] = ("constant", "constant")
-        rows: list[tuple[float, float, Tangent, Tangent]] = []
+        rows: list[tuple[float, float, Tangent, Tangent]] | None = None
         while self.word is not None and self.word.group() != b"}":
             text = self.word.group()
             if text == b"extrapolate":
                 self._advance()
                 extrapolation = (self._mode(), self._mode())
             elif text == b"keys":
+                if rows is not None:
+                    raise self._error("expected one list of keys, found another")
                 self._advance()
                 rows = self._keys()
             else:
                 raise self._error(f"expected extrapolate or keys, found {shown(text)}")
         self._expect(b"}")
-        return self._make_channel(index, rows, extrapolation)
+        return self._make_channel(index, rows or [], extrapolation)
 
     def _make_channel(
         self,
@@ -163,8 +180,13 @@ class _Parser:
         self.word = next(self.words, None)
 
     def _error(self, message: str) -> FormatError:
-        where = len(self.source.data.rstrip()) if self.word is None else self.word.start()
-        return self.source.error(f"{self.what}: {message}", where)
+        if self.word is not None:
+            return self.source.error(f"{self.what}: {message}", self.word.start())
+        first = self.source.line(self.began)
+        return self.source.error(
+            f"{self.what}: {message} ({self.what.split(',')[0]} begins in line {first})",
+            len(self.source.data.rstrip()),
+        )
 
     def _found(self) -> str:
         return "the end of the file" if self.word is None else shown(self.word.group())

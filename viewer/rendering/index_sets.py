@@ -1,4 +1,9 @@
-"""Which triangles are drawn: all of them, a coarser set, or without hidden body parts."""
+"""Which triangles are drawn, and in what order: neighbours follow one another.
+
+Drivers keep the last few vertices that they computed, at best a few hundred. Files often list
+triangles in an order that finds none of them there, so that every vertex is computed three to five
+times; along a space-filling curve it is once or twice (``tests/bench/bench_crowd.py``).
+"""
 
 from __future__ import annotations
 
@@ -6,12 +11,15 @@ from dataclasses import dataclass
 
 import moderngl
 import numpy as np
+from numpy.typing import NDArray
 
 from viewer.rendering.upload import buffer
-from viewer.rig.arrays import Bools, Ints
+from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
 
-__all__ = ["IndexSet", "MeshRun", "index_set", "kept_triangles"]
+__all__ = ["IndexSet", "MeshRun", "curve_places", "index_set", "kept_triangles"]
+
+_CURVE_BITS = 10  # an axis
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,10 +33,26 @@ class MeshRun:
 
 @dataclass(frozen=True, slots=True)
 class IndexSet:
-    """An index buffer and its runs; whoever made it releases the buffer."""
+    """An index buffer and its runs; whoever made it releases the buffer.
+
+    Attributes
+    ----------
+    indices : moderngl.Buffer
+        Of split vertices.
+    runs : tuple of MeshRun
+        One after the other.
+    order : (N,) int32
+        Which of the triangles that were given is drawn first, second …
+    """
 
     indices: moderngl.Buffer
     runs: tuple[MeshRun, ...]
+    order: Ints
+
+    @property
+    def n_indices(self) -> int:
+        """Number of indices of all runs together."""
+        return 3 * len(self.order)
 
 
 def index_set(
@@ -36,8 +60,9 @@ def index_set(
     triangles: Ints,
     materials: Ints,
     textures: list[moderngl.Texture | None],
+    positions: Floats | None = None,
 ) -> IndexSet:
-    """Upload triangles; runs follow their materials.
+    """Upload triangles; runs follow their materials, and a space-filling curve within each.
 
     Parameters
     ----------
@@ -49,6 +74,8 @@ def index_set(
         Index into ``textures`` of each triangle, -1 for none.
     textures : list
         Of the materials.
+    positions : (R, 3), optional
+        Of the split vertices, at rest; without them triangles stay in their order.
     """
     edges = np.flatnonzero(np.diff(materials)) + 1
     runs = []
@@ -56,7 +83,38 @@ def index_set(
         index = int(materials[first]) if len(materials) else -1
         texture = None if index < 0 else textures[index]
         runs.append(MeshRun(3 * int(first), 3 * int(last - first), texture))
-    return IndexSet(buffer(context, triangles, "u4"), tuple(runs))
+    order: Ints = np.arange(len(triangles), dtype=np.int32)
+    if positions is not None and len(triangles):
+        run = np.zeros(len(triangles), dtype=np.int64)
+        run[edges] = 1
+        places = curve_places(positions[triangles].mean(axis=1))
+        order = np.argsort((np.cumsum(run) << 3 * _CURVE_BITS) + places, kind="stable")
+    return IndexSet(buffer(context, triangles[order], "u4"), tuple(runs), order.astype(np.int32))
+
+
+def curve_places(points: Floats) -> NDArray[np.int64]:
+    """Return where points lie on a Z-order curve through their box (Morton 1966).
+
+    Parameters
+    ----------
+    points : (N, 3)
+        At least one.
+
+    Returns
+    -------
+    (N,)
+        Bits of x, y and z interleaved, of 1024 cells along the longest side.
+
+    >>> curve_places(np.array([[0.0, 0, 0], [1023, 0, 0], [0, 1, 0], [1, 1, 1]])).tolist()
+    [0, 153391689, 2, 7]
+    """
+    low = points.min(axis=0)
+    size = float((points.max(axis=0) - low).max()) or 1.0
+    cells = ((points - low) * ((2**_CURVE_BITS - 1) / size)).astype(np.int64)
+    # Each step spreads groups of bits apart, until two zeros lie between any two.
+    for shift, mask in ((16, 0x30000FF), (8, 0x300F00F), (4, 0x30C30C3), (2, 0x9249249)):
+        cells = (cells | cells << shift) & mask
+    return cells[:, 0] | cells[:, 1] << 1 | cells[:, 2] << 2
 
 
 def kept_triangles(figure: Figure, hidden: tuple[int, ...], triangles: Ints) -> Bools:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import moderngl
 import numpy as np
 
@@ -54,7 +56,7 @@ class MeshBuffers:
         self.copies[self.sources] = np.arange(self.n_vertices)
         self.center: Floats = bounding_box(mesh.positions).mean(axis=0)
         self._owner = Owner()
-        self._index_sets: dict[tuple[bool, tuple[int, ...]], IndexSet] = {}
+        self._index_sets: dict[tuple[bool, tuple[int, ...], bool], IndexSet] = {}
         self._skins: dict[tuple[int, bool], SkinBuffers] = {}
         self._colors: moderngl.Buffer | None = None
         self._offsets: moderngl.Texture | None = None
@@ -83,15 +85,22 @@ class MeshBuffers:
         """Return a buffer with one row of (V, 3) for every split vertex."""
         return self._owner.keep(buffer(self.context, rows[self.sources], "f4"))
 
-    def index_set(self, reduced: bool, hidden: tuple[int, ...]) -> IndexSet:
-        """Return the triangles of the full or the reduced mesh, without hidden body parts."""
+    def index_set(
+        self, reduced: bool, hidden: tuple[int, ...], as_listed: bool = False
+    ) -> IndexSet:
+        """Return the triangles of the full or the reduced mesh, without hidden body parts.
+
+        ``as_listed`` keeps the file's order: translucent edges look different in another one.
+        """
         reduced = reduced and self.figure.reduced is not None
-        key = (reduced, hidden)
+        key = (reduced, hidden, as_listed)
         if key not in self._index_sets:
-            self._index_sets[key] = self._make_index_set(reduced, hidden)
+            self._index_sets[key] = self._make_index_set(*key)
         return self._index_sets[key]
 
-    def _make_index_set(self, reduced: bool, hidden: tuple[int, ...]) -> IndexSet:
+    def _make_index_set(
+        self, reduced: bool, hidden: tuple[int, ...], as_listed: bool
+    ) -> IndexSet:
         mesh, coarse = self.figure.mesh, self.figure.reduced
         assert mesh is not None
         if reduced and coarse is not None:
@@ -100,9 +109,10 @@ class MeshBuffers:
         else:
             of_figure, split, materials = mesh.triangles, self.triangles, mesh.material_indices
         kept = kept_triangles(self.figure, hidden, of_figure)
-        made = index_set(self.context, split[kept], materials[kept], self._textures)
+        rest = None if as_listed else mesh.positions[self.sources]
+        made = index_set(self.context, split[kept], materials[kept], self._textures, rest)
         self._owner.keep(made.indices)
-        return made
+        return replace(made, order=np.flatnonzero(kept).astype(np.int32)[made.order])
 
     def skin(self, skinning: Skinning) -> SkinBuffers:
         """Return the influences that count."""

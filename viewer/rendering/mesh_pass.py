@@ -91,7 +91,7 @@ class MeshPass:
         set_model(program, view, placement, mesh.center)
         program["u_line_color"] = _premultiplied(_EDGE_COLOR)
         self.context.wireframe = True
-        indices = mesh.mesh.index_set(options.reduced, options.hidden_parts)
+        indices = mesh.mesh.index_set(options.reduced, options.hidden_parts, as_listed=True)
         self._array(mesh, program, indices).render(moderngl.TRIANGLES)
         self.context.wireframe = False
 

@@ -11,7 +11,7 @@ from viewer.errors import RenderError, ViewerError
 from viewer.rendering.context import check_errors
 from viewer.rig.arrays import Bytes
 
-__all__ = ["Target", "check_size"]
+__all__ = ["Target", "check_size", "picture_rows", "straight"]
 
 
 def check_size(context: moderngl.Context, size: tuple[int, int]) -> None:
@@ -83,17 +83,44 @@ class Target:
 
         Colours are not multiplied by alpha any more, as picture files expect.
         """
-        width, height = self.size
-        rows = np.frombuffer(self._resolved.read(components=4), dtype=np.uint8)
-        pixels = rows.reshape(height, width, 4)[::-1].copy()
-        alpha = pixels[..., 3]
-        partial = (alpha > 0) & (alpha < 255)
-        if partial.any():
-            straight = pixels[partial, :3].astype(np.float64) * 255.0 / alpha[partial, None]
-            pixels[partial, :3] = np.minimum(np.rint(straight), 255.0)
-        return pixels
+        return straight(picture_rows(self._resolved.read(components=4), self.size))
+
+    def read_into(self, buffer: moderngl.Buffer) -> None:
+        """Have the resolved picture copied into a buffer, as soon as the driver gets to it.
+
+        Parameters
+        ----------
+        buffer : moderngl.Buffer
+            4 bytes a pixel, last row first; ``picture_rows`` makes a picture of what is read
+            from it. Whoever reads it waits until it is there.
+        """
+        self._resolved.read_into(buffer, components=4)
 
     def release(self) -> None:
         """Free framebuffers and textures."""
         for item in self._owned:
             item.release()
+
+
+def picture_rows(data: bytes, size: tuple[int, int]) -> Bytes:
+    """Return what OpenGL read as a picture: (H, W, 4) uint8, first row at the top, not a copy.
+
+    Parameters
+    ----------
+    data : bytes
+        Last row first.
+    size : (int, int)
+        Width and height.
+    """
+    return np.frombuffer(data, dtype=np.uint8).reshape(size[1], size[0], 4)[::-1]
+
+
+def straight(pixels: Bytes) -> Bytes:
+    """Return colours that are not multiplied by their alpha any more: (H, W, 4), a copy."""
+    pixels = pixels.copy()
+    alpha = pixels[..., 3]
+    partial = (alpha > 0) & (alpha < 255)
+    if partial.any():
+        colors = pixels[partial, :3].astype(np.float64) * 255.0 / alpha[partial, None]
+        pixels[partial, :3] = np.minimum(np.rint(colors), 255.0)
+    return pixels

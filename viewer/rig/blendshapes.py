@@ -23,21 +23,31 @@ class BlendShapes:
     offsets : (S, V, 3), or Deferred
         Figure units per unit of weight; read from the file when a weight is first not 0.
     groups : tuple of S str
-        What each belongs to: ``"shape"`` (a weight of 1 is one standard deviation) or
-        ``"expression"``.
+        What each belongs to: ``"shape"`` (a weight of 1 is one standard deviation),
+        ``"expression"``, or ``"morph"`` (a weight of 1 is a target reached).
+    normal_offsets : (S, V, 3), or Deferred, or None
+        Directions in which the rest normals change, per unit of weight; None if the normals are
+        those of the changed surface.
     """
 
     names: tuple[str, ...]
     offsets: Floats | Deferred
     groups: tuple[str, ...] = ()
+    normal_offsets: Floats | Deferred | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.offsets, Deferred):
             offsets = frozen("offsets", self.offsets, (len(self.names), None, 3))
             object.__setattr__(self, "offsets", offsets)
+        given = self.normal_offsets
+        if given is not None and not isinstance(given, Deferred):
+            given = frozen("normal_offsets", given, (None, None, 3))
+            object.__setattr__(self, "normal_offsets", given)
         if not self.groups:
             object.__setattr__(self, "groups", ("shape",) * len(self.names))
         _check_shape("offsets", self.offsets.shape, (len(self.names), self.n_vertices, 3))
+        if given is not None:
+            _check_shape("normal_offsets", given.shape, self.offsets.shape)
         if len(self.groups) != len(self.names):
             raise RigError(f"groups: expected {len(self.names)}, found {len(self.groups)}")
 
@@ -69,12 +79,45 @@ class BlendShapes:
         RigError
             If there are more weights than directions.
         """
+        return self._weighted(self.offsets, weights)
+
+    def normal_displacement(self, weights: Floats) -> Floats | None:
+        """Return what is added to the rest normals, as ``displacement`` is to the vertices.
+
+        Parameters
+        ----------
+        weights : (N,)
+            N <= S; the others count as 0.
+
+        Returns
+        -------
+        (V, 3) or None
+            None if the normals are to be those of the changed surface.
+
+        Raises
+        ------
+        RigError
+            If there are more weights than directions.
+        """
+        offsets = self.normal_offsets
+        return None if offsets is None else self._weighted(offsets, weights)
+
+    def _weighted(self, offsets: Floats | Deferred, weights: Floats) -> Floats:
         if len(weights) > self.n_shapes:
             raise RigError(f"expected at most {self.n_shapes} shape weights, found {len(weights)}")
         active = np.flatnonzero(weights)
         if len(active) == 0:
             return np.zeros((self.n_vertices, 3))
-        return np.einsum("s,sva->va", weights[active], _values(self.offsets)[active])
+        return np.einsum("s,sva->va", weights[active], _values(offsets)[active])
+
+    def direction_values(self) -> Floats:
+        """Return the offsets, read from the file now if they were not before: (S, V, 3)."""
+        return _values(self.offsets)
+
+    def normal_values(self) -> Floats:
+        """Return the offsets of normals, zeros if there are none: (S, V, 3)."""
+        offsets = self.normal_offsets
+        return np.zeros(self.offsets.shape) if offsets is None else _values(offsets)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

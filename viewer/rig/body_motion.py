@@ -10,7 +10,7 @@ from viewer.errors import RigError
 from viewer.rig.arrays import Floats, frozen
 from viewer.rig.figure import Figure
 from viewer.rig.hands import Hand
-from viewer.rig.quaternion import rotation_vector_to_quaternion
+from viewer.rig.quaternion import multiply, rotation_vector_to_quaternion
 from viewer.rig.rotation import quaternion_to_matrix
 from viewer.rig.sampled_clip import SampledClip
 from viewer.rig.shape import joint_directions, rest_joints
@@ -48,6 +48,9 @@ class BodyMotion:
         The axis that points up in the world; empty if unknown.
     facts : tuple of (str, str)
         What the file says beside, for ``viewer info``.
+    world_turns : (N, 3) or None
+        Rotation vectors that turn the whole body about the figure's origin after ``vectors`` have
+        posed it, V = W (R (X - J0) + J0) + T; needs ``about_origin`` to be False.
     """
 
     name: str
@@ -62,6 +65,7 @@ class BodyMotion:
     flat_hands: bool = False
     up: str = ""
     facts: tuple[tuple[str, str], ...] = ()
+    world_turns: Floats | None = None
 
     def __post_init__(self) -> None:
         def put(name: str, shape: tuple[int | None, ...]) -> None:
@@ -72,6 +76,7 @@ class BodyMotion:
         put("translations", (len(self.vectors), 3))
         put("shape", (None, None))
         put("expression", (None, None))
+        put("world_turns", (len(self.vectors), 3))
 
     @property
     def n_rows(self) -> int:
@@ -83,7 +88,8 @@ def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[str
     """Return a figure's clip of a body motion: joints found by name.
 
     With the root turning about the origin, the figure's translation is t = T - J0 + R J0, where
-    J0 is the root joint of the frame's own shape; so the vertices are exactly R X + T.
+    J0 is the root joint of the frame's own shape; so the vertices are exactly R X + T. A turn W of
+    the whole body makes the root's rotation W R and the translation T - J0 + W J0.
 
     Parameters
     ----------
@@ -125,12 +131,15 @@ def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[str
         )
     weights, more = _weights(motion, figure)
     rotations = rotation_vector_to_quaternion(vectors)
-    translations = motion.translations
-    if motion.about_origin:
+    translations, turns = motion.translations, None
+    if motion.world_turns is not None:
+        turns = rotation_vector_to_quaternion(motion.world_turns)
+        rotations[:, 0] = multiply(turns, rotations[:, 0])
+    elif motion.about_origin:
+        turns = rotations[:, 0]
+    if turns is not None:
         root = root_positions(figure, weights)
-        turned = np.einsum(
-            "nab,nb->na", quaternion_to_matrix(rotations[:, 0]), root + 0.0 * translations
-        )
+        turned = np.einsum("nab,nb->na", quaternion_to_matrix(turns), root + 0.0 * translations)
         translations = translations - root + turned
     clip = SampledClip(
         motion.name,

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
 
 from viewer.errors import RigError
-from viewer.rig.arrays import Bools, Floats, frozen
+from viewer.rig.arrays import Floats, frozen
 from viewer.rig.pose import Pose
 from viewer.rig.skeleton import Skeleton, clamp_dofs
 
 __all__ = [
     "EXTRAPOLATIONS",
+    "SHORTEST",
     "TANGENT_RULES",
     "Channel",
     "Clip",
@@ -21,6 +23,7 @@ __all__ = [
     "Tangent",
     "check_fit",
     "evaluate",
+    "is_course_rig",
     "sample",
     "slopes",
 ]
@@ -28,6 +31,9 @@ __all__ = [
 Extrapolation = Literal["constant", "linear", "cycle", "cycle_offset", "bounce"]
 EXTRAPOLATIONS: tuple[Extrapolation, ...] = get_args(Extrapolation)
 """What a curve does before its first and after its last key."""
+
+SHORTEST = 1e-9
+"""Seconds: keys that are no farther apart lie at one time, and no slope is measured there."""
 
 TangentRule = Literal["flat", "linear", "smooth"]
 TANGENT_RULES: tuple[TangentRule, ...] = get_args(TangentRule)
@@ -68,6 +74,24 @@ class Channel:
             raise RigError(f"tangents: expected {count} pairs, found {len(self.tangents)}")
         if (np.diff(self.times) < 0).any():
             raise RigError("times: expected seconds that never fall")
+        # Thousands of keys share a few pairs.
+        pairs = {pair: (_tangent(pair[0]), _tangent(pair[1])) for pair in set(self.tangents)}
+        object.__setattr__(self, "tangents", tuple(pairs[pair] for pair in self.tangents))
+        wrong = next((mode for mode in self.extrapolation if mode not in EXTRAPOLATIONS), None)
+        if wrong is not None or len(self.extrapolation) != 2:
+            raise RigError(
+                f"extrapolation: expected two of {', '.join(EXTRAPOLATIONS)}, "
+                f"found {self.extrapolation}"
+            )
+
+
+def _tangent(given: Tangent) -> Tangent:
+    """Return a rule as it is, a slope as a plain number, which files show in full."""
+    if given in TANGENT_RULES:
+        return given
+    if isinstance(given, str) or not math.isfinite(given):
+        raise RigError(f"tangent: expected {', '.join(TANGENT_RULES)} or a number, found {given}")
+    return float(given)
 
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
@@ -89,6 +113,12 @@ class Clip:
     start: float
     end: float
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "start", float(self.start))
+        object.__setattr__(self, "end", float(self.end))
+        if not (math.isfinite(self.start) and self.start <= self.end < math.inf):
+            raise RigError(f"clip {self.name}: expected a range, found {self.start} to {self.end}")
+
 
 def slopes(channel: Channel) -> Floats:
     """Return the slopes on both sides of every key, as the tangent rules make them.
@@ -104,31 +134,28 @@ def slopes(channel: Channel) -> Floats:
     Returns
     -------
     (N, 2)
-        Incoming and outgoing slope, value per second; 0 over a span without duration.
+        Incoming and outgoing slope, value per second; 0 over a span without duration, and for
+        all keys at one time.
     """
     times, values = channel.times, channel.values
     count = len(times)
     result = np.zeros((count, 2))
-    if count < 2:
+    if count < 2 or times[-1] - times[0] <= SHORTEST:
         return result
     spans = _ratio(np.diff(values), np.diff(times))
-    before = np.concatenate([spans[:1], spans])
-    after = np.concatenate([spans, spans[-1:]])
-    smooth = before.copy()
-    smooth[-1] = after[-1]
-    smooth[1:-1] = _ratio(values[2:] - values[:-2], times[2:] - times[:-2])
-    rules = {"flat": (np.zeros(count),) * 2, "linear": (before, after), "smooth": (smooth,) * 2}
-    for key, pair in enumerate(channel.tangents):
-        for side, tangent in enumerate(pair):
-            if isinstance(tangent, str):
-                result[key, side] = rules[tangent][side][key]
-            else:
-                result[key, side] = tangent
-    return result
+    linear = np.stack([np.append(spans[0], spans), np.append(spans, spans[-1])], axis=1)
+    smooth = linear.copy()
+    smooth[1:-1] = _ratio(values[2:] - values[:-2], times[2:] - times[:-2])[:, None]
+    known = {"flat": result, "linear": linear, "smooth": smooth}
+    for rule, rates in known.items():
+        follows = np.array([[tangent == rule for tangent in pair] for pair in channel.tangents])
+        result = np.where(follows, rates, result)
+    numbers = [[0.0 if t in known else float(t) for t in pair] for pair in channel.tangents]
+    return result + np.array(numbers)
 
 
 def _ratio(rise: Floats, run: Floats) -> Floats:
-    return np.divide(rise, run, out=np.zeros_like(rise), where=run != 0.0)
+    return np.divide(rise, run, out=np.zeros_like(rise), where=run > SHORTEST)
 
 
 def evaluate(channel: Channel, times: Floats) -> Floats:
@@ -136,7 +163,7 @@ def evaluate(channel: Channel, times: Floats) -> Floats:
 
     With u in 0..1 across a span of h seconds, v0 = h out0 and v1 = h in1, the value is
     ((a u + b) u + v0) u + p0, a = 2 p0 - 2 p1 + v0 + v1, b = -3 p0 + 3 p1 - 2 v0 - v1
-    (CSE169 course notes).
+    (CSE169 course notes). On a key it is exactly the key's value.
 
     Parameters
     ----------
@@ -150,51 +177,10 @@ def evaluate(channel: Channel, times: Floats) -> Floats:
     (...)
         Lengths or radians.
     """
+    from viewer.rig.clip_table import evaluate_channels
+
     times = np.asarray(times, dtype=np.float64)
-    if len(channel.times) == 0:
-        return np.zeros(times.shape)
-    first, last = channel.times[0], channel.times[-1]
-    if first == last:
-        return np.full(times.shape, channel.values[-1])
-    edges = slopes(channel)
-    inside, shift = np.clip(times, first, last), np.zeros(times.shape)
-    for outside, mode, key, side in (
-        (times < first, channel.extrapolation[0], 0, 0),
-        (times > last, channel.extrapolation[1], -1, 1),
-    ):
-        if mode == "linear":
-            distance = times - channel.times[key]
-            shift = np.where(outside, edges[key, side] * distance, shift)
-        elif mode != "constant":
-            folded, offset = _fold(channel, times, mode)
-            inside = np.where(outside, folded, inside)
-            shift = np.where(outside, offset, shift)
-    return _hermite(channel, edges, inside) + shift
-
-
-def _fold(channel: Channel, times: Floats, mode: Extrapolation) -> tuple[Floats, Floats]:
-    """Return where in the keys a repeated curve is at these times, and what to add."""
-    first, last = channel.times[0], channel.times[-1]
-    period = last - first
-    turns = np.floor((times - first) / period)
-    folded = times - turns * period
-    if mode == "bounce":
-        odd: Bools = turns % 2 != 0
-        return np.where(odd, first + last - folded, folded), np.zeros(times.shape)
-    rise = channel.values[-1] - channel.values[0]
-    return folded, turns * rise if mode == "cycle_offset" else np.zeros(times.shape)
-
-
-def _hermite(channel: Channel, edges: Floats, times: Floats) -> Floats:
-    span = np.clip(
-        np.searchsorted(channel.times, times, side="right") - 1, 0, len(channel.times) - 2
-    )
-    duration = channel.times[span + 1] - channel.times[span]
-    u = _ratio(times - channel.times[span], duration)
-    p0, p1 = channel.values[span], channel.values[span + 1]
-    v0, v1 = duration * edges[span, 1], duration * edges[span + 1, 0]
-    a, b = 2.0 * p0 - 2.0 * p1 + v0 + v1, -3.0 * p0 + 3.0 * p1 - 2.0 * v0 - v1
-    return ((a * u + b) * u + v0) * u + p0
+    return evaluate_channels((channel,), times.ravel())[:, 0].reshape(times.shape)
 
 
 def sample(clip: Clip, skeleton: Skeleton, time: float, out: Pose) -> None:
@@ -218,14 +204,32 @@ def sample(clip: Clip, skeleton: Skeleton, time: float, out: Pose) -> None:
     out.dofs[:] = clamp_dofs(skeleton, out.dofs)
 
 
+def is_course_rig(skeleton: Skeleton) -> bool:
+    """Return whether a skeleton's DOFs are those that ``.anim`` channels move, in their order.
+
+    That is: translation x, y, z of the root, then rotations x, y, z of joint 0, 1, 2 and so on.
+    """
+    count = skeleton.n_joints
+    if skeleton.n_dofs != 3 + 3 * count:
+        return False
+    joints = np.concatenate([[0, 0, 0], np.repeat(np.arange(count), 3)])
+    kinds = np.concatenate([[0, 1, 2], np.tile([3, 4, 5], count)])
+    return bool((skeleton.dof_joints == joints).all() and (skeleton.dof_kinds == kinds).all())
+
+
 def check_fit(clip: Clip, skeleton: Skeleton) -> None:
     """Refuse a clip that was made for another skeleton.
 
     Raises
     ------
     RigError
-        With both numbers.
+        With both numbers, or if the DOFs are not those of ``is_course_rig``.
     """
+    if not is_course_rig(skeleton):
+        raise RigError(
+            f"clip {clip.name} moves a root and three angles of each joint, "
+            "which is not how this skeleton moves"
+        )
     if len(clip.channels) != skeleton.n_dofs:
         raise RigError(
             f"clip {clip.name} has {len(clip.channels)} channels, the skeleton needs "

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.clip import EXTRAPOLATIONS, Channel, Clip, slopes
+from viewer.rig.clip import EXTRAPOLATIONS, SHORTEST, Channel, Clip, slopes
 from viewer.rig.memo import Memo
 
-__all__ = ["evaluate_all"]
+__all__ = ["evaluate_all", "evaluate_channels"]
 
 _MODES: dict[str, int] = {mode: index for index, mode in enumerate(EXTRAPOLATIONS)}
 
@@ -48,19 +49,30 @@ def evaluate_all(clip: Clip, times: Floats) -> tuple[Ints, Floats]:
         Lengths or radians; channels without keys are 0.
     """
     table = _tables.get(clip, (), lambda: _table(clip.channels))
-    times = np.atleast_1d(np.asarray(times, dtype=np.float64))[:, None]
+    return table.targets, _values(table, np.atleast_1d(times))
+
+
+def evaluate_channels(channels: Sequence[Channel], times: Floats) -> Floats:
+    """Return some curves at many times, without remembering anything: (T, C) for times (T,)."""
+    return _values(_table(channels), times)
+
+
+def _values(table: _Table, times: Floats) -> Floats:
+    times = np.asarray(times, dtype=np.float64)[:, None]
     if not len(table.targets):
-        return table.targets, np.zeros((len(times), 0))
+        return np.zeros((len(times), 0))
     every = np.arange(len(table.targets))
     first, last = table.times[:, 0], table.times[every, table.last]
-    period = last - first
-    is_flat = period == 0.0
-    inside, shift = _inside(table, times, first, last, np.where(is_flat, 1.0, period))
-    values = _hermite(table, inside) + shift
-    return table.targets, np.where(is_flat, table.values[every, table.last], values)
+    at_first, at_last = table.values[:, 0], table.values[every, table.last]
+    is_flat = last - first <= SHORTEST
+    inside, shift = _inside(table, times, first, last, np.where(is_flat, 1.0, last - first))
+    # The ends are given out as they are: of several keys at one time, the outer one counts.
+    values = np.where(inside >= last, at_last, _hermite(table, inside))
+    values = np.where((inside <= first) & (times < first), at_first, values) + shift
+    return np.where(is_flat, at_last, values)
 
 
-def _table(channels: tuple[Channel, ...]) -> _Table:
+def _table(channels: Sequence[Channel]) -> _Table:
     width = max((len(channel.times) for channel in channels), default=0)
     count, width = len(channels), max(width, 1)
     times = np.full((count, width), np.inf)
@@ -87,8 +99,9 @@ def _inside(
     every = np.arange(len(table.targets))
     inside = np.clip(times, first, last)
     shift = np.zeros(inside.shape)
-    turns = np.floor((times - first) / period)
-    folded = times - turns * period
+    # The remainder is exact, however far away the time and however short the period.
+    turns, rest = np.divmod(times - first, period)
+    folded = np.minimum(first + rest, last)
     mirrored = np.where(turns % 2 != 0, first + last - folded, folded)
     rise = table.values[every, table.last] - table.values[:, 0]
     ends = ((times < first, 0, first, table.edges[:, 0, 0]),
@@ -125,7 +138,7 @@ def _hermite(table: _Table, times: Floats) -> Floats:
     following = np.minimum(span + 1, table.last)
     start = table.times[every, span]
     duration = table.times[every, following] - start
-    u = np.divide(times - start, duration, out=np.zeros(times.shape), where=duration > 0.0)
+    u = np.divide(times - start, duration, out=np.zeros(times.shape), where=duration > SHORTEST)
     p0, p1 = table.values[every, span], table.values[every, following]
     v0, v1 = duration * table.edges[every, span, 1], duration * table.edges[every, following, 0]
     a, b = 2.0 * p0 - 2.0 * p1 + v0 + v1, -3.0 * p0 + 3.0 * p1 - 2.0 * v0 - v1

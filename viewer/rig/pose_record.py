@@ -295,7 +295,8 @@ def _apply_weights(group: str, values: Floats | None, figure: Figure, pose: Pose
     if values is None or len(values) == 0:
         return
     groups = figure.blend_shapes.groups if figure.blend_shapes else ()
-    rows = [index for index, name in enumerate(groups) if name == group]
+    # Whatever is no shape was recorded as an expression, morphs among them.
+    rows = [index for index, name in enumerate(groups) if (name == "shape") == (group == "shape")]
     values = np.asarray(values, dtype=np.float64).ravel()
     if len(values) > len(rows) and values[len(rows) :].any():
         raise RigError(f"{figure.name} has {len(rows)} {group} coefficients, found {len(values)}")

@@ -58,12 +58,14 @@ def shaped(figure: Figure, weights: Floats) -> Figure:
         return figure
 
     def make() -> Figure:
-        return with_rest_mesh(figure, mesh.positions + shapes.displacement(weights))
+        turned = shapes.normal_displacement(weights)
+        normals = None if turned is None else mesh.normals + turned
+        return with_rest_mesh(figure, mesh.positions + shapes.displacement(weights), normals)
 
     return _shaped.get(figure, weights.tobytes(), make)
 
 
-def with_rest_mesh(figure: Figure, positions: Floats) -> Figure:
+def with_rest_mesh(figure: Figure, positions: Floats, normals: Floats | None = None) -> Figure:
     """Return the figure with another rest mesh, its joints regressed from it.
 
     Without a joint regressor the joints stay where they are. Rest rotations stay.
@@ -74,6 +76,8 @@ def with_rest_mesh(figure: Figure, positions: Floats) -> Figure:
         With a mesh.
     positions : (V, 3)
         Its new rest vertices, figure units.
+    normals : (V, 3), optional
+        Its new rest normals; those of the new surface if omitted.
 
     Returns
     -------
@@ -82,7 +86,7 @@ def with_rest_mesh(figure: Figure, positions: Floats) -> Figure:
     """
     mesh, skeleton, skin = figure.mesh, figure.skeleton, figure.skin
     assert mesh is not None  # the caller has its positions
-    normals = vertex_normals(positions, mesh.triangles)
+    normals = vertex_normals(positions, mesh.triangles) if normals is None else normals
     new_mesh = replace(mesh, positions=positions, normals=normals)
     if figure.joint_regressor is None or skeleton is None:
         return replace(figure, mesh=new_mesh)

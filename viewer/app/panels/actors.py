@@ -9,7 +9,9 @@ from viewer.app.actions import start_following, stop_following
 from viewer.app.state import AppState
 from viewer.app.widgets import button, checkbox, note_item, same_line_if_room
 from viewer.errors import printable
+from viewer.rig.fit_error import fitted_body, keypoint_distances
 from viewer.rig.mesh import box_size
+from viewer.rig.scalars import length_unit
 from viewer.rig.scene import Actor
 
 __all__ = ["draw"]
@@ -28,6 +30,7 @@ def draw(state: AppState) -> None:
     _draw_place(state, actor)
     _draw_following(state)
     _draw_trails(state, actor)
+    _draw_fit(state, actor)
 
 
 def _draw_list(state: AppState) -> None:
@@ -125,6 +128,27 @@ def _draw_trails(state: AppState, actor: Actor) -> None:
         _explain("how far paths go back and forth; 0 shows all of the motion")
         if changed:
             options.trail_seconds = max(value, 0.0)
+
+
+def _draw_fit(state: AppState, actor: Actor) -> None:
+    """Say how far a person's captured keypoints are from the joints of the body fitted to them."""
+    same = [a for a in state.scene.actors if a.points is not None and a.person == actor.person]
+    points = actor if actor.points is not None else next(iter(same), None)
+    body = None if points is None else fitted_body(points, state.scene.actors)
+    if points is None or body is None:
+        return
+    distances = keypoint_distances(points, body)
+    if not distances:
+        return
+    factor, unit = length_unit(body.figure)
+    mean = sum(distances.values()) / len(distances)
+    imgui.separator()
+    text = f"Keypoints to joints: {factor * mean:.1f} {unit} on average###fit"
+    if imgui.tree_node(text):
+        for name, distance in sorted(distances.items(), key=lambda item: -item[1]):
+            imgui.text_unformatted(f"{factor * distance:8.1f} {unit}  {printable(name, 40)}")
+        imgui.tree_pop()
+    note_item(state, "fit")
 
 
 def _explain(text: str) -> None:

@@ -75,7 +75,7 @@ def _draw_actor_choice(state: AppState) -> None:
     if len(state.scene.actors) < 2:
         return
     names = [
-        f"{number}  {printable(actor.figure.name, 60)}"
+        f"{number}  {printable(actor.name, 60)}"
         for number, actor in enumerate(state.scene.actors, 1)
     ]
     imgui.set_next_item_width(-1.0)

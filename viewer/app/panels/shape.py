@@ -1,4 +1,4 @@
-"""Shape: a slider per shape and expression coefficient, and what the body then measures."""
+"""Shape: a slider per coefficient of shape, expression or morph, and what the body measures."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from viewer.errors import printable
 from viewer.rig.figure import Figure
 from viewer.rig.measure import measure
 from viewer.rig.memo import Memo
+from viewer.rig.morph_target import MORPH_GROUP
 from viewer.rig.pose import Pose
 from viewer.rig.shape import shaped
 
@@ -19,7 +20,7 @@ __all__ = ["draw"]
 
 _REACH = 5.0  # standard deviations that a slider covers; more can be typed
 _WIDEST = 20.0  # a slider, in heights of the letters
-_HEADINGS = {"shape": "Shape", "expression": "Expression"}
+_HEADINGS = {"shape": "Shape", "expression": "Expression", MORPH_GROUP: "Morphs"}
 _measured: Memo[Figure, tuple[tuple[str, str], ...]] = Memo(kept=4)
 
 
@@ -30,18 +31,16 @@ def draw(state: AppState) -> None:
         imgui.text_wrapped("This figure has one fixed shape.")
         return
     _draw_measures(figure, pose)
-    if button(state, "Random"):
+    varies = "shape" in figure.blend_shapes.groups
+    if varies and button(state, "Random"):
         state.shape_seed += 1
         random_shape(state)
-    same_line_if_room("Reset shape")
+    if varies:
+        same_line_if_room("Reset shape")
     if button(state, "Reset shape"):
         reset_shape(state)
-    imgui.set_next_item_width(_width_beside("seed", 8.0))
-    changed, seed = imgui.input_int("seed", state.shape_seed)
-    note_item(state, "seed")
-    if changed and seed != state.shape_seed:
-        state.shape_seed = max(seed, 0)
-        random_shape(state)
+    if varies:
+        _draw_seed(state)
     if figure.correctives is not None:
         skinning = state.options.skinning
         skinning.correctives = checkbox(state, "Pose correctives", skinning.correctives)
@@ -52,6 +51,15 @@ def draw(state: AppState) -> None:
         _draw_coefficients(state, figure, pose)
         imgui.pop_item_width()
     imgui.end_child()
+
+
+def _draw_seed(state: AppState) -> None:
+    imgui.set_next_item_width(_width_beside("seed", 8.0))
+    changed, seed = imgui.input_int("seed", state.shape_seed)
+    note_item(state, "seed")
+    if changed and seed != state.shape_seed:
+        state.shape_seed = max(seed, 0)
+        random_shape(state)
 
 
 def _width_beside(label: str, most: float) -> float:
@@ -101,23 +109,25 @@ def _draw_coefficients(state: AppState, figure: Figure, pose: Pose) -> None:
                 imgui.align_text_to_frame_padding()
                 imgui.text_disabled(row)
             else:
-                _draw_slider(state, shapes.names[row], row, pose)
+                is_morph = shapes.groups[row] == MORPH_GROUP
+                _draw_slider(state, shapes.names[row], row, pose, is_morph)
     clipper.end()
 
 
-def _draw_slider(state: AppState, name: str, index: int, pose: Pose) -> None:
+def _draw_slider(state: AppState, name: str, index: int, pose: Pose, is_morph: bool) -> None:
     shown = printable(name, 40)
+    low, high = (0.0, 1.0) if is_morph else (-_REACH, _REACH)
     changed, value = imgui.slider_float(
-        f"{shown}##{index}", float(pose.shape_weights[index]), -_REACH, _REACH, "%.2f"
+        f"{shown}##{index}", float(pose.shape_weights[index]), low, high, "%.2f"
     )
     note_item(state, f"coefficient {index}")
     if changed and abs(value) < 1e6:  # "nan" and "1e99" can be typed into a slider
         pose.shape_weights[index] = value
-    _draw_marks()
+    if not is_morph:
+        _draw_marks()
     if imgui.is_item_hovered():
-        imgui.set_tooltip(
-            f"{shown}: standard deviations\nCtrl+click types a value, double-click resets"
-        )
+        unit = "1 reaches the target" if is_morph else "standard deviations"
+        imgui.set_tooltip(f"{shown}: {unit}\nCtrl+click types a value, double-click resets")
         if imgui.is_mouse_double_clicked(imgui.MouseButton_.left):
             pose.shape_weights[index] = 0.0
 

@@ -1,0 +1,68 @@
+"""Folders as EasyMocap writes them, for tests."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from viewer.formats import Source
+from viewer.formats.easymocap import open_capture
+
+
+def waves(*shape: int, seed: float = 0.0) -> np.ndarray:
+    """Return numbers from -0.6 to 0.6 with three decimals, all different."""
+    count = int(np.prod(shape))
+    return np.round(0.6 * np.sin(seed + 1.7 * np.arange(1, count + 1) ** 1.3), 3).reshape(shape)
+
+
+def body(person: int, count: int = 72, seed: float = 0.0, flat: bool = False, **changes) -> dict:
+    """Return a record of body parameters; a change of None leaves a key out."""
+    poses = waves(count, seed=seed)
+    if count not in (69, 63):
+        poses[:3] = 0.0
+    values = {
+        "Rh": waves(3, seed=seed + 1),
+        "Th": waves(3, seed=seed + 2),
+        "poses": poses,
+        "shapes": waves(10, seed=person + 3),
+    }
+    record = {key: value.tolist() if flat else [value.tolist()] for key, value in values.items()}
+    record = {"id": person, **record, **changes}
+    return {key: value for key, value in record.items() if value is not None}
+
+
+def points(person: int, count: int = 25, columns: int = 4, seed: float = 0.0, **changes) -> dict:
+    """Return a record of keypoints, confidences from 0.4 to 1."""
+    rows = waves(count, columns, seed=seed)
+    if columns == 4:
+        rows[:, 3] = 0.7 + 0.5 * rows[:, 3]
+    return {"id": person, "keypoints3d": rows.tolist(), **changes}
+
+
+def write_frames(folder: Path, frames: dict[int | str, object]) -> Path:
+    """Write frame files: numbers become six digits, texts are written as they are."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for frame, content in frames.items():
+        name = f"{frame:06}" if isinstance(frame, int) else frame
+        text = content if isinstance(content, str) else json.dumps(content)
+        (folder / f"{name}.json").write_text(text)
+    return folder
+
+
+def opened(path: Path, **options):
+    """Return a capture, its parts, and the warnings of the source."""
+    source = Source.open(path)
+    capture = open_capture(source, **options)
+    return capture, list(capture.parts()), source.warnings
+
+
+def rows_of(parts: list, person: int) -> list[int]:
+    """Return the frames in which a person's body is present, in all parts together."""
+    frames = [
+        np.flatnonzero(part.bodies[person].timing.present)
+        for part in parts
+        if person in part.bodies
+    ]
+    return [int(frame) for part in frames for frame in part]

@@ -1,0 +1,291 @@
+"""``viewer render`` of more than one frame: numbered pictures, videos, contact sheets."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import re
+import string
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from viewer.commands._numbers import number
+from viewer.commands._output import check_output
+from viewer.commands._pose import pose_files
+from viewer.commands._progress import Progress
+from viewer.commands._scene import print_warnings
+from viewer.commands._shots import Range, Shots, Turntable, parse_range, parse_turntable, shots_of
+from viewer.commands._view import camera_of
+from viewer.errors import OutputError, ViewerError, printable
+from viewer.formats._video import VIDEOS
+from viewer.rig.scene import Scene
+
+if TYPE_CHECKING:
+    from viewer.formats._picture_sinks import PictureSink, SheetSink
+    from viewer.formats._video import VideoSink
+    from viewer.rendering.options import DisplayOptions
+    from viewer.rendering.recorder import Recording
+
+__all__ = ["Request", "add_sequence_arguments", "draw_sequence", "request_of"]
+
+_FIELD = re.compile(r"\{frame[:!}]")
+_MOST_CELLS = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """What is asked for, checked as far as it can be before anything is opened.
+
+    Attributes
+    ----------
+    kind : "pictures", "video" or "sheet"
+        One file each, one file that moves, or one picture of all.
+    output : Path
+        As given, with ``{frame}`` for pictures.
+    range : Range or None
+        Which frames; None for the whole motion.
+    turntable : Turntable or None
+        How the camera turns.
+    is_certain : bool
+        False for a GIF that is a still picture if nothing moves.
+    """
+
+    kind: str
+    output: Path
+    range: Range | None
+    turntable: Turntable | None
+    is_certain: bool = True
+
+
+def add_sequence_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options of pictures in motion."""
+    group = parser.add_argument_group(
+        "motion: -o frame_{frame:05}.png for numbered pictures, -o walk.mp4, .webm or .gif"
+    )
+    group.add_argument(
+        "--frames",
+        metavar="A:B[:STEP]",
+        help="frames A to B - 1 counted from 0, as --fps counts (default: the whole motion)",
+    )
+    group.add_argument(
+        "--turntable",
+        nargs="?",
+        const="",
+        metavar="SECONDS|DEGREESdeg",
+        help="turn the camera once around, in so many seconds, or by so many degrees",
+    )
+    group.add_argument(
+        "--contact-sheet", type=int, metavar="N", help="one picture of N frames, numbered"
+    )
+    group.add_argument(
+        "--speed", type=number, metavar="S", help="of videos: 0.5 is half as fast, -1 backwards"
+    )
+    group.add_argument(
+        "--follow", metavar="NAME", help="the camera goes with an actor or joint (or ACTOR/JOINT)"
+    )
+    group.add_argument(
+        "--quality", type=number, metavar="Q", help="of .mp4 and .webm: 0 to 100 (default 75)"
+    )
+
+
+def request_of(arguments: argparse.Namespace, output: Path) -> Request | None:
+    """Return what is asked for if it is more than one still picture.
+
+    Raises
+    ------
+    ViewerError
+        If options do not go together, or the name of numbered pictures has no number.
+    """
+    frames = None if arguments.frames is None else parse_range(arguments.frames)
+    turntable = None if arguments.turntable is None else parse_turntable(arguments.turntable)
+    kind, is_certain = _kind(arguments, output)
+    _check_options(arguments, kind if is_certain else "")
+    if not kind:
+        return None
+    if kind == "pictures":
+        _check_name(str(output))
+    return Request(kind, output, frames, turntable, is_certain)
+
+
+def _kind(arguments: argparse.Namespace, output: Path) -> tuple[str, bool]:
+    """Return what a name and options stand for, and whether it is certain; "" for a still."""
+    asks = arguments.frames is not None or arguments.turntable is not None
+    if arguments.contact_sheet is not None:
+        return "sheet", True
+    if _FIELD.search(str(output)):
+        return "pictures", True
+    if output.suffix.lower() == ".gif":
+        is_posed = arguments.frame is not None or arguments.time is not None
+        return ("video", asks) if asks or not is_posed else ("", True)
+    if output.suffix.lower() in VIDEOS:
+        return "video", True
+    return ("pictures", True) if asks else ("", True)
+
+
+def _check_options(arguments: argparse.Namespace, kind: str) -> None:
+    if kind and arguments.panels:
+        raise ViewerError("--panels: draws one picture; videos and sequences have no panels")
+    if arguments.frames is not None:
+        for option in ("frame", "time"):
+            if getattr(arguments, option) is not None:
+                raise ViewerError(f"--frames and --{option}: expected one of them, found both")
+    if arguments.follow is not None and not kind:
+        raise ViewerError("--follow: expected a video, contact sheet or numbered pictures")
+    for option in ("speed", "quality"):
+        if getattr(arguments, option) is not None and kind != "video":
+            suffix = Path(arguments.output).suffix.lower()
+            if not (kind == "" and suffix in VIDEOS):
+                raise ViewerError(f"--{option}: only videos have one: {', '.join(VIDEOS)}")
+    speed = arguments.speed
+    if speed is not None and not 1e-3 <= abs(speed) <= 1e3:
+        raise ViewerError(f"--speed: expected 0.001 to 1000 or their negatives, found {speed:g}")
+    cells = arguments.contact_sheet
+    if cells is not None and not 1 <= cells <= _MOST_CELLS:
+        raise ViewerError(f"--contact-sheet: expected 1 to {_MOST_CELLS} frames, found {cells}")
+    if kind == "sheet" and Path(arguments.output).suffix.lower() in (".mp4", ".webm"):
+        raise ViewerError("--contact-sheet: is a picture, as .png; found the name of a video")
+
+
+def _check_name(name: str) -> None:
+    """Hold the name of numbered pictures to one kind of field: ``{frame}``, ``{frame:05}``."""
+    try:
+        fields = [part for part in string.Formatter().parse(name) if part[1] is not None]
+    except ValueError:
+        fields = []
+    is_good = fields and all(
+        field == "frame" and conversion is None and re.fullmatch(r"0?\d{0,2}d?", spec or "")
+        for _, field, spec, conversion in fields
+    )
+    if not is_good:
+        raise ViewerError(
+            "--output: expected {frame} or {frame:05} in the name of numbered pictures, as "
+            f'frame_{{frame:05}}.png, found "{printable(name)}"'
+        )
+
+
+def draw_sequence(
+    request: Request,
+    arguments: argparse.Namespace,
+    scene: Scene,
+    options: DisplayOptions,
+    size: tuple[int, int],
+) -> str:
+    """Draw and write all frames; return the line that says what is where.
+
+    Raises
+    ------
+    ViewerError
+        If nothing moves, options make no sense for what was opened, or drawing fails.
+    OutputError
+        If a file is there already, or cannot be written.
+    """
+    from viewer.rendering.offscreen import Offscreen
+    from viewer.rendering.recorder import record
+
+    shots = shots_of(request, arguments, scene)
+    outputs = _outputs(request, shots)
+    inputs = [Path(file) for file in [*arguments.files, *pose_files(arguments)]]
+    _check_outputs(outputs, inputs, arguments.force)
+    sink = _sink(request, arguments, options, shots, outputs, size)
+    print_warnings([*shots.notes, *getattr(sink, "notes", [])])
+    frame_size = getattr(sink, "cell", size)
+    recording = _recording(arguments, scene, shots, options, frame_size)
+    title = f"drawing {printable(outputs[0].name)}"
+    with Offscreen(arguments.gpu) as offscreen, offscreen.context:
+        steps = record(recording, offscreen.renderer, sink)
+        # Closed while the context is still there, whatever happens.
+        with Progress(title, recording.n_frames) as line, contextlib.closing(steps):
+            for progress in steps:
+                line.show(progress.done)
+        print_warnings(offscreen.renderer.notes)
+    return _summary(request, shots, outputs, frame_size, sink)
+
+
+def _outputs(request: Request, shots: Shots) -> list[Path]:
+    if request.kind != "pictures":
+        return [request.output]
+    pattern = str(request.output)
+    return [Path(pattern.format(frame=number)) for number in shots.numbers]
+
+
+def _check_outputs(outputs: Sequence[Path], inputs: list[Path], force: bool) -> None:
+    """Refuse the whole sequence, before anything is drawn, if one of its files may not be."""
+    for folder in dict.fromkeys(output.parent for output in outputs):
+        if not folder.is_dir():
+            shown = printable(folder, 300)
+            raise OutputError(f"{printable(outputs[0], 300)}: the folder {shown} does not exist")
+    for output in outputs:
+        check_output(output, inputs, force)
+
+
+def _sink(
+    request: Request,
+    arguments: argparse.Namespace,
+    options: DisplayOptions,
+    shots: Shots,
+    outputs: list[Path],
+    size: tuple[int, int],
+) -> PictureSink | SheetSink | VideoSink:
+    if request.kind == "video":
+        from viewer.formats._video import VideoSink
+
+        quality = 75.0 if arguments.quality is None else arguments.quality
+        is_transparent = options.background == "transparent"
+        return VideoSink(outputs[0], size, shots.rate, quality, is_transparent)
+    from viewer.formats._picture_sinks import PictureSink, SheetSink
+
+    if request.kind == "sheet":
+        return SheetSink(outputs[0], size, shots.numbers)
+    return PictureSink(outputs)
+
+
+def _recording(
+    arguments: argparse.Namespace,
+    scene: Scene,
+    shots: Shots,
+    options: DisplayOptions,
+    size: tuple[int, int],
+) -> Recording:
+    """Return what is recorded, its camera fitted to the whole motion."""
+    from viewer.rendering.camera import Camera
+    from viewer.rendering.framing import find_follow, fit_turning, frame_motion
+    from viewer.rendering.recorder import Recording
+
+    recording = Recording(
+        scene,
+        shots.times,
+        Camera(up=scene.up),
+        size,
+        options,
+        moves=shots.moves,
+        fill=arguments.fill_gaps,
+        turn=shots.turn,
+        follow=None if arguments.follow is None else find_follow(scene, arguments.follow),
+    )
+    points, recording.box = frame_motion(recording)
+    recording.camera = camera_of(arguments, scene, points, size)
+    if arguments.distance is None:
+        fit_turning(recording.camera, points, size[0] / size[1], shots.turn)
+    return recording
+
+
+def _summary(
+    request: Request,
+    shots: Shots,
+    outputs: list[Path],
+    size: tuple[int, int],
+    sink: PictureSink | SheetSink | VideoSink,
+) -> str:
+    name, count = printable(outputs[0]), len(shots.times)
+    frames = "1 frame" if count == 1 else f"{count} frames"
+    pixels = f"{size[0]} x {size[1]}"
+    weight = f"{sink.n_bytes / 1e6:.2f} MB"
+    if request.kind == "video":
+        seconds, rate = count / shots.rate, f"{shots.rate:g} frames a second"
+        return f"{name}: {frames}, {seconds:.3g} s, {pixels}, {rate}, {weight}"
+    if request.kind == "sheet":
+        return f"{name}: {frames} of {pixels}, {weight}"
+    last = f" to {printable(outputs[-1].name)}" if count > 1 else ""
+    return f"{name}{last}: {frames}, {shots.seconds:.3g} s, {pixels}, {weight}"

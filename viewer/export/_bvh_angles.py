@@ -1,0 +1,99 @@
+"""Rotations as three angles about given axes, and angles that run on without jumps."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.rig.arrays import Floats
+from viewer.rig.rotation import axis_rotations
+
+__all__ = ["euler_angles", "unrolled"]
+
+_LOCKED = 1e-9  # cosine of the middle angle below which the outer two turn about one axis
+
+
+def euler_angles(matrices: Floats, order: str) -> Floats:
+    """Return angles a, b, c with R = R_i(a) R_j(b) R_k(c), i, j, k being the axes of ``order``.
+
+    With e = 1 where i, j, k is a turn of x, y, z and -1 otherwise: R[j, k] = -e sin a cos b,
+    R[k, k] = cos a cos b, and R_i(a)^T R = R_j(b) R_k(c) gives b and c.
+
+    Parameters
+    ----------
+    matrices : (..., 3, 3)
+        Rotations for column vectors.
+    order : str
+        ``"zyx"`` for R = Rz Ry Rx.
+
+    Returns
+    -------
+    (..., 3)
+        Radians, in the order of the axes; the middle one from -pi / 2 to pi / 2.
+    """
+    i, j, k = ("xyz".index(letter) for letter in order)
+    sign = _sign(order)
+    m = matrices
+    locked = np.hypot(m[..., j, k], m[..., k, k]) < _LOCKED
+    # Where only a sum of the outer angles counts, the first one is 0: see unrolled.
+    first = np.where(locked, 0.0, np.arctan2(-sign * m[..., j, k], m[..., k, k]))
+    rest = np.swapaxes(axis_rotations(i, first), -1, -2) @ m
+    second = np.arctan2(sign * rest[..., i, k], rest[..., k, k])
+    third = np.arctan2(sign * rest[..., j, i], rest[..., j, j])
+    return np.stack([first, second, third], axis=-1)
+
+
+def unrolled(angles: Floats, order: str) -> Floats:
+    """Return the same rotations with angles that are nearest to those of the frame before.
+
+    (a, b, c) and (a + pi, pi - b, c + pi) are one rotation, and so is every full turn more.
+    Where the middle angle is a right one, the outer two are any with the same sum or difference.
+
+    Parameters
+    ----------
+    angles : (N, ..., 3)
+        Radians, by frames; as ``euler_angles`` gives them.
+    order : str
+        Of the axes.
+
+    Returns
+    -------
+    (N, ..., 3)
+        Radians, of any size.
+    """
+    if len(angles) < 2:
+        return angles.copy()
+    angles = _unlocked(angles, order)
+    other = angles * [1.0, -1.0, 1.0] + np.pi
+    # From either form to the nearer one: the same cost from both, so the changes just add up.
+    stay = np.abs(_wrapped(angles[1:] - angles[:-1])).sum(axis=-1)
+    change = np.abs(_wrapped(other[1:] - angles[:-1])).sum(axis=-1)
+    changed = np.logical_xor.accumulate(change < stay - 1e-9, axis=0)
+    chosen = angles.copy()
+    chosen[1:] = np.where(changed[..., None], other[1:], angles[1:])
+    return np.unwrap(chosen, axis=0)
+
+
+def _wrapped(angles: Floats) -> Floats:
+    return (angles + np.pi) % (2.0 * np.pi) - np.pi
+
+
+def _unlocked(angles: Floats, order: str) -> Floats:
+    """Give locked frames the first angle of the frame before; the third makes up for it.
+
+    R_j(+-90 degrees) carries axis k to +-i (or -+i), so a + c or a - c is all that counts.
+    """
+    locked = np.cos(angles[..., 1]) < 2.0 * _LOCKED
+    if not locked.any():
+        return angles
+    frames = np.arange(len(angles)).reshape(-1, *[1] * (locked.ndim - 1))
+    before = np.maximum.accumulate(np.where(locked, 0, frames), axis=0)
+    first = np.take_along_axis(angles[..., 0], before, axis=0)
+    result = angles.copy()
+    result[..., 0] = np.where(locked, first, angles[..., 0])
+    sign = _sign(order) * np.sign(angles[..., 1])
+    result[..., 2] += np.where(locked, sign * (angles[..., 0] - first), 0.0)
+    return result
+
+
+def _sign(order: str) -> float:
+    return 1.0 if order in ("xyz", "yzx", "zxy") else -1.0

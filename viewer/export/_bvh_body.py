@@ -1,0 +1,233 @@
+"""A take as BVH has it: offsets at rest without rotation, and what turns and moves each joint.
+
+With W the world rotations of a joint at rest and P its place there, x the file's axes to the
+world's, e the figure's axes to the file's, R the local rotation of a frame, R_0 the one at rest::
+
+    offset    o_j = e (P_j - P_parent)                       nothing is turned at rest
+    rotation  Q_j = e W_parent R R_0^-1 W_parent^-1 e^-1     x in place of the first e at the root
+    position  p_j = D_parent^-1 (place_j - place_parent)     D: product of Q from the root on
+
+A joint whose p is o in every frame needs no position channels.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from viewer.export._bvh_angles import euler_angles
+from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.figure import Figure
+from viewer.rig.kinematics import forward_kinematics, world_matrices
+from viewer.rig.motion import Frames, rest_translations_of, world_frames
+from viewer.rig.pose import rest_pose
+from viewer.rig.rotation import quaternion_to_matrix
+
+__all__ = ["Body", "Space", "body_of", "rest_matrices", "shape_at", "shape_changes"]
+
+_BLOCK = 4096  # frames at a time, so that matrices of all frames never exist at once
+_NOISE = 1e-9  # of the skeleton's size: what moves less does not move
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Space:
+    """From a figure to a file.
+
+    Attributes
+    ----------
+    rest : (3, 3)
+        The figure's axes to the file's, e.
+    world : (3, 3)
+        The world's axes to the file's, x.
+    factor : float
+        Lengths in the file for one of the figure's.
+    """
+
+    rest: Floats
+    world: Floats
+    factor: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Body:
+    """What a file says of J joints in F frames, joints in the figure's order.
+
+    Attributes
+    ----------
+    offsets : (J, 3)
+        At rest, from the parent; of roots from the figure's origin.
+    angles : (F, J, 3)
+        Radians, in the order of the rotation channels.
+    positions : (F, J, 3)
+        Within the parent, offset included; of roots in the file's space.
+    moves : (J,) bool
+        Whose positions differ from the offset.
+    places : (F, J, 3)
+        Where the joints are in the file's space.
+    """
+
+    offsets: Floats
+    angles: Floats
+    positions: Floats
+    moves: Bools
+    places: Floats
+
+
+def rest_matrices(figure: Figure, offsets: Floats) -> Floats:
+    """Return joint space to figure space with all DOFs at 0, for given rest translations."""
+    assert figure.skeleton is not None  # whoever has frames has a skeleton
+    skeleton = replace(figure.skeleton, rest_translations=offsets)
+    pose = rest_pose(skeleton)
+    pose.dofs[:] = 0.0
+    return world_matrices(skeleton, pose)
+
+
+def body_of(figure: Figure, frames: Frames, reference: int, order: str, space: Space) -> Body:
+    """Return what a file says of a figure's frames.
+
+    Parameters
+    ----------
+    figure : Figure
+        Unshaped; the frames hold the shape.
+    frames : Frames
+        All present.
+    reference : int
+        The frame whose shape and scale all bones have; roots keep those of each frame.
+    order : str
+        Of the rotation channels.
+    space : Space
+        To the file.
+    """
+    skeleton = figure.skeleton
+    assert skeleton is not None  # whoever has frames has a skeleton
+    parents, count = skeleton.parents, frames.n_frames
+    weights = shape_at(frames, reference)
+    scale = float(frames.figure_scales[reference])
+    rest = rest_matrices(figure, rest_translations_of(figure, weights)[0])
+    points = scale * space.factor * rest[:, :3, 3] @ space.rest.T
+    inner = parents >= 0
+    offsets = points - np.where(inner[:, None], points[parents], 0.0)
+    shape = (count, skeleton.n_joints, 3)
+    angles, positions, places = np.empty(shape), np.empty(shape), np.empty(shape)
+    for start in range(0, count, _BLOCK):
+        block = slice(start, min(start + _BLOCK, count))
+        part = _block(frames, block)
+        places[block] = _places(figure, part, weights, scale) @ space.world.T * space.factor
+        turns = _rotations(figure, part, space)
+        angles[block] = euler_angles(turns, order)
+        world = np.swapaxes(
+            forward_kinematics(parents, np.ascontiguousarray(np.swapaxes(turns, 0, 1))), 0, 1
+        )
+        ways = places[block] - np.where(inner[:, None], places[block][:, parents], 0.0)
+        within = np.einsum("njba,njb->nja", world[:, parents], ways)
+        positions[block] = np.where(inner[:, None], within, ways)
+    size = float(np.ptp(points, axis=0).max())
+    noise = _NOISE * (size + 1e-3 * float(np.abs(places).max(initial=0.0)))
+    offsets, moves = _fixed(offsets, positions, inner, noise)
+    return Body(offsets, angles, positions, moves, places)
+
+
+def shape_at(frames: Frames, frame: int) -> Floats:
+    """Return the shape weights of one frame: (1, S)."""
+    weights = frames.shape_weights
+    return weights if len(weights) == 1 else weights[frame : frame + 1]
+
+
+def _block(frames: Frames, rows: slice) -> Frames:
+    weights = frames.shape_weights
+    return Frames(
+        frames.times[rows],
+        frames.present[rows],
+        frames.rotations[rows],
+        frames.translations[rows],
+        weights if len(weights) == 1 else weights[rows],
+        frames.figure_translations[rows],
+        frames.figure_scales[rows],
+    )
+
+
+def _places(figure: Figure, frames: Frames, weights: Floats, scale: float) -> Floats:
+    """Return joints in the world, bones of one shape and scale, roots where they are: (F, J, 3)."""
+    skeleton = figure.skeleton
+    assert skeleton is not None  # the caller looked
+    fixed = replace(frames, shape_weights=weights, figure_scales=np.full(frames.n_frames, scale))
+    places = world_frames(figure, fixed)[..., :3, 3]
+    is_shaped = len(frames.shape_weights) > 1
+    if not is_shaped and (frames.figure_scales == scale).all():
+        return places
+    roots = _roots(skeleton.parents)
+    own = (
+        rest_translations_of(figure, frames.shape_weights)[:, roots] + frames.translations[:, roots]
+    )
+    own = own * frames.figure_scales[:, None, None] + frames.figure_translations[:, None]
+    return places + own - places[:, roots]
+
+
+def _roots(parents: Ints) -> Ints:
+    """Return the root above each joint: (J,)."""
+    roots = np.arange(len(parents), dtype=np.int32)
+    for joint, parent in enumerate(parents):
+        if parent >= 0:
+            roots[joint] = roots[parent]
+    return roots
+
+
+def _rotations(figure: Figure, frames: Frames, space: Space) -> Floats:
+    """Return the file's local rotations: (F, J, 3, 3)."""
+    skeleton = figure.skeleton
+    assert skeleton is not None  # the caller looked
+    parents = skeleton.parents
+    rest = quaternion_to_matrix(skeleton.rest_rotations)
+    above = forward_kinematics(parents, rest)[parents]
+    above[parents < 0] = np.eye(3)
+    before = space.rest @ above
+    after = np.swapaxes(rest, -1, -2) @ np.swapaxes(before, -1, -2)
+    before[parents < 0] = space.world
+    turns = quaternion_to_matrix(frames.rotations)
+    if not (before == np.eye(3)).all():
+        turns = before @ turns
+    return turns if (after == np.eye(3)).all() else turns @ after
+
+
+def _fixed(offsets: Floats, positions: Floats, inner: Bools, noise: float) -> tuple[Floats, Bools]:
+    """Return offsets that hold what is shifted but still, and which joints move within theirs."""
+    low, high = positions.min(axis=0), positions.max(axis=0)
+    moves = inner & ((high - low) > noise).any(axis=1)
+    shifted = inner & ~moves & (np.abs(low - offsets) > noise).any(axis=1)
+    return np.where(shifted[:, None], low, offsets), moves
+
+
+def shape_changes(figure: Figure, frames: Frames, reference: int) -> tuple[float, int, int] | None:
+    """Return how much bones grow or shrink over time because the shape changes.
+
+    Parameters
+    ----------
+    figure : Figure
+        Unshaped.
+    frames : Frames
+        With a shape for all, or one for each.
+    reference : int
+        The frame to compare with.
+
+    Returns
+    -------
+    difference : float
+        Largest, figure units.
+    frame, joint : int
+        Where it is; the bone ends at the joint. None instead of all if the shape is one.
+    """
+    skeleton = figure.skeleton
+    if len(frames.shape_weights) < 2 or skeleton is None:
+        return None
+    first = rest_translations_of(figure, frames.shape_weights[reference : reference + 1])
+    worst = (0.0, reference, 0)
+    for start in range(0, frames.n_frames, _BLOCK):
+        moved = rest_translations_of(figure, frames.shape_weights[start : start + _BLOCK])
+        change = np.abs(np.linalg.norm(moved, axis=2) - np.linalg.norm(first, axis=2))
+        change[:, skeleton.parents < 0] = 0.0
+        change[~frames.present[start : start + _BLOCK]] = 0.0
+        row, joint = np.unravel_index(change.argmax(), change.shape)
+        if change[row, joint] > worst[0]:
+            worst = float(change[row, joint]), start + int(row), int(joint)
+    return worst

@@ -1,0 +1,78 @@
+"""Where the last joints of a skeleton end: by their vertices, their boxes, or the bone before."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.figure import Figure
+
+__all__ = ["end_offsets"]
+
+_MOSTLY = 0.5  # a weight from which on a vertex belongs to a joint
+_FEW = 4  # vertices that say nothing of a joint's extent
+_TOO_SHORT = 0.1  # of the bone before: shorter ends are not believed
+_HALF = 0.5  # of the bone before: what is written without better knowledge
+_NO_SIZE = {"m": 0.1}  # the end of a skeleton without any bone
+_DEFAULT_END = 1.0
+
+
+def end_offsets(figure: Figure, rest: Floats, leaves: Ints) -> Floats:
+    """Return how far the last joints reach at rest; none is 0.
+
+    Parameters
+    ----------
+    figure : Figure
+        Shaped.
+    rest : (J, 4, 4)
+        Joint space to figure space in the rest pose.
+    leaves : (L,)
+        Joints without children.
+
+    Returns
+    -------
+    (L, 3)
+        From the joint, figure space.
+    """
+    skeleton = figure.skeleton
+    assert skeleton is not None  # whoever has a motion has a skeleton
+    ends = np.zeros((len(leaves), 3))
+    size = float(np.ptp(rest[:, :3, 3], axis=0).max())
+    for row, leaf in enumerate(leaves):
+        bone = _last_bone(skeleton.parents, rest, int(leaf))
+        length = float(np.linalg.norm(bone)) or size or _NO_SIZE.get(figure.unit, _DEFAULT_END)
+        if not bone.any():
+            bone = np.eye(3)["xyz".index(figure.up)] * length
+        ends[row] = _HALF * bone
+        known = _by_vertices(figure, rest, int(leaf), bone)
+        if known is None and skeleton.boxes is not None:
+            known = rest[leaf, :3, :3] @ skeleton.boxes[leaf].sum(axis=0)
+        if known is not None and np.linalg.norm(known) > _TOO_SHORT * length:
+            ends[row] = known
+    return ends
+
+
+def _last_bone(parents: Ints, rest: Floats, joint: int) -> Floats:
+    """Return the way to a joint from the nearest joint above it that is elsewhere."""
+    above = int(parents[joint])
+    while above >= 0:
+        bone = rest[joint, :3, 3] - rest[above, :3, 3]
+        if bone.any():
+            return bone
+        above = int(parents[above])
+    return np.zeros(3)
+
+
+def _by_vertices(figure: Figure, rest: Floats, joint: int, bone: Floats) -> Floats | None:
+    """Return how far along the bone the joint's vertices reach."""
+    mesh, skin = figure.mesh, figure.skin
+    if mesh is None or skin is None:
+        return None
+    mine = np.flatnonzero((skin.joints == joint) & (skin.weights > _MOSTLY))
+    vertices = np.searchsorted(skin.starts, mine, side="right") - 1
+    if len(vertices) < _FEW:
+        return None
+    within = rest[joint] @ skin.inverse_bind[joint]
+    places = mesh.positions[vertices] @ within[:3, :3].T + within[:3, 3] - rest[joint, :3, 3]
+    direction = bone / np.linalg.norm(bone)
+    return direction * max(float((places @ direction).max()), 0.0)

@@ -1,0 +1,75 @@
+"""Missing frames of a motion, for formats that know none: bridged, or cut out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.rig.arrays import Bools, Floats
+from viewer.rig.motion import Frames
+from viewer.rig.quaternion import slerp
+
+__all__ = ["filled", "gaps_text", "runs"]
+
+Indices = NDArray[np.intp]
+
+_LISTED = 6  # gaps in a note
+
+
+def runs(flags: Bools) -> list[tuple[int, int]]:
+    """Return where runs of True begin and end: first index, and the one behind the last."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]])))
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def gaps_text(present: Bools, first_frame: int) -> str:
+    """Return which frames are missing, in words: ``"frames 3 to 5, 9"``."""
+    found = [
+        f"{a + first_frame}" if b == a + 1 else f"{a + first_frame} to {b - 1 + first_frame}"
+        for a, b in runs(~present)
+    ]
+    more = f" and {len(found) - _LISTED} more gaps" * (len(found) > _LISTED)
+    plural = "s" if int((~present).sum()) > 1 else ""
+    return f"frame{plural} {', '.join(found[:_LISTED])}{more}"
+
+
+def filled(frames: Frames, interpolate: bool) -> Frames:
+    """Return frames without gaps.
+
+    Parameters
+    ----------
+    frames : Frames
+        At least one of them present.
+    interpolate : bool
+        True: rotations on the shorter arc, all else in a straight line, between the frames around
+        a gap. False: the frame before it. Before the first and after the last frame, that one.
+    """
+    if frames.present.all():
+        return frames
+    there = np.flatnonzero(frames.present)
+    every = np.arange(frames.n_frames)
+    place = np.searchsorted(there, every, side="right")
+    before = there[np.clip(place - 1, 0, len(there) - 1)]
+    after = there[np.clip(place, 0, len(there) - 1)] if interpolate else before
+    span = after - before
+    share = np.divide(every - before, span, out=np.zeros(len(every)), where=span > 0).clip(0.0, 1.0)
+    moves = np.flatnonzero(share > 0.0)
+    rotations = frames.rotations[before]
+    rotations[moves] = slerp(rotations[moves], frames.rotations[after[moves]], share[moves, None])
+    weights = frames.shape_weights
+    return replace(
+        frames,
+        present=np.ones(len(every), dtype=np.bool_),
+        rotations=rotations,
+        translations=_line(frames.translations, before, after, share),
+        shape_weights=weights if len(weights) == 1 else _line(weights, before, after, share),
+        figure_translations=_line(frames.figure_translations, before, after, share),
+        figure_scales=_line(frames.figure_scales, before, after, share),
+    )
+
+
+def _line(rows: Floats, before: Indices, after: Indices, share: Floats) -> Floats:
+    weight = share.reshape(-1, *[1] * (rows.ndim - 1))
+    return rows[before] + weight * (rows[after] - rows[before])

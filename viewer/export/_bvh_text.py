@@ -1,0 +1,139 @@
+"""The text of a BVH file, as every reader that we know of takes it.
+
+One item per line and "{" alone on its line (Blender counts lines), one ROOT, six channels on it and
+three on the others, positions first, the same rotation order everywhere, no exponents, LF.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from viewer.rig.arrays import Bools, Floats, Ints
+
+__all__ = ["bvh_text", "depth_first"]
+
+_DEEPEST = 32  # tabs that a line begins with
+_SECONDS_DIGITS = 9  # of the frame time, at least: exact to 1e-8 of itself
+
+
+def depth_first(parents: Ints) -> Ints:
+    """Return the joints in the order in which the file nests them, children by index: (J,)."""
+    children: list[list[int]] = [[] for _ in parents]
+    stack: list[int] = []
+    for joint, parent in enumerate(parents):
+        (stack if parent < 0 else children[parent]).append(joint)
+    stack.reverse()
+    order = []
+    while stack:
+        joint = stack.pop()
+        order.append(joint)
+        stack += reversed(children[joint])
+    return np.array(order, dtype=np.int32)
+
+
+def bvh_text(
+    names: Sequence[str],
+    parents: Ints,
+    offsets: Floats,
+    ends: dict[int, Floats],
+    moves: Bools,
+    rotation_order: str,
+    rate: float,
+    rows: tuple[Floats, Floats],
+    digits: int,
+) -> str:
+    """Return a whole file.
+
+    Parameters
+    ----------
+    names : J str
+        Unique, of letters, digits and underscores.
+    parents : (J,)
+        With one root, the first joint.
+    offsets : (J, 3)
+        Within the parent; the root's is written as 0.
+    ends : dict of (3,)
+        Offset of the End Site of every joint without children.
+    moves : (J,) bool
+        Which joints have position channels.
+    rotation_order : str
+        ``"zyx"`` for Zrotation Yrotation Xrotation.
+    rate : float
+        Frames a second.
+    rows : (F, J, 3), (F, J, 3)
+        Positions, and angles in degrees in that order.
+    digits : int
+        Decimals.
+    """
+    order = depth_first(parents)
+    lines = _hierarchy(names, parents, order, offsets, ends, moves, rotation_order, digits)
+    values = _columns(order, moves, rows, digits)
+    line = " ".join([f"%.{digits}f"] * values.shape[1])
+    seconds = 1.0 / rate
+    decimals = max(_SECONDS_DIGITS, _SECONDS_DIGITS - 1 - int(np.floor(np.log10(seconds))))
+    lines += ["MOTION", f"Frames: {len(values)}", f"Frame Time: {seconds:.{decimals}f}"]
+    lines += [line % tuple(row) for row in values.tolist()]
+    return "\n".join(lines) + "\n"
+
+
+def _hierarchy(
+    names: Sequence[str],
+    parents: Ints,
+    order: Ints,
+    offsets: Floats,
+    ends: dict[int, Floats],
+    moves: Bools,
+    rotation_order: str,
+    digits: int,
+) -> list[str]:
+    lines = ["HIERARCHY"]
+    turns = " ".join(f"{axis.upper()}rotation" for axis in rotation_order)
+    open_joints: list[int] = []
+
+    def put(depth: int, text: str) -> None:
+        lines.append("\t" * min(depth, _DEEPEST) + text)
+
+    def close(until: int) -> None:
+        while open_joints and open_joints[-1] != until:
+            open_joints.pop()
+            put(len(open_joints), "}")
+
+    for joint in order:
+        parent = int(parents[joint])
+        close(parent)
+        depth = len(open_joints)
+        put(depth, f"{'ROOT' if parent < 0 else 'JOINT'} {names[joint]}")
+        put(depth, "{")
+        put(depth + 1, f"OFFSET {_vector(offsets[joint] if parent >= 0 else np.zeros(3), digits)}")
+        has_positions = parent < 0 or moves[joint]
+        count = "6 Xposition Yposition Zposition" if has_positions else "3"
+        put(depth + 1, f"CHANNELS {count} {turns}")
+        open_joints.append(int(joint))
+        if int(joint) in ends:
+            put(depth + 1, "End Site")
+            put(depth + 1, "{")
+            put(depth + 2, f"OFFSET {_vector(ends[int(joint)], digits)}")
+            put(depth + 1, "}")
+    close(-1)
+    return lines
+
+
+def _vector(values: Floats, digits: int) -> str:
+    return " ".join(f"{value:.{digits}f}" for value in np.round(values, digits) + 0.0)
+
+
+def _columns(order: Ints, moves: Bools, rows: tuple[Floats, Floats], digits: int) -> Floats:
+    """Return the numbers of every frame, joints in the order of the file: (F, C)."""
+    positions, angles = rows
+    parts = []
+    for joint in order:
+        if joint == order[0] or moves[joint]:
+            parts.append(positions[:, joint])
+        parts.append(angles[:, joint])
+    # Adding 0 makes -0 positive.
+    values: Floats = np.concatenate(parts, axis=1)
+    np.round(values, digits, out=values)
+    values += 0.0
+    return values

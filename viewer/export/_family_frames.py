@@ -1,0 +1,203 @@
+"""A take of a body of the SMPL family, as the family's own parameters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.export._options import MotionOptions
+from viewer.rig.arrays import Floats
+from viewer.rig.body_motion import root_positions
+from viewer.rig.figure import Figure
+from viewer.rig.motion import Frames
+from viewer.rig.quaternion import multiply, rotation_vector_to_quaternion
+from viewer.rig.rotation import rotation_vector_to_matrix
+from viewer.rig.smpl_family import FAMILY, Member
+from viewer.rig.take import Take
+
+__all__ = ["FamilyFrames", "family_frames", "member_of_figure", "up_axis"]
+
+_OWN_SHAPE = "stature"  # SMPL's shapes have numbers, those of the bundled body names
+_NEGLIGIBLE = 1e-6  # metres, and parts of a scale of 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FamilyFrames:
+    """Poses of one body, V = R (X - J0) + J0 + t.
+
+    Attributes
+    ----------
+    member : Member
+        Which model of the family.
+    vectors : (F, J, 3)
+        Rotation vectors in the member's own order, angles up to pi.
+    translations : (F, 3)
+        t, in the unit of the figure.
+    roots : (F, 3) or (1, 3)
+        J0, the rest position of the root.
+    shape, expression : (F, S) or (1, S)
+        Coefficients; one row where they never change.
+    """
+
+    member: Member
+    vectors: Floats
+    translations: Floats
+    roots: Floats
+    shape: Floats
+    expression: Floats
+
+    @property
+    def has_expression(self) -> bool:
+        """Whether any coefficient of the expression is not 0."""
+        return bool(self.expression.any())
+
+    def about_origin(self) -> Floats:
+        """Return T of V = R X + T: T = t + J0 - R J0, (F, 3)."""
+        turned = np.einsum(
+            "fab,fb->fa",
+            rotation_vector_to_matrix(self.vectors[:, 0]),
+            self.roots + 0.0 * self.translations,
+        )
+        return self.translations + self.roots - turned
+
+
+def member_of_figure(figure: Figure, what: str, root: str = "") -> Member:
+    """Return the member of the family whose joints a figure has.
+
+    Parameters
+    ----------
+    figure : Figure
+        With a skeleton.
+    what : str
+        What is written, for the message.
+    root : str
+        What the root must be called; empty for any.
+
+    Raises
+    ------
+    RigError
+        If it has others, or more, or fewer.
+    """
+    names = () if figure.skeleton is None else figure.skeleton.names
+    member = FAMILY.get(len(names))
+    if member is None or set(member.names) != set(names) or root not in ("", member.names[0]):
+        titles = [kind.title for kind in FAMILY.values() if root in ("", kind.names[0])]
+        raise RigError(
+            f"{figure.name} cannot be written as {what}: expected the joints of "
+            f"{', '.join(titles[:-1])} or {titles[-1]}, found others"
+        )
+    return member
+
+
+def up_axis(options: MotionOptions) -> str:
+    """Return the axis that points up in the file: that of the scene unless another is asked for.
+
+    Raises
+    ------
+    RigError
+        If it is neither y nor z.
+    """
+    up = options.up or options.world_up
+    if up not in ("y", "z"):
+        raise RigError(f'up axis: expected y or z, found "{up}"')
+    return up
+
+
+def family_frames(
+    take: Take, frames: Frames, member: Member, options: MotionOptions
+) -> tuple[FamilyFrames, list[str]]:
+    """Return a take as parameters of the family.
+
+    With another up axis the world turns by Q about its x axis: R' = Q R, t' = Q (t + J0) - J0.
+
+    Parameters
+    ----------
+    take : Take
+        Gives the figure.
+    frames : Frames
+        Its frames, where a row that is not present means nothing.
+    member : Member
+        As ``member_of_figure`` found it.
+    options : MotionOptions
+        Its up axes count.
+
+    Returns
+    -------
+    frames : FamilyFrames
+        One row a frame.
+    notes : list of str
+        What the family has no parameters for, and how much that is.
+
+    Raises
+    ------
+    RigError
+        If a number of a present frame is not finite.
+    """
+    figure, skeleton = take.figure, take.figure.skeleton
+    assert skeleton is not None  # whoever has a member has a skeleton
+    order = [skeleton.names.index(name) for name in member.names]
+    rotations = frames.rotations[:, order]
+    moved = frames.translations[:, order]
+    translations = frames.figure_translations + moved[:, 0]
+    roots = root_positions(figure, frames.shape_weights)
+    if up_axis(options) != options.world_up:
+        angle = np.pi / 2 if up_axis(options) == "z" else -np.pi / 2
+        turn = np.array([angle, 0.0, 0.0])
+        rotations = rotations.copy()
+        rotations[:, 0] = multiply(rotation_vector_to_quaternion(turn), rotations[:, 0])
+        matrix = np.round(rotation_vector_to_matrix(turn))  # a quarter turn has no fractions
+        translations = (translations + roots) @ matrix.T - roots
+    groups = figure.blend_shapes.groups if figure.blend_shapes else ()
+    columns = {
+        kind: [index for index, group in enumerate(groups) if group == kind]
+        for kind in ("shape", "expression")
+    }
+    found = FamilyFrames(
+        member,
+        _vectors(rotations),
+        translations,
+        roots,
+        frames.shape_weights[:, columns["shape"]],
+        frames.shape_weights[:, columns["expression"]],
+    )
+    present = frames.present
+    parts = (found.vectors, found.translations)
+    if not all(np.isfinite(part[present]).all() for part in parts):
+        raise RigError(f"{take.name}: expected finite numbers in every frame")
+    return found, _losses(frames, moved[:, 1:]) + _own_shapes(figure)
+
+
+def _vectors(quaternions: Floats) -> Floats:
+    """Return axis times angle, the angle from 0 to pi, of unit quaternions: (..., 3)."""
+    halves = np.where(quaternions[..., 3:] < 0.0, -quaternions, quaternions)
+    sines = np.linalg.norm(halves[..., :3], axis=-1, keepdims=True)
+    angles = 2.0 * np.arctan2(sines, halves[..., 3:])
+    is_zero = sines == 0.0
+    return np.asarray(
+        halves[..., :3] * np.where(is_zero, 2.0, angles / np.where(is_zero, 1.0, sines))
+    )
+
+
+def _own_shapes(figure: Figure) -> list[str]:
+    """Say so if shapes and rest pelvis are those of a body of our own."""
+    if figure.blend_shapes is None or _OWN_SHAPE not in figure.blend_shapes.names:
+        return []
+    return [
+        f"shape and translation are meant for {figure.name}, which is no SMPL body: other models "
+        "stand elsewhere with them, by the distance of their rest pelvises"
+    ]
+
+
+def _losses(frames: Frames, moved: Floats) -> list[str]:
+    notes = []
+    present = frames.present
+    farthest = np.abs(moved[present]).max(initial=0.0)
+    if farthest > _NEGLIGIBLE:
+        notes.append(f"joints that move within their parents are left out (up to {farthest:.3g})")
+    scales = frames.figure_scales[present]
+    if np.abs(scales - 1.0).max(initial=0.0) > _NEGLIGIBLE:
+        low, high = scales.min(), scales.max()
+        notes.append(f"the figure's scale is left out ({low:.6g} to {high:.6g})")
+    return notes

@@ -1,0 +1,128 @@
+"""Write the motion of a body of the SMPL family as AMASS has it.
+
+::
+
+    poses (N, 3 J)   trans (N, 3)   betas (S,) or (N, S)   expressions (N, E)   gender "neutral"
+    surface_model_type   num_betas   mocap_framerate   mocap_frame_rate   up   present (N,)
+
+``trans`` is transl of V = R (X - J0) + J0 + transl, ``poses`` are rotation vectors in the model's
+own order. ``up`` and ``present``, which is there if frames were missing, are our own.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.errors import RigError, printable
+from viewer.export._bvh_gaps import filled, gaps_text, runs
+from viewer.export._family_frames import FamilyFrames, family_frames, member_of_figure, up_axis
+from viewer.export._options import GAPS, MotionOptions
+from viewer.formats import all_or_none, save_arrays
+from viewer.rig.arrays import Bools, Floats
+from viewer.rig.take import Take
+
+__all__ = ["export_take"]
+
+_FEWEST = 16  # shape numbers that readers of AMASS ask for
+_TYPES = {"SMPL": "smpl", "SMPL+H": "smplh", "SMPL-X": "smplx"}
+
+
+def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
+    """Write a motion, its world as it is unless another up axis is asked for.
+
+    Parameters
+    ----------
+    take : Take
+        Of a body with the joints of SMPL, SMPL+H or SMPL-X.
+    path : Path
+        With ``gaps="split"`` and gaps, files are called ``name-1.npz``, ``name-2.npz`` ….
+    options : MotionOptions
+        Up axis (that of the scene if empty) and gaps.
+
+    Returns
+    -------
+    list of str
+        What was written, then what the format cannot hold.
+
+    Raises
+    ------
+    RigError
+        If the figure has other joints, or no frame is present.
+    OutputError
+        If a file cannot be written.
+    """
+    member = member_of_figure(take.figure, "an AMASS motion", root="pelvis")
+    present = take.frames.present
+    if options.gaps not in GAPS:
+        raise RigError(f'gaps: expected one of {", ".join(GAPS)}, found "{options.gaps}"')
+    if not present.any():
+        raise RigError(f"{take.name}: every frame is missing, there is nothing to write")
+    frames = filled(take.frames, options.gaps == "interpolate")
+    body, notes = family_frames(take, frames, member, options)
+    is_split = options.gaps == "split" and not present.all()
+    spans = runs(present) if is_split else [(0, len(present))]
+    paths = [path]
+    if len(spans) > 1:
+        count = len(spans)
+        paths = [path.with_name(f"{path.stem}-{i + 1}{path.suffix}") for i in range(count)]
+    up = up_axis(options)
+    written = []
+    with all_or_none(paths):
+        for file, (start, stop) in zip(paths, spans, strict=True):
+            arrays = _arrays(body, slice(start, stop), take.frame_rate, up)
+            if not is_split and not present.all():
+                arrays["present"] = present
+            save_arrays(file, arrays)
+            written.append(
+                f"{printable(file, 300)}: {stop - start} frames of {member.title} at "
+                f"{take.frame_rate:g} a second, {up} up"
+            )
+    return [*written, *_remarks(body, take, present, options), *notes]
+
+
+def _arrays(body: FamilyFrames, part: slice, rate: float, up: str) -> dict[str, NDArray[Any]]:
+    shape = _padded(body.shape)
+    vectors = body.vectors[part]
+    arrays: dict[str, NDArray[Any]] = {
+        "poses": vectors.reshape(len(vectors), -1),
+        "trans": body.translations[part],
+        "betas": shape[0] if len(shape) == 1 else shape[part],
+        "num_betas": np.array(shape.shape[1]),
+        "gender": np.array("neutral"),
+        "surface_model_type": np.array(_TYPES[body.member.title]),
+        "mocap_framerate": np.array(float(rate)),
+        "mocap_frame_rate": np.array(float(rate)),
+        "up": np.array(up),
+    }
+    if body.has_expression:
+        rows = np.broadcast_to(body.expression, (len(body.vectors), body.expression.shape[1]))
+        arrays["expressions"] = rows[part].copy()
+    return arrays
+
+
+def _padded(shape: Floats) -> Floats:
+    """Return as many shape numbers as are needed, and no fewer than is usual."""
+    used = np.flatnonzero(shape.any(axis=0))
+    count = max(_FEWEST, int(used[-1]) + 1 if len(used) else 0)
+    padded = np.zeros((len(shape), count))
+    padded[:, : shape.shape[1]] = shape[:, :count]
+    return padded
+
+
+def _remarks(body: FamilyFrames, take: Take, present: Bools, options: MotionOptions) -> list[str]:
+    notes = []
+    if len(body.shape) > 1:
+        notes.append("the shape changes: betas has one row a frame, which few programs read")
+    if not present.all():
+        missing = gaps_text(present, take.first_frame)
+        how = {
+            "hold": "filled with the last pose, and marked in present",
+            "interpolate": "bridged on the shorter arc, and marked in present",
+            "split": "left out between the files",
+        }[options.gaps]
+        notes.append(f"{missing} missing: {how}")
+    return notes

@@ -1,0 +1,211 @@
+"""Write motions of course rigs as ``.anim``: the clip's own keys, or a key per frame."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from viewer.errors import RigError, printable
+from viewer.export._bvh_angles import euler_angles, unrolled
+from viewer.export._bvh_gaps import filled, gaps_text, runs
+from viewer.export._options import GAPS, MotionOptions
+from viewer.formats import all_or_none, write
+from viewer.rig.arrays import Floats
+from viewer.rig.clip import Clip, Tangent, is_course_rig
+from viewer.rig.clip_edit import clip_from_frames
+from viewer.rig.clip_table import evaluate_all
+from viewer.rig.figure import Figure
+from viewer.rig.motion import Frames, frames_of, world_frames
+from viewer.rig.rotation import quaternion_to_matrix
+from viewer.rig.scalars import length_text
+from viewer.rig.scene import figure_pose
+from viewer.rig.skeleton import Skeleton
+from viewer.rig.take import Take
+
+__all__ = ["export_take"]
+
+_RULES: tuple[Tangent, ...] = ("linear", "smooth")
+_BLOCK = 4096  # frames measured at a time
+_SAME = 1e-9  # of a frame, or of a length: less is no difference
+
+
+def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
+    """Write a motion as a clip of keys, see ``viewer.export.export_take``.
+
+    A keyed clip whose frames are all asked for is written with its own keys, exactly. Any other
+    motion gets a key per frame at the seconds it has; between them straight or smooth curves,
+    whichever keep the joints nearer to the motion.
+
+    Parameters
+    ----------
+    take : Take
+        Of a figure that moves as ``.skel`` files do.
+    path : Path
+        With ``gaps="split"`` and gaps, files are called ``name-1.anim``, ``name-2.anim`` ….
+    options : MotionOptions
+        Only ``gaps`` counts.
+
+    Returns
+    -------
+    list of str
+        What was written, how far joints are off, and what the format cannot hold.
+
+    Raises
+    ------
+    RigError
+        If the figure moves in another way, or no frame is present.
+    OutputError
+        If a file cannot be written.
+    """
+    figure, frames, skeleton = take.figure, take.frames, take.figure.skeleton
+    assert skeleton is not None  # whoever has frames has a skeleton
+    if not is_course_rig(skeleton):
+        raise RigError(
+            f".anim moves a root and three angles of each joint, as .skel files do; "
+            f"{figure.name} moves otherwise"
+        )
+    if options.gaps not in GAPS:
+        raise RigError(
+            f'way to close gaps: expected one of {", ".join(GAPS)}, found "{options.gaps}"'
+        )
+    if not frames.present.any():
+        raise RigError(f"{take.name}: every frame is missing, there is nothing to write")
+    if isinstance(take.motion, Clip) and _is_whole(take, take.motion):
+        write(take.motion, path)
+        notes = [f"{_summary(path, take.motion)}, the clip's own"]
+        if frames.figure_translations.any():
+            notes.append("the place of the whole figure is no part of its clip: it is left out")
+        return notes + _left_out(figure, frames)
+    return _export_frames(take, skeleton, path, options)
+
+
+def _export_frames(take: Take, skeleton: Skeleton, path: Path, options: MotionOptions) -> list[str]:
+    """Write a key per frame, in one file or one for each run of frames."""
+    frames = take.frames
+    whole = filled(frames, options.gaps == "interpolate")
+    dofs = _dofs(take, skeleton, whole)
+    is_split = options.gaps == "split" and not frames.present.all()
+    spans = runs(frames.present) if is_split else [(0, frames.n_frames)]
+    clips, errors = [], []
+    for start, stop in spans:
+        part = slice(start, stop)
+        trials = [
+            clip_from_frames(take.motion.name, dofs[part], frames.times[part], rule)
+            for rule in _RULES
+        ]
+        measured = [_error(take, trial, part) for trial in trials]
+        best = int(np.argmin([between for _, between in measured]))
+        clips.append(trials[best])
+        errors.append((*measured[best], _RULES[best]))
+    paths = [path]
+    if len(clips) > 1:
+        numbers = range(1, len(clips) + 1)
+        paths = [path.with_name(f"{path.stem}-{number}{path.suffix}") for number in numbers]
+    with all_or_none(paths):
+        for file, clip in zip(paths, clips, strict=True):
+            write(clip, file)
+    notes = [_summary(file, clip) for file, clip in zip(paths, clips, strict=True)]
+    return notes + _remarks(take, errors, options)
+
+
+def _remarks(
+    take: Take, errors: list[tuple[float, float, Tangent]], options: MotionOptions
+) -> list[str]:
+    on_frames, between = max(error[0] for error in errors), max(error[1] for error in errors)
+    rules = " or ".join(dict.fromkeys(str(error[2]) for error in errors))
+    figure, frames = take.figure, take.frames
+    notes = [
+        f"joints are off by up to {length_text(figure, on_frames)} on the frames, "
+        f"{length_text(figure, between)} between them ({rules} tangents)"
+    ]
+    if not frames.present.all():
+        done = {"hold": "the last pose is held", "interpolate": "interpolated"}
+        text = gaps_text(frames.present, take.first_frame)
+        notes.append(f"missing {text}: {done.get(options.gaps, 'one file for each run of frames')}")
+    return notes + _left_out(figure, frames)
+
+
+def _is_whole(take: Take, clip: Clip) -> bool:
+    """Return whether the frames are all of a clip, which has a channel for every DOF."""
+    skeleton, times = take.figure.skeleton, take.frames.times
+    assert skeleton is not None  # whoever has frames has a skeleton
+    targets = [channel.target for channel in clip.channels]
+    step = 1.0 / take.frame_rate
+    starts = abs(float(times[0]) - clip.start) <= _SAME * step
+    # The last frame may come up to a frame before the end.
+    ends = clip.end - float(times[-1]) < step * (1.0 - _SAME)
+    return targets == list(range(skeleton.n_dofs)) and starts and ends
+
+
+def _dofs(take: Take, skeleton: Skeleton, frames: Frames) -> Floats:
+    """Return every frame's DOFs: (F, D)."""
+    base = quaternion_to_matrix(skeleton.rest_rotations)
+    within = np.swapaxes(base, -1, -2) @ quaternion_to_matrix(frames.rotations)
+    angles = euler_angles(within, "zyx")
+    # Angles that run on without jumps might run out of limits.
+    is_free = np.isinf(skeleton.dof_limits[3:]).all(axis=1).reshape(-1, 3).all(axis=1)
+    angles[:, is_free] = unrolled(angles, "zyx")[:, is_free]
+    dofs = np.zeros((frames.n_frames, skeleton.n_dofs))
+    dofs[:, 3:] = angles[..., ::-1].reshape(frames.n_frames, -1)
+    dofs[:, :3] = frames.translations[:, 0]
+    if isinstance(take.motion, Clip):
+        # Its own numbers instead of angles that make the same rotations.
+        targets, values = evaluate_all(take.motion, frames.times)
+        dofs[:, targets] = values
+    dofs = np.clip(dofs, *skeleton.dof_limits.T)
+    dofs[:, :3] += frames.figure_translations / frames.figure_scales[:, None]
+    return dofs
+
+
+def _error(take: Take, clip: Clip, part: slice) -> tuple[float, float]:
+    """Return how far joints are off at most, on the frames and half-way between them."""
+    times = take.frames.times[part]
+    middles = 0.5 * (times[1:] + times[:-1])
+    return _distance(take, clip, times), _distance(take, clip, middles)
+
+
+def _distance(take: Take, clip: Clip, times: Floats) -> float:
+    figure, worst = take.figure, 0.0
+    first, base = int(take.frames.present.argmax()), figure_pose(figure)
+    base.figure_translation = take.frames.figure_translations[first]
+    base.figure_scale = float(take.frames.figure_scales[first])
+    for start in range(0, len(times), _BLOCK):
+        block = times[start : start + _BLOCK]
+        wanted = frames_of(figure, take.motion, block, base)
+        found = frames_of(figure, clip, block)
+        # The scale is not part of the file: positions are compared as they are without.
+        place = wanted.figure_translations / wanted.figure_scales[:, None]
+        one = np.ones(len(block))
+        wanted = replace(wanted, figure_scales=one, figure_translations=place)
+        found = replace(found, shape_weights=wanted.shape_weights)
+        apart = world_frames(figure, wanted)[..., :3, 3] - world_frames(figure, found)[..., :3, 3]
+        off = np.linalg.norm(apart, axis=-1).max(axis=1)
+        worst = max(worst, float(off[wanted.present].max(initial=0.0)))
+    return worst
+
+
+def _summary(path: Path, clip: Clip) -> str:
+    keys = sum(len(channel.times) for channel in clip.channels)
+    return (
+        f"{printable(path, 300)}: {len(clip.channels)} channels with {keys} keys, "
+        f"{clip.start:g} to {clip.end:g} s"
+    )
+
+
+def _left_out(figure: Figure, frames: Frames) -> list[str]:
+    """Say what a clip cannot hold."""
+    notes, there = [], frames.present
+    scales = frames.figure_scales[there]
+    if np.abs(scales - 1.0).max() > _SAME:
+        notes.append(f".anim cannot hold the figure's scale of {scales.max():g}: it is left out")
+    moved = np.linalg.norm(frames.translations[there][:, 1:], axis=-1).max(initial=0.0)
+    if moved > _SAME:
+        notes.append(
+            ".anim moves the root alone: translations of other joints, up to "
+            f"{length_text(figure, float(moved))}, are left out"
+        )
+    if frames.shape_weights.any():
+        notes.append(".anim holds no shape: the weights of shapes and morphs are left out")
+    return notes

@@ -1,0 +1,299 @@
+"""Write motions as ``.bvh``: a skeleton without rotations at rest, and its joints' channels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from viewer.errors import RigError, printable
+from viewer.export._bvh_angles import unrolled
+from viewer.export._bvh_body import Body, Space, body_of, rest_matrices, shape_at, shape_changes
+from viewer.export._bvh_ends import end_offsets
+from viewer.export._bvh_gaps import filled, gaps_text, runs
+from viewer.export._bvh_text import bvh_text
+from viewer.export._options import GAPS, ROTATION_ORDERS, UNITS, MotionOptions
+from viewer.formats import Source, all_or_none, bvh, save_bytes
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.figure import Figure
+from viewer.rig.joint_names import plain_names
+from viewer.rig.motion import Frames, frames_of, rest_translations_of, world_frames
+from viewer.rig.rotation import axis_rotations
+from viewer.rig.scalars import length_text
+from viewer.rig.shape import shaped
+from viewer.rig.skeleton import joint_label
+from viewer.rig.take import Take
+
+__all__ = ["export_take"]
+
+_DEFAULT_UNIT = "cm"
+_WORDS = {"m": "metres", "cm": "centimetres", "mm": "millimetres"}
+_BLOCK = 4096  # frames at a time, when the file is read back
+_SHORTEST_END = 2e-3  # Blender invents a direction for bones below 1e-3
+_MOST_DIGITS = 15
+_LISTED = 8  # joints in a note
+
+
+def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
+    """Write a motion, read it back, and say how far its joints are off.
+
+    Offsets are those of the shape in the first frame that is present. The root has offset 0 and
+    its place in its channels, so that readers that add and readers that replace offsets agree.
+    Angles run on without jumps.
+
+    Parameters
+    ----------
+    take : Take
+        A figure in many poses.
+    path : Path
+        With ``gaps="split"`` and gaps, files are called ``name-1.bvh``, ``name-2.bvh`` ….
+    options : MotionOptions
+        Unit (centimetres if empty), up axis (y if empty), rotation order, gaps, rest frame,
+        digits.
+
+    Returns
+    -------
+    list of str
+        What was written, the largest error, and what the format cannot hold.
+
+    Raises
+    ------
+    RigError
+        If no frame is present, numbers are not finite, or an option is unknown.
+    OutputError
+        If a file cannot be written.
+    """
+    _check(options)
+    if not take.frames.present.any():
+        raise RigError(f"{take.name}: every frame is missing, there is nothing to write")
+    reference = int(take.frames.present.argmax())
+    is_split = options.gaps == "split" and not take.frames.present.all()
+    frames = filled(take.frames, options.gaps == "interpolate")
+    figure, rigged = _one_root(take.figure, frames, reference)
+    space = _space(figure, options)
+    with np.errstate(invalid="ignore", over="ignore"):
+        body = body_of(figure, rigged, reference, options.rotation_order, space)
+    if not all(np.isfinite(part).all() for part in (body.angles, body.places, body.offsets)):
+        raise RigError(f"{take.name}: expected finite numbers in every frame")
+    writer = _Writer(take, figure, body, _ends(take, figure, space, reference), space, options)
+    spans = runs(take.frames.present) if is_split else [(0, frames.n_frames)]
+    paths = (
+        [path]
+        if len(spans) == 1
+        else [
+            path.with_name(f"{path.stem}-{number}{path.suffix}")
+            for number in range(1, len(spans) + 1)
+        ]
+    )
+    texts = [writer.text(*span) for span in spans]
+    errors = [
+        writer.error(file, text, *span)
+        for file, text, span in zip(paths, texts, spans, strict=True)
+    ]
+    with all_or_none(paths):
+        for file, text in zip(paths, texts, strict=True):
+            save_bytes(file, text)
+    notes = [writer.summary(file, *span) for file, span in zip(paths, spans, strict=True)]
+    error, worst = max(errors)
+    present = int(take.frames.present.sum())
+    notes.append(
+        f"read back: the largest joint position error is {writer.length(error)} ({worst}) "
+        f"over {present} frames"
+    )
+    return notes + _remarks(take, figure, body, reference, options)
+
+
+def _check(options: MotionOptions) -> None:
+    for what, value, known in (
+        ("unit", options.unit, ("", *UNITS)),
+        ("up axis", options.up, ("", "y", "z")),
+        ("up axis of the scene", options.world_up, ("y", "z")),
+        ("rotation order", options.rotation_order, ROTATION_ORDERS),
+        ("way to close gaps", options.gaps, tuple(GAPS)),
+    ):
+        if value not in known:
+            listed = ", ".join(filter(None, known))
+            raise RigError(f'{what}: expected one of {listed}, found "{value}"')
+    if not 1 <= options.digits <= _MOST_DIGITS:
+        raise RigError(f"digits: expected 1 to {_MOST_DIGITS}, found {options.digits}")
+
+
+def _space(figure: Figure, options: MotionOptions) -> Space:
+    up = options.up or "y"
+    factor = 1.0
+    if figure.unit == "m":
+        factor = 1.0 / UNITS[options.unit or _DEFAULT_UNIT]
+    return Space(_turn(figure.up, up), _turn(options.world_up, up), factor)
+
+
+def _turn(start: str, end: str) -> Floats:
+    """Return the exact quarter turn about x that carries one up axis into the other."""
+    if start == end:
+        return np.eye(3)
+    return np.round(axis_rotations(0, np.asarray(np.pi / 2 if end == "z" else -np.pi / 2)))
+
+
+def _one_root(figure: Figure, frames: Frames, reference: int) -> tuple[Figure, Frames]:
+    """Return a figure whose roots, if there are several, hang from a joint at its origin."""
+    skeleton = figure.skeleton
+    assert skeleton is not None  # whoever has frames has a skeleton
+    if int((skeleton.parents < 0).sum()) == 1:
+        return figure, frames
+    still = rest_translations_of(figure, shape_at(frames, reference))[0]
+    name = "root"
+    while name in skeleton.names:
+        name = f"common_{name}"
+    joined = replace(
+        skeleton,
+        names=(name, *skeleton.names),
+        parents=np.concatenate([[-1], skeleton.parents + 1]),
+        rest_translations=np.concatenate([np.zeros((1, 3)), still]),
+        rest_rotations=np.concatenate([[[0.0, 0.0, 0.0, 1.0]], skeleton.rest_rotations]),
+        rest_scales=np.concatenate([np.ones((1, 3)), skeleton.rest_scales]),
+        dof_joints=skeleton.dof_joints + 1,
+        boxes=None,
+    )
+    count = frames.n_frames
+    turns = np.tile([0.0, 0.0, 0.0, 1.0], (count, 1, 1))
+    return Figure(figure.name, skeleton=joined, up=figure.up, unit=figure.unit), replace(
+        frames,
+        rotations=np.concatenate([turns, frames.rotations], axis=1),
+        translations=np.concatenate([np.zeros((count, 1, 3)), frames.translations], axis=1),
+        shape_weights=np.zeros((1, 0)),
+    )
+
+
+def _ends(take: Take, figure: Figure, space: Space, reference: int) -> dict[int, Floats]:
+    """Return the End Sites in the file's space, by joint of the figure that is written."""
+    weights = shape_at(take.frames, reference)
+    own = shaped(take.figure, weights[0])
+    skeleton = take.figure.skeleton
+    assert skeleton is not None and figure.skeleton is not None  # whoever has frames has one
+    leaves = np.setdiff1d(np.arange(skeleton.n_joints), skeleton.parents).astype(np.int32)
+    rest = rest_matrices(take.figure, rest_translations_of(take.figure, weights)[0])
+    scale = float(take.frames.figure_scales[reference]) * space.factor
+    ends = scale * end_offsets(own, rest, leaves) @ space.rest.T
+    lengths = np.linalg.norm(ends, axis=1, keepdims=True)
+    ends *= np.maximum(1.0, _SHORTEST_END / np.where(lengths > 0.0, lengths, 1.0))
+    shift = figure.skeleton.n_joints - skeleton.n_joints
+    return {int(leaf) + shift: end for leaf, end in zip(leaves, ends, strict=True)}
+
+
+@dataclass(frozen=True, slots=True)
+class _Writer:
+    """All files of one take."""
+
+    take: Take
+    figure: Figure  # with one root
+    body: Body
+    ends: dict[int, Floats]
+    space: Space
+    options: MotionOptions
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What the joints are called in the file."""
+        assert self.figure.skeleton is not None  # whoever has frames has a skeleton
+        return plain_names(self.figure.skeleton.names)
+
+    @property
+    def parents(self) -> Ints:
+        """Of the joints."""
+        assert self.figure.skeleton is not None  # whoever has frames has a skeleton
+        return self.figure.skeleton.parents
+
+    def text(self, start: int, stop: int) -> bytes:
+        """Return the file of some frames."""
+        angles = np.degrees(unrolled(self.body.angles[start:stop], self.options.rotation_order))
+        positions = self.body.positions[start:stop]
+        if self.options.rest_frame:
+            still = self.body.offsets[None]
+            positions = np.concatenate([still, positions])
+            angles = np.concatenate([np.zeros_like(still), angles])
+        return bvh_text(
+            self.names,
+            self.parents,
+            self.body.offsets,
+            self.ends,
+            self.body.moves,
+            self.options.rotation_order,
+            self.take.frame_rate,
+            (positions, angles),
+            self.options.digits,
+        ).encode("ascii")
+
+    def error(self, path: Path, text: bytes, start: int, stop: int) -> tuple[float, str]:
+        """Return how far joints are off when the text is read back, and which is worst."""
+        motion = bvh.read(Source(path, text))
+        skeleton, clip = motion.figure.skeleton, motion.clip
+        assert skeleton is not None  # the reader gives one
+        place = [skeleton.names.index(name) for name in self.names]
+        first = int(self.options.rest_frame)
+        worst = (0.0, self.names[0])
+        for row in range(start, stop, _BLOCK):
+            rows = np.arange(row, min(row + _BLOCK, stop))
+            times = (rows - start + first) / clip.timing.frame_rate
+            found = world_frames(motion.figure, frames_of(motion.figure, clip, times))
+            off = np.linalg.norm(found[..., :3, 3][:, place] - self.body.places[rows], axis=2)
+            off[~self.take.frames.present[rows]] = 0.0
+            joint = int(off.max(axis=0).argmax())
+            worst = max(worst, (float(off[:, joint].max()), self.names[joint]))
+        return worst[0] / self.space.factor, worst[1]
+
+    def length(self, length: float) -> str:
+        """Return a small length of the figure in plain decimals."""
+        if self.figure.unit == "m":
+            return f"{1000.0 * length:.6f} mm"
+        return f"{length:.2g} in the figure's own unit"
+
+    def summary(self, path: Path, start: int, stop: int) -> str:
+        """Return what a file holds."""
+        unit = _WORDS[self.options.unit or _DEFAULT_UNIT]
+        unit = unit if self.figure.unit == "m" else "the figure's own unit"
+        first = self.take.first_frame + start
+        rest = "the rest pose and " * self.options.rest_frame
+        return (
+            f"{printable(path, 300)}: {len(self.names)} joints, {rest}{stop - start} frames "
+            f"({first} to {first + stop - start - 1}) at {self.take.frame_rate:g} a second, "
+            f"{unit}, {self.options.up or 'y'} up, channels {self.options.rotation_order.upper()}"
+        )
+
+
+def _remarks(
+    take: Take, figure: Figure, body: Body, reference: int, options: MotionOptions
+) -> list[str]:
+    """Say what was changed or left out."""
+    frames, notes = take.frames, []
+    skeleton = figure.skeleton
+    assert skeleton is not None and take.figure.skeleton is not None  # whoever has frames has one
+    if figure is not take.figure:
+        notes.append(f"several roots: they hang from a joint {skeleton.names[0]}, which was added")
+    if not frames.present.all():
+        done = {"hold": "the last pose is held", "interpolate": "interpolated, held at both ends"}
+        text = gaps_text(frames.present, take.first_frame)
+        notes.append(f"missing {text}: {done.get(options.gaps, 'one file for each run of frames')}")
+    if figure.unit != "m" and options.unit:
+        notes.append(f"lengths stay as they are: {take.figure.name} does not say its unit")
+    moving = [joint_label(skeleton, int(joint)) for joint in np.flatnonzero(body.moves)]
+    if moving:
+        more = f" and {len(moving) - _LISTED} more" * (len(moving) > _LISTED)
+        notes.append(
+            f"{len(moving)} joints below the root move within their parents and have position "
+            f"channels: {', '.join(moving[:_LISTED])}{more}"
+        )
+    changes = shape_changes(take.figure, frames, reference)
+    if changes is not None and changes[0] > 0.0:
+        difference, frame, joint = changes
+        notes.append(
+            f"the shape changes over time: bones are written as in frame "
+            f"{reference + take.first_frame}, off by up to {length_text(take.figure, difference)} "
+            f"({joint_label(take.figure.skeleton, joint)} in frame {frame + take.first_frame})"
+        )
+    scales = frames.figure_scales[frames.present]
+    if np.ptp(scales) > 0.0:
+        notes.append(
+            f"the figure's scale changes from {scales.min():g} to {scales.max():g}: bones are "
+            f"written at {scales[0]:g}"
+        )
+    return notes

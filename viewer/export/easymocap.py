@@ -1,0 +1,209 @@
+"""Write the motions of bodies of the SMPL family as an EasyMocap folder.
+
+::
+
+    out/smpl/000000.json    [{"id", "Rh" [[3]], "Th" [[3]], "poses" [[3 J]], "shapes" [[S]],
+                              "expression" [[E]]}, …]
+
+``Rh`` and ``Th`` place the body about the model's origin, so the first three ``poses`` are 0. Who
+is missing in a frame is missing in its file.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import shutil
+import tempfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from viewer.errors import OutputError, RigError, printable
+from viewer.export._bvh_gaps import gaps_text
+from viewer.export._family_frames import FamilyFrames, family_frames, member_of_figure, up_axis
+from viewer.export._options import MotionOptions
+from viewer.rig.arrays import Floats
+from viewer.rig.take import Take
+
+__all__ = ["export_take", "export_takes"]
+
+_FOLDER = "smpl"
+_FRAME = re.compile(r"[0-9]+\.json")
+_DIGITS = 7  # as EasyMocap's newer writer has them
+_SHAPES = 10  # of which EasyMocap's layers take that many
+
+
+def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
+    """Write one person, called 0; see ``export_takes``."""
+    return export_takes([take], path, options)
+
+
+def export_takes(
+    takes: Sequence[Take],
+    path: Path,
+    options: MotionOptions,
+    persons: Sequence[int] | None = None,
+) -> list[str]:
+    """Write several people into one folder, seven decimals.
+
+    Frames are numbered as the takes number them. Frames without anybody hold an empty list.
+
+    Parameters
+    ----------
+    takes : sequence of Take
+        At least one, of bodies of the SMPL family, all at one frame rate.
+    path : Path
+        The folder; ``smpl`` in it is replaced if it holds nothing but numbered frames.
+    options : MotionOptions
+        Up axis (that of the scene if empty). Gaps stay gaps.
+    persons : sequence of int, optional
+        What each is called; 0, 1, 2 … if omitted.
+
+    Returns
+    -------
+    list of str
+        What was written, then what the format cannot hold.
+
+    Raises
+    ------
+    RigError
+        If a figure has other joints, frame rates differ, two people have one number, or no frame
+        is present.
+    OutputError
+        If the folder cannot be written, or holds something else.
+    """
+    persons = range(len(takes)) if persons is None else persons
+    _check(takes, persons)
+    people, notes = [], []
+    for take, person in zip(takes, persons, strict=True):
+        member = member_of_figure(take.figure, "an EasyMocap folder")
+        body, losses = family_frames(take, take.frames, member, options)
+        people.append((person, take, _Records(person, body)))
+        who = f"person {person}: " if len(takes) > 1 else ""
+        notes += [f"{who}{loss}" for loss in losses]
+        if not take.frames.present.all():
+            missing = gaps_text(take.frames.present, take.first_frame)
+            notes.append(f"{who}{missing} missing, as in the motion")
+    first = min(take.first_frame for take in takes)
+    stop = max(take.first_frame + take.frames.n_frames for take in takes)
+    with _new_folder(path) as folder:
+        for frame in range(first, stop):
+            rows = [
+                records.text(frame - take.first_frame)
+                for _, take, records in people
+                if 0 <= frame - take.first_frame < take.frames.n_frames
+                and take.frames.present[frame - take.first_frame]
+            ]
+            text = "[\n" + ",\n".join(rows) + "\n]\n"
+            (folder / f"{frame:06}.json").write_text(text, encoding="ascii", newline="\n")
+    who = "1 person" if len(takes) == 1 else f"{len(takes)} people"
+    return [
+        f"{printable(path / _FOLDER, 300)}: {stop - first} frames of {who}, {up_axis(options)} up; "
+        f"EasyMocap keeps no frame rate: it is {takes[0].frame_rate:g} a second",
+        *notes,
+    ]
+
+
+def _check(takes: Sequence[Take], persons: Sequence[int]) -> None:
+    if not takes:
+        raise RigError("expected somebody to write, found nobody")
+    if len(set(persons)) < len(takes) or len(persons) != len(takes):
+        raise RigError(f"expected a number for each of {len(takes)} people, found {list(persons)}")
+    rates = {take.frame_rate for take in takes}
+    if max(rates) - min(rates) > 1e-6 * max(rates):
+        listed = ", ".join(f"{rate:g}" for rate in sorted(rates))
+        raise RigError(f"expected one frame rate for all people, found {listed}")
+    for take in takes:
+        if take.first_frame < 0:
+            raise RigError(f"{take.name}: expected frames from 0 on, found {take.first_frame}")
+        if not take.frames.present.any():
+            raise RigError(f"{take.name}: every frame is missing, there is nothing to write")
+
+
+class _Records:
+    """The records of one person, made into text frame by frame."""
+
+    def __init__(self, person: int, body: FamilyFrames) -> None:
+        count = len(body.vectors)
+        poses = body.vectors.reshape(count, -1).copy()
+        poses[:, :3] = 0.0
+        self.head = f'    {{\n        "id": {person}'
+        self.parts: list[tuple[str, Floats]] = [
+            ("Rh", body.vectors[:, 0]),
+            ("Th", body.about_origin()),
+            ("poses", poses),
+            ("shapes", _used(body.shape, count)),
+        ]
+        if body.has_expression:
+            self.parts.append(("expression", _used(body.expression, count)))
+
+    def text(self, frame: int) -> str:
+        """Return one record as JSON."""
+        lines = [self.head]
+        for key, rows in self.parts:
+            # Adding 0 makes -0.0000000 a plain 0.
+            numbers = np.round(rows[frame], _DIGITS) + 0.0
+            row = ", ".join([f"{number:.{_DIGITS}f}" for number in numbers.tolist()])
+            lines.append(f'        "{key}": [\n          [{row}]\n        ]')
+        return ",\n".join(lines) + "\n    }"
+
+
+def _used(rows: Floats, count: int) -> Floats:
+    """Return coefficients for every frame: ten, or all up to the last one that is not 0."""
+    used = np.flatnonzero(rows.any(axis=0))
+    width = max(_SHAPES, int(used[-1]) + 1 if len(used) else 0)
+    padded = np.zeros((count, width))
+    padded[:, : rows.shape[1]] = rows[:, :width]
+    return padded
+
+
+@contextlib.contextmanager
+def _new_folder(path: Path) -> Iterator[Path]:
+    """Give a folder to fill beside ``path/smpl``, and put it there when the block succeeds."""
+    target = path / _FOLDER
+    made = None
+    try:
+        is_new = not path.exists()
+        _refuse_others(path, target)
+        path.mkdir(parents=True, exist_ok=True)
+        made = Path(tempfile.mkdtemp(dir=path, prefix=f".{_FOLDER}."))
+        fresh, old = made / "new", made / "old"
+        fresh.mkdir()
+        yield fresh
+        if target.exists():
+            target.replace(old)
+        try:
+            fresh.replace(target)
+        except OSError:
+            if old.exists():
+                old.replace(target)
+            raise
+    except BaseException as problem:  # also Ctrl-C: nothing half written may stay behind
+        if made is not None:
+            shutil.rmtree(made, ignore_errors=True)
+            if is_new:
+                with contextlib.suppress(OSError):
+                    path.rmdir()
+        if isinstance(problem, OSError):
+            reason = problem.strerror or problem
+            raise OutputError(f"{printable(path, 300)}: {reason}") from None
+        raise
+    shutil.rmtree(made, ignore_errors=True)
+
+
+def _refuse_others(path: Path, target: Path) -> None:
+    """Refuse to replace a folder that holds anything but numbered frames."""
+    if path.exists() and not path.is_dir():
+        raise OutputError(f"{printable(path, 300)}: expected a folder, found a file")
+    if not target.exists():
+        return
+    with os.scandir(target) as entries:
+        other = next((entry.name for entry in entries if not _FRAME.fullmatch(entry.name)), None)
+    if other is not None:
+        raise OutputError(
+            f"{printable(target, 300)}: holds other files than frames ({printable(other, 60)}), "
+            "and is not replaced"
+        )

@@ -1,0 +1,145 @@
+"""What a BVH file does not say: the unit of its lengths, its up axis, its exact frame rate."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from viewer.formats._source import Source
+from viewer.rig.arrays import Floats
+from viewer.rig.figure import Figure
+from viewer.rig.joint_names import canonical_names
+from viewer.rig.motion import DEFAULT_RATE, frames_of, world_frames
+from viewer.rig.sampled_clip import SampledClip
+
+__all__ = ["frame_rate", "guess_unit", "guess_up"]
+
+Facts = tuple[tuple[str, str], ...]
+
+_SIZES = (
+    ("m", "metres", 0.3, 3.5, 1.0),
+    ("cm", "centimetres", 50.0, 350.0, 0.01),
+    ("mm", "millimetres", 500.0, 3500.0, 0.001),
+)
+_INCHES = (30.0, 90.0)
+_INCH = 0.0254  # metres
+_RATES = (
+    *(12.0, 15.0, 24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 72.0, 90.0, 100.0, 120.0, 144.0, 150.0),
+    *(180.0, 200.0, 240.0, 250.0, 300.0, 480.0, 500.0, 1000.0),
+    *(24000 / 1001, 30000 / 1001, 60000 / 1001, 120000 / 1001),
+)
+_LONG = 2.0  # times as far along z as along y: z is up
+_UPRIGHT = 0.8  # cosine: a body that stands along an axis
+_LOOKS = 16  # frames that are looked at
+_UPPER = ("head", "neck", "left_shoulder", "right_shoulder")
+_LOWER = ("left_ankle", "right_ankle", "left_knee", "right_knee")
+
+
+def frame_rate(source: Source, frame_time: bytes | None) -> float:
+    """Return frames a second: the usual rate that rounds to the seconds as written.
+
+    ``0.0333333`` is 30 a second, ``0.033367`` is 30000/1001, ``0.1`` is 10.
+    """
+    seconds = 0.0 if frame_time is None else float(frame_time.rstrip(b"fF"))
+    if seconds == 0.0 or not 1e-6 < 1.0 / seconds < 1e6:
+        found = "is missing" if frame_time is None else f"is {seconds:g}"
+        source.warn(f"Frame Time {found}: taken for {DEFAULT_RATE:g} frames a second")
+        return DEFAULT_RATE
+    assert frame_time is not None  # or there would be no seconds
+    digits = frame_time.lower().partition(b"e")[0].rstrip(b"f").replace(b".", b"").lstrip(b"+0")
+    exact = 1.0 / seconds
+    if len(digits) < 2:
+        return float(round(exact)) if abs(exact - round(exact)) < 1e-9 * exact else exact
+    # Half a unit of the last digit written, as a share of the whole.
+    rounding = 0.5 / float(digits)
+    nearest = min((*_RATES, float(max(round(exact), 1))), key=lambda rate: abs(rate - exact))
+    return nearest if abs(nearest * seconds - 1.0) <= rounding * (1.0 + 1e-9) else exact
+
+
+def guess_unit(source: Source, points: Floats) -> tuple[str, Facts]:
+    """Return the figure's unit, ``"m"`` or nothing, and what was found out.
+
+    Parameters
+    ----------
+    source : Source
+        Gets a warning unless the lengths are those of metres.
+    points : (P, 3)
+        The rest pose.
+
+    Returns
+    -------
+    unit : str
+        As in ``Figure.unit``.
+    facts : tuple of (str, str)
+        As in ``Figure.facts``: ``("unit", "cm, taken from …")``.
+    """
+    size = float(np.ptp(points, axis=0).max())
+    inches = f"; inches would be {size * _INCH:.3g} m" if _INCHES[0] < size < _INCHES[1] else ""
+    for unit, words, low, high, _ in _SIZES:
+        if low <= size <= high:
+            fact = f"{unit}, taken from the skeleton's size of {size:.4g}{inches}"
+            if unit != "m":
+                source.warn(f"taken for {words} (skeleton {size:.4g} high{inches}); --unit sets it")
+            return (unit if unit == "m" else ""), (("unit", fact),)
+    if size > 0.0:
+        source.warn(f"unit unknown (skeleton {size:.4g} high{inches}); --unit sets it")
+    return "", (("unit", f"unknown, the skeleton's size is {size:.4g}{inches}"),)
+
+
+def guess_up(
+    source: Source, figure: Figure, clip: SampledClip, points: Floats
+) -> tuple[Literal["y", "z"], Facts]:
+    """Return the up axis of the rest skeleton: where the head is from the feet, else its long side.
+
+    Parameters
+    ----------
+    source : Source
+        Gets a warning unless that is y, in the rest pose and in the frames.
+    figure, clip : Figure, SampledClip
+        As read.
+    points : (P, 3)
+        The rest pose.
+
+    Returns
+    -------
+    up : "y" or "z"
+        As in ``Figure.up``.
+    facts : tuple of (str, str)
+        As in ``Figure.facts``.
+    """
+    skeleton = figure.skeleton
+    assert skeleton is not None  # the reader made it
+    names = canonical_names(skeleton.names, skeleton.parents)
+    upper, lower = (
+        [names.index(name) for name in part if name in names] for part in (_UPPER, _LOWER)
+    )
+    if not upper or not lower:
+        _, deep, high = np.ptp(points, axis=0)[[0, 1, 2]]
+        if high > _LONG * deep:
+            source.warn("z taken for up: the rest skeleton is longest along z; --up sets it")
+            return "z", (("up", "z, along which the rest skeleton is longest"),)
+        return "y", ()
+    joints = points[: skeleton.n_joints]
+    rest = _axis(joints[upper].mean(axis=0) - joints[lower].mean(axis=0))
+    up: Literal["y", "z"] = "z" if rest == "+z" else "y"
+    if up == "z":
+        source.warn("z taken for up: the head is above the feet along z; --up sets it")
+    elif rest not in ("+y", ""):
+        source.warn(f"y taken for up, though the rest skeleton stands along {rest}; --up sets it")
+    every = (
+        np.linspace(0, clip.n_rows - 1, min(_LOOKS, clip.n_rows)).round() / clip.timing.frame_rate
+    )
+    posed = world_frames(figure, frames_of(figure, clip, every))[:, :, :3, 3]
+    stands = _axis((posed[:, upper].mean(axis=1) - posed[:, lower].mean(axis=1)).mean(axis=0))
+    if stands in ("+y", "+z") and stands[1] != up:
+        source.warn(f"{up} taken for up, but in its frames it stands along {stands}; --up sets it")
+    return up, (("up", f"{up}, from the rest skeleton"),)
+
+
+def _axis(direction: Floats) -> str:
+    """Return the axis that a direction mostly lies along, ``"+y"``; nothing if none."""
+    axis = int(np.abs(direction).argmax())
+    if not abs(direction[axis]) > _UPRIGHT * np.linalg.norm(direction):
+        return ""
+    return ("-" if direction[axis] < 0 else "+") + "xyz"[axis]

@@ -1,0 +1,272 @@
+"""Read calibrated cameras: ``intri.yml`` and ``extri.yml``, files of OpenCV's FileStorage.
+
+::
+
+    %YAML:1.0
+    ---
+    names:
+      - "01"
+    K_01: !!opencv-matrix
+      rows: 3
+      cols: 3
+      dt: d
+      data: [ 1200., 0., 512., 0., …
+          … ]
+    dist_01: …   H_01: 1080   W_01: 1920         in intri.yml; D_01 is dist_01 as well
+    R_01: …      Rot_01: …    T_01: …            in extri.yml: rotation vector, matrix, translation
+
+That is all of YAML that is understood here.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from viewer.errors import FormatError, printable
+from viewer.formats._numbers import to_number
+from viewer.formats._source import Source, shown
+from viewer.rig.arrays import Floats
+from viewer.rig.camera_view import CameraView
+from viewer.rig.rotation import rotation_vector_to_matrix
+
+__all__ = ["find_cameras", "read_storage"]
+
+_INTRINSIC, _EXTRINSIC = "intri.yml", "extri.yml"
+_KEY = re.compile(rb"([^\s:\-#\"][^\s:]*|\"[^\"\r\n]*\")[ \t]*:(?:[ \t]+|$)(.*)")
+_PART = re.compile(rb"[ \t]+(rows|cols|dt|data)[ \t]*:[ \t]*(.*)")
+_ITEM = re.compile(rb"[ \t]*-[ \t]*(.*)")
+_MOST = 100_000  # numbers of a matrix
+_NEAR = 1e-3  # calibrations are written with few digits
+
+Value = Floats | list[str] | str
+
+
+def find_cameras(
+    folders: Sequence[Path], max_size: int
+) -> tuple[tuple[CameraView, ...], list[str]]:
+    """Return the cameras of the first folder that has their files.
+
+    Parameters
+    ----------
+    folders : sequence of Path
+        Where to look.
+    max_size : int
+        Larger files, in bytes, are refused.
+
+    Returns
+    -------
+    views : tuple of CameraView
+        In the order of the files; none if there are no files, or they cannot be used.
+    notes : list of str
+        What cannot be used and why, one line each.
+    """
+    for folder in folders:
+        there = [name for name in (_INTRINSIC, _EXTRINSIC) if (folder / name).is_file()]
+        if len(there) == 2:
+            try:
+                return _cameras(*(Source.open(folder / name, max_size) for name in there))
+            except FormatError as problem:
+                return (), [f"{problem}; the cameras are left out"]
+        if there:
+            lacking = _EXTRINSIC if there == [_INTRINSIC] else _INTRINSIC
+            shown_path = printable(folder / there[0], 300)
+            return (), [f"{shown_path}: no {lacking} beside it; the cameras are left out"]
+    return (), []
+
+
+def _cameras(intrinsic: Source, extrinsic: Source) -> tuple[tuple[CameraView, ...], list[str]]:
+    inner, outer = read_storage(intrinsic), read_storage(extrinsic)
+    views, notes = [], []
+    for name in _names(inner, outer):
+        try:
+            views.append(_camera(name, intrinsic, inner, extrinsic, outer))
+        except FormatError as problem:
+            notes.append(f"{problem}; this camera is left out")
+    return tuple(views), notes
+
+
+def _names(inner: dict[str, Value], outer: dict[str, Value]) -> list[str]:
+    """Return the cameras that one of the files lists, or else those that have a matrix K."""
+    for values in (inner, outer):
+        listed = values.get("names")
+        if isinstance(listed, list):
+            return list(dict.fromkeys(listed))
+    return [key.removeprefix("K_") for key in inner if key.startswith("K_")]
+
+
+def _camera(
+    name: str,
+    intrinsic: Source,
+    inner: dict[str, Value],
+    extrinsic: Source,
+    outer: dict[str, Value],
+) -> CameraView:
+    matrix = _matrix(intrinsic, inner, f"K_{name}", (3, 3))
+    if not (matrix[[0, 1], [0, 1]] > 0).all() or not np.allclose(matrix[2], [0, 0, 1]):
+        raise intrinsic.error(
+            f"K_{printable(name, 40)}: expected focal lengths above 0 and the last row 0 0 1"
+        )
+    lens = next((inner[key] for key in (f"dist_{name}", f"D_{name}") if key in inner), None)
+    distortion = lens.ravel() if isinstance(lens, np.ndarray) else np.zeros(0)
+    sizes = [inner.get(f"{axis}_{name}") for axis in "WH"]
+    pixels = [_pixels(size) for size in sizes]
+    width, height = pixels
+    return CameraView(
+        name,
+        matrix,
+        _rotation(extrinsic, outer, name),
+        _matrix(extrinsic, outer, f"T_{name}", (3,)),
+        (width, height) if width and height else None,
+        distortion,
+    )
+
+
+def _rotation(source: Source, values: dict[str, Value], name: str) -> Floats:
+    """Return R: the matrix if the file has it, else of the rotation vector."""
+    if f"Rot_{name}" not in values:
+        return rotation_vector_to_matrix(_matrix(source, values, f"R_{name}", (3,)))
+    rotation = _matrix(source, values, f"Rot_{name}", (3, 3))
+    off = np.abs(rotation @ rotation.T - np.eye(3)).max()
+    if off > _NEAR or np.linalg.det(rotation) < 0.0:
+        raise source.error(
+            f"Rot_{printable(name, 40)}: expected a rotation, found a matrix that is none"
+        )
+    return rotation
+
+
+def _matrix(source: Source, values: dict[str, Value], key: str, shape: tuple[int, ...]) -> Floats:
+    value = values.get(key)
+    wanted = " x ".join(map(str, shape))
+    if not isinstance(value, np.ndarray):
+        found = "no such key" if value is None else "something else"
+        raise source.error(f"{printable(key, 40)}: expected {wanted} numbers, found {found}")
+    if value.size != np.prod(shape) or (len(shape) == 2 and value.shape != shape):
+        found = " x ".join(map(str, value.shape))
+        raise source.error(f"{printable(key, 40)}: expected {wanted} numbers, found {found}")
+    return value.reshape(shape)
+
+
+def _pixels(value: Value | None) -> int:
+    number = to_number(value.encode()) if isinstance(value, str) else None
+    return int(number) if number is not None and 0 < number < 1 << 20 else 0
+
+
+@dataclass(slots=True)
+class _Matrix:
+    """A matrix whose lines are being read."""
+
+    key: str
+    line: int
+    rows: int = -1
+    columns: int = -1
+    data: list[bytes] = field(default_factory=list)
+    is_open: bool = False  # whether the list of numbers goes on
+
+
+def read_storage(source: Source) -> dict[str, Value]:
+    """Return what a FileStorage file holds: matrices, lists of texts and single texts by name.
+
+    Parameters
+    ----------
+    source : Source
+        The file.
+
+    Raises
+    ------
+    FormatError
+        With the line that is not understood.
+    """
+    values: dict[str, Value] = {}
+    matrix: _Matrix | None = None
+    listed: list[str] | None = None
+    for number, line in _lines(source.data):
+        key = None if matrix is not None and matrix.is_open else _KEY.fullmatch(line)
+        if key is not None:
+            _close(source, matrix, values)
+            matrix, listed = None, None
+            name, rest = _text(key[1]), key[2].strip()
+            if name in values:
+                raise FormatError(source.path, f'expected every key once, found "{name}"', number)
+            if rest.startswith(b"!!opencv-matrix"):
+                matrix = _Matrix(name, number)
+            elif rest.startswith(b"[") and rest.endswith(b"]"):
+                values[name] = [_text(word) for word in rest[1:-1].split(b",") if word.strip()]
+            elif rest:
+                values[name] = _text(rest)
+            else:
+                values[name] = listed = []
+        elif matrix is not None:
+            _continue(source, matrix, line, number)
+        elif listed is not None and (item := _ITEM.fullmatch(line)):
+            listed.append(_text(item[1]))
+        else:
+            found = shown(line.strip())
+            raise FormatError(source.path, f"expected name: value, found {found}", number)
+    _close(source, matrix, values)
+    return values
+
+
+def _lines(data: bytes) -> Iterator[tuple[int, bytes]]:
+    """Yield the lines that say something, with their numbers."""
+    for number, line in enumerate(data.splitlines(), start=1):
+        bare = line.strip()
+        if bare and not bare.startswith((b"%", b"#")) and bare not in (b"---", b"..."):
+            yield number, line.rstrip()
+
+
+def _text(word: bytes) -> str:
+    return word.strip().strip(b"\"'").decode("utf-8", "replace")
+
+
+def _continue(source: Source, matrix: _Matrix, line: bytes, number: int) -> None:
+    """Take in one line of a matrix."""
+    part = None if matrix.is_open else _PART.fullmatch(line)
+    if part is None and not matrix.is_open:
+        raise FormatError(
+            source.path, f"expected rows, cols, dt or data, found {shown(line.strip())}", number
+        )
+    text = line.strip() if part is None else part[2].strip()
+    if part is not None and part[1] in (b"rows", b"cols"):
+        size = to_number(text)
+        if size is None or size != int(size) or not 0 <= size <= _MOST:
+            raise FormatError(source.path, f"expected a size, found {shown(text)}", number)
+        if part[1] == b"rows":
+            matrix.rows = int(size)
+        else:
+            matrix.columns = int(size)
+        return
+    if part is not None and part[1] == b"dt":
+        return
+    if part is not None:
+        if not text.startswith(b"["):
+            raise FormatError(source.path, f"expected [ numbers ], found {shown(text)}", number)
+        text, matrix.is_open = text[1:], True
+    numbers, bracket, _ = text.partition(b"]")
+    matrix.is_open = not bracket
+    matrix.data += numbers.replace(b",", b" ").split()
+
+
+def _close(source: Source, matrix: _Matrix | None, values: dict[str, Value]) -> None:
+    """Make an array of a matrix that is complete."""
+    if matrix is None:
+        return
+    numbers = [to_number(word) for word in matrix.data]
+    if None in numbers:
+        odd = matrix.data[numbers.index(None)]
+        raise FormatError(
+            source.path, f"{matrix.key}: expected numbers, found {shown(odd)}", matrix.line
+        )
+    if matrix.is_open or matrix.rows * matrix.columns != len(numbers):
+        raise FormatError(
+            source.path,
+            f"{matrix.key}: expected {matrix.rows} x {matrix.columns} numbers, "
+            f"found {len(numbers)}",
+            matrix.line,
+        )
+    array = np.array(numbers, dtype=np.float64).reshape(matrix.rows, matrix.columns)
+    values[matrix.key] = array

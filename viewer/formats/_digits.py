@@ -1,0 +1,63 @@
+"""Whole numbers written into pictures, without a font: digits of 5 x 7 dots."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.rig.arrays import Bools, Bytes
+
+__all__ = ["digits", "write_number"]
+
+_ROWS = (
+    " ###    #    ###  ##### #   # #####  ###  #####  ###   ### ",
+    "#   #  ##   #   #     # #   # #     #   #     # #   # #   #",
+    "#   #   #       #    #  #   # #     #        #  #   # #   #",
+    "#   #   #      #    ##  ##### ####  ####    #    ###   ####",
+    "#   #   #     #       #     #     # #   #   #   #   #     #",
+    "#   #   #    #    #   #     # #   # #   #   #   #   # #   #",
+    " ###   ###  #####  ###      #  ###   ###    #    ###   ### ",
+)
+_WIDTH, _HEIGHT, _STEP = 5, 7, 6
+_INK, _PAPER = (255, 255, 255, 255), (0, 0, 0, 255)
+_PAPER_SHARE = 0.55  # how much of what is under the paper it covers
+
+
+def digits(number: int) -> Bools:
+    """Return the dots of a whole number of 0 or more: (7, 6 n - 1), True is ink.
+
+    >>> digits(17).shape
+    (7, 11)
+    """
+    glyphs = []
+    for digit in map(int, str(number)):
+        start = digit * _STEP
+        glyph = [[dot == "#" for dot in row[start : start + _WIDTH].ljust(_WIDTH)] for row in _ROWS]
+        glyphs.append(np.pad(np.array(glyph), ((0, 0), (0, _STEP - _WIDTH))))
+    return np.concatenate(glyphs, axis=1)[:, :-1]
+
+
+def write_number(pixels: Bytes, number: int) -> None:
+    """Write a number into the lower left corner of a picture, on dark paper that shines through.
+
+    Parameters
+    ----------
+    pixels : (H, W, 4) uint8
+        Changed in place; left as it is if the number does not fit.
+    number : int
+        0 or more.
+    """
+    height, width = pixels.shape[:2]
+    dots = np.pad(digits(number), 2)  # the paper's margin, in dots
+    scale = max(round(height / 100), 1)
+    ink = np.kron(dots, np.ones((scale, scale), dtype=np.bool_)).astype(np.bool_)
+    if ink.shape[0] > height or ink.shape[1] > width:
+        return
+    corner = pixels[height - ink.shape[0] :, : ink.shape[1]]
+    # Paper over a transparent background: its share is its alpha.
+    under = corner.astype(np.float64)
+    share = _PAPER_SHARE
+    under[..., :3] *= under[..., 3:] / 255.0
+    alpha = 255.0 * share + (1.0 - share) * under[..., 3]
+    color = (1.0 - share) * under[..., :3] * 255.0 / alpha[..., None]
+    corner[..., :3], corner[..., 3] = np.rint(color), np.rint(alpha)
+    corner[ink] = _INK

@@ -1,0 +1,186 @@
+"""Which files a recording of EasyMocap is made of, and where they are on one timeline."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from viewer.errors import printable
+from viewer.formats._source import Source
+
+__all__ = ["BODIES", "POINTS", "FrameFiles", "FrameFolder", "find_frames"]
+
+BODIES = ("smpl_full", "smplfull", "smpl")
+"""Folders of body parameters, the fullest first."""
+
+POINTS = "keypoints3d"
+"""Folder of keypoints."""
+
+_SUFFIX = ".json"
+_MOST_HOLES = 10  # frames for every file, and beside those as many as follows
+_FEW = 1000
+
+
+@dataclass(slots=True)
+class FrameFolder:
+    """The frame files of one folder.
+
+    Attributes
+    ----------
+    path : Path
+        The folder.
+    has_bodies, has_points : bool
+        What is looked for in its files.
+    names : dict of int to str
+        File names by frame, counted from the first frame of the recording.
+    """
+
+    path: Path
+    has_bodies: bool = True
+    has_points: bool = True
+    names: dict[int, str] = field(default_factory=dict)
+
+
+@dataclass(slots=True)
+class FrameFiles:
+    """All frame files of a recording.
+
+    Attributes
+    ----------
+    folders : list of FrameFolder
+        Read frame by frame, in this order.
+    frames : list of int
+        Those that have a file, rising.
+    n_frames, first_frame : int
+        Length of the timeline, and what the files call its first frame.
+    """
+
+    folders: list[FrameFolder]
+    frames: list[int] = field(default_factory=list)
+    n_frames: int = 0
+    first_frame: int = 0
+
+
+def find_frames(source: Source) -> FrameFiles:
+    """Find the frame files of a folder that EasyMocap wrote, or of one inside it, or one file.
+
+    Parameters
+    ----------
+    source : Source
+        What was left aside is added to its warnings.
+
+    Raises
+    ------
+    FormatError
+        If there are none, or a folder cannot be looked into.
+    """
+    if not source.is_folder:
+        folder = FrameFolder(source.path.parent)
+        return _on_timeline(source, [folder], [[source.path.name]])
+    names, inside = _look(source, source.path)
+    folders = _folders(source, names, inside)
+    found = []
+    for folder in folders:
+        names, inside = _look(source, folder.path)
+        if not names and inside:
+            names = _first_camera(source, folder, inside)
+        found.append(names)
+    if not any(found):
+        raise source.error(
+            f"expected frame files ({', '.join((*BODIES, POINTS))}: 000000{_SUFFIX} …), found none"
+        )
+    return _on_timeline(source, folders, found)
+
+
+def _look(source: Source, folder: Path) -> tuple[list[str], list[str]]:
+    """Return the names of a folder's frame files and of the folders in it, sorted."""
+    files, folders, others = [], [], []
+    try:
+        with os.scandir(folder) as entries:
+            for entry in entries:
+                is_frame = entry.name.lower().endswith(_SUFFIX) and entry.name[0] != "."
+                if is_frame and entry.is_file():
+                    files.append(entry.name)
+                elif entry.is_dir():
+                    folders.append(entry.name)
+                elif is_frame:
+                    others.append(entry.name)
+    except OSError as problem:
+        reason = problem.strerror or problem
+        raise source.error(f"{printable(folder.name, 100)}: cannot be read: {reason}") from None
+    if others:
+        source.warn(f"{_listed(others)}: expected files, found something else")
+    return sorted(files), sorted(folders)
+
+
+def _folders(source: Source, names: list[str], inside: list[str]) -> list[FrameFolder]:
+    """Return the folders that hold frames: those inside by name, or the one that was opened."""
+    bodies = [name for name in BODIES if name in inside]
+    points = [POINTS] if POINTS in inside else []
+    if not bodies and not points:
+        return [FrameFolder(source.path)]
+    if len(bodies) > 1:
+        source.warn(f"{bodies[0]}/ is read, {' and '.join(bodies[1:])}/ beside it is not")
+    if names:
+        source.warn(f"files beside the folders of frames are not read: {_listed(names)}")
+    both = bool(bodies and points)
+    return [
+        FrameFolder(source.path / name, name != POINTS or not both, name == POINTS or not both)
+        for name in (*bodies[:1], *points)
+    ]
+
+
+def _first_camera(source: Source, folder: FrameFolder, inside: list[str]) -> list[str]:
+    """Go into the first folder that has frames: fits of one view each have a folder."""
+    holding = [(name, files) for name in inside if (files := _look(source, folder.path / name)[0])]
+    if not holding:
+        return []
+    first, files = holding[0]
+    if len(holding) > 1:
+        others = _listed([name for name, _ in holding[1:]])
+        source.warn(f"{folder.path.name}/{printable(first, 100)} is read, others are not: {others}")
+    folder.path = folder.path / first
+    return files
+
+
+def _listed(names: list[str]) -> str:
+    shown = ", ".join(printable(name, 60) for name in names[:6])
+    return shown if len(names) <= 6 else f"{shown} and {len(names) - 6} more"
+
+
+def _on_timeline(source: Source, folders: list[FrameFolder], found: list[list[str]]) -> FrameFiles:
+    """Give every file its frame: numbers keep their holes, other names follow one another."""
+    stems = {name: name[: -len(_SUFFIX)] for names in found for name in names}
+    files = FrameFiles(folders)
+    place: dict[str, int] = {}
+    if all(stem.isascii() and stem.isdecimal() for stem in stems.values()):
+        numbers = {name: int(stem) for name, stem in stems.items()}
+        order = sorted(set(numbers.values()))
+        first, last = order[0], order[-1]
+        if last - first < _MOST_HOLES * len(order) + _FEW:
+            place = {name: number - first for name, number in numbers.items()}
+            files.first_frame = first
+        else:
+            source.warn(
+                f"{len(order)} frames numbered from {first} to {last}: taken one after the other"
+            )
+            rank = {number: index for index, number in enumerate(order)}
+            place = {name: rank[number] for name, number in numbers.items()}
+    else:
+        place = {name: index for index, name in enumerate(sorted(stems, key=stems.__getitem__))}
+    for folder, names in zip(folders, found, strict=True):
+        _put(source, folder, ((place[name], name) for name in names))
+    files.frames = sorted(set(place.values()))
+    files.n_frames = files.frames[-1] + 1
+    return files
+
+
+def _put(source: Source, folder: FrameFolder, frames: Iterable[tuple[int, str]]) -> None:
+    doubled = []
+    for frame, name in frames:
+        if folder.names.setdefault(frame, name) != name:
+            doubled.append(name)
+    if doubled:
+        source.warn(f"frames that another file has too are left out: {_listed(doubled)}")

@@ -1,0 +1,150 @@
+"""One frame file of EasyMocap: its list of people, and the words for what is wrong in it."""
+
+from __future__ import annotations
+
+import json
+import os
+from typing import Any
+
+from viewer.errors import FormatError, printable
+from viewer.formats._archive import describe
+
+__all__ = ["MisfitError", "load_people", "person_of", "row_of", "take_row"]
+
+Record = dict[str, Any]
+
+
+class MisfitError(ValueError):
+    """A person's record that cannot be used; the text says ``key: expected …, found …``."""
+
+
+def _unique(pairs: list[tuple[str, Any]]) -> Record:
+    values = dict(pairs)
+    if len(values) != len(pairs):
+        keys = [key for key, _ in pairs]
+        twice = next(key for key in keys if keys.count(key) > 1)
+        raise MisfitError(f'expected every key once, found "{printable(twice, 40)}" twice')
+    return values
+
+
+_decode = json.JSONDecoder(object_pairs_hook=_unique).decode  # made once: making it takes longer
+
+
+def load_people(path: str, max_size: int) -> list[Any]:
+    """Return the people in a frame file, unchecked; NaN and infinities pass.
+
+    Parameters
+    ----------
+    path : str
+        The file, which is a regular one.
+    max_size : int
+        Larger files, in bytes, are refused before they are read.
+
+    Raises
+    ------
+    FormatError
+        If it cannot be read, is no JSON, or holds no list of people.
+    """
+    try:
+        text = _read(path, max_size).decode()
+        content = _decode(text.removeprefix("\ufeff"))
+    except OSError as problem:
+        raise FormatError(path, f"cannot be read: {problem.strerror or problem}") from None
+    except json.JSONDecodeError as problem:
+        what = f"expected JSON, found a mistake: {printable(problem.msg, 100)}"
+        raise FormatError(path, what, problem.lineno) from None
+    except UnicodeDecodeError:
+        raise FormatError(path, "expected text in UTF-8, found other bytes") from None
+    except RecursionError:
+        raise FormatError(path, "expected JSON, found too deep a nesting") from None
+    except ValueError as problem:  # numbers of thousands of digits, and keys that come twice
+        raise FormatError(path, printable(problem)) from None
+    if isinstance(content, dict) and "annots" in content:
+        content = content["annots"]
+    if not isinstance(content, list):
+        raise FormatError(path, f"expected a list of people, found {describe(content)}")
+    return content
+
+
+def _read(path: str, max_size: int) -> bytes:
+    # Thousands of small files: a stream object for each would take as long as reading it.
+    handle = os.open(path, os.O_RDONLY | getattr(os, "O_BINARY", 0))
+    try:
+        size = os.fstat(handle).st_size
+        if size > max_size:
+            raise FormatError(path, f"expected at most {max_size} bytes, found {size} (--max-size)")
+        data = os.read(handle, size + 1)
+        while 0 < len(data) < size and (more := os.read(handle, size - len(data) + 1)):
+            data += more
+        return data
+    finally:
+        os.close(handle)
+
+
+def person_of(record: Any, place: int) -> int:
+    """Return whose record it is: ``id``, ``personID``, or else its place in the list.
+
+    Raises
+    ------
+    MisfitError
+        If it is no record, or names nobody.
+    """
+    if type(record) is dict and type(person := record.get("id")) is int and -1 <= person < 1 << 31:
+        return person
+    if not isinstance(record, dict):
+        raise MisfitError(f"expected a person with names and values, found {describe(record)}")
+    person = record.get("id", record.get("personID", place))
+    if isinstance(person, float) and person.is_integer():
+        person = int(person)
+    if isinstance(person, bool) or not isinstance(person, int):
+        raise MisfitError(f"id: expected a whole number, found {describe(person)}")
+    if abs(person) >= 1 << 31:
+        raise MisfitError(f"id: expected less than 2147483648, found {describe(person)}")
+    return person
+
+
+def row_of(record: Record, key: str) -> list[Any]:
+    """Return the numbers of a key, which may be written as a matrix of one row.
+
+    Raises
+    ------
+    MisfitError
+        If it is no list.
+    """
+    values = record.get(key)
+    if isinstance(values, list) and len(values) == 1 and isinstance(values[0], list):
+        values = values[0]
+    if not isinstance(values, list):
+        found = "no such key" if key not in record else describe(record[key])
+        raise MisfitError(f"{key}: expected numbers, found {found}")
+    return values
+
+
+def take_row(record: Record, key: str, count: int, put: Any) -> None:
+    """Hand the numbers of a key to ``put``, the ``fromlist`` of an ``array("d")``.
+
+    Raises
+    ------
+    MisfitError
+        If there are more or fewer, or others than numbers.
+    """
+    try:
+        values = record[key]
+        if len(values) == 1 and type(values[0]) is list:
+            values = values[0]
+        if len(values) == count:
+            put(values)
+            return
+    except (KeyError, TypeError, ValueError, OverflowError):
+        pass  # looked at below
+    values = row_of(record, key)
+    if len(values) != count:
+        raise MisfitError(f"{key}: expected {count} numbers, found {len(values)}")
+    raise MisfitError(
+        f"{key}: expected {count} numbers, found {describe(_odd_one(values))} among them"
+    )
+
+
+def _odd_one(values: list[Any]) -> Any:
+    odd = (value for value in values if not isinstance(value, int | float))
+    return next(odd, max((value for value in values if isinstance(value, int)), key=abs, default=0))

@@ -1,0 +1,155 @@
+"""Keypoints of EasyMocap's records, gathered person by person.
+
+``keypoints3d`` holds rows of x, y, z and confidence, or of three numbers seen for certain; hands
+and face may be beside it in keys of their own. A confidence of 0 is "not seen".
+"""
+
+from __future__ import annotations
+
+from array import array
+from dataclasses import dataclass, field
+from itertools import chain
+from typing import Any
+
+import numpy as np
+
+from viewer.formats._archive import describe
+from viewer.formats._easymocap_bodies import Rows
+from viewer.formats._easymocap_json import MisfitError
+from viewer.formats._numbers import LARGEST
+from viewer.rig.arrays import Floats
+from viewer.rig.keypoint_layouts import TITLES, joined_layout, keypoint_layout
+from viewer.rig.points import PointLayout
+
+__all__ = ["KEY", "PointRows", "point_layout"]
+
+KEY = "keypoints3d"
+_BESIDE = ("handl3d", "handr3d", "face3d")
+_MOST = 1 << 16  # keypoints of one person
+_FOUR, _THREE = {4}, {3}
+
+Parts = tuple[tuple[str, int], ...]
+
+
+def point_layout(record: dict[str, Any], title: str = "") -> tuple[PointLayout, Parts]:
+    """Return the layout of a record's keypoints, and its keys with their numbers of points.
+
+    Parameters
+    ----------
+    record : dict
+        Of one person.
+    title : str
+        The layout by name, where ``keypoints3d`` has that number of points.
+
+    Raises
+    ------
+    MisfitError
+        If a key holds no rows.
+    """
+    parts = [(key, _count(record, key)) for key in (KEY, *_BESIDE) if key in record]
+    counts = [count for _, count in parts]
+    body = keypoint_layout(counts[0], title if title in TITLES.get(counts[0], ()) else "")
+    if len(parts) == 1:
+        return body, tuple(parts)
+    beside = {key: keypoint_layout(count) for key, count in parts[1:]}
+    for key, side in (("handl3d", 0), ("handr3d", 1)):
+        if key in beside and len(beside[key].names) == 21:
+            beside[key] = _one_hand(side)
+    joined = joined_layout("", [body, *beside.values()])
+    whole = keypoint_layout(len(joined.names))
+    # Body, hands and face in the usual order are a layout with a name of its own.
+    named = whole if whole.names == joined.names else None
+    text = " + ".join([body.title, *beside])
+    return named or PointLayout(text, joined.names, joined.limbs, joined.sides), tuple(parts)
+
+
+def _one_hand(side: int) -> PointLayout:
+    both = keypoint_layout(42)
+    first, stop = 21 * side, 21 * side + 21
+    inside = (both.limbs >= first).all(axis=1) & (both.limbs < stop).all(axis=1)
+    limbs = both.limbs[inside] - first
+    return PointLayout("hand", both.names[first:stop], limbs, both.sides[first:stop])
+
+
+def _count(record: dict[str, Any], key: str) -> int:
+    rows = record[key]
+    if not isinstance(rows, list) or not rows or not all(isinstance(row, list) for row in rows):
+        raise MisfitError(f"{key}: expected rows of 3 or 4 numbers, found {describe(rows)}")
+    if len(rows) > _MOST:
+        raise MisfitError(f"{key}: expected at most {_MOST} keypoints, found {len(rows)}")
+    return len(rows)
+
+
+@dataclass(slots=True, kw_only=True)
+class PointRows(Rows):
+    """Keypoints of one person.
+
+    Attributes
+    ----------
+    layout : PointLayout
+        Of all records.
+    parts : tuple of (str, int)
+        Keys of a record, and their numbers of points.
+    buffer : array
+        x, y, z, confidence of all points, one record behind the other.
+    """
+
+    layout: PointLayout
+    parts: Parts
+    buffer: array[float] = field(default_factory=lambda: array("d"))
+
+    def add(self, record: dict[str, Any], frame: int, path: str) -> None:
+        """Take in one record.
+
+        Raises
+        ------
+        MisfitError
+            If something is missing, or has another number of points than before.
+        """
+        before = len(self.buffer)
+        try:
+            for key, count in self.parts:
+                self._take(record.get(key), key, count)
+        except MisfitError:
+            del self.buffer[before:]
+            raise
+        self.frames.append(frame)
+        self.paths.append(path)
+
+    def _take(self, rows: Any, key: str, count: int) -> None:
+        try:
+            if len(rows) == count:
+                widths = set(map(len, rows))
+                if widths == _FOUR:
+                    self.buffer.fromlist(list(chain.from_iterable(rows)))
+                    return
+                if widths == _THREE:
+                    certain = [[*row, 1.0] for row in rows]
+                    self.buffer.fromlist(list(chain.from_iterable(certain)))
+                    return
+        except (TypeError, ValueError, OverflowError):
+            pass  # said below
+        if not isinstance(rows, list):
+            raise MisfitError(f"{key}: expected {count} keypoints, found {describe(rows)}")
+        if len(rows) != count:
+            raise MisfitError(f"{key}: expected {count} keypoints, found {len(rows)}")
+        raise MisfitError(f"{key}: expected rows of 3 or 4 numbers, found others")
+
+    def points(self) -> tuple[Floats, list[tuple[str, str]]]:
+        """Return the points (N, K, 4), and what was wrong with some: file and text."""
+        count = sum(size for _, size in self.parts)
+        points = np.frombuffer(self.buffer, dtype=np.float64).reshape(-1, count, 4).copy()
+        confidence = points[..., 3]
+        is_unseen = confidence == 0.0
+        is_odd = ~((np.abs(points) <= LARGEST).all(axis=-1) & (confidence >= 0.0)) & ~is_unseen
+        points[is_odd | is_unseen] = 0.0
+        faults = [
+            (
+                self.paths[row],
+                f"{int(is_odd[row].sum())} keypoints without finite numbers, or of a confidence "
+                "below 0, count as not seen",
+            )
+            for row in np.flatnonzero(is_odd.any(axis=1))
+        ]
+        points.flags.writeable = False  # so that it is not copied again
+        return points, faults

@@ -1,0 +1,161 @@
+"""Where frames go as pictures: one file each, or all of them side by side in one."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from viewer.errors import OutputError, ViewerError, printable
+from viewer.formats._digits import write_number
+from viewer.formats._image import save_image
+from viewer.rig.arrays import Bytes
+
+__all__ = ["PictureSink", "SheetSink", "sheet_layout"]
+
+_MOST_WORKERS = 4  # pictures that are compressed at the same time
+_SMALLEST_CELL = 16  # pixels
+_CELL_ASPECT = 4.0 / 3.0
+
+
+class PictureSink:
+    """Writes a picture for every frame, each in one step.
+
+    Pictures that are finished stay if the rest is given up.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        One for each frame; their suffix chooses the format.
+
+    Attributes
+    ----------
+    workers : int
+        Pictures that may be written at the same time.
+    n_bytes : int
+        Size of what is written so far.
+    """
+
+    def __init__(self, paths: Sequence[Path]) -> None:
+        self.paths = paths
+        self.workers = min(max((os.cpu_count() or 2) - 1, 1), _MOST_WORKERS)
+
+    @property
+    def n_bytes(self) -> int:
+        """Size of the files that are there."""
+        return sum(path.stat().st_size for path in self.paths if path.is_file())
+
+    def write(self, frame: int, pixels: Bytes) -> None:
+        """Write one picture; see ``viewer.rendering.recorder.Sink``.
+
+        Raises
+        ------
+        OutputError
+            If it cannot be written.
+        """
+        _save(self.paths[frame], pixels)
+
+    def close(self) -> None:
+        """Do nothing: every picture is there."""
+
+    def abort(self) -> None:
+        """Do nothing: no picture is ever half there."""
+
+
+class SheetSink:
+    """Writes one picture of all frames, row by row, with a number in each cell.
+
+    Parameters
+    ----------
+    path : Path
+        Its suffix chooses the format.
+    size : (int, int)
+        The most that the picture may be wide and high, in pixels.
+    numbers : sequence of int
+        One for each frame, written into its cell.
+
+    Attributes
+    ----------
+    columns, rows : int
+        How many cells there are across and down.
+    cell : (int, int)
+        Width and height of one: the size of the frames.
+    size : (int, int)
+        Width and height of the whole.
+    n_bytes : int
+        Size of the written file.
+
+    Raises
+    ------
+    ViewerError
+        If so many cells would be too small.
+    """
+
+    def __init__(self, path: Path, size: tuple[int, int], numbers: Sequence[int]) -> None:
+        self.path, self.numbers, self.workers, self.n_bytes = path, numbers, 1, 0
+        self.columns, self.rows = sheet_layout(size, len(numbers))
+        self.cell = size[0] // self.columns, size[1] // self.rows
+        self.size = self.columns * self.cell[0], self.rows * self.cell[1]
+        if min(self.cell) < _SMALLEST_CELL:
+            raise ViewerError(
+                f"contact sheet: {len(numbers)} frames in {size[0]} x {size[1]} pixels are "
+                f"{self.cell[0]} x {self.cell[1]} each, which is too small to see anything"
+            )
+        self._sheet: Bytes | None = None
+
+    def write(self, frame: int, pixels: Bytes) -> None:
+        """Put a frame into its cell; see ``viewer.rendering.recorder.Sink``."""
+        if self._sheet is None:
+            # Cells that stay empty look like the background.
+            self._sheet = np.empty((self.size[1], self.size[0], 4), dtype=np.uint8)
+            self._sheet[:] = pixels[0, 0]
+        row, column = divmod(frame, self.columns)
+        width, height = self.cell
+        cell = self._sheet[row * height : (row + 1) * height, column * width : (column + 1) * width]
+        cell[:] = pixels
+        write_number(cell, self.numbers[frame])
+
+    def close(self) -> None:
+        """Write the picture.
+
+        Raises
+        ------
+        OutputError
+            If it cannot be written.
+        """
+        assert self._sheet is not None  # there is at least one frame
+        _save(self.path, self._sheet)
+        self.n_bytes = self.path.stat().st_size
+
+    def abort(self) -> None:
+        """Forget the frames; nothing is written before ``close``."""
+        self._sheet = None
+
+
+def sheet_layout(size: tuple[int, int], count: int) -> tuple[int, int]:
+    """Return how many columns and rows hold some frames best.
+
+    Cells near 4 : 3 are good, empty ones bad.
+
+    >>> sheet_layout((1280, 720), 12), sheet_layout((1280, 720), 1)
+    ((4, 3), (1, 1))
+    """
+
+    def badness(columns: int) -> float:
+        rows = math.ceil(count / columns)
+        aspect = (size[0] / columns) / (size[1] / rows)
+        return abs(math.log(aspect / _CELL_ASPECT)) + (columns * rows - count) / count
+
+    columns = min(range(1, count + 1), key=badness)
+    return columns, math.ceil(count / columns)
+
+
+def _save(path: Path, pixels: Bytes) -> None:
+    try:
+        save_image(path, pixels)
+    except (KeyError, ValueError, OSError) as problem:  # what Pillow raises
+        reason = problem if isinstance(problem, OSError) else "pictures cannot be written as this"
+        raise OutputError(f"{printable(path, 300)}: {reason}") from None

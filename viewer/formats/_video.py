@@ -1,0 +1,375 @@
+"""Write videos through PyAV (FFmpeg's libraries), which is imported when there is one to write.
+
+``.mp4`` holds H.264, ``.webm`` VP9, ``.gif`` pictures of 256 colours. Colours of the first two are
+those of BT.709 in limited range, converted and tagged as such (ITU-T H.273, table 2 to 4, code
+point 1), so that players show the colours that were drawn.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from viewer.errors import UnsupportedFormatError, ViewerError, printable
+from viewer.formats._save import Replacement
+from viewer.rig.arrays import Bytes
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    import av
+    from av.video.frame import VideoFrame
+
+__all__ = ["MOST_GIF_RATE", "VIDEOS", "VideoSink", "video_kind"]
+
+MOST_GIF_RATE = 50.0
+"""Frames a second: viewers show delays below 2/100 s as 10/100 s."""
+
+_BT709, _LIMITED = 1, 1  # H.273's code points; FFmpeg's AVColorSpace and AVColorRange
+_QUALITY = 75
+
+
+@dataclass(frozen=True, slots=True)
+class VideoKind:
+    """What can be said of a kind of video before anything is imported.
+
+    Attributes
+    ----------
+    title : str
+        For menus.
+    encoders : tuple of str
+        FFmpeg's names, the best first.
+    has_alpha : bool
+        Whether it can be transparent.
+    needs_even : bool
+        Whether width and height must be even: colours have half the resolution.
+    """
+
+    title: str
+    encoders: tuple[str, ...]
+    has_alpha: bool
+    needs_even: bool
+    muxer: dict[str, str] = field(default_factory=dict)
+
+
+VIDEOS = {
+    ".mp4": VideoKind(
+        "MP4 video (H.264)",
+        ("libx264", "libopenh264", "mpeg4"),
+        False,
+        True,
+        {"movflags": "+faststart"},  # the index first, so that browsers start at once
+    ),
+    ".webm": VideoKind("WebM video (VP9)", ("libvpx-vp9", "libvpx"), True, True),
+    ".gif": VideoKind("animated GIF", ("gif",), True, False),
+}
+"""Kinds of video by suffix."""
+
+
+def video_kind(path: Path) -> VideoKind:
+    """Return the kind of video that a file of this name is.
+
+    Raises
+    ------
+    UnsupportedFormatError
+        If it is none; the message lists those there are.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in VIDEOS:
+        known = ", ".join(VIDEOS)
+        raise UnsupportedFormatError(f'videos cannot be written as "{suffix}"; there are: {known}')
+    return VIDEOS[suffix]
+
+
+class VideoSink:
+    """Writes frames as a video; a sink of ``viewer.rendering.recorder``.
+
+    The file is written next to its place and put there when it is whole.
+
+    Parameters
+    ----------
+    path : Path
+        Its suffix chooses the kind.
+    size : (int, int)
+        Width and height of the frames. Where they must be even and are not, the last column or
+        row is repeated.
+    rate : float
+        Frames a second. A GIF counts time in 1/100 s, so its delays are rounded in turn and their
+        mean is right.
+    quality : float
+        0 to 100; GIFs have one quality.
+    transparent : bool
+        Whether frames have transparent pixels. Where the format knows none, they are put on black.
+
+    Attributes
+    ----------
+    workers : int
+        1: frames are needed in order.
+    notes : list of str
+        What is not as asked for, one line each.
+    n_bytes : int
+        Size of the file, once it is there.
+    encoder : str
+        FFmpeg's name for it.
+
+    Raises
+    ------
+    ViewerError
+        If PyAV is not installed or lacks the encoder, or the numbers make no sense.
+    OutputError
+        If no file can be written there.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        size: tuple[int, int],
+        rate: float,
+        quality: float = _QUALITY,
+        transparent: bool = False,
+    ) -> None:
+        self.path, self.size, self.workers, self.n_bytes = path, size, 1, 0
+        self._kind = video_kind(path)
+        self._av = _library()
+        self.encoder = _first_encoder(self._av, self._kind, path)
+        _check_numbers(path, rate, quality)
+        self.rate, self._quality = Fraction(rate).limit_denominator(1001), quality
+        self.notes: list[str] = []
+        self._has_alpha = transparent and self._kind.has_alpha
+        self._coded = _even(size) if self._kind.needs_even else size
+        self._note(transparent)
+        self._file = Replacement(path)
+        self._container: av.container.OutputContainer | None = None
+        self._stream: Any = None
+        self._palettes: _Palettes | None = None
+
+    def _note(self, transparent: bool) -> None:
+        name, rate = printable(self.path), float(self.rate)
+        if transparent and not self._has_alpha:
+            self.notes.append(f"{name}: this format knows no transparency; drawn on black")
+        if self._coded != self.size:
+            (width, height), (wide, high) = self.size, self._coded
+            self.notes.append(
+                f"{name}: this format needs even sizes; the last column or row is repeated: "
+                f"{width} x {height} becomes {wide} x {high}"
+            )
+        if self.encoder == "gif" and 100 % rate:
+            low = int(100 / rate)
+            self.notes.append(
+                f"{name}: GIFs count time in 1/100 s; frames stay for {low} or {low + 1} of them, "
+                f"{rate:g} frames a second on average"
+            )
+
+    def write(self, frame: int, pixels: Bytes) -> None:
+        """Encode one frame; they come in order.
+
+        Raises
+        ------
+        OutputError
+            If the encoder refuses it or the file cannot be written.
+        """
+        try:
+            if self._container is None:
+                self._open()
+            picture = self._picture(pixels)
+            picture.pts, picture.time_base = frame, 1 / self.rate
+            self._encode(self._converted(picture))
+        except (OSError, ValueError, self._av.FFmpegError) as problem:
+            raise self._file.error(problem) from None
+
+    def close(self) -> None:
+        """Finish the video and put it in its place.
+
+        Raises
+        ------
+        OutputError
+            If it cannot be finished; then what was there before stays.
+        """
+        assert self._container is not None  # there is at least one frame
+        try:
+            if self._palettes is not None:
+                self._encode(self._palettes.rest())
+            self._container.mux(self._stream.encode(None))
+            self._container.close()
+        except (OSError, ValueError, self._av.FFmpegError) as problem:
+            raise self._file.error(problem) from None
+        self._container = None
+        self.n_bytes = self._file.commit()
+
+    def abort(self) -> None:
+        """Remove the unfinished file."""
+        if self._container is not None:
+            # It is thrown away anyway, most often because the disk is full.
+            with contextlib.suppress(OSError, ValueError, self._av.FFmpegError):
+                self._container.close()
+            self._container = None
+        self._file.discard()
+
+    def _open(self) -> None:
+        temporary = self._file.begin()
+        format_name = temporary.suffix.lower()[1:]
+        muxer = dict(self._kind.muxer)
+        if self.encoder == "gif":
+            muxer["final_delay"] = str(round(100 / self.rate))  # 1/100 s
+        self._container = self._av.open(str(temporary), "w", format=format_name, options=muxer)
+        rate = Fraction(100) if self.encoder == "gif" else self.rate
+        options = _encoder_options(self.encoder, self._quality)
+        stream: Any = self._container.add_stream(self.encoder, rate=rate, options=options)
+        stream.width, stream.height = self._coded
+        stream.pix_fmt = "pal8" if self.encoder == "gif" else self._pixel_format
+        context = stream.codec_context
+        context.thread_count = 0  # as many as there are processors
+        if self.encoder == "gif":
+            context.time_base = Fraction(1, 100)
+            self._palettes = _Palettes(self._av, self._coded, self._has_alpha, 1 / self.rate)
+        else:
+            context.time_base = 1 / self.rate
+            context.color_range, context.colorspace = _LIMITED, _BT709
+            context.color_primaries, context.color_trc = _BT709, _BT709
+        if self.encoder == "libopenh264" or self.encoder == "mpeg4":
+            context.bit_rate = _bit_rate(self._coded, float(self.rate), self._quality)
+        self._stream, self._reformatter = stream, self._av.video.reformatter.VideoReformatter()
+
+    @property
+    def _pixel_format(self) -> str:
+        return "yuva420p" if self._has_alpha else "yuv420p"
+
+    def _picture(self, pixels: Bytes) -> VideoFrame:
+        """Return the pixels in FFmpeg's memory, the edges repeated where the size must be even."""
+        (wide, high), (height, width) = self._coded, pixels.shape[:2]
+        picture: VideoFrame = self._av.VideoFrame(wide, high, "rgba")
+        plane = picture.planes[0]
+        rows = np.frombuffer(memoryview(plane), dtype=np.uint8).reshape(high, plane.line_size)
+        rgba = rows[:, : 4 * wide].reshape(high, wide, 4)
+        rgba[:height, :width] = pixels
+        rgba[:height, width:] = pixels[:, -1:]
+        rgba[height:] = rgba[height - 1]
+        if not self._has_alpha and (pixels[..., 3] < 255).any():
+            shares = rgba[..., 3:].astype(np.uint16)
+            rgba[..., :3] = (rgba[..., :3] * shares + 127) // 255
+        return picture
+
+    def _converted(self, picture: VideoFrame) -> Iterable[VideoFrame]:
+        if self._palettes is not None:
+            return self._palettes.taken(picture)
+        return [
+            self._reformatter.reformat(
+                picture,
+                format=self._pixel_format,
+                dst_colorspace=_BT709,
+                dst_color_range=_LIMITED,
+                threads=1,  # the encoder's threads are busy enough
+            )
+        ]
+
+    def _encode(self, pictures: Iterable[VideoFrame]) -> None:
+        assert self._container is not None  # write() opened it
+        for picture in pictures:
+            self._container.mux(self._stream.encode(picture))
+
+
+class _Palettes:
+    """Frames of 256 colours, each with its own palette and an ordered dither that stands still."""
+
+    def __init__(
+        self, library: ModuleType, size: tuple[int, int], has_alpha: bool, time_base: Fraction
+    ) -> None:
+        self._av, self._graph = library, library.filter.Graph()
+        graph = self._graph
+        source = graph.add_buffer(width=size[0], height=size[1], format="rgba", time_base=time_base)
+        split = graph.add("split")
+        reserve = "1" if has_alpha else "0"
+        palette = graph.add("palettegen", f"stats_mode=single:reserve_transparent={reserve}")
+        use = graph.add("paletteuse", "new=1:dither=bayer:bayer_scale=4:alpha_threshold=128")
+        sink = graph.add("buffersink")
+        source.link_to(split)
+        split.link_to(use, 0, 0)
+        split.link_to(palette, 1, 0)
+        palette.link_to(use, 0, 1)
+        use.link_to(sink)
+        graph.configure()
+
+    def taken(self, picture: VideoFrame) -> list[VideoFrame]:
+        """Return what is ready once this frame is in."""
+        self._graph.push(picture)
+        return self._ready()
+
+    def rest(self) -> list[VideoFrame]:
+        """Return the last frames."""
+        self._graph.push(None)
+        return self._ready()
+
+    def _ready(self) -> list[VideoFrame]:
+        ready: list[VideoFrame] = []
+        while True:
+            try:
+                picture = self._graph.pull()
+            except (self._av.BlockingIOError, self._av.EOFError):
+                return ready
+            # Delays in 1/100 s, rounded so that no error adds up.
+            start = picture.pts * picture.time_base
+            picture.pts, picture.time_base = round(100 * start), Fraction(1, 100)
+            ready.append(picture)
+
+
+def _library() -> ModuleType:
+    try:
+        import av
+        import av.filter
+        import av.video.reformatter
+    except ImportError:
+        raise ViewerError(
+            'videos need PyAV, which is not installed: pip install "skinning-viewer[video]"'
+        ) from None
+    return av
+
+
+def _first_encoder(library: ModuleType, kind: VideoKind, path: Path) -> str:
+    for name in kind.encoders:
+        try:
+            library.Codec(name, "w")
+        except library.codec.codec.UnknownCodecError:
+            continue
+        return name
+    wanted = " or ".join(kind.encoders)
+    raise ViewerError(
+        f"{printable(path, 300)}: the installed PyAV has no encoder for {kind.title}: {wanted}"
+    )
+
+
+def _check_numbers(path: Path, rate: float, quality: float) -> None:
+    if not 0.0 <= quality <= 100.0:
+        raise ViewerError(f"video quality: expected 0 to 100, found {quality:g}")
+    most = MOST_GIF_RATE if path.suffix.lower() == ".gif" else 1000.0
+    if not 0.01 <= rate <= most:
+        raise ViewerError(
+            f"{printable(path, 300)}: expected 0.01 to {most:g} frames a second, found {rate:g}"
+        )
+
+
+def _even(size: tuple[int, int]) -> tuple[int, int]:
+    return size[0] + size[0] % 2, size[1] + size[1] % 2
+
+
+def _encoder_options(encoder: str, quality: float) -> dict[str, str]:
+    """Return an encoder's own words for a quality from 0 to 100."""
+    if encoder == "libx264":
+        return {"preset": "veryfast", "crf": f"{51.0 - 0.43 * quality:.1f}"}  # 75: 18.8
+    if encoder in ("libvpx-vp9", "libvpx"):
+        crf = {"crf": f"{63.0 - 0.5 * quality:.0f}", "b": "0" if "vp9" in encoder else "20M"}
+        speed = {"deadline": "good", "cpu-used": "5", "auto-alt-ref": "0"}
+        return {**crf, **speed, **({"row-mt": "1"} if "vp9" in encoder else {})}
+    if encoder == "gif":
+        return {"global_palette": "0"}
+    return {}
+
+
+def _bit_rate(size: tuple[int, int], rate: float, quality: float) -> int:
+    """Return bits a second for encoders that know no quality: 0.02 to 0.6 bits a pixel."""
+    return int(size[0] * size[1] * rate * 0.02 * 30.0 ** (quality / 100.0))

@@ -1,0 +1,291 @@
+"""Read motions of the SMPL family: AMASS and what is written like it.
+
+::
+
+    AMASS, SMPL+H   poses (N, 156)  trans (N, 3)  betas (16,)  dmpls (N, 8)  gender  mocap_framerate
+    AMASS, SMPL-X   poses (N, 165)  trans  betas  gender  surface_model_type  mocap_frame_rate, or
+                    root_orient (N, 3)  pose_body (N, 63)  pose_hand (N, 90)  pose_jaw  pose_eye
+    EMAGE, BEATS2   the same, with expressions (N, 100)  model
+    AIST++, .pkl    smpl_poses (N, 72)  smpl_trans (N, 3)  smpl_scaling (1,)
+    smplx's names   global_orient (N, 3)  body_pose (N, 63 or 69)  transl (N, 3)  left_hand_pose …
+
+Poses may also be (N, J, 3). Beside these, files that we wrote hold ``up`` and ``present`` (N,).
+The root turns about the rest pelvis, V = R (X - J0) + J0 + trans. AMASS stands z up, AIST++ y up.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from viewer.errors import FormatError, printable
+from viewer.formats._archive import Archive
+from viewer.formats._container import archive_of, finite
+from viewer.formats._source import Source
+from viewer.rig.arrays import Deferred, Floats, Ints
+from viewer.rig.body_motion import BodyMotion
+from viewer.rig.smpl_family import FAMILY, members_by_numbers
+from viewer.rig.timing import Timing
+
+__all__ = ["has_frames", "read"]
+
+_POSES = ("poses", "pose", "fullpose", "smpl_poses")
+_ROOTS = ("root_orient", "global_orient")
+_TRANSLATIONS = ("trans", "transl", "smpl_trans")
+_SHAPES = ("betas", "shape")
+_EXPRESSIONS = ("expressions", "expression")
+_RATES = ("mocap_framerate", "mocap_frame_rate", "fps")
+_BODY = members_by_numbers()[66]
+_SMPL, _SMPLX = FAMILY[24].names, FAMILY[55].names
+# Keys of parts and, by their number of columns, the joints that they turn.
+_PARTS: tuple[tuple[tuple[str, ...], dict[int, tuple[str, ...]]], ...] = (
+    (_ROOTS, {3: _BODY[:1]}),
+    (("pose_body", "body_pose"), {63: _BODY[1:], 69: _SMPL[1:]}),
+    (("pose_jaw", "jaw_pose"), {3: _SMPLX[22:23]}),
+    (("pose_eye",), {6: _SMPLX[23:25]}),
+    (("leye_pose",), {3: _SMPLX[23:24]}),
+    (("reye_pose",), {3: _SMPLX[24:25]}),
+    (("pose_hand",), {90: _SMPLX[25:]}),
+    (("left_hand_pose",), {45: _SMPLX[25:40]}),
+    (("right_hand_pose",), {45: _SMPLX[40:]}),
+)
+_HANDS = {"left_hand_pose": "left", "right_hand_pose": "right"}
+# Columns of the principal components that a hand has at most, less than its angles.
+_MOST_COMPONENTS = 44
+_FLAGS = ("flat_hand_mean", "use_pca")
+_OWN = ("present", "up")
+_BESIDES = (
+    "gender model model_type surface_model_type num_betas mocap_time_length dmpls marker_data "
+    "marker_labels markers labels vids markers_latent latent_labels markers_latent_vids "
+    "smpl_scaling smpl_loss"
+)
+_KNOWN = {
+    *_POSES, *_TRANSLATIONS, *_SHAPES, *_EXPRESSIONS, *_RATES, *_FLAGS, *_OWN, *_BESIDES.split(),
+    *(key for keys, _ in _PARTS for key in keys),
+}  # fmt: skip
+_OF_AMASS = ("mocap_framerate", "mocap_frame_rate", "mocap_time_length", "dmpls", "pose_body")
+_RATE, _RATE_OF_AIST = 30.0, 60.0
+
+
+def has_frames(archive: Archive) -> bool:
+    """Return whether an archive holds more than one pose, so that it is a motion.
+
+    Poses of one frame may be J x 3 numbers.
+    """
+    for key in (*_POSES, "body_pose", "pose_body", *_ROOTS):
+        value = archive.get(key) if archive.has(key) else None
+        if isinstance(value, Deferred):
+            shape = value.shape
+            is_per_joint = shape[-1:] == (3,) and key not in _ROOTS
+            return math.prod(shape[: -2 if is_per_joint else -1]) > 1
+    return False
+
+
+def read(source: Source) -> BodyMotion:
+    """Read a motion of one person.
+
+    Parameters
+    ----------
+    source : Source
+        The file; what is not used is added to its warnings.
+
+    Returns
+    -------
+    BodyMotion
+        To be given to a figure.
+
+    Raises
+    ------
+    FormatError
+        If there are no poses, or arrays differ in their number of frames.
+    """
+    archive = archive_of(source)
+    found = next((key for key in _POSES if archive.has(key)), None)
+    hands: dict[str, Floats] = {}
+    if found is not None:
+        names, vectors = _whole_poses(archive, found)
+    else:
+        found = next((key for key in _ROOTS if archive.has(key)), None)
+        if found is None:
+            raise source.error(_refusal(source, archive))
+        names, vectors, hands = _split_poses(source, archive, found)
+    count = len(vectors)
+    is_aist = found == "smpl_poses"
+    _notice(source, archive)
+    return BodyMotion(
+        source.path.stem,
+        Timing(_rate(source, archive, is_aist), _timed_rows(archive, count, found)),
+        names,
+        vectors,
+        _translations(source, archive, count, found),
+        shape=_coefficients(archive, _SHAPES, count, found),
+        expression=_coefficients(archive, _EXPRESSIONS, count, found),
+        hands=hands,
+        flat_hands=_flag(archive, "flat_hand_mean"),
+        up=_up(archive, is_aist),
+        facts=_facts(archive),
+    )
+
+
+def _refusal(source: Source, archive: Archive) -> str:
+    keys = ", ".join(printable(key, 40) for key in archive.keys[:8]) or "none"
+    if archive.has("markers_latent") or "stagei." in source.path.name:
+        return (
+            "expected a motion, found the first stage of a marker fit, which has no poses: open "
+            "the *_stageii.npz files beside it"
+        )
+    if set(archive.keys) <= {"betas", *_BESIDES.split(), *_RATES}:
+        return (
+            f"expected a motion, found a subject's shape (keys {keys}): open the *_poses.npz files "
+            "beside it"
+        )
+    return f"expected a motion (poses, or root_orient and pose_body), found the keys {keys}"
+
+
+def _rows(archive: Archive, key: str, count: int | None = None, first: str = "") -> Floats:
+    """Return an array as one row a frame, (N, C), finite."""
+    array = archive.array(key)
+    shape = array.shape if len(array.shape) > 1 else (1, *array.shape)
+    if count is not None and shape[0] != count:
+        raise archive.error(key, f"expected {count} frames as in {first}, found {shape[0]}")
+    if not shape[0]:
+        raise archive.error(key, "expected frames, found none")
+    return finite(archive, key, array.values()).reshape(shape[0], math.prod(shape[1:]))
+
+
+def _whole_poses(archive: Archive, key: str) -> tuple[tuple[str, ...], Floats]:
+    rows, known = _rows(archive, key), members_by_numbers()
+    if rows.shape[1] not in known:
+        wanted = ", ".join(map(str, sorted(known)))
+        raise archive.error(key, f"expected {wanted} numbers a frame, found {rows.shape[1]}")
+    return known[rows.shape[1]], rows.reshape(len(rows), -1, 3)
+
+
+def _split_poses(
+    source: Source, archive: Archive, root: str
+) -> tuple[tuple[str, ...], Floats, dict[str, Floats]]:
+    """Return joints, their rotation vectors, and components of hands."""
+    count = len(_rows(archive, root))
+    names: list[str] = []
+    parts: list[Floats] = []
+    hands: dict[str, Floats] = {}
+    for keys, joints in _PARTS:
+        key = next((key for key in keys if archive.has(key)), None)
+        if key is None:
+            continue
+        rows = _rows(archive, key, count, root)
+        columns = rows.shape[1]
+        if key in _HANDS and (columns <= _MOST_COMPONENTS or _flag(archive, "use_pca")):
+            hands[_HANDS[key]] = rows
+            continue
+        if columns not in joints:
+            wanted = " or ".join(map(str, joints))
+            raise archive.error(key, f"expected {wanted} numbers a frame, found {columns}")
+        if key in _HANDS and archive.has("flat_hand_mean") and not _flag(archive, "flat_hand_mean"):
+            source.warn(f"{key}: angles are taken as they are; the mean hand is not added to them")
+        names += joints[columns]
+        parts.append(rows)
+    vectors = np.concatenate(parts, axis=1).reshape(count, -1, 3)
+    return tuple(names), vectors, hands
+
+
+def _flag(archive: Archive, key: str) -> bool:
+    return archive.has(key) and bool(archive.array(key).values().all())
+
+
+def _translations(source: Source, archive: Archive, count: int, first: str) -> Floats:
+    key = next((key for key in _TRANSLATIONS if archive.has(key)), None)
+    if key is None:
+        source.warn("no trans in it: the body stays in its place")
+        return np.zeros((count, 3))
+    rows = _rows(archive, key, count, first)
+    if rows.shape[1] != 3:
+        raise archive.error(key, f"expected 3 numbers a frame, found {rows.shape[1]}")
+    scale = _single(archive, "smpl_scaling") if archive.has("smpl_scaling") else 1.0
+    if scale <= 0.0:
+        raise archive.error("smpl_scaling", f"expected a number above 0, found {scale:g}")
+    return rows / scale
+
+
+def _coefficients(archive: Archive, keys: tuple[str, ...], count: int, first: str) -> Floats | None:
+    key = next((key for key in keys if archive.has(key)), None)
+    if key is None:
+        return None
+    array = archive.array(key)
+    if not array.shape or math.prod(array.shape) == 0:
+        return None
+    is_constant = len(array.shape) == 1 or array.shape[0] == 1
+    return _rows(archive, key, None if is_constant else count, first)
+
+
+def _single(archive: Archive, key: str) -> float:
+    values = archive.array(key).values().ravel()
+    if len(values) != 1:
+        raise archive.error(key, f"expected one number, found {len(values)}")
+    return float(finite(archive, key, values)[0])
+
+
+def _rate(source: Source, archive: Archive, is_aist: bool) -> float:
+    rates = {key: _single(archive, key) for key in _RATES if archive.has(key)}
+    for key, rate in rates.items():
+        if not 0.0 < rate < 1e6:
+            raise archive.error(key, f"expected more than 0 frames a second, found {rate:g}")
+    if len(set(rates.values())) > 1:
+        given = ", ".join(f"{key} {rate:g}" for key, rate in rates.items())
+        source.warn(f"frame rates that differ ({given}): the first is taken")
+    if rates:
+        return next(iter(rates.values()))
+    rate, reason = (_RATE_OF_AIST, "as AIST++ has") if is_aist else (_RATE, "as is usual")
+    source.warn(f"no frame rate in it: {rate:g} frames a second, {reason}")
+    return rate
+
+
+def _timed_rows(archive: Archive, count: int, first: str) -> Ints:
+    """Return the row of every frame, -1 where the file says that it fills a gap."""
+    rows: Ints = np.arange(count, dtype=np.int32)
+    if archive.has("present"):
+        present = _rows(archive, "present").ravel()
+        if len(present) != count:
+            raise archive.error("present", f"expected {count} as in {first}, found {len(present)}")
+        rows[present == 0.0] = -1
+    return rows
+
+
+def _up(archive: Archive, is_aist: bool) -> str:
+    said = _text(archive, "up")
+    if said in ("y", "z"):
+        return said
+    if is_aist:
+        return "y"
+    is_speech = any(archive.has(key) for key in _EXPRESSIONS)  # EMAGE: y up, but it does not say
+    return "z" if not is_speech and any(archive.has(key) for key in _OF_AMASS) else ""
+
+
+def _text(archive: Archive, key: str) -> str:
+    """Return a text, also one that was made of bytes by ``str``; empty if there is none."""
+    if not archive.has(key):
+        return ""
+    try:
+        text = archive.text(key)
+    except FormatError:  # an object array, in which nothing matters
+        return ""
+    return text[2:-1] if text.startswith("b'") and text.endswith("'") else text
+
+
+def _notice(source: Source, archive: Archive) -> None:
+    if archive.has("dmpls"):
+        moved = int(_rows(archive, "dmpls").any(axis=1).sum())
+        if moved:
+            source.warn(f"dmpls, the soft tissue of {moved} frames, are left out")
+    odd = [printable(key, 40) for key in archive.keys if key not in _KNOWN]
+    if odd:
+        source.warn(f"keys that mean nothing in a motion: {', '.join(odd[:12])}")
+
+
+def _facts(archive: Archive) -> tuple[tuple[str, str], ...]:
+    texts = {
+        "gender": _text(archive, "gender"),
+        "made for": _text(archive, "surface_model_type") or _text(archive, "model"),
+    }
+    return tuple((heading, printable(text, 60)) for heading, text in texts.items() if text)

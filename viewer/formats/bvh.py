@@ -1,0 +1,238 @@
+r"""Read ``.bvh``: a skeleton and its motion (BioVision; the format has no standard).
+
+::
+
+    bvh       = "HIERARCHY" root+ "MOTION" "Frames:" N "Frame Time:" seconds number*
+    root      = "ROOT" name "{" item* "}"
+    item      = "OFFSET" x y z | "CHANNELS" n channel*n | "JOINT" name "{" item* "}"
+              | "End" "Site" name? "{" item* "}"
+    channel   = Xposition | Yposition | Zposition | Xrotation | Yrotation | Zrotation
+    name      = word*
+
+Words are separated by any white space, line ends among them, and keywords come in any case. A frame
+has one number per channel, joints in the order of the file. Angles are degrees; a joint's rotation
+channels multiply from left to right, ``Zrotation Yrotation Xrotation`` is R = Rz Ry Rx. Position
+channels replace the joint's OFFSET. Unit and up axis are not in the file: both are guessed, and
+the guess is said.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from viewer.errors import printable
+from viewer.formats._bvh_guess import frame_rate, guess_unit, guess_up
+from viewer.formats._bvh_hierarchy import BvhJoint, read_hierarchy
+from viewer.formats._bvh_motion import Motion, read_motion
+from viewer.formats._source import Source
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.figure import Figure
+from viewer.rig.motion import DEFAULT_RATE
+from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.skeleton import Skeleton, ball_skeleton
+from viewer.rig.skeleton_motion import SkeletonMotion
+from viewer.rig.timing import Timing
+
+__all__ = ["read"]
+
+_LARGEST_SHARE = 8  # rotations kept for each number of the file, before a file is refused
+_SMALL_CLIP = 1 << 24  # rotations that are never too many
+_CHUNK = 256  # frames at a time, whose numbers stay inside the processor's cache
+_THICKNESS = 0.1  # of a joint's box, in lengths of the bone
+_THINNEST, _THICKEST = 0.05, 0.3  # ... but within these, in lengths of a usual bone
+
+
+def read(source: Source) -> SkeletonMotion:
+    """Read a skeleton and its motion.
+
+    Parameters
+    ----------
+    source : Source
+        The file; what is odd but readable is added to its warnings.
+
+    Returns
+    -------
+    SkeletonMotion
+        Lengths as in the file. Every joint is a ball joint; the clip's translations are position
+        channels without the OFFSET. End Sites are the far ends of the joints' boxes.
+
+    Raises
+    ------
+    FormatError
+        With file and line, if the text breaks the grammar.
+    """
+    hierarchy = read_hierarchy(source)
+    table = _table(source, hierarchy.joints)
+    motion = read_motion(source, hierarchy.motion, table.n_channels)
+    _refuse_empty_joints(source, table, motion)
+    skeleton = _skeleton(table)
+    has_motion = hierarchy.motion >= 0
+    rate = frame_rate(source, motion.frame_time) if has_motion else DEFAULT_RATE
+    clip = SampledClip(
+        source.path.stem,
+        Timing(rate, np.arange(len(motion.values), dtype=np.int32)),
+        _rotations(table, motion.values),
+        _translations(source, table, motion.values),
+    )
+    points = _rest_points(table, skeleton)
+    unit, facts = guess_unit(source, points)
+    figure = Figure(source.path.stem, skeleton=skeleton, unit=unit)
+    up, more = guess_up(source, figure, clip, points)
+    facts += (*more, ("frames", f"{len(motion.values)} at {rate:g} a second"))
+    return SkeletonMotion(replace(figure, up=up, facts=facts), clip)
+
+
+@dataclass(frozen=True, slots=True)
+class _Table:
+    """Joints without End Sites, and which column of a frame does what to which."""
+
+    names: tuple[str, ...]
+    parents: list[int]
+    offsets: Floats  # (J, 3)
+    columns: list[list[tuple[int, int]]]  # per joint: code of the channel, column
+    ends: list[tuple[int, list[float]]]  # joint, offset of an End Site
+    n_channels: int
+
+
+def _table(source: Source, joints: list[BvhJoint]) -> _Table:
+    place: dict[int, int] = {}
+    columns: list[list[tuple[int, int]]] = []
+    ends: list[tuple[int, list[float]]] = []
+    kept: list[BvhJoint] = []
+    count = 0
+    for index, joint in enumerate(joints):
+        what = f"joint {printable(joint.name, 60)}" if joint.name else "a joint without a name"
+        if joint.offset is None:
+            end = "an End Site of " * joint.is_end
+            source.warn(f"{end}{what} has no OFFSET: taken for 0 0 0", joint.start)
+        codes = joint.channels or []
+        if joint.is_end:
+            ends.append((place[joint.parent], joint.offset or [0.0, 0.0, 0.0]))
+            if codes:
+                source.warn(f"ignored the channels of an End Site of {what}", joint.start)
+        else:
+            place[index] = len(kept)
+            kept.append(joint)
+            columns.append([(code, count + at) for at, code in enumerate(codes)])
+        count += len(codes)
+    return _Table(
+        tuple(joint.name for joint in kept),
+        [place.get(joint.parent, -1) for joint in kept],
+        np.array([joint.offset or [0.0, 0.0, 0.0] for joint in kept]),
+        columns,
+        ends,
+        count,
+    )
+
+
+def _refuse_empty_joints(source: Source, table: _Table, motion: Motion) -> None:
+    """Refuse what would fill the memory: many frames of many joints that have no channels."""
+    rotations = len(motion.values) * len(table.names)
+    if rotations > max(_SMALL_CLIP, _LARGEST_SHARE * motion.values.size):
+        raise source.error(
+            f"expected channels for most joints, found {table.n_channels} for "
+            f"{len(table.names)} joints in {len(motion.values)} frames"
+        )
+
+
+def _skeleton(table: _Table) -> Skeleton:
+    parents = np.array(table.parents, dtype=np.int32)
+    # Offsets are kept as they are, not as differences of positions: those would be rounded.
+    skeleton = ball_skeleton(table.names, parents, np.zeros((len(parents), 3)))
+    return replace(skeleton, rest_translations=table.offsets, boxes=_boxes(table, parents))
+
+
+def _rest_points(table: _Table, skeleton: Skeleton) -> Floats:
+    """Return joints and End Sites in the rest pose: (P, 3)."""
+    joints = np.zeros((skeleton.n_joints, 3))
+    for joint, parent in enumerate(table.parents):
+        joints[joint] = table.offsets[joint] + (joints[parent] if parent >= 0 else 0.0)
+    tips = [joints[joint] + offset for joint, offset in table.ends]
+    return np.concatenate([joints, np.reshape(tips, (-1, 3))])
+
+
+def _boxes(table: _Table, parents: Ints) -> Floats:
+    """Return a box for each joint from itself to its children or End Sites: (J, 2, 3).
+
+    Twice its middle is the End Site of a joint with one; the exporter counts on it.
+    """
+    inner = np.flatnonzero(parents >= 0)
+    owners = np.concatenate([parents[inner], [joint for joint, _ in table.ends]]).astype(np.int32)
+    tips = np.concatenate(
+        [table.offsets[inner], np.reshape([tip for _, tip in table.ends], (-1, 3))]
+    )
+    lengths = np.linalg.norm(tips, axis=1)
+    size = float(np.median(lengths[lengths > 0.0])) if lengths.any() else 1.0
+    half = np.clip(_THICKNESS * lengths, _THINNEST * size, _THICKEST * size)[:, None]
+    # A bone is as long as it is, and neither thinner nor, where it lies aslant, much thicker.
+    along = np.abs(tips) >= np.abs(tips).max(axis=1, keepdims=True)
+    reach = np.where(along, np.abs(0.5 * tips), np.minimum(np.abs(0.5 * tips), 2.0 * half))
+    reach = np.where(reach < half, reach + half, reach)
+    boxes = np.stack([np.full((len(parents), 3), np.inf), np.full((len(parents), 3), -np.inf)], 1)
+    np.minimum.at(boxes[:, 0], owners, 0.5 * tips - reach)
+    np.maximum.at(boxes[:, 1], owners, 0.5 * tips + reach)
+    bare = ~np.isfinite(boxes[:, 0, 0])
+    boxes[bare] = np.array([-1.0, 1.0])[:, None] * _THICKNESS * size
+    return boxes
+
+
+def _rotations(table: _Table, values: Floats) -> Floats:
+    """Multiply every joint's rotation channels, those with the same axes at once: (N, J, 4)."""
+    rotations = np.empty((len(values), len(table.names), 4))
+    groups: dict[tuple[int, ...], list[int]] = {}
+    turns = [[(code, column) for code, column in row if code >= 3] for row in table.columns]
+    for joint, row in enumerate(turns):
+        groups.setdefault(tuple(code - 3 for code, _ in row), []).append(joint)
+    for axes, joints in groups.items():
+        columns = [[turns[joint][place][1] for joint in joints] for place in range(len(axes))]
+        for start in range(0, len(values), _CHUNK):
+            rows = slice(start, start + _CHUNK)
+            parts = [np.zeros((len(values[rows]), len(joints))) for _ in range(3)]
+            parts.append(np.ones_like(parts[0]))
+            for axis, chosen in zip(axes, columns, strict=True):
+                half = values[rows, chosen] * (np.pi / 360.0)
+                _turn(parts, axis, np.sin(half), np.cos(half))
+            for number, part in enumerate(parts):
+                rotations[rows, joints, number] = part
+    _keep_signs(rotations)
+    return rotations
+
+
+def _turn(parts: list[Floats], axis: int, sine: Floats, cosine: Floats) -> None:
+    """Multiply quaternions (x, y, z, w) by one about a coordinate axis from the right."""
+    other, third = (axis + 1) % 3, (axis + 2) % 3
+    a, b, c, w = parts[axis], parts[other], parts[third], parts[3]
+    parts[axis], parts[3] = a * cosine + w * sine, w * cosine - a * sine
+    parts[other], parts[third] = b * cosine + c * sine, c * cosine - b * sine
+
+
+def _keep_signs(rotations: Floats) -> None:
+    """Of q and -q, which are one rotation, take the one nearer to the frame before; in place."""
+    products = np.einsum("nja,nja->nj", rotations[1:], rotations[:-1])
+    turned = np.logical_xor.accumulate(products < 0.0, axis=0)
+    if turned.any():
+        rotations[1:][turned] *= -1.0
+
+
+def _translations(source: Source, table: _Table, values: Floats) -> Floats | None:
+    """Return position channels without the OFFSET that they replace: (N, J, 3)."""
+    moves = [
+        (joint, code, column)
+        for joint, row in enumerate(table.columns)
+        for code, column in row
+        if code < 3
+    ]
+    if not moves:
+        return None
+    joints, axes, columns = (list(part) for part in zip(*moves, strict=True))
+    shifts = values[:, columns]
+    inner = [at for at, joint in enumerate(joints) if table.parents[joint] >= 0]
+    base = table.offsets[joints, axes]
+    if base[inner].any() and not shifts[:, inner].any():
+        source.warn("position channels are 0 but for the root's: taken as added to OFFSET")
+        base[inner] = 0.0
+    translations = np.zeros((len(values), len(table.names), 3))
+    translations[:, joints, axes] = shifts - base
+    return translations

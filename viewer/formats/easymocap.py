@@ -1,0 +1,128 @@
+"""Read what EasyMocap writes: a folder of JSON files, one a frame, of people by number.
+
+::
+
+    out/smpl/000000.json          body parameters; smpl_full/ or smplfull/ go before smpl/
+    out/keypoints3d/000000.json   3D keypoints of the same frames
+    out/smpl/01/000000.json       fits of single views: the first view is read
+    intri.yml, extri.yml          cameras, in that folder or one of the two above it
+
+    frame    [person, …]  or  {"annots": [person, …], …}
+    person   {"id": 0, "Rh": [[3]], "Th": [[3]], "poses": [[P]], "shapes": [[10]],
+              "expression": [[10]], "handl": [[n]], "handr": [[n]],
+              "keypoints3d": [[x, y, z, c], …], "handl3d", "handr3d", "face3d"}
+
+File names that are all numbers are frame numbers, holes included; others are sorted. Bodies are
+V = R(Rh) X(poses, shapes) + Th, turned about the model's origin. There is no frame rate in it.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from viewer.errors import FormatError
+from viewer.formats._camera_files import find_cameras
+from viewer.formats._easymocap_files import BODIES, POINTS, find_frames
+from viewer.formats._easymocap_reading import Options, Reading
+from viewer.formats._source import Source
+from viewer.rig.capture import Capture
+
+__all__ = ["open_capture", "read"]
+
+_LEVELS = 3  # folders, from that of the frames upwards, that may hold the cameras
+
+
+def read(source: Source) -> Capture:
+    """Look at a recording, with all that its files leave open as it usually is.
+
+    Parameters
+    ----------
+    source : Source
+        The folder that EasyMocap wrote, one of the folders in it, or a single frame file.
+
+    Returns
+    -------
+    Capture
+        Not read yet, except for the first people in it.
+
+    Raises
+    ------
+    FormatError
+        If there are no frames, or nobody is in any of them.
+    """
+    return open_capture(source)
+
+
+def open_capture(
+    source: Source,
+    frame_rate: float = 30.0,
+    flat_hands: bool | None = None,
+    up: str = "",
+    legacy_expression: bool = False,
+    layout: str = "",
+) -> Capture:
+    """Look at a recording.
+
+    Parameters
+    ----------
+    source : Source
+        The folder that EasyMocap wrote, one of the folders in it, or a single frame file.
+    frame_rate : float
+        Frames a second.
+    flat_hands : bool, optional
+        Whether hand components leave the mean hand out; by default they do for SMPL-X and MANO,
+        and do not for SMPL+H.
+    up : "y", "z", "-y", "-z" or ""
+        The axis that points up in the world; empty to guess it from the people.
+    legacy_expression : bool
+        Let the expression drive shape components 10 to 19, as EasyMocap does with files of 300
+        shapes.
+    layout : str
+        Of keypoints, see ``keypoint_layout``, where several have the same number: ``"h36m"``,
+        ``"panoptic"``.
+
+    Returns
+    -------
+    Capture
+        Not read yet, except for the first people in it. What was noticed about the files as a
+        whole is in the source's warnings.
+
+    Raises
+    ------
+    FormatError
+        If there are no frames, or nobody is in any of them.
+    """
+    files = find_frames(source)
+    options = Options(
+        _name(source), frame_rate, flat_hands, up, legacy_expression, layout, source.max_size
+    )
+    looking = Reading(files, options)
+    if not any(part.bodies or part.points for part in looking.parts()):
+        raise _refusal(source, len(files.frames), looking.first_fault)
+    folder = files.folders[0].path.absolute()
+    views, notes = find_cameras([folder, *folder.parents][:_LEVELS], source.max_size)
+    return Capture(
+        options.name,
+        files.n_frames,
+        files.first_frame,
+        lambda: Reading(files, options).parts(),
+        up,
+        views,
+        looking.body_layout.model if looking.body_layout else "",
+        tuple(notes),
+    )
+
+
+def _name(source: Source) -> str:
+    """Return what a recording is called: not ``smpl``, as all are."""
+    path = source.path.absolute()
+    is_inside = source.is_folder and path.name in (*BODIES, POINTS)
+    return (path.parent if is_inside else Path(path.stem)).name or "capture"
+
+
+def _refusal(source: Source, count: int, fault: FormatError | None) -> FormatError:
+    if fault is None:
+        return source.error(f"expected people, found nobody in {count} frames")
+    if not source.is_folder:
+        return fault
+    return source.error(f"expected people, found none in {count} frames; the first: {fault}")

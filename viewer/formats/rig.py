@@ -1,0 +1,119 @@
+r"""Read ``.rig`` files (UCSD course CSE169): the names of files that belong together.
+
+::
+
+    rig   = "rig" name? "{" item* "}"
+    item  = "skeleton" file | "skin" file | "morphs" n "{" file*n "}"
+
+Files are relative to the ``.rig`` itself. A name may have blanks if it stands in double quotes.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from viewer.errors import FormatError
+from viewer.formats._numbers import to_number
+from viewer.formats._source import Source, shown
+
+__all__ = ["NamedFiles", "read"]
+
+_WORD = re.compile(rb'[{}]|"[^"\r\n]*"|[^{}\s]+')
+
+Words = list[re.Match[bytes]]
+
+
+@dataclass(frozen=True, slots=True)
+class NamedFiles:
+    """Files that are to be opened together.
+
+    Attributes
+    ----------
+    name : str
+        Of the whole.
+    paths : tuple of Path
+        Skeleton, skin and morphs in the order of the file; they need not exist.
+    """
+
+    name: str
+    paths: tuple[Path, ...]
+
+
+def read(source: Source) -> NamedFiles:
+    """Read which files belong together; none of them is looked at.
+
+    Parameters
+    ----------
+    source : Source
+        The file; what is odd but readable is added to its warnings.
+
+    Raises
+    ------
+    FormatError
+        With file and line, if the text breaks the grammar or names no file.
+    """
+    words = list(_WORD.finditer(source.data))
+    words.reverse()
+    _expect(source, words, b"rig")
+    name: list[str] = []
+    while words and words[-1].group() not in (b"{", b"}"):
+        name.append(_text(words.pop()))
+    _expect(source, words, b"{")
+    files: list[str] = []
+    while words and words[-1].group() != b"}":
+        files += _item(source, words)
+    if not words:
+        source.warn('the last "}" is missing')
+    elif len(words) > 1:
+        source.warn(f"ignored what follows the rig, {shown(words[-2].group())}", words[-2].start())
+    if not files:
+        raise source.error("expected a skeleton or a skin, found no name of a file")
+    folder = source.path.parent
+    return NamedFiles(" ".join(name) or source.path.stem, tuple(folder / file for file in files))
+
+
+def _item(source: Source, words: Words) -> list[str]:
+    word = words.pop()
+    if word.group() in (b"skeleton", b"skin"):
+        return [_file(source, words, word.group().decode())]
+    if word.group() != b"morphs":
+        raise source.error(
+            f"expected skeleton, skin or morphs, found {shown(word.group())}", word.start()
+        )
+    count = to_number(words[-1].group()) if words else None
+    if count is None or count != int(count) or count < 0:
+        raise _wrong(source, words, "morphs: expected a count")
+    words.pop()
+    _expect(source, words, b"{")
+    files = []
+    while words and words[-1].group() != b"}":
+        files.append(_file(source, words, "morphs"))
+    if len(files) != count:
+        raise _wrong(source, words, f"morphs: expected {count:g} files", f"{len(files)}")
+    _expect(source, words, b"}")
+    return files
+
+
+def _file(source: Source, words: Words, what: str) -> str:
+    if not words or words[-1].group() in (b"{", b"}"):
+        raise _wrong(source, words, f"{what}: expected the name of a file")
+    return _text(words.pop())
+
+
+def _text(word: re.Match[bytes]) -> str:
+    return word.group().strip(b'"').decode("utf-8", "surrogateescape")
+
+
+def _expect(source: Source, words: Words, text: bytes) -> None:
+    if not words or words[-1].group() != text:
+        raise _wrong(source, words, f'expected "{text.decode()}"')
+    words.pop()
+
+
+def _wrong(source: Source, words: Words, expected: str, found: str = "") -> FormatError:
+    """Return an error at the next word."""
+    there = shown(words[-1].group()) if words else "the end of the file"
+    where = words[-1].start() if words else len(source.data.rstrip())
+    return source.error(f"{expected}, found {found or there}", where)

@@ -1,0 +1,287 @@
+"""What joints are called elsewhere: rules from many programs' names to those of the SMPL family.
+
+Known are the names of SMPL, SMPL+H and SMPL-X (also as exported through Maya), Mixamo,
+MotionBuilder and Rokoko, CMU (both its ``.bvh`` and its ``.asf`` words), Poser and DAZ, 3ds
+Max's Biped, Unreal, VRM, Xsens, and Blender's Rigify. Sides are found as ``L``, ``R``, ``Left`` or
+``Right`` at either end of a name; prefixes that most joints share (``mixamorig:``, ``Bip01 ``,
+``m_avg_``) are dropped.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections import Counter
+from collections.abc import Sequence
+
+from viewer.rig.arrays import Ints
+
+__all__ = ["canonical_names", "plain_names"]
+
+_WORDS = {
+    "pelvis": "pelvis hips",
+    "hip": "hip upleg upperleg thigh femur",
+    "knee": "knee leg lowleg lowerleg shin calf tibia",
+    "ankle": "ankle",
+    "foot": "toebase toe toes ball",
+    "spine": "spine lowerback upperback back abdomen abdomenlower abdomenupper chest chestlower "
+    "chestupper upperchest torso thorax waist",
+    "neck": "neck lowerneck upperneck necklower neckupper",
+    "head": "head",
+    "collar": "collar clavicle collarbone",
+    "shoulder": "arm upperarm uparm humerus shldr",
+    "elbow": "elbow forearm lowerarm lowarm radius",
+    "wrist": "wrist",
+    "jaw": "jaw",
+    "eye": "eye eyesmplhf eyeball",
+}
+_ROLES = {word: role for role, words in _WORDS.items() for word in words.split()}
+_AMBIGUOUS = {"foot", "shoulder", "hand"}  # different joints in different conventions
+_PREFIXES = {"bip", "j", "def", "org", "mixamorig", "character"}  # before a side or a word
+
+_SIDED = {"hip", "knee", "ankle", "foot", "collar", "shoulder", "elbow", "wrist", "hand", "eye"}
+_SIDES = {"l": "left", "left": "left", "r": "right", "right": "right"}
+_XSENS_SPINE = {"l5", "l3", "t12", "t8"}
+_FINGERS = {
+    **{name: name for name in ("thumb", "index", "middle", "ring", "pinky")},
+    **{"mid": "middle", "little": "pinky"},
+}
+_PHALANX = {"proximal": 1, "intermediate": 2, "distal": 3}
+_FINGER = re.compile(rf"(?:hand|f)?({'|'.join(_FINGERS)})(?:finger)?({'|'.join(_PHALANX)})?(\d*)")
+_BIPED_FINGERS = ("thumb", "index", "middle", "ring", "pinky")
+_TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
+_SHARED = 0.6  # of the joints: a first word that more of them have says nothing
+_MOST = 2000  # joints; what has more is no body
+_SPINES = ("spine1", "spine2", "spine3")
+
+_ARMS = ("left_collar", "right_collar", "left_shoulder", "right_shoulder")
+
+_Key = tuple[str, str]  # side and word, in small letters: ("left", "upleg")
+
+
+def plain_names(names: Sequence[str]) -> tuple[str, ...]:
+    """Return names that every program can read: unique, of ``[A-Za-z0-9_]`` alone.
+
+    Parameters
+    ----------
+    names : sequence of J str
+        May repeat, be empty, or hold anything.
+
+    Returns
+    -------
+    tuple of J str
+        Unchanged where that is so already.
+
+    >>> plain_names(["hip", "hip", "", "left knee", "é"])
+    ('hip', 'hip_2', 'joint2', 'left_knee', 'e')
+    """
+    bare = []
+    for index, name in enumerate(names):
+        letters = unicodedata.normalize("NFKD", name)
+        letters = "".join(letter for letter in letters if not unicodedata.combining(letter))
+        text = re.sub(r"[^A-Za-z0-9_]", "_", letters)
+        bare.append(text if text.strip("_") else f"joint{index}")
+    # A name that needs no change keeps itself, however late it comes.
+    taken = {text for text, name in zip(bare, names, strict=True) if text == name}
+    result: list[str] = []
+    used: set[str] = set()
+    numbers: Counter[str] = Counter()
+    for text, name in zip(bare, names, strict=True):
+        chosen = text
+        while chosen in used or (chosen in taken and chosen != name):
+            numbers[text] += 1
+            chosen = f"{text}_{numbers[text] + 1}"
+        used.add(chosen)
+        result.append(chosen)
+    return tuple(result)
+
+
+def canonical_names(names: Sequence[str], parents: Ints) -> tuple[str, ...]:
+    """Return what the SMPL family would call each joint: ``left_hip``, ``spine2`` and so on.
+
+    Words that conventions use differently are told apart by the skeleton's other names:
+    ``LeftShoulder`` is a collar where there is a ``LeftArm``, ``LeftFoot`` an ankle where there
+    is none. Chains of spine joints are numbered from the pelvis; of more than three, the first,
+    the middle and the last count. Without a pelvis the joint that both legs hang from is it.
+
+    Parameters
+    ----------
+    names : sequence of J str
+        As in the file.
+    parents : (J,)
+        -1 for a root.
+
+    Returns
+    -------
+    tuple of J str
+        Empty for joints without a counterpart; no name occurs twice.
+
+    >>> import numpy as np
+    >>> canonical_names(["Hips", "LeftUpLeg", "LeftFoot"], np.array([-1, 0, 1]))
+    ('pelvis', 'left_hip', 'left_ankle')
+    """
+    if len(names) > _MOST:
+        return ("",) * len(names)
+    keys = _keys(names)
+    roles = [_role(key) for key in _unambiguous(keys)]
+    chains = {chain: [j for j, role in enumerate(roles) if role == chain] for chain in _CHAINS}
+    result = ["" if role in _CHAINS else role for role in roles]
+    spine = chains["spine"]
+    if "pelvis" not in result:
+        _put_pelvis(result, parents, spine)
+    spine = _without_neck([j for j in spine if not result[j]], chains["neck"], result, parents)
+    for joint, name in zip(*_numbered(spine), strict=True):
+        result[joint] = name
+    if chains["neck"]:
+        result[chains["neck"][0]] = "neck"
+    seen: set[str] = set()
+    for joint, name in enumerate(result):
+        result[joint] = "" if name in seen else name
+        seen.add(name)
+    return tuple(result)
+
+
+_CHAINS = ("spine", "neck")
+
+
+def _numbered(spine: list[int]) -> tuple[list[int], tuple[str, ...]]:
+    """Return which joints of a spine get which names."""
+    if len(spine) <= 1:
+        return spine, _SPINES[: len(spine)]
+    if len(spine) == 2:
+        return spine, (_SPINES[0], _SPINES[2])
+    return [spine[0], spine[(len(spine) - 1) // 2], spine[-1]], _SPINES
+
+
+def _put_pelvis(result: list[str], parents: Ints, spine: list[int]) -> None:
+    """Call the joint pelvis that both legs, or else the first leg or spine joint, hang from."""
+    legs = [result.index(name) for name in ("left_hip", "right_hip") if name in result]
+    paths = [_ancestors(joint, parents) for joint in legs]
+    shared = [joint for joint in paths[0] if all(joint in path for path in paths)] if paths else []
+    if not shared and spine:
+        shared = _ancestors(spine[0], parents)
+    if shared and not result[shared[0]]:
+        result[shared[0]] = "pelvis"
+
+
+def _without_neck(
+    spine: list[int], necks: list[int], result: list[str], parents: Ints
+) -> list[int]:
+    """Return the spine up to the chest; what goes on behind it is neck and head (Rigify)."""
+    arms = [result.index(name) for name in _ARMS if name in result]
+    paths = [_ancestors(joint, parents) for joint in arms]
+    chest = [joint for joint in paths[0] if all(joint in path for path in paths)] if paths else []
+    if necks or "head" in result or len(arms) < 2 or not chest or chest[0] not in spine:
+        return spine
+    above = [joint for joint in spine if chest[0] in _ancestors(joint, parents)]
+    if above:
+        result[above[-1]] = "head"
+        necks += above[:1] if len(above) > 1 else []
+    return [joint for joint in spine if joint not in above]
+
+
+def _ancestors(joint: int, parents: Ints) -> list[int]:
+    path = []
+    while parents[joint] >= 0:
+        joint = int(parents[joint])
+        path.append(joint)
+    return path
+
+
+def _keys(names: Sequence[str]) -> list[_Key]:
+    """Return side and word of every name, without what most names begin with."""
+    split = [_tokens(name) for name in names]
+    while True:
+        first = Counter(tokens[0] for tokens in split if tokens)
+        token, count = first.most_common(1)[0] if first else ("", 0)
+        shared = count > max(2.0, _SHARED * len(split)) and token not in _SIDES
+        if not shared:
+            return [_key(tokens) for tokens in split]
+        split = [tokens[1:] if tokens[:1] == [token] else tokens for tokens in split]
+
+
+def _tokens(name: str) -> list[str]:
+    """Split a name at capitals, digits and signs, behind its name space: small letters."""
+    bare = re.split(r"[:|]", name)[-1]
+    tokens = [token.lower() for token in _TOKEN.findall(bare)]
+    while len(tokens) > 1 and tokens[0] in _PREFIXES:
+        behind = 2 if tokens[1].isdigit() and len(tokens) > 2 else 1  # Bip01
+        tokens = tokens[behind:]
+    return tokens
+
+
+def _key(tokens: list[str]) -> _Key:
+    """Take the side off either end."""
+    if "".join(tokens) in _XSENS_SPINE:
+        return "", "spine"
+    tokens = [token for token in tokens if token != "c"]  # VRM's centre
+    for end in (0, -1):
+        if len(tokens) > 1 and tokens[end] in _SIDES:
+            rest = tokens[1:] if end == 0 else tokens[:-1]
+            return _SIDES[tokens[end]], _word(rest)
+    # Blender puts numbers behind the side: f_index.01.L, but also thigh.L.001.
+    if len(tokens) > 2 and tokens[-2] in _SIDES and tokens[-1].isdigit():
+        return _SIDES[tokens[-2]], _word([*tokens[:-2], tokens[-1]])
+    if len(tokens) > 2 and tokens[1] in _SIDES and not tokens[0].isdigit():
+        return _SIDES[tokens[1]], _word([tokens[0], *tokens[2:]])
+    word = _word(tokens)
+    for letters in ("left", "right", "l", "r"):
+        # lfemur: a side without a capital counts only before a word that we know.
+        if word.startswith(letters) and word not in _ROLES and _is_known(word[len(letters) :]):
+            return _SIDES[letters], word[len(letters) :]
+    return "", word
+
+
+def _word(tokens: list[str]) -> str:
+    return "".join(tokens)
+
+
+def _is_known(word: str) -> bool:
+    stem = word.rstrip("0123456789")
+    return stem in _ROLES or stem in _AMBIGUOUS or _FINGER.fullmatch(word) is not None
+
+
+def _unambiguous(keys: list[_Key]) -> list[_Key]:
+    """Rename what means different joints in different conventions."""
+    roles = {_ROLES.get(word.rstrip("0123456789"), "") for _, word in keys}
+    words = {word for _, word in keys}
+    has_arm = bool(words & set(_WORDS["shoulder"].split()))
+    renamed = {
+        "shoulder": "collar" if has_arm and "collar" not in roles else "upperarm",
+        "foot": "toebase" if "ankle" in roles else "ankle",
+        "hand": "hand" if "wrist" in roles else "wrist",
+    }
+    return [(side, renamed.get(word, word)) for side, word in keys]
+
+
+def _role(key: _Key) -> str:
+    """Return the canonical name of one joint, or the chain that it belongs to."""
+    side, word = key
+    finger = _finger(word)
+    if finger:
+        return f"{side}_{finger}" if side else finger
+    stem = word.rstrip("0123456789")
+    number = word[len(stem) :]
+    role = "hand" if stem == "hand" else _ROLES.get(stem, "")
+    if role == "hip" and not side and stem == "hip":
+        role = "pelvis"
+    if role in _CHAINS:
+        return role if not side else ""
+    if not role or (number and role != "foot" and int(number) > 1):
+        return ""
+    if role in _SIDED:
+        # Hands on their own (MANO) have no sides.
+        return f"{side}_{role}" if side else (role if role == "wrist" else "")
+    return "" if side else role
+
+
+def _finger(word: str) -> str:
+    """Return ``index2`` of ``HandIndex2``, ``f_index.02``, ``IndexIntermediate``, ``Finger11``."""
+    biped = re.fullmatch(r"finger([0-4])([12]?)", word)
+    if biped:
+        return f"{_BIPED_FINGERS[int(biped[1])]}{int(biped[2] or 0) + 1}"
+    match = _FINGER.fullmatch(word)
+    if match is None:
+        return ""
+    number = _PHALANX[match[2]] if match[2] else int(match[3] or 0)
+    return f"{_FINGERS[match[1]]}{number}" if 1 <= number <= 3 else ""
