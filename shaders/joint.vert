@@ -13,12 +13,16 @@ uniform mat4 u_projection;
 uniform sampler2D u_world;     // joint matrices to figure space minus centre, three rows each
 uniform int u_selected;        // this joint is drawn in u_highlight; -1 for none
 uniform vec3 u_highlight;      // linear
+uniform bool u_has_color;      // u_color counts, not in_color
+uniform vec3 u_color;          // linear
 
 out vec3 v_position;    // camera space
 out vec3 v_normal;      // camera space, any length
 out vec2 v_uv;
 out vec3 v_color;
 out float v_scalar;
+flat out float v_opacity;
+flat out int v_instance;
 
 vec4 world_row(int row) {
     // upload.py's rows hold 256 matrices.
@@ -34,6 +38,9 @@ void main() {
     v_normal = u_normal_matrix * normal;
     v_uv = vec2(0.0);
     v_scalar = 0.0;
-    v_color = gl_InstanceID == u_selected ? u_highlight : in_color;
+    v_color = u_has_color ? u_color : in_color;
+    v_color = gl_InstanceID == u_selected ? u_highlight : v_color;
+    v_opacity = 1.0;
+    v_instance = gl_InstanceID;
     gl_Position = u_projection * position;
 }

@@ -6,6 +6,7 @@ in vec3 v_normal;
 in vec2 v_uv;
 in vec3 v_color;
 in float v_scalar;
+flat in float v_opacity;
 
 uniform bool u_flat;            // one normal per triangle
 uniform bool u_orthographic;
@@ -38,5 +39,6 @@ void main() {
     vec3 normal = u_flat || dot(v_normal, v_normal) == 0.0 ? face : normalize(v_normal);
     // Well beyond a right angle: at one, rounding would turn every other pixel.
     normal = dot(normal, face) < -0.1 ? -normal : normal;
-    f_color = vec4(encode(shade(v_position, normal, to_eye)) * u_opacity, u_opacity);
+    float opacity = u_opacity * v_opacity;
+    f_color = vec4(encode(shade(v_position, normal, to_eye)) * opacity, opacity);
 }

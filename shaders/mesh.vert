@@ -18,6 +18,8 @@ out vec3 v_normal;      // camera space, any length
 out vec2 v_uv;
 out vec3 v_color;
 out float v_scalar;
+flat out float v_opacity;
+flat out int v_instance;
 
 void main() {
     vec4 position = u_model_view * vec4(in_position, 1.0);
@@ -26,5 +28,7 @@ void main() {
     v_uv = in_uv;
     v_color = u_has_colors ? in_color : u_color;
     v_scalar = in_scalar;
+    v_opacity = 1.0;
+    v_instance = gl_InstanceID;
     gl_Position = u_projection * position;
 }

@@ -1,69 +1,20 @@
 #version 330
 // Skins a vertex once per changed pose; its outputs are captured by transform feedback.
-// Positions are in figure units, relative to the rest centre on the way in and to the posed
-// centre on the way out, so that float32 keeps its digits far from the origin.
 
-in vec3 in_position;     // bind space, minus the rest centre
-in vec3 in_normal;       // bind space, any length
-in uvec2 in_influences;  // first pair, number of pairs
-in float in_excess;      // sum of the weights, minus 1
-in int in_source;        // the vertex in u_offsets
+#pragma include skinning
 
-uniform bool u_attached;        // false: leave the vertex in its binding space
-uniform vec3 u_rest_shift;      // rest centre minus posed centre
-uniform vec3 u_center;          // posed centre, figure space
-uniform sampler2D u_palette;    // skinning matrices, three rows each
-uniform sampler2D u_pairs;      // joint and weight, each vertex's strongest first
-uniform int u_n_offsets;        // rows of u_offset_list; 0: none
-uniform int u_n_sources;        // vertices in each row of u_offsets
-uniform sampler2D u_offset_list;  // row of u_offsets and its weight
-uniform sampler2D u_offsets;    // pose correctives, row after row
+uniform bool u_attached;    // false: leave the vertex in its binding space
+uniform vec3 u_rest_shift;  // rest centre minus posed centre
+uniform vec3 u_center;      // posed centre, figure space
 
 out vec3 v_position;     // figure space, minus the posed centre
 out vec3 v_normal;       // figure space, unit length
 
-// Shifts, as processors have no division of eight integers at once: upload.py's rows hold 1024
-// pairs or 256 matrices.
-
-// Joint index and weight of one pair.
-vec2 influence(uint index) {
-    return texelFetch(u_pairs, ivec2(index & 1023u, index >> 10), 0).rg;
-}
-
-// One row of a joint's skinning matrix.
-vec4 palette_row(int joint, int row) {
-    return texelFetch(u_palette, ivec2(3 * (joint & 255) + row, joint >> 8), 0);
-}
-
-vec3 unit(vec3 v) {
-    float size = length(v);
-    return size > 0.0 ? v / size : v;
-}
-
-// Sum of the pose correctives of one vertex: upload.py's rows hold 4096 offsets.
-vec3 offset(int vertex) {
-    vec3 sum = vec3(0.0);
-    for (int i = 0; i < u_n_offsets; ++i) {
-        vec2 row = texelFetch(u_offset_list, ivec2(i & 1023, i >> 10), 0).rg;
-        int index = int(row.x) * u_n_sources + vertex;
-        sum += row.y * texelFetch(u_offsets, ivec2(index & 4095, index >> 12), 0).rgb;
-    }
-    return sum;
-}
-
 #pragma chunk
 
 void main() {
-    vec3 position = in_position;
-    if (u_n_offsets > 0) {
-        position += offset(in_source);
-    }
-    vec3 normal = in_normal;
-    if (u_attached && in_influences.y > 0u) {
-        skin(position, normal);
-    } else {
-        position += u_rest_shift;
-    }
-    v_position = position;
-    v_normal = unit(normal);
+    rest_shift = u_rest_shift;
+    center = u_center;
+    first_joint = first_offset = 0;
+    pose_vertex(u_attached, v_position, v_normal);
 }

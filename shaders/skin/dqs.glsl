@@ -1,9 +1,11 @@
 // Dual quaternion skinning (Kavan et al. 2008): stretch linearly, then move rigidly.
-uniform sampler2D u_rigid;      // five texels a joint: real part, dual part, stretch rows
+uniform sampler2D u_rigid;      // five texels a joint: real part, dual part, stretch rows,
+                                // instance after instance
 
 // Texels of a joint in u_rigid: upload.py's rows hold 128 joints.
 vec4 rigid_texel(int joint, int texel) {
-    return texelFetch(u_rigid, ivec2(5 * (joint & 127) + texel, joint >> 7), 0);
+    int index = first_joint + joint;
+    return texelFetch(u_rigid, ivec2(5 * (index & 127) + texel, index >> 7), 0);
 }
 
 vec3 rotate(vec4 q, vec3 v) {
@@ -32,7 +34,7 @@ void skin(inout vec3 position, inout vec3 normal) {
     }
     float size = length(real);
     if (abs(1.0 + in_excess) < 1e-12 || size < 1e-12 * abs(sum)) {
-        position += u_rest_shift;  // influences that cancel out give no rotation
+        position += rest_shift;  // influences that cancel out give no rotation
         return;
     }
     // A negative sum turns the blended quaternion around, which is the same rotation.

@@ -11,6 +11,6 @@ void skin(inout vec3 position, inout vec3 normal) {
     }
     vec4 point = vec4(position, 1.0);
     // The matrices have the posed centre subtracted once per unit of weight.
-    position = vec3(dot(x, point), dot(y, point), dot(z, point)) + in_excess * u_center;
+    position = vec3(dot(x, point), dot(y, point), dot(z, point)) + in_excess * center;
     normal = vec3(dot(x.xyz, normal), dot(y.xyz, normal), dot(z.xyz, normal));
 }

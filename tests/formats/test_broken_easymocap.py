@@ -143,7 +143,7 @@ def test_broken_record_is_a_gap_for_one_person(tmp_path, changes, message):
     ],
 )
 def test_person_without_a_number_is_left_out(tmp_path, person, message):
-    warnings, _ = gap(tmp_path, [body(person)])
+    warnings, _ = gap(tmp_path, [body(0, id=person)])
     assert warnings == [f": {message}"]
 
 
@@ -201,7 +201,7 @@ def test_broken_keypoints_are_a_gap(tmp_path, rows, message):
 
 
 def test_many_faults_are_counted(tmp_path):
-    broken = {frame: "[" for frame in range(1, 31)}
+    broken = dict.fromkeys(range(1, 31), "[")
     write_frames(tmp_path / "smpl", {0: [body(0)], **broken, 31: [body(0)]})
     _, parts, _ = opened(tmp_path)
     warnings = [text for part in parts for text in part.warnings]

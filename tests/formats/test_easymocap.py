@@ -313,7 +313,11 @@ def test_one_hand_beside_a_coco_body(tmp_path):
     record = points(0, 17, handr3d=points(0, 21)["keypoints3d"])
     write_frames(tmp_path / "keypoints3d", {0: [record]})
     layout, clip = opened(tmp_path)[1][0].points[0]
-    assert (layout.title, len(layout.names), clip.points.shape) == ("coco + handr3d", 38, (1, 38, 4))
+    assert (layout.title, len(layout.names), clip.points.shape) == (
+        "coco + handr3d",
+        38,
+        (1, 38, 4),
+    )
     assert layout.names[17:19] == ("right_hand_wrist", "right_thumb1")
     # The hand grows from the body's right wrist, number 10 of coco.
     assert [10, 18] in layout.limbs.tolist()

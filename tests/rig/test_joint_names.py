@@ -160,7 +160,6 @@ spine = pelvis
  thigh.R = right_hip
   thigh.R.001 = -
 """
-DEFORMING = RIGIFY.replace("\n", "\nX").replace("X ", " X")
 MAYA_SMPL = """
 m_avg_root = -
  m_avg_Pelvis = pelvis

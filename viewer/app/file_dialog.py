@@ -255,7 +255,7 @@ def _is_model_folder(dialog: FileDialog, path: Path) -> bool:
     if dialog.purpose != "open" or imgui.is_mouse_double_clicked(imgui.MouseButton_.left):
         return False
     names = {name for kind in FORMATS.values() for name in kind.files}
-    return any((path / name).is_file() for name in names)
+    return path.name in names or any((path / name).exists() for name in names)
 
 
 def folder_of(paths: Sequence[Path]) -> Path:

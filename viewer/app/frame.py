@@ -257,7 +257,8 @@ class Frame:
         is_part &= len(paths) == 1 and len(state.paths) == 1 and len(suffixes) == 2
         if is_part and paths[0].suffix.lower() not in _ADDED:
             attempts.insert(0, [*state.paths, *paths])
-        state.loader = Loader(paths, attempts, self.wake)
+        opened = state.paths or bundled_files()
+        state.loader = Loader(paths, attempts, self.wake, opened=opened)
 
     def _take_loaded(self) -> None:
         """Show what was read, or say why it was not."""

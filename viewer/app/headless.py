@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from imgui_bundle import imgui
+from imgui_bundle import imgui, implot
 
 from viewer.app.actions import fit_view
 from viewer.app.frame import Frame
@@ -47,6 +47,7 @@ class HeadlessApp:
         pixels = (round(size[0] * pixels_per_point), round(size[1] * pixels_per_point))
         self.screen = Target(self.context, pixels, 1)
         self._imgui = imgui.create_context()
+        self._implot = implot.create_context()
         io = imgui.get_io()
         io.set_ini_filename(None)
         io.config_flags |= imgui.ConfigFlags_.docking_enable
@@ -86,6 +87,7 @@ class HeadlessApp:
         """Free everything, the context too."""
         self._make_current()
         imgui.backends.opengl3_shutdown()
+        implot.destroy_context(self._implot)
         imgui.destroy_context(self._imgui)
         self.frame.release()
         self.screen.release()

@@ -108,7 +108,8 @@ def _is_needed(state: AppState, panel: Panel) -> bool:
 
 def _draw_panel(state: AppState, name: str, panel: Panel) -> None:
     # A panel that comes with a figure does not push itself in front of the others.
-    flags = imgui.WindowFlags_.no_focus_on_appearing if panel.needs else imgui.WindowFlags_.none
+    is_quiet = panel.needs and not panel.leads
+    flags = imgui.WindowFlags_.no_focus_on_appearing if is_quiet else imgui.WindowFlags_.none
     shown, stays = imgui.begin(panel.title, True, flags)
     if shown:
         # Labels stand right of their widgets and must not be cut off.

@@ -5,10 +5,11 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from viewer.errors import ViewerError
-from viewer.loading import Builder, Contents, MotionSettings, begin, read_files
+from viewer.loading import Builder, Contents, MotionSettings, begin, is_body, read_files
 from viewer.rig.scene import Scene
 
 __all__ = ["Loader"]
@@ -29,6 +30,8 @@ class Loader:
         Called from the thread when it is done.
     settings : MotionSettings, optional
         How motions are taken.
+    opened : sequence of Path
+        The files of the scene that is shown: motions are given to its figures.
 
     Attributes
     ----------
@@ -48,6 +51,7 @@ class Loader:
         attempts: Sequence[Sequence[Path]],
         wake: Callable[[], None],
         settings: MotionSettings | None = None,
+        opened: Sequence[Path] = (),
     ) -> None:
         self.paths: tuple[Path, ...] = tuple(paths)
         self.scene: Scene | None = None
@@ -55,6 +59,7 @@ class Loader:
         self.addition: Contents | None = None
         self.error = ""
         self._attempts, self._wake, self._settings = attempts, wake, settings
+        self._opened = tuple(opened)
         self._started = time.monotonic()
         self._thread = threading.Thread(target=self._read, daemon=True)
         self._thread.start()
@@ -62,18 +67,40 @@ class Loader:
     def _read(self) -> None:
         for paths in self._attempts:
             try:
-                contents = read_files(paths, settings=self._settings)
-                if contents.is_addition:
-                    self.addition = contents
-                else:
-                    self.scene, self.builders = begin(contents, self._settings)
-                self.paths, self.error = tuple(paths), ""
+                self._read_one(paths)
+                self.error = ""
                 break
             except ViewerError as problem:
                 self.error = str(problem)
             except MemoryError:
                 self.error = f"{paths[-1]}: not enough memory"
         self._wake()
+
+    def _read_one(self, paths: Sequence[Path]) -> None:
+        contents = read_files(paths, settings=self._settings)
+        self.paths = tuple(paths)
+        if contents.is_addition:
+            self.addition = contents
+        elif contents.needs_figure and self._opened:
+            self._join(contents, paths)
+        else:
+            self.scene, self.builders = begin(contents, self._settings)
+
+    def _join(self, contents: Contents, paths: Sequence[Path]) -> None:
+        """Give motions to the figures that are open; what they do not fit stands alone."""
+        opened = read_files(self._opened, settings=self._settings)
+        figures = opened.figures
+        if contents.only_bodies and not any(is_body(figure) for _, figure in figures):
+            figures = []  # people are drawn with the bundled body, and nobody else stays
+        kept = {path for path, _ in figures} | {path for path, _ in opened.morphs}
+        joined = replace(contents, figures=figures, morphs=[*opened.morphs, *contents.morphs])
+        count = len(begin(replace(joined, captures=[], skeleton_motions=[]))[0].actors)
+        self.scene, self.builders = begin(joined, self._settings)
+        if contents.skeleton_motions and len(self.scene.actors) > count:
+            # A BVH that drives nothing here is shown on its own.
+            kept = set()
+            self.scene, self.builders = begin(contents, self._settings)
+        self.paths = (*(path for path in self._opened if path in kept), *paths)
 
     @property
     def is_done(self) -> bool:

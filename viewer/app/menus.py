@@ -7,6 +7,7 @@ from pathlib import Path
 from imgui_bundle import imgui
 
 from viewer.app.actions import redo, reset_pose, undo
+from viewer.app.clip_actions import can_have_keys, new_clip
 from viewer.app.file_dialog import FileDialog, folder_of
 from viewer.app.motion_actions import motion_suffixes, moving_actors, save_motion
 from viewer.app.panels import PANELS
@@ -170,6 +171,8 @@ def _draw_edit_menu(state: AppState) -> None:
         reset_pose(state)
     if menu_item(state, "Mirror pose", "M", enabled=has_pose):
         mirror(state)
+    if menu_item(state, "New clip", enabled=can_have_keys(state)):
+        new_clip(state)
     if menu_item(state, "Copy pose", "Ctrl+C", enabled=has_pose):
         copy_pose(state)
     if menu_item(state, "Copy pose as numbers", "Ctrl+Shift+C", enabled=has_pose):

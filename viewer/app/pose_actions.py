@@ -26,6 +26,7 @@ __all__ = [
     "random_shape",
     "reset_shape",
     "save_export",
+    "save_files",
     "save_pose",
 ]
 
@@ -83,7 +84,7 @@ def save_pose(state: AppState, path: Path) -> None:
     """Write the chosen actor's pose; the suffix chooses the form."""
     record = _record(state)
     if record is not None:
-        _save(state, lambda: write(record, path), [path])
+        save_files(state, lambda: write(record, path), [path])
 
 
 def save_export(state: AppState, path: Path) -> None:
@@ -93,10 +94,11 @@ def save_export(state: AppState, path: Path) -> None:
     except ViewerError as problem:
         state.error = str(problem)
         return
-    _save(state, lambda: state.say(*export(state.actor, path, state.options.skinning)), files)
+    save_files(state, lambda: state.say(*export(state.actor, path, state.options.skinning)), files)
 
 
-def _save(state: AppState, act: Callable[[], None], files: list[Path]) -> None:
+def save_files(state: AppState, act: Callable[[], None], files: list[Path]) -> None:
+    """Write files unless one of them was opened, and say which, or why not."""
     try:
         refuse_inputs(files, state.paths)
         act()

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from viewer.app.curve_view import CurveView
 from viewer.app.edits import History
 from viewer.app.playback import Playback
 from viewer.rendering.camera import Camera, fit
@@ -100,6 +101,8 @@ class AppState:
         Files to open after the frame.
     playback : Playback
         The scene's clock.
+    curves : CurveView
+        What the Curves panel shows.
     job : Job or None
         Work that goes on beside the frame loop.
     stream : Stream or None
@@ -139,6 +142,7 @@ class AppState:
     stats: Stats = field(default_factory=Stats)
     history: History = field(default_factory=History)
     playback: Playback = field(default_factory=Playback)
+    curves: CurveView = field(default_factory=CurveView)
     job: Job | None = None
     stream: Stream | None = None
     followed: tuple[int, int] | None = None

@@ -13,7 +13,7 @@ from viewer.app.display import find_display, import_glfw
 glfw = import_glfw()
 
 import moderngl  # noqa: E402  after glfw, whose library imgui-bundle chooses
-from imgui_bundle import imgui  # noqa: E402
+from imgui_bundle import imgui, implot  # noqa: E402
 
 from viewer.app.frame import Frame  # noqa: E402
 from viewer.app.recent import (  # noqa: E402
@@ -131,6 +131,7 @@ class _Window:
         self._title = ""
         self._set_callbacks()
         self._imgui: Any = imgui.create_context()
+        self._implot: Any = implot.create_context()
         self._set_up_imgui(scale)
         self.frame = Frame(state, self.context, glfw.post_empty_event, keeps_recent=True)
 
@@ -243,6 +244,7 @@ class _Window:
         save_closed_panels(self.state.closed_panels)
         imgui.backends.opengl3_shutdown()
         imgui.backends.glfw_shutdown()
+        implot.destroy_context(self._implot)
         imgui.destroy_context(self._imgui)
         self.frame.release()
         self.context.release()

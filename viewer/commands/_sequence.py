@@ -101,7 +101,7 @@ def request_of(arguments: argparse.Namespace, output: Path) -> Request | None:
     frames = None if arguments.frames is None else parse_range(arguments.frames)
     turntable = None if arguments.turntable is None else parse_turntable(arguments.turntable)
     kind, is_certain = _kind(arguments, output)
-    _check_options(arguments, kind if is_certain else "")
+    _check_options(arguments, kind)
     if not kind:
         return None
     if kind == "pictures":
@@ -117,8 +117,9 @@ def _kind(arguments: argparse.Namespace, output: Path) -> tuple[str, bool]:
     if _FIELD.search(str(output)):
         return "pictures", True
     if output.suffix.lower() == ".gif":
-        is_posed = arguments.frame is not None or arguments.time is not None
-        return ("video", asks) if asks or not is_posed else ("", True)
+        wants = asks or arguments.follow is not None or arguments.speed is not None
+        is_still = arguments.frame is not None or arguments.time is not None or arguments.panels
+        return ("video", wants) if wants or not is_still else ("", True)
     if output.suffix.lower() in VIDEOS:
         return "video", True
     return ("pictures", True) if asks else ("", True)
@@ -135,9 +136,9 @@ def _check_options(arguments: argparse.Namespace, kind: str) -> None:
         raise ViewerError("--follow: expected a video, contact sheet or numbered pictures")
     for option in ("speed", "quality"):
         if getattr(arguments, option) is not None and kind != "video":
-            suffix = Path(arguments.output).suffix.lower()
-            if not (kind == "" and suffix in VIDEOS):
-                raise ViewerError(f"--{option}: only videos have one: {', '.join(VIDEOS)}")
+            raise ViewerError(f"--{option}: only videos have one: {', '.join(VIDEOS)}")
+    if arguments.quality is not None and Path(arguments.output).suffix.lower() == ".gif":
+        raise ViewerError("--quality: a GIF has one quality; .mp4 and .webm have more")
     speed = arguments.speed
     if speed is not None and not 1e-3 <= abs(speed) <= 1e3:
         raise ViewerError(f"--speed: expected 0.001 to 1000 or their negatives, found {speed:g}")

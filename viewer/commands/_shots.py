@@ -131,7 +131,9 @@ def shots_of(request: Request, arguments: argparse.Namespace, scene: Scene) -> S
     rate, notes = counted, []
     if request.kind == "video" and request.output.suffix.lower() == ".gif" and rate > MOST_GIF_RATE:
         rate = MOST_GIF_RATE
-        notes.append(f"GIFs show at most {rate:g} frames a second, not {counted:g}; drawn so many")
+        notes.append(
+            f"GIFs show at most {rate:g} frames a second: drawn at {rate:g}, not {counted:g}"
+        )
     if moves:
         places, more = _places(request, arguments, scene, counted, rate)
         notes += [*more, *_overridden(arguments)]
@@ -166,12 +168,11 @@ def _places(
     begin = asked.first if pace > 0.0 else stop - 1
     seconds = None if request.turntable is None else request.turntable.seconds
     if seconds is None:
-        count = _count(math.ceil(length / abs(pace) - 1e-9))
-        places = np.clip(begin + np.arange(count) * pace, asked.first, stop - 1)
-        return places, notes
+        count = _count(math.floor((length - 1) / abs(pace) + 1e-9) + 1)
+        return begin + np.arange(count) * pace, notes
     # The motion begins again until the camera is all the way round.
-    places = asked.first + np.mod(begin - asked.first + np.arange(_count(seconds * rate)) * pace, length)
-    return np.minimum(places, max(total - 1, stop - 1)), notes
+    run = begin - asked.first + np.arange(_count(seconds * rate)) * pace
+    return asked.first + np.minimum(np.mod(run, length), length - 1), notes
 
 
 def _count(frames: float) -> int:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from viewer.commands._output import STDOUT, check_output
 from viewer.commands._scene import add_scene_arguments, open_scene, print_warnings
+from viewer.commands._sequence import add_sequence_arguments, draw_sequence, request_of
 from viewer.commands._view import (
     add_camera_arguments,
     add_display_arguments,
@@ -34,9 +35,10 @@ _OPAQUE = (".jpg", ".jpeg", ".bmp", ".ppm")
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     add_scene_arguments(parser)
-    parser.add_argument("-o", "--output", required=True, metavar="PICTURE", help=".png, .jpg, …")
-    parser.add_argument("--force", action="store_true", help="replace an existing picture")
+    parser.add_argument("-o", "--output", required=True, metavar="FILE", help=".png, .jpg, … .mp4")
+    parser.add_argument("--force", action="store_true", help="replace existing files")
     parser.add_argument("--size", default="1280x720", metavar="WxH", help="default: 1280x720")
+    add_sequence_arguments(parser)
     add_camera_arguments(parser)
     add_display_arguments(parser)
     parser.add_argument("--panels", action="store_true", help="draw the whole interface too")
@@ -44,17 +46,32 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Draw the picture, write it, and say where it is."""
+    """Draw the picture or pictures, write them, and say where they are."""
     size = parse_size(arguments.size)
     output = Path(arguments.output)
-    check_output(output, [Path(file) for file in arguments.files], arguments.force)
-    _check_suffix(output)
+    request = request_of(arguments, output)
+    is_video = request is not None and request.kind == "video"
+    if request is None or request.kind != "pictures":
+        check_output(output, [Path(file) for file in arguments.files], arguments.force)
+    if not is_video:
+        _check_suffix(output)
     options = display_of(arguments)
     if options.background == "transparent" and output.suffix.lower() in _OPAQUE:
         print_warnings([f"{printable(output)}: this format knows no transparency"])
     scene = open_scene(arguments)
     hide_parts(arguments, scene, options)
     print_warnings(warn_of_missing(scene, options))
+    if request is not None and (request.is_certain or any(a.clip for a in scene.actors)):
+        print(draw_sequence(request, arguments, scene, options, size))
+    else:
+        _draw_still(arguments, scene, options, size)
+    return 0
+
+
+def _draw_still(
+    arguments: argparse.Namespace, scene: Scene, options: DisplayOptions, size: tuple[int, int]
+) -> None:
+    output = Path(arguments.output)
     points = scene_points(scene, options.show)
     camera = camera_of(arguments, scene, points, size)
     box = bounding_box(points)
@@ -69,7 +86,6 @@ def run(arguments: argparse.Namespace) -> int:
     stream = sys.stderr if str(output) in STDOUT else sys.stdout
     colors = scalar_text(scene, options)
     print(f"{printable(output)}: {size[0]} x {size[1]}{grid}{colors}", file=stream)
-    return 0
 
 
 def _check_suffix(output: Path) -> None:

@@ -63,7 +63,7 @@ class FamilyFrames:
         return self.translations + self.roots - turned
 
 
-def member_of_figure(figure: Figure, what: str, root: str = "") -> Member:
+def member_of_figure(figure: Figure, what: str, roots: tuple[str, ...]) -> Member:
     """Return the member of the family whose joints a figure has.
 
     Parameters
@@ -72,8 +72,8 @@ def member_of_figure(figure: Figure, what: str, root: str = "") -> Member:
         With a skeleton.
     what : str
         What is written, for the message.
-    root : str
-        What the root must be called; empty for any.
+    roots : tuple of str
+        What the root may be called: ``"pelvis"`` for bodies, ``"wrist"`` for hands.
 
     Raises
     ------
@@ -82,8 +82,8 @@ def member_of_figure(figure: Figure, what: str, root: str = "") -> Member:
     """
     names = () if figure.skeleton is None else figure.skeleton.names
     member = FAMILY.get(len(names))
-    if member is None or set(member.names) != set(names) or root not in ("", member.names[0]):
-        titles = [kind.title for kind in FAMILY.values() if root in ("", kind.names[0])]
+    if member is None or set(member.names) != set(names) or member.names[0] not in roots:
+        titles = [kind.title for kind in FAMILY.values() if kind.names[0] in roots]
         raise RigError(
             f"{figure.name} cannot be written as {what}: expected the joints of "
             f"{', '.join(titles[:-1])} or {titles[-1]}, found others"

@@ -55,7 +55,7 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
     OutputError
         If a file cannot be written.
     """
-    member = member_of_figure(take.figure, "an AMASS motion", root="pelvis")
+    member = member_of_figure(take.figure, "an AMASS motion", ("pelvis",))
     present = take.frames.present
     if options.gaps not in GAPS:
         raise RigError(f'gaps: expected one of {", ".join(GAPS)}, found "{options.gaps}"')

@@ -79,7 +79,7 @@ def export_takes(
     _check(takes, persons)
     people, notes = [], []
     for take, person in zip(takes, persons, strict=True):
-        member = member_of_figure(take.figure, "an EasyMocap folder")
+        member = member_of_figure(take.figure, "an EasyMocap folder", ("pelvis", "wrist"))
         body, losses = family_frames(take, take.frames, member, options)
         people.append((person, take, _Records(person, body)))
         who = f"person {person}: " if len(takes) > 1 else ""

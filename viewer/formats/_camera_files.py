@@ -255,6 +255,13 @@ def _close(source: Source, matrix: _Matrix | None, values: dict[str, Value]) -> 
     """Make an array of a matrix that is complete."""
     if matrix is None:
         return
+    if min(matrix.rows, matrix.columns) < 0:
+        lacking = "rows" if matrix.rows < 0 else "cols"
+        raise FormatError(
+            source.path,
+            f"{matrix.key}: expected rows, cols and data, found no {lacking}",
+            matrix.line,
+        )
     numbers = [to_number(word) for word in matrix.data]
     if None in numbers:
         odd = matrix.data[numbers.index(None)]

@@ -39,6 +39,8 @@ class PictureSink:
         Size of what is written so far.
     """
 
+    n_samples = 0
+
     def __init__(self, paths: Sequence[Path]) -> None:
         self.paths = paths
         self.workers = min(max((os.cpu_count() or 2) - 1, 1), _MOST_WORKERS)
@@ -47,6 +49,9 @@ class PictureSink:
     def n_bytes(self) -> int:
         """Size of the files that are there."""
         return sum(path.stat().st_size for path in self.paths if path.is_file())
+
+    def look(self, pixels: Bytes) -> None:
+        """Do nothing: no picture depends on others."""
 
     def write(self, frame: int, pixels: Bytes) -> None:
         """Write one picture; see ``viewer.rendering.recorder.Sink``.
@@ -94,6 +99,8 @@ class SheetSink:
         If so many cells would be too small.
     """
 
+    n_samples = 0
+
     def __init__(self, path: Path, size: tuple[int, int], numbers: Sequence[int]) -> None:
         self.path, self.numbers, self.workers, self.n_bytes = path, numbers, 1, 0
         self.columns, self.rows = sheet_layout(size, len(numbers))
@@ -105,6 +112,9 @@ class SheetSink:
                 f"{self.cell[0]} x {self.cell[1]} each, which is too small to see anything"
             )
         self._sheet: Bytes | None = None
+
+    def look(self, pixels: Bytes) -> None:
+        """Do nothing: no cell depends on others."""
 
     def write(self, frame: int, pixels: Bytes) -> None:
         """Put a frame into its cell; see ``viewer.rendering.recorder.Sink``."""

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from viewer.errors import UnsupportedFormatError, ViewerError, printable
+from viewer.formats._gif_palette import PaletteChooser, PaletteUser
 from viewer.formats._save import Replacement
 from viewer.rig.arrays import Bytes
 
@@ -32,7 +33,8 @@ MOST_GIF_RATE = 50.0
 """Frames a second: viewers show delays below 2/100 s as 10/100 s."""
 
 _BT709, _LIMITED = 1, 1  # H.273's code points; FFmpeg's AVColorSpace and AVColorRange
-_QUALITY = 75
+_QUALITY = 75.0
+_GIF_SAMPLES = 12  # frames whose colours are looked at
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +68,7 @@ VIDEOS = {
         True,
         {"movflags": "+faststart"},  # the index first, so that browsers start at once
     ),
-    ".webm": VideoKind("WebM video (VP9)", ("libvpx-vp9", "libvpx"), True, True),
+    ".webm": VideoKind("WebM video (VP9)", ("libvpx-vp9",), True, True),
     ".gif": VideoKind("animated GIF", ("gif",), True, False),
 }
 """Kinds of video by suffix."""
@@ -111,6 +113,8 @@ class VideoSink:
     ----------
     workers : int
         1: frames are needed in order.
+    n_samples : int
+        How many frames ``look`` should see first.
     notes : list of str
         What is not as asked for, one line each.
     n_bytes : int
@@ -147,7 +151,9 @@ class VideoSink:
         self._file = Replacement(path)
         self._container: av.container.OutputContainer | None = None
         self._stream: Any = None
-        self._palettes: _Palettes | None = None
+        self.n_samples = _GIF_SAMPLES if self.encoder == "gif" else 0
+        self._chooser: PaletteChooser | None = None
+        self._palette: PaletteUser | None = None
 
     def _note(self, transparent: bool) -> None:
         name, rate = printable(self.path), float(self.rate)
@@ -166,6 +172,12 @@ class VideoSink:
                 f"{rate:g} frames a second on average"
             )
 
+    def look(self, pixels: Bytes) -> None:
+        """Take the colours of some frame into account; before any is written, and only for GIFs."""
+        if self._chooser is None:
+            self._chooser = PaletteChooser(self._av, self._coded)
+        self._chooser.look(self._picture(pixels))
+
     def write(self, frame: int, pixels: Bytes) -> None:
         """Encode one frame; they come in order.
 
@@ -176,6 +188,8 @@ class VideoSink:
         """
         try:
             if self._container is None:
+                if self.encoder == "gif" and self._chooser is None:
+                    self.look(pixels)  # better than none
                 self._open()
             picture = self._picture(pixels)
             picture.pts, picture.time_base = frame, 1 / self.rate
@@ -193,8 +207,8 @@ class VideoSink:
         """
         assert self._container is not None  # there is at least one frame
         try:
-            if self._palettes is not None:
-                self._encode(self._palettes.rest())
+            if self._palette is not None:
+                self._encode(self._palette.taken(None))
             self._container.mux(self._stream.encode(None))
             self._container.close()
         except (OSError, ValueError, self._av.FFmpegError) as problem:
@@ -225,14 +239,15 @@ class VideoSink:
         stream.pix_fmt = "pal8" if self.encoder == "gif" else self._pixel_format
         context = stream.codec_context
         context.thread_count = 0  # as many as there are processors
-        if self.encoder == "gif":
+        if self._chooser is not None:
             context.time_base = Fraction(1, 100)
-            self._palettes = _Palettes(self._av, self._coded, self._has_alpha, 1 / self.rate)
+            palette = self._chooser.palette()
+            self._palette = PaletteUser(self._av, self._coded, 1 / self.rate, palette)
         else:
             context.time_base = 1 / self.rate
             context.color_range, context.colorspace = _LIMITED, _BT709
             context.color_primaries, context.color_trc = _BT709, _BT709
-        if self.encoder == "libopenh264" or self.encoder == "mpeg4":
+        if self.encoder in ("libopenh264", "mpeg4"):
             context.bit_rate = _bit_rate(self._coded, float(self.rate), self._quality)
         self._stream, self._reformatter = stream, self._av.video.reformatter.VideoReformatter()
 
@@ -253,11 +268,12 @@ class VideoSink:
         if not self._has_alpha and (pixels[..., 3] < 255).any():
             shares = rgba[..., 3:].astype(np.uint16)
             rgba[..., :3] = (rgba[..., :3] * shares + 127) // 255
+            rgba[..., 3] = 255
         return picture
 
     def _converted(self, picture: VideoFrame) -> Iterable[VideoFrame]:
-        if self._palettes is not None:
-            return self._palettes.taken(picture)
+        if self._palette is not None:
+            return self._palette.taken(picture)
         return [
             self._reformatter.reformat(
                 picture,
@@ -272,50 +288,6 @@ class VideoSink:
         assert self._container is not None  # write() opened it
         for picture in pictures:
             self._container.mux(self._stream.encode(picture))
-
-
-class _Palettes:
-    """Frames of 256 colours, each with its own palette and an ordered dither that stands still."""
-
-    def __init__(
-        self, library: ModuleType, size: tuple[int, int], has_alpha: bool, time_base: Fraction
-    ) -> None:
-        self._av, self._graph = library, library.filter.Graph()
-        graph = self._graph
-        source = graph.add_buffer(width=size[0], height=size[1], format="rgba", time_base=time_base)
-        split = graph.add("split")
-        reserve = "1" if has_alpha else "0"
-        palette = graph.add("palettegen", f"stats_mode=single:reserve_transparent={reserve}")
-        use = graph.add("paletteuse", "new=1:dither=bayer:bayer_scale=4:alpha_threshold=128")
-        sink = graph.add("buffersink")
-        source.link_to(split)
-        split.link_to(use, 0, 0)
-        split.link_to(palette, 1, 0)
-        palette.link_to(use, 0, 1)
-        use.link_to(sink)
-        graph.configure()
-
-    def taken(self, picture: VideoFrame) -> list[VideoFrame]:
-        """Return what is ready once this frame is in."""
-        self._graph.push(picture)
-        return self._ready()
-
-    def rest(self) -> list[VideoFrame]:
-        """Return the last frames."""
-        self._graph.push(None)
-        return self._ready()
-
-    def _ready(self) -> list[VideoFrame]:
-        ready: list[VideoFrame] = []
-        while True:
-            try:
-                picture = self._graph.pull()
-            except (self._av.BlockingIOError, self._av.EOFError):
-                return ready
-            # Delays in 1/100 s, rounded so that no error adds up.
-            start = picture.pts * picture.time_base
-            picture.pts, picture.time_base = round(100 * start), Fraction(1, 100)
-            ready.append(picture)
 
 
 def _library() -> ModuleType:
@@ -361,10 +333,9 @@ def _encoder_options(encoder: str, quality: float) -> dict[str, str]:
     """Return an encoder's own words for a quality from 0 to 100."""
     if encoder == "libx264":
         return {"preset": "veryfast", "crf": f"{51.0 - 0.43 * quality:.1f}"}  # 75: 18.8
-    if encoder in ("libvpx-vp9", "libvpx"):
-        crf = {"crf": f"{63.0 - 0.5 * quality:.0f}", "b": "0" if "vp9" in encoder else "20M"}
-        speed = {"deadline": "good", "cpu-used": "5", "auto-alt-ref": "0"}
-        return {**crf, **speed, **({"row-mt": "1"} if "vp9" in encoder else {})}
+    if encoder == "libvpx-vp9":
+        speed = {"deadline": "good", "cpu-used": "5", "row-mt": "1", "auto-alt-ref": "0"}
+        return {"crf": f"{63.0 - 0.5 * quality:.0f}", "b": "0", **speed}  # 75: 26
     if encoder == "gif":
         return {"global_palette": "0"}
     return {}

@@ -10,6 +10,7 @@ from viewer.loading.assembly import assemble, begin
 from viewer.loading.bundled import bundled_body, bundled_files
 from viewer.loading.capturing import Builder
 from viewer.loading.contents import Contents, read_files
+from viewer.loading.driving import is_body
 from viewer.loading.settings import MotionSettings
 from viewer.rig.scene import Scene
 
@@ -22,6 +23,7 @@ __all__ = [
     "begin",
     "bundled_body",
     "bundled_files",
+    "is_body",
     "load",
     "read_files",
 ]

@@ -15,6 +15,7 @@ from viewer.loading.driving import Cast, drive
 from viewer.loading.settings import MotionSettings
 from viewer.rig.arrays import Bytes
 from viewer.rig.figure import Figure
+from viewer.rig.morph_target import with_morphs
 from viewer.rig.motion import pose_actor, time_span
 from viewer.rig.pose_record import PoseRecord
 from viewer.rig.scene import Actor, Scene, scene_box
@@ -67,8 +68,9 @@ def begin(
     pairs = _pairs([figure for _, figure in figures])
     cast = Cast([])
     for pair in pairs:
-        actor = Actor(_join([figures[index] for index in pair]))
-        cast.add(actor, actor.figure.up, placed=False)
+        figure = _join([figures[index] for index in pair])
+        cast.add(Actor(figure), figure.up, placed=False)
+    _give_morphs(contents, cast.actors)
     drive(contents, cast, settings or MotionSettings())
     start = time_span(cast.actors)[0]
     for actor in cast.actors:
@@ -116,6 +118,23 @@ def _fits(skeleton: Figure, skin: Figure) -> bool:
 
 def _fits_by_name(skeleton: Figure, skin: Figure) -> bool:
     return skeleton.name == skin.name and _fits(skeleton, skin)
+
+
+def _give_morphs(contents: Contents, actors: list[Actor]) -> None:
+    """Give targets to the first mesh that has their vertices, all that fit to the same one."""
+    for path, target in contents.morphs:
+        problem: RigError | None = None
+        for index, actor in enumerate(actors):
+            try:
+                actors[index] = Actor(with_morphs(actor.figure, [target]))
+                break
+            except RigError as refused:
+                problem = problem or refused
+        else:
+            shown = printable(path, 300)
+            raise RigError(
+                f"{shown}: {problem}" if problem else f"{shown}: open it together with its .skin"
+            )
 
 
 def _assign_pose(path: Path, record: PoseRecord, actors: list[Actor]) -> list[str]:

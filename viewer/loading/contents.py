@@ -8,19 +8,23 @@ from pathlib import Path
 
 from viewer.errors import FormatError
 from viewer.formats import MAX_SIZE, Source, claims, detect, is_picture, read, read_picture
+from viewer.formats.rig import NamedFiles
 from viewer.loading.settings import MotionSettings
 from viewer.rig.arrays import Bytes
 from viewer.rig.body_motion import BodyMotion
 from viewer.rig.capture import Capture
 from viewer.rig.clip import Clip
 from viewer.rig.figure import Figure
+from viewer.rig.morph_target import MorphTarget
 from viewer.rig.motion import DEFAULT_RATE
 from viewer.rig.pose_record import PoseRecord
 from viewer.rig.skeleton_motion import SkeletonMotion
 
 __all__ = ["Contents", "read_files"]
 
-Content = Figure | Clip | PoseRecord | BodyMotion | SkeletonMotion | Capture
+Content = (
+    Figure | Clip | PoseRecord | BodyMotion | SkeletonMotion | Capture | MorphTarget | NamedFiles
+)
 
 _PEEK = 16  # bytes that tell a picture
 
@@ -36,6 +40,7 @@ class Contents:
     body_motions: list[tuple[Path, BodyMotion]] = field(default_factory=list)
     skeleton_motions: list[tuple[Path, SkeletonMotion]] = field(default_factory=list)
     captures: list[tuple[Path, Capture]] = field(default_factory=list)
+    morphs: list[tuple[Path, MorphTarget]] = field(default_factory=list)
     warnings: tuple[str, ...] = ()
 
     @property
@@ -44,9 +49,22 @@ class Contents:
         return bool(self.clips or self.body_motions or self.skeleton_motions or self.captures)
 
     @property
+    def needs_figure(self) -> bool:
+        """Whether there are motions or morphs, and no figure for them."""
+        return not self.figures and (self.has_motion or bool(self.morphs))
+
+    @property
+    def only_bodies(self) -> bool:
+        """Whether all that moves are bodies of the SMPL family."""
+        return bool(self.body_motions or self.captures) and not (
+            self.clips or self.skeleton_motions or self.morphs
+        )
+
+    @property
     def is_addition(self) -> bool:
         """Whether there are only poses and pictures, for a figure that is open already."""
-        return not self.figures and not self.has_motion and bool(self.poses or self.pictures)
+        others = self.figures or self.has_motion or self.morphs
+        return not others and bool(self.poses or self.pictures)
 
 
 def read_files(
@@ -55,18 +73,22 @@ def read_files(
     """Read files without putting them together; see ``viewer.loading.load``."""
     contents = Contents()
     sources = [Source.open(path, max_size) for path in paths]
-    for source in sources:
+    for source in sources:  # grows while it is read: a .rig names files
         if _is_picture(source):
             contents.pictures.append((source.path, read_picture(source)))
         else:
-            _sort(source, contents, settings or MotionSettings())
+            named = _sort(source, contents, settings or MotionSettings())
+            known = {other.path for other in sources}
+            sources += [Source.open(path, max_size) for path in named if path not in known]
     contents.warnings = tuple(text for source in sources for text in source.warnings)
     return contents
 
 
-def _sort(source: Source, contents: Contents, settings: MotionSettings) -> None:
-    """Read a file and put what it holds where its kind belongs."""
+def _sort(source: Source, contents: Contents, settings: MotionSettings) -> tuple[Path, ...]:
+    """Read a file and put what it holds where its kind belongs; return files that it names."""
     content, path = _read(source, settings), source.path
+    if isinstance(content, NamedFiles):
+        return content.paths
     if isinstance(content, Clip):
         contents.clips.append((path, content))
     elif isinstance(content, PoseRecord):
@@ -75,11 +97,14 @@ def _sort(source: Source, contents: Contents, settings: MotionSettings) -> None:
         contents.body_motions.append((path, content))
     elif isinstance(content, SkeletonMotion):
         contents.skeleton_motions.append((path, content))
+    elif isinstance(content, MorphTarget):
+        contents.morphs.append((path, content))
     elif isinstance(content, Capture):
         contents.captures.append((path, content))
     else:
         figure = _with_own_picture(source, content) if source.is_folder else content
         contents.figures.append((path, figure))
+    return ()
 
 
 def _read(source: Source, settings: MotionSettings) -> Content:

@@ -21,7 +21,7 @@ from viewer.rig.scene import Actor
 from viewer.rig.skeleton_motion import SkeletonMotion
 from viewer.rig.transform import rotation_transform
 
-__all__ = ["Cast", "drive"]
+__all__ = ["Cast", "drive", "is_body"]
 
 _ROOTS = ("pelvis", "wrist", "global")  # of the SMPL family's members
 
@@ -122,7 +122,8 @@ def _give_skeleton_motion(
     cast.add(Actor(motion.figure, clip=motion.clip), motion.figure.up, placed=False)
 
 
-def _is_body(figure: Figure) -> bool:
+def is_body(figure: Figure) -> bool:
+    """Return whether captured bodies can be drawn with a figure: the family's root and a mesh."""
     skeleton = figure.skeleton
     return skeleton is not None and figure.mesh is not None and skeleton.names[0] in _ROOTS
 
@@ -140,7 +141,7 @@ def _model(cast: Cast, settings: MotionSettings) -> tuple[Figure, bool]:
         cast.notes += source.warnings
         return model, False
     for index, actor in enumerate(cast.actors):
-        if actor.clip is None and _is_body(actor.figure):
+        if actor.clip is None and is_body(actor.figure):
             del cast.actors[index], cast.ups[index], cast.placed[index]
             return actor.figure, _is_bundled(actor.figure)
     body = read(Source.open(bundled_body()))

@@ -9,10 +9,22 @@ from typing import Literal
 import numpy as np
 from pyrr import matrix44
 
+from viewer.rendering.pinhole import picture_size, pinhole_projection, pinhole_view
 from viewer.rig.arrays import Floats
+from viewer.rig.camera_view import CameraView
 from viewer.rig.mesh import bounding_box, box_size
 
-__all__ = ["VIEWS", "Camera", "camera_axes", "eye", "fit", "orbit", "pan", "zoom"]
+__all__ = [
+    "VIEWS",
+    "Camera",
+    "camera_axes",
+    "camera_from_view",
+    "eye",
+    "fit",
+    "orbit",
+    "pan",
+    "zoom",
+]
 
 VIEWS = {
     "front": (0.0, 0.0),
@@ -47,6 +59,9 @@ class Camera:
         Parallel projection with the same height at the target.
     up : "y" or "z"
         The scene's up axis.
+    fixed : CameraView or None
+        A calibrated camera that is looked through: the matrices are then its own, and all else
+        says where the camera will be once this is None again.
     """
 
     target: Floats = field(default_factory=lambda: np.zeros(3))
@@ -56,6 +71,7 @@ class Camera:
     fov: float = 35.0
     orthographic: bool = False
     up: Literal["y", "z"] = "y"
+    fixed: CameraView | None = None
 
     def copy(self) -> Camera:
         """Return a camera that shares nothing with this one."""
@@ -67,10 +83,18 @@ class Camera:
             self.fov,
             self.orthographic,
             self.up,
+            self.fixed,
         )
+
+    @property
+    def is_parallel(self) -> bool:
+        """Whether it projects along parallels: a calibrated camera never does."""
+        return self.orthographic and self.fixed is None
 
     def view_matrix(self) -> Floats:
         """Return the matrix from scene to camera space, for column vectors: (4, 4)."""
+        if self.fixed is not None:
+            return pinhole_view(self.fixed)
         _, up, _ = camera_axes(self)
         # pyrr's matrices suit row vectors.
         return np.array(matrix44.create_look_at(eye(self), self.target, up, dtype="f8")).T
@@ -90,6 +114,8 @@ class Camera:
         (4, 4)
             OpenGL clip space, z in -1..1.
         """
+        if self.fixed is not None:
+            return pinhole_projection(self.fixed, aspect, box)
         reach = box_size(box) + float(np.linalg.norm(box.mean(axis=0) - self.target))
         reach = reach or self.distance  # an empty scene needs a depth range too
         far = self.distance + 20.0 * reach
@@ -130,6 +156,52 @@ def camera_axes(camera: Camera) -> tuple[Floats, Floats, Floats]:
 def eye(camera: Camera) -> Floats:
     """Return the position of the camera in scene space: (3,)."""
     return camera.target + camera.distance * camera_axes(camera)[2]
+
+
+def camera_from_view(
+    view: CameraView, size: tuple[int, int], up: Literal["y", "z"], box: Floats | None = None
+) -> Camera:
+    """Return a camera that looks through a calibrated one.
+
+    Setting its ``fixed`` to None leaves an orbit camera at the same place that looks along the same
+    axis, about as wide; it stands upright, and the picture's middle is on the axis.
+
+    Parameters
+    ----------
+    view : CameraView
+        In scene space.
+    size : (int, int)
+        Width and height of what is drawn, pixels.
+    up : "y" or "z"
+        The scene's up axis.
+    box : (2, 3), optional
+        What will be orbited about, scene space; the origin if omitted.
+
+    Raises
+    ------
+    RigError
+        If nothing says how large the camera's pictures are.
+    """
+    width, height = picture_size(view)
+    aspect = size[0] / size[1]
+    seen = max(height, width / aspect)  # the picture's rows, and what is seen above and below
+    backward = -view.rotation[2]
+    place = -view.rotation.T @ view.translation
+    middle = np.zeros(3) if box is None else box.mean(axis=0)
+    distance = float((place - middle) @ backward)
+    if distance <= _SMALLEST:  # it is behind the camera
+        distance = float(np.linalg.norm(place - middle)) or 1.0
+    x, y, z = backward if up == "y" else (backward[0], backward[2], -backward[1])
+    focal = float(view.intrinsic[1, 1] / view.intrinsic[2, 2])
+    return Camera(
+        target=place - distance * backward,
+        distance=distance,
+        azimuth=math.degrees(math.atan2(x, z)),
+        inclination=math.degrees(math.atan2(y, math.hypot(x, z))),
+        fov=math.degrees(2.0 * math.atan2(0.5 * seen, focal)),
+        up=up,
+        fixed=view,
+    )
 
 
 def fit(camera: Camera, points: Floats, aspect: float) -> None:

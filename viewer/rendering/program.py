@@ -22,7 +22,8 @@ SHADING = {
 """Chunks in ``shaders/shade``, with the name that menus show."""
 
 _NEEDS = re.compile(r"^#pragma needs ([\w ]+)\n")
-_CHUNK_MARK = re.compile(r"^#pragma chunk\s*$", re.MULTILINE)
+_INCLUDE = re.compile(r"^#pragma include (\w+)\s*$")
+_CHUNK_MARK = "#pragma chunk"
 _LINES_PER_FILE = 10_000
 _PLACE = re.compile(r"(?:ERROR:\s*)?\b\d+[:(](\d+)\)?(?:\(\d+\))?\s*:\s*")
 
@@ -60,8 +61,10 @@ class Programs:
         self.context = context
         self._cache: dict[tuple[str, ...], moderngl.Program] = {}
 
-    def drawing(self, name: str, chunk: str = "", fragment: str = "") -> moderngl.Program:
-        """Return the program of ``name.vert`` and a fragment shader, with the chunk in the latter.
+    def drawing(
+        self, name: str, chunk: str = "", fragment: str = "", skin: str = ""
+    ) -> moderngl.Program:
+        """Return the program of ``name.vert`` and a fragment shader, each with its chunk.
 
         Parameters
         ----------
@@ -71,23 +74,25 @@ class Programs:
             A key of ``SHADING``, for fragment shaders that take one.
         fragment : str
             Of the fragment shader; the same name if omitted.
+        skin : str
+            A key of ``viewer.rig.skinning.METHODS``, for vertex shaders that skin.
 
         Raises
         ------
         RenderError
             If the driver refuses a shader; the message names our file and its line.
         """
-        return self._get((name, fragment or name, chunk), ())
+        return self._get((name, skin, fragment or name, chunk), ())
 
     def feedback(self, name: str, chunk: str, outputs: tuple[str, ...]) -> moderngl.Program:
         """Return a program without fragments whose outputs are captured, interleaved."""
-        return self._get((name, "", chunk), outputs)
+        return self._get((name, chunk, "", ""), outputs)
 
-    def _get(self, key: tuple[str, str, str], outputs: tuple[str, ...]) -> moderngl.Program:
+    def _get(self, key: tuple[str, str, str, str], outputs: tuple[str, ...]) -> moderngl.Program:
         if key not in self._cache:
-            name, fragment_name, chunk = key
+            name, skin, fragment_name, chunk = key
             files: list[str] = []
-            vertex = _compose(f"{name}.vert", "" if fragment_name else chunk, files)
+            vertex = _compose(f"{name}.vert", skin, files)
             fragment = _compose(f"{fragment_name}.frag", chunk, files) if fragment_name else None
             try:
                 self._cache[key] = self.context.program(
@@ -121,23 +126,33 @@ class Programs:
 
 
 def _compose(name: str, chunk: str, files: list[str]) -> str:
-    """Return a shader's text with its chunk inside, each line numbered as in its own file.
+    """Return a shader's text with its chunk and includes, each line numbered as in its own file.
 
     The line tells the file too, as ``_LINES_PER_FILE`` times its index in ``files``: Mesa forgets
     a source number after parsing.
     """
-    base = len(files)
+    base = len(files) * _LINES_PER_FILE
     files.append(name)
-    text = resource("shaders", name).read_text("utf-8")
-    if not chunk:
-        return _number_lines(text, base)
-    mark = _CHUNK_MARK.search(text)
-    assert mark is not None  # every shader that takes a chunk has the mark
-    folder = "skin" if name.endswith(".vert") else "shade"
-    inner = _chunk(folder, chunk, files)
-    behind = base * _LINES_PER_FILE + text[: mark.end()].count("\n") + 2
-    head = _number_lines(text[: mark.start()], base)
-    return f"{head}{inner}#line {behind}{text[mark.end() :]}"
+    parts = []
+    for number, line in enumerate(resource("shaders", name).read_text("utf-8").splitlines(), 1):
+        include = _INCLUDE.match(line)
+        if include:
+            parts.append(_included(include[1], files))
+        elif line.strip() == _CHUNK_MARK and chunk:
+            folder = "skin" if name.endswith(".vert") else "shade"
+            parts.append(_chunk(folder, chunk, files))
+        else:
+            parts.append(f"{line}\n")
+        if include or line.startswith(("#version", _CHUNK_MARK)):
+            parts.append(f"#line {base + number + 1}\n")
+    return "".join(parts)
+
+
+def _included(name: str, files: list[str]) -> str:
+    """Return the text of a file that several shaders share."""
+    text = resource("shaders", f"{name}.glsl").read_text("utf-8")
+    files.append(f"{name}.glsl")
+    return f"#line {(len(files) - 1) * _LINES_PER_FILE + 1}\n{text}"
 
 
 def _chunk(folder: str, chunk: str, files: list[str]) -> str:
@@ -154,7 +169,3 @@ def _chunk(folder: str, chunk: str, files: list[str]) -> str:
     parts.append(f"#line {len(files) * _LINES_PER_FILE + 1}\n{inner}\n")
     files.append(f"{folder}/{chunk}.glsl")
     return "".join(parts)
-
-
-def _number_lines(text: str, file: int) -> str:
-    return text.replace("#version 330\n", f"#version 330\n#line {file * _LINES_PER_FILE + 2}\n", 1)

@@ -15,11 +15,13 @@ The window and the command line use it alike::
 
 from __future__ import annotations
 
+import math
 import time
 from collections import deque
-from collections.abc import Generator
+from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Protocol
 
 import moderngl
@@ -48,11 +50,20 @@ class Sink(Protocol):
     workers : int
         How many threads may call ``write`` at the same time. 1 for whoever needs the frames in
         order.
+    n_samples : int
+        How many frames, spread over the whole, ``look`` is to see before the first is written.
     """
 
     @property
     def workers(self) -> int:
         """How many threads may call ``write``."""
+
+    @property
+    def n_samples(self) -> int:
+        """How many frames ``look`` is to see."""
+
+    def look(self, pixels: Bytes) -> None:
+        """See a frame before any is written: to choose the colours of a GIF."""
 
     def write(self, frame: int, pixels: Bytes) -> None:
         """Take one frame; called in a worker's thread.
@@ -207,62 +218,115 @@ def record(recording: Recording, renderer: Renderer, sink: Sink) -> Generator[Pr
         If the sink cannot write.
     """
     started, total = time.perf_counter(), recording.n_frames
-    pool = ThreadPoolExecutor(max(sink.workers, 1), "viewer-record")
-    waiting: deque[Future[None]] = deque()
-    frames = _drawn(recording, renderer)
+    samples = np.unique(np.rint(np.linspace(0, total - 1, sink.n_samples)).astype(int)).tolist()
+    queue = _Queue(max(sink.workers, 1))
     is_opaque = recording.options.background != "transparent"
 
-    def encode(frame: int, data: bytes) -> None:
+    def pixels_of(data: bytes) -> Bytes:
         pixels = picture_rows(data, recording.size)
-        sink.write(frame, pixels if is_opaque else straight(pixels))
+        return pixels if is_opaque else straight(pixels)
 
+    def look(data: bytes) -> None:
+        sink.look(pixels_of(data))
+
+    def write(frame: int, data: bytes) -> None:
+        sink.write(frame, pixels_of(data))
+
+    def progress(done: int) -> Progress:
+        return Progress(done, total, time.perf_counter() - started)
+
+    drawer: _Drawer | None = None
     try:
-        for done, data in enumerate(frames, 1):
-            waiting.append(pool.submit(encode, done - 1, data))
-            while len(waiting) > sink.workers + _WAITING:
-                waiting.popleft().result()
-            yield Progress(done, total, time.perf_counter() - started)
-        while waiting:
-            waiting.popleft().result()
-        closing = pool.submit(sink.close)
+        drawer = _Drawer(recording, renderer)
+        for data in drawer.draw(samples):
+            queue.begin(partial(look, data)).result()  # one at a time, in order
+            yield progress(0)
+        for frame, data in enumerate(drawer.draw(range(total))):
+            queue.add(partial(write, frame, data))
+            yield progress(frame + 1)
+        queue.finish()
+        closing = queue.begin(sink.close)
         while wait([closing], _PATIENCE).not_done:
-            yield Progress(total, total, time.perf_counter() - started)
+            yield progress(total)
         closing.result()
     except BaseException:  # also Ctrl-C, and a generator that is closed
-        pool.shutdown(wait=True, cancel_futures=True)
+        queue.stop()
         sink.abort()
         raise
     finally:
-        pool.shutdown(wait=True)
-        frames.close()
+        queue.stop()
+        if drawer is not None:
+            drawer.release()
 
 
-def _drawn(recording: Recording, renderer: Renderer) -> Generator[bytes]:
-    """Yield every frame's bytes as OpenGL has them, last row first."""
-    scene, context = copied(recording.scene), renderer.context
-    cameras = _Cameras(recording)
-    box = scene_box(scene, recording.options.show) if recording.box is None else recording.box
-    owned: list[Target | moderngl.Buffer] = []
-    try:
-        targets = [Target(context, recording.size, recording.options.samples) for _ in range(2)]
-        owned += targets
-        n_bytes = 4 * recording.size[0] * recording.size[1]
-        buffers = [context.buffer(reserve=n_bytes) for _ in range(2)]
-        owned += buffers
-        for step in range(recording.n_frames + 2):
+class _Queue:
+    """Work for some threads, of which only a little may wait."""
+
+    def __init__(self, workers: int) -> None:
+        self._pool = ThreadPoolExecutor(workers, "viewer-record")
+        self._most = workers + _WAITING
+        self._waiting: deque[Future[None]] = deque()
+
+    def begin(self, work: Callable[[], None]) -> Future[None]:
+        return self._pool.submit(work)
+
+    def add(self, work: Callable[[], None]) -> None:
+        """Begin some work; wait for the oldest if there is too much, and raise what it raised."""
+        self._waiting.append(self.begin(work))
+        while len(self._waiting) > self._most:
+            self._waiting.popleft().result()
+
+    def finish(self) -> None:
+        while self._waiting:
+            self._waiting.popleft().result()
+
+    def stop(self) -> None:
+        self._pool.shutdown(wait=True, cancel_futures=True)
+
+
+class _Drawer:
+    """Draws frames of a recording, two at a time under way."""
+
+    def __init__(self, recording: Recording, renderer: Renderer) -> None:
+        self._recording, self._renderer = recording, renderer
+        self._scene, context = copied(recording.scene), renderer.context
+        show = recording.options.show
+        self._box = scene_box(self._scene, show) if recording.box is None else recording.box
+        self._targets: list[Target] = []
+        self._buffers: list[moderngl.Buffer] = []
+        try:
+            for _ in range(2):
+                self._targets.append(Target(context, recording.size, recording.options.samples))
+                self._buffers.append(context.buffer(reserve=4 * math.prod(recording.size)))
+        except BaseException:
+            self.release()
+            raise
+
+    def draw(self, frames: Sequence[int]) -> Generator[bytes]:
+        """Yield some frames' bytes as OpenGL has them, last row first."""
+        recording, cameras = self._recording, _Cameras(self._recording)
+        for step in range(len(frames) + 2 if frames else 0):
+            new, old = step % 2, (step - 1) % 2
             # Drawing comes first: the driver works on it while the frames before are read.
-            if step < recording.n_frames:
-                pose_scene(scene, recording, float(recording.times[step]))
-                camera = cameras.at(step, scene)
-                renderer.draw(scene, camera, recording.options, targets[step % 2], box)
-            if 1 <= step <= recording.n_frames:
-                targets[(step - 1) % 2].resolve()
-                targets[(step - 1) % 2].read_into(buffers[(step - 1) % 2])
+            if step < len(frames):
+                pose_scene(self._scene, recording, float(recording.times[frames[step]]))
+                camera = cameras.at(frames[step], self._scene)
+                target = self._targets[new]
+                self._renderer.draw(self._scene, camera, recording.options, target, self._box)
+            if 1 <= step <= len(frames):
+                self._targets[old].resolve()
+                self._targets[old].read_into(self._buffers[old])
             if step >= 2:
-                yield buffers[step % 2].read()
-    finally:
-        for item in owned:
-            item.release()
+                yield self._buffers[new].read()
+
+    def release(self) -> None:
+        """Free what was drawn into; the framebuffer of nobody is bound then."""
+        # One that is bound must not be freed: moderngl would bind it again.
+        self._renderer.context.detect_framebuffer(0).use()
+        for target in self._targets:
+            target.release()
+        for buffer in self._buffers:
+            buffer.release()
 
 
 class _Cameras:

@@ -49,7 +49,7 @@ def set_model(program: moderngl.Program, view: View, placement: Floats, center: 
         "u_model_view": as_uniform(model_view),
         "u_projection": as_uniform(view.projection),
         "u_normal_matrix": as_uniform(np.linalg.inv(model_view[:3, :3]).T),
-        "u_orthographic": view.camera.orthographic,
+        "u_orthographic": view.camera.is_parallel,
     }
     set_uniforms(program, values)
 

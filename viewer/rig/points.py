@@ -42,7 +42,7 @@ class PointLayout:
             raise RigError(f"limbs: expected 0 to {count - 1}, found {self.limbs.max()}")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class PointClip:
     """A motion of points.
 

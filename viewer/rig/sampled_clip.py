@@ -15,7 +15,7 @@ from viewer.rig.timing import Timing
 __all__ = ["SampledClip", "SampledRows", "joined", "sample_rows"]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class SampledClip:
     """A motion of one skeleton, as captures have it.
 

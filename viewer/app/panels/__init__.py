@@ -22,11 +22,14 @@ class Panel:
     needs : str
         A part of ``Figure`` without which the panel is left out; ``"motion"`` or ``"actors"``:
         something that moves, or that or several actors; empty for nothing.
+    leads : bool
+        Whether it comes to the front of its tabs when a scene brings it.
     """
 
     title: str
     place: str
     needs: str = ""
+    leads: bool = False
 
 
 PANELS = {
@@ -39,7 +42,8 @@ PANELS = {
     "lights": Panel("Lights", "right 2"),
     "stats": Panel("Stats", "right 3"),
     "actors": Panel("Actors", "right 3", needs="actors"),
-    "timeline": Panel("Timeline", "bottom", needs="motion"),
+    "timeline": Panel("Timeline", "bottom", needs="motion", leads=True),
+    "curves": Panel("Curves", "bottom", needs="motion"),
 }
 """Modules in this folder."""
 

@@ -1,0 +1,48 @@
+#version 330
+// Skins and places a vertex of one of many actors that share a figure: instances of its mesh.
+
+#pragma include skinning
+
+in vec2 in_uv;              // v = 0 at the bottom row of the texture
+in vec3 in_color;           // linear
+in vec4 in_model_x;         // per instance: rows of the matrix from figure space, minus the posed
+in vec4 in_model_y;         // centre, to camera space
+in vec4 in_model_z;
+in vec4 in_turn_x;          // per instance: rows of its inverse transpose; in w red, green and blue
+in vec4 in_turn_y;          // of the actor, linear
+in vec4 in_turn_z;
+in vec3 in_rest_shift;      // per instance: rest centre minus posed centre
+in vec3 in_center;          // per instance: posed centre, figure space
+
+uniform mat4 u_projection;
+uniform int u_n_joints;     // matrices of one instance
+uniform bool u_has_colors;  // in_color counts
+
+out vec3 v_position;        // camera space
+out vec3 v_normal;          // camera space, any length
+out vec2 v_uv;
+out vec3 v_color;
+out float v_scalar;
+flat out float v_opacity;
+flat out int v_instance;
+
+#pragma chunk
+
+void main() {
+    rest_shift = in_rest_shift;
+    center = in_center;
+    first_joint = gl_InstanceID * u_n_joints;
+    first_offset = gl_InstanceID * u_n_offsets;
+    vec3 position, normal;
+    pose_vertex(true, position, normal);
+    vec4 point = vec4(position, 1.0);
+    v_position = vec3(dot(in_model_x, point), dot(in_model_y, point), dot(in_model_z, point));
+    v_normal = vec3(
+        dot(in_turn_x.xyz, normal), dot(in_turn_y.xyz, normal), dot(in_turn_z.xyz, normal));
+    v_uv = in_uv;
+    v_color = u_has_colors ? in_color : vec3(in_turn_x.w, in_turn_y.w, in_turn_z.w);
+    v_scalar = 0.0;
+    v_opacity = 1.0;
+    v_instance = gl_InstanceID;
+    gl_Position = u_projection * vec4(v_position, 1.0);
+}

@@ -1,0 +1,69 @@
+// What skin.vert and crowd.vert share: a vertex at rest, its influences, what joints do to it.
+// Positions are in figure units, relative to the rest centre on the way in and to the posed
+// centre on the way out, so that float32 keeps its digits far from the origin.
+
+in vec3 in_position;     // bind space, minus the rest centre
+in vec3 in_normal;       // bind space, any length
+in uvec2 in_influences;  // first pair, number of pairs
+in float in_excess;      // sum of the weights, minus 1
+in int in_source;        // the vertex in u_offsets
+
+uniform sampler2D u_palette;    // skinning matrices, three rows each, instance after instance
+uniform sampler2D u_pairs;      // joint and weight, each vertex's strongest first
+uniform int u_n_offsets;        // rows of u_offset_list for one instance; 0: none
+uniform int u_n_sources;        // vertices in each row of u_offsets
+uniform sampler2D u_offset_list;  // row of u_offsets and its weight, instance after instance
+uniform sampler2D u_offsets;    // pose correctives, row after row
+
+// Of the instance; main sets them before anything is called.
+vec3 rest_shift;     // rest centre minus posed centre
+vec3 center;         // posed centre, figure space
+int first_joint;     // its first matrix
+int first_offset;    // its first row of u_offset_list
+
+// Shifts, as processors have no division of eight integers at once: upload.py's rows hold 1024
+// pairs or 256 matrices.
+
+// Joint index and weight of one pair.
+vec2 influence(uint index) {
+    return texelFetch(u_pairs, ivec2(index & 1023u, index >> 10), 0).rg;
+}
+
+// One row of a joint's skinning matrix.
+vec4 palette_row(int joint, int row) {
+    int index = first_joint + joint;
+    return texelFetch(u_palette, ivec2(3 * (index & 255) + row, index >> 8), 0);
+}
+
+vec3 unit(vec3 v) {
+    float size = length(v);
+    return size > 0.0 ? v / size : v;
+}
+
+// Sum of the pose correctives of one vertex: upload.py's rows hold 4096 offsets.
+vec3 offset(int vertex) {
+    vec3 sum = vec3(0.0);
+    for (int i = first_offset; i < first_offset + u_n_offsets; ++i) {
+        vec2 row = texelFetch(u_offset_list, ivec2(i & 1023, i >> 10), 0).rg;
+        int index = int(row.x) * u_n_sources + vertex;
+        sum += row.y * texelFetch(u_offsets, ivec2(index & 4095, index >> 12), 0).rgb;
+    }
+    return sum;
+}
+
+void skin(inout vec3 position, inout vec3 normal);  // of the chunk
+
+// Position in figure space minus the posed centre, and unit normal.
+void pose_vertex(bool attached, out vec3 position, out vec3 normal) {
+    position = in_position;
+    if (u_n_offsets > 0) {
+        position += offset(in_source);
+    }
+    normal = in_normal;
+    if (attached && in_influences.y > 0u) {
+        skin(position, normal);
+    } else {
+        position += rest_shift;
+    }
+    normal = unit(normal);
+}

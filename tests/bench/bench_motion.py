@@ -1,0 +1,129 @@
+"""What playing costs: sampling, kinematics and upload of one 62-joint actor against its frame.
+
+The frame is 1280 x 720 with the default display. Of 500 played frames the growth of memory is
+printed as well: of what Python holds, and of the whole process.
+"""
+
+from __future__ import annotations
+
+import gc
+import resource
+import statistics
+import tracemalloc
+from pathlib import Path
+
+import numpy as np
+from bench_skinning import N_JOINTS, SIZE, synthetic
+from measure import interleaved, median_ratio
+
+from viewer.rendering.offscreen import Offscreen, default_camera
+from viewer.rendering.options import DisplayOptions
+from viewer.rig.clip import Channel, Clip
+from viewer.rig.motion import pose_actor
+from viewer.rig.rotation import matrix_to_quaternion, rotation_vector_to_matrix
+from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.scene import Actor, Motion, Scene, scene_box
+from viewer.rig.timing import Timing
+
+GOAL = 0.05
+N_FRAMES, SECONDS = 300, 10.0
+
+
+def sampled() -> SampledClip:
+    """Return ten seconds of capture: every joint turns a little, the figure walks."""
+    rng = np.random.default_rng(0)
+    turns = np.cumsum(rng.normal(0.0, 0.003, (N_FRAMES, N_JOINTS, 3)), axis=0)
+    place = np.zeros((N_FRAMES, 3))
+    place[:, 0] = np.linspace(-0.3, 0.3, N_FRAMES)
+    rotations = matrix_to_quaternion(rotation_vector_to_matrix(turns))
+    timing = Timing(N_FRAMES / SECONDS, np.arange(N_FRAMES, dtype=np.int32))
+    return SampledClip("sampled", timing, rotations, figure_translations=place)
+
+
+def keyed() -> Clip:
+    """Return ten seconds of curves, 31 keys for each of the 186 DOFs."""
+    rng = np.random.default_rng(1)
+    times = np.linspace(0.0, SECONDS, 31)
+    channels = [
+        Channel(dof, times, rng.normal(0.0, 0.02, 31), (("smooth", "smooth"),) * 31)
+        for dof in range(3 * N_JOINTS)
+    ]
+    return Clip("keyed", tuple(channels), 0.0, SECONDS)
+
+
+def main(rounds: int = 150) -> None:
+    """Print the share of each kind of motion in its drawn frame, and what 500 frames leave."""
+    figure = synthetic()
+    for clip in (sampled(), keyed()):
+        actor = Actor(figure, clip=clip)
+        scene, options = Scene([actor]), DisplayOptions()
+        pose_actor(actor, 0.0)
+        camera, box = default_camera(scene, SIZE), scene_box(scene)
+        with Offscreen() as offscreen, offscreen.context:
+            target, clock = offscreen.target(SIZE, options.samples), Clock(clip)
+            renderer = offscreen.renderer
+
+            def frame() -> None:
+                pose_actor(actor, clock.next())
+                renderer.draw(scene, camera, options, target, box)
+                offscreen.context.finish()
+
+            def prepare() -> None:
+                pose_actor(actor, clock.next())
+                renderer.posed_mesh(actor).upload(actor.pose, options.skinning)
+
+            times = interleaved({"frame": frame, "sample, pose, upload": prepare}, rounds)
+            share = median_ratio(times, "sample, pose, upload", "frame")
+            verdict = "met" if share < GOAL else "MISSED"
+            print(f"{clip.name} motion of {N_JOINTS} joints, {options.samples} samples a pixel")
+            for name, values in times.items():
+                print(f"  {name:<44} {statistics.median(values):9.3f} ms")
+            print(f"  share of the frame: {share:.1%} (goal: below {GOAL:.0%}, {verdict})")
+            held, resident = growth(frame)
+            print(f"  after 500 frames Python holds {held:+.1f} kB, the process {resident:+.0f} kB\n")
+
+
+class Clock:
+    """Seconds of a clip, one frame of a 60 Hz screen after the other, round and round."""
+
+    def __init__(self, clip: Motion) -> None:
+        self.clip, self.ticks = clip, 0
+
+    def next(self) -> float:
+        """Return the next time; never one that was there before, so that nothing is kept."""
+        self.ticks += 1
+        return (self.ticks / 60.0 + 1e-5 * self.ticks) % (self.clip.end - self.clip.start)
+
+
+def growth(frame) -> tuple[float, float]:
+    """Return by how many kB Python's memory and the process grow over 500 frames."""
+    for _ in range(100):
+        frame()
+    gc.collect()
+    before = resident()
+    for _ in range(500):
+        frame()
+    grown = resident() - before
+    tracemalloc.start()
+    for _ in range(20):
+        frame()
+    gc.collect()
+    started = tracemalloc.get_traced_memory()[0]
+    for _ in range(500):
+        frame()
+    gc.collect()
+    held = tracemalloc.get_traced_memory()[0] - started
+    tracemalloc.stop()
+    return held / 1e3, grown / 1e3
+
+
+def resident() -> float:
+    """Return the memory of this process in bytes; its peak where the system tells no more."""
+    pages = Path("/proc/self/statm")
+    if pages.exists():
+        return int(pages.read_text().split()[1]) * resource.getpagesize()
+    return 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,298 @@
+"""AMASS and its relatives: every spelling, mismatched arrays, and which files are still poses."""
+
+import pickle
+
+import numpy as np
+import pytest
+from capture_files import waves
+from numpy.testing import assert_allclose, assert_array_equal
+
+from viewer.errors import FormatError
+from viewer.formats import Source, amass, detect, read
+from viewer.rig.body_motion import BodyMotion
+from viewer.rig.pose_record import PoseRecord
+from viewer.rig.smpl_family import FAMILY
+
+SMPLH, SMPLX, SMPL = FAMILY[52].names, FAMILY[55].names, FAMILY[24].names
+NO_RATE = "no frame rate in it: 30 frames a second, as is usual"
+
+
+def saved(path, **arrays):
+    """Write an archive; a change of None leaves a key out."""
+    np.savez(path, **{key: value for key, value in arrays.items() if value is not None})
+    return path
+
+
+def first_release(count=4, **changes):
+    """Return the arrays of AMASS for SMPL+H."""
+    values = {
+        "poses": waves(count, 156),
+        "trans": waves(count, 3, seed=1),
+        "betas": waves(16, seed=2),
+        "dmpls": np.zeros((count, 8)),
+        "gender": np.array("male"),
+        "mocap_framerate": np.array(120.0),
+    }
+    return {**values, **changes}
+
+
+def motion_of(path):
+    source = Source.open(path)
+    motion = read(source)
+    assert isinstance(motion, BodyMotion)
+    return motion, [text.removeprefix(f"{path}: ") for text in source.warnings]
+
+
+def refusal(path):
+    with pytest.raises(FormatError) as caught:
+        amass.read(Source.open(path))
+    return str(caught.value).removeprefix(f"{path}: ")
+
+
+def test_first_release(tmp_path):
+    path = saved(tmp_path / "walk_poses.npz", **first_release())
+    motion, warnings = motion_of(path)
+    assert (motion.name, warnings) == ("walk_poses", [])
+    assert (motion.joint_names, motion.up, motion.about_origin) == (SMPLH, "z", False)
+    assert_array_equal(motion.vectors, waves(4, 156).reshape(4, 52, 3))
+    assert_array_equal(motion.translations, waves(4, 3, seed=1))
+    assert_array_equal(motion.shape, [waves(16, seed=2)])
+    timing = motion.timing
+    assert (timing.frame_rate, timing.rows.tolist(), timing.holds) == (120.0, [0, 1, 2, 3], True)
+    assert (motion.hands, motion.expression, motion.world_turns) == ({}, None, None)
+    assert motion.facts == (("gender", "male"),)
+
+
+@pytest.mark.parametrize(
+    ("gender", "said"),
+    [
+        (np.array("female"), "female"),
+        (np.array(b"female"), "female"),
+        (np.array(["female"]), "female"),
+        (np.array("b'female'"), "female"),
+        (np.array("female", dtype=object), None),
+    ],
+)
+def test_gender_may_be_written_in_many_ways(tmp_path, gender, said):
+    path = saved(tmp_path / "a.npz", **first_release(gender=gender))
+    assert dict(motion_of(path)[0].facts).get("gender") == said
+
+
+@pytest.mark.parametrize("key", ["mocap_framerate", "mocap_frame_rate", "fps"])
+@pytest.mark.parametrize("value", [np.array(59.94), np.array([59.94], dtype=">f8")])
+def test_frame_rate_by_any_name(tmp_path, key, value):
+    path = saved(tmp_path / "a.npz", **first_release(**{"mocap_framerate": None, key: value}))
+    motion, warnings = motion_of(path)
+    assert (motion.timing.frame_rate, warnings) == (59.94, [])
+
+
+def test_differing_frame_rates_are_noticed(tmp_path):
+    path = saved(tmp_path / "a.npz", **first_release(mocap_frame_rate=np.array(60)))
+    motion, warnings = motion_of(path)
+    assert motion.timing.frame_rate == 120.0
+    assert warnings == [
+        "frame rates that differ (mocap_framerate 120, mocap_frame_rate 60): the first is taken"
+    ]
+
+
+def test_soft_tissue_is_counted(tmp_path):
+    dmpls = np.zeros((4, 8))
+    dmpls[1:3, 2] = 0.5
+    path = saved(tmp_path / "a.npz", **first_release(dmpls=dmpls))
+    assert motion_of(path)[1] == ["dmpls, the soft tissue of 2 frames, are left out"]
+
+
+def test_second_release(tmp_path):
+    path = saved(
+        tmp_path / "a_stageii.npz",
+        gender=np.array("neutral"),
+        surface_model_type=np.array("smplx"),
+        mocap_frame_rate=np.array(120.0),
+        mocap_time_length=np.array(0.1),
+        trans=waves(3, 3),
+        poses=waves(3, 165),
+        betas=waves(16),
+        num_betas=np.array(16),
+        root_orient=waves(3, 3),
+        pose_body=waves(3, 63),
+        markers_latent=np.zeros((5, 3)),
+        latent_labels=np.array(["a"]),
+    )
+    motion, warnings = motion_of(path)
+    assert (motion.joint_names, motion.up, warnings) == (SMPLX, "z", [])
+    assert motion.facts == (("gender", "neutral"), ("made for", "smplx"))
+
+
+def test_split_keys_alone(tmp_path):
+    parts = {
+        "root_orient": waves(3, 3, seed=1),
+        "pose_body": waves(3, 63, seed=2),
+        "pose_jaw": waves(3, 3, seed=3),
+        "pose_eye": waves(3, 6, seed=4),
+        "pose_hand": waves(3, 90, seed=5),
+    }
+    path = saved(tmp_path / "a.npz", **parts, trans=waves(3, 3), mocap_frame_rate=np.array(30))
+    motion, warnings = motion_of(path)
+    assert (motion.joint_names, warnings) == (SMPLX, [])
+    expected = np.concatenate(list(parts.values()), axis=1).reshape(3, 55, 3)
+    assert_array_equal(motion.vectors, expected)
+
+
+def test_names_of_smplx(tmp_path):
+    path = saved(
+        tmp_path / "a.npz",
+        global_orient=waves(2, 1, 3),
+        body_pose=waves(2, 23, 3),
+        transl=waves(2, 3),
+        betas=waves(2, 10),
+        left_hand_pose=waves(2, 6),
+        fps=np.array(25),
+    )
+    motion, warnings = motion_of(path)
+    assert (motion.joint_names, motion.up, warnings) == (SMPL, "", [])
+    assert_array_equal(motion.vectors[:, 1:], waves(2, 69).reshape(2, 23, 3))
+    assert_array_equal(motion.hands["left"], waves(2, 6))
+    assert (motion.flat_hands, motion.shape.shape) == (False, (2, 10))
+
+
+def test_hand_angles_are_joints_and_never_get_the_mean(tmp_path):
+    parts = {"global_orient": waves(2, 3), "body_pose": waves(2, 63)}
+    parts |= {"right_hand_pose": waves(2, 45), "flat_hand_mean": np.array(False)}
+    path = saved(tmp_path / "a.npz", **parts, transl=waves(2, 3), fps=np.array(25))
+    motion, warnings = motion_of(path)
+    assert motion.joint_names == (*SMPL[:22], *SMPLX[40:])
+    assert warnings == [
+        "right_hand_pose: angles are taken as they are; the mean hand is not added to them"
+    ]
+
+
+def test_expressions_of_speech(tmp_path):
+    path = saved(
+        tmp_path / "a.npz",
+        betas=waves(300),
+        poses=waves(3, 165),
+        expressions=waves(3, 100),
+        trans=waves(3, 3),
+        model=np.array("smplx2020"),
+        gender=np.array("neutral"),
+        mocap_frame_rate=np.array(30),
+    )
+    motion, warnings = motion_of(path)
+    assert (motion.up, warnings) == ("", [])
+    assert_array_equal(motion.expression, waves(3, 100))
+
+
+def test_dance_in_a_pickle(tmp_path):
+    path = tmp_path / "gBR_sBM_c01.pkl"
+    values = {"smpl_poses": waves(3, 72), "smpl_trans": 93.0 * waves(3, 3)}
+    values |= {"smpl_scaling": np.array([93.0]), "smpl_loss": 0.5}
+    path.write_bytes(pickle.dumps(values, protocol=4))
+    motion, warnings = motion_of(path)
+    assert (motion.joint_names, motion.up, motion.timing.frame_rate) == (SMPL, "y", 60.0)
+    assert_allclose(motion.translations, waves(3, 3), rtol=0, atol=1e-15)  # one rounding of 93 x
+    assert warnings == ["no frame rate in it: 60 frames a second, as AIST++ has"]
+
+
+@pytest.mark.parametrize(
+    ("shape", "names"),
+    [((2, 72), SMPL), ((2, 24, 3), SMPL), ((2, 66), SMPL[:22]), ((2, 52, 3), SMPLH)],
+)
+def test_poses_alone_are_a_motion_if_there_are_several(tmp_path, shape, names):
+    path = saved(tmp_path / "a.npz", poses=waves(*shape))
+    motion, warnings = motion_of(path)
+    assert (motion.joint_names, motion.n_rows, motion.up) == (names, 2, "")
+    assert warnings == [NO_RATE, "no trans in it: the body stays in its place"]
+
+
+@pytest.mark.parametrize(
+    "arrays",
+    [
+        {"poses": waves(1, 72), "trans": waves(1, 3)},
+        {"poses": waves(24, 3)},
+        {"poses": waves(1, 156), "mocap_framerate": np.array(120.0), "dmpls": np.zeros((1, 8))},
+        {"global_orient": waves(3), "body_pose": waves(21, 3)},
+        {"betas": waves(10), "gender": np.array("male")},
+    ],
+)
+def test_one_frame_is_still_a_pose(tmp_path, arrays):
+    source = Source.open(saved(tmp_path / "a.npz", **arrays))
+    assert detect(source) == "pose"
+    assert isinstance(read(source), PoseRecord)
+
+
+def test_marks_of_our_own_files_are_read(tmp_path):
+    present = np.array([True, False, True, True])
+    arrays = first_release(present=present, up=np.array("y"))
+    motion, warnings = motion_of(saved(tmp_path / "a.npz", **arrays))
+    assert (motion.timing.rows.tolist(), motion.up, warnings) == ([0, -1, 2, 3], "y", [])
+
+
+def test_unknown_keys_are_named(tmp_path):
+    path = saved(tmp_path / "a.npz", **first_release(contact=np.zeros(4)))
+    assert motion_of(path)[1] == ["keys that mean nothing in a motion: contact"]
+
+
+# Broken
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"trans": waves(3, 3)}, "trans: expected 4 frames as in poses, found 3"),
+        ({"trans": waves(4, 2)}, "trans: expected 3 numbers a frame, found 2"),
+        ({"trans": np.full((4, 3), np.nan)},
+         "trans: expected finite numbers, found 12 that are not"),
+        ({"betas": waves(3, 16)}, "betas: expected 4 frames as in poses, found 3"),
+        ({"poses": waves(4, 155)},
+         "poses: expected 66, 72, 156, 165 numbers a frame, found 155"),
+        ({"poses": np.zeros((0, 156))}, "poses: expected frames, found none"),
+        ({"poses": np.array(["a"])}, "poses: expected an array of numbers, found 1 texts"),
+        ({"mocap_framerate": np.array(0.0)},
+         "mocap_framerate: expected more than 0 frames a second, found 0"),
+        ({"mocap_framerate": np.array([30.0, 60.0])},
+         "mocap_framerate: expected one number, found 2"),
+        ({"mocap_framerate": np.array(np.nan)},
+         "mocap_framerate: expected finite numbers, found 1 that are not"),
+        ({"present": np.ones(3)}, "present: expected 4 as in poses, found 3"),
+        ({"smpl_scaling": np.zeros(1)}, "smpl_scaling: expected a number above 0, found 0"),
+    ],
+)  # fmt: skip
+def test_mismatched_arrays_are_refused(tmp_path, changes, message):
+    assert refusal(saved(tmp_path / "a.npz", **first_release(**changes))) == message
+
+
+@pytest.mark.parametrize(
+    ("part", "message"),
+    [
+        ({"pose_body": waves(2, 63)}, "pose_body: expected 3 frames as in root_orient, found 2"),
+        ({"pose_body": waves(3, 62)}, "pose_body: expected 63 or 69 numbers a frame, found 62"),
+        ({"pose_hand": waves(3, 12)}, "pose_hand: expected 90 numbers a frame, found 12"),
+    ],
+)
+def test_mismatched_parts_are_refused(tmp_path, part, message):
+    assert refusal(saved(tmp_path / "a.npz", root_orient=waves(3, 3), **part)) == message
+
+
+def test_shape_of_a_subject_is_no_motion(tmp_path):
+    path = saved(tmp_path / "shape.npz", betas=waves(16), gender=np.array("male"))
+    assert refusal(path) == (
+        "expected a motion, found a subject's shape (keys betas, gender): open the *_poses.npz "
+        "files beside it"
+    )
+
+
+def test_first_stage_is_no_motion(tmp_path):
+    arrays = {"betas": waves(16), "markers_latent": np.zeros((4, 3)), "gender": np.array("male")}
+    path = saved(tmp_path / "female_stagei.npz", **arrays)
+    assert detect(Source.open(path)) == "amass"
+    assert refusal(path) == (
+        "expected a motion, found the first stage of a marker fit, which has no poses: open the "
+        "*_stageii.npz files beside it"
+    )
+
+
+def test_other_archives_are_named_by_their_keys(tmp_path):
+    path = saved(tmp_path / "a.npz", pose_body=waves(3, 63))
+    assert refusal(path) == (
+        "expected a motion (poses, or root_orient and pose_body), found the keys pose_body"
+    )

@@ -1,0 +1,383 @@
+"""Videos: colours, sizes, rates and transparency come back; nothing broken is ever left."""
+
+from __future__ import annotations
+
+import os
+import stat
+import subprocess
+import sys
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from viewer.errors import OutputError, UnsupportedFormatError, ViewerError
+from viewer.formats import _video
+from viewer.formats._video import VideoSink, video_kind
+
+av = pytest.importorskip("av")
+ROOT = Path(__file__).resolve().parents[2]
+COLORS = {"red": (220, 40, 30), "green": (30, 170, 60), "blue": (40, 60, 200), "gray": (128,) * 3}
+
+
+def quarters(width: int, height: int) -> np.ndarray:
+    """Return four colours, one in each quarter."""
+    pixels = np.full((height, width, 4), 255, dtype=np.uint8)
+    half, middle = height // 2, width // 2
+    pixels[:half, :middle, :3], pixels[:half, middle:, :3] = COLORS["red"], COLORS["green"]
+    pixels[half:, :middle, :3], pixels[half:, middle:, :3] = COLORS["blue"], COLORS["gray"]
+    return pixels
+
+
+def counting(frame: int, size: tuple[int, int] = (64, 48)) -> np.ndarray:
+    """Return a gray that says which frame it is."""
+    return np.full((size[1], size[0], 4), (20 * frame,) * 3 + (255,), dtype=np.uint8)
+
+
+def write(sink: VideoSink, frames: list[np.ndarray]) -> None:
+    for index, pixels in enumerate(frames):
+        sink.write(index, pixels)
+    sink.close()
+
+
+def decoded(path: Path) -> list[np.ndarray]:
+    with av.open(str(path)) as container:
+        return [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+@pytest.mark.parametrize("suffix", [".mp4", ".webm", ".gif"])
+def test_colours_come_back(tmp_path, suffix):
+    path = tmp_path / f"x{suffix}"
+    write(VideoSink(path, (64, 48), 25.0), [quarters(64, 48)] * 5)
+    frames = decoded(path)
+    assert len(frames) == 5
+    middles = [frames[2][12, 16], frames[2][12, 48], frames[2][36, 16], frames[2][36, 48]]
+    # Rounding to 8 bits of limited range, twice, and what the encoder leaves out.
+    assert np.abs(np.array(middles, dtype=int) - list(COLORS.values())).max() <= 3
+
+
+def test_colours_are_those_of_bt709(tmp_path):
+    """ITU-R BT.709-6, 3.2 and 3.4: Y = 16 + 219 (0.2126 R + 0.7152 G + 0.0722 B), and so on."""
+    path = tmp_path / "x.mp4"
+    pixels = np.full((48, 64, 4), (220, 40, 30, 255), dtype=np.uint8)
+    write(VideoSink(path, (64, 48), 25.0, quality=100), [pixels])
+    with av.open(str(path)) as container:
+        frame = next(container.decode(video=0))
+        context = container.streams.video[0].codec_context
+        tags = context.colorspace, context.color_primaries, context.color_trc, context.color_range
+    planes = [
+        np.frombuffer(memoryview(plane), dtype=np.uint8).reshape(plane.height, plane.line_size)
+        for plane in frame.planes
+    ]
+    red, green, blue = np.array([220, 40, 30]) / 255.0
+    luma = 0.2126 * red + 0.7152 * green + 0.0722 * blue
+    wanted = 16 + 219 * luma, 128 + 224 * (blue - luma) / 1.8556, 128 + 224 * (red - luma) / 1.5748
+    found = planes[0][24, 32], planes[1][12, 16], planes[2][12, 16]
+    np.testing.assert_allclose(found, wanted, atol=1.5)  # 8-bit steps
+    assert [int(tag) for tag in tags] == [1, 1, 1, 1]
+
+
+@pytest.mark.parametrize(
+    ("rate", "exact"),
+    [
+        (30.0, Fraction(30)),
+        (23.976024, Fraction(24000, 1001)),
+        (12.5, Fraction(25, 2)),
+        (120.0, Fraction(120)),
+    ],
+)
+def test_rate_and_order_are_kept(tmp_path, rate, exact):
+    path = tmp_path / "x.mp4"
+    write(VideoSink(path, (64, 48), rate), [counting(frame) for frame in range(12)])
+    with av.open(str(path)) as container:
+        stream = container.streams.video[0]
+        frames = list(container.decode(stream))
+    assert stream.average_rate == exact
+    assert [frame.pts * frame.time_base for frame in frames] == [n / exact for n in range(12)]
+    grays = [frame.to_ndarray(format="rgb24").mean() for frame in frames]
+    np.testing.assert_allclose(grays, 20.0 * np.arange(12), atol=3.0)
+
+
+@pytest.mark.parametrize("suffix", [".mp4", ".webm"])
+def test_odd_sizes_repeat_the_last_column_and_row(tmp_path, suffix):
+    path = tmp_path / f"x{suffix}"
+    pixels = np.full((31, 33, 4), 255, dtype=np.uint8)
+    pixels[:, 32, :3], pixels[30, :, :3] = (200, 0, 0), (0, 0, 200)
+    sink = VideoSink(path, (33, 31), 25.0, quality=100)
+    assert sink.notes == [
+        f"{path}: this format needs even sizes; the last column or row is repeated: "
+        "33 x 31 becomes 34 x 32"
+    ]
+    write(sink, [pixels])
+    frame = decoded(path)[0].astype(int)
+    assert frame.shape == (32, 34, 3)
+    assert frame[10, 33, 0] > 150 and frame[10, 33, 2] < 60
+    assert frame[31, 10, 2] > 150 and frame[31, 10, 0] < 60
+
+
+def test_gif_keeps_odd_sizes(tmp_path):
+    sink = VideoSink(tmp_path / "x.gif", (33, 31), 25.0)
+    write(sink, [counting(1, (33, 31))])
+    assert sink.notes == [] and decoded(tmp_path / "x.gif")[0].shape == (31, 33, 3)
+
+
+def test_webm_holds_transparency(tmp_path):
+    path = tmp_path / "x.webm"
+    pixels = quarters(64, 48)
+    pixels[:24, :32, 3], pixels[24:, 32:, 3] = 0, 100
+    sink = VideoSink(path, (64, 48), 25.0, transparent=True)
+    write(sink, [pixels] * 2)
+    assert sink.notes == []
+    with av.open(str(path)) as container:
+        stream = container.streams.video[0]
+        assert stream.metadata["alpha_mode"] == "1"
+        # FFmpeg's own decoder leaves the alpha out; libvpx's does not.
+        decoder = av.CodecContext.create("libvpx-vp9", "r")
+        packets = [packet for packet in container.demux(stream) if packet.size]
+        frames = [frame for packet in packets for frame in decoder.decode(packet)]
+    plane = frames[0].planes[3]
+    alpha = np.frombuffer(memoryview(plane), dtype=np.uint8).reshape(plane.height, plane.line_size)
+    found = alpha[12, 16], alpha[12, 48], alpha[36, 16], alpha[36, 48]
+    np.testing.assert_allclose(found, (0, 255, 255, 100), atol=3)
+
+
+def test_gif_holds_transparency(tmp_path):
+    path = tmp_path / "x.gif"
+    pixels = quarters(64, 48)
+    pixels[:24, :32, 3] = 0
+    moved = pixels[::-1]
+    write(VideoSink(path, (64, 48), 25.0, transparent=True), [pixels, moved])
+    with Image.open(path) as picture:
+        first = np.array(picture.convert("RGBA"))
+        picture.seek(1)
+        second = np.array(picture.convert("RGBA"))
+    assert first[12, 16, 3] == 0 and (first[12, 48], first[36, 16])[0][3] == 255
+    # What the first frame showed there is gone.
+    assert second[36, 16, 3] == 0 and second[12, 16, 3] == 255
+
+
+@pytest.mark.parametrize("suffix", [".mp4", ".gif"])
+def test_opaque_videos_put_transparent_pixels_on_black(tmp_path, suffix):
+    path = tmp_path / f"x{suffix}"
+    pixels = quarters(64, 48)
+    pixels[:24, :, 3], pixels[24:, :32, 3] = 0, 128
+    wants = suffix == ".mp4"
+    sink = VideoSink(path, (64, 48), 25.0, transparent=wants)
+    said = f"{path}: this format knows no transparency; drawn on black"
+    assert sink.notes == [said] * wants
+    write(sink, [pixels])
+    frame = decoded(path)[0].astype(int)
+    assert frame[12, 16].max() <= 4
+    np.testing.assert_allclose(frame[36, 16], np.array(COLORS["blue"]) * 128 / 255, atol=4)
+
+
+def delays(path: Path) -> list[int]:
+    """Return what a GIF says of each frame, in 1/100 s, without a decoder (GIF89a, 23.c.vi)."""
+    data, found, place = path.read_bytes(), [], 0
+    while (place := data.find(b"\x21\xf9\x04", place)) >= 0:
+        found.append(int.from_bytes(data[place + 4 : place + 6], "little"))
+        place += 8
+    return found
+
+
+@pytest.mark.parametrize(
+    ("rate", "wanted", "words"),
+    [
+        (25.0, [4] * 6, ""),
+        (50.0, [2] * 6, ""),
+        (30.0, [3, 4, 3, 3, 4, 3], "frames stay for 3 or 4 of them, 30 frames a second on average"),
+        (24.0, [4, 4, 4, 5, 4, 4], "frames stay for 4 or 5 of them, 24 frames a second on average"),
+    ],
+)
+def test_gif_delays_are_right_on_average(tmp_path, rate, wanted, words):
+    path = tmp_path / "x.gif"
+    sink = VideoSink(path, (64, 48), rate)
+    write(sink, [counting(frame) for frame in range(6)])
+    assert sink.notes == ([f"{path}: GIFs count time in 1/100 s; {words}"] if words else [])
+    assert delays(path) == wanted
+
+
+def test_gif_colours_come_from_all_that_was_looked_at(tmp_path):
+    path = tmp_path / "x.gif"
+    sink = VideoSink(path, (64, 48), 10.0)
+    first, last = np.zeros((48, 64, 4), np.uint8), quarters(64, 48)
+    first[..., 3] = 255
+    for pixels in (first, last):
+        sink.look(pixels)
+    write(sink, [first, last])
+    frame = decoded(path)[1].astype(int)
+    assert np.abs(frame[12, 16] - COLORS["red"]).max() <= 3
+
+
+def test_better_quality_is_larger_and_nearer(tmp_path):
+    noise = np.random.default_rng(3).integers(0, 255, (64, 96, 4), dtype=np.uint8)
+    noise[..., 3] = 255
+    errors, sizes = [], []
+    for quality in (10.0, 60.0, 100.0):
+        path = tmp_path / f"{quality}.mp4"
+        sink = VideoSink(path, (96, 64), 25.0, quality)
+        write(sink, [noise] * 4)
+        errors.append(np.abs(decoded(path)[1].astype(int) - noise[..., :3]).mean())
+        sizes.append(sink.n_bytes)
+        assert sink.n_bytes == path.stat().st_size
+    assert sizes == sorted(sizes) and errors == sorted(errors, reverse=True)
+
+
+def test_encoder_that_stands_in_works(tmp_path, monkeypatch):
+    kind = _video.VideoKind("MP4 video (H.264)", ("no_such", "mpeg4"), False, True)
+    monkeypatch.setitem(_video.VIDEOS, ".mp4", kind)
+    path = tmp_path / "x.mp4"
+    sink = VideoSink(path, (64, 48), 25.0)
+    write(sink, [quarters(64, 48)] * 3)
+    assert sink.encoder == "mpeg4"
+    assert np.abs(decoded(path)[1][12, 16].astype(int) - COLORS["red"]).max() <= 12  # it is coarser
+
+
+# Refusals
+
+
+def test_missing_encoder_is_one_line(tmp_path, monkeypatch):
+    kind = _video.VideoKind("MP4 video (H.264)", ("no_such", "nor_this"), False, True)
+    monkeypatch.setitem(_video.VIDEOS, ".mp4", kind)
+    path = tmp_path / "x.mp4"
+    with pytest.raises(ViewerError) as caught:
+        VideoSink(path, (64, 48), 25.0)
+    assert str(caught.value) == (
+        f"{path}: the installed PyAV has no encoder for MP4 video (H.264): no_such or nor_this"
+    )
+
+
+def test_missing_library_says_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "av", None)
+    with pytest.raises(ViewerError) as caught:
+        VideoSink(tmp_path / "x.mp4", (64, 48), 25.0)
+    assert str(caught.value) == (
+        'videos need PyAV, which is not installed: pip install "skinning-viewer[video]"'
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "rate", "quality", "words"),
+    [
+        ("x.mp4", 25.0, 101.0, "video quality: expected 0 to 100, found 101"),
+        ("x.mp4", 0.0, 75.0, "x.mp4: expected 0.01 to 1000 frames a second, found 0"),
+        ("x.gif", 60.0, 75.0, "x.gif: expected 0.01 to 50 frames a second, found 60"),
+    ],
+)
+def test_numbers_without_sense_are_refused(tmp_path, name, rate, quality, words):
+    with pytest.raises(ViewerError) as caught:
+        VideoSink(tmp_path / name, (64, 48), rate, quality)
+    assert str(caught.value).endswith(words)
+
+
+def test_kinds_are_listed_for_other_suffixes():
+    with pytest.raises(UnsupportedFormatError) as caught:
+        video_kind(Path("x.avi"))
+    assert str(caught.value) == ('videos cannot be written as ".avi"; there are: .mp4, .webm, .gif')
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("missing/x.mp4", "does not exist"),
+        ("folder.mp4", "is a folder"),
+        ("pipe.mp4", "is not a regular file, which a video must be written to"),
+    ],
+)
+def test_places_where_no_video_can_be_are_refused_at_once(tmp_path, name, words):
+    (tmp_path / "folder.mp4").mkdir()
+    os.mkfifo(tmp_path / "pipe.mp4")
+    with pytest.raises(OutputError) as caught:
+        VideoSink(tmp_path / name, (64, 48), 25.0)
+    assert str(caught.value).endswith(words)
+
+
+# Nothing broken stays
+
+
+def test_video_appears_only_when_it_is_whole(tmp_path):
+    path = tmp_path / "x.mp4"
+    path.write_bytes(b"precious")
+    path.chmod(0o640)
+    sink = VideoSink(path, (64, 48), 25.0)
+    for frame in range(6):
+        sink.write(frame, counting(frame))
+        assert path.read_bytes() == b"precious"
+    sink.close()
+    assert names(tmp_path) == ["x.mp4"] and len(decoded(path)) == 6
+    assert stat.S_IMODE(path.stat().st_mode) == 0o640
+
+
+@pytest.mark.parametrize("n_frames", [0, 1, 30])
+@pytest.mark.parametrize("suffix", [".mp4", ".webm", ".gif"])
+def test_aborted_video_leaves_nothing(tmp_path, suffix, n_frames):
+    path = tmp_path / f"x{suffix}"
+    path.write_bytes(b"precious")
+    sink = VideoSink(path, (64, 48), 25.0)
+    for frame in range(n_frames):
+        sink.write(frame, counting(frame % 12))
+    sink.abort()
+    sink.abort()
+    assert names(tmp_path) == [path.name] and path.read_bytes() == b"precious"
+
+
+def test_abort_after_close_keeps_the_video(tmp_path):
+    sink = VideoSink(tmp_path / "x.mp4", (64, 48), 25.0)
+    write(sink, [counting(1)])
+    sink.abort()
+    assert len(decoded(tmp_path / "x.mp4")) == 1
+
+
+def test_link_is_followed(tmp_path):
+    (tmp_path / "real.gif").write_bytes(b"old")
+    (tmp_path / "link.gif").symlink_to(tmp_path / "real.gif")
+    write(VideoSink(tmp_path / "link.gif", (64, 48), 25.0), [counting(1)])
+    assert (tmp_path / "link.gif").is_symlink() and len(decoded(tmp_path / "real.gif")) == 1
+
+
+_FULL = """
+import resource, sys
+import numpy as np
+from pathlib import Path
+from viewer.errors import OutputError
+from viewer.formats._video import VideoSink
+
+def write(path):
+    sink = VideoSink(path, (320, 240), 25.0)
+    try:
+        for frame in range(20):
+            sink.write(frame, np.roll(noise, frame, axis=1))
+        sink.close()
+    except OutputError as problem:
+        sink.abort()
+        print(problem)
+    return sink.n_bytes
+
+noise = np.random.default_rng(0).integers(0, 255, (240, 320, 4), dtype=np.uint8)
+noise[..., 3] = 255
+path = Path(sys.argv[1])
+size = write(path)
+path.write_bytes(b"precious")
+for limit in (0, 1000, size // 3, size - 40_000, size - 1000, size - 1):
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
+    write(path)
+"""
+
+
+@pytest.mark.parametrize("suffix", [".mp4", ".webm", ".gif"])
+def test_full_disk_is_one_line_and_leaves_nothing(tmp_path, suffix):
+    """A limit on the size of files stands for the end of a disk."""
+    path = tmp_path / f"x{suffix}"
+    run = subprocess.run(
+        [sys.executable, "-c", _FULL, str(path)],
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True, text=True, timeout=120, check=False,
+    )  # fmt: skip
+    assert run.stdout == f"{path}: File too large\n" * 6, run.stderr
+    assert names(tmp_path) == [path.name] and path.read_bytes() == b"precious"

@@ -1,0 +1,187 @@
+"""What there is to plot of a motion: its curves by name, and their values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.errors import printable
+from viewer.rig.arrays import Floats
+from viewer.rig.clip import Channel, Clip
+from viewer.rig.clip_table import evaluate_all
+from viewer.rig.memo import Memo
+from viewer.rig.points import PointClip, PointLayout
+from viewer.rig.rotation import matrix_to_euler, quaternion_to_matrix
+from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.scene import Actor
+from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_labels
+
+__all__ = ["Curve", "channel_of", "curves_of", "keyed_values", "sampled_points"]
+
+_AXES = "xyz"
+_FIRST_ROTATION = 3
+_PLACE = "place"  # of the whole figure
+_MOST_POINTS = 2000
+_PAGE = 500  # frames by which the part of a long motion that is looked at moves on
+
+Points = tuple[Floats, Floats]
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """One curve as the list shows it.
+
+    Attributes
+    ----------
+    group : str
+        The joint or keypoint, for the heading.
+    number : int
+        That one's index; -1 for the whole figure.
+    name : str
+        ``"x"``, ``"ty"`` …
+    axis : int
+        0 to 2 for x, y, z.
+    is_angle : bool
+        Whether the values are radians.
+    """
+
+    group: str
+    number: int
+    name: str
+    axis: int
+    is_angle: bool
+
+    @property
+    def label(self) -> str:
+        """Joint and axis."""
+        return f"{self.group}.{self.name}"
+
+
+_of_skeleton: Memo[Skeleton, tuple[Curve, ...]] = Memo(kept=2)
+_points: Memo[SampledClip | PointClip, Points] = Memo(kept=64)
+_parts: Memo[Clip, Clip] = Memo(kept=2)
+
+
+def curves_of(actor: Actor) -> tuple[Curve, ...]:
+    """Return the curves of an actor's motion; a row's index is its number everywhere.
+
+    Of a keyed clip these are the DOFs; of frames the place of the figure and each joint's angles
+    about x, y and z (R = Rz Ry Rx); of captured points their coordinates.
+    """
+    skeleton, points = actor.figure.skeleton, actor.figure.points
+    if isinstance(actor.clip, PointClip) and points is not None:
+        return _point_curves(points)
+    if skeleton is None or isinstance(actor.clip, PointClip):
+        return ()
+    if isinstance(actor.clip, SampledClip):
+        return _of_skeleton.get(skeleton, "frames", lambda: _joint_curves(skeleton))
+    return _of_skeleton.get(skeleton, "keys", lambda: _dof_curves(skeleton))
+
+
+def _dof_curves(skeleton: Skeleton) -> tuple[Curve, ...]:
+    labels = [printable(label, 60) for label in joint_labels(skeleton)]
+    return tuple(
+        Curve(labels[joint], joint, DOF_KINDS[kind], kind % 3, kind >= _FIRST_ROTATION)
+        for joint, kind in zip(
+            skeleton.dof_joints.tolist(), skeleton.dof_kinds.tolist(), strict=True
+        )
+    )
+
+
+def _joint_curves(skeleton: Skeleton) -> tuple[Curve, ...]:
+    groups = [(_PLACE, -1, False)]
+    groups += [(printable(label, 60), j, True) for j, label in enumerate(joint_labels(skeleton))]
+    return tuple(
+        Curve(group, number, _AXES[axis], axis, is_angle)
+        for group, number, is_angle in groups
+        for axis in range(3)
+    )
+
+
+def _point_curves(points: PointLayout) -> tuple[Curve, ...]:
+    return tuple(
+        Curve(printable(name, 60), number, _AXES[axis], axis, False)
+        for number, name in enumerate(points.names)
+        for axis in range(3)
+    )
+
+
+def channel_of(clip: Clip, row: int) -> Channel | None:
+    """Return the channel that moves a DOF, if there is one."""
+    # Files list a channel for every DOF, in their order.
+    if row < len(clip.channels) and clip.channels[row].target == row:
+        return clip.channels[row]
+    return next((channel for channel in clip.channels if channel.target == row), None)
+
+
+def keyed_values(clip: Clip, rows: tuple[int, ...], times: Floats) -> Floats:
+    """Return some curves of a clip at many times: (T, C); those without a channel are 0."""
+
+    def chosen() -> Clip:
+        channels = (channel_of(clip, row) for row in rows)
+        return Clip(clip.name, tuple(filter(None, channels)), clip.start, clip.end)
+
+    targets, values = evaluate_all(_parts.get(clip, rows, chosen), times)
+    result = np.zeros((len(times), len(rows)))
+    for column, target in enumerate(targets.tolist()):
+        result[:, rows.index(target)] = values[:, column]
+    return result
+
+
+def sampled_points(clip: SampledClip | PointClip, row: int, low: float, high: float) -> Points:
+    """Return a curve of frames as a line of at most 2000 points, each exactly on a frame.
+
+    Parameters
+    ----------
+    clip : SampledClip or PointClip
+        The motion.
+    row : int
+        See ``curves_of``.
+    low, high : float
+        Seconds that are looked at; longer motions are thinned out only as far as needed there.
+
+    Returns
+    -------
+    times, values : (P,)
+        Seconds; lengths or radians without jumps of full turns. NaN where nothing is.
+    """
+    timing = clip.timing
+    first, step = 0, 1
+    if timing.n_frames > _MOST_POINTS:
+        seen = max((high - low) * timing.frame_rate, 1.0)
+        # By powers of two, so that zooming a little shows the same points.
+        while step * (_MOST_POINTS - 2 * _PAGE) < min(seen, timing.n_frames):
+            step *= 2
+        page = step * _PAGE
+        start = (low - timing.start) * timing.frame_rate
+        first = int(np.clip(np.floor(start / page) * page, 0, timing.n_frames))
+    return _points.get(clip, (row, first, step), lambda: _line(clip, row, first, step))
+
+
+def _line(clip: SampledClip | PointClip, row: int, first: int, step: int) -> Points:
+    timing = clip.timing
+    frames = np.arange(first, min(first + step * _MOST_POINTS, timing.n_frames), step)
+    rows = timing.rows[frames]
+    there = rows >= 0
+    values = np.full(len(frames), np.nan)
+    if isinstance(clip, PointClip):
+        seen = clip.points[rows[there], row // 3]
+        values[there] = np.where(seen[:, 3] > 0.0, seen[:, row % 3], np.nan)
+    elif row < 3:
+        values[there] = _places(clip, rows[there])[:, row]
+    else:
+        joint, axis = divmod(row - 3, 3)
+        angles = matrix_to_euler(quaternion_to_matrix(clip.rotations[rows[there], joint]))
+        values[there] = np.unwrap(angles[:, axis])
+    return timing.start + frames / timing.frame_rate, values
+
+
+def _places(clip: SampledClip, rows: np.ndarray) -> Floats:
+    """Return the place of the whole figure, and of its root within it: (N, 3)."""
+    places = np.zeros((len(rows), 3))
+    if clip.figure_translations is not None:
+        places += clip.figure_translations[rows]
+    if clip.translations is not None:
+        places += clip.translations[rows, 0]
+    return places

@@ -1,0 +1,168 @@
+"""Keys and tangents in the plot of the Curves panel: drawn, dragged, added and deleted."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from imgui_bundle import imgui, implot
+
+from viewer.app.curve_axes import Plot
+from viewer.app.curve_data import channel_of
+from viewer.app.curve_edit import (
+    add_key_at,
+    clip_of,
+    delete_chosen,
+    move_chosen,
+    nearest_row,
+    turn_tangent,
+)
+from viewer.app.curve_view import KeyPlace
+from viewer.rig.arrays import Floats
+from viewer.rig.clip import Channel, slopes
+
+__all__ = ["draw_handles", "draw_keys", "edit"]
+
+_CHOSEN, _HANDLE = (1.0, 1.0, 1.0, 1.0), (1.0, 0.85, 0.4, 1.0)
+_FAINT = (0.75, 0.75, 0.8, 0.8)
+_MOST_KEYS = 300  # that can be taken hold of at once
+_HANDLE_LENGTH = 4.0  # letters' heights
+_HANDLE_ID = 16
+_FIRST_KEY_ID = 32
+_KEYS_PER_ROW = 1 << 20
+_FIXED = implot.DragToolFlags_.no_fit
+
+
+def draw_keys(plot: Plot) -> bool:
+    """Draw the keys of the shown curves; return whether the mouse is at one of them."""
+    clip = clip_of(plot.state)
+    if clip is None:
+        return False
+    low, high, bottom, top = plot.limits
+    seen: list[tuple[int, Floats, Floats, list[int]]] = []
+    for row in plot.view.rows:
+        channel = channel_of(clip, row)
+        if channel is not None:
+            values = plot.factor(row) * channel.values
+            inside = (channel.times >= low) & (channel.times <= high)
+            inside &= (values >= bottom) & (values <= top)
+            seen.append((row, channel.times, values, np.flatnonzero(inside).tolist()))
+    if sum(len(keys) for *_, keys in seen) > _MOST_KEYS:
+        _draw_many(plot, seen)
+        return False
+    touched = [
+        _draw_key(plot, (row, key), float(times[key]), float(values[key]))
+        for row, times, values, keys in seen
+        for key in keys
+    ]
+    return any(touched)
+
+
+def _draw_many(plot: Plot, seen: list[tuple[int, Floats, Floats, list[int]]]) -> None:
+    """Draw more keys than a mouse could tell apart as mere dots."""
+    for row, times, values, keys in seen:
+        if keys:
+            color = plot.color(row)
+            spec = implot.Spec(
+                marker=implot.Marker_.circle,
+                marker_size=2.0,
+                marker_fill_color=color,
+                marker_line_color=color,
+            )
+            implot.plot_scatter(f"##keys {row}", times[keys], values[keys], spec)
+    place, light = implot.get_plot_pos(), imgui.get_color_u32(_FAINT)
+    text = f"{sum(len(keys) for *_, keys in seen)} keys: zoom in to edit them"
+    implot.get_plot_draw_list().add_text((place.x + 6.0, place.y + 4.0), light, text)
+
+
+def _draw_key(plot: Plot, place: KeyPlace, time: float, value: float) -> bool:
+    view, (row, key) = plot.view, place
+    is_chosen = place in view.keys
+    moved, x, y, _, hovered, held = implot.drag_point(
+        (_FIRST_KEY_ID + row * _KEYS_PER_ROW + key) & 0x7FFFFFFF,
+        time,
+        value,
+        _CHOSEN if is_chosen else plot.color(row),
+        5.5 if is_chosen else 4.5,
+        _FIXED,
+        False,
+        False,
+        False,
+    )
+    plot.note(f"key {plot.curves[row].label} {key}", time, value)
+    if held and not is_chosen:
+        kept = view.keys if imgui.get_io().key_shift else frozenset()
+        view.keys = kept | {place}
+    if moved:
+        move_chosen(plot.state, x - time, (y - value) / plot.factor(row))
+    return bool(hovered or held)
+
+
+def draw_handles(plot: Plot) -> bool:
+    """Draw the tangents of a key that is chosen alone; return whether the mouse is at one."""
+    clip, view = clip_of(plot.state), plot.view
+    if clip is None or len(view.keys) != 1:
+        return False
+    row, key = next(iter(view.keys))
+    channel = channel_of(clip, row)
+    if channel is None or row not in view.rows or len(channel.times) < 2:
+        return False
+    touched = [_draw_handle(plot, channel, (row, key), side) for side in (0, 1)]
+    return any(touched)
+
+
+def _draw_handle(plot: Plot, channel: Channel, place: KeyPlace, side: int) -> bool:
+    """Draw one tangent as a line of fixed length with a knob; dragging makes it a slope."""
+    row, key = place
+    factor, sign = plot.factor(row), (-1.0, 1.0)[side]
+    time, value = float(channel.times[key]), factor * float(channel.values[key])
+    slope = factor * float(slopes(channel)[key, side])
+    across, up = plot.scale
+    length = _HANDLE_LENGTH * imgui.get_font_size() / math.hypot(1.0, slope * up / across)
+    end, height = time + sign * length / across, value + sign * slope * length / across
+    points = implot.plot_to_pixels(time, value), implot.plot_to_pixels(end, height)
+    implot.push_plot_clip_rect()
+    implot.get_plot_draw_list().add_line(points[0], points[1], imgui.get_color_u32(_HANDLE), 1.2)
+    implot.pop_plot_clip_rect()
+    moved, x, y, _, hovered, held = implot.drag_point(
+        _HANDLE_ID + side, end, height, _HANDLE, 3.5, _FIXED, False, False, False
+    )
+    plot.note(f"tangent {side}", end, height)
+    if moved:
+        # A pixel at least on its own side of the key: no tangent is vertical.
+        run = sign * max(sign * (x - time), 1.0 / across)
+        for each in (0, 1) if imgui.get_io().key_shift else (side,):
+            turn_tangent(plot.state, [place], each, (y - value) / run / factor)
+    return bool(hovered or held)
+
+
+def edit(plot: Plot, touched: bool) -> None:
+    """Do what clicks and keys ask for.
+
+    Parameters
+    ----------
+    plot : Plot
+        Being drawn.
+    touched : bool
+        Whether the mouse is at a key or tangent, so that a click is not meant for the plot.
+    """
+    state, view, clip = plot.state, plot.view, clip_of(plot.state)
+    if clip is None or not implot.is_plot_hovered() or state.error or state.dialog is not None:
+        return
+    left, io = imgui.MouseButton_.left, imgui.get_io()
+    was_dragged = io.mouse_drag_max_distance_sqr[left] >= io.mouse_drag_threshold**2
+    adds = imgui.is_mouse_double_clicked(left) and not touched
+    if adds or _is_pressed(imgui.Key.insert):
+        mouse = implot.get_plot_mouse_pos()
+        factors = [plot.factor(row) for row in view.rows]
+        row = nearest_row(clip, view, mouse.x, mouse.y, factors)
+        if row >= 0:
+            add_key_at(state, [row], mouse.x)
+    elif _is_pressed(imgui.Key.delete):
+        delete_chosen(state)
+    elif imgui.is_mouse_released(left) and not touched and not was_dragged:
+        view.keys = frozenset()
+
+
+def _is_pressed(key: imgui.Key) -> bool:
+    return imgui.is_key_pressed(key, False) and not imgui.get_io().want_text_input

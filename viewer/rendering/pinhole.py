@@ -1,0 +1,128 @@
+"""Calibrated cameras: the matrices by which OpenGL draws what such a camera recorded."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.rig.arrays import Floats
+from viewer.rig.camera_view import CameraView
+from viewer.rig.mesh import box_size
+
+__all__ = ["distortion_error", "picture_size", "pinhole_projection", "pinhole_view"]
+
+_FLIP = np.diag([1.0, -1.0, -1.0])  # OpenCV looks along z with y down, OpenGL along -z with y up
+_NEAREST = 5e-3  # near plane, of the distance to the middle of what is drawn
+
+
+def picture_size(view: CameraView) -> tuple[float, float]:
+    """Return width and height of a camera's pictures in pixels.
+
+    If the files do not say, the principal point counts as their middle.
+
+    Raises
+    ------
+    RigError
+        If the size is unknown and the principal point is not right of and below the corner.
+    """
+    if view.size is not None:
+        return float(view.size[0]), float(view.size[1])
+    width, height = 2.0 * view.intrinsic[:2, 2] / view.intrinsic[2, 2]
+    if not (width > 0.0 and height > 0.0):
+        raise RigError(
+            f"camera {view.name}: expected a principal point above 0 or the size of the pictures, "
+            f"found {width / 2:g}, {height / 2:g}"
+        )
+    return float(width), float(height)
+
+
+def pinhole_view(view: CameraView) -> Floats:
+    """Return the matrix from scene to OpenGL's camera space, F [R | T]: (4, 4)."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = _FLIP @ view.rotation
+    matrix[:3, 3] = _FLIP @ view.translation
+    return matrix
+
+
+def pinhole_projection(view: CameraView, aspect: float, box: Floats) -> Floats:
+    """Return the matrix from camera to clip space that puts points where the camera saw them.
+
+    OpenCV counts pixels from the middle of the first one, OpenGL from its corner, so with K from
+    ``view`` and W its pictures' width, x in -1..1 is 2 (u + 1/2) / W - 1. A picture of another
+    shape shows the whole of the camera's picture in its middle, and more on two sides.
+
+    Parameters
+    ----------
+    view : CameraView
+        Distortion is left out, see ``distortion_error``.
+    aspect : float
+        Width / height of what is drawn.
+    box : (2, 3)
+        What must lie between the near and the far plane, scene space.
+
+    Returns
+    -------
+    (4, 4)
+        OpenGL clip space, z in -1..1.
+
+    Raises
+    ------
+    RigError
+        See ``picture_size``.
+    """
+    width, height = picture_size(view)
+    k = view.intrinsic / view.intrinsic[2, 2]
+    distance = float(np.linalg.norm(view.rotation @ box.mean(axis=0) + view.translation))
+    reach = box_size(box) or distance or 1.0
+    near, far = max(distance - reach, _NEAREST * (distance + reach)), distance + 20.0 * reach
+    matrix = np.zeros((4, 4))
+    # Camera space is OpenCV's with y and z turned round: its z is -w.
+    matrix[0, :3] = 2.0 * k[0, 0] / width, -2.0 * k[0, 1] / width, _offset(k[0, 2], width)
+    matrix[1, :3] = 0.0, 2.0 * k[1, 1] / height, -_offset(k[1, 2], height)
+    matrix[2, 2:] = -(far + near) / (far - near), -2.0 * far * near / (far - near)
+    matrix[3, 2] = -1.0
+    own = width / height
+    matrix[0] *= min(own / aspect, 1.0)
+    matrix[1] *= min(aspect / own, 1.0)
+    return matrix
+
+
+def _offset(principal: float, side: float) -> float:
+    """Return the negative of where the principal point is from the middle, in half pictures."""
+    return 1.0 - 2.0 * (principal + 0.5) / side
+
+
+def distortion_error(view: CameraView) -> float:
+    """Return how far the lens moves the corner of the picture that it moves most, in pixels.
+
+    That is what looking through the camera leaves out. OpenCV's model with r^2 = x^2 + y^2:
+    x' = x (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6) + 2 p1 x y
+    + p2 (r^2 + 2 x^2), and y' alike with p1 and p2 exchanged.
+
+    Parameters
+    ----------
+    view : CameraView
+        Coefficients k1 k2 p1 p2 k3 k4 k5 k6, those missing at the end 0; the thin prism's, after
+        them, are not used.
+
+    Returns
+    -------
+    float
+        Pixels; 0 without distortion.
+
+    Raises
+    ------
+    RigError
+        See ``picture_size``.
+    """
+    k1, k2, p1, p2, k3, k4, k5, k6 = np.append(view.distortion, np.zeros(8))[:8]
+    width, height = picture_size(view)
+    k = view.intrinsic / view.intrinsic[2, 2]
+    corners = [[u, v, 1.0] for u in (0.0, width - 1.0) for v in (0.0, height - 1.0)]
+    x, y, _ = np.linalg.solve(k, np.transpose(corners))
+    r2 = x * x + y * y
+    radial = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)))
+    dx = x * (radial - 1.0) + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
+    dy = y * (radial - 1.0) + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
+    moved = k[:2, :2] @ np.stack([dx, dy])
+    return float(np.linalg.norm(moved, axis=0).max())
