@@ -1,6 +1,8 @@
 """Broken frame files: each is named, becomes a gap, and the others are read."""
 
+import json
 import os
+import random
 
 import numpy as np
 import pytest
@@ -251,3 +253,42 @@ def test_points_in_the_plane_are_refused(tmp_path):
     assert refusal(tmp_path / "annots").endswith(
         "person 0: expected poses or keypoints3d, found the keys personID, keypoints"
     )
+
+
+def test_mutations_are_read_or_refused_in_one_line(tmp_path):
+    record = body(0, 78) | points(0, 17) | {"expression": [[0.5] * 10]}
+    good = json.dumps([record, body(-1, 78)])
+    pieces = [
+        "[",
+        "]",
+        "{",
+        "}",
+        '"',
+        ",",
+        ":",
+        "null",
+        "NaN",
+        "1e999",
+        "-1",
+        '"id"',
+        "[[]]",
+        "true",
+    ]
+    folder, path = write_frames(tmp_path / "smpl", {0: good}), tmp_path / "smpl" / "000001.json"
+    rng = random.Random(4)
+    for _ in range(400):
+        text = list(good)
+        for _ in range(rng.choice((1, 1, 2, 5))):
+            start = rng.randrange(len(text))
+            text[start : start + rng.choice((0, 1, 3, 40, 400))] = rng.choice(pieces)
+        path.write_text("".join(text))
+        _, parts, _ = opened(tmp_path)
+        assert 0 in parts[0].bodies
+        for part in parts:
+            assert all(line.isprintable() and str(folder) in line for line in part.warnings)
+            assert all(np.isfinite(motion.vectors).all() for motion in part.bodies.values())
+            assert all(np.isfinite(clip.points).all() for _, clip in part.points.values())
+        try:
+            list(easymocap.read(Source.open(path)).parts())
+        except FormatError as problem:
+            assert str(problem).isprintable()

@@ -50,11 +50,14 @@ def draw_keys(plot: Plot) -> bool:
     if sum(len(keys) for *_, keys in seen) > _MOST_KEYS:
         _draw_many(plot, seen)
         return False
-    touched = [
-        _draw_key(plot, (row, key), float(times[key]), float(values[key]))
+    places = [
+        ((row, key), float(times[key]), float(values[key]))
         for row, times, values, keys in seen
         for key in keys
     ]
+    # What comes later lies on top, to be seen and to be taken hold of.
+    places.sort(key=lambda one: one[0] in plot.view.keys)
+    touched = [_draw_key(plot, *one) for one in places]
     return any(touched)
 
 

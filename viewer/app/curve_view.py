@@ -24,6 +24,8 @@ class CurveView:
         Only curves with this in their name are listed.
     wants_fit : bool
         Fit the axes in the next frame.
+    wants_scroll : bool
+        Scroll the list to the first chosen curve in the next frame.
     owner : (int, str, int)
         The actor, and the kind and number of curves that ``rows`` belong to.
     joint : int
@@ -34,6 +36,7 @@ class CurveView:
     keys: frozenset[KeyPlace] = frozenset()
     filter: str = ""
     wants_fit: bool = True
+    wants_scroll: bool = False
     owner: tuple[int, str, int] = (-1, "", 0)
     joint: int = -1
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -12,10 +13,10 @@ from viewer.formats import Source, read
 from viewer.loading.bundled import bundled_body
 from viewer.loading.capturing import Builder
 from viewer.loading.contents import Contents
-from viewer.loading.settings import MotionSettings
+from viewer.loading.settings import METRES, MotionSettings
 from viewer.rig.body_motion import BodyMotion, body_clip
 from viewer.rig.capture import Capture
-from viewer.rig.clip import Clip
+from viewer.rig.clip import Clip, suits
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton_motion import SkeletonMotion
@@ -83,15 +84,14 @@ def _give_clip(path: Path, clip: Clip, cast: Cast, contents: Contents) -> None:
     """Give a clip to the first actor that it fits."""
     skeletons = [actor.figure.skeleton for actor in cast.actors]
     for actor, skeleton in zip(cast.actors, skeletons, strict=True):
-        fits = skeleton is not None and skeleton.n_dofs == len(clip.channels)
-        if fits and actor.pose is not None and actor.clip is None:
+        if skeleton is not None and suits(clip, skeleton) and actor.pose is not None and actor.clip is None:
             actor.clip = clip
             return
     shown, count = printable(path, 300), len(clip.channels)
     first = next((skeleton for skeleton in skeletons if skeleton is not None), None)
     if first is None:
         raise RigError(f"{shown} is a clip: open it together with its .skel")
-    if any(skeleton is not None and skeleton.n_dofs == count for skeleton in skeletons):
+    if any(skeleton is not None and suits(clip, skeleton) for skeleton in skeletons):
         raise RigError(f"{shown}: every skeleton that it fits has a clip already")
     owner = next(path for path, figure in contents.figures if figure.skeleton)
     raise RigError(
@@ -104,9 +104,17 @@ def _give_skeleton_motion(
     path: Path, motion: SkeletonMotion, cast: Cast, settings: MotionSettings
 ) -> None:
     """Let a motion drive the first figure with a mesh whose joints it names, or stand alone."""
-    if settings.drives:
-        from viewer.rig.retarget import retarget
+    from viewer.rig.retarget import retarget, scaled_motion
 
+    if settings.unit:
+        motion = scaled_motion(motion, METRES[settings.unit], "m")
+    if settings.up:
+        up: Literal["y", "z"] = "z" if settings.up.endswith("z") else "y"
+        motion = replace(motion, figure=replace(motion.figure, up=up))
+    if settings.frame_rate is not None:
+        timing = replace(motion.clip.timing, frame_rate=settings.frame_rate)
+        motion = replace(motion, clip=replace(motion.clip, timing=timing))
+    if settings.drives:
         refusal = ""
         for actor in cast.actors:
             if actor.clip is None and actor.figure.is_attached:
@@ -119,7 +127,9 @@ def _give_skeleton_motion(
                 return
         if refusal:
             cast.notes.append(f"{printable(path, 300)} stands alone: {refusal}")
-    cast.add(Actor(motion.figure, clip=motion.clip), motion.figure.up, placed=False)
+    placement = rotation_transform(0, np.pi) if settings.up.startswith("-") else np.eye(4)
+    actor = Actor(motion.figure, clip=motion.clip, placement=placement)
+    cast.add(actor, motion.figure.up, placed=False)
 
 
 def is_body(figure: Figure) -> bool:

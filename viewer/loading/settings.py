@@ -5,7 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ["MotionSettings"]
+__all__ = ["METRES", "MotionSettings"]
+
+METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+"""Units that BVH lengths may be in."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ import colorsys
 import moderngl
 import numpy as np
 
-from viewer.rendering.options import DisplayOptions
+from viewer.rendering.options import Color, DisplayOptions
 from viewer.rendering.ownership import Owner
 from viewer.rendering.program import Programs, set_uniforms
 from viewer.rendering.upload import buffer, matrix_texture, write_matrices
@@ -131,6 +131,7 @@ class JointPass:
         options: DisplayOptions,
         selected: int = -1,
         opacity: float = 1.0,
+        color: Color | None = None,
     ) -> None:
         """Draw one box per joint.
 
@@ -149,6 +150,8 @@ class JointPass:
         opacity : float
             Below 1 the boxes are one translucent layer over everything drawn before: boxes
             often enclose the skin, and would hide it.
+        color : (r, g, b), optional
+            Of all boxes, linear; a colour for each joint if omitted.
         """
         overlays = opacity < 1.0
         view = in_front(view) if overlays else view
@@ -159,7 +162,7 @@ class JointPass:
             target = self.context.fbo
             target.color_mask = False, False, False, False
             target.use()  # moderngl hands masks to OpenGL only then
-        place = placement, skeleton.center, view, options, selected, opacity
+        place = placement, skeleton.center, view, options, selected, opacity, color
         draw_boxes(program, array, count, skeleton.world, *place)
         if overlays:
             target.color_mask = True, True, True, True
@@ -184,6 +187,7 @@ def draw_boxes(
     options: DisplayOptions,
     selected: int = -1,
     opacity: float = 1.0,
+    color: Color | None = None,
 ) -> None:
     """Draw instances of the cube, each by its own matrix of ``world``."""
     set_model(program, view, placement, center)
@@ -192,6 +196,8 @@ def draw_boxes(
         "u_world": _WORLD_UNIT,
         "u_selected": selected,
         "u_highlight": _HIGHLIGHT,
+        "u_has_color": color is not None,
+        "u_color": color or (0.0, 0.0, 0.0),
         "u_flat": False,
         "u_textured": False,
         "u_opacity": opacity,

@@ -9,20 +9,23 @@ import numpy as np
 
 from viewer.rendering.colormap import colormap
 from viewer.rendering.index_sets import IndexSet
-from viewer.rendering.options import DisplayOptions
+from viewer.rendering.mesh_buffers import MeshBuffers
+from viewer.rendering.options import Color, DisplayOptions
 from viewer.rendering.program import Programs, set_uniforms
 from viewer.rendering.skin_pass import PosedMesh
 from viewer.rendering.upload import ramp_texture
 from viewer.rendering.view import View, set_lights, set_model
 from viewer.rig.arrays import Floats
 
-__all__ = ["MeshPass"]
+__all__ = ["SKIN_COLOR", "MeshPass", "draw_runs", "set_surface"]
 
-SKIN_COLOR = (0.62, 0.60, 0.57)  # linear
+SKIN_COLOR = (0.62, 0.60, 0.57)
+"""Of a surface without texture, linear."""
+
 _EDGE_COLOR = (0.05, 0.07, 0.10, 0.55)  # sRGB and alpha
 _NORMAL_COLOR = (0.10, 0.75, 0.85, 1.0)
 _NORMAL_LENGTH = 0.02  # of the figure's size
-_TEXTURE_UNIT, _COLORMAP_UNIT = 2, 3
+_TEXTURE_UNIT, _COLORMAP_UNIT = 5, 6  # those before are the skinning shader's
 
 
 class MeshPass:
@@ -41,7 +44,14 @@ class MeshPass:
         self._arrays: dict[tuple[int, int, int], tuple[PosedMesh, moderngl.VertexArray]] = {}
         self._colormap = ramp_texture(context, colormap())
 
-    def draw(self, mesh: PosedMesh, placement: Floats, view: View, options: DisplayOptions) -> None:
+    def draw(
+        self,
+        mesh: PosedMesh,
+        placement: Floats,
+        view: View,
+        options: DisplayOptions,
+        color: Color | None = None,
+    ) -> None:
         """Draw the surface.
 
         Parameters
@@ -54,17 +64,15 @@ class MeshPass:
             The camera's matrices.
         options : DisplayOptions
             Shading and lights.
+        color : (r, g, b), optional
+            Of what has no texture, linear; ``SKIN_COLOR`` if omitted.
         """
         program = self.programs.drawing("mesh", options.shading)
         set_model(program, view, placement, mesh.center)
         set_lights(program, view, options.lights)
+        set_surface(program, mesh.mesh, options)
         values = {
-            "u_flat": options.flat,
-            "u_color": SKIN_COLOR,
-            "u_opacity": 1.0,
-            "u_has_uv": mesh.mesh.uvs is not None,
-            "u_texture": _TEXTURE_UNIT,
-            "u_has_colors": options.shading == "parts" and mesh.mesh.colors is not None,
+            "u_color": SKIN_COLOR if color is None else color,
             "u_scalar_range": mesh.scalars.shown,
             "u_colormap": _COLORMAP_UNIT,
         }
@@ -72,16 +80,7 @@ class MeshPass:
         if options.shading == "scalar":
             self._colormap.use(_COLORMAP_UNIT)
         indices = mesh.mesh.index_set(options.reduced, options.hidden_parts)
-        self._draw_runs(self._array(mesh, program, indices), indices, options.texture)
-
-    def _draw_runs(self, array: moderngl.VertexArray, indices: IndexSet, textured: bool) -> None:
-        program = array.program
-        for run in indices.runs:
-            has_texture = textured and run.texture is not None
-            set_uniforms(program, {"u_textured": has_texture})
-            if has_texture and run.texture is not None:
-                run.texture.use(_TEXTURE_UNIT)
-            array.render(moderngl.TRIANGLES, vertices=run.count, first=run.first)
+        draw_runs(self.array(mesh, program, indices), indices, options.texture)
 
     def draw_edges(
         self, mesh: PosedMesh, placement: Floats, view: View, options: DisplayOptions
@@ -92,7 +91,7 @@ class MeshPass:
         program["u_line_color"] = _premultiplied(_EDGE_COLOR)
         self.context.wireframe = True
         indices = mesh.mesh.index_set(options.reduced, options.hidden_parts, as_listed=True)
-        self._array(mesh, program, indices).render(moderngl.TRIANGLES)
+        self.array(mesh, program, indices).render(moderngl.TRIANGLES)
         self.context.wireframe = False
 
     def draw_normals(self, mesh: PosedMesh, placement: Floats, view: View, size: float) -> None:
@@ -108,7 +107,7 @@ class MeshPass:
         instances = mesh.mesh.n_vertices
         self._arrays[key][1].render(moderngl.LINES, vertices=2, instances=instances)
 
-    def _array(
+    def array(
         self, mesh: PosedMesh, program: moderngl.Program, indices: IndexSet
     ) -> moderngl.VertexArray:
         """Return the mesh's vertex array for a program, with what the compiler kept."""
@@ -139,6 +138,32 @@ class MeshPass:
             array.release()
         self._arrays.clear()
         self._colormap.release()
+
+
+def set_surface(program: moderngl.Program, mesh: MeshBuffers, options: DisplayOptions) -> None:
+    """Set what the shading programs must know of a figure's surface."""
+    values = {
+        "u_flat": options.flat,
+        "u_opacity": 1.0,
+        "u_has_uv": mesh.uvs is not None,
+        "u_texture": _TEXTURE_UNIT,
+        "u_has_colors": options.shading == "parts" and mesh.colors is not None,
+    }
+    set_uniforms(program, values)
+
+
+def draw_runs(
+    array: moderngl.VertexArray, indices: IndexSet, textured: bool, instances: int = 1
+) -> None:
+    """Draw all triangles, those of one material at a time."""
+    for run in indices.runs:
+        has_texture = textured and run.texture is not None
+        set_uniforms(array.program, {"u_textured": has_texture})
+        if has_texture and run.texture is not None:
+            run.texture.use(_TEXTURE_UNIT)
+        array.render(
+            moderngl.TRIANGLES, vertices=run.count, first=run.first, instances=instances
+        )
 
 
 def _premultiplied(color: tuple[float, float, float, float]) -> tuple[float, ...]:

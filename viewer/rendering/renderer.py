@@ -134,7 +134,7 @@ class Renderer:
         """Skin what changed, before anything is drawn."""
         meshes = []
         for actor in scene.actors:
-            if actor.visible and _shows_mesh(actor.figure, options):
+            if actor.is_drawn and _shows_mesh(actor.figure, options):
                 mesh = self.posed_mesh(actor)
                 pose = None if options.show == "binding" else actor.pose
                 mesh.update(pose, options.skinning)
@@ -184,7 +184,7 @@ class Renderer:
         self.joint_pass.draw(skeleton, placement, view, options, selected, opacity)
 
     def _draw_keypoints(self, actor: Actor, view: View, options: DisplayOptions) -> None:
-        if actor.pose is None or actor.figure.keypoints is None or not actor.visible:
+        if actor.pose is None or actor.figure.keypoints is None or not actor.is_drawn:
             return
         if id(actor) not in self._keypoints:
             points = KeypointBuffers(self.context, actor.figure, self.joint_pass.cube)
@@ -245,7 +245,7 @@ def _shows_mesh(figure: Figure, options: DisplayOptions) -> bool:
 def _shows_skeleton(actor: Actor, options: DisplayOptions) -> bool:
     figure = actor.figure
     wanted = options.show in ("skeleton", "both") or figure.mesh is None
-    return actor.visible and figure.skeleton is not None and wanted
+    return actor.is_drawn and figure.skeleton is not None and wanted
 
 
 def _placement(actor: Actor, options: DisplayOptions) -> Floats:

@@ -31,7 +31,7 @@ from viewer.rig.skin import bind_positions
 from viewer.rig.skinning import Skinning
 from viewer.rig.skinning.dqs import split_palette
 
-__all__ = ["PosedMesh"]
+__all__ = ["PosedMesh", "skinning_words"]
 
 _BYTES_PER_VERTEX = 24  # position and normal, three float32 each
 _PALETTE_UNIT, _PAIRS_UNIT, _RIGID_UNIT, _LIST_UNIT, _OFFSETS_UNIT = range(5)
@@ -95,18 +95,21 @@ class PosedMesh:
         """
         how = Skinning(skinning) if isinstance(skinning, str) else skinning
         attached = self.mesh.figure.is_attached and pose is not None
-        key = (*_skinning_words(how), *skinning_key(pose)) if attached and pose else ("binding",)
+        key = (*skinning_words(how), *skinning_key(pose)) if attached and pose else ("binding",)
         if key == self._key:
             return
         self.center = self.mesh.center
-        skin = self.mesh.skin(how)
         if attached and pose is not None:
-            figure = shaped(self.mesh.figure, pose.shape_weights)
-            self._rest.update(figure, pose, how.correctives)
-            self._write_palette(figure, pose, how, skin)
-        self._run(skin, how, bool(attached))
+            self.upload(pose, how)
+        self._run(self.mesh.skin(how), how, bool(attached))
         self._key = key
         self.n_updates += 1
+
+    def upload(self, pose: Pose, how: Skinning) -> None:
+        """Send what a pose needs and skin nothing: the processor's part of ``update``."""
+        figure = shaped(self.mesh.figure, pose.shape_weights)
+        self._rest.update(figure, pose, how.correctives)
+        self._write_palette(figure, pose, how, self.mesh.skin(how))
 
     def _run(self, skin: SkinBuffers, how: Skinning, attached: bool) -> None:
         array = self._array(how.method, skin, attached)
@@ -185,5 +188,6 @@ class PosedMesh:
         self._owner.release()
 
 
-def _skinning_words(how: Skinning) -> tuple[object, ...]:
+def skinning_words(how: Skinning) -> tuple[object, ...]:
+    """Return what changes if and only if the way of skinning does."""
     return (how.method, how.share, how.max_influences, how.normalize, how.correctives)

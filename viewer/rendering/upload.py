@@ -17,6 +17,7 @@ __all__ = [
     "as_uniform",
     "buffer",
     "checked",
+    "empty_offsets",
     "float32",
     "matrix_rows",
     "matrix_texture",
@@ -28,6 +29,7 @@ __all__ = [
     "write_matrices",
     "write_pairs",
     "write_rigid",
+    "write_stacked",
 ]
 
 _Item = TypeVar("_Item", moderngl.Buffer, moderngl.Texture)
@@ -85,6 +87,24 @@ def write_matrices(texture: moderngl.Texture, matrices: Floats) -> None:
     texture.write(matrix_rows(matrices))
 
 
+def write_stacked(texture: moderngl.Texture, rows: NDArray[np.float32]) -> None:
+    """Upload rows of texels that fill the first rows of a texture, the last one perhaps in part.
+
+    Parameters
+    ----------
+    texture : moderngl.Texture
+        Of float32.
+    rows : (N, ...)
+        Texels one after the other; written in place of what was there.
+    """
+    wide = texture.width * texture.components
+    flat = rows.reshape(-1)
+    height = -(-flat.size // wide)
+    if flat.size < height * wide:
+        flat = np.concatenate([flat, np.zeros(height * wide - flat.size, "f4")])
+    texture.write(flat, viewport=(0, 0, texture.width, height))
+
+
 def rigid_texture(context: moderngl.Context, count: int) -> moderngl.Texture:
     """Return an empty texture for ``count`` joints' dual quaternions and stretches."""
     size = (5 * _RIGID_PER_ROW, _height(count, _RIGID_PER_ROW))
@@ -119,13 +139,15 @@ def write_pairs(texture: moderngl.Texture, indices: Any, weights: Any) -> None:
 
 def offset_texture(context: moderngl.Context, offsets: Floats) -> moderngl.Texture:
     """Return a texture of (P, V, 3) offsets, one texel each, row after row."""
-    count = offsets.shape[0] * offsets.shape[1]
-    height = _height(count, _OFFSETS_PER_ROW)
-    texels = np.zeros((height * _OFFSETS_PER_ROW, 3), "f4")
-    texels[:count] = offsets.reshape(-1, 3)
-    texture = _data_texture(context, (_OFFSETS_PER_ROW, height), 3, f"{count} offsets")
-    texture.write(texels.tobytes())
-    return checked(context, texture, f"{count} offsets")
+    texture = empty_offsets(context, offsets.shape[0] * offsets.shape[1])
+    write_stacked(texture, float32(offsets))
+    return checked(context, texture, f"{offsets.shape[0] * offsets.shape[1]} offsets")
+
+
+def empty_offsets(context: moderngl.Context, count: int) -> moderngl.Texture:
+    """Return an empty texture for offsets of vertices, one texel each."""
+    size = (_OFFSETS_PER_ROW, _height(count, _OFFSETS_PER_ROW))
+    return _data_texture(context, size, 3, f"{count} offsets")
 
 
 def picture_texture(context: moderngl.Context, pixels: Bytes, notes: list[str]) -> moderngl.Texture:

@@ -26,6 +26,7 @@ __all__ = [
     "is_course_rig",
     "sample",
     "slopes",
+    "suits",
 ]
 
 Extrapolation = Literal["constant", "linear", "cycle", "cycle_offset", "bounce"]
@@ -215,6 +216,11 @@ def is_course_rig(skeleton: Skeleton) -> bool:
     joints = np.concatenate([[0, 0, 0], np.repeat(np.arange(count), 3)])
     kinds = np.concatenate([[0, 1, 2], np.tile([3, 4, 5], count)])
     return bool((skeleton.dof_joints == joints).all() and (skeleton.dof_kinds == kinds).all())
+
+
+def suits(clip: Clip, skeleton: Skeleton) -> bool:
+    """Return whether a clip's channels are the DOFs of a skeleton; see ``check_fit``."""
+    return is_course_rig(skeleton) and skeleton.n_dofs == len(clip.channels)
 
 
 def check_fit(clip: Clip, skeleton: Skeleton) -> None:

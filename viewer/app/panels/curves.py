@@ -76,6 +76,7 @@ def _follow(state: AppState, curves: tuple[Curve, ...]) -> None:
         rows = _rows_of(curves, view.joint)
         if view.joint >= 0 and rows:
             view.choose(rows)
+            view.wants_scroll = True
     if isinstance(clip, Clip):
         drop_missing(view, clip)
 
@@ -98,6 +99,10 @@ def _draw_list(state: AppState, curves: tuple[Curve, ...]) -> None:
     shown = _listed(curves, view.filter.lower())
     if not shown:
         imgui.text_disabled("no channel is called so")
+    if view.wants_scroll:
+        view.wants_scroll = False
+        above = shown.index(view.rows[0]) - 1 if view.rows and view.rows[0] in shown else 0
+        imgui.set_scroll_y(above * imgui.get_text_line_height_with_spacing())
     clipper = imgui.ListClipper()
     clipper.begin(len(shown))
     while clipper.step():

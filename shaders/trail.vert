@@ -1,0 +1,43 @@
+#version 330
+// One segment of a path per instance: a strip of four vertices, as wide on the screen wherever.
+
+in vec3 in_start;       // figure space minus centre
+in vec3 in_end;
+in vec2 in_times;       // of both ends, seconds of the scene's clock
+in vec3 in_color;       // sRGB
+
+uniform mat4 u_model_view;
+uniform mat4 u_projection;
+uniform vec2 u_size;    // of the picture, pixels
+uniform float u_width;  // of the line, pixels
+uniform float u_now;    // seconds
+uniform float u_reach;  // seconds back and forth at which nothing is left; 0: all is as strong
+uniform float u_opacity;
+
+out vec3 v_color;       // sRGB
+out float v_opacity;
+
+// Where the segment from a to b, with a behind the near plane, crosses it.
+vec4 cut(vec4 a, vec4 b) {
+    float distance_a = a.z + a.w, distance_b = b.z + b.w;
+    return distance_a < 0.0 && distance_b > 0.0
+        ? mix(a, b, distance_a / (distance_a - distance_b)) : a;
+}
+
+void main() {
+    mat4 matrix = u_projection * u_model_view;
+    vec4 first = matrix * vec4(in_start, 1.0), second = matrix * vec4(in_end, 1.0);
+    vec4 start = cut(first, second), end = cut(second, first);
+    bool at_end = gl_VertexID >= 2;
+    vec2 way = (end.xy / end.w - start.xy / start.w) * u_size;
+    way = dot(way, way) > 0.0 ? normalize(way) : vec2(1.0, 0.0);
+    float side = gl_VertexID % 2 == 0 ? -1.0 : 1.0;
+    vec4 place = at_end ? end : start;
+    // Half a width further along, too, so that bends have no gaps.
+    vec2 shift = side * vec2(-way.y, way.x) + (at_end ? way : -way);
+    place.xy += 0.5 * u_width * 2.0 / u_size * shift * place.w;
+    gl_Position = place;
+    float away = abs((at_end ? in_times.y : in_times.x) - u_now);
+    v_opacity = u_opacity * (u_reach > 0.0 ? clamp(1.0 - away / u_reach, 0.0, 1.0) : 1.0);
+    v_color = in_color;
+}

@@ -1,0 +1,300 @@
+"""Many frames in order: the pixels of single pictures, on copies, and an orderly end any time."""
+
+from __future__ import annotations
+
+import itertools
+import threading
+
+import numpy as np
+import pytest
+from drawn_figures import arm
+from moving import moving_arm
+
+from viewer.errors import OutputError, ViewerError
+from viewer.rendering.camera import Camera
+from viewer.rendering.offscreen import Offscreen
+from viewer.rendering.options import DisplayOptions
+from viewer.rendering.recorder import Follow, Progress, Recording, record
+from viewer.rig.motion import pose_actor
+from viewer.rig.scene import Actor, Scene, scene_box
+
+SIZE = 64, 48
+FULL = OutputError("disk full")
+TIMES = np.array([0.0, 0.1, 0.2, 0.35, 0.7, 1.0])
+
+
+class Kept:
+    """A sink that keeps what it is given, and can be told to fail."""
+
+    def __init__(self, workers=1, n_samples=0, fails_at=None, problem=FULL):
+        self.workers, self.n_samples, self.fails_at = workers, n_samples, fails_at
+        self.problem = problem
+        self.frames: dict[int, np.ndarray] = {}
+        self.seen: list[np.ndarray] = []
+        self.ended: list[str] = []
+        self.threads: set[int] = set()
+
+    def look(self, pixels):
+        assert not self.frames
+        self.seen.append(pixels.copy())
+
+    def write(self, frame, pixels):
+        if frame == self.fails_at:
+            raise self.problem
+        self.threads.add(threading.get_ident())
+        self.frames[frame] = pixels.copy()
+
+    def close(self):
+        if self.fails_at == "close":
+            raise self.problem
+        self.ended.append("close")
+
+    def abort(self):
+        self.ended.append("abort")
+
+
+@pytest.fixture(scope="module")
+def offscreen():
+    with Offscreen() as kept:
+        yield kept
+        with kept.context:
+            assert kept.context.error == "GL_NO_ERROR"
+
+
+@pytest.fixture
+def scene() -> Scene:
+    return Scene([moving_arm()])
+
+
+def recording_of(scene, **changes) -> Recording:
+    camera = Camera(np.array([1.5, 0.0, 0.0]), 12.0)
+    values = {"options": DisplayOptions(grid=False), "box": np.array([[-2.0] * 3, [6.0] * 3])}
+    return Recording(scene, TIMES, camera, SIZE, **{**values, **changes})
+
+
+def run(offscreen, recording, sink) -> list[Progress]:
+    with offscreen.context:
+        return list(record(recording, offscreen.renderer, sink))
+
+
+def one_by_one(offscreen, recording, cameras=None) -> list[np.ndarray]:
+    """Return what single pictures show: posed here, drawn without the recorder."""
+    pictures = []
+    actor = moving_arm()
+    for index, seconds in enumerate(recording.times):
+        pose_actor(actor, float(seconds))
+        camera = recording.camera if cameras is None else cameras[index]
+        scene = Scene([actor])
+        picture = offscreen.render(scene, SIZE, camera, recording.options, recording.box)
+        pictures.append(picture)
+    return pictures
+
+
+@pytest.mark.parametrize("background", ["gradient", "transparent"])
+def test_frames_are_those_of_single_pictures(offscreen, scene, background):
+    options = DisplayOptions(background=background, grid=False)
+    recording, sink = recording_of(scene, options=options), Kept()
+    run(offscreen, recording, sink)
+    assert list(sink.frames) == list(range(len(TIMES))) and sink.ended == ["close"]
+    for index, wanted in enumerate(one_by_one(offscreen, recording)):
+        assert (sink.frames[index] == wanted).all(), index
+    assert (sink.frames[0] != sink.frames[2]).any()
+
+
+def test_scene_of_the_caller_stays_as_it_is(offscreen, scene):
+    actor = scene.actors[0]
+    actor.pose.dofs[4] = 0.25
+    before = actor.pose.copy()
+    run(offscreen, recording_of(scene), Kept())
+    assert scene.actors == [actor] and actor.is_present and scene.time is None
+    assert (actor.pose.dofs == before.dofs).all()
+    assert (actor.pose.figure_translation == before.figure_translation).all()
+
+
+def test_absent_actors_are_not_drawn(offscreen, scene):
+    """Frame 5 of the motion, at 0.5 s, is missing, and lasts until 0.6 s."""
+    options = DisplayOptions(background="transparent", grid=False)
+    sink = Kept()
+    recording = recording_of(scene, options=options)
+    recording.times = np.array([0.4, 0.55, 0.6])
+    run(offscreen, recording, sink)
+    drawn = [bool(sink.frames[frame].any()) for frame in range(3)]
+    assert drawn == [True, False, True]
+    recording.fill = True
+    filled = Kept()
+    run(offscreen, recording, filled)
+    assert filled.frames[1].any()
+
+
+def test_still_scene_keeps_its_pose(offscreen, scene):
+    scene.actors[0].pose.dofs[5] = 0.7
+    sink = Kept()
+    recording = recording_of(scene, moves=False)
+    run(offscreen, recording, sink)
+    wanted = offscreen.render(scene, SIZE, recording.camera, recording.options, recording.box)
+    assert all((sink.frames[frame] == wanted).all() for frame in range(len(TIMES)))
+
+
+def test_turntable_is_a_seamless_loop(offscreen):
+    scene = Scene([Actor(arm(3))])
+    recording = recording_of(scene, moves=False, turn=360.0)
+    recording.times, recording.camera.azimuth = np.zeros(8), 170.0
+    sink = Kept()
+    run(offscreen, recording, sink)
+    for frame in range(8):
+        camera = recording.camera.copy()
+        camera.azimuth += 45.0 * frame  # the eighth step would be the first frame again
+        wanted = offscreen.render(scene, SIZE, camera, recording.options, recording.box)
+        differs = (sink.frames[frame] != wanted).any(axis=2)
+        assert differs.mean() < 0.01  # 530 and 170 degrees differ in the last bit
+    assert recording.camera.azimuth == 170.0
+
+
+def test_camera_goes_with_whom_it_follows(offscreen, scene):
+    """The arm moves along x by 2 a second and turns nothing else."""
+    straight = moving_arm(turns=False)
+    options = DisplayOptions(background="transparent", grid=False)
+    recording = recording_of(Scene([straight]), options=options)
+    recording.times = np.array([0.0, 0.3, 0.4])
+    fixed, followed = Kept(), Kept()
+    run(offscreen, recording, fixed)
+    recording.follow = Follow(0, 1, np.array([1.0, 0.0, 0.0]))  # where joint 1 begins
+    run(offscreen, recording, followed)
+    assert (fixed.frames[0] != fixed.frames[2]).any()
+    assert (fixed.frames[0] == followed.frames[0]).all()
+    for frame in (1, 2):
+        differs = (followed.frames[frame] != followed.frames[0]).any(axis=2)
+        assert differs.mean() < 0.02  # sums in another order move edges by the last bit
+
+
+def test_camera_waits_where_an_actor_is_absent(offscreen, scene):
+    marker = Actor(arm(2))  # stands still
+    recording = recording_of(Scene([moving_arm(turns=False), marker]))
+    recording.times = np.array([0.4, 0.55])
+    recording.follow = Follow(0, 0, np.zeros(3))
+    recording.options.background = "transparent"
+    sink = Kept()
+    run(offscreen, recording, sink)
+    camera = recording.camera.copy()
+    camera.target = camera.target + np.array([0.8, 0.0, 0.0])  # as at 0.4 s
+    wanted = offscreen.render(Scene([marker]), SIZE, camera, recording.options, recording.box)
+    assert (sink.frames[1] == wanted).all()
+
+
+def test_progress_counts_every_frame(offscreen, scene):
+    steps = run(offscreen, recording_of(scene), Kept())
+    assert [step.done for step in steps[: len(TIMES)]] == [1, 2, 3, 4, 5, 6]
+    assert {step.total for step in steps} == {6} and steps[-1].done == 6
+    assert Progress(0, 6, 1.0).left == 0.0 and Progress(2, 6, 1.0).left == 2.0
+    assert all(a.seconds <= b.seconds for a, b in itertools.pairwise(steps))
+
+
+def test_samples_are_seen_before_the_first_frame(offscreen, scene):
+    sink = Kept(n_samples=3)
+    run(offscreen, recording_of(scene), sink)
+    assert len(sink.seen) == 3
+    for seen, frame in zip(sink.seen, (0, 2, 5), strict=True):  # 2.5 is rounded to even
+        assert (seen == sink.frames[frame]).all()
+
+
+def test_more_samples_than_frames_are_all_frames(offscreen, scene):
+    sink = Kept(n_samples=12)
+    run(offscreen, recording_of(scene), sink)
+    assert len(sink.seen) == len(TIMES)
+
+
+def test_frames_are_written_beside_the_drawing(offscreen, scene):
+    sink = Kept(workers=3)
+    run(offscreen, recording_of(scene), sink)
+    assert sorted(sink.frames) == list(range(len(TIMES)))
+    assert threading.get_ident() not in sink.threads
+
+
+@pytest.mark.parametrize("n_frames", [0, 1, 2])
+def test_few_frames(offscreen, scene, n_frames):
+    recording, sink = recording_of(scene), Kept()
+    recording.times = TIMES[:n_frames]
+    run(offscreen, recording, sink)
+    assert len(sink.frames) == n_frames and sink.ended == ["close"]
+
+
+def test_sizes_may_change_from_one_recording_to_the_next(offscreen, scene):
+    for size in ((33, 17), (64, 48), (33, 17)):
+        recording, sink = recording_of(scene), Kept(n_samples=2)
+        recording.size = size
+        run(offscreen, recording, sink)
+        assert sink.frames[0].shape == (size[1], size[0], 4)
+
+
+@pytest.mark.parametrize("at", [0, 2, 5, "close"])
+def test_sink_that_fails_ends_the_recording(offscreen, scene, at):
+    sink = Kept(fails_at=at)
+    with pytest.raises(OutputError, match="disk full"):
+        run(offscreen, recording_of(scene), sink)
+    assert sink.ended == ["abort"]
+    run(offscreen, recording_of(scene), after := Kept())  # nothing is left behind
+    assert after.ended == ["close"]
+
+
+def test_interruption_aborts(offscreen, scene):
+    sink = Kept(fails_at=3, problem=KeyboardInterrupt())
+    with pytest.raises(KeyboardInterrupt):
+        run(offscreen, recording_of(scene), sink)
+    assert sink.ended == ["abort"]
+
+
+@pytest.mark.parametrize("n_steps", [1, 3, 6])
+def test_closing_the_generator_cancels(offscreen, scene, n_steps):
+    sink = Kept()
+    before = threading.active_count()
+    with offscreen.context:
+        steps = record(recording_of(scene), offscreen.renderer, sink)
+        for _ in range(n_steps):
+            next(steps)
+        steps.close()
+        assert offscreen.context.error == "GL_NO_ERROR"
+    assert sink.ended == ["abort"] and threading.active_count() == before
+
+
+def test_other_things_may_be_drawn_between_steps(offscreen, scene):
+    recording, sink = recording_of(scene), Kept()
+    other = Scene([Actor(arm(2))])
+    with Offscreen() as window:
+        with window.context:
+            steps = record(recording, window.renderer, sink)
+            for _ in steps:
+                target = window.target((40, 30), 4)
+                window.renderer.draw(
+                    other, recording.camera, recording.options, target, scene_box(other)
+                )
+                target.resolve()
+                assert target.read().any()
+        for index, wanted in enumerate(one_by_one(window, recording)):
+            assert (sink.frames[index] == wanted).all(), index
+
+
+def test_little_waits_however_slow_the_sink_is(offscreen, scene):
+    class Slow(Kept):
+        def write(self, frame, pixels):
+            gate.wait(10)
+            super().write(frame, pixels)
+
+    gate, sink = threading.Event(), Slow()
+    recording = recording_of(scene)
+    recording.times = np.linspace(0.0, 1.0, 12)
+    drawn = 0
+    with offscreen.context:
+        for progress in record(recording, offscreen.renderer, sink):
+            drawn = progress.done
+            if drawn == 3:  # one being written, two that wait; the next must wait too
+                threading.Timer(0.2, gate.set).start()
+            assert drawn - len(sink.frames) <= 4
+    assert drawn == 12 == len(sink.frames)
+
+
+def test_size_that_cannot_be_drawn_is_refused(offscreen, scene):
+    recording, sink = recording_of(scene), Kept()
+    recording.size = (1_000_000, 10)
+    with pytest.raises(ViewerError, match="picture size: expected 1 to"):
+        run(offscreen, recording, sink)
+    assert sink.ended == ["abort"]
