@@ -33,9 +33,8 @@ void main() {
     way = dot(way, way) > 0.0 ? normalize(way) : vec2(1.0, 0.0);
     float side = gl_VertexID % 2 == 0 ? -1.0 : 1.0;
     vec4 place = at_end ? end : start;
-    // Half a width further along, too, so that bends have no gaps.
-    vec2 shift = side * vec2(-way.y, way.x) + (at_end ? way : -way);
-    place.xy += 0.5 * u_width * 2.0 / u_size * shift * place.w;
+    // Half a width to either side; a picture is 2 wide in this space.
+    place.xy += u_width / u_size * side * vec2(-way.y, way.x) * place.w;
     gl_Position = place;
     float away = abs((at_end ? in_times.y : in_times.x) - u_now);
     v_opacity = u_opacity * (u_reach > 0.0 ? clamp(1.0 - away / u_reach, 0.0, 1.0) : 1.0);

@@ -14,6 +14,7 @@ from viewer.commands._progress import Progress
 from viewer.errors import FormatError, ViewerError, printable
 from viewer.loading import Builder, MotionSettings, begin, bundled_body, bundled_files, read_files
 from viewer.models import known_models, load_model_folder, resolve, save_model_folder
+from viewer.rig.keypoint_layouts import TITLES
 from viewer.rig.scene import Scene
 
 __all__ = [
@@ -63,6 +64,11 @@ def _add_motion_arguments(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument("--unit", choices=("m", "cm", "mm"), help="of BVH lengths")
     group.add_argument(
+        "--layout",
+        choices=[title for titles in TITLES.values() if len(titles) > 1 for title in titles],
+        help="what captured keypoints are where their number leaves a choice",
+    )
+    group.add_argument(
         "--legacy-expression",
         action="store_true",
         help="expressions drive SMPL-X columns 10 to 19, as EasyMocap has it",
@@ -84,6 +90,7 @@ def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
         up=arguments.up or "",
         unit=arguments.unit or "",
         flat_hands=None if arguments.hands is None else arguments.hands == "flat",
+        layout=arguments.layout or "",
         legacy_expression=arguments.legacy_expression,
         drives=not arguments.beside,
     )

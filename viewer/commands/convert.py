@@ -89,11 +89,29 @@ def _write_motions(
     moving = [actor for actor in scene.actors if isinstance(actor.clip, Clip | SampledClip)]
     if "{frame" in output.name or (arguments.frames and output.suffix.lower() == ".obj"):
         check_frame_field(output)
-    elif output.suffix:
+    elif not output.suffix:
+        _check_capture_folder(output, inputs, arguments.force)
+    else:
         for path in motion_paths(output, moving):
             _check_folder(path)
             check_output(path, inputs, arguments.force)
     return write_motions(arguments, scene, output, skinning)
+
+
+def _check_capture_folder(output: Path, inputs: list[Path], force: bool) -> None:
+    """Refuse to replace frames that were opened, or that exist without ``--force``."""
+    frames = output / "smpl"
+    shown = printable(frames, 300)
+    try:
+        for opened in inputs:
+            place = opened.resolve()
+            if place in (output.resolve(), frames.resolve()) or frames.resolve() in place.parents:
+                raise OutputError(f"{shown}: is an input folder, which is never replaced")
+        if frames.exists() and not force:
+            raise OutputError(f"{shown}: exists already (--force replaces it)")
+    except (OSError, ValueError, RuntimeError) as problem:
+        reason = getattr(problem, "strerror", None) or problem
+        raise OutputError(f"{shown}: {reason}") from None
 
 
 def _inputs(arguments: argparse.Namespace) -> list[Path]:

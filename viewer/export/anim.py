@@ -9,7 +9,7 @@ import numpy as np
 
 from viewer.errors import RigError, printable
 from viewer.export._bvh_angles import euler_angles, unrolled
-from viewer.export._bvh_gaps import filled, gaps_text, runs
+from viewer.export._gaps import filled, gaps_text, runs
 from viewer.export._options import GAPS, MotionOptions
 from viewer.formats import all_or_none, write
 from viewer.rig.arrays import Floats

@@ -119,6 +119,7 @@ def _read(source: Source, settings: MotionSettings) -> Content:
             flat_hands=settings.flat_hands,
             up=settings.up,
             legacy_expression=settings.legacy_expression,
+            layout=settings.layout,
         )
     return read(source)
 

@@ -84,7 +84,12 @@ def _give_clip(path: Path, clip: Clip, cast: Cast, contents: Contents) -> None:
     """Give a clip to the first actor that it fits."""
     skeletons = [actor.figure.skeleton for actor in cast.actors]
     for actor, skeleton in zip(cast.actors, skeletons, strict=True):
-        if skeleton is not None and suits(clip, skeleton) and actor.pose is not None and actor.clip is None:
+        if (
+            skeleton is not None
+            and suits(clip, skeleton)
+            and actor.pose is not None
+            and actor.clip is None
+        ):
             actor.clip = clip
             return
     shown, count = printable(path, 300), len(clip.channels)

@@ -28,6 +28,9 @@ class MotionSettings:
         Of BVH lengths; empty to judge by the skeleton's height.
     flat_hands : bool or None
         Whether hand components leave the mean hand out; None for the model's custom.
+    layout : str
+        What captured keypoints are, a title of ``viewer.rig.keypoint_layouts``; empty to judge by
+        their number.
     legacy_expression : bool
         Whether expressions drive SMPL-X columns 10 to 19, as EasyMocap has it.
     drives : bool
@@ -39,5 +42,6 @@ class MotionSettings:
     up: str = ""
     unit: str = ""
     flat_hands: bool | None = None
+    layout: str = ""
     legacy_expression: bool = False
     drives: bool = True

@@ -16,7 +16,7 @@ from viewer.rig.arrays import Floats
 from viewer.rig.clip import Clip
 from viewer.rig.mesh import bounding_box
 from viewer.rig.points import PointClip
-from viewer.rig.scene import Actor
+from viewer.rig.scene import Actor, Motion
 from viewer.rig.trails import Trail, segments, trail
 
 __all__ = ["Moment", "TrailBuffers", "TrailPass", "trail_colors"]
@@ -55,6 +55,7 @@ class TrailBuffers:
         self.center: Floats = np.zeros(3)
         self._owner = Owner()
         self._arrays: dict[int, moderngl.VertexArray] = {}
+        self._clip: Motion | None = None
         self._key: tuple[object, ...] | None = None
 
     def update(self, actor: Actor, joints: tuple[int, ...], min_confidence: float) -> None:

@@ -1,0 +1,173 @@
+"""Cameras that see a whole motion, all the way round, and find whom they follow."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from drawn_figures import arm
+from moving import moving_arm
+
+from viewer.errors import RigError
+from viewer.rendering.camera import Camera, fit
+from viewer.rendering.framing import find_follow, fit_turning, frame_motion, outermost
+from viewer.rendering.recorder import Follow, Recording
+from viewer.rig.figure import Figure
+from viewer.rig.motion import pose_actor
+from viewer.rig.points import PointClip, PointLayout
+from viewer.rig.scene import Actor, Scene, scene_points
+from viewer.rig.timing import Timing
+
+ASPECT = 16 / 9
+LAYOUT = PointLayout("two", ("left_knee", "nose"), np.zeros((0, 2)), np.array([1, 0]))
+
+
+def recording_of(*actors, times=(0.0, 0.2, 0.4, 1.0), **changes) -> Recording:
+    return Recording(Scene(list(actors)), np.array(times), Camera(), (64, 36), **changes)
+
+
+def is_seen(camera: Camera, points: np.ndarray) -> bool:
+    """Return whether all points are within the picture, by the camera's matrices alone."""
+    box = np.array([points.min(axis=0), points.max(axis=0)])
+    matrix = camera.projection_matrix(ASPECT, box) @ camera.view_matrix()
+    clip = np.concatenate([points, np.ones((len(points), 1))], axis=1) @ matrix.T
+    return bool((np.abs(clip[:, :2]) <= clip[:, 3:]).all() and (clip[:, 3] > 0).all())
+
+
+def all_points(seconds) -> np.ndarray:
+    actor, clouds = moving_arm(), []
+    for time in seconds:
+        pose_actor(actor, float(time))
+        clouds.append(scene_points(Scene([actor])))
+    return np.concatenate(clouds)
+
+
+def test_box_and_points_are_those_of_all_frames():
+    times = np.linspace(0.0, 1.0, 11)
+    points, box = frame_motion(recording_of(moving_arm(), times=times[[0, 1, 2, 3, 4, 6, 10]]))
+    every = all_points(times[[0, 1, 2, 3, 4, 6, 10]])
+    np.testing.assert_allclose(box, [every.min(axis=0), every.max(axis=0)], atol=1e-12)
+    camera = Camera()
+    fit(camera, points, ASPECT)
+    assert is_seen(camera, every)
+    exact = Camera()
+    fit(exact, every, ASPECT)
+    # Outermost points may miss 1 % of the size.
+    assert camera.distance == pytest.approx(exact.distance, rel=0.015)
+    np.testing.assert_allclose(camera.target, exact.target, atol=1e-12)
+
+
+def test_at_most_32_frames_are_looked_at(monkeypatch):
+    looked = []
+    monkeypatch.setattr(
+        "viewer.rendering.framing.pose_scene", lambda scene, recording, time: looked.append(time)
+    )
+    frame_motion(recording_of(moving_arm(), times=np.linspace(0.0, 5.0, 1001)))
+    assert len(looked) == 32 and looked[0] == 0.0 and looked[-1] == 5.0
+
+
+def test_scene_stays_as_it_is():
+    actor = moving_arm()
+    before = actor.pose.copy()
+    frame_motion(recording_of(actor))
+    assert (actor.pose.figure_translation == before.figure_translation).all()
+
+
+def test_frames_without_anybody_do_not_count():
+    points, box = frame_motion(recording_of(moving_arm(), times=(0.55, 0.2)))
+    wanted = all_points([0.2])
+    np.testing.assert_allclose(box, [wanted.min(axis=0), wanted.max(axis=0)], atol=1e-12)
+    nobody, empty = frame_motion(recording_of(moving_arm(), times=(0.55, 0.56)))
+    assert nobody.tolist() == [[0, 0, 0]] and empty.tolist() == [[0, 0, 0]] * 2
+
+
+def test_still_scene_is_fitted_as_it_is_posed():
+    actor = moving_arm()
+    actor.pose.figure_translation[:] = (9.0, 0.0, 0.0)
+    _, box = frame_motion(recording_of(actor, moves=False))
+    assert box[0, 0] == pytest.approx(9.0)  # the arm begins at x = 0
+
+
+def test_following_camera_fits_what_stays_around_it():
+    straight = moving_arm(turns=False)
+    follow = Follow(0, 0, np.array([0.0, 0.0, 0.0]))
+    points, box = frame_motion(recording_of(straight, follow=follow))
+    still = scene_points(Scene([Actor(arm(3))]))
+    np.testing.assert_allclose(points.min(axis=0), still.min(axis=0), atol=1e-12)
+    np.testing.assert_allclose(points.max(axis=0), still.max(axis=0), atol=1e-12)
+    assert box[1, 0] == pytest.approx(3.0 + 2.0)  # one second at 2 a second
+
+
+@pytest.mark.parametrize("up", ["y", "z"])
+@pytest.mark.parametrize("orthographic", [False, True])
+def test_turning_camera_sees_all_the_way_round(up, orthographic):
+    points = np.random.default_rng(1).uniform(-1, 1, (500, 3)) * [8.0, 1.0, 0.5]
+    camera = Camera(up=up, azimuth=90.0, orthographic=orthographic)
+    fit_turning(camera, points, ASPECT, 360.0)
+    assert camera.azimuth == 90.0
+    for azimuth in np.arange(0.0, 360.0, 7.0):
+        turned = camera.copy()
+        turned.azimuth = azimuth
+        assert is_seen(turned, points)
+
+
+def test_camera_that_does_not_turn_is_fitted_as_ever():
+    points = np.random.default_rng(1).uniform(-1, 1, (50, 3))
+    camera, plain = Camera(), Camera()
+    fit_turning(camera, points, ASPECT, 0.0)
+    fit(plain, points, ASPECT)
+    assert camera.distance == plain.distance and (camera.target == plain.target).all()
+
+
+@pytest.mark.parametrize("count", [1, 250, 251, 45_000])
+def test_outermost_points_reach_as_far_in_every_direction(count):
+    rng = np.random.default_rng(count)
+    points = rng.normal(size=(count, 3)) * [5.0, 1.0, 2.0] + [100.0, 0.0, -7.0]
+    chosen = outermost(points)
+    assert len(chosen) <= 256
+    assert (chosen.min(axis=0) == points.min(axis=0)).all()
+    assert (chosen.max(axis=0) == points.max(axis=0)).all()
+    directions = rng.normal(size=(300, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    missed = (points @ directions.T).max(axis=0) - (chosen @ directions.T).max(axis=0)
+    size = np.linalg.norm(np.ptp(points, axis=0))
+    assert missed.max() <= 0.01 * size
+
+
+# Whom to follow
+
+
+def captured(person: int | None = None) -> Actor:
+    points = np.array([[[1.0, 2.0, 3.0, 1.0], [3.0, 2.0, 1.0, 1.0]]])
+    clip = PointClip("points", Timing(10.0, np.zeros(1, dtype=np.int32)), points)
+    actor = Actor(Figure("keypoints", points=LAYOUT), clip=clip, person=person)
+    pose_actor(actor, 0.0)
+    return actor
+
+
+@pytest.mark.parametrize(
+    ("name", "actor", "joint", "origin"),
+    [
+        ("arm", 0, 0, (0.5, 0, 0)),
+        ("ARM", 0, 0, (0.5, 0, 0)),
+        ("j2", 0, 2, (2.5, 0, 0)),
+        ("arm/J1", 0, 1, (1.5, 0, 0)),
+        ("keypoints 4", 1, -1, (2, 2, 2)),
+        ("nose", 1, 1, (3, 2, 1)),
+        ("keypoints 4/left_knee", 1, 0, (1, 2, 3)),
+    ],
+)
+def test_name_finds_actor_or_joint(name, actor, joint, origin):
+    first = Actor(arm(3))
+    first.pose.figure_translation[0] = 0.5
+    follow = find_follow(Scene([first, captured(4)]), name)
+    assert (follow.actor, follow.joint) == (actor, joint)
+    np.testing.assert_allclose(follow.origin, origin, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["leg", "leg/j1", "arm/j9", "", "/"])
+def test_unknown_name_lists_the_actors(name):
+    with pytest.raises(RigError) as caught:
+        find_follow(Scene([Actor(arm(3)), captured()]), name)
+    assert str(caught.value) == (
+        f'no actor, joint or point is called "{name}"; actors: arm, keypoints'
+    )
