@@ -51,8 +51,8 @@ def test_box_and_points_are_those_of_all_frames():
     assert is_seen(camera, every)
     exact = Camera()
     fit(exact, every, ASPECT)
-    # Outermost points may miss 1 % of the size.
-    assert camera.distance == pytest.approx(exact.distance, rel=0.015)
+    # Outermost points may miss a little.
+    assert camera.distance == pytest.approx(exact.distance, rel=0.005)
     np.testing.assert_allclose(camera.target, exact.target, atol=1e-12)
 
 
@@ -73,7 +73,7 @@ def test_scene_stays_as_it_is():
 
 
 def test_frames_without_anybody_do_not_count():
-    points, box = frame_motion(recording_of(moving_arm(), times=(0.55, 0.2)))
+    _, box = frame_motion(recording_of(moving_arm(), times=(0.55, 0.2)))
     wanted = all_points([0.2])
     np.testing.assert_allclose(box, [wanted.min(axis=0), wanted.max(axis=0)], atol=1e-12)
     nobody, empty = frame_motion(recording_of(moving_arm(), times=(0.55, 0.56)))
@@ -118,19 +118,19 @@ def test_camera_that_does_not_turn_is_fitted_as_ever():
     assert camera.distance == plain.distance and (camera.target == plain.target).all()
 
 
-@pytest.mark.parametrize("count", [1, 250, 251, 45_000])
+@pytest.mark.parametrize("count", [1, 1000, 1001, 45_000])
 def test_outermost_points_reach_as_far_in_every_direction(count):
     rng = np.random.default_rng(count)
     points = rng.normal(size=(count, 3)) * [5.0, 1.0, 2.0] + [100.0, 0.0, -7.0]
     chosen = outermost(points)
-    assert len(chosen) <= 256
+    assert len(chosen) <= 1006
     assert (chosen.min(axis=0) == points.min(axis=0)).all()
     assert (chosen.max(axis=0) == points.max(axis=0)).all()
     directions = rng.normal(size=(300, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     missed = (points @ directions.T).max(axis=0) - (chosen @ directions.T).max(axis=0)
     size = np.linalg.norm(np.ptp(points, axis=0))
-    assert missed.max() <= 0.01 * size
+    assert missed.max() <= 0.005 * size
 
 
 # Whom to follow

@@ -115,6 +115,6 @@ def test_markers_have_the_size_of_the_figure_not_of_the_picture(offscreen):
 def test_markers_of_actors_that_left_are_freed(offscreen):
     scene = alone(marked(CENTER))
     front_view(offscreen, scene, keypoints=True)
-    assert len(offscreen.renderer._keypoints) == 1
+    assert len(offscreen.renderer.buffers.keypoints) == 1
     front_view(offscreen, alone(grid_figure()), keypoints=True)
-    assert offscreen.renderer._keypoints == {}
+    assert len(offscreen.renderer.buffers.keypoints) == 0

@@ -176,6 +176,8 @@ def cancel(state: AppState) -> None:
     elif state.job is not None and state.job.can_cancel:
         state.job.cancel()
         state.say_status("Cancelled")
+    elif state.record is not None:
+        state.record = None
     elif state.stream is not None:
         state.stream.cancel()
         state.stream = None

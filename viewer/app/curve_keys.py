@@ -21,7 +21,7 @@ from viewer.app.curve_view import KeyPlace
 from viewer.rig.arrays import Floats
 from viewer.rig.clip import Channel, slopes
 
-__all__ = ["draw_handles", "draw_keys", "edit"]
+__all__ = ["draw_keys", "edit"]
 
 _CHOSEN, _HANDLE = (1.0, 1.0, 1.0, 1.0), (1.0, 0.85, 0.4, 1.0)
 _FAINT = (0.75, 0.75, 0.8, 0.8)
@@ -34,7 +34,11 @@ _FIXED = implot.DragToolFlags_.no_fit
 
 
 def draw_keys(plot: Plot) -> bool:
-    """Draw the keys of the shown curves; return whether the mouse is at one of them."""
+    """Draw keys and tangents; return whether the mouse is at one of them.
+
+    Of what lies at one place, ImGui gives the mouse to what comes first: chosen keys, tangents,
+    other keys.
+    """
     clip = clip_of(plot.state)
     if clip is None:
         return False
@@ -46,6 +50,8 @@ def draw_keys(plot: Plot) -> bool:
             values = plot.factor(row) * channel.values
             inside = (channel.times >= low) & (channel.times <= high)
             inside &= (values >= bottom) & (values <= top)
+            # A key that is dragged out of the plot is still held.
+            inside[[key for owner, key in plot.view.keys if owner == row]] = True
             seen.append((row, channel.times, values, np.flatnonzero(inside).tolist()))
     if sum(len(keys) for *_, keys in seen) > _MOST_KEYS:
         _draw_many(plot, seen)
@@ -55,10 +61,23 @@ def draw_keys(plot: Plot) -> bool:
         for row, times, values, keys in seen
         for key in keys
     ]
-    # What comes later lies on top, to be seen and to be taken hold of.
-    places.sort(key=lambda one: one[0] in plot.view.keys)
-    touched = [_draw_key(plot, *one) for one in places]
+    chosen = [one for one in places if one[0] in plot.view.keys]
+    touched = [_draw_key(plot, *one) for one in chosen]
+    touched.append(_draw_handles(plot))
+    touched += [_draw_key(plot, *one) for one in places if one not in chosen]
+    _mark(plot, chosen)
     return any(touched)
+
+
+def _mark(plot: Plot, chosen: list[tuple[KeyPlace, float, float]]) -> None:
+    """Draw the chosen keys once more, over everything."""
+    implot.push_plot_clip_rect()
+    for place, time, value in chosen:
+        middle, inner = implot.plot_to_pixels(time, value), plot.color(place[0])
+        draw_list = implot.get_plot_draw_list()
+        draw_list.add_circle_filled(middle, 6.0, imgui.get_color_u32(_CHOSEN))
+        draw_list.add_circle_filled(middle, 3.5, imgui.get_color_u32(inner))
+    implot.pop_plot_clip_rect()
 
 
 def _draw_many(plot: Plot, seen: list[tuple[int, Floats, Floats, list[int]]]) -> None:
@@ -85,8 +104,8 @@ def _draw_key(plot: Plot, place: KeyPlace, time: float, value: float) -> bool:
         (_FIRST_KEY_ID + row * _KEYS_PER_ROW + key) & 0x7FFFFFFF,
         time,
         value,
-        _CHOSEN if is_chosen else plot.color(row),
-        5.5 if is_chosen else 4.5,
+        plot.color(row),
+        4.5,
         _FIXED,
         False,
         False,
@@ -101,7 +120,7 @@ def _draw_key(plot: Plot, place: KeyPlace, time: float, value: float) -> bool:
     return bool(hovered or held)
 
 
-def draw_handles(plot: Plot) -> bool:
+def _draw_handles(plot: Plot) -> bool:
     """Draw the tangents of a key that is chosen alone; return whether the mouse is at one."""
     clip, view = clip_of(plot.state), plot.view
     if clip is None or len(view.keys) != 1:
@@ -153,6 +172,7 @@ def edit(plot: Plot, touched: bool) -> None:
     if clip is None or not implot.is_plot_hovered() or state.error or state.dialog is not None:
         return
     left, io = imgui.MouseButton_.left, imgui.get_io()
+    is_second = io.mouse_clicked_last_count[left] > 1
     was_dragged = io.mouse_drag_max_distance_sqr[left] >= io.mouse_drag_threshold**2
     adds = imgui.is_mouse_double_clicked(left) and not touched
     if adds or _is_pressed(imgui.Key.insert):
@@ -163,7 +183,7 @@ def edit(plot: Plot, touched: bool) -> None:
             add_key_at(state, [row], mouse.x)
     elif _is_pressed(imgui.Key.delete):
         delete_chosen(state)
-    elif imgui.is_mouse_released(left) and not touched and not was_dragged:
+    elif imgui.is_mouse_released(left) and not (touched or was_dragged or is_second):
         view.keys = frozenset()
 
 

@@ -13,7 +13,7 @@ from imgui_bundle import imgui, implot
 from viewer.app.curve_axes import Color, Plot, factor_of, measured
 from viewer.app.curve_data import Curve, channel_of, keyed_values, sampled_points
 from viewer.app.curve_edit import set_clip_range
-from viewer.app.curve_keys import draw_handles, draw_keys, edit
+from viewer.app.curve_keys import draw_keys, edit
 from viewer.app.state import AppState
 from viewer.rig.arrays import Floats
 from viewer.rig.clip import Clip
@@ -60,11 +60,11 @@ def _draw(state: AppState, curves: tuple[Curve, ...]) -> None:
     _draw_outside(plot)
     for row in view.rows:
         _draw_line(plot, row)
-    _draw_range(plot)
-    at_handle = draw_handles(plot)
-    at_key = draw_keys(plot)
+    # Of what lies at one place, ImGui gives the mouse to what comes first.
+    touched = draw_keys(plot)
     _draw_time(plot)
-    edit(plot, at_handle or at_key)
+    _draw_range(plot)
+    edit(plot, touched)
     _draw_units(plot)
 
 
@@ -102,7 +102,7 @@ def _fitting(state: AppState, curves: tuple[Curve, ...]) -> tuple[float, float, 
     values = np.concatenate(parts)
     values = values[np.isfinite(values)]
     bottom, top = (float(values.min()), float(values.max())) if len(values) else (-1.0, 1.0)
-    pad = _MARGIN * (top - bottom)
+    pad = 2.0 * _MARGIN * (top - bottom)
     # Rounding alone is no reason to fill the height with it.
     pad = pad if pad > 1e-6 * max(abs(top), 1e-6) else max(0.5 * abs(top), 0.5)
     return low, high, bottom - pad, top + pad

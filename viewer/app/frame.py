@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import moderngl
@@ -14,10 +15,12 @@ from imgui_bundle import imgui
 from viewer.app.actions import follow_actor
 from viewer.app.file_dialog import PICTURES, FileDialog, draw_file_dialog, folder_of
 from viewer.app.interface import draw_hints, draw_interface
+from viewer.app.jobs import FrameJob
 from viewer.app.keys import handle_keys
 from viewer.app.loader import Loader
 from viewer.app.mouse import handle_mouse
 from viewer.app.recent import remember
+from viewer.app.record_dialog import draw_record_dialog
 from viewer.app.state import AppState
 from viewer.app.stream import Stream
 from viewer.errors import RenderError, ViewerError, printable
@@ -85,6 +88,7 @@ class Frame:
         self._play()
         self._check_shapes()
         self.open(draw_interface(state))
+        draw_record_dialog(state)
         draw_file_dialog(state)
         self.open(state.wants_open)
         state.wants_open = []
@@ -320,6 +324,14 @@ class Frame:
             self.open([bundled_body()])
         if "screenshot" in state.wants:
             self._save_screenshot()
+        if state.wants_recording is not None and state.record is not None and state.job is None:
+            from viewer.app.recording import recording_steps
+
+            path, settings = state.wants_recording, replace(state.record)
+            steps = recording_steps(state, self.context, settings, path)
+            state.job = FrameJob(f"Recording {printable(path.name, 60)}", steps)
+            state.playback.playing, state.record = False, None
+        state.wants_recording = None
         state.wants -= {"open dialog", "open bundled", "open body", "screenshot"}
 
     def _save_screenshot(self) -> None:

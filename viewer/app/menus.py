@@ -19,6 +19,7 @@ from viewer.app.pose_actions import (
     save_export,
     save_pose,
 )
+from viewer.app.record_dialog import RecordSettings
 from viewer.app.state import AppState
 from viewer.app.widgets import begin_menu, menu_item, note_item
 from viewer.errors import ViewerError, printable
@@ -84,6 +85,8 @@ def _draw_file_menu(state: AppState) -> list[Path]:
         _ask_for_export(state)
     if menu_item(state, "Export motion…", enabled=state.actor in moving_actors(state)):
         _ask_for_motion(state)
+    if menu_item(state, "Record pictures or video…", enabled=state.job is None):
+        state.record = RecordSettings()
     if menu_item(state, "Save screenshot", "F12"):
         state.wants.add("screenshot")
     imgui.separator()

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from viewer.app.file_dialog import FileDialog
     from viewer.app.jobs import Job
     from viewer.app.loader import Loader
+    from viewer.app.record_dialog import RecordSettings
     from viewer.app.stream import Stream
 
 __all__ = ["AppState", "HeldVector", "Note", "Stats"]
@@ -105,6 +106,10 @@ class AppState:
         What the Curves panel shows.
     job : Job or None
         Work that goes on beside the frame loop.
+    record : RecordSettings or None
+        What the window "Record" asks for, while it is open.
+    wants_recording : Path or None
+        Where to record to, after the frame.
     stream : Stream or None
         Captures that are still being read.
     followed : (int, int) or None
@@ -144,6 +149,8 @@ class AppState:
     playback: Playback = field(default_factory=Playback)
     curves: CurveView = field(default_factory=CurveView)
     job: Job | None = None
+    record: RecordSettings | None = None
+    wants_recording: Path | None = None
     stream: Stream | None = None
     followed: tuple[int, int] | None = None
     followed_from: Floats | None = None

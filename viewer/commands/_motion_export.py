@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import re
 from pathlib import Path
 
 from viewer.commands._numbers import number
+from viewer.commands._shots import parse_range
 from viewer.errors import OutputError, RigError, UnsupportedFormatError, ViewerError, printable
 from viewer.export import EXPORTERS, MotionOptions, export_take, motion_exporters
 from viewer.export._options import GAPS, ROTATION_ORDERS, UNITS
@@ -37,7 +37,7 @@ def add_motion_arguments(parser: argparse.ArgumentParser) -> None:
         choices=[*EXPORTERS],
         help=f"what to write, where a suffix leaves a choice; motions: {', '.join(kinds)}",
     )
-    group.add_argument("--frames", metavar="A:B", help="frames A to B of the motion, B included")
+    group.add_argument("--frames", metavar="A:B", help="frames A to B - 1 of the motion, from 0")
     group.add_argument("--gaps", choices=GAPS, default="hold", help="missing frames: default hold")
     group.add_argument("--to-unit", choices=UNITS, help="unit of the file (BVH: default cm)")
     group.add_argument("--to-up", choices=("y", "z"), help="up axis of the file (BVH: default y)")
@@ -150,17 +150,14 @@ def _is_body(actor: Actor) -> bool:
     return skeleton is not None and member_of(tuple(skeleton.parents.tolist())) is not None
 
 
-def _frames(text: str | None) -> tuple[int, int] | None:
-    """Return the range of ``A:B``, both counted from 0, as first and one behind the last."""
+def _frames(text: str | None) -> tuple[int, int | None] | None:
+    """Return the range of ``A:B``: the first frame and the one behind the last."""
     if text is None:
         return None
-    found = re.fullmatch(r"(\d{1,9})(?::(\d{1,9}))?", text)
-    if not found:
-        raise ViewerError(f'--frames: expected A:B, found "{printable(text, 40)}"')
-    first, last = int(found[1]), int(found[2] or found[1])
-    if last < first:
-        raise ViewerError(f"--frames: expected A not above B, found {text}")
-    return first, last + 1
+    found = parse_range(text)
+    if found.step != 1:
+        raise ViewerError(f"--frames: expected A:B (--fps thins out), found {printable(text, 40)}")
+    return found.first, found.stop
 
 
 def check_frame_field(output: Path) -> None:

@@ -114,9 +114,7 @@ class CrowdBuffers:
         words = (*skinning_words(how), poses[0].shape_weights.tobytes())
         keys = [skinning_key(pose) for pose in poses]
         old = self._keys if words == self._words else []
-        changed = [
-            row for row, key in enumerate(keys) if row >= len(old) or key != old[row]
-        ]
+        changed = [row for row, key in enumerate(keys) if row >= len(old) or key != old[row]]
         self._how, self._words, self._keys, self.count = how, words, keys, len(poses)
         if not changed:
             return

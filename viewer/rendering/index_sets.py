@@ -88,8 +88,9 @@ def index_set(
         run = np.zeros(len(triangles), dtype=np.int64)
         run[edges] = 1
         places = curve_places(positions[triangles].mean(axis=1))
-        order = np.argsort((np.cumsum(run) << 3 * _CURVE_BITS) + places, kind="stable")
-    return IndexSet(buffer(context, triangles[order], "u4"), tuple(runs), order.astype(np.int32))
+        along = (np.cumsum(run) << 3 * _CURVE_BITS) + places
+        order = np.argsort(along, kind="stable").astype(np.int32)
+    return IndexSet(buffer(context, triangles[order], "u4"), tuple(runs), order)
 
 
 def curve_places(points: Floats) -> NDArray[np.int64]:

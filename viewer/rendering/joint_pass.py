@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import colorsys
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -20,7 +21,7 @@ from viewer.rig.pose import Pose, rest_pose, skinning_key
 from viewer.rig.shape import shaped
 from viewer.rig.skeleton import Skeleton
 
-__all__ = ["JointPass", "SkeletonBuffers", "draw_boxes", "joint_colors"]
+__all__ = ["JointPass", "SkeletonBuffers", "box_content", "draw_boxes", "joint_colors"]
 
 _HIGHLIGHT = (1.0, 0.55, 0.02)  # linear
 _CUBE_SIZE = 0.015  # of a skeleton without boxes
@@ -60,7 +61,7 @@ class SkeletonBuffers:
             self._colors = keep(buffer(context, joint_colors(skeleton.n_joints), "f4"))
             self.world = keep(matrix_texture(context, skeleton.n_joints))
         self.center: Floats = np.zeros(3)
-        self._array: moderngl.VertexArray | None = None
+        self._arrays: dict[int, moderngl.VertexArray] = {}
         self._key: tuple[bytes, ...] | None = None
 
     def update(self, pose: Pose) -> None:
@@ -91,20 +92,15 @@ class SkeletonBuffers:
 
     def array(self, program: moderngl.Program) -> moderngl.VertexArray:
         """Return the instanced cubes for a program."""
-        if self._array is None:
-            content = [
-                (self._cube, "3f4 3f4", "in_corner", "in_normal"),
-                (self._low, "3f4/i", "in_low"),
-                (self._high, "3f4/i", "in_high"),
-                (self._colors, "3f4/i", "in_color"),
-            ]
-            self._array = self.context.vertex_array(program, content)
-        return self._array
+        if id(program) not in self._arrays:
+            content = box_content(program, self._cube, self._low, self._high, self._colors)
+            self._arrays[id(program)] = self.context.vertex_array(program, content)
+        return self._arrays[id(program)]
 
     def release(self) -> None:
         """Free every buffer."""
-        if self._array is not None:
-            self._array.release()
+        for array in self._arrays.values():
+            array.release()
         self._owner.release()
 
 
@@ -174,6 +170,21 @@ class JointPass:
     def release(self) -> None:
         """Free the cube."""
         self.cube.release()
+
+
+def box_content(
+    program: moderngl.Program,
+    cube: moderngl.Buffer,
+    low: moderngl.Buffer,
+    high: moderngl.Buffer,
+    colors: moderngl.Buffer,
+) -> list[Any]:
+    """Return what a vertex array of boxes is made of: those attributes that the compiler kept."""
+    content: list[Any] = [(cube, "3f4 3f4", "in_corner", "in_normal")]
+    if "in_normal" not in program:
+        content = [(cube, "3f4 12x", "in_corner")]
+    content += [(low, "3f4/i", "in_low"), (high, "3f4/i", "in_high")]
+    return content + ([(colors, "3f4/i", "in_color")] if "in_color" in program else [])
 
 
 def draw_boxes(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 
-from viewer.rendering.joint_pass import JointPass, draw_boxes, joint_colors
+from viewer.rendering.joint_pass import JointPass, box_content, draw_boxes, joint_colors
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.ownership import Owner
 from viewer.rendering.upload import buffer, matrix_texture, write_matrices
@@ -64,12 +64,7 @@ class KeypointBuffers:
     def array(self, program: moderngl.Program) -> moderngl.VertexArray:
         """Return the instanced cubes for a program."""
         if id(program) not in self._arrays:
-            content = [
-                (self.cube, "3f4 3f4", "in_corner", "in_normal"),
-                (self.low, "3f4/i", "in_low"),
-                (self.high, "3f4/i", "in_high"),
-                (self.colors, "3f4/i", "in_color"),
-            ]
+            content = box_content(program, self.cube, self.low, self.high, self.colors)
             self._arrays[id(program)] = self.context.vertex_array(program, content)
         return self._arrays[id(program)]
 

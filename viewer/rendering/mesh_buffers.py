@@ -98,9 +98,7 @@ class MeshBuffers:
             self._index_sets[key] = self._make_index_set(*key)
         return self._index_sets[key]
 
-    def _make_index_set(
-        self, reduced: bool, hidden: tuple[int, ...], as_listed: bool
-    ) -> IndexSet:
+    def _make_index_set(self, reduced: bool, hidden: tuple[int, ...], as_listed: bool) -> IndexSet:
         mesh, coarse = self.figure.mesh, self.figure.reduced
         assert mesh is not None
         if reduced and coarse is not None:

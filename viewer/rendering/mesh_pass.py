@@ -161,9 +161,7 @@ def draw_runs(
         set_uniforms(array.program, {"u_textured": has_texture})
         if has_texture and run.texture is not None:
             run.texture.use(_TEXTURE_UNIT)
-        array.render(
-            moderngl.TRIANGLES, vertices=run.count, first=run.first, instances=instances
-        )
+        array.render(moderngl.TRIANGLES, vertices=run.count, first=run.first, instances=instances)
 
 
 def _premultiplied(color: tuple[float, float, float, float]) -> tuple[float, ...]:

@@ -35,7 +35,6 @@ _SIDES, _RINGS = 12, 3  # of a capsule: around, and from its equator to a pole
 _FLOATS = 11  # numbers of an instance
 
 
-
 def point_radii(points: Floats) -> Floats:
     """Return how large each point is drawn, by how far apart the points are.
 
@@ -67,9 +66,9 @@ def point_radii(points: Floats) -> Floats:
     if not sizes:
         return np.zeros(points.shape[1])
     size = float(np.median(sizes))
-    nearest = np.array(gaps)
-    nearest[~np.isfinite(nearest)] = np.inf
-    widest = np.median(nearest, axis=0)
+    seen_ever = ~np.isnan(gaps).all(axis=0)
+    widest = np.full(points.shape[1], np.inf)
+    widest[seen_ever] = np.nanmedian(np.array(gaps)[:, seen_ever], axis=0)
     return np.clip(_SPACING * widest, _SMALLEST * size, _LARGEST * size)
 
 
@@ -107,6 +106,7 @@ class PointBuffers:
         self._rows = self._owner.keep(context.buffer(reserve=4 * _FLOATS * max(room, 1)))
         self._arrays: dict[int, moderngl.VertexArray] = {}
         self._key: tuple[object, ...] | None = None
+        self._numbers: Ints = self.elements
         self._measured: tuple[object, Floats] | None = None
 
     def update(self, actor: Actor, placement: Floats, view: View, min_confidence: float) -> None:
@@ -144,8 +144,8 @@ class PointBuffers:
         """Return both ends and the opacity of everything that is drawn: (N, 2), (N,)."""
         limbs = self.layout.limbs
         single = np.flatnonzero(shown)
-        kept = np.flatnonzero(shown[limbs].all(axis=1)) if len(limbs) else np.zeros(0, np.int64)
-        ends = np.concatenate([np.stack([single, single], axis=1), limbs[kept].reshape(-1, 2)])
+        kept = np.flatnonzero(shown[limbs].all(axis=1))
+        ends = np.concatenate([np.stack([single, single], axis=1), limbs[kept]])
         self._numbers = np.concatenate([single, len(self.layout.names) + kept]).astype(np.int32)
         # A limb is as certain as its less certain end.
         return ends, np.clip(points[ends, 3].min(axis=1), 0.0, 1.0)
@@ -173,9 +173,7 @@ class PointBuffers:
         if id(program) not in self._arrays:
             layout = "3f4 3f4 f4 4f4/i" if "in_color" in program else "3f4 3f4 f4 16x/i"
             names = [
-                name
-                for name in ("in_start", "in_end", "in_radius", "in_color")
-                if name in program
+                name for name in ("in_start", "in_end", "in_radius", "in_color") if name in program
             ]
             content = [(capsule[0], "4f4", "in_corner"), (self._rows, layout, *names)]
             self._arrays[id(program)] = self.context.vertex_array(
@@ -241,11 +239,15 @@ class PointPass:
         set_lights(program, view, options.lights)
         set_uniforms(program, {"u_flat": False, "u_textured": False, "u_opacity": 1.0})
         array, count = points.array(program, self.capsule), len(points.elements)
+        # What is translucent shows its front alone; a mirroring placement turns triangles round.
+        is_mirrored = bool(np.linalg.det(placement[:3, :3]) < 0.0)
+        self.context.front_face = "cw" if is_mirrored else "ccw"
         self.context.enable(moderngl.CULL_FACE)
         if overlays:
             self._draw_hidden(array, count, options.skeleton_opacity)
         array.render(moderngl.TRIANGLES, instances=count)
         self.context.disable(moderngl.CULL_FACE)
+        self.context.front_face = "ccw"
 
     def _draw_hidden(self, array: moderngl.VertexArray, count: int, opacity: float) -> None:
         target = self.context.fbo
@@ -276,8 +278,8 @@ def _capsule() -> tuple[Floats, Ints]:
         for tilt in tilts[::-1] if end == 0.0 else tilts:
             around = 2.0 * math.pi * np.arange(_SIDES) / _SIDES
             flat, height = math.cos(tilt), (2.0 * end - 1.0) * math.sin(tilt)
-            ring = [flat * np.cos(around), flat * np.sin(around)]
-            rows.append(np.stack([*ring, np.full(_SIDES, height), np.full(_SIDES, end)], axis=1))
+            x, y = flat * np.cos(around), flat * np.sin(around)
+            rows.append(np.stack([x, y, np.full(_SIDES, height), np.full(_SIDES, end)], axis=1))
     ring, side = np.divmod(np.arange((len(rows) - 1) * _SIDES), _SIDES)
     here, right = ring * _SIDES + side, ring * _SIDES + (side + 1) % _SIDES
     above, corner = here + _SIDES, right + _SIDES

@@ -84,9 +84,7 @@ class SummedOffsets:
         """Multiply the weights of all changed instances by the offsets, at once."""
         product, size = self.mesh.product, 3 * len(self.mesh.copies)
         if len(self._sums) < count:
-            grown = np.zeros((count, size), "f4")
-            grown[: len(self._sums)] = self._sums
-            self._sums, rows = grown, np.arange(count)
+            self._sums, rows = np.zeros((count, size), "f4"), np.arange(count)
         weights = self._weights[rows]
         total = np.zeros((len(rows), size), "f4")
         for run in active_rows(np.abs(weights).max(axis=0)):

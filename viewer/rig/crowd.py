@@ -65,8 +65,8 @@ def worlds(skeleton: Skeleton, poses: Sequence[Pose], rotations: Floats | None =
     moves = np.flatnonzero(skeleton.dof_kinds < _FIRST_ROTATION)
     if len(moves):
         dofs = np.stack([pose.dofs[moves] for pose in poses])
-        place = (slice(None), skeleton.dof_joints[moves], skeleton.dof_kinds[moves])
-        np.add.at(shifts, place, dofs)
+        every = np.arange(len(poses))[:, None]
+        np.add.at(shifts, (every, skeleton.dof_joints[moves], skeleton.dof_kinds[moves]), dofs)
     local[..., :3, 3] = np.swapaxes(skeleton.rest_translations + shifts, 0, 1)
     return np.swapaxes(forward_kinematics(skeleton.parents, local), 0, 1)
 

@@ -49,7 +49,7 @@ class Take:
 def take_of(
     actor: Actor,
     rate: float | None = None,
-    frames: tuple[int, int] | None = None,
+    frames: tuple[int, int | None] | None = None,
     fill: bool = False,
 ) -> Take:
     """Sample an actor's clip at a fixed rate.
@@ -61,8 +61,8 @@ def take_of(
     rate : float, optional
         Frames a second; the clip's own if omitted, so that captured frames come back exactly.
     frames : (int, int), optional
-        First frame and the one behind the last, counted from the clip's start at that rate; all
-        if omitted.
+        First frame and the one behind the last (None: the clip's end), counted from the clip's
+        start at that rate; all if omitted.
     fill : bool
         Bridge gaps: rotations on the shorter arc.
 
@@ -77,7 +77,10 @@ def take_of(
     own = frame_rate(motion) if isinstance(motion, SampledClip) else DEFAULT_RATE
     rate = own if rate is None else rate
     count = int(np.floor((motion.end - motion.start) * rate + 1e-6)) + 1
-    first, stop = (0, count) if frames is None else frames
+    first, stop = (0, None) if frames is None else frames
+    stop = count if stop is None else stop
+    if isinstance(motion, SampledClip):
+        stop = min(stop, count)  # curves go on behind their keys, captures do not
     if not 0 <= first < stop:
         raise RigError(f"frames: expected a range within 0 to {count}, found {first} to {stop}")
     times: Floats = motion.start + np.arange(first, stop) / rate
@@ -90,7 +93,7 @@ def upright_take(
     scene: Scene,
     actor: Actor,
     rate: float | None = None,
-    frames: tuple[int, int] | None = None,
+    frames: tuple[int, int | None] | None = None,
     fill: bool = False,
 ) -> tuple[Take, str]:
     """Sample an actor's clip, stood up where its own world hangs head down.

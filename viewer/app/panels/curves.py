@@ -27,11 +27,12 @@ from viewer.rig.clip import EXTRAPOLATIONS, TANGENT_RULES, Channel, Clip, slopes
 
 __all__ = ["draw"]
 
-_LIST_WIDTH, _SIDE_WIDTH, _FIELD = 10.0, 13.0, 7.0  # letters' heights
+_LIST_WIDTH, _SIDE_WIDTH, _FIELD = 10.0, 20.0, 5.8  # letters' heights
 _MODES: dict[str, str] = {mode: mode.replace("_", " ") for mode in EXTRAPOLATIONS}
 _TANGENTS: dict[str, str] = {rule: rule for rule in TANGENT_RULES} | {"number": "number"}
 _SIDES = ("In", "Out")
 _FARTHEST = 1e9  # that can be typed
+_WIDE = "M" * 8  # about as wide as a field with its label
 _HINT = "Double-click adds a key. Drag keys and tangents; Delete removes keys, Shift takes more."
 
 
@@ -49,7 +50,9 @@ def draw(state: AppState) -> None:
     imgui.end_child()
     imgui.same_line()
     # Beside the plot, not above it: what appears there must not push a key from under the mouse.
-    side = _SIDE_WIDTH * imgui.get_font_size() if clip_of(state) is not None else 0.0
+    room, side = imgui.get_content_region_avail().x, 0.0
+    if clip_of(state) is not None:
+        side = min(_SIDE_WIDTH * imgui.get_font_size(), 0.45 * room)
     if imgui.begin_child("##plot", (-side, 0.0)):
         _draw_tools(state)
         draw_plot(state, curves)
@@ -207,6 +210,8 @@ def _draw_modes(state: AppState) -> None:
     if channel is None:
         return
     for side, text in enumerate(("Before", "After")):
+        if side:
+            same_line_if_room(_WIDE)
         now = channel.extrapolation[side]
         new = choice(state, text, now, _MODES)
         _explain("of the curves with chosen keys, or else of all that are shown")
@@ -227,13 +232,19 @@ def _draw_key_fields(state: AppState, curves: tuple[Curve, ...]) -> None:
         return
     factor = factor_of(state, curves[place[0]])
     more = f" and {len(view.keys) - 1} more" * (len(view.keys) > 1)
+    if button(state, "Delete"):
+        delete_chosen(state)
+        return
+    imgui.same_line()
     imgui.text_unformatted(f"{curves[place[0]].label}, key {place[1]}{more}")
     if len(view.keys) == 1:
         _draw_numbers(state, channel, place, factor)
     for side, text in enumerate(_SIDES):
-        _draw_tangent(state, channel, place, side, text, factor)
-    if button(state, "Delete"):
-        delete_chosen(state)
+        if side:
+            same_line_if_room(_WIDE)
+        _draw_rule(state, channel, place, side, text)
+    if len(view.keys) == 1:
+        _draw_slopes(state, channel, place, factor)
 
 
 def _field(state: AppState, label: str, value: float) -> float | None:
@@ -250,28 +261,35 @@ def _draw_numbers(state: AppState, channel: Channel, place: KeyPlace, factor: fl
     time = _field(state, "Time", float(channel.times[key]))
     if time is not None:
         place_key(state, place, time=time)
+    same_line_if_room(_WIDE)
     value = _field(state, "Value", factor * float(channel.values[key]))
     if value is not None:
         place_key(state, place, value=value / factor)
 
 
-def _draw_tangent(
-    state: AppState, channel: Channel, place: KeyPlace, side: int, text: str, factor: float
-) -> None:
-    """Draw one side's rule, and its slope if that is a number."""
-    tangent, slope = channel.tangents[place[1]][side], float(slopes(channel)[place[1], side])
-    now, keys = tangent if isinstance(tangent, str) else "number", state.curves.keys
+def _draw_rule(state: AppState, channel: Channel, place: KeyPlace, side: int, text: str) -> None:
+    """Draw how the tangent on one side is found."""
+    tangent = channel.tangents[place[1]][side]
+    now = tangent if isinstance(tangent, str) else "number"
     new = choice(state, text, now, _TANGENTS)
     if new == "number" != now:
         # The slope that the rule gave: the curve stays as it is.
-        turn_tangent(state, [place], side, slope)
+        turn_tangent(state, [place], side, float(slopes(channel)[place[1], side]))
     for rule in TANGENT_RULES:
         if new == rule != now:
-            turn_tangent(state, keys, side, rule)
-    if now == "number" and len(keys) == 1:
-        typed = _field(state, f"{text} slope", factor * slope)
+            turn_tangent(state, state.curves.keys, side, rule)
+
+
+def _draw_slopes(state: AppState, channel: Channel, place: KeyPlace, factor: float) -> None:
+    """Draw the slopes of tangents that are numbers, per second."""
+    pair = channel.tangents[place[1]]
+    given = [(side, slope) for side, slope in enumerate(pair) if not isinstance(slope, str)]
+    for number, (side, slope) in enumerate(given):
+        if number:
+            same_line_if_room(_WIDE)
+        typed = _field(state, f"{_SIDES[side]} slope", factor * slope)
         if typed is not None:
-            turn_tangent(state, keys, side, typed / factor)
+            turn_tangent(state, [place], side, typed / factor)
 
 
 def _explain(text: str) -> None:

@@ -1,0 +1,510 @@
+"""``viewer render`` of motions: numbered pictures, videos, contact sheets; never half a file."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from app.tiny import write_rig
+from PIL import Image
+
+import viewer
+from viewer.cli import run
+from viewer.commands._shots import Range, Turntable, parse_range, parse_turntable
+from viewer.rig.motion import pose_actor
+
+av = pytest.importorskip("av")
+ROOT = Path(__file__).resolve().parents[2]
+NOTHING_MOVES = "nothing moves: no file is a clip (--turntable turns the camera)"
+
+
+def anim_text(end: float, channels: int, moving: dict[int, tuple[float, float]]) -> str:
+    """Return a clip from 0 to ``end`` whose channels stay 0, or go from one value to another."""
+    lines = ["animation {", f"range 0 {end}", f"numchannels {channels}"]
+    for channel in range(channels):
+        low, high = moving.get(channel, (0.0, 0.0))
+        keys = f"0 {low} linear linear\n{end} {high} linear linear"
+        lines.append(f"channel {{\nextrapolate constant constant\nkeys 2 {{\n{keys}\n}}\n}}")
+    return "\n".join([*lines, "}"])
+
+
+@pytest.fixture
+def walk(tmp_path) -> list[str]:
+    """Files of the tiny rig and a clip of 1 s: it goes 4 along x, and its arm turns."""
+    files = write_rig(tmp_path)
+    clip = tmp_path / "walk.anim"
+    # Three translations, then x, y, z of the root and of the arm.
+    clip.write_text(anim_text(1.0, 9, {0: (0.0, 4.0), 8: (0.0, 1.5)}))
+    return [str(path) for path in (*files, clip)]
+
+
+@pytest.fixture
+def fox(tmp_path) -> list[str]:
+    """The bundled fox's files, and a clip of half a second that turns its head."""
+    from viewer.loading import bundled_files
+
+    channels = 3 + 3 * viewer.load().actors[0].figure.skeleton.n_joints
+    clip = tmp_path / "fox.anim"
+    clip.write_text(anim_text(0.5, channels, {2: (0.0, 0.3), 4: (0.0, 0.6)}))
+    return [*map(str, bundled_files()), str(clip)]
+
+
+@pytest.fixture
+def draw(tmp_path, capsys):
+    """Return a function that renders files into a name with options, and returns what is said."""
+
+    def command(files, name, *options, size="64x48", code=0):
+        out = str(tmp_path / name)
+        found = run(["render", *files, "-o", out, "--size", size, *options])
+        said = capsys.readouterr()
+        assert found == code, said.err
+        return said
+
+    return command
+
+
+def picture(path) -> np.ndarray:
+    return np.array(Image.open(path).convert("RGBA")).astype(int)
+
+
+def n_frames(path) -> int:
+    with Image.open(path) as animation:
+        return animation.n_frames
+
+
+def frames(path) -> list[np.ndarray]:
+    with av.open(str(path)) as container:
+        return [f.to_ndarray(format="rgb24").astype(int) for f in container.decode(video=0)]
+
+
+def names(folder, *suffixes) -> list[str]:
+    return sorted(path.name for path in folder.iterdir() if path.suffix in suffixes)
+
+
+def single(files, seconds, camera, box, size=(64, 48), **options) -> np.ndarray:
+    """Return the picture of one time, drawn without this command's code."""
+    from viewer.rendering.offscreen import Offscreen
+
+    scene = viewer.load(*files)
+    for actor in scene.actors:
+        pose_actor(actor, seconds)
+    with Offscreen() as offscreen:
+        shown = viewer.DisplayOptions(**options)
+        return offscreen.render(scene, size, camera, shown, box).astype(int)
+
+
+# Numbered pictures
+
+
+def test_numbered_pictures_are_the_frames(draw, walk, tmp_path):
+    said = draw(walk, "f_{frame:03}.png", "--frames", "0:31:15", "--no-grid", "--follow", "root")
+    assert said.out.startswith(f"{tmp_path / 'f_000.png'} to f_030.png: 3 frames, 0.1 s, 64 x 48")
+    assert said.err == "" and names(tmp_path, ".png") == ["f_000.png", "f_015.png", "f_030.png"]
+    # The camera goes with the root, so that only the arm and what lies behind seem to move.
+    first, last = picture(tmp_path / "f_000.png"), picture(tmp_path / "f_030.png")
+    assert (first != last).any()
+    np.testing.assert_allclose(first[40:], last[40:], atol=60)
+
+
+def test_sequence_shows_the_same_as_single_frames(draw, walk, tmp_path):
+    """At a given distance only the target is fitted: that of the middle of all frames."""
+    options = ("--distance", "30", "--no-grid", "--background", "transparent")
+    draw(walk, "{frame}.png", "--frames", "0:31", *options)
+    assert len(names(tmp_path, ".png")) == 31
+    scene = viewer.load(*walk)
+    clouds = []
+    for frame in range(31):
+        pose_actor(scene.actors[0], frame / 30)
+        clouds.append(viewer.deform(scene.actors[0].figure, scene.actors[0].pose)[0])
+    cloud = np.concatenate(clouds)
+    box = np.array([cloud.min(axis=0), cloud.max(axis=0)])
+    camera = viewer.Camera(box.mean(axis=0), 30.0)
+    for frame in (0, 7, 30):
+        wanted = single(walk, frame / 30, camera, box, grid=False, background="transparent")
+        assert (picture(tmp_path / f"{frame}.png") == wanted).all(), frame
+
+
+def test_whole_motion_is_in_the_picture(draw, walk, tmp_path):
+    draw(walk, "{frame}.png", "--no-grid", "--background", "transparent", size="128x72")
+    assert len(names(tmp_path, ".png")) == 31
+    drawn = sum(picture(tmp_path / f"{frame}.png")[..., 3] for frame in range(31)) > 0
+    rows, columns = np.flatnonzero(drawn.any(axis=1)), np.flatnonzero(drawn.any(axis=0))
+    room = columns[0], 127 - columns[-1], rows[0], 71 - rows[-1]
+    # Nothing is cut off, and on the side that decides there is no more room than 8 %.
+    assert 1 <= min(room) <= 6
+
+
+@pytest.mark.parametrize(
+    ("options", "wanted"),
+    [
+        (["--frames", "2:5"], [2, 3, 4]),
+        (["--frames", ":3"], [0, 1, 2]),
+        (["--frames", "28:"], [28, 29, 30]),
+        (["--frames", "5:30:10"], [5, 15, 25]),
+        (["--frames", "0:3", "--fps", "2"], [0, 1, 2]),
+        (["--fps", "2"], [0, 1, 2]),
+        (["--turntable", "0.1"], [0, 1, 2]),
+        (["--turntable", "90deg", "--frames", "4:6"], [4, 5]),
+    ],
+)
+def test_frames_are_counted_from_0_as_fps_counts(draw, walk, tmp_path, options, wanted):
+    draw(walk, "{frame}.png", *options, size="16x16")
+    assert names(tmp_path, ".png") == sorted(f"{frame}.png" for frame in wanted)
+
+
+def test_frames_behind_the_end_are_drawn_and_said(draw, walk, tmp_path):
+    said = draw(walk, "{frame}.png", "--frames", "29:33", size="16x16")
+    assert said.err == "warning: --frames: frames 31 to 32 are behind the motion's end\n"
+    assert len(names(tmp_path, ".png")) == 4
+
+
+def test_braces_twice_are_braces(draw, walk, tmp_path):
+    draw(walk, "{{x}}_{frame:02d}.png", "--frames", "0:2", size="16x16")
+    assert names(tmp_path, ".png") == ["{x}_00.png", "{x}_01.png"]
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "x.png",
+        "x_{frme}.png",
+        "x_{frame.real}.png",
+        "x_{frame!r}.png",
+        "x_{frame:x}.png",
+        "{frame:999}.png",
+        "{frame}{.png",
+        "{frame}_{0}.png",
+        "x_{frame:05.png",
+    ],
+)
+def test_bad_names_are_refused_before_any_work(draw, tmp_path, name):
+    said = draw(["missing.skel"], name, "--frames", "0:2", code=2)
+    assert said.err == (
+        "viewer: --output: expected {frame} or {frame:05} in the name of numbered pictures, as "
+        f'frame_{{frame:05}}.png, found "{tmp_path / name}"\n'
+    )
+
+
+@pytest.mark.parametrize("text", ["5", "5:2", "5:5", "-1:3", "a:b", "0:5:0", "1:2:3:4", "", "٣:٤"])
+def test_bad_ranges_are_one_line(draw, walk, text):
+    said = draw(walk, "{frame}.png", f"--frames={text}", code=2)
+    assert said.err == (
+        f'viewer: --frames: expected A:B or A:B:STEP with A below B, as 0:100, found "{text}"\n'
+    )
+
+
+def test_range_that_begins_behind_the_end_says_how_many_there_are(draw, walk):
+    said = draw(walk, "{frame}.png", "--frames", "31:", code=2)
+    assert said.err == "viewer: --frames: there are 31 frames, 0 to 30\n"
+
+
+def test_ranges_and_turntables_are_read():
+    assert parse_range("3:") == Range(3, None, 1) and parse_range(" :9:2") == Range(0, 9, 2)
+    assert parse_turntable("2.5") == Turntable(360.0, 2.5) == parse_turntable("2.5s")
+    assert parse_turntable("-45deg") == Turntable(-45.0, None)
+
+
+@pytest.mark.parametrize("text", ["0", "-3", "0deg", "nan", "fox.skel", "1e9", "99999deg"])
+def test_bad_turntables_are_one_line(draw, walk, text):
+    said = draw(walk, "x.mp4", f"--turntable={text}", code=2)
+    assert said.err == (
+        f'viewer: --turntable: expected seconds, as 6, or degrees, as 90deg, found "{text}"\n'
+    )
+
+
+# Videos
+
+
+@pytest.mark.parametrize("suffix", [".mp4", ".webm", ".gif"])
+def test_video_shows_the_whole_clip(draw, fox, tmp_path, suffix):
+    path = tmp_path / f"head{suffix}"
+    said = draw(fox, path.name)
+    wanted = f"{path}: 16 frames, 0.533 s, 64 x 48, 30 frames a second, "
+    assert said.out.startswith(wanted) and said.out.endswith(" MB\n")
+    shown = frames(path)
+    assert len(shown) == 16 and shown[0].shape == (48, 64, 3)
+    draw(fox, "{frame}.png")
+    for frame in (0, 8, 15):
+        difference = np.abs(shown[frame] - picture(tmp_path / f"{frame}.png")[..., :3])
+        # Half the resolution in colours, or 256 of them.
+        assert difference.mean() < 4.0, frame
+    assert np.abs(shown[0] - shown[15]).mean() > 1.0
+
+
+@pytest.mark.parametrize(
+    ("options", "count", "rate"),
+    [
+        (["--fps", "10"], 11, 10),
+        (["--frames", "10:20"], 10, 30),
+        (["--frames", "0:20:4"], 5, 30),
+        (["--speed", "0.5"], 61, 30),
+        (["--speed", "2"], 16, 30),
+        (["--speed", "-1", "--frames", "0:10"], 10, 30),
+        (["--turntable"], 31, 30),
+        (["--turntable", "2"], 60, 30),
+        (["--turntable", "1", "--fps", "12.5"], 12, 12.5),
+    ],
+)
+def test_video_has_as_many_frames_as_asked_for(draw, walk, tmp_path, options, count, rate):
+    draw(walk, "x.mp4", *options, size="32x32")
+    with av.open(str(tmp_path / "x.mp4")) as container:
+        assert float(container.streams.video[0].average_rate) == rate
+    assert len(frames(tmp_path / "x.mp4")) == count
+
+
+def test_speed_below_0_plays_backwards(draw, walk, tmp_path):
+    draw(walk, "there.mp4", "--frames", "0:20", "--quality", "95")
+    draw(walk, "back.mp4", "--frames", "0:20", "--quality", "95", "--speed", "-1")
+    there, back = frames(tmp_path / "there.mp4"), frames(tmp_path / "back.mp4")
+    assert np.abs(there[0] - back[-1]).mean() < 2.0 and np.abs(there[-1] - back[0]).mean() < 2.0
+    assert np.abs(there[0] - back[0]).mean() > 4.0
+
+
+def test_turntable_needs_no_motion_and_ends_where_it_begins(draw, tmp_path):
+    draw([], "x.mp4", "--turntable", "1", "--no-grid", "--quality", "95")
+    shown = frames(tmp_path / "x.mp4")
+    assert len(shown) == 30
+    steps = [np.abs(a - b).mean() for a, b in zip(shown, [*shown[1:], shown[0]], strict=True)]
+    # The step from the last frame to the first is like the others, and none stands still.
+    assert min(steps) > 0.3 * max(steps)
+
+
+def test_turntable_of_one_frame_of_a_motion(draw, walk, tmp_path):
+    draw(walk, "x.mp4", "--turntable", "0.2", "--frame", "15", "--no-grid")
+    draw(walk, "x.png", "--frame", "15", "--no-grid")
+    assert len(frames(tmp_path / "x.mp4")) == 6
+
+
+def test_gif_of_what_does_not_move_is_a_picture(draw, walk, tmp_path):
+    draw(walk[:2], "still.gif")
+    draw(walk, "frame.gif", "--frame", "3")
+    draw(walk, "moving.gif", size="32x32")
+    found = [n_frames(tmp_path / f"{name}.gif") for name in ("still", "frame", "moving")]
+    assert found == [1, 1, 31]
+
+
+def test_gif_of_many_frames_a_second_says_how_many_it_shows(draw, walk, tmp_path):
+    said = draw(walk, "x.gif", "--fps", "100", size="32x32")
+    assert said.err == ("warning: GIFs show at most 50 frames a second: drawn at 50, not 100\n")
+    assert "51 frames, 1.02 s" in said.out and n_frames(tmp_path / "x.gif") == 51
+
+
+def test_transparent_videos(draw, fox, tmp_path):
+    said = draw(fox, "x.mp4", "--background", "transparent", "--no-grid")
+    shown = f"{tmp_path / 'x.mp4'}: this format knows no transparency; drawn on black"
+    assert said.err == f"warning: {shown}\n"
+    assert frames(tmp_path / "x.mp4")[0][0, 0].max() <= 3
+    said = draw(fox, "x.webm", "--background", "transparent", "--no-grid")
+    assert said.err == ""
+    with av.open(str(tmp_path / "x.webm")) as container:
+        assert container.streams.video[0].metadata["alpha_mode"] == "1"
+    draw(fox, "x.gif", "--background", "transparent", "--no-grid")
+    with Image.open(tmp_path / "x.gif") as shown:
+        alpha = np.array(shown.convert("RGBA"))[..., 3]
+    assert alpha[0, 0] == 0 and alpha.max() == 255
+
+
+def test_options_that_a_motion_overrides_are_said(draw, walk):
+    said = draw(walk, "x.mp4", "--dof", "arm.x=1", "--mirror", size="32x32")
+    assert said.err.splitlines() == [
+        "warning: --dof: only figures without a motion keep it",
+        "warning: --mirror: only figures without a motion keep it",
+    ]
+
+
+# Contact sheets
+
+
+def test_contact_sheet_spreads_frames_over_the_motion(draw, walk, tmp_path):
+    said = draw(walk, "sheet.png", "--contact-sheet", "4", size="240x180")
+    assert said.out.startswith(f"{tmp_path / 'sheet.png'}: 4 frames of 120 x 90, ")
+    sheet = picture(tmp_path / "sheet.png")
+    assert sheet.shape == (180, 240, 4)
+    draw(walk, "{frame}.png", "--frames", "0:31:10", size="120x90")
+    for index, frame in enumerate((0, 10, 20, 30)):
+        row, column = divmod(index, 2)
+        cell = sheet[90 * row : 90 * row + 70, 120 * column : 120 * column + 120]
+        assert (cell == picture(tmp_path / f"{frame}.png")[:70]).all(), frame
+
+
+def test_contact_sheet_of_few_frames_has_no_more(draw, walk, tmp_path):
+    said = draw(walk, "sheet.png", "--contact-sheet", "9", "--frames", "0:3", size="240x180")
+    assert ": 3 frames of " in said.out
+
+
+def test_contact_sheet_of_a_turntable(draw, tmp_path):
+    said = draw([], "sheet.png", "--contact-sheet", "8", "--turntable", size="320x160")
+    assert ": 8 frames of 80 x 80, " in said.out
+
+
+# What does not go together
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "words"),
+    [
+        ("x.mp4", "", NOTHING_MOVES),
+        ("{frame}.png", "--frames 0:3", NOTHING_MOVES),
+        ("x.gif", "--speed 2", NOTHING_MOVES),
+        ("x.mp4", "--turntable --frames 0:3", "--frames: no file is a clip"),
+        ("x.png", "--speed 2", "--speed: only videos have one: .mp4, .webm, .gif"),
+        ("{frame}.png", "--quality 9", "--quality: only videos have one: .mp4, .webm, .gif"),
+        (
+            "x.gif",
+            "--quality 9 --turntable",
+            "--quality: a GIF has one quality; .mp4 and .webm have more",
+        ),
+        ("x.mp4", "--quality 900 --turntable", "video quality: expected 0 to 100, found 900"),
+        ("x.mp4", "--speed 0", "--speed: expected 0.001 to 1000 or their negatives, found 0"),
+        (
+            "x.png",
+            "--follow root",
+            "--follow: expected a video, contact sheet or numbered pictures",
+        ),
+        (
+            "x.mp4",
+            "--follow who --turntable",
+            'no actor, joint or point is called "who"; actors: tiny',
+        ),
+        (
+            "x.mp4",
+            "--panels",
+            "--panels: draws one picture; videos and sequences have no panels",
+        ),
+        (
+            "x.mp4",
+            "--contact-sheet 4",
+            "--contact-sheet: is a picture, as .png; found the name of a video",
+        ),
+        ("x.png", "--contact-sheet 0", "--contact-sheet: expected 1 to 1000 frames, found 0"),
+        (
+            "x.png",
+            "--contact-sheet 500 --turntable",
+            "contact sheet: 500 frames in 64 x 48 pixels are 2 x 2 each, which is too small to "
+            "see anything",
+        ),
+        (
+            "x.mp4",
+            "--frames 0:3 --frame 1",
+            "--frames and --frame: expected one of them, found both",
+        ),
+        (
+            "x.mp4",
+            "--frames 0:3 --time 1",
+            "--frames and --time: expected one of them, found both",
+        ),
+        (
+            "x.mp4",
+            "--turntable 99999 --fps 1000",
+            "expected at most 1,000,000 frames, found 99,999,000",
+        ),
+    ],
+)
+def test_options_without_sense_are_one_line(draw, walk, tmp_path, name, options, words):
+    said = draw(walk[:2], name, *options.split(), code=2)
+    assert said.err == f"viewer: {words}\n"
+    assert names(tmp_path, ".png", ".mp4", ".gif") == []
+
+
+def test_missing_library_is_one_line(draw, walk, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "av", None)
+    said = draw(walk, "x.mp4", code=2)
+    assert said.err == (
+        'viewer: videos need PyAV, which is not installed: pip install "skinning-viewer[video]"\n'
+    )
+    draw(walk, "{frame}.png", "--frames", "0:2", size="16x16")  # pictures need no such thing
+
+
+# Files
+
+
+def test_existing_files_are_checked_before_anything_is_drawn(draw, walk, tmp_path):
+    (tmp_path / "f_2.png").write_bytes(b"precious")
+    said = draw(walk, "f_{frame}.png", "--frames", "0:3", size="16x16", code=5)
+    assert said.err == (f"viewer: {tmp_path / 'f_2.png'}: exists already (--force replaces it)\n")
+    assert names(tmp_path, ".png") == ["f_2.png"]
+    draw(walk, "f_{frame}.png", "--frames", "0:3", "--force", size="16x16")
+    assert len(names(tmp_path, ".png")) == 3 and picture(tmp_path / "f_2.png").shape == (16, 16, 4)
+
+
+@pytest.mark.parametrize("name", ["x.mp4", "x.gif", "x.webm"])
+def test_existing_video_is_replaced_only_with_force(draw, walk, tmp_path, name):
+    (tmp_path / name).write_bytes(b"precious")
+    draw(walk, name, size="16x16", code=5)
+    assert (tmp_path / name).read_bytes() == b"precious"
+    draw(walk, name, "--force", size="16x16")
+    assert len(frames(tmp_path / name)) == 31
+
+
+def test_inputs_are_never_replaced(draw, tmp_path):
+    skel, skin = write_rig(tmp_path)
+    clip = tmp_path / "walk_1.png"  # a clip under the name of a picture
+    clip.write_text(anim_text(1.0, 9, {}))
+    kept = clip.read_bytes()
+    said = draw([str(skel), str(skin), str(clip)], "walk_{frame}.png", "--force", code=5)
+    assert said.err == f"viewer: {clip}: is an input file, which is never replaced\n"
+    assert clip.read_bytes() == kept and names(tmp_path, ".png") == ["walk_1.png"]
+
+
+@pytest.mark.parametrize("name", ["no/{frame}.png", "no/x.mp4", "no/x.gif"])
+def test_missing_folder_is_said_before_anything_is_drawn(draw, walk, tmp_path, name):
+    said = draw(walk, name, code=5)
+    wanted = str(tmp_path / name).replace("{frame}", "0")
+    assert said.err == f"viewer: {wanted}: the folder {tmp_path / 'no'} does not exist\n"
+
+
+def start(walk, tmp_path, name) -> subprocess.Popen:
+    command = [sys.executable, "-m", "viewer", "render", *walk, "-o", str(tmp_path / name)]
+    options = ["--turntable", "200", "--size", "320x240", "--force"]
+    return subprocess.Popen(
+        [*command, *options], env={**os.environ, "PYTHONPATH": str(ROOT)}, stderr=subprocess.PIPE
+    )
+
+
+def wait_for(condition) -> None:
+    end = time.monotonic() + 60
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+@pytest.mark.parametrize(
+    ("number", "code", "word"),
+    [(signal.SIGINT, 130, b"interrupted"), (signal.SIGTERM, 143, b"terminated")],
+)
+@pytest.mark.parametrize("name", ["x.mp4", "x.webm", "x.gif"])
+def test_interrupted_video_leaves_nothing(walk, tmp_path, name, number, code, word):
+    (tmp_path / name).write_bytes(b"precious")
+    process = start(walk, tmp_path, name)
+    suffix = name[1:]
+    wait_for(lambda: len(names(tmp_path, suffix)) > 1)  # the temporary one has begun
+    time.sleep(0.3)
+    process.send_signal(number)
+    _, error = process.communicate(timeout=60)
+    assert (process.returncode, error.splitlines()[-1]) == (code, b"viewer: " + word)
+    assert names(tmp_path, suffix) == [name] and (tmp_path / name).read_bytes() == b"precious"
+
+
+def test_interrupted_sequence_leaves_whole_pictures(walk, tmp_path):
+    process = start(walk, tmp_path, "{frame:04}.png")
+    wait_for(lambda: (tmp_path / "0005.png").exists())
+    process.send_signal(signal.SIGINT)
+    _, error = process.communicate(timeout=60)
+    assert (process.returncode, error) == (130, b"viewer: interrupted\n")
+    found = names(tmp_path, ".png")
+    assert found == [f"{frame:04}.png" for frame in range(len(found))]
+    assert all(picture(tmp_path / name).shape == (240, 320, 4) for name in found)
+
+
+def test_wasp_walks(draw, shared, tmp_path):
+    files = [str(shared / name) for name in ("wasp.skel", "wasp.skin", "wasp_walk.anim")]
+    said = draw(files, "walk.mp4", size="160x90")
+    assert ": 121 frames, 4.03 s, 160 x 90, 30 frames a second, " in said.out
+    shown = frames(tmp_path / "walk.mp4")
+    assert len(shown) == 121 and np.abs(shown[0] - shown[60]).mean() > 1.0

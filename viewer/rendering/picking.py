@@ -1,0 +1,285 @@
+"""What is seen at a pixel: actors, joints, triangles and keypoints drawn as numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.rendering.actor_buffers import ActorBuffers
+from viewer.rendering.crowd_buffers import CrowdBuffers
+from viewer.rendering.joint_pass import draw_boxes
+from viewer.rendering.mesh_pass import MeshPass
+from viewer.rendering.options import DisplayOptions
+from viewer.rendering.point_pass import PointPass
+from viewer.rendering.program import Programs, set_uniforms
+from viewer.rendering.shown import (
+    has_markers,
+    has_points,
+    placement_of,
+    shows_mesh,
+    shows_skeleton,
+    update_meshes,
+)
+from viewer.rendering.skin_pass import PosedMesh
+from viewer.rendering.view import View, in_front, set_model
+from viewer.rig.arrays import Floats
+from viewer.rig.scene import Actor, Scene
+from viewer.rig.transform import apply_transform
+
+__all__ = ["Passes", "Pick", "PickPass"]
+
+_REACH = 3  # pixels around the one that is asked for
+_SIDE = 2 * _REACH + 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pick:
+    """What is seen at a pixel.
+
+    Attributes
+    ----------
+    actor : int
+        Index in the scene.
+    joint : int
+        Whose box it is, -1 for something else.
+    triangle : int
+        Index in the figure's mesh, or in its reduced mesh if that is drawn; -1 for something else.
+    keypoint : int
+        Captured point, or keypoint of the figure; the nearer one on a limb; -1 for something else.
+    point : (3,)
+        Where the surface is, scene space.
+    """
+
+    actor: int
+    joint: int
+    triangle: int
+    keypoint: int
+    point: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Passes:
+    """What picking shares with drawing."""
+
+    programs: Programs
+    meshes: MeshPass
+    points: PointPass
+    buffers: ActorBuffers
+
+
+_Found = Callable[[int, int, Floats], Pick]
+"""From instance, triangle as it is drawn, and point in scene space to what that is."""
+
+
+class PickPass:
+    """Draws numbers in place of colours, a few pixels of them, when somebody asks.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        The context in use.
+    passes : Passes
+        Gives programs, and what was uploaded and posed for drawing.
+    """
+
+    def __init__(self, context: moderngl.Context, passes: Passes) -> None:
+        self.context, self.passes = context, passes
+        self._numbers: moderngl.Texture | None = None
+        self._found: list[_Found] = []
+
+    def pick(
+        self,
+        scene: Scene,
+        view: View,
+        options: DisplayOptions,
+        size: tuple[int, int],
+        pixel: tuple[float, float],
+    ) -> Pick | None:
+        """Return what is seen at a pixel, or nearest to it within three.
+
+        Parameters
+        ----------
+        scene : Scene
+            As it is drawn.
+        view : View
+            The camera's matrices.
+        options : DisplayOptions
+            What is shown.
+        size : (int, int)
+            Width and height of the picture.
+        pixel : (float, float)
+            From the picture's left and upper edge.
+        """
+        self._begin()
+        near = replace(view, projection=_window(size, pixel) @ view.projection)
+        self._found = []
+        self._draw_meshes(scene, near, options)
+        for index, actor in enumerate(scene.actors):
+            if shows_skeleton(actor, options):
+                self._draw_boxes(index, actor, near, options)
+            if has_points(actor):
+                self._draw_points(index, actor, near, options)
+            if has_markers(actor, options):
+                self._draw_markers(index, actor, near, options)
+        return self._read(near)
+
+    def _begin(self) -> None:
+        """Bind a few pixels of four whole numbers each, all 0."""
+        context = self.context
+        if self._numbers is None:
+            self._numbers = context.texture((_SIDE, _SIDE), 4, dtype="i4")
+            self._depth = context.depth_renderbuffer((_SIDE, _SIDE))
+            self._framebuffer = context.framebuffer([self._numbers], self._depth)
+        self._numbers.write(np.zeros((_SIDE, _SIDE, 4), "i4"))
+        # Clearing colours is not defined for whole numbers.
+        self._framebuffer.color_mask = False, False, False, False
+        self._framebuffer.clear(depth=1.0)
+        self._framebuffer.color_mask = True, True, True, True
+        self._framebuffer.use()
+        context.viewport = (0, 0, _SIDE, _SIDE)
+        context.enable_only(moderngl.DEPTH_TEST)
+        context.depth_func = "<"
+
+    def _number(self, program: moderngl.Program, found: _Found) -> None:
+        """Give what is drawn next a number, and remember what it stands for."""
+        self._found.append(found)
+        set_uniforms(program, {"u_item": len(self._found)})
+
+    def _draw_meshes(self, scene: Scene, view: View, options: DisplayOptions) -> None:
+        meshes = update_meshes(self.passes.buffers, scene.actors, options)
+        index = {id(actor): number for number, actor in enumerate(scene.actors)}
+        if options.cull:
+            self.context.enable(moderngl.CULL_FACE)
+        for actor, mesh in meshes.singles:
+            self._draw_mesh(index[id(actor)], mesh, placement_of(actor, options), view, options)
+        for actors, crowd in meshes.crowds:
+            crowd.place(actors, view)
+            self._draw_crowd([index[id(actor)] for actor in actors], crowd, view, options)
+        self.context.disable(moderngl.CULL_FACE)
+
+    def _draw_mesh(
+        self, index: int, mesh: PosedMesh, placement: Floats, view: View, options: DisplayOptions
+    ) -> None:
+        program = self.passes.programs.drawing("mesh", fragment="pick")
+        indices = mesh.mesh.index_set(options.reduced, options.hidden_parts)
+        set_model(program, view, placement, mesh.center)
+        order = indices.order
+        self._number(program, lambda _, t, point: Pick(index, -1, int(order[t]), -1, point))
+        array = self.passes.meshes.array(mesh, program, indices)
+        array.render(moderngl.TRIANGLES, vertices=indices.n_indices)
+
+    def _draw_crowd(
+        self, numbers: list[int], crowd: CrowdBuffers, view: View, options: DisplayOptions
+    ) -> None:
+        program = self.passes.programs.drawing("crowd", fragment="pick", skin=crowd.method)
+        indices = crowd.mesh.index_set(options.reduced, options.hidden_parts)
+        crowd.use(program, view)
+        order = indices.order
+
+        def found(instance: int, triangle: int, point: Floats) -> Pick:
+            # Some drivers count on from one instance to the next.
+            return Pick(numbers[instance], -1, int(order[triangle % len(order)]), -1, point)
+
+        self._number(program, found)
+        array = crowd.array(program, indices)
+        array.render(moderngl.TRIANGLES, vertices=indices.n_indices, instances=crowd.count)
+
+    def _draw_boxes(self, index: int, actor: Actor, view: View, options: DisplayOptions) -> None:
+        assert actor.pose is not None  # whoever has a skeleton has a pose
+        skeleton = self.passes.buffers.skeleton(actor)
+        skeleton.update(actor.pose)
+        # Over a skin it is drawn in front of it.
+        view = in_front(view) if shows_mesh(actor.figure, options) else view
+        program = self.passes.programs.drawing("joint", fragment="pick")
+        self._number(program, lambda joint, _, point: Pick(index, joint, -1, -1, point))
+        draw_boxes(
+            program,
+            skeleton.array(program),
+            skeleton.n_joints,
+            skeleton.world,
+            placement_of(actor, options),
+            skeleton.center,
+            view,
+            options,
+        )
+
+    def _draw_markers(self, index: int, actor: Actor, view: View, options: DisplayOptions) -> None:
+        assert actor.pose is not None  # it has markers
+        markers = self.passes.buffers.keypoints_of(actor)
+        markers.update(actor.pose, options.skinning)
+        program = self.passes.programs.drawing("joint", fragment="pick")
+        self._number(program, lambda marker, _, point: Pick(index, -1, -1, marker, point))
+        draw_boxes(
+            program,
+            markers.array(program),
+            markers.count,
+            markers.world,
+            actor.placement,
+            markers.center,
+            in_front(view),
+            options,
+        )
+
+    def _draw_points(self, index: int, actor: Actor, view: View, options: DisplayOptions) -> None:
+        points = self.passes.buffers.points_of(actor)
+        points.update(actor, actor.placement, view, options.min_confidence)
+        elements, places, layout = points.elements, actor.points, actor.figure.points
+        assert places is not None and layout is not None  # it has points
+        if not len(elements):
+            return
+        program = self.passes.programs.drawing("point", fragment="pick")
+        set_model(program, view, actor.placement, points.center)
+
+        def found(instance: int, _: int, point: Floats) -> Pick:
+            element = int(elements[instance]) - len(layout.names)
+            if element < 0:
+                return Pick(index, -1, -1, int(elements[instance]), point)
+            ends = layout.limbs[element]
+            apart = apply_transform(actor.placement, places[ends, :3]) - point
+            return Pick(index, -1, -1, int(ends[np.linalg.norm(apart, axis=1).argmin()]), point)
+
+        self._number(program, found)
+        array = points.array(program, self.passes.points.capsule)
+        array.render(moderngl.TRIANGLES, instances=len(elements))
+
+    def _read(self, view: View) -> Pick | None:
+        """Return what the hit nearest to the middle stands for."""
+        rows = np.frombuffer(self._framebuffer.read(components=4, dtype="i4"), dtype=np.int32)
+        numbers = rows.reshape(_SIDE, _SIDE, 4)
+        row, column = np.nonzero(numbers[..., 0])
+        if not len(row):
+            return None
+        nearest = ((row - _REACH) ** 2 + (column - _REACH) ** 2).argmin()
+        y, x = int(row[nearest]), int(column[nearest])
+        item, instance, triangle = (int(number) for number in numbers[y, x, :3])
+        depth = float(numbers[y, x, 3:].view(np.float32)[0])
+        return self._found[item - 1](instance, triangle, _unproject(view, (x, y), depth))
+
+    def release(self) -> None:
+        """Free the pixels."""
+        if self._numbers is not None:
+            for item in (self._framebuffer, self._depth, self._numbers):
+                item.release()
+            self._numbers = None
+
+
+def _window(size: tuple[int, int], pixel: tuple[float, float]) -> Floats:
+    """Return what spreads a few pixels around one over the whole of clip space."""
+    x, y = np.floor(pixel[0]) + 0.5, np.floor(pixel[1]) + 0.5
+    scale = size[0] / _SIDE, size[1] / _SIDE
+    matrix: NDArray[np.float64] = np.diag([*scale, 1.0, 1.0])
+    matrix[0, 3] = -scale[0] * (2.0 * x / size[0] - 1.0)
+    matrix[1, 3] = -scale[1] * (1.0 - 2.0 * y / size[1])
+    return matrix
+
+
+def _unproject(view: View, pixel: tuple[int, int], depth: float) -> Floats:
+    """Return the point in scene space that is seen at a pixel, ``depth`` along the camera's z."""
+    x, y = (2.0 * (side + 0.5) / _SIDE - 1.0 for side in pixel)
+    _, _, clip_z, clip_w = view.projection @ [0.0, 0.0, depth, 1.0]
+    back = np.linalg.inv(view.projection @ view.matrix)
+    return back[:3] @ np.array([x * clip_w, y * clip_w, clip_z, clip_w])

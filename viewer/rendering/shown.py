@@ -1,0 +1,129 @@
+"""What of a scene is drawn, and the posed meshes and crowds that it takes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from viewer.rendering.actor_buffers import ActorBuffers
+from viewer.rendering.crowd_buffers import CrowdBuffers
+from viewer.rendering.crowd_pass import crowds_of
+from viewer.rendering.options import DisplayOptions
+from viewer.rendering.skin_pass import PosedMesh
+from viewer.rig.arrays import Floats
+from viewer.rig.figure import Figure
+from viewer.rig.pose import placement_matrix
+from viewer.rig.scene import Actor
+
+__all__ = [
+    "Meshes",
+    "has_markers",
+    "has_points",
+    "placement_of",
+    "prepare_meshes",
+    "shows_mesh",
+    "shows_skeleton",
+    "update_meshes",
+]
+
+
+@dataclass(frozen=True, slots=True)
+class Meshes:
+    """The meshes of a picture: those drawn one by one, and those drawn together."""
+
+    singles: list[tuple[Actor, PosedMesh]] = field(default_factory=list)
+    crowds: list[tuple[list[Actor], CrowdBuffers]] = field(default_factory=list)
+
+    def __bool__(self) -> bool:
+        return bool(self.singles or self.crowds)
+
+
+def prepare_meshes(
+    buffers: ActorBuffers, actors: Sequence[Actor], options: DisplayOptions
+) -> Meshes:
+    """Upload what the meshes of some actors need; none is skinned yet.
+
+    Parameters
+    ----------
+    buffers : ActorBuffers
+        Gets what is new.
+    actors : sequence of Actor
+        Those whose figure has no mesh are left out.
+    options : DisplayOptions
+        What is shown.
+
+    Raises
+    ------
+    RenderError
+        If the driver has no room for it.
+    """
+    meshes = Meshes()
+    actors = [actor for actor in actors if shows_mesh(actor.figure, options)]
+    of_figure: dict[int, list[list[Actor]]] = {}
+    for group in crowds_of(actors, options):
+        of_figure.setdefault(id(group[0].figure), []).append(group)
+    for groups in of_figure.values():
+        crowds = buffers.crowds(groups[0][0].figure, len(groups))
+        for group, crowd in zip(groups, crowds, strict=True):
+            poses = [actor.pose for actor in group if actor.pose is not None]
+            crowd.update(poses, options.skinning)
+            meshes.crowds.append((group, crowd))
+    together = {id(actor) for group, _ in meshes.crowds for actor in group}
+    for actor in actors:
+        if id(actor) not in together:
+            meshes.singles.append((actor, buffers.posed_mesh(actor)))
+    return meshes
+
+
+def update_meshes(
+    buffers: ActorBuffers, actors: Sequence[Actor], options: DisplayOptions
+) -> Meshes:
+    """Skin what changed, before anything is drawn; some framebuffer must be bound.
+
+    Parameters
+    ----------
+    buffers : ActorBuffers
+        Gets what is new.
+    actors : sequence of Actor
+        Of a scene.
+    options : DisplayOptions
+        What is shown.
+    """
+    meshes = prepare_meshes(buffers, [actor for actor in actors if actor.is_drawn], options)
+    for actor, mesh in meshes.singles:
+        pose = None if options.show == "binding" else actor.pose
+        mesh.update(pose, options.skinning)
+        if options.shading == "scalar":
+            mesh.scalars.update(options.scalar, pose, options.skinning)
+    return meshes
+
+
+def shows_mesh(figure: Figure, options: DisplayOptions) -> bool:
+    """Return whether a figure's surface is drawn."""
+    return figure.mesh is not None and (options.show != "skeleton" or figure.skeleton is None)
+
+
+def shows_skeleton(actor: Actor, options: DisplayOptions) -> bool:
+    """Return whether an actor's boxes are drawn."""
+    figure = actor.figure
+    wanted = options.show in ("skeleton", "both") or figure.mesh is None
+    return actor.is_drawn and figure.skeleton is not None and wanted
+
+
+def has_markers(actor: Actor, options: DisplayOptions) -> bool:
+    """Return whether the keypoints that an actor's figure itself has are marked."""
+    if not options.keypoints or options.show == "binding" or actor.pose is None:
+        return False
+    return actor.is_drawn and actor.figure.keypoints is not None
+
+
+def has_points(actor: Actor) -> bool:
+    """Return whether an actor's captured points are drawn."""
+    return actor.is_drawn and actor.figure.points is not None and actor.points is not None
+
+
+def placement_of(actor: Actor, options: DisplayOptions) -> Floats:
+    """Return where an actor stands: its placement, then that of its pose."""
+    if actor.pose is None or options.show == "binding":
+        return actor.placement
+    return actor.placement @ placement_matrix(actor.pose)
