@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from viewer.app.state import AppState
-from viewer.errors import printable
-from viewer.rendering.camera import VIEWS, fit
+from viewer.errors import ViewerError, printable
+from viewer.rendering.camera import VIEWS, Camera, camera_from_view, fit
 from viewer.rendering.options import SHOWN, Lights
+from viewer.rendering.pinhole import distortion_error
 from viewer.rig.follow import followed_point
 from viewer.rig.pose import rest_pose
 from viewer.rig.scene import scene_points
@@ -16,6 +17,7 @@ __all__ = [
     "follow_actor",
     "go_to_end",
     "look",
+    "look_through",
     "play",
     "range_in",
     "range_out",
@@ -70,16 +72,38 @@ def toggle_option(state: AppState, name: str, text: str) -> None:
 
 def fit_view(state: AppState) -> None:
     """Aim the camera at the scene as it is posed and fill the view with it."""
+    state.camera.fixed = None
     fit(state.camera, scene_points(state.scene, state.options.show), state.aspect)
 
 
 def look(state: AppState, name: str) -> None:
     """Turn the camera to a named view."""
+    state.camera.fixed = None
     state.camera.azimuth, state.camera.inclination = VIEWS[name]
+
+
+def look_through(state: AppState, index: int) -> None:
+    """See what a calibrated camera of the capture saw; -1 leaves it where it is."""
+    if index < 0:
+        state.camera.fixed = None
+        return
+    view = state.scene.views[index]
+    size = (max(round(state.view_rect[2]), 1), max(round(state.view_rect[3]), 1))
+    try:
+        seen = camera_from_view(view, size, state.scene.up, state.box)
+    except ViewerError as problem:
+        state.error = str(problem)
+        return
+    for name in Camera.__slots__:
+        setattr(state.camera, name, getattr(seen, name))
+    error = distortion_error(view)
+    if error >= 0.5:
+        state.say(f"The lens of {printable(view.name)} bends pictures by up to {error:.1f} pixels")
 
 
 def toggle_projection(state: AppState) -> None:
     """Switch between perspective and parallel projection."""
+    state.camera.fixed = None
     state.camera.orthographic = not state.camera.orthographic
     state.say_status("Orthographic" if state.camera.orthographic else "Perspective")
 

@@ -232,7 +232,7 @@ class Frame:
         )
         selected = (state.chosen_actor, state.selected_joint)
         place = (camera.target.tobytes(), camera.distance, camera.azimuth, camera.inclination)
-        lens = (camera.fov, camera.orthographic, camera.up)
+        lens = (camera.fov, camera.orthographic, camera.up, id(camera.fixed))
         return (size, place, lens, copy.deepcopy(state.options), poses, *selected)
 
     def _target(self, size: tuple[int, int]) -> Target:

@@ -11,6 +11,7 @@ __all__ = ["handle_mouse"]
 
 _DEGREES_PER_POINT = 0.4
 _ZOOM_PER_NOTCH = 0.88
+_BUTTONS = (imgui.MouseButton_.left, imgui.MouseButton_.right, imgui.MouseButton_.middle)
 
 
 def handle_mouse(state: AppState) -> None:
@@ -20,6 +21,9 @@ def handle_mouse(state: AppState) -> None:
     if io.want_capture_mouse or width < 1 or height < 1:
         return
     delta = io.mouse_delta
+    moves = bool(delta.x or delta.y) and any(map(_drags, _BUTTONS))
+    if moves or io.mouse_wheel:
+        state.camera.fixed = None  # go on from where the calibrated camera stands
     left = _drags(imgui.MouseButton_.left)
     pans = _drags(imgui.MouseButton_.right) or _drags(imgui.MouseButton_.middle)
     if pans or (left and io.key_shift):

@@ -188,7 +188,7 @@ class AppState:
         points = scene_points(scene, self.options.show)
         self.scene, self.paths = scene, tuple(paths)
         self.box = bounding_box(points)
-        self.camera.up = scene.up
+        self.camera.up, self.camera.fixed = scene.up, None
         fit(self.camera, points, self.aspect)
         # Body parts and levels of detail mean something else on another model.
         self.options.hidden_parts, self.options.reduced = (), False

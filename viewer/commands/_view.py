@@ -7,12 +7,13 @@ import re
 
 from viewer.commands._numbers import number
 from viewer.commands._pose import add_skinning_arguments, skinning_of
-from viewer.errors import ViewerError
-from viewer.rendering.camera import Camera, fit
+from viewer.errors import ViewerError, printable
+from viewer.rendering.camera import Camera, camera_from_view, fit
 from viewer.rendering.ground_pass import parse_color
 from viewer.rendering.options import BACKGROUNDS, SHOWN, DisplayOptions
 from viewer.rendering.program import SHADING
 from viewer.rig.arrays import Floats
+from viewer.rig.camera_view import CameraView
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.scalars import SCALARS, compute, length_text, missing_part
 from viewer.rig.scene import Scene
@@ -34,6 +35,9 @@ def add_camera_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--azimuth", type=number, metavar="A", help="degrees about the up axis")
     parser.add_argument("--inclination", type=number, metavar="I", help="degrees above the horizon")
     parser.add_argument("--distance", type=number, metavar="D", help="from the target, in units")
+    parser.add_argument(
+        "--view", metavar="NAME|N", help="look through a calibrated camera of a capture"
+    )
     parser.add_argument("--orthographic", action="store_true", help="parallel projection")
 
 
@@ -86,6 +90,8 @@ def camera_of(
     arguments: argparse.Namespace, scene: Scene, points: Floats, size: tuple[int, int]
 ) -> Camera:
     """Return the camera asked for; its distance fits the points unless it is given."""
+    if arguments.view is not None:
+        return camera_from_view(_find_view(scene, arguments.view), size, scene.up)
     camera = Camera(up=scene.up, orthographic=arguments.orthographic)
     if arguments.azimuth is not None:
         camera.azimuth = arguments.azimuth
@@ -105,6 +111,17 @@ def camera_of(
             )
         camera.distance = arguments.distance
     return camera
+
+
+def _find_view(scene: Scene, text: str) -> CameraView:
+    """Return a calibrated camera by its name, or by its number counted from 1."""
+    for view in scene.views:
+        if view.name == text:
+            return view
+    if text.isdecimal() and 1 <= int(text) <= len(scene.views):
+        return scene.views[int(text) - 1]
+    names = ", ".join(printable(view.name, 40) for view in scene.views) or "none"
+    raise ViewerError(f'--view: no camera "{printable(text, 60)}"; there are: {names}')
 
 
 def display_of(arguments: argparse.Namespace) -> DisplayOptions:

@@ -146,6 +146,7 @@ class VideoSink:
         self.rate, self._quality = Fraction(rate).limit_denominator(1001), quality
         self.notes: list[str] = []
         self._has_alpha = transparent and self._kind.has_alpha
+        self._may_blend = not self._has_alpha and (transparent or self.encoder == "gif")
         self._coded = _even(size) if self._kind.needs_even else size
         self._note(transparent)
         self._file = Replacement(path)
@@ -265,7 +266,7 @@ class VideoSink:
         rgba[:height, :width] = pixels
         rgba[:height, width:] = pixels[:, -1:]
         rgba[height:] = rgba[height - 1]
-        if not self._has_alpha and (pixels[..., 3] < 255).any():
+        if self._may_blend and (pixels[..., 3] < 255).any():
             shares = rgba[..., 3:].astype(np.uint16)
             rgba[..., :3] = (rgba[..., :3] * shares + 127) // 255
             rgba[..., 3] = 255

@@ -84,8 +84,7 @@ def begin(
     _stand_up(cast, world_up)
     _place_side_by_side(cast)
     warnings = (*contents.warnings, *cast.notes)
-    views = tuple(view for _, capture in contents.captures for view in capture.views)
-    scene = Scene(cast.actors, warnings, "z" if world_up == "z" else "y", views)
+    scene = Scene(cast.actors, warnings, "z" if world_up == "z" else "y", tuple(cast.views))
     return scene, cast.builders
 
 

@@ -15,6 +15,7 @@ from viewer.loading.capturing import Builder
 from viewer.loading.contents import Contents
 from viewer.loading.settings import METRES, MotionSettings
 from viewer.rig.body_motion import BodyMotion, body_clip
+from viewer.rig.camera_view import CameraView
 from viewer.rig.capture import Capture
 from viewer.rig.clip import Clip, suits
 from viewer.rig.figure import Figure
@@ -41,6 +42,8 @@ class Cast:
         Whether its motion says where it is.
     builders : list of Builder
         Captures that are still being read.
+    views : list of CameraView
+        Calibrated cameras, in the scene.
     notes : list of str
         One line each.
     """
@@ -49,6 +52,7 @@ class Cast:
     ups: list[str] = field(default_factory=list)
     placed: list[bool] = field(default_factory=list)
     builders: list[Builder] = field(default_factory=list)
+    views: list[CameraView] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
     def add(self, actor: Actor, up: str, placed: bool) -> None:
@@ -219,6 +223,8 @@ def _begin_capture(
         cast.notes.append(_on_bundled(path, builder.has_shape))
     up = settings.up or capture.up or guess_up(builder.actors)
     builder.place(up)
+    turn = builder.placement[:3, :3].T
+    cast.views += [replace(view, rotation=view.rotation @ turn) for view in capture.views]
     for actor in builder.actors:
         cast.add(actor, up[-1], placed=True)
     cast.builders.append(builder)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from viewer.app.actions import fit_view, look, toggle_projection
+from viewer.app.actions import fit_view, look, look_through, toggle_projection
 from viewer.app.state import AppState
-from viewer.app.widgets import button, checkbox, slider
+from viewer.app.widgets import button, checkbox, note_item, slider
+from viewer.errors import printable
 from viewer.rendering.camera import VIEWS
 from viewer.rig.mesh import box_size
 
@@ -19,6 +20,8 @@ _LOG = imgui.SliderFlags_.logarithmic | imgui.SliderFlags_.no_round_to_format
 def draw(state: AppState) -> None:
     """Draw the panel."""
     camera = state.camera
+    _draw_views(state)
+    before = _place(state)
     size = box_size(state.box) or 1.0
     distance = slider(
         state, "Distance", camera.distance, 0.05 * size, 20.0 * size, _digits(size), _LOG
@@ -31,6 +34,8 @@ def draw(state: AppState) -> None:
     camera.fov = slider(
         state, "Field of view", camera.fov, 5.0, 120.0, "%.0f\N{DEGREE SIGN}", _CLAMP
     )
+    if camera.fixed is not None and _place(state) != before:
+        camera.fixed = None  # go on from where the calibrated camera stands
     if checkbox(state, "Orthographic", camera.orthographic) != camera.orthographic:
         toggle_projection(state)
     imgui.same_line()
@@ -41,6 +46,25 @@ def draw(state: AppState) -> None:
             imgui.same_line()
         if button(state, name.capitalize()):
             look(state, name)
+
+
+def _place(state: AppState) -> tuple[float, ...]:
+    camera = state.camera
+    return camera.distance, camera.azimuth, camera.inclination, camera.fov
+
+
+def _draw_views(state: AppState) -> None:
+    """Draw the list of calibrated cameras, if a capture has some."""
+    views, fixed = state.scene.views, state.camera.fixed
+    if not views:
+        return
+    names = ["Free camera", *(printable(f"Camera {view.name}", 60) for view in views)]
+    index = next((number for number, view in enumerate(views, 1) if view is fixed), 0)
+    imgui.set_next_item_width(-1.0)
+    changed, chosen = imgui.combo("##views", index, names)
+    note_item(state, "Calibrated camera")
+    if changed:
+        look_through(state, chosen - 1)
 
 
 def _digits(size: float) -> str:

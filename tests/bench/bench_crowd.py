@@ -1,0 +1,226 @@
+"""A hundred posed bodies as instances, against as many copies that stand still, drawn alike.
+
+Both are one instanced draw of the same triangles with the same fragment shader, 1280 x 720; the
+copies' vertex shader places them and does nothing else. Alternating, so that the machine cancels
+out. The processor's part (kinematics, correctives, upload) is printed beside it, and so is how few
+actors are worth a crowd.
+"""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Callable
+from typing import Any
+
+import moderngl
+import numpy as np
+from measure import interleaved, median_ratio, report
+
+import viewer
+from viewer.loading import bundled_body
+from viewer.rendering import crowd_pass
+from viewer.rendering.crowd_buffers import CrowdBuffers
+from viewer.rendering.mesh_pass import draw_runs, set_surface
+from viewer.rendering.offscreen import Offscreen, default_camera
+from viewer.rendering.options import DisplayOptions
+from viewer.rendering.program import Programs, set_uniforms
+from viewer.rendering.upload import as_uniform
+from viewer.rendering.view import View, set_lights, view_of
+from viewer.resources import resource
+from viewer.rig.figure import Figure
+from viewer.rig.scene import Actor, Scene, scene_box
+from viewer.rig.skinning import Skinning
+
+SIZE, COUNT, GOAL = (1280, 720), 100, 1.2
+_STILL = """#version 330
+in vec3 in_position; in vec3 in_normal;
+in vec4 in_model_x; in vec4 in_model_y; in vec4 in_model_z;
+in vec4 in_turn_x; in vec4 in_turn_y; in vec4 in_turn_z;
+uniform mat4 u_projection;
+out vec3 v_position; out vec3 v_normal; out vec2 v_uv; out vec3 v_color; out float v_scalar;
+flat out float v_opacity;
+void main() {
+    vec4 p = vec4(in_position, 1.0);
+    v_position = vec3(dot(in_model_x, p), dot(in_model_y, p), dot(in_model_z, p));
+    v_normal = vec3(dot(in_turn_x.xyz, in_normal), dot(in_turn_y.xyz, in_normal),
+        dot(in_turn_z.xyz, in_normal));
+    v_uv = vec2(0.0); v_scalar = 0.0; v_opacity = 1.0;
+    v_color = vec3(in_turn_x.w, in_turn_y.w, in_turn_z.w);
+    gl_Position = u_projection * vec4(v_position, 1.0);
+}
+"""
+
+
+def cast(figure: Figure, count: int) -> Scene:
+    """Return actors in rows of ten, each in its own pose."""
+    rng, actors = np.random.default_rng(0), []
+    for number in range(count):
+        actor = Actor(figure)
+        actor.placement[:3, 3] = number % 10, 0.0, -(number // 10)
+        actors.append(actor)
+    change(actors, rng)
+    return Scene(actors)
+
+
+def change(actors: list[Actor], rng: np.random.Generator) -> None:
+    """Give every actor a new pose."""
+    for actor in actors:
+        assert actor.pose is not None
+        actor.pose.dofs[:] = rng.normal(0.0, 0.15, len(actor.pose.dofs))
+
+
+def main(rounds: int = 15) -> None:
+    """Print the ratios."""
+    figure = viewer.load(bundled_body()).actors[0].figure
+    assert figure.mesh is not None
+    print(f"{COUNT} x {figure.name}, {figure.mesh.n_vertices} vertices each, 1280 x 720\n")
+    for samples in (4, 1):
+        draws(figure, samples, rounds)
+    processor(figure, rounds)
+    fewest(figure, rounds)
+
+
+def draws(figure: Figure, samples: int, rounds: int) -> None:
+    """Compare the draws alone: everything was uploaded before."""
+    scene = cast(figure, COUNT)
+    options = DisplayOptions(background="transparent", grid=False, samples=samples)
+    with Offscreen() as offscreen, offscreen.context:
+        target, box = offscreen.target(SIZE, samples), scene_box(scene)
+        view = view_of(default_camera(scene, SIZE), SIZE, box)
+        renderer = offscreen.renderer
+        crowd = renderer.buffers.crowds(figure, 1)[0]
+        crowd.update([actor.pose for actor in scene.actors if actor.pose], Skinning())
+        posed = posed_draw(renderer.programs, crowd, scene.actors, view, options)
+        still = still_draw(offscreen.context, crowd, view, options)
+
+        def timed(draw: Callable[[], object]) -> Callable[[], None]:
+            def run() -> None:
+                target.framebuffer.use()
+                target.framebuffer.clear(depth=1.0)
+                offscreen.context.enable_only(moderngl.DEPTH_TEST | moderngl.BLEND)
+                draw()
+                offscreen.context.finish()
+
+            return run
+
+        times = interleaved({"posed": timed(posed), "still": timed(still)}, rounds)
+        report(f"the draw alone, {samples} samples a pixel", times, ("posed", "still"), GOAL)
+
+
+def posed_draw(
+    programs: Programs,
+    crowd: CrowdBuffers,
+    actors: list[Actor],
+    view: View,
+    options: DisplayOptions,
+) -> Callable[[], None]:
+    """Return what draws the crowd as the renderer does."""
+    return lambda: crowd_pass.draw_crowd(programs, crowd, actors, view, options)
+
+
+def still_draw(
+    context: moderngl.Context, crowd: CrowdBuffers, view: View, options: DisplayOptions
+) -> Callable[[], None]:
+    """Return what draws as many copies of the mesh at rest."""
+    fragment = resource("shaders", "mesh.frag").read_text()
+    shade = resource("shaders", "shade", "phong.glsl").read_text()
+    program = context.program(
+        vertex_shader=_STILL, fragment_shader=fragment.replace("#pragma chunk", shade)
+    )
+    mesh = crowd.mesh
+    indices = mesh.index_set(False, ())
+    layout = "4f4 4f4 4f4 4f4 4f4 4f4 24x/i"
+    names = [f"in_{kind}_{axis}" for kind in ("model", "turn") for axis in "xyz"]
+    content: list[Any] = [
+        (mesh.positions, "3f4", "in_position"),
+        (mesh.normals, "3f4", "in_normal"),
+        (crowd._instances, layout, *names),
+    ]
+    array = context.vertex_array(program, content, index_buffer=indices.indices)
+
+    def draw() -> None:
+        set_uniforms(program, {"u_projection": as_uniform(view.projection)})
+        set_lights(program, view, options.lights)
+        set_surface(program, mesh, options)
+        draw_runs(array, indices, options.texture, instances=crowd.count)
+
+    return draw
+
+
+def processor(figure: Figure, rounds: int) -> None:
+    """Print what a frame of all poses costs before anything is drawn."""
+    actors, rng = cast(figure, COUNT).actors, np.random.default_rng(1)
+    with Offscreen() as offscreen, offscreen.context:
+        offscreen.target((16, 16), 1).framebuffer.use()
+        crowd = offscreen.renderer.buffers.crowds(figure, 1)[0]
+        meshes = [offscreen.renderer.posed_mesh(actor) for actor in actors]
+
+        def together(how: Skinning) -> None:
+            change(actors, rng)
+            crowd.update([actor.pose for actor in actors if actor.pose], how)
+
+        def alone(how: Skinning) -> None:
+            change(actors, rng)
+            for actor, mesh in zip(actors, meshes, strict=True):
+                assert actor.pose is not None
+                mesh.upload(actor.pose, how)
+
+        plain = Skinning(correctives=False)
+        work = {
+            "as a crowd": lambda: together(plain),
+            "one by one": lambda: alone(plain),
+            "as a crowd, with correctives": lambda: together(Skinning()),
+            "one by one, with correctives": lambda: alone(Skinning()),
+        }
+        times = interleaved(work, max(rounds // 3, 3))
+        report("the processor's part of a frame", times, ("as a crowd", "one by one"))
+        ratio = median_ratio(times, *list(work)[2:])
+        print(f"  with correctives: {ratio:.2f}\n")
+
+
+def fewest(figure: Figure, rounds: int) -> None:
+    """Print whole played frames as a crowd and one by one, and frames of a camera that moves."""
+    normal = crowd_pass.FEWEST
+    for count in (2, 3, 4, 8, 16):
+        scene, rng = cast(figure, count), np.random.default_rng(2)
+        options, box = DisplayOptions(), scene_box(scene)
+        camera = default_camera(scene, SIZE)
+        with Offscreen() as crowded, Offscreen() as single:
+
+            def frame(
+                offscreen: Offscreen,
+                least: int,
+                moves: bool,
+                scene: Scene = scene,
+                rng: np.random.Generator = rng,
+                drawing: tuple[Any, ...] = (camera, options),
+                box: Any = box,
+            ) -> None:
+                crowd_pass.FEWEST = least
+                if moves:
+                    change(scene.actors, rng)
+                with offscreen.context:
+                    target = offscreen.target(SIZE, options.samples)
+                    offscreen.renderer.draw(scene, *drawing, target, box)
+                    offscreen.context.finish()
+
+            work = {
+                "played, crowd": lambda: frame(crowded, 2, True),
+                "played, single": lambda: frame(single, 1000, True),
+                "still, crowd": lambda: frame(crowded, 2, False),
+                "still, single": lambda: frame(single, 1000, False),
+            }
+            times = interleaved(work, rounds)
+        played, still = (
+            median_ratio(times, f"{kind}, crowd", f"{kind}, single") for kind in ("played", "still")
+        )
+        middle = statistics.median(times["played, crowd"])
+        print(
+            f"  {count:3} actors: played frame {middle:.1f} ms, crowd / single {played:.2f}; "
+            f"still figures {still:.2f}"
+        )
+    crowd_pass.FEWEST = normal
+
+
+if __name__ == "__main__":
+    main()
