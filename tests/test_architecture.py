@@ -41,6 +41,7 @@ HOMES = {
     "glfw": {"app"},
     "imgui_bundle": {"app"},
     "PIL": {"formats/_image.py"},
+    "av": {"formats/_video.py"},
 }
 
 

@@ -271,7 +271,7 @@ def morphed(drive, rig):
     scene = viewer.load(*rig)
     figure = scene.actors[0].figure
     mesh = figure.mesh
-    lifted = mesh.positions[:1] + [0.0, 1.0, 0.0]
+    lifted = mesh.positions[:1] + np.array([0.0, 1.0, 0.0])
     targets = [
         MorphTarget("lift", [0], lifted, mesh.normals[:1]),
         MorphTarget("spread", np.arange(mesh.n_vertices), 2.0 * mesh.positions, mesh.normals),

@@ -179,38 +179,12 @@ def processor(figure: Figure, rounds: int) -> None:
 
 
 def fewest(figure: Figure, rounds: int) -> None:
-    """Print whole played frames as a crowd and one by one, and frames of a camera that moves."""
+    """Print whole frames as a crowd against one by one, played and of a camera that moves."""
     normal = crowd_pass.FEWEST
-    for count in (2, 3, 4, 8, 16):
-        scene, rng = cast(figure, count), np.random.default_rng(2)
-        options, box = DisplayOptions(), scene_box(scene)
-        camera = default_camera(scene, SIZE)
+    for count in (2, 4, 8, 16, 32):
         with Offscreen() as crowded, Offscreen() as single:
-
-            def frame(
-                offscreen: Offscreen,
-                least: int,
-                moves: bool,
-                scene: Scene = scene,
-                rng: np.random.Generator = rng,
-                drawing: tuple[Any, ...] = (camera, options),
-                box: Any = box,
-            ) -> None:
-                crowd_pass.FEWEST = least
-                if moves:
-                    change(scene.actors, rng)
-                with offscreen.context:
-                    target = offscreen.target(SIZE, options.samples)
-                    offscreen.renderer.draw(scene, *drawing, target, box)
-                    offscreen.context.finish()
-
-            work = {
-                "played, crowd": lambda: frame(crowded, 2, True),
-                "played, single": lambda: frame(single, 1000, True),
-                "still, crowd": lambda: frame(crowded, 2, False),
-                "still, single": lambda: frame(single, 1000, False),
-            }
-            times = interleaved(work, rounds)
+            frames = whole_frames(cast(figure, count), crowded, single)
+            times = interleaved(frames, rounds)
         played, still = (
             median_ratio(times, f"{kind}, crowd", f"{kind}, single") for kind in ("played", "still")
         )
@@ -220,6 +194,30 @@ def fewest(figure: Figure, rounds: int) -> None:
             f"still figures {still:.2f}"
         )
     crowd_pass.FEWEST = normal
+
+
+def whole_frames(
+    scene: Scene, crowded: Offscreen, single: Offscreen
+) -> dict[str, Callable[[], None]]:
+    """Return what draws frames in four ways."""
+    rng, options, box = np.random.default_rng(2), DisplayOptions(), scene_box(scene)
+    camera = default_camera(scene, SIZE)
+
+    def frame(offscreen: Offscreen, least: int, moves: bool) -> None:
+        crowd_pass.FEWEST = least
+        if moves:
+            change(scene.actors, rng)
+        with offscreen.context:
+            target = offscreen.target(SIZE, options.samples)
+            offscreen.renderer.draw(scene, camera, options, target, box)
+            offscreen.context.finish()
+
+    return {
+        "played, crowd": lambda: frame(crowded, 2, True),
+        "played, single": lambda: frame(single, 1000, True),
+        "still, crowd": lambda: frame(crowded, 2, False),
+        "still, single": lambda: frame(single, 1000, False),
+    }
 
 
 if __name__ == "__main__":

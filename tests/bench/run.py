@@ -6,7 +6,7 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
-NAMES = ("start", "memory", "models", "skinning", "bodies", "deform", "read", "captures")
+NAMES = ("start", "memory", "models", "skinning", "bodies", "deform", "read", "captures", "video")
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "formats")]

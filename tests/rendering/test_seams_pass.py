@@ -60,7 +60,8 @@ def test_every_split_vertex_has_a_row_with_its_texture_coordinate(posed):
     assert mesh.mesh.n_vertices == 9
     assert mesh.posed.size == 24 * 9
     assert rows_of(mesh.mesh.uvs, 2).shape == (9, 2)
-    indices = np.frombuffer(mesh.mesh.index_set(False, (), as_listed=True).indices.read(), dtype="u4")
+    listed = mesh.mesh.index_set(False, (), as_listed=True)
+    indices = np.frombuffer(listed.indices.read(), dtype="u4")
     corners = figure.mesh.uv_triangles.ravel()
     assert np.array_equal(rows_of(mesh.mesh.uvs, 2)[indices], figure.mesh.uvs[corners])
     assert np.array_equal(mesh.mesh.sources[indices], figure.mesh.triangles.ravel())

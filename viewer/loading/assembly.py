@@ -15,7 +15,7 @@ from viewer.loading.driving import Cast, drive
 from viewer.loading.settings import MotionSettings
 from viewer.rig.arrays import Bytes
 from viewer.rig.figure import Figure
-from viewer.rig.morph_target import with_morphs
+from viewer.rig.morph_target import on_one_joint, with_morphs
 from viewer.rig.motion import pose_actor, time_span
 from viewer.rig.pose_record import PoseRecord
 from viewer.rig.scene import Actor, Scene, scene_box
@@ -70,7 +70,7 @@ def begin(
     for pair in pairs:
         figure = _join([figures[index] for index in pair])
         cast.add(Actor(figure), figure.up, placed=False)
-    _give_morphs(contents, cast.actors)
+    _give_morphs(contents, cast)
     drive(contents, cast, settings or MotionSettings())
     start = time_span(cast.actors)[0]
     for actor in cast.actors:
@@ -119,13 +119,20 @@ def _fits_by_name(skeleton: Figure, skin: Figure) -> bool:
     return skeleton.name == skin.name and _fits(skeleton, skin)
 
 
-def _give_morphs(contents: Contents, actors: list[Actor]) -> None:
+def _give_morphs(contents: Contents, cast: Cast) -> None:
     """Give targets to the first mesh that has their vertices, all that fit to the same one."""
+    actors = cast.actors
     for path, target in contents.morphs:
         problem: RigError | None = None
         for index, actor in enumerate(actors):
+            figure = actor.figure
             try:
-                actors[index] = Actor(with_morphs(actor.figure, [target]))
+                if figure.skeleton is None and figure.mesh is not None:
+                    figure = on_one_joint(figure)
+                    cast.notes.append(
+                        f"{printable(figure.name, 60)}: without its .skel only the morphs move it"
+                    )
+                actors[index] = Actor(with_morphs(figure, [target]))
                 break
             except RigError as refused:
                 problem = problem or refused

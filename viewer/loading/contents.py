@@ -73,13 +73,16 @@ def read_files(
     """Read files without putting them together; see ``viewer.loading.load``."""
     contents = Contents()
     sources = [Source.open(path, max_size) for path in paths]
+    known = {source.path.resolve() for source in sources}
     for source in sources:  # grows while it is read: a .rig names files
         if _is_picture(source):
             contents.pictures.append((source.path, read_picture(source)))
         else:
             named = _sort(source, contents, settings or MotionSettings())
-            known = {other.path for other in sources}
-            sources += [Source.open(path, max_size) for path in named if path not in known]
+            for path in named:
+                if path.resolve() not in known:  # a .rig may name another, or itself
+                    known.add(path.resolve())
+                    sources.append(Source.open(path, max_size))
     contents.warnings = tuple(text for source in sources for text in source.warnings)
     return contents
 

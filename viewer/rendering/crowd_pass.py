@@ -13,7 +13,7 @@ from viewer.rig.scene import Actor
 
 __all__ = ["FEWEST", "crowds_of", "draw_crowd"]
 
-FEWEST = 4
+FEWEST = 8
 """Actors from which on they are drawn as a crowd; see ``crowds_of``."""
 
 

@@ -11,8 +11,10 @@ from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints, frozen
 from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.figure import Figure
+from viewer.rig.skeleton import Skeleton
+from viewer.rig.skin import Skin
 
-__all__ = ["MORPH_GROUP", "MorphTarget", "with_morphs"]
+__all__ = ["MORPH_GROUP", "MorphTarget", "on_one_joint", "with_morphs"]
 
 MORPH_GROUP = "morph"
 """Of blend shapes whose weight 1 is a target reached, and 0 is the mesh as it is."""
@@ -95,6 +97,40 @@ def with_morphs(figure: Figure, targets: Sequence[MorphTarget]) -> Figure:
         offsets = np.concatenate([known, offsets], axis=1)
     offsets.flags.writeable = False  # so that nobody has to copy it
     return replace(figure, blend_shapes=BlendShapes(names, offsets[0], groups, offsets[1]))
+
+
+def on_one_joint(figure: Figure) -> Figure:
+    """Return a mesh without a skeleton on a single joint that never moves.
+
+    Blend shapes have their weights in a pose, and poses are of skeletons. The mesh stays in its
+    binding space.
+
+    Parameters
+    ----------
+    figure : Figure
+        With a mesh; its skin, which no skeleton moves, is replaced.
+    """
+    mesh = figure.mesh
+    assert mesh is not None  # the caller looked
+    empty = np.zeros(0, dtype=np.int32)
+    skeleton = Skeleton(
+        names=("binding",),
+        parents=np.array([-1], dtype=np.int32),
+        rest_translations=np.zeros((1, 3)),
+        rest_rotations=np.array([[0.0, 0.0, 0.0, 1.0]]),
+        rest_scales=np.ones((1, 3)),
+        dof_joints=empty,
+        dof_kinds=empty,
+        rest_dofs=np.zeros(0),
+        dof_limits=np.zeros((0, 2)),
+    )
+    skin = Skin(
+        starts=np.arange(mesh.n_vertices + 1, dtype=np.int32),
+        joints=np.zeros(mesh.n_vertices, dtype=np.int32),
+        weights=np.ones(mesh.n_vertices),
+        inverse_bind=np.eye(4)[None],
+    )
+    return replace(figure, skeleton=skeleton, skin=skin)
 
 
 def _check_vertices(target: MorphTarget, figure_name: str, count: int) -> None:

@@ -92,7 +92,7 @@ def trail(
     for first in range(0, len(times), step):
         rows = slice(first, first + step)
         frames = frames_of(figure, motion, times[rows], base)
-        points[rows] = world_frames(figure, frames)[:, chosen, :3, 3]
+        points[rows] = world_frames(figure, frames)[:, chosen][..., :3, 3]
         present[rows] = frames.present[:, None]
     return Trail(times, points, present)
 

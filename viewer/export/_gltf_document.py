@@ -1,0 +1,165 @@
+"""A glTF 2.0 file in the making: its JSON, and the arrays and pictures that go into its buffer.
+
+Facts are those of the Khronos specification: ``registry.khronos.org/glTF/specs/2.0``.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from typing import Any
+from urllib.parse import quote
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.errors import RigError
+
+__all__ = ["INDICES", "VERTICES", "Document", "text_of"]
+
+VERTICES, INDICES = 34962, 34963  # targets of buffer views
+
+_TYPES = {np.dtype("u1"): 5121, np.dtype("<u2"): 5123, np.dtype("<u4"): 5125, np.dtype("<f4"): 5126}
+_SIZES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+_PADDING = 4  # every array begins at a multiple of the largest component
+_LONGEST = 2**32 - 1  # a .glb gives its length in 32 bits
+_HEADER = 28  # bytes of a .glb that are neither JSON nor arrays
+
+
+class Document:
+    """What a file will hold; everything in it is told apart by index.
+
+    Parameters
+    ----------
+    name : str
+        What errors call it.
+
+    Attributes
+    ----------
+    root : dict
+        The JSON.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.root: dict[str, Any] = {"asset": {"version": "2.0", "generator": "viewer"}}
+        self._name = name
+        self._parts: list[bytes] = []
+        self._size = 0
+
+    def add(self, kind: str, item: dict[str, Any]) -> int:
+        """Append to ``nodes``, ``meshes`` … and return the index."""
+        items: list[dict[str, Any]] = self.root.setdefault(kind, [])
+        items.append(item)
+        return len(items) - 1
+
+    def array(self, values: NDArray[Any], kind: str, target: int = 0, bounds: bool = False) -> int:
+        """Add an array; return its accessor.
+
+        Parameters
+        ----------
+        values : (N, ...)
+            Unsigned integers as they are, floating-point numbers in single precision; one row an
+            element, N > 0.
+        kind : str
+            ``"SCALAR"``, ``"VEC3"`` ….
+        target : int
+            ``VERTICES``, ``INDICES``, or 0 for what no mesh draws.
+        bounds : bool
+            Give the least and greatest value of each component.
+
+        Raises
+        ------
+        RigError
+            If a number is too large for single precision, or not one.
+        """
+        return self.arrays(values[None], kind, target, bounds)[0]
+
+    def arrays(
+        self, values: NDArray[Any], kind: str, target: int = 0, bounds: bool = False
+    ) -> list[int]:
+        """Add several arrays of one size, which lie behind one another; return their accessors.
+
+        Parameters
+        ----------
+        values : (A, N, ...)
+            As for ``array``, A times.
+        kind, target, bounds
+            As for ``array``.
+        """
+        stored = self._stored(values)
+        rows = stored.reshape(len(stored), -1, _SIZES[kind])
+        view = self._view(stored.tobytes(), target)
+        accessors = []
+        for number, part in enumerate(rows):
+            accessor = {
+                "bufferView": view,
+                "byteOffset": number * part.nbytes,
+                "componentType": _TYPES[stored.dtype],
+                "count": len(part),
+                "type": kind,
+            }
+            if bounds:
+                accessor["min"] = part.min(axis=0).tolist()
+                accessor["max"] = part.max(axis=0).tolist()
+            accessors.append(self.add("accessors", accessor))
+        return accessors
+
+    def picture(self, png: bytes, name: str) -> int:
+        """Add a picture, a PNG file as bytes; return its index in ``images``."""
+        view = self._view(png, 0)
+        image = {"name": text_of(name), "mimeType": "image/png", "bufferView": view}
+        return self.add("images", image)
+
+    def glb(self) -> bytes:
+        """Return the whole as one binary file.
+
+        Raises
+        ------
+        RigError
+            If it is longer than such files can be.
+        """
+        content = self._json({"byteLength": self._size})
+        content += b" " * (-len(content) % _PADDING)
+        length = _HEADER + len(content) + self._size
+        if length > _LONGEST:
+            raise RigError(f"{self._name}: {length} bytes are more than a .glb can have")
+        chunks = struct.pack("<I4s", len(content), b"JSON") + content
+        if self._parts:
+            chunks += struct.pack("<I4s", self._size, b"BIN\0") + b"".join(self._parts)
+        return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+    def pair(self, buffer_name: str) -> tuple[bytes, bytes]:
+        """Return the JSON file, and the arrays for a file of that name beside it."""
+        uri = quote(buffer_name.encode("utf-8", "surrogateescape"), safe="")
+        return self._json({"uri": uri, "byteLength": self._size}), b"".join(self._parts)
+
+    def _json(self, buffer: dict[str, Any]) -> bytes:
+        whole = {**self.root, "buffers": [buffer]} if self._parts else self.root
+        text = json.dumps(whole, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+        return text.encode()
+
+    def _view(self, data: bytes, target: int) -> int:
+        view = {"buffer": 0, "byteOffset": self._size, "byteLength": len(data)}
+        if target:
+            view["target"] = target
+        padded = data + b"\0" * (-len(data) % _PADDING)
+        self._parts.append(padded)
+        self._size += len(padded)
+        return self.add("bufferViews", view)
+
+    def _stored(self, values: NDArray[Any]) -> NDArray[Any]:
+        if values.dtype.kind != "f":
+            return np.ascontiguousarray(values, dtype=values.dtype.newbyteorder("<"))
+        with np.errstate(over="ignore"):
+            single = np.ascontiguousarray(values, dtype="<f4")
+        if not np.isfinite(single).all():
+            worst = values[~np.isfinite(single)][0]
+            raise RigError(
+                f"{self._name}: expected numbers that fit glTF's single precision, found {worst:g}"
+            )
+        return single
+
+
+def text_of(name: str) -> str:
+    """Return a name as Unicode text: half characters of broken file names become ``?``."""
+    return name.encode("utf-8", "replace").decode()

@@ -1,0 +1,185 @@
+"""A mesh as glTF has it: one primitive a material, vertices split along seams, morph targets."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.export._gltf_document import INDICES, VERTICES, Document, text_of
+from viewer.export._gltf_shape import Shape
+from viewer.export._gltf_skin import Influences, influence_sets
+from viewer.formats._image import encode_png
+from viewer.rig.arrays import Bytes, Floats, Ints
+from viewer.rig.blendshapes import BlendShapes
+from viewer.rig.mesh import Mesh, split_seams, vertex_normals
+from viewer.rig.vectors import unit
+
+__all__ = ["add_mesh"]
+
+_PLAIN = (0.62, 0.60, 0.57)  # linear; what the viewer draws without a texture
+_POINTS = 0  # mode of a primitive without triangles
+_LONG = 65535  # the index itself is reserved, so so many vertices fit 16 bits
+_CLAMP, _LINEAR, _MIPMAPS = 33071, 9729, 9987
+_NOT_UNIT = 1e-3  # normals too short or long for their squares to be numbers stay otherwise
+
+Color = tuple[float, float, float]
+
+
+def add_mesh(
+    document: Document,
+    name: str,
+    shape: Shape,
+    influences: Influences | None,
+    color: Color | None = None,
+) -> tuple[int, int]:
+    """Add a figure's mesh.
+
+    Parameters
+    ----------
+    document : Document
+        Changed.
+    name : str
+        The figure's.
+    shape : Shape
+        Its figure has a mesh with vertices.
+    influences : Influences or None
+        Of the mesh; None if no joint moves it.
+    color : (r, g, b), optional
+        Linear, of what has no texture.
+
+    Returns
+    -------
+    mesh : int
+        Its index.
+    n_vertices : int
+        How many are written: along seams there are several for one of the figure.
+    """
+    mesh = shape.figure.mesh
+    assert mesh is not None  # the caller looked
+    sources, uv_indices, triangles = split_seams(mesh)
+    attributes = _attributes(document, mesh, sources, uv_indices)
+    for number, (joints, weights) in enumerate(
+        influence_sets(influences, sources) if influences is not None else ()
+    ):
+        attributes[f"JOINTS_{number}"] = document.array(joints, "VEC4", VERTICES)
+        attributes[f"WEIGHTS_{number}"] = document.array(weights, "VEC4", VERTICES)
+    item: dict[str, Any] = {"name": text_of(f"{name} mesh")}
+    shared: dict[str, Any] = {"attributes": attributes}
+    shapes = shape.figure.blend_shapes
+    if shapes is not None and len(shape.targets):
+        shared["targets"] = _targets(document, mesh, shapes, shape.targets, sources)
+        item["weights"] = shape.weights[0].tolist()
+        item["extras"] = {"targetNames": [text_of(shapes.names[row]) for row in shape.targets]}
+    item["primitives"] = _primitives(document, mesh, triangles, len(sources), shared, color)
+    return document.add("meshes", item), len(sources)
+
+
+def _attributes(document: Document, mesh: Mesh, sources: Ints, uv_indices: Ints) -> dict[str, int]:
+    attributes = {
+        "POSITION": document.array(mesh.positions[sources], "VEC3", VERTICES, bounds=True),
+        "NORMAL": document.array(_normals(mesh)[sources], "VEC3", VERTICES),
+    }
+    if mesh.uvs is not None and len(mesh.uvs):
+        # The first row of a picture is at v = 0 in glTF, and at v = 1 here.
+        uvs = mesh.uvs[uv_indices] * [1.0, -1.0] + [0.0, 1.0]
+        attributes["TEXCOORD_0"] = document.array(uvs, "VEC2", VERTICES)
+    return attributes
+
+
+def _normals(mesh: Mesh) -> Floats:
+    """Return unit normals; those of the surface where the figure has none of any length."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        normals = unit(mesh.normals)
+        odd = ~(np.abs(np.linalg.norm(normals, axis=1) - 1.0) < _NOT_UNIT)
+    if odd.any():
+        normals[odd] = vertex_normals(mesh.positions, mesh.triangles)[odd]
+    return normals
+
+
+def _targets(
+    document: Document,
+    mesh: Mesh,
+    shapes: BlendShapes,
+    rows: NDArray[np.intp],
+    sources: Ints,
+) -> list[dict[str, int]]:
+    # Normals are written at length 1, and what is added to them at the same scale.
+    lengths = np.linalg.norm(mesh.normals, axis=1, keepdims=True)
+    scales = np.divide(1.0, lengths, out=np.zeros_like(lengths), where=lengths > 0.0)
+    targets = []
+    for row in rows:
+        one = np.zeros(shapes.n_shapes)
+        one[row] = 1.0
+        moves = shapes.displacement(one)[sources]
+        target = {"POSITION": document.array(moves, "VEC3", VERTICES, bounds=True)}
+        turns = shapes.normal_displacement(one)
+        if turns is not None:
+            target["NORMAL"] = document.array((turns * scales)[sources], "VEC3", VERTICES)
+        targets.append(target)
+    return targets
+
+
+def _primitives(
+    document: Document,
+    mesh: Mesh,
+    triangles: Ints,
+    n_vertices: int,
+    shared: dict[str, Any],
+    color: Color | None,
+) -> list[dict[str, Any]]:
+    if len(triangles) == 0:
+        return [{**shared, "mode": _POINTS, "material": _plain(document, "plain", color)}]
+    dtype = np.uint16 if n_vertices <= _LONG else np.uint32
+    textures: dict[int, int] = {}
+    primitives = []
+    for index in np.unique(mesh.material_indices).tolist():
+        chosen = triangles[mesh.material_indices == index].astype(dtype).ravel()
+        primitives.append(
+            {
+                **shared,
+                "indices": document.array(chosen, "SCALAR", INDICES),
+                "material": _material(document, mesh, index, textures, color),
+            }
+        )
+    return primitives
+
+
+def _material(
+    document: Document, mesh: Mesh, index: int, textures: dict[int, int], color: Color | None
+) -> int:
+    if index < 0:
+        return _plain(document, "plain", color)
+    material = mesh.materials[index]
+    name = material.name or material.texture or f"material{index}"
+    if material.image is None or mesh.uvs is None or len(mesh.uvs) == 0:
+        return _plain(document, name, color)
+    # Materials may share a picture.
+    if id(material.image) not in textures:
+        picture = material.texture or name
+        textures[id(material.image)] = _texture(document, material.image, picture)
+    surface = {"baseColorTexture": {"index": textures[id(material.image)]}}
+    return _surface(document, name, surface)
+
+
+def _texture(document: Document, image: Bytes, name: str) -> int:
+    # The viewer takes no notice of alpha either: materials are opaque by default.
+    source = document.picture(encode_png(image), name)
+    if "samplers" not in document.root:
+        wraps = {"wrapS": _CLAMP, "wrapT": _CLAMP}
+        document.add("samplers", {"magFilter": _LINEAR, "minFilter": _MIPMAPS, **wraps})
+    return document.add("textures", {"sampler": 0, "source": source})
+
+
+def _plain(document: Document, name: str, color: Color | None) -> int:
+    return _surface(document, name, {"baseColorFactor": [*(color or _PLAIN), 1.0]})
+
+
+def _surface(document: Document, name: str, surface: dict[str, Any]) -> int:
+    # Without these, glTF takes a surface for metal. Files may wind triangles either way.
+    matte = {**surface, "metallicFactor": 0.0, "roughnessFactor": 0.8}
+    return document.add(
+        "materials",
+        {"name": text_of(name), "pbrMetallicRoughness": matte, "doubleSided": True},
+    )

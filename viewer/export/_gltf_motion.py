@@ -1,0 +1,139 @@
+"""Frames as a glTF animation: one sampler for everything that moves, in straight lines."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.errors import RigError
+from viewer.export._gltf_document import Document, text_of
+from viewer.export._gltf_nodes import Locals, Tree
+from viewer.rig.arrays import Bools, Floats
+from viewer.rig.motion import Frames
+from viewer.rig.skeleton import Skeleton
+
+__all__ = ["add_animation", "frames_between", "moving", "still_locals"]
+
+_NOISE = 1e-9  # of the skeleton's size: what moves less does not move
+
+
+def moving(skeleton: Skeleton, frames: Frames) -> Bools:
+    """Return which joints move within their parents: (J,)."""
+    size = float(np.abs(skeleton.rest_translations).max())
+    return np.asarray((np.ptp(frames.translations, axis=0) > _NOISE * size).any(axis=1))
+
+
+def still_locals(skeleton: Skeleton, rest: Locals, frames: Frames) -> Locals:
+    """Return joints at rest, those that are shifted for good where they are in all frames."""
+    there = skeleton.rest_translations + frames.translations[0]
+    chosen = moving(skeleton, frames)[:, None]
+    translations = np.where(chosen, rest.translations, there)
+    return Locals(translations, rest.rotations, skeleton.rest_scales)
+
+
+def add_animation(
+    document: Document,
+    name: str,
+    rate: float,
+    skeleton: Skeleton,
+    frames: Frames,
+    tree: Tree,
+    morph: tuple[int, Floats] | None,
+) -> int:
+    """Add rotations of all joints, translations of those that move, and the figure's place.
+
+    Quaternions are on the side of the frame before, so that programs that blend components do
+    right. Times begin at 0.
+
+    Parameters
+    ----------
+    document : Document
+        Changed.
+    name : str
+        The motion's.
+    rate : float
+        Frames a second.
+    skeleton : Skeleton
+        In the shape that is written.
+    frames : Frames
+        Without gaps.
+    tree : Tree
+        The nodes.
+    morph : (int, (F, M)) or None
+        The mesh's node and its targets' weights, if these change.
+
+    Returns
+    -------
+    int
+        Number of joints that have translations.
+
+    Raises
+    ------
+    RigError
+        If frames are too close together, or numbers not finite.
+    """
+    times = (np.arange(frames.n_frames) / rate).astype(np.float32)
+    if (np.diff(times) <= 0.0).any():
+        raise RigError(f"{rate:g} frames a second are more than glTF's single precision can tell")
+    keys = _Keys(document, document.array(times, "SCALAR", bounds=True))
+    turns = np.swapaxes(_continuous(frames.rotations), 0, 1)
+    for node, output in zip(tree.joints, document.arrays(turns, "VEC4"), strict=True):
+        keys.add(node, "rotation", output)
+    moves = np.flatnonzero(moving(skeleton, frames))
+    if len(moves):
+        places = skeleton.rest_translations[moves] + frames.translations[:, moves]
+        outputs = document.arrays(np.swapaxes(places, 0, 1), "VEC3")
+        for joint, output in zip(moves, outputs, strict=True):
+            keys.add(tree.joints[joint], "translation", output)
+    if np.ptp(frames.figure_translations, axis=0).any():
+        keys.add(tree.place, "translation", document.array(frames.figure_translations, "VEC3"))
+    if np.ptp(frames.figure_scales):
+        scales = np.repeat(frames.figure_scales[:, None], 3, axis=1)
+        keys.add(tree.place, "scale", document.array(scales, "VEC3"))
+    if morph is not None:
+        keys.add(morph[0], "weights", document.array(morph[1].ravel(), "SCALAR"))
+    document.add(
+        "animations",
+        {"name": text_of(name), "samplers": keys.samplers, "channels": keys.channels},
+    )
+    return len(moves)
+
+
+class _Keys:
+    """Samplers and channels of one animation."""
+
+    def __init__(self, document: Document, times: int) -> None:
+        self.document, self.times = document, times
+        self.samplers: list[dict[str, Any]] = []
+        self.channels: list[dict[str, Any]] = []
+
+    def add(self, node: int, path: str, output: int) -> None:
+        target = {"node": node, "path": path}
+        self.channels.append({"sampler": len(self.samplers), "target": target})
+        sampler = {"input": self.times, "output": output, "interpolation": "LINEAR"}
+        self.samplers.append(sampler)
+
+
+def _continuous(rotations: Floats) -> Floats:
+    """Return unit quaternions, each on the side of the one before: (F, J, 4)."""
+    units = rotations / np.linalg.norm(rotations, axis=-1, keepdims=True)
+    cosines = np.einsum("fja,fja->fj", units[1:], units[:-1])
+    sides = np.cumprod(np.where(cosines < 0.0, -1.0, 1.0), axis=0)
+    units[1:] *= sides[..., None]
+    return units
+
+
+def frames_between(frames: Frames, rows: slice | NDArray[np.intp]) -> Frames:
+    """Return some of the frames."""
+    weights = frames.shape_weights
+    return Frames(
+        frames.times[rows],
+        frames.present[rows],
+        frames.rotations[rows],
+        frames.translations[rows],
+        weights if len(weights) == 1 else weights[rows],
+        frames.figure_translations[rows],
+        frames.figure_scales[rows],
+    )

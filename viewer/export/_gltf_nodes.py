@@ -1,0 +1,161 @@
+"""Nodes of a glTF file: what turns z up into y up, the figure's place, its joints.
+
+::
+
+    z up                     only if z is up: turned by -90 degrees about x
+    └── the figure's name    figure_translation and figure_scale
+        ├── joints           T R S, by the figure's names
+        ├── fixed            only if vertices follow no joint: they follow this, which never moves
+        └── mesh             only if the mesh follows no joints; a skinned one is a root
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.export._gltf_document import Document, text_of
+from viewer.rig.arrays import Floats
+from viewer.rig.pose import Pose, joint_rotations, local_matrices
+from viewer.rig.rotation import matrix_to_quaternion
+from viewer.rig.skeleton import Skeleton
+
+__all__ = ["Locals", "Tree", "add_nodes", "locals_of"]
+
+_HALF = float(np.sqrt(0.5))
+_Z_TO_Y = [-_HALF, 0.0, 0.0, _HALF]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Locals:
+    """Where joints are within their parents.
+
+    Attributes
+    ----------
+    translations, rotations, scales : (J, 3), (J, 4), (J, 3)
+        Figure units, unit quaternions (x, y, z, w), factors.
+    """
+
+    translations: Floats
+    rotations: Floats
+    scales: Floats
+
+
+@dataclass(slots=True)
+class Tree:
+    """Indices of nodes.
+
+    Attributes
+    ----------
+    root : int
+        The topmost.
+    place : int
+        Moves the whole figure.
+    joints : list of J int
+        In the figure's order.
+    fixed : list of int
+        What vertices without a joint follow; one or none.
+    """
+
+    root: int
+    place: int
+    joints: list[int]
+    fixed: list[int]
+
+
+def locals_of(skeleton: Skeleton, pose: Pose) -> Locals:
+    """Return the joints of a pose.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        In shape.
+    pose : Pose
+        DOFs in lengths and radians.
+    """
+    rotations = matrix_to_quaternion(joint_rotations(skeleton, pose))
+    return Locals(local_matrices(skeleton, pose)[:, :3, 3], rotations, pose.scales)
+
+
+def add_nodes(
+    document: Document,
+    name: str,
+    up: str,
+    skeleton: Skeleton | None,
+    pose: Pose | None,
+    still: Locals | None,
+    fixes: bool,
+) -> Tree:
+    """Add all nodes but that of the mesh.
+
+    Parameters
+    ----------
+    document : Document
+        Changed.
+    name : str
+        The figure's.
+    up : "y" or "z"
+        The axis that points up in the world that the figure is in.
+    skeleton, still : Skeleton and Locals, or None
+        The joints and where they are.
+    pose : Pose or None
+        Gives the figure's place.
+    fixes : bool
+        Whether vertices need something that never moves.
+
+    Raises
+    ------
+    RigError
+        If a number is not finite.
+    """
+    top: dict[str, Any] = {"name": text_of(name)}
+    place = root = document.add("nodes", top)
+    if up == "z":
+        turned = {"name": "z up", "rotation": _Z_TO_Y, "children": [place]}
+        root = document.add("nodes", turned)
+    children: list[int] = []
+    if pose is not None:
+        _put(top, "translation", pose.figure_translation, 0.0)
+        _put(top, "scale", np.full(3, pose.figure_scale), 1.0)
+    joints: list[int] = []
+    if skeleton is not None and still is not None:
+        joints = _add_joints(document, skeleton, still)
+        roots = np.flatnonzero(skeleton.parents < 0)
+        children += [joints[joint] for joint in roots]
+    fixed = [document.add("nodes", {"name": "fixed"})] if fixes else []
+    children += fixed
+    if children:
+        top["children"] = children
+    return Tree(root, place, joints, fixed)
+
+
+def _add_joints(document: Document, skeleton: Skeleton, still: Locals) -> list[int]:
+    first = len(document.root["nodes"])
+    below: list[list[int]] = [[] for _ in skeleton.names]
+    for joint, parent in enumerate(skeleton.parents.tolist()):
+        if parent >= 0:
+            below[parent].append(first + joint)
+    for joint, name in enumerate(skeleton.names):
+        node: dict[str, Any] = {"name": text_of(name)}
+        _put(node, "translation", still.translations[joint], 0.0)
+        rotation = still.rotations[joint]
+        node["rotation"] = _finite(rotation / np.linalg.norm(rotation))
+        _put(node, "scale", still.scales[joint], 1.0)
+        if below[joint]:
+            node["children"] = below[joint]
+        document.add("nodes", node)
+    return list(range(first, first + skeleton.n_joints))
+
+
+def _put(node: dict[str, Any], name: str, values: Floats, default: float) -> None:
+    if (values != default).any():
+        node[name] = _finite(values)
+
+
+def _finite(values: Floats) -> list[float]:
+    if not np.isfinite(values).all():
+        raise RigError("expected finite numbers in the pose, which glTF needs")
+    return [float(value) for value in values]

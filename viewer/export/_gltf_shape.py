@@ -1,0 +1,63 @@
+"""A figure's shape as glTF has it: morph targets, or a mesh that is in shape already."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.rig.arrays import Floats
+from viewer.rig.figure import Figure
+from viewer.rig.shape import shaped
+
+__all__ = ["Shape", "shape_of"]
+
+_MOST_TARGETS = 64  # each costs 12 bytes a vertex, and programs hold only so many
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shape:
+    """What is written of a figure's shape.
+
+    Attributes
+    ----------
+    figure : Figure
+        Whose mesh, skeleton and skin are written.
+    targets : (M,) int
+        Blend shapes that become morph targets.
+    weights : (F, M) or (1, M)
+        Of these, over time.
+    baked : (S,) or None
+        The shape that is in the mesh instead; None where none is.
+    """
+
+    figure: Figure
+    targets: NDArray[np.intp]
+    weights: Floats
+    baked: Floats | None = None
+
+
+def shape_of(figure: Figure, weights: Floats, reference: int = 0) -> Shape:
+    """Return how a figure's shape is written.
+
+    Where joints follow the mesh, morph targets would leave the joints behind: then one shape is
+    baked in, and so it is if there are too many.
+
+    Parameters
+    ----------
+    figure : Figure
+        Unshaped.
+    weights : (F, S) or (1, S)
+        Of its blend shapes, over time.
+    reference : int
+        The row to bake in.
+    """
+    used = np.flatnonzero(weights.any(axis=0))
+    if figure.mesh is None or figure.blend_shapes is None or len(used) == 0:
+        return Shape(figure, used[:0], np.zeros((1, 0)))
+    if figure.joint_regressor is None and len(used) <= _MOST_TARGETS:
+        return Shape(figure, used, weights[:, used])
+    row = weights[min(reference, len(weights) - 1)]
+    whole = replace(shaped(figure, row), blend_shapes=None)
+    return Shape(whole, used[:0], np.zeros((1, 0)), row)

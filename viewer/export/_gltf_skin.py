@@ -1,0 +1,142 @@
+"""Influences as glTF has them: in sets of four, no joint twice, none negative, sums of 1."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.errors import RigError
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.skin import (
+    Skin,
+    has_influence,
+    influence_counts,
+    limit_influences,
+    skin_from_entries,
+    weight_sums,
+)
+
+__all__ = ["Influences", "influence_sets", "influences_of", "inverse_bind_matrices"]
+
+PER_SET = 4
+_SUM = 1e-6  # sums nearer to 1 are rounding in the figure's file
+_MOST_JOINTS = 65536  # they are numbered in 16 bits
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Influences:
+    """What a file says of a skin.
+
+    Attributes
+    ----------
+    skin : Skin
+        Each joint once a vertex, strongest first, weights above 0 with sums of 1.
+    n_scaled : int
+        Vertices whose weights did not add up to 1.
+    n_negative : int
+        Vertices that had negative weights, which glTF forbids.
+    n_fixed : int
+        Vertices that nothing moves.
+    most : int
+        Largest number of influences of a vertex.
+    """
+
+    skin: Skin
+    n_scaled: int
+    n_negative: int
+    n_fixed: int
+    most: int
+
+    @property
+    def n_joints(self) -> int:
+        """Number of joints the file's skin lists: one more if vertices are fixed."""
+        return self.skin.n_joints + bool(self.n_fixed)
+
+
+def influences_of(skin: Skin) -> Influences:
+    """Return what glTF can hold of a skin.
+
+    Parameters
+    ----------
+    skin : Skin
+        Any weights.
+
+    Raises
+    ------
+    RigError
+        If there are more joints than a file can number.
+    """
+    merged = limit_influences(skin, max(1, int(influence_counts(skin).max(initial=0))))
+    owners = np.repeat(np.arange(skin.n_vertices, dtype=np.int32), influence_counts(merged))
+    positive = np.maximum(merged.weights, 0.0)
+    sums = np.bincount(owners, positive, skin.n_vertices)[owners]
+    weights = np.divide(positive, sums, out=np.zeros_like(positive), where=sums > 0.0)
+    kept = weights.astype(np.float32) > 0.0
+    written = skin_from_entries(
+        skin.n_vertices, owners[kept], merged.joints[kept], weights[kept], skin.inverse_bind
+    )
+    counts = influence_counts(written)
+    scaled = has_influence(skin) & (np.abs(weight_sums(skin) - 1.0) > _SUM)
+    found = Influences(
+        written,
+        int(scaled.sum()),
+        len(np.unique(owners[merged.weights < 0.0])),
+        int((counts == 0).sum()),
+        int(counts.max(initial=0)),
+    )
+    if found.n_joints > _MOST_JOINTS:
+        raise RigError(f"glTF numbers at most {_MOST_JOINTS} joints, found {found.n_joints}")
+    return found
+
+
+def influence_sets(
+    influences: Influences, sources: Ints
+) -> Iterator[tuple[NDArray[np.unsignedinteger], Floats]]:
+    """Yield JOINTS_0 and WEIGHTS_0, JOINTS_1 and WEIGHTS_1, and so on.
+
+    Parameters
+    ----------
+    influences : Influences
+        Of V vertices.
+    sources : (R,)
+        The vertices, or copies of them, that are written.
+
+    Yields
+    ------
+    joints : (R, 4) uint8 or uint16
+        Places in the skin's list of joints; the last one there is what fixed vertices hold on
+        to. 0 in unused slots, as the specification asks.
+    weights : (R, 4)
+        0 in unused slots.
+    """
+    skin = influences.skin
+    counts, starts = influence_counts(skin)[sources], skin.starts[sources]
+    dtype = np.uint8 if influences.n_joints <= 256 else np.uint16
+    for first in range(0, max(influences.most, 1), PER_SET):
+        rank = first + np.arange(PER_SET)
+        used = rank < counts[:, None]
+        place = (starts[:, None] + rank)[used]
+        joints, weights = np.zeros(used.shape, dtype), np.zeros(used.shape)
+        joints[used], weights[used] = skin.joints[place], skin.weights[place]
+        if first == 0:
+            fixed = counts == 0
+            joints[fixed, 0], weights[fixed, 0] = influences.n_joints - 1, 1.0
+        yield joints, weights
+
+
+def inverse_bind_matrices(influences: Influences, inverse_bind: Floats) -> Floats:
+    """Return the matrices of all joints that the skin lists, column after column: (N, 16).
+
+    Parameters
+    ----------
+    influences : Influences
+        Says whether vertices are fixed: what they hold on to was bound at the origin.
+    inverse_bind : (J, 4, 4)
+        Of the figure's joints.
+    """
+    matrices = np.concatenate([inverse_bind, np.eye(4)[None]])[: influences.n_joints]
+    matrices[:, 3] = 0.0, 0.0, 0.0, 1.0  # exactly, as readers expect
+    return matrices.transpose(0, 2, 1).reshape(-1, 16)

@@ -1,0 +1,305 @@
+"""Write figures as glTF 2.0, ``.glb`` or ``.gltf`` with a ``.bin``: mesh, skin, pose and motion.
+
+Facts are those of the Khronos specification: ``registry.khronos.org/glTF/specs/2.0``. Lengths are
+metres, y is up. Data stay as they are: a node above the figure turns what has z up.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from viewer.errors import RigError, printable
+from viewer.export._gaps import filled, gaps_text, runs
+from viewer.export._gltf_document import Document, text_of
+from viewer.export._gltf_losses import losses, not_held, sampled
+from viewer.export._gltf_mesh import Color, add_mesh
+from viewer.export._gltf_motion import add_animation, frames_between, moving, still_locals
+from viewer.export._gltf_nodes import Locals, Tree, add_nodes, locals_of
+from viewer.export._gltf_shape import Shape, shape_of
+from viewer.export._gltf_skin import Influences, influences_of, inverse_bind_matrices
+from viewer.export._options import GAPS, MotionOptions
+from viewer.formats import all_or_none, save_bytes
+from viewer.rig.arrays import Floats
+from viewer.rig.figure import Figure
+from viewer.rig.motion import Frames, pose_of
+from viewer.rig.pose import Pose
+from viewer.rig.scene import Actor, figure_pose
+from viewer.rig.skeleton import joint_label
+from viewer.rig.skinning import Skinning, skin_used
+from viewer.rig.take import Take
+
+__all__ = ["export", "export_take"]
+
+_LISTED = 8  # joints in a note
+
+
+def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
+    """Write a figure, its joints as they are posed; see ``viewer.export.export``."""
+    figure, pose = actor.figure, actor.pose
+    weights = np.zeros((1, 0)) if pose is None else pose.shape_weights[None]
+    body = _body_of(figure, shape_of(figure, weights), skinning)
+    skeleton, still = body.shape.figure.skeleton, None
+    if skeleton is not None and pose is not None:
+        still = locals_of(skeleton, pose)
+    document = Document(figure.name)
+    built = _add_body(document, body, figure.up, pose, still, actor.color)
+    (data,) = _files([(path, document)])
+    notes = [f"{printable(path, 300)}: {built.counts}, {data[path]}"]
+    notes += _beside(data, path) + _remarks(body, figure.up)
+    if figure.mesh is not None:
+        poses = [] if pose is None else [pose]
+        notes += losses(figure, poses, skinning, body.shape, body.influences, "", False)
+    return notes + not_held(figure, body.shape)
+
+
+def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
+    """Write a figure at rest and its motion; see ``viewer.export.export_take``.
+
+    Of a shape that is baked in and changes, that of the first frame that is present is written.
+
+    Parameters
+    ----------
+    take : Take
+        A figure in many poses.
+    path : Path
+        With ``gaps="split"`` and gaps, files are called ``name-1.glb``, ``name-2.glb`` ….
+    options : MotionOptions
+        Gaps, skinning, and what is up in the frames' world.
+
+    Returns
+    -------
+    list of str
+        What was written, then what the format cannot hold and by how much that is off.
+
+    Raises
+    ------
+    RigError
+        If no frame is present, numbers are not finite, or an option is unknown.
+    OutputError
+        If a file cannot be written.
+    """
+    _check(take, options)
+    present = take.frames.present
+    frames = filled(take.frames, options.gaps == "interpolate")
+    reference = int(present.argmax())
+    shape = shape_of(take.figure, frames.shape_weights, reference)
+    body = _body_of(take.figure, shape, options.skinning)
+    spans = [(0, frames.n_frames)]
+    paths = [path]
+    if options.gaps == "split" and not present.all():
+        spans = runs(present)
+        if len(spans) > 1:
+            names = [f"{path.stem}-{number}{path.suffix}" for number in range(1, len(spans) + 1)]
+            paths = [path.with_name(name) for name in names]
+    documents, counts = [], ""
+    for start, stop in spans:
+        document = Document(take.name)
+        counts = _add_take(document, take, body, frames, (start, stop), options.world_up)
+        documents.append(document)
+    notes = []
+    saved = _files(list(zip(paths, documents, strict=True)))
+    for file, (start, stop), data in zip(paths, spans, saved, strict=True):
+        first = take.first_frame + start
+        motion = f"{stop - start} frames ({first} to {first + stop - start - 1})"
+        rate = f"at {take.frame_rate:g} a second"
+        notes += [f"{printable(file, 300)}: {counts}, {motion} {rate}, {data[file]}"]
+        notes += _beside(data, file)
+    notes += _remarks(body, options.world_up) + _motion_remarks(take, body, frames, options)
+    return notes + _take_losses(take, body, options) + not_held(take.figure, shape)
+
+
+def _check(take: Take, options: MotionOptions) -> None:
+    for what, value, known in (
+        ("unit", options.unit, ("", "m")),
+        ("up axis", options.up, ("", "y")),
+        ("up axis of the scene", options.world_up, ("y", "z")),
+        ("way to close gaps", options.gaps, tuple(GAPS)),
+    ):
+        if value not in known:
+            listed = ", ".join(filter(None, known))
+            one = "one of " * (len(list(filter(None, known))) > 1)
+            raise RigError(f'{what} of glTF: expected {one}{listed}, found "{value}"')
+    if not take.frames.present.any():
+        raise RigError(f"{take.name}: every frame is missing, there is nothing to write")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Body:
+    """What is the same in all files of an export."""
+
+    shape: Shape
+    influences: Influences | None  # None if no joint moves the mesh
+
+    @property
+    def figure(self) -> Figure:
+        """As it is written."""
+        return self.shape.figure
+
+
+@dataclass(frozen=True, slots=True)
+class _Built:
+    """What one file was given."""
+
+    tree: Tree
+    mesh_node: int | None
+    counts: str
+
+
+def _body_of(figure: Figure, shape: Shape, skinning: Skinning) -> _Body:
+    if figure.mesh is None and figure.skeleton is None:
+        raise RigError(f"figure {figure.name} has neither mesh nor skeleton to write as glTF")
+    if not figure.is_attached or figure.skin is None:
+        return _Body(shape, None)
+    return _Body(shape, influences_of(skin_used(figure.skin, skinning)))
+
+
+def _add_body(
+    document: Document,
+    body: _Body,
+    up: str,
+    pose: Pose | None,
+    still: Locals | None,
+    color: Color | None = None,
+) -> _Built:
+    """Add nodes, mesh and skin of a figure; return their indices and how many there are."""
+    figure, influences = body.figure, body.influences
+    fixes = influences is not None and influences.n_fixed > 0
+    tree = add_nodes(document, figure.name, up, figure.skeleton, pose, still, fixes)
+    scene, counts, node = [tree.root], [], None
+    if figure.mesh is not None and figure.mesh.n_vertices:
+        mesh, written = add_mesh(document, figure.name, body.shape, influences, color)
+        item: dict[str, Any] = {"name": text_of(f"{figure.name} mesh"), "mesh": mesh}
+        node = document.add("nodes", item)
+        if influences is not None and figure.skin is not None:
+            matrices = inverse_bind_matrices(influences, figure.skin.inverse_bind)
+            bound = document.array(matrices, "MAT4")
+            joints = tree.joints + tree.fixed
+            skin = {"name": text_of(figure.name), "joints": joints, "inverseBindMatrices": bound}
+            item["skin"] = document.add("skins", skin)
+            scene.append(node)  # what is above a skinned mesh moves its joints, never itself
+        else:
+            document.root["nodes"][tree.place].setdefault("children", []).append(node)
+        split = f" ({figure.mesh.n_vertices} before they were split along texture seams)"
+        counts = [f"{written} vertices{split * (written != figure.mesh.n_vertices)}"]
+        counts += [f"{figure.mesh.n_triangles} triangles"]
+    if figure.skeleton is not None:
+        counts += [f"{figure.skeleton.n_joints} joints"]
+    document.root["scene"] = document.add("scenes", {"nodes": scene})
+    return _Built(tree, node, ", ".join(counts))
+
+
+def _add_take(
+    document: Document, take: Take, body: _Body, frames: Frames, span: tuple[int, int], up: str
+) -> str:
+    """Add a figure at rest, and some of the frames as an animation."""
+    skeleton = body.figure.skeleton
+    assert skeleton is not None  # whoever has a take has a skeleton
+    part = frames_between(frames, slice(*span))
+    pose = figure_pose(take.figure)
+    rest = locals_of(skeleton, pose)
+    pose.figure_translation = part.figure_translations[0]
+    pose.figure_scale = float(part.figure_scales[0])
+    weights = body.shape.weights
+    if len(weights) > 1:
+        weights = weights[slice(*span)]
+        body = replace(body, shape=replace(body.shape, weights=weights))
+    built = _add_body(document, body, up, pose, still_locals(skeleton, rest, part))
+    morph = None
+    if built.mesh_node is not None and np.ptp(weights, axis=0).any():
+        morph = built.mesh_node, weights
+    name = take.motion.name or take.name
+    add_animation(document, name, take.frame_rate, skeleton, part, built.tree, morph)
+    return built.counts
+
+
+def _files(documents: list[tuple[Path, Document]]) -> list[dict[Path, str]]:
+    """Write all files, or none; return how long they are in words."""
+    saved: list[dict[Path, bytes]] = []
+    for path, document in documents:
+        if path.suffix.lower() == ".gltf":
+            beside = path.with_suffix(".bin")
+            text, arrays = document.pair(beside.name)
+            saved.append({path: text, **({beside: arrays} if arrays else {})})
+        else:
+            saved.append({path: document.glb()})
+    with all_or_none([file for files in saved for file in files]):
+        for files in saved:
+            for file, data in files.items():
+                save_bytes(file, data)
+    return [{file: f"{len(data)} bytes" for file, data in files.items()} for files in saved]
+
+
+def _beside(data: dict[Path, str], path: Path) -> list[str]:
+    return [f"{printable(file, 300)}: its arrays, {n}" for file, n in data.items() if file != path]
+
+
+def _remarks(body: _Body, up: str) -> list[str]:
+    """Say what readers of the file should know of space and shape."""
+    figure, notes = body.figure, []
+    if up == "z":
+        notes.append("z is up: a node above the figure turns it by -90 degrees about x")
+    if figure.unit != "m":
+        notes.append(
+            f"lengths stay as they are: {printable(figure.name, 100)} does not say its unit, and "
+            "programs take glTF's for metres"
+        )
+    if figure.mesh is not None and figure.mesh.n_vertices == 0:
+        notes.append("the mesh has no vertices, and is left out")
+    if body.shape.baked is not None:
+        notes.append("the shape is baked in: mesh and joints are written as it has them")
+    if len(body.shape.targets):
+        notes.append(f"{len(body.shape.targets)} blend shapes are morph targets")
+        shapes = figure.blend_shapes
+        if shapes is not None and shapes.normal_offsets is None:
+            notes.append("normals do not follow these: glTF has no rule for it")
+    if body.influences is not None and body.influences.n_fixed:
+        notes.append(
+            f"{body.influences.n_fixed} vertices have no influence: they follow a node that never "
+            "moves, fixed"
+        )
+    return notes
+
+
+def _motion_remarks(take: Take, body: _Body, frames: Frames, options: MotionOptions) -> list[str]:
+    """Say what was done with gaps, and which joints move within their parents."""
+    notes, skeleton = [], take.figure.skeleton
+    assert skeleton is not None  # whoever has a take has a skeleton
+    if not take.frames.present.all():
+        done = {"hold": "the last pose is held", "interpolate": "interpolated, held at both ends"}
+        text = gaps_text(take.frames.present, take.first_frame)
+        notes.append(f"missing {text}: {done.get(options.gaps, 'one file for each run of frames')}")
+    assert body.figure.skeleton is not None  # shaping keeps it
+    moves = np.flatnonzero(moving(body.figure.skeleton, frames) & (skeleton.parents >= 0))
+    if len(moves):
+        names = ", ".join(joint_label(skeleton, int(joint)) for joint in moves[:_LISTED])
+        more = f" and {len(moves) - _LISTED} more" * (len(moves) > _LISTED)
+        notes.append(
+            f"{len(moves)} joints below the root move within their parents: "
+            f"{printable(names, 300)}{more}"
+        )
+    return notes
+
+
+def _take_losses(take: Take, body: _Body, options: MotionOptions) -> list[str]:
+    if take.figure.mesh is None:
+        return []
+    present = np.flatnonzero(take.frames.present)
+    rows = sampled(present)
+    poses = [pose_of(take.figure, take.frames, int(row)) for row in rows]
+    extent = f" in {len(rows)} of {len(present)} frames" if len(rows) < len(present) else ""
+    changes = _changes(take.frames.shape_weights[present] if _varies(take) else np.zeros((1, 0)))
+    return losses(
+        take.figure, poses, options.skinning, body.shape, body.influences, extent, changes
+    )
+
+
+def _varies(take: Take) -> bool:
+    return len(take.frames.shape_weights) > 1
+
+
+def _changes(weights: Floats) -> bool:
+    return bool(np.ptp(weights, axis=0).any())
