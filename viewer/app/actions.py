@@ -6,6 +6,7 @@ from viewer.app.state import AppState
 from viewer.errors import ViewerError, printable
 from viewer.rendering.camera import VIEWS, Camera, camera_from_view, fit
 from viewer.rendering.options import SHOWN, Lights
+from viewer.rendering.picking import Pick
 from viewer.rendering.pinhole import distortion_error
 from viewer.rig.follow import followed_point
 from viewer.rig.pose import rest_pose
@@ -28,6 +29,7 @@ __all__ = [
     "start_following",
     "step",
     "stop_following",
+    "take_pick",
     "toggle_binding",
     "toggle_option",
     "toggle_projection",
@@ -99,6 +101,23 @@ def look_through(state: AppState, index: int) -> None:
     error = distortion_error(view)
     if error >= 0.5:
         state.say(f"The lens of {printable(view.name)} bends pictures by up to {error:.1f} pixels")
+
+
+def take_pick(state: AppState, found: Pick, aims: bool) -> None:
+    """Choose the actor and joint that were clicked; a double click aims the camera there."""
+    if found.actor != state.chosen_actor:
+        state.choose_actor(found.actor)
+        state.say_status(printable(state.actor.name, 60))
+    if found.joint >= 0:
+        state.selected_joint = found.joint
+        skeleton = state.actor.figure.skeleton
+        above = found.joint
+        while skeleton is not None and above >= 0:
+            state.opened_joints.add(above)  # so that its row is seen
+            above = int(skeleton.parents[above])
+    if aims:
+        state.camera.fixed = None
+        state.camera.target = found.point.copy()
 
 
 def toggle_projection(state: AppState) -> None:

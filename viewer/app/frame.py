@@ -12,7 +12,7 @@ import moderngl
 import numpy as np
 from imgui_bundle import imgui
 
-from viewer.app.actions import follow_actor
+from viewer.app.actions import follow_actor, take_pick
 from viewer.app.file_dialog import PICTURES, FileDialog, draw_file_dialog, folder_of
 from viewer.app.interface import draw_hints, draw_interface
 from viewer.app.jobs import FrameJob
@@ -102,6 +102,7 @@ class Frame:
         self._pose()
         state.history.observe(state.scene, state.options, imgui.is_any_item_active())
         self._draw_scene(scale)
+        self._pick(scale)
         imgui.render()
         framebuffer.use()
         self.context.viewport = (0, 0, *size)
@@ -198,6 +199,24 @@ class Frame:
             draw_list.add_image(picture, (x, y), corner, (0.0, 1.0), (1.0, 0.0))
             if state.panels_visible:
                 draw_hints(state)
+
+    def _pick(self, scale: float) -> None:
+        """Choose what was clicked in the view, or aim the camera at it."""
+        state, wanted = self.state, self.state.wants_pick
+        state.wants_pick = None
+        if wanted is None or self.target is None:
+            return
+        x, y, aims = wanted
+        try:
+            found = self.renderer.pick(
+                state.scene, state.camera, state.options, self.target.size,
+                x * scale, y * scale, state.box,
+            )  # fmt: skip
+        except ViewerError as problem:
+            state.error = str(problem)
+            return
+        if found is not None:
+            take_pick(state, found, aims)
 
     def _draw_target(self, size: tuple[int, int]) -> None:
         """Draw the scene; what the driver refuses becomes a message, and the window stays."""

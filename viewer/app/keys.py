@@ -100,6 +100,8 @@ _REPEATED = (_K.left_arrow, _K.right_arrow)  # go on while they are held
 _ALWAYS = ("Esc", "Ctrl+Q")  # also while a message or dialog lies over everything
 
 MOUSE = (
+    ("Click", "choose an actor or joint"),
+    ("Double click", "aim the camera there"),
     ("Left drag", "orbit"),
     ("Right drag, Shift drag", "pan"),
     ("Wheel", "zoom to the pointer"),

@@ -1,4 +1,4 @@
-"""The mouse in the view: orbit, pan, zoom."""
+"""The mouse in the view: orbit, pan, zoom; a click chooses, a double click aims."""
 
 from __future__ import annotations
 
@@ -30,6 +30,11 @@ def handle_mouse(state: AppState) -> None:
         pan(state.camera, -delta.x / height, delta.y / height)
     elif left:
         orbit(state.camera, -_DEGREES_PER_POINT * delta.x, _DEGREES_PER_POINT * delta.y)
+    place = (io.mouse_pos.x - x, io.mouse_pos.y - y)
+    if imgui.is_mouse_double_clicked(imgui.MouseButton_.left):
+        state.wants_pick = (*place, True)
+    elif imgui.is_mouse_released(imgui.MouseButton_.left) and _is_click():
+        state.wants_pick = (*place, False)
     if io.mouse_wheel and imgui.is_mouse_pos_valid():
         across = (io.mouse_pos.x - x - width / 2) / height
         upward = -(io.mouse_pos.y - y - height / 2) / height
@@ -39,3 +44,10 @@ def handle_mouse(state: AppState) -> None:
 def _drags(button: imgui.MouseButton_) -> bool:
     # A quick hand moves and lets go within one frame: that way belongs to the drag as well.
     return imgui.is_mouse_dragging(button, 0.0) or imgui.is_mouse_released(button)
+
+
+def _is_click() -> bool:
+    """Return whether the button that went up had not been dragged, nor clicked twice."""
+    io, left = imgui.get_io(), imgui.MouseButton_.left
+    is_still = io.mouse_drag_max_distance_sqr[left] < io.mouse_drag_threshold**2
+    return is_still and io.mouse_clicked_last_count[left] < 2 and not io.key_shift

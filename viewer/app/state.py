@@ -108,6 +108,8 @@ class AppState:
         Work that goes on beside the frame loop.
     record : RecordSettings or None
         What the window "Record" asks for, while it is open.
+    wants_pick : (x, y, aims) or None
+        Where the view was clicked, from its corner; whether the camera aims there.
     wants_recording : Path or None
         Where to record to, after the frame.
     stream : Stream or None
@@ -150,6 +152,7 @@ class AppState:
     curves: CurveView = field(default_factory=CurveView)
     job: Job | None = None
     record: RecordSettings | None = None
+    wants_pick: tuple[float, float, bool] | None = None
     wants_recording: Path | None = None
     stream: Stream | None = None
     followed: tuple[int, int] | None = None
