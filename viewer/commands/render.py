@@ -76,7 +76,7 @@ def _draw_still(
     camera = camera_of(arguments, scene, points, size)
     box = bounding_box(points)
     if arguments.panels:
-        fits = arguments.distance is None
+        fits = arguments.distance is None and arguments.view is None
         pixels = _draw_panels(scene, size, camera, options, box, arguments.gpu, fits)
     else:
         pixels = draw_scene(scene, size, camera, options, box, arguments.gpu)

@@ -80,7 +80,7 @@ def run(arguments: argparse.Namespace) -> int:
         options=options,
         paths=scene_files(arguments),
         scale=arguments.scale,
-        fit_distance=arguments.distance is None,
+        fit_distance=arguments.distance is None and arguments.view is None,
         builders=builders,
         plays=arguments.play,
     )
