@@ -237,7 +237,7 @@ def _draw_progress(state: AppState) -> None:
         share, text = read / max(total, 1), f"{read:,} of {total:,} frames"
         names = ", ".join(builder.capture.name for builder in stream.builders)
         title, label = f"Reading {printable(names, 60)}", "Cancel reading"
-        place, pivot = (x + width - 10, y + height - 10), (1.0, 1.0)
+        place, pivot = (x + width - 10, y + 10), (1.0, 0.0)
     elif state.job is not None:
         done, total = state.job.progress
         title, label = state.job.title, "Cancel" if state.job.can_cancel else ""

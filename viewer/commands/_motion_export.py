@@ -10,7 +10,9 @@ from viewer.commands._shots import parse_range
 from viewer.errors import OutputError, RigError, UnsupportedFormatError, ViewerError, printable
 from viewer.export import EXPORTERS, MotionOptions, export_take, motion_exporters
 from viewer.export._options import GAPS, ROTATION_ORDERS, UNITS
+from viewer.rig.clip import Clip
 from viewer.rig.points import PointClip
+from viewer.rig.sampled_clip import SampledClip
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import Skinning
 from viewer.rig.smpl_family import member_of
@@ -25,6 +27,7 @@ __all__ = [
 ]
 
 _MOST_DIGITS = 15
+_ONE_A_FRAME = (".obj",)  # their motions are many files, which nobody wants by accident
 
 
 def add_motion_arguments(parser: argparse.ArgumentParser) -> None:
@@ -50,16 +53,20 @@ def add_motion_arguments(parser: argparse.ArgumentParser) -> None:
 
 def is_motion(arguments: argparse.Namespace, output: Path, scene: Scene) -> bool:
     """Return whether the whole motion is asked for, rather than one pose."""
+    suffix = output.suffix.lower() or "/"
     if arguments.kind is not None:
-        kind = EXPORTERS[arguments.kind]
-        return kind.writes_motion and (not kind.writes_pose or arguments.frames is not None)
+        kinds = [EXPORTERS[arguments.kind]]
+    else:
+        kinds = [kind for kind in EXPORTERS.values() if suffix in kind.suffixes]
+    if not any(kind.writes_motion for kind in kinds):
+        return False
     if arguments.frames is not None or "{frame" in output.name:
         return True
-    suffix = output.suffix.lower() or "/"
-    poses = any(suffix in kind.suffixes for kind in EXPORTERS.values() if kind.writes_pose)
-    moves = any(actor.clip is not None for actor in scene.actors)
+    if not any(kind.writes_pose for kind in kinds):
+        return True
+    moves = any(isinstance(actor.clip, Clip | SampledClip) for actor in scene.actors)
     wants_one = arguments.time is not None or arguments.frame is not None
-    return not poses or (suffix == ".npz" and moves and not wants_one)
+    return moves and not wants_one and suffix not in _ONE_A_FRAME
 
 
 def motion_options(arguments: argparse.Namespace, skinning: Skinning) -> MotionOptions:

@@ -1,0 +1,170 @@
+"""``viewer convert`` with motions: which exporter, which frames, which files, and refusals."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from app.tiny import write_rig
+from formats.synthetic_smpl import model
+from numpy.testing import assert_allclose
+
+import viewer
+from viewer.cli import run
+from viewer.rig.motion import pose_actor
+
+
+@pytest.fixture
+def walk(tmp_path):
+    """The tiny rig and a clip of its root: 0.5 to the right in a second, from second 1 on."""
+    skel, skin = write_rig(tmp_path)
+    count = viewer.load(skel).actors[0].figure.skeleton.n_dofs
+    moving = (
+        "channel { extrapolate constant constant keys 2 { 1 0 linear linear 2 0.5 linear linear } }"
+    )
+    still = "channel { extrapolate constant constant keys 1 { 0 0 flat flat } }"
+    clip = tmp_path / "walk.anim"
+    channels = " ".join([moving] + [still] * (count - 1))
+    clip.write_text(f"animation {{ range 1 2 numchannels {count} {channels} }}")
+    return str(skel), str(skin), str(clip)
+
+
+@pytest.fixture
+def recording(tmp_path):
+    """A model, and a folder of five frames in which person 3 misses the middle one."""
+    path = tmp_path / "SMPL.npz"
+    np.savez(path, **model("smpl"))
+    folder = tmp_path / "take" / "smpl"
+    folder.mkdir(parents=True)
+    for frame in range(5):
+        people = []
+        for person in (0, 3):
+            if (person, frame) == (3, 2):
+                continue
+            poses = np.zeros(72)
+            poses[12] = 0.1 * frame
+            record = {
+                "id": person,
+                "Rh": [[0.3, 0.2, 0.1 * frame]],
+                "Th": [[person, 0.1 * frame, 1.0]],
+            }
+            people.append({**record, "poses": [poses.tolist()], "shapes": [[0.5] + [0.0] * 9]})
+        (folder / f"{frame:06}.json").write_text(json.dumps(people))
+    return str(tmp_path / "take"), "--model", str(path)
+
+
+def convert(*arguments):
+    return run(["convert", *map(str, arguments)])
+
+
+def test_numbered_meshes_are_the_posed_ones(walk, tmp_path, capsys):
+    out = tmp_path / "w_{frame:03}.obj"
+    assert convert(*walk, "-o", out, "--fps", 4, "--frames", "1:4") == 0
+    assert "3 files, w_001.obj to w_003.obj" in capsys.readouterr().out
+    actor = viewer.load(*walk).actors[0]
+    for frame in (1, 2, 3):
+        pose_actor(actor, 1.0 + frame / 4)
+        wanted, _ = viewer.deform(actor.figure, actor.pose)
+        lines = (tmp_path / f"w_{frame:03}.obj").read_text().splitlines()
+        found = np.array([line.split()[1:] for line in lines if line.startswith("v ")], float)
+        assert_allclose(found, wanted, atol=1e-7)
+    assert not (tmp_path / "w_000.obj").exists()
+
+
+def test_arrays_of_all_frames(walk, tmp_path):
+    out = tmp_path / "walk.npz"
+    assert convert(*walk, "-o", out, "--fps", 4) == 0
+    with np.load(out) as arrays:
+        assert_allclose(arrays["times"], [1.0, 1.25, 1.5, 1.75, 2.0])
+        roots = arrays["joints"][:, 0, 0]
+        assert_allclose(roots - roots[0], [0.0, 0.125, 0.25, 0.375, 0.5], atol=1e-12)
+        moved = arrays["vertices"] - arrays["vertices"][0]
+        assert_allclose(moved[4], np.broadcast_to([0.5, 0, 0], moved[4].shape), atol=1e-12)
+
+
+def test_one_pose_where_a_time_is_given(walk, tmp_path):
+    out = tmp_path / "pose.npz"
+    assert convert(*walk, "-o", out, "--time", 1.5) == 0
+    with np.load(out) as arrays:
+        assert arrays["vertices"].ndim == 2
+
+
+def test_people_get_files_of_their_own(recording, tmp_path, capsys):
+    assert convert(*recording, "-o", tmp_path / "walk.bvh") == 0
+    written = sorted(path.name for path in tmp_path.glob("*.bvh"))
+    assert written == ["walk-0.bvh", "walk-3.bvh"]
+    text = capsys.readouterr().out
+    assert "the largest joint position error" in text
+    assert "missing frames 2" in text or "missing frame 2" in text
+
+
+def test_captures_become_amass_and_come_back(recording, tmp_path):
+    assert convert(*recording, "-o", tmp_path / "m.npz") == 0
+    source = viewer.load(recording[0], motion=viewer.loading.MotionSettings(model=recording[2]))
+    for actor in source.actors:
+        back = viewer.load(tmp_path / f"m-{actor.person}.npz", recording[2]).actors[0]
+        for frame in (0, 1, 3, 4):
+            pose_actor(actor, frame / 30.0)
+            pose_actor(back, frame / 30.0)
+            first, _ = viewer.deform(actor.figure, actor.pose)
+            second, _ = viewer.deform(back.figure, back.pose)
+            assert_allclose(second, first, atol=1e-9)
+
+
+def test_easymocap_folder_is_written_and_inputs_never_replaced(recording, tmp_path, capsys):
+    assert convert(*recording, "-o", tmp_path / "again") == 0
+    frames = sorted((tmp_path / "again" / "smpl").iterdir())
+    assert [path.name for path in frames] == [f"{n:06}.json" for n in range(5)]
+    assert [record["id"] for record in json.loads(frames[2].read_text())] == [0]
+    assert convert(*recording, "-o", tmp_path / "again") == 5
+    assert "exists already (--force replaces it)" in capsys.readouterr().err
+    assert convert(*recording, "-o", tmp_path / "take", "--force") == 5
+    assert "is an input folder, which is never replaced" in capsys.readouterr().err
+    assert (
+        convert(tmp_path / "take" / "smpl", *recording[1:], "-o", tmp_path / "take", "--force") == 5
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["-o", "w.obj", "--frames", "0:2"], "expected a name with {frame}, as in walk_{frame:05}.obj"),
+        (["-o", "w.bvh", "--frames", "2:1"], "--frames: expected A:B"),
+        (["-o", "w.bvh", "--frames", "0:4:2"], "--frames: expected A:B"),
+        (["-o", "w.xyz"], 'no exporter for ".xyz"; there are:'),
+        (["-o", "w.bvh", "--as", "anim"], "--as anim: expected a name with .anim"),
+        (["-o", "missing/w.bvh"], "missing/w.bvh: the folder does not exist"),
+        (["-o", "w.bvh", "--digits", "99"], "--digits: expected 0 to 15, found 99"),
+    ],
+)  # fmt: skip
+def test_refusals(walk, tmp_path, monkeypatch, capsys, arguments, message):
+    monkeypatch.chdir(tmp_path)
+    before = set(tmp_path.iterdir())
+    assert run(["convert", *walk, *arguments]) in (2, 5)
+    error = capsys.readouterr().err
+    assert message in error and error.count("\n") == 1
+    assert set(tmp_path.iterdir()) == before
+
+
+def test_still_figures_have_no_motion_to_write(tmp_path, capsys):
+    skel, skin = write_rig(tmp_path)
+    assert convert(skel, skin, "-o", tmp_path / "w.bvh") == 2
+    assert "no file moves anything: a motion cannot be written" in capsys.readouterr().err
+
+
+def test_existing_files_need_force(walk, tmp_path, capsys):
+    (tmp_path / "w.bvh").write_text("precious")
+    assert convert(*walk, "-o", tmp_path / "w.bvh") == 5
+    assert (tmp_path / "w.bvh").read_text() == "precious"
+    assert convert(*walk, "-o", tmp_path / "w.bvh", "--force") == 0
+    assert (tmp_path / "w.bvh").read_text().startswith("HIERARCHY")
+
+
+def test_worlds_that_hang_head_down_are_written_upright(recording, tmp_path):
+    # With y pointing down, a body's joints come out turned by half a turn about x.
+    assert convert(*recording, "--up=-y", "-o", tmp_path / "a.npz", "--as", "npz") == 0
+    assert convert(*recording, "--up=y", "-o", tmp_path / "b.npz", "--as", "npz") == 0
+    with np.load(tmp_path / "a-0.npz") as a, np.load(tmp_path / "b-0.npz") as b:
+        assert (str(a["up"]), str(b["up"])) == ("y", "y")
+        assert_allclose(a["joints"], b["joints"] * [1, -1, -1], atol=1e-12)
