@@ -129,7 +129,7 @@ def test_easymocap_folder_is_written_and_inputs_never_replaced(recording, tmp_pa
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["-o", "w.obj", "--frames", "0:2"], "expected a name with {frame}, as in walk_{frame:05}.obj"),
+        (["-o", "w.obj", "--frames", "0:2"], "expected a name with {frame}, as in walk_"),
         (["-o", "w.bvh", "--frames", "2:1"], "--frames: expected A:B"),
         (["-o", "w.bvh", "--frames", "0:4:2"], "--frames: expected A:B"),
         (["-o", "w.xyz"], 'no exporter for ".xyz"; there are:'),

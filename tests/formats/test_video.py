@@ -215,6 +215,37 @@ def test_gif_colours_come_from_all_that_was_looked_at(tmp_path):
     assert np.abs(frame[12, 16] - COLORS["red"]).max() <= 3
 
 
+@pytest.mark.parametrize("transparent", [False, True])
+def test_gif_of_gradients_with_a_moving_bar_is_right_in_every_frame(tmp_path, transparent):
+    """Most pixels stay from frame to frame, and are not stored again."""
+    path = tmp_path / "x.gif"
+    x, y = np.meshgrid(np.linspace(60, 220, 96), np.linspace(80, 240, 64))
+    still = np.stack([x, (x + y) / 2, y, np.full_like(x, 255)], axis=-1).astype(np.uint8)
+    still[::9] = (40, 45, 50, 255)
+    if transparent:
+        still[:, 70:] = 0
+    frames = []
+    for frame in range(8):
+        pixels = still.copy()
+        pixels[20:50, 10 * frame : 10 * frame + 6] = (200, 30, 20, 255)
+        if not transparent:  # so many colours that the palette is full
+            noise = np.random.default_rng(frame).integers(0, 255, (4, 20, 3))
+            pixels[30:34, 40:60, :3] = noise
+        frames.append(pixels)
+    sink = VideoSink(path, (96, 64), 20.0, transparent=transparent)
+    for pixels in frames:
+        sink.look(pixels)
+    write(sink, frames)
+    with Image.open(path) as animation:
+        for index, pixels in enumerate(frames):
+            animation.seek(index)
+            shown = np.array(animation.convert("RGBA")).astype(int)
+            assert (shown[..., 3] == pixels[..., 3]).all(), index
+            error = np.abs(shown - pixels)[pixels[..., 3] == 255].max(axis=-1)
+            # Ordered dither, and the noise: 80 pixels that have hardly a palette of their own.
+            assert error.mean() <= 6 and (error > 60).sum() <= 40, index
+
+
 def test_better_quality_is_larger_and_nearer(tmp_path):
     noise = np.random.default_rng(3).integers(0, 255, (64, 96, 4), dtype=np.uint8)
     noise[..., 3] = 255

@@ -28,6 +28,14 @@ def build(ctx, name: str):
     """Compile every program that a file takes part in."""
     programs = Programs(ctx)
     try:
+        if name.startswith("crowd"):
+            return programs.drawing("crowd", "phong", "mesh", skin="mix")
+        if name.startswith("point"):
+            return programs.drawing("point", "phong", "mesh")
+        if name.startswith("pick"):
+            return programs.drawing("crowd", fragment="pick", skin="dqs")
+        if name.startswith("trail"):
+            return programs.drawing("trail")
         if name.startswith("skin"):
             return programs.feedback("skin", "lbs", VARYINGS)
         if name.startswith(("mesh", "shade")):
@@ -55,6 +63,12 @@ def lines_to_break(text: str) -> list[int]:
         "shade/phong.glsl",
         "skin.vert",
         "skin/lbs.glsl",
+        "skinning.glsl",
+        "crowd.vert",
+        "point.vert",
+        "trail.vert",
+        "trail.frag",
+        "pick.frag",
         "joint.vert",
         "line.vert",
         "line.frag",
@@ -115,6 +129,8 @@ def test_every_shading_mode_compiles(ctx, shading):
 def test_every_skinning_method_compiles(ctx, method):
     programs = Programs(ctx)
     assert "u_pairs" in programs.feedback("skin", method, VARYINGS)
+    for shading in SHADING:
+        assert "u_pairs" in programs.drawing("crowd", shading, "mesh", skin=method)
     programs.release()
 
 

@@ -57,6 +57,7 @@ EXPORTERS = {
     "anim": Exporter(
         "clip: keys of a course rig", (".anim",), writes_pose=False, writes_motion=True
     ),
+    "gltf": Exporter("glTF: mesh, skin and motion", (".glb", ".gltf"), writes_motion=True),
     "bvh": Exporter("BVH: skeleton and motion", (".bvh",), writes_pose=False, writes_motion=True),
     "amass": Exporter(
         "AMASS: parameters of the SMPL family", (".npz",), writes_pose=False, writes_motion=True
@@ -165,7 +166,7 @@ def export_take(take: Take, path: str | Path, key: str, options: MotionOptions) 
 
 
 def files_written(path: str | Path) -> list[Path]:
-    """Return all files that an export to ``path`` writes: a rig is two.
+    """Return all files that an export to ``path`` writes: a rig is two, and so is a ``.gltf``.
 
     Raises
     ------
@@ -175,6 +176,8 @@ def files_written(path: str | Path) -> list[Path]:
     suffixes = EXPORTERS[exporter_for(path)].suffixes
     if exporter_for(path) == "rig":
         return [Path(path).with_suffix(suffix) for suffix in suffixes]
+    if Path(path).suffix.lower() == ".gltf":
+        return [Path(path), Path(path).with_suffix(".bin")]
     return [Path(path)]
 
 

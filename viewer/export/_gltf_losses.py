@@ -83,9 +83,9 @@ def losses(
     if len(notes) > 1:
         notes.append(f"all this together: up to {length_text(figure, total)}")
     if influences is not None and influences.most > PER_SET:
-        cut = _Step("", steps[-1].figure, Skinning(max_influences=PER_SET, correctives=False), None)
-        cut = replace(cut, weights=steps[-1].weights)
-        off = max(_distance(_vertices(cut, pose), _vertices(_plain(cut), pose)) for pose in poses)
+        whole = replace(steps[-1], how=Skinning(correctives=False))
+        cut = replace(whole, how=replace(whole.how, max_influences=PER_SET))
+        off = max(_distance(_vertices(cut, pose), _vertices(whole, pose)) for pose in poses)
         notes.append(
             f"up to {influences.most} influences a vertex, all of them written, strongest first: "
             f"programs that read only JOINTS_0 are off by up to {length_text(figure, off)}{extent}"
@@ -98,31 +98,24 @@ def _steps(
 ) -> list[_Step]:
     """Return the way from what is asked for to what is written, one loss after the other."""
     steps = [_Step("", figure, how, None)]
-
-    def lose(text: str, **parts: object) -> None:
-        steps.append(replace(steps[-1], text=text, **parts))
-
     if influences is not None:
         written = replace(figure, skin=influences.skin)
         exact = replace(how, max_influences=0, normalize=False)
         if influences.n_scaled or influences.n_negative:
-            lose(_weights_text(influences), figure=written, how=exact)
+            steps.append(_Step(_weights_text(influences), written, exact, None))
         else:
             steps[0] = _Step("", written, exact, None)
-        if how.method != "lbs":
+        if exact.method != "lbs":
             text = f"{METHODS[how.method]} skinning cannot be held, glTF blends linearly: up to "
-            lose(text, how=replace(steps[-1].how, method="lbs"))
+            exact = replace(exact, method="lbs")
+            steps.append(_Step(text, written, exact, None))
         if figure.correctives is not None and how.correctives:
             text = "pose correctives cannot be held: vertices are off by up to "
-            lose(text, how=replace(steps[-1].how, correctives=False))
+            steps.append(_Step(text, written, replace(exact, correctives=False), None))
     if shape.baked is not None and changes:
         text = "the shape changes over time, which cannot be held: vertices are off by up to "
-        lose(text, weights=shape.baked)
+        steps.append(replace(steps[-1], text=text, weights=shape.baked))
     return steps
-
-
-def _plain(step: _Step) -> _Step:
-    return replace(step, how=Skinning(correctives=False))
 
 
 def _weights_text(influences: Influences) -> str:

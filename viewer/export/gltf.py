@@ -23,7 +23,6 @@ from viewer.export._gltf_shape import Shape, shape_of
 from viewer.export._gltf_skin import Influences, influences_of, inverse_bind_matrices
 from viewer.export._options import GAPS, MotionOptions
 from viewer.formats import all_or_none, save_bytes
-from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.motion import Frames, pose_of
 from viewer.rig.pose import Pose
@@ -291,15 +290,9 @@ def _take_losses(take: Take, body: _Body, options: MotionOptions) -> list[str]:
     rows = sampled(present)
     poses = [pose_of(take.figure, take.frames, int(row)) for row in rows]
     extent = f" in {len(rows)} of {len(present)} frames" if len(rows) < len(present) else ""
-    changes = _changes(take.frames.shape_weights[present] if _varies(take) else np.zeros((1, 0)))
+    weights = take.frames.shape_weights
+    weights = weights if len(weights) == 1 else weights[present]
+    changes = bool(np.ptp(weights, axis=0).any())
     return losses(
         take.figure, poses, options.skinning, body.shape, body.influences, extent, changes
     )
-
-
-def _varies(take: Take) -> bool:
-    return len(take.frames.shape_weights) > 1
-
-
-def _changes(weights: Floats) -> bool:
-    return bool(np.ptp(weights, axis=0).any())

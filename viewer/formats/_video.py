@@ -337,8 +337,6 @@ def _encoder_options(encoder: str, quality: float) -> dict[str, str]:
     if encoder == "libvpx-vp9":
         speed = {"deadline": "good", "cpu-used": "5", "row-mt": "1", "auto-alt-ref": "0"}
         return {"crf": f"{63.0 - 0.5 * quality:.0f}", "b": "0", **speed}  # 75: 26
-    if encoder == "gif":
-        return {"global_palette": "0"}
     return {}
 
 

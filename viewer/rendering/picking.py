@@ -34,6 +34,7 @@ __all__ = ["Passes", "Pick", "PickPass"]
 
 _REACH = 3  # pixels around the one that is asked for
 _SIDE = 2 * _REACH + 1
+_PREFERENCE = 2.5  # pixels by which a keypoint may be further away than a surface
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,6 +91,7 @@ class PickPass:
         self.context, self.passes = context, passes
         self._numbers: moderngl.Texture | None = None
         self._found: list[_Found] = []
+        self._is_small: list[bool] = []
 
     def pick(
         self,
@@ -116,7 +118,7 @@ class PickPass:
         """
         self._begin()
         near = replace(view, projection=_window(size, pixel) @ view.projection)
-        self._found = []
+        self._found, self._is_small = [], []
         self._draw_meshes(scene, near, options)
         for index, actor in enumerate(scene.actors):
             if shows_skeleton(actor, options):
@@ -144,9 +146,10 @@ class PickPass:
         context.enable_only(moderngl.DEPTH_TEST)
         context.depth_func = "<"
 
-    def _number(self, program: moderngl.Program, found: _Found) -> None:
+    def _number(self, program: moderngl.Program, found: _Found, is_small: bool = False) -> None:
         """Give what is drawn next a number, and remember what it stands for."""
         self._found.append(found)
+        self._is_small.append(is_small)
         set_uniforms(program, {"u_item": len(self._found)})
 
     def _draw_meshes(self, scene: Scene, view: View, options: DisplayOptions) -> None:
@@ -212,7 +215,7 @@ class PickPass:
         markers = self.passes.buffers.keypoints_of(actor)
         markers.update(actor.pose, options.skinning)
         program = self.passes.programs.drawing("joint", fragment="pick")
-        self._number(program, lambda marker, _, point: Pick(index, -1, -1, marker, point))
+        self._number(program, lambda marker, _, point: Pick(index, -1, -1, marker, point), True)
         draw_boxes(
             program,
             markers.array(program),
@@ -242,18 +245,20 @@ class PickPass:
             apart = apply_transform(actor.placement, places[ends, :3]) - point
             return Pick(index, -1, -1, int(ends[np.linalg.norm(apart, axis=1).argmin()]), point)
 
-        self._number(program, found)
+        self._number(program, found, True)
         array = points.array(program, self.passes.points.capsule)
         array.render(moderngl.TRIANGLES, instances=len(elements))
 
     def _read(self, view: View) -> Pick | None:
-        """Return what the hit nearest to the middle stands for."""
+        """Return what the hit nearest to the middle stands for; keypoints are easily missed."""
         rows = np.frombuffer(self._framebuffer.read(components=4, dtype="i4"), dtype=np.int32)
         numbers = rows.reshape(_SIDE, _SIDE, 4)
         row, column = np.nonzero(numbers[..., 0])
         if not len(row):
             return None
-        nearest = ((row - _REACH) ** 2 + (column - _REACH) ** 2).argmin()
+        away = np.hypot(row - _REACH, column - _REACH)
+        away -= _PREFERENCE * np.array(self._is_small)[numbers[row, column, 0] - 1]
+        nearest = away.argmin()
         y, x = int(row[nearest]), int(column[nearest])
         item, instance, triangle = (int(number) for number in numbers[y, x, :3])
         depth = float(numbers[y, x, 3:].view(np.float32)[0])

@@ -1,0 +1,199 @@
+"""Looking through calibrated cameras: points land on the pixels that OpenCV's formula gives."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from drawn_figures import square
+
+from viewer.errors import RigError
+from viewer.rendering.camera import Camera, camera_axes, camera_from_view, eye, orbit
+from viewer.rendering.offscreen import Offscreen
+from viewer.rendering.options import DisplayOptions
+from viewer.rendering.pinhole import distortion_error, picture_size
+from viewer.rig.camera_view import CameraView
+from viewer.rig.figure import Figure
+from viewer.rig.points import PointLayout
+from viewer.rig.scene import Actor, Scene
+
+BOX = np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
+K = np.array([[800.0, 0.0, 300.0], [0.0, 820.0, 260.0], [0.0, 0.0, 1.0]])
+
+
+def camera_view(**changes) -> CameraView:
+    """Return a camera 5 in front of the origin of a y-up scene, looking along -z, upright."""
+    parts = {
+        "name": "01",
+        "intrinsic": K,
+        "rotation": np.diag([1.0, -1.0, -1.0]),
+        "translation": [0.0, 0.0, 5.0],
+        "size": (640, 480),
+    }
+    return CameraView(**{**parts, **changes})
+
+
+def pixel(view: CameraView, point, size) -> np.ndarray:
+    """Return where our matrices put a scene point, in pixels counted from the first one's middle.
+
+    OpenGL's window coordinates start at the picture's lower left corner.
+    """
+    camera = Camera(fixed=view)
+    clip = camera.projection_matrix(size[0] / size[1], BOX) @ camera.view_matrix() @ [*point, 1.0]
+    assert -1.0 <= clip[2] / clip[3] <= 1.0
+    x, y = clip[:2] / clip[3]
+    return np.array([0.5 * (1.0 + x) * size[0] - 0.5, 0.5 * (1.0 - y) * size[1] - 0.5])
+
+
+@pytest.mark.parametrize(
+    ("point", "wanted"),
+    [
+        ((0.0, 0.0, 0.0), (300.0, 260.0)),  # on the axis: the principal point
+        ((1.0, 0.0, 0.0), (460.0, 260.0)),  # 800 / 5 to the right
+        ((0.0, 1.0, 0.0), (300.0, 96.0)),  # 820 / 5 upwards
+        ((-0.5, -1.0, 1.0), (200.0, 465.0)),  # nearer: 0.5 * 800 / 4, 820 / 4
+    ],
+)
+def test_points_land_where_the_camera_saw_them(point, wanted):
+    assert pixel(camera_view(), point, (640, 480)) == pytest.approx(wanted, abs=1e-9)
+
+
+def test_every_point_lands_at_k_times_its_place():
+    rng = np.random.default_rng(0)
+    axis = rng.normal(size=3)
+    axis /= np.linalg.norm(axis)
+    cross = np.cross(np.eye(3), axis)
+    turn = np.eye(3) + math.sin(0.4) * cross + (1 - math.cos(0.4)) * cross @ cross
+    skewed = K.copy()
+    skewed[0, 1] = 12.0
+    for scale in (1.0, 2.5):
+        view = camera_view(
+            intrinsic=scale * skewed,
+            rotation=turn @ np.diag([1.0, -1.0, -1.0]),
+            translation=[0.2, -0.1, 6.0],
+        )
+        for point in rng.uniform(-1.0, 1.0, (50, 3)):
+            seen = skewed @ (view.rotation @ point + view.translation)
+            found = pixel(view, point, (640, 480))
+            assert found == pytest.approx(seen[:2] / seen[2], abs=1e-8)
+
+
+def test_a_larger_picture_is_the_same_picture():
+    point = (0.4, -0.3, 0.2)
+    small, large = (pixel(camera_view(), point, size) for size in ((640, 480), (1920, 1440)))
+    assert large + 0.5 == pytest.approx(3.0 * (small + 0.5))
+
+
+def test_pictures_of_another_shape_show_the_whole_in_their_middle():
+    point = (0.4, -0.3, 0.2)
+    small = pixel(camera_view(), point, (640, 480))
+    assert pixel(camera_view(), point, (800, 480)) == pytest.approx(small + np.array([80.0, 0.0]))
+    assert pixel(camera_view(), point, (640, 500)) == pytest.approx(small + np.array([0.0, 10.0]))
+
+
+def test_without_a_size_the_principal_point_is_in_the_middle():
+    assert picture_size(camera_view(size=None)) == (600.0, 520.0)
+    assert picture_size(camera_view(size=None, intrinsic=2.0 * K)) == (600.0, 520.0)
+    # Half a pixel, as pixels are counted from the first one's middle.
+    assert pixel(camera_view(size=None), (0, 0, 0), (600, 520)) == pytest.approx([300.0, 260.0])
+    with pytest.raises(RigError) as caught:
+        picture_size(camera_view(size=None, intrinsic=np.diag([800.0, 800.0, 1.0])))
+    assert str(caught.value) == (
+        "camera 01: expected a principal point above 0 or the size of the pictures, found 0, 0"
+    )
+
+
+def test_what_is_drawn_lands_there_too():
+    """Two captured points, 1 apart, and a square's corners."""
+    layout = PointLayout("two", ("a", "b"), np.zeros((0, 2)), [-1, -1])
+    dots = Actor(Figure("dots", points=layout))
+    dots.points = np.array([[0.3, 0.2, 0.1, 1.0], [-0.7, 0.2, 0.1, 1.0]])
+    wall = Actor(Figure("wall", square(z=-3.0, half=0.5)))
+    camera = camera_from_view(camera_view(), (640, 480), "y")
+    options = DisplayOptions(background="transparent", grid=False, samples=1)
+    with Offscreen() as offscreen:
+        alone = offscreen.render(Scene([wall]), (640, 480), camera, options, BOX)
+        marks = offscreen.render(Scene([dots]), (640, 480), camera, options, BOX)
+    rows, columns = np.nonzero(alone[..., 3])
+    # Corners at +-0.5, 8 away: 300 +- 50 and 260 +- 51.25, whose ends may be counted or not.
+    assert (columns.min(), columns.max()) in ((250, 350), (250, 349), (251, 350), (251, 349))
+    assert (rows.min(), rows.max()) == (209, 311)
+    rows, columns = np.nonzero(marks[..., 3])
+    right = columns > 300
+    # Seen at 300 + 800 * 0.3 / 4.9 and 260 - 820 * 0.2 / 4.9.
+    assert (columns[right].mean(), rows[right].mean()) == pytest.approx((348.98, 226.53), abs=0.5)
+    # And at 300 - 800 * 0.7 / 4.9.
+    assert (columns[~right].mean(), rows[~right].mean()) == pytest.approx((185.71, 226.53), abs=0.5)
+
+
+def test_depth_range_holds_what_is_drawn_from_inside_too():
+    for distance in (0.5, 3.0, 30.0):
+        view = camera_view(translation=[0.0, 0.0, distance])
+        camera = Camera(fixed=view)
+        matrix = camera.projection_matrix(1.0, BOX) @ camera.view_matrix()
+        for z in (-1.0, 0.0, min(1.0, distance - 0.2)):
+            clip = matrix @ [0.0, 0.0, z, 1.0]
+            assert -1.0 <= clip[2] / clip[3] <= 1.0
+
+
+@pytest.mark.parametrize("up", ["y", "z"])
+def test_leaving_the_fixed_view_stays_where_it_was(up):
+    """The orbit camera that is left stands at the same place and looks along the same axis."""
+    start = Camera(np.array([0.3, 0.2, -0.1]), 4.0, 40.0, -20.0, up=up)
+    right, upward, backward = camera_axes(start)
+    rotation = np.stack([right, -upward, -backward])
+    view = camera_view(rotation=rotation, translation=-rotation @ eye(start))
+    camera = camera_from_view(view, (640, 480), up, BOX)
+    assert camera.fixed is view and not camera.is_parallel
+    assert camera.copy().fixed is view
+    assert np.allclose(camera.view_matrix(), start.view_matrix(), atol=1e-12)
+    camera.fixed = None
+    assert np.allclose(camera.view_matrix(), start.view_matrix(), atol=1e-12)
+    assert (camera.azimuth, camera.inclination) == pytest.approx((40.0, -20.0))
+    # 480 rows at a focal length of 820: 2 atan(240 / 820).
+    assert camera.fov == pytest.approx(math.degrees(2.0 * math.atan(240 / 820)))
+    orbit(camera, 10.0, 0.0)
+    assert camera.azimuth == pytest.approx(50.0)
+
+
+def test_a_camera_that_turns_its_back_orbits_all_the_same():
+    view = camera_view(rotation=np.diag([-1.0, -1.0, 1.0]), translation=[0.0, 0.0, 4.0])
+    away = camera_view(rotation=np.eye(3), translation=[0.0, 0.0, 0.0])
+    for one in (view, away):
+        camera = camera_from_view(one, (640, 480), "y")
+        assert camera.distance > 0.0 and np.isfinite(camera.view_matrix()).all()
+
+
+def test_wide_pictures_see_as_much_to_the_sides():
+    camera = camera_from_view(camera_view(), (480, 480), "y")
+    # 640 columns fit into the width, so 640 rows are seen.
+    assert camera.fov == pytest.approx(math.degrees(2 * math.atan(320 / 820)))
+
+
+def test_a_fixed_camera_is_never_parallel():
+    camera = Camera(orthographic=True, fixed=camera_view())
+    assert not camera.is_parallel
+    camera.fixed = None
+    assert camera.is_parallel
+
+
+def test_distortion_by_hand():
+    """Corner of the picture with K = diag(100, 100, 1), the principal point at (50, 50)."""
+    k = np.array([[100.0, 0.0, 50.0], [0.0, 100.0, 50.0], [0.0, 0.0, 1.0]])
+
+    def error(*coefficients):
+        view = camera_view(intrinsic=k, size=(101, 101), distortion=coefficients)
+        return distortion_error(view)
+
+    assert error() == 0.0
+    assert error(0.0, 0.0, 0.0, 0.0, 0.0) == 0.0
+    # Corners at +-0.5: r^2 = 0.5. k1 = 0.1 moves both axes by 0.5 * 0.05, 2.5 pixels.
+    assert error(0.1) == pytest.approx(2.5 * math.sqrt(2))
+    assert error(0.0, 0.2) == pytest.approx(2.5 * math.sqrt(2))
+    assert error(0.0, 0.0, 0.0, 0.0, 0.4) == pytest.approx(2.5 * math.sqrt(2))
+    # p1 at (0.5, 0.5): dx = 2 p1 / 4, dy = p1 (0.5 + 0.5): 0.5 and 1 pixels for p1 = 0.01.
+    assert error(0.0, 0.0, 0.01) == pytest.approx(math.hypot(0.5, 1.0))
+    assert error(0.0, 0.0, 0.0, 0.01) == pytest.approx(math.hypot(0.5, 1.0))
+    # k4 = 1 divides by 1.5: each axis loses a third of its 50 pixels.
+    assert error(0, 0, 0, 0, 0, 1.0) == pytest.approx(50 / 3 * math.sqrt(2))
