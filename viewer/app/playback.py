@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from viewer.rig.clip import Clip
-from viewer.rig.motion import DEFAULT_RATE, frame_rate, pose_actor, time_span
+from viewer.rig.crowd import pose_actors
+from viewer.rig.motion import DEFAULT_RATE, frame_rate, time_span
 from viewer.rig.scene import Actor, Scene
 
 __all__ = ["FASTEST", "MODES", "Playback"]
@@ -200,8 +201,7 @@ class Playback:
         if key == self._posed and not again:
             return False
         self._posed = key
-        for actor in scene.actors:
-            pose_actor(actor, self.time, self.fill_gaps)
+        pose_actors(scene.actors, self.time, self.fill_gaps)
         return True
 
     def accept(self) -> None:
