@@ -10,12 +10,9 @@ uniform mat4 u_model_view;
 uniform mat4 u_projection;
 uniform vec2 u_size;    // of the picture, pixels
 uniform float u_width;  // of the line, pixels
-uniform float u_now;    // seconds
-uniform float u_reach;  // seconds back and forth at which nothing is left; 0: all is as strong
-uniform float u_opacity;
 
 out vec3 v_color;       // sRGB
-out float v_opacity;
+out float v_time;
 
 // Where the segment from a to b, with a behind the near plane, crosses it.
 vec4 cut(vec4 a, vec4 b) {
@@ -36,7 +33,6 @@ void main() {
     // Half a width to either side; a picture is 2 wide in this space.
     place.xy += u_width / u_size * side * vec2(-way.y, way.x) * place.w;
     gl_Position = place;
-    float away = abs((at_end ? in_times.y : in_times.x) - u_now);
-    v_opacity = u_opacity * (u_reach > 0.0 ? clamp(1.0 - away / u_reach, 0.0, 1.0) : 1.0);
+    v_time = at_end ? in_times.y : in_times.x;
     v_color = in_color;
 }

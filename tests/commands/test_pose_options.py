@@ -97,7 +97,10 @@ NUMBERS_WANTED = "expected numbers separated by commas, found"
         ("arms.skel --time 1", "--time: no file is a clip"),
         ("arms.skel --frame 1", "--frame: no file is a clip"),
         ("twist.skel move.anim --frame -1", "--frame: expected 0 or more, found -1"),
-        ("twist.skel move.anim --frame 1 --fps 0", "--fps: expected more than 0, found 0"),
+        (
+            "twist.skel move.anim --frame 1 --fps 0",
+            "argument --fps: expected more than 0, found 0 (viewer info --help lists the options)",
+        ),
         (
             "twist.skel move.anim --frame 1 --time 1",
             "--frame and --time: expected one of them, found both",

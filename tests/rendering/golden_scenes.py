@@ -13,6 +13,7 @@ from picture_metrics import OTHER_SSIM_ERROR
 import viewer
 from viewer.rendering.camera import VIEWS, Camera, fit
 from viewer.rendering.options import DisplayOptions, Light, Lights
+from viewer.rig.camera_view import CameraView
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Material, Mesh
 from viewer.rig.scene import Actor, Scene, scene_points
@@ -30,6 +31,7 @@ class Shot:
     view: str | tuple[float, float] = (35.0, 15.0)
     orthographic: bool = False
     selected_joint: int = -1
+    fixed: CameraView | None = None
     ssim_limit: float = OTHER_SSIM_ERROR
 
     @property
@@ -43,6 +45,7 @@ class Shot:
             up=self.scene.up,
         )
         fit(camera, scene_points(self.scene), 1.0)
+        camera.fixed = self.fixed
         return camera
 
 
@@ -56,7 +59,7 @@ def _fox() -> Figure:
     return viewer.load().actors[0].figure
 
 
-def _posed_fox(seed: int = 0) -> Scene:
+def posed_fox(seed: int = 0) -> Scene:
     """Return the fox in its own pose, or with every DOF a third of the way to a random limit."""
     actor = Actor(_fox())
     if seed:
@@ -160,19 +163,19 @@ def _white_lights() -> Lights:
 
 
 SHOTS: dict[str, Callable[[], Shot]] = {
-    "fox": lambda: Shot(_posed_fox(), DisplayOptions()),
-    "fox-front": lambda: Shot(_posed_fox(), options(), "front"),
-    "fox-left": lambda: Shot(_posed_fox(), options(), "left"),
-    "fox-back": lambda: Shot(_posed_fox(), options(), "back"),
-    "fox-top": lambda: Shot(_posed_fox(), options(), "top"),
-    "fox-pose-1": lambda: Shot(_posed_fox(1), options()),
-    "fox-pose-2": lambda: Shot(_posed_fox(2), options(), (120.0, 20.0)),
-    "fox-binding": lambda: Shot(_posed_fox(2), options(show="binding")),
-    "fox-skeleton": lambda: Shot(_posed_fox(), options(show="skeleton"), "left"),
-    "fox-both": lambda: Shot(_posed_fox(1), DisplayOptions(show="both"), selected_joint=3),
-    "fox-checker": lambda: Shot(_posed_fox(), options(shading="checker")),
-    "fox-normals": lambda: Shot(_posed_fox(), options(shading="normals")),
-    "fox-plain-flat": lambda: Shot(_posed_fox(), options(texture=False, flat=True)),
+    "fox": lambda: Shot(posed_fox(), DisplayOptions()),
+    "fox-front": lambda: Shot(posed_fox(), options(), "front"),
+    "fox-left": lambda: Shot(posed_fox(), options(), "left"),
+    "fox-back": lambda: Shot(posed_fox(), options(), "back"),
+    "fox-top": lambda: Shot(posed_fox(), options(), "top"),
+    "fox-pose-1": lambda: Shot(posed_fox(1), options()),
+    "fox-pose-2": lambda: Shot(posed_fox(2), options(), (120.0, 20.0)),
+    "fox-binding": lambda: Shot(posed_fox(2), options(show="binding")),
+    "fox-skeleton": lambda: Shot(posed_fox(), options(show="skeleton"), "left"),
+    "fox-both": lambda: Shot(posed_fox(1), DisplayOptions(show="both"), selected_joint=3),
+    "fox-checker": lambda: Shot(posed_fox(), options(shading="checker")),
+    "fox-normals": lambda: Shot(posed_fox(), options(shading="normals")),
+    "fox-plain-flat": lambda: Shot(posed_fox(), options(texture=False, flat=True)),
     "arm": lambda: Shot(_arm(*BEND), DisplayOptions()),
     "arm-rest": lambda: Shot(_arm(), options()),
     "arm-wireframe": lambda: Shot(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import math
 from collections.abc import Generator
@@ -15,6 +16,7 @@ from viewer.app.record_dialog import RecordSettings
 from viewer.app.state import AppState
 from viewer.errors import OutputError, printable
 from viewer.export import refuse_inputs
+from viewer.formats._video import MOST_GIF_RATE
 from viewer.rendering.recorder import Follow, Recording, Sink, record
 from viewer.rendering.renderer import Renderer
 from viewer.rig.arrays import Floats
@@ -86,8 +88,10 @@ def recording_steps(
     )
     renderer = Renderer(context)
     try:
-        for progress in record(recording, renderer, sink):
-            yield progress.done, progress.total
+        # Closed before its renderer goes, also if this generator is.
+        with contextlib.closing(record(recording, renderer, sink)) as steps:
+            for progress in steps:
+                yield progress.done, progress.total
     finally:
         renderer.release()
     name = printable(files[0], 200) + (f" to {printable(files[-1].name)}" if files[1:] else "")
@@ -99,6 +103,8 @@ def _times(state: AppState, settings: RecordSettings) -> tuple[Floats, list[int]
     """Return the seconds of every frame, what they are called, and frames a second."""
     playback = state.playback
     rate = settings.rate or playback.frame_rate
+    if settings.kind == ".gif":
+        rate = min(rate, MOST_GIF_RATE)
     if not playback.has_motion:
         count = max(round(settings.seconds * rate), 1) if settings.turntable else 1
         if settings.kind == "sheet":

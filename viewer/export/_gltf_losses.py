@@ -17,7 +17,7 @@ from viewer.rig.pose import Pose
 from viewer.rig.scalars import length_text
 from viewer.rig.skinning import METHODS, Skinning, deform
 
-__all__ = ["MOST_SAMPLES", "losses", "not_held", "sampled"]
+__all__ = ["MOST_SAMPLES", "losses", "not_held", "sampled", "vertices_text"]
 
 MOST_SAMPLES = 32
 """Poses that are compared at most."""
@@ -121,11 +121,16 @@ def _steps(
 def _weights_text(influences: Influences) -> str:
     parts = []
     if influences.n_scaled:
-        parts.append(f"weights of {influences.n_scaled} vertices do not add up to 1")
+        parts.append(f"weights of {vertices_text(influences.n_scaled)} do not add up to 1")
     if influences.n_negative:
-        parts.append(f"{influences.n_negative} vertices have negative weights")
+        parts.append(f"weights of {vertices_text(influences.n_negative)} are negative")
     done = "left out and the others scaled" if influences.n_negative else "scaled"
     return f"{' and '.join(parts)}: {done}, as glTF demands, which moves vertices by up to "
+
+
+def vertices_text(count: int) -> str:
+    """Return a number of vertices in words."""
+    return "1 vertex" if count == 1 else f"{count} vertices"
 
 
 def _vertices(step: _Step, pose: Pose) -> Floats:

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.errors import RigError, printable
-from viewer.export._gaps import filled, gaps_text, runs
 from viewer.export._family_frames import FamilyFrames, family_frames, member_of_figure, up_axis
+from viewer.export._gaps import filled, gaps_text, runs
 from viewer.export._options import GAPS, MotionOptions
 from viewer.formats import all_or_none, save_arrays
 from viewer.rig.arrays import Bools, Floats

@@ -11,8 +11,8 @@ from viewer.errors import RigError, printable
 from viewer.export._bvh_angles import unrolled
 from viewer.export._bvh_body import Body, Space, body_of, rest_matrices, shape_at, shape_changes
 from viewer.export._bvh_ends import end_offsets
-from viewer.export._gaps import filled, gaps_text, runs
 from viewer.export._bvh_text import bvh_text
+from viewer.export._gaps import filled, gaps_text, runs
 from viewer.export._options import GAPS, ROTATION_ORDERS, UNITS, MotionOptions
 from viewer.formats import Source, all_or_none, bvh, save_bytes
 from viewer.rig.arrays import Floats, Ints

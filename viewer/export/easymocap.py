@@ -22,8 +22,8 @@ from pathlib import Path
 import numpy as np
 
 from viewer.errors import OutputError, RigError, printable
-from viewer.export._gaps import gaps_text
 from viewer.export._family_frames import FamilyFrames, family_frames, member_of_figure, up_axis
+from viewer.export._gaps import gaps_text
 from viewer.export._options import MotionOptions
 from viewer.rig.arrays import Floats
 from viewer.rig.take import Take

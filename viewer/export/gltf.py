@@ -15,7 +15,7 @@ import numpy as np
 from viewer.errors import RigError, printable
 from viewer.export._gaps import filled, gaps_text, runs
 from viewer.export._gltf_document import Document, text_of
-from viewer.export._gltf_losses import losses, not_held, sampled
+from viewer.export._gltf_losses import losses, not_held, sampled, vertices_text
 from viewer.export._gltf_mesh import Color, add_mesh
 from viewer.export._gltf_motion import add_animation, frames_between, moving, still_locals
 from viewer.export._gltf_nodes import Locals, Tree, add_nodes, locals_of
@@ -257,8 +257,8 @@ def _remarks(body: _Body, up: str) -> list[str]:
             notes.append("normals do not follow these: glTF has no rule for it")
     if body.influences is not None and body.influences.n_fixed:
         notes.append(
-            f"{body.influences.n_fixed} vertices have no influence: they follow a node that never "
-            "moves, fixed"
+            f"{vertices_text(body.influences.n_fixed)} without influence: bound to a node that "
+            "never moves, fixed"
         )
     return notes
 

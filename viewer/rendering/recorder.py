@@ -1,9 +1,9 @@
 """Many frames of a scene in order: drawn, read back and handed on while the next are drawn.
 
-Three things happen at the same time. The driver draws a frame into one of two targets; this thread
-reads the frame before it, which is already done, into one of two pixel buffers; and the sink's
-workers encode the frames before those. So recording takes about as long as the slowest of the three
-alone, where they do not compete for the same processor.
+Three things happen at the same time. The driver draws a frame; this thread poses the next one; and
+the sink's workers encode those before, for which this thread lets go of Python's lock while it
+waits for the driver. So recording takes about as long as drawing or encoding alone, whichever is
+slower, as far as they do not compete for the same processors (``tests/bench/bench_video.py``).
 
 The window and the command line use it alike::
 
@@ -24,16 +24,16 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Protocol
 
-import moderngl
 import numpy as np
 
 from viewer.rendering.camera import Camera
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.renderer import Renderer
 from viewer.rendering.target import Target, picture_rows, straight
+from viewer.rendering.waiting import Waiter
 from viewer.rig.arrays import Bytes, Floats
+from viewer.rig.crowd import pose_actors
 from viewer.rig.follow import followed_point
-from viewer.rig.motion import pose_actor
 from viewer.rig.scene import Scene, scene_box
 
 __all__ = ["Follow", "Progress", "Recording", "Sink", "copied", "pose_scene", "record"]
@@ -185,8 +185,7 @@ def pose_scene(scene: Scene, recording: Recording, seconds: float) -> None:
     """Pose a copy of the recording's scene as it is at one time."""
     if recording.moves:
         scene.time = seconds
-        for actor in scene.actors:
-            pose_actor(actor, seconds, recording.fill)
+        pose_actors(scene.actors, seconds, recording.fill)
 
 
 def record(recording: Recording, renderer: Renderer, sink: Sink) -> Generator[Progress]:
@@ -285,48 +284,51 @@ class _Queue:
 
 
 class _Drawer:
-    """Draws frames of a recording, two at a time under way."""
+    """Draws frames of a recording; one is being drawn while the one before is handed on."""
 
     def __init__(self, recording: Recording, renderer: Renderer) -> None:
         self._recording, self._renderer = recording, renderer
         self._scene, context = copied(recording.scene), renderer.context
         show = recording.options.show
         self._box = scene_box(self._scene, show) if recording.box is None else recording.box
-        self._targets: list[Target] = []
-        self._buffers: list[moderngl.Buffer] = []
+        self._waiter = Waiter(context)
+        self._target = Target(context, recording.size, recording.options.samples)
         try:
-            for _ in range(2):
-                self._targets.append(Target(context, recording.size, recording.options.samples))
-                self._buffers.append(context.buffer(reserve=4 * math.prod(recording.size)))
+            self._buffer = context.buffer(reserve=4 * math.prod(recording.size))
         except BaseException:
-            self.release()
+            self._release_target()
             raise
 
     def draw(self, frames: Sequence[int]) -> Generator[bytes]:
         """Yield some frames' bytes as OpenGL has them, last row first."""
-        recording, cameras = self._recording, _Cameras(self._recording)
-        for step in range(len(frames) + 2 if frames else 0):
-            new, old = step % 2, (step - 1) % 2
-            # Drawing comes first: the driver works on it while the frames before are read.
+        cameras, times = _Cameras(self._recording), self._recording.times
+        for step in range(len(frames) + 1 if frames else 0):
             if step < len(frames):
-                pose_scene(self._scene, recording, float(recording.times[frames[step]]))
-                camera = cameras.at(frames[step], self._scene)
-                target = self._targets[new]
-                self._renderer.draw(self._scene, camera, recording.options, target, self._box)
-            if 1 <= step <= len(frames):
-                self._targets[old].resolve()
-                self._targets[old].read_into(self._buffers[old])
-            if step >= 2:
-                yield self._buffers[new].read()
+                # The driver still draws the frame before.
+                pose_scene(self._scene, self._recording, float(times[frames[step]]))
+            if step:
+                self._waiter.end()
+                self._target.resolve()
+                self._target.read_into(self._buffer)
+            if step < len(frames):
+                self._draw(cameras.at(frames[step], self._scene))
+            if step:
+                yield self._buffer.read()
+
+    def _draw(self, camera: Camera) -> None:
+        options = self._recording.options
+        self._renderer.draw(self._scene, camera, options, self._target, self._box)
+        self._waiter.begin()
 
     def release(self) -> None:
         """Free what was drawn into; the framebuffer of nobody is bound then."""
+        self._release_target()
+        self._buffer.release()
+
+    def _release_target(self) -> None:
         # One that is bound must not be freed: moderngl would bind it again.
         self._renderer.context.detect_framebuffer(0).use()
-        for target in self._targets:
-            target.release()
-        for buffer in self._buffers:
-            buffer.release()
+        self._target.release()
 
 
 class _Cameras:

@@ -1,22 +1,96 @@
-"""Many poses of one figure at once: their joints' matrices, without a loop over actors."""
+"""Many actors of one figure at once: posed by their clips, and their joints' matrices.
+
+Nothing here computes actor by actor; numbers are only copied into each one's own pose.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from viewer.rig.arrays import Floats
+from viewer.rig.clip import Clip
+from viewer.rig.clip_table import evaluate_all
 from viewer.rig.figure import Figure
 from viewer.rig.kinematics import forward_kinematics, skinning_matrices
+from viewer.rig.motion import place_pose, pose_actor
 from viewer.rig.pose import Pose, dof_rotations
-from viewer.rig.rotation import quaternion_to_matrix
+from viewer.rig.pose_vector import rotation_rows
+from viewer.rig.rotation import matrix_to_euler, quaternion_to_matrix
+from viewer.rig.sampled_clip import SampledClip, sample_rows
+from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
-from viewer.rig.skeleton import Skeleton
+from viewer.rig.skeleton import Skeleton, clamp_dofs
 
-__all__ = ["local_rotations", "palettes", "placements", "worlds"]
+__all__ = ["local_rotations", "palettes", "placements", "pose_actors", "worlds"]
 
 _FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
+
+
+def pose_actors(actors: Iterable[Actor], time: float, fill: bool = False) -> None:
+    """Pose actors by their clips as they are at one time of the scene's clock, in place.
+
+    Actors that share figure and clip, each at its own offset, are posed together; the result is
+    that of ``viewer.rig.motion.pose_actor`` for each.
+
+    Parameters
+    ----------
+    actors : iterable of Actor
+        Those without a clip stay as they are.
+    time : float
+        Seconds; each actor's own ``offset`` is taken off.
+    fill : bool
+        Bridge gaps of captures instead of leaving actors out.
+    """
+    groups: dict[tuple[int, int], list[Actor]] = {}
+    for actor in actors:
+        groups.setdefault((id(actor.figure), id(actor.clip)), []).append(actor)
+    for group in groups.values():
+        clip, skeleton = group[0].clip, group[0].figure.skeleton
+        poses = [actor.pose for actor in group if actor.pose is not None]
+        times = np.array([time - actor.offset for actor in group])
+        if skeleton is None or len(group) < 2:
+            clip = None
+        if isinstance(clip, Clip) and skeleton is not None:
+            _pose_by_curves(clip, skeleton, poses, times)
+        elif isinstance(clip, SampledClip) and skeleton is not None and _takes_any(skeleton):
+            _pose_by_frames(group, clip, skeleton, times, fill)
+        else:
+            for actor in group:
+                pose_actor(actor, time, fill)
+
+
+def _takes_any(skeleton: Skeleton) -> bool:
+    """Return whether the DOFs of every joint can take any rotation."""
+    return bool((rotation_rows(skeleton) >= 0).all())
+
+
+def _pose_by_curves(clip: Clip, skeleton: Skeleton, poses: list[Pose], times: Floats) -> None:
+    targets, values = evaluate_all(clip, times)
+    dofs = np.stack([pose.dofs for pose in poses])
+    dofs[:, targets] = values
+    for pose, row in zip(poses, clamp_dofs(skeleton, dofs), strict=True):
+        pose.dofs[:] = row
+
+
+def _pose_by_frames(
+    actors: list[Actor], clip: SampledClip, skeleton: Skeleton, times: Floats, fill: bool
+) -> None:
+    """Pose by captured rotations; every joint takes any rotation as its DOFs."""
+    balls, rows = rotation_rows(skeleton), sample_rows(clip, times, fill)
+    base = quaternion_to_matrix(skeleton.rest_rotations)
+    within = np.swapaxes(base, -1, -2) @ quaternion_to_matrix(rows.rotations)
+    dofs = np.stack([actor.pose.dofs for actor in actors if actor.pose is not None])
+    dofs[:, skeleton.dof_kinds < _FIRST_ROTATION] = 0.0
+    dofs[:, balls] = matrix_to_euler(within)
+    dofs = clamp_dofs(skeleton, dofs)
+    for row, actor in enumerate(actors):
+        actor.is_present = bool(rows.present[row])
+        if actor.is_present and actor.pose is not None:
+            actor.pose.dofs[:] = dofs[row]
+            actor.pose.rotations[:] = skeleton.rest_rotations
+            place_pose(actor.pose, rows, row)
 
 
 def local_rotations(skeleton: Skeleton, poses: Sequence[Pose]) -> Floats:

@@ -28,6 +28,7 @@ __all__ = [
     "Frames",
     "frame_rate",
     "frames_of",
+    "place_pose",
     "pose_actor",
     "pose_of",
     "rest_translations_of",
@@ -129,6 +130,11 @@ def _apply(rows: SampledRows, row: int, skeleton: Skeleton, pose: Pose) -> None:
     moves = skeleton.dof_kinds < _FIRST_ROTATION
     pose.dofs[moves] = np.clip(0.0, *skeleton.dof_limits[moves].T)
     set_joint_rotations(skeleton, pose, joints, quaternion_to_matrix(rows.rotations[row]))
+    place_pose(pose, rows, row)
+
+
+def place_pose(pose: Pose, rows: SampledRows, row: int) -> None:
+    """Give a pose what a clip has at one time beside the joints' rotations, in place."""
     if rows.translations is not None:
         pose.translations[:] = rows.translations[row]
     if rows.figure_translations is not None:

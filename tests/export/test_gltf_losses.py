@@ -1,0 +1,160 @@
+"""Influences in glTF files, and what the exporter says of that which the format cannot hold."""
+
+from dataclasses import replace
+
+import numpy as np
+from family_models import family_figure
+from formats.pig_text import write as write_pig
+from gltf_files import EXACT, TO_Y, assert_drawn, corners, write
+from numpy.testing import assert_allclose
+from seamed import (
+    POSITIONS,
+    TRIANGLES,
+    seamed_actor,
+    seamed_mesh,
+)
+
+import viewer
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import Mesh
+from viewer.rig.scene import Actor
+from viewer.rig.skeleton import ball_skeleton
+from viewer.rig.skin import skin_from_lists
+from viewer.rig.skinning import Skinning, deform
+
+
+def test_influences_can_be_cut_as_asked(tmp_path):
+    actor = viewer.load().actors[0]
+    actor.pose.dofs[:] = np.linspace(-0.5, 0.5, len(actor.pose.dofs))
+    gltf, notes = write(tmp_path, actor, max_influences=3)
+    assert_drawn(gltf, actor.figure, actor.pose, max_influences=3)
+    assert len(gltf.influence_sets()) == 1
+    assert not any("influences" in note for note in notes[1:])
+
+
+def test_thirteen_influences_are_all_there(tmp_path):
+    shares = np.arange(1.0, 14.0) / 91.0
+    joints = np.array([[0.1 * j, 0, 0] for j in range(14)])
+    bound = np.tile(np.eye(4), (14, 1, 1))
+    bound[:, :3, 3] = -joints
+    rows = [[(13, 1.0)], [(j, shares[j]) for j in range(13)], [(0, 0.0), (3, 1.0)]]
+    points = np.array([[0, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=float)
+    mesh = Mesh(points, np.tile([0.0, 0, 1], (3, 1)), np.array([[0, 1, 2]]))
+    skeleton = ball_skeleton(tuple(f"j{j}" for j in range(14)), np.arange(-1, 13), joints)
+    actor = Actor(Figure("many", mesh, skeleton, skin_from_lists(rows, bound), unit="m"))
+    actor.pose.dofs[:] = np.linspace(-0.4, 0.5, 42)
+    gltf, notes = write(tmp_path, actor)
+    assert_drawn(gltf, actor.figure, actor.pose)
+    sets = gltf.influence_sets()
+    assert len(sets) == 4
+    # The strongest first: joint 12 with 13/91, then 11, and so on; unused slots are 0.
+    assert np.concatenate([j[1] for j, _ in sets]).tolist() == [*range(12, -1, -1), 0, 0, 0]
+    weights = np.concatenate([w[1] for _, w in sets])
+    assert_allclose(weights[:13], shares[::-1], rtol=1e-6)
+    assert [j[2].tolist() for j, _ in sets] == [[3, 0, 0, 0]] + [[0] * 4] * 3
+    assert notes[1].startswith("up to 13 influences a vertex, all of them written")
+
+
+def test_weights_are_scaled_and_the_largest_move_is_told(tmp_path):
+    # Vertex 1 at (1, 0, 0) weighs 0.5: as stored it is drawn at (0.5, 0, 0), half a metre away.
+    # Vertex 3 at (1, 2, 1) weighs 1.1: drawn at (1.1, 2.2, 1.1), 0.1 sqrt(6) away.
+    rows = ((1.0, 0.0), (0.0, 0.5), (1.0, 0.0), (0.6, 0.5), (1.0, 0.0))
+    actor = seamed_actor(weights=rows, unit="m")
+    gltf, notes = write(tmp_path, actor)
+    # A weight of 6/11 is rounded.
+    assert_allclose(corners(gltf, gltf.vertices()[0]), POSITIONS[TRIANGLES], rtol=0, atol=EXACT)
+    assert notes[1] == (
+        "weights of 2 vertices do not add up to 1: scaled, as glTF demands, which moves vertices "
+        "by up to 500 mm"
+    )
+
+
+def test_vertices_without_influence_hold_on_to_a_node_that_never_moves(tmp_path):
+    rows = ((1.0, 0.0), (0.0, 0.0), (1.0, 0.0), (0.5, 0.5), (0.0, 0.0))
+    actor = seamed_actor(weights=rows, unit="m", mesh=seamed_mesh(uvs=False))
+    actor.pose.dofs[2] = np.pi
+    actor.pose.figure_translation[:] = 0, 0, 5
+    gltf, notes = write(tmp_path, actor)
+    assert_drawn(gltf, actor.figure, actor.pose)
+    assert_allclose(gltf.vertices()[0][[1, 4]], [[1, 0, 5], [3, 3, 8]], rtol=0, atol=EXACT)
+    assert gltf.root["skins"][0]["joints"][-1] == gltf.named("fixed")
+    assert notes[1:] == ["2 vertices without influence: bound to a node that never moves, fixed"]
+
+
+def test_negative_and_repeated_weights_become_what_gltf_allows(tmp_path):
+    actor = seamed_actor(unit="m", mesh=seamed_mesh(uvs=False))
+    rows = [[(0, 1.5), (1, -0.5)], [(0, 0.25), (1, 0.5), (0, 0.25)], [(1, 1)], [(1, 1)], [(1, 1)]]
+    skin = skin_from_lists(rows, actor.figure.skin.inverse_bind)
+    actor = Actor(replace(actor.figure, skin=skin))
+    actor.pose.dofs[5] = np.pi  # the tip, at (1, 0, 0), about z
+    gltf, notes = write(tmp_path, actor)
+    # Vertex 0: as stored 1.5 (0, 0, 0) - 0.5 (2, 0, 0), as written the origin. Vertex 1 is the tip.
+    assert_allclose(gltf.vertices()[0][:2], [[0, 0, 0], [1, 0, 0]], rtol=0, atol=EXACT)
+    assert gltf.influence_sets()[0][1][1].tolist() == [0.5, 0.5, 0, 0]
+    assert notes[1] == (
+        "weights of 1 vertex are negative: left out and the others scaled, as glTF demands, which "
+        "moves vertices by up to 1000 mm"
+    )
+
+
+def test_other_skinning_is_told(tmp_path):
+    # Half and half, 180 degrees apart about z: LBS collapses to the axis, DQS keeps the distance.
+    actor = seamed_actor(unit="m", mesh=seamed_mesh(uvs=False))
+    actor.pose.dofs[5] = np.pi
+    linear, dual = (deform(actor.figure, actor.pose, how)[0] for how in ("lbs", "dqs"))
+    worst = np.linalg.norm(linear - dual, axis=1).max()
+    gltf, notes = write(tmp_path, actor, method="dqs")
+    assert_drawn(gltf, actor.figure, actor.pose)
+    assert notes[1] == (
+        "Dual quaternion (DQS) skinning cannot be held, glTF blends linearly: up to "
+        f"{1000 * worst:.0f} mm"
+    )
+
+
+def test_several_losses_are_summed_up(tmp_path):
+    figure = family_figure("smpl", tmp_path)
+    skin = replace(figure.skin, weights=figure.skin.weights * 0.9)
+    actor = Actor(replace(figure, skin=skin))
+    actor.pose.dofs[:] = 0.3
+    _, notes = write(tmp_path, actor)
+    asked = deform(actor.figure, actor.pose)[0]
+    plain = deform(figure, actor.pose, Skinning(correctives=False))[0]
+    worst = 1000 * np.linalg.norm(asked - plain, axis=1).max()
+    assert f"all this together: up to {worst:.3g} mm" in notes
+    assert sum(note.startswith("weights of 96 vertices") for note in notes) == 1
+
+
+def test_raw_weights_of_an_animal_model(tmp_path):
+    figure = viewer.load(write_pig(tmp_path / "pig")).actors[0].figure
+    actor = Actor(figure)
+    gltf, _ = write(tmp_path, actor)
+    assert_drawn(gltf, figure, actor.pose, TO_Y if figure.up == "z" else np.eye(3))
+
+
+def test_far_meshes_say_what_single_precision_costs(tmp_path):
+    mesh = replace(seamed_mesh(), positions=POSITIONS + np.array([2.0**24 + 1.0, 0, 0]))
+    _, notes = write(tmp_path, Actor(Figure("far", mesh, unit="m")))
+    # Above 2^24 single precision knows even numbers only.
+    assert notes[1] == (
+        "the mesh is far from its origin for glTF's single precision: vertices are off by up to "
+        "1000 mm"
+    )
+
+
+def test_large_meshes_and_skeletons_get_larger_numbers(tmp_path):
+    count, n_joints = 65536, 300
+    points = np.random.default_rng(0).normal(size=(count, 3))
+    triangles = np.array([[0, 1, 2], [65533, 65534, 65535]])
+    joints = np.zeros((n_joints, 3))
+    bound = np.tile(np.eye(4), (n_joints, 1, 1))
+    rows = [[(v % n_joints, 1.0)] for v in range(count)]
+    names = tuple(f"j{j}" for j in range(n_joints))
+    skeleton = ball_skeleton(names, np.full(n_joints, -1), joints)
+    mesh = Mesh(points, np.tile([0.0, 0, 1], (count, 1)), triangles)
+    figure = Figure("crowd", mesh, skeleton, skin_from_lists(rows, bound))
+    gltf, _ = write(tmp_path, Actor(figure))
+    kinds = [gltf.root["accessors"][gltf.primitives[0]["indices"]]["componentType"]]
+    attributes = gltf.primitives[0]["attributes"]
+    kinds.append(gltf.root["accessors"][attributes["JOINTS_0"]]["componentType"])
+    assert kinds == [5125, 5123]  # 32 and 16 bits
+    assert gltf.attribute("JOINTS_0")[[299, 300], 0].tolist() == [299, 0]
