@@ -8,9 +8,7 @@ in vec3 in_color;           // linear
 in vec4 in_model_x;         // per instance: rows of the matrix from figure space, minus the posed
 in vec4 in_model_y;         // centre, to camera space
 in vec4 in_model_z;
-in vec4 in_turn_x;          // per instance: rows of its inverse transpose; in w red, green and blue
-in vec4 in_turn_y;          // of the actor, linear
-in vec4 in_turn_z;
+in vec3 in_actor_color;     // per instance: linear
 in vec3 in_rest_shift;      // per instance: rest centre minus posed centre
 in vec3 in_center;          // per instance: posed centre, figure space
 
@@ -37,10 +35,14 @@ void main() {
     pose_vertex(true, position, normal);
     vec4 point = vec4(position, 1.0);
     v_position = vec3(dot(in_model_x, point), dot(in_model_y, point), dot(in_model_z, point));
-    v_normal = vec3(
-        dot(in_turn_x.xyz, normal), dot(in_turn_y.xyz, normal), dot(in_turn_z.xyz, normal));
+    // Rows of the cofactor matrix, which is the inverse transpose times the determinant.
+    vec3 x = cross(in_model_y.xyz, in_model_z.xyz);
+    vec3 y = cross(in_model_z.xyz, in_model_x.xyz);
+    vec3 z = cross(in_model_x.xyz, in_model_y.xyz);
+    v_normal = vec3(dot(x, normal), dot(y, normal), dot(z, normal));
+    v_normal *= sign(dot(in_model_x.xyz, x));
     v_uv = in_uv;
-    v_color = u_has_colors ? in_color : vec3(in_turn_x.w, in_turn_y.w, in_turn_z.w);
+    v_color = u_has_colors ? in_color : in_actor_color;
     v_scalar = 0.0;
     v_opacity = 1.0;
     v_instance = gl_InstanceID;

@@ -4,9 +4,8 @@
 
 in vec3 in_position;     // bind space, minus the rest centre
 in vec3 in_normal;       // bind space, any length
-in uvec2 in_influences;  // first pair, number of pairs
-in float in_excess;      // sum of the weights, minus 1
-in int in_source;        // the vertex in u_offsets
+in uvec4 in_bindings;    // first pair, number of pairs, the vertex in u_offsets, and the bits of
+                         // a float: the sum of the weights, minus 1
 
 uniform sampler2D u_palette;    // skinning matrices, three rows each, instance after instance
 uniform sampler2D u_pairs;      // joint and weight, each vertex's strongest first
@@ -20,6 +19,11 @@ vec3 rest_shift;     // rest centre minus posed centre
 vec3 center;         // posed centre, figure space
 int first_joint;     // its first matrix
 int first_offset;    // its first row of u_offset_list
+
+// Sum of the vertex's weights, minus 1.
+float excess() {
+    return uintBitsToFloat(in_bindings.w);
+}
 
 // Shifts, as processors have no division of eight integers at once: upload.py's rows hold 1024
 // pairs or 256 matrices.
@@ -44,7 +48,7 @@ vec3 unit(vec3 v) {
 vec3 offset(int vertex) {
     vec3 sum = vec3(0.0);
     for (int i = first_offset; i < first_offset + u_n_offsets; ++i) {
-        vec2 row = texelFetch(u_offset_list, ivec2(i & 1023, i >> 10), 0).rg;
+        vec2 row = vec2(float(i),1.0);
         int index = int(row.x) * u_n_sources + vertex;
         sum += row.y * texelFetch(u_offsets, ivec2(index & 4095, index >> 12), 0).rgb;
     }
@@ -57,10 +61,10 @@ void skin(inout vec3 position, inout vec3 normal);  // of the chunk
 void pose_vertex(bool attached, out vec3 position, out vec3 normal) {
     position = in_position;
     if (u_n_offsets > 0) {
-        position += offset(in_source);
+        position += offset(int(in_bindings.z));
     }
     normal = in_normal;
-    if (attached && in_influences.y > 0u) {
+    if (attached && in_bindings.y > 0u) {
         skin(position, normal);
     } else {
         position += rest_shift;

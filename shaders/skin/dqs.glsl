@@ -15,16 +15,16 @@ vec3 rotate(vec4 q, vec3 v) {
 void skin(inout vec3 position, inout vec3 normal) {
     vec4 real = vec4(0.0), dual = vec4(0.0), first = vec4(0.0);
     vec4 x = vec4(0.0), y = vec4(0.0), z = vec4(0.0);
-    uint end = in_influences.x + in_influences.y;
+    uint end = in_bindings.x + in_bindings.y;
     float sum = 0.0;  // weights count relative to it
-    for (uint index = in_influences.x; index < end; ++index) {
+    for (uint index = in_bindings.x; index < end; ++index) {
         vec2 pair = influence(index);
         int joint = int(pair.x);
         float weight = pair.y;
         sum += weight;
         vec4 q = rigid_texel(joint, 0);
         // Quaternions are added on the strongest influence's side of the sphere; it comes first.
-        first = index == in_influences.x ? q : first;
+        first = index == in_bindings.x ? q : first;
         float turned = dot(q, first) < 0.0 ? -weight : weight;
         real += turned * q;
         dual += turned * rigid_texel(joint, 1);
@@ -33,7 +33,7 @@ void skin(inout vec3 position, inout vec3 normal) {
         z += weight * rigid_texel(joint, 4);
     }
     float size = length(real);
-    if (abs(1.0 + in_excess) < 1e-12 || size < 1e-12 * abs(sum)) {
+    if (abs(1.0 + excess()) < 1e-12 || size < 1e-12 * abs(sum)) {
         position += rest_shift;  // influences that cancel out give no rotation
         return;
     }

@@ -1,8 +1,8 @@
 // Linear blend skinning: v' = (sum w M) [v 1], n' = (sum w M) [n 0].
 void skin(inout vec3 position, inout vec3 normal) {
     vec4 x = vec4(0.0), y = vec4(0.0), z = vec4(0.0);
-    uint end = in_influences.x + in_influences.y;
-    for (uint index = in_influences.x; index < end; ++index) {
+    uint end = in_bindings.x + in_bindings.y;
+    for (uint index = in_bindings.x; index < end; ++index) {
         vec2 pair = influence(index);
         int joint = int(pair.x);
         x += pair.y * palette_row(joint, 0);
@@ -11,6 +11,6 @@ void skin(inout vec3 position, inout vec3 normal) {
     }
     vec4 point = vec4(position, 1.0);
     // The matrices have the posed centre subtracted once per unit of weight.
-    position = vec3(dot(x, point), dot(y, point), dot(z, point)) + in_excess * center;
+    position = vec3(dot(x, point), dot(y, point), dot(z, point)) + excess() * center;
     normal = vec3(dot(x.xyz, normal), dot(y.xyz, normal), dot(z.xyz, normal));
 }

@@ -33,22 +33,23 @@ from viewer.rig.skinning import Skinning
 
 SIZE, COUNT, GOAL = (1280, 720), 100, 1.2
 _STILL = """#version 330
-in vec3 in_position; in vec3 in_normal;
-in vec4 in_model_x; in vec4 in_model_y; in vec4 in_model_z;
-in vec4 in_turn_x; in vec4 in_turn_y; in vec4 in_turn_z;
-uniform mat4 u_projection;
+in vec3 in_position; in vec3 in_normal; in vec2 in_uv; in vec3 in_color;
+in vec4 in_model_x; in vec4 in_model_y; in vec4 in_model_z; in vec3 in_actor_color;
+uniform mat4 u_projection; uniform bool u_has_colors;
 out vec3 v_position; out vec3 v_normal; out vec2 v_uv; out vec3 v_color; out float v_scalar;
 flat out float v_opacity;
 void main() {
     vec4 p = vec4(in_position, 1.0);
     v_position = vec3(dot(in_model_x, p), dot(in_model_y, p), dot(in_model_z, p));
-    v_normal = vec3(dot(in_turn_x.xyz, in_normal), dot(in_turn_y.xyz, in_normal),
-        dot(in_turn_z.xyz, in_normal));
-    v_uv = vec2(0.0); v_scalar = 0.0; v_opacity = 1.0;
-    v_color = vec3(in_turn_x.w, in_turn_y.w, in_turn_z.w);
+    vec3 x = cross(in_model_y.xyz, in_model_z.xyz), y = cross(in_model_z.xyz, in_model_x.xyz);
+    vec3 z = cross(in_model_x.xyz, in_model_y.xyz);
+    v_normal = vec3(dot(x, in_normal), dot(y, in_normal), dot(z, in_normal));
+    v_normal *= sign(dot(in_model_x.xyz, x));
+    v_uv = in_uv; v_scalar = 0.0; v_opacity = 1.0;
+    v_color = u_has_colors ? in_color : in_actor_color;
     gl_Position = u_projection * vec4(v_position, 1.0);
 }
-"""
+"""  # crowd.vert without skinning
 
 
 def cast(figure: Figure, count: int) -> Scene:
@@ -129,13 +130,15 @@ def still_draw(
     )
     mesh = crowd.mesh
     indices = mesh.index_set(False, ())
-    layout = "4f4 4f4 4f4 4f4 4f4 4f4 24x/i"
-    names = [f"in_{kind}_{axis}" for kind in ("model", "turn") for axis in "xyz"]
+    names = "in_model_x", "in_model_y", "in_model_z", "in_actor_color"
     content: list[Any] = [
         (mesh.positions, "3f4", "in_position"),
         (mesh.normals, "3f4", "in_normal"),
-        (crowd._instances, layout, *names),
+        (crowd._instances, "4f4 4f4 4f4 3f4 24x/i", *names),
     ]
+    for values, layout, name in ((mesh.uvs, "2f4", "in_uv"), (mesh.colors, "3f4", "in_color")):
+        if name in program and values is not None:
+            content.append((values, layout, name))
     array = context.vertex_array(program, content, index_buffer=indices.indices)
 
     def draw() -> None:

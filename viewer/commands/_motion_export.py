@@ -8,14 +8,19 @@ from pathlib import Path
 from viewer.commands._numbers import number
 from viewer.commands._shots import parse_range
 from viewer.errors import OutputError, RigError, UnsupportedFormatError, ViewerError, printable
-from viewer.export import EXPORTERS, MotionOptions, export_take, motion_exporters
+from viewer.export import (
+    EXPORTERS,
+    MotionOptions,
+    export_take,
+    motion_exporters,
+    suited_exporter,
+)
 from viewer.export._options import GAPS, ROTATION_ORDERS, UNITS
 from viewer.rig.clip import Clip
 from viewer.rig.points import PointClip
 from viewer.rig.sampled_clip import SampledClip
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import Skinning
-from viewer.rig.smpl_family import member_of
 from viewer.rig.take import upright_take
 
 __all__ = [
@@ -146,15 +151,7 @@ def _exporter(arguments: argparse.Namespace, output: Path, scene: Scene) -> str:
             known = ", ".join(EXPORTERS[arguments.kind].suffixes)
             raise UnsupportedFormatError(f"--as {arguments.kind}: expected a name with {known}")
         return str(arguments.kind)
-    if "amass" in found and len(found) > 1:
-        is_body = all(_is_body(actor) for actor in _moving(scene))
-        return "amass" if is_body else next(key for key in found if key != "amass")
-    return found[0]
-
-
-def _is_body(actor: Actor) -> bool:
-    skeleton = actor.figure.skeleton
-    return skeleton is not None and member_of(tuple(skeleton.parents.tolist())) is not None
+    return suited_exporter(output, _moving(scene)[0].figure)
 
 
 def _frames(text: str | None) -> tuple[int, int | None] | None:

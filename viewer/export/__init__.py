@@ -9,8 +9,10 @@ from pathlib import Path
 
 from viewer.errors import OutputError, RigError, UnsupportedFormatError, printable
 from viewer.export._options import MotionOptions
+from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import Skinning
+from viewer.rig.smpl_family import member_of
 from viewer.rig.take import Take
 
 __all__ = [
@@ -23,6 +25,7 @@ __all__ = [
     "files_written",
     "motion_exporters",
     "refuse_inputs",
+    "suited_exporter",
 ]
 
 
@@ -132,6 +135,24 @@ def motion_exporters(path: str | Path) -> list[str]:
         known = ", ".join(dict.fromkeys(s for kind in kinds.values() for s in kind.suffixes))
         raise UnsupportedFormatError(f'no motion exporter for "{suffix}"; there are: {known}')
     return found
+
+
+def suited_exporter(path: str | Path, figure: Figure) -> str:
+    """Return the exporter that writes a figure's motion to a file of this suffix.
+
+    Arrays of bodies of the SMPL family are written as AMASS has them.
+
+    Raises
+    ------
+    UnsupportedFormatError
+        If no exporter of motions has this suffix.
+    """
+    found = motion_exporters(path)
+    if "amass" not in found or len(found) == 1:
+        return found[0]
+    skeleton = figure.skeleton
+    is_member = skeleton is not None and member_of(tuple(skeleton.parents.tolist())) is not None
+    return "amass" if is_member else next(key for key in found if key != "amass")
 
 
 def export_take(take: Take, path: str | Path, key: str, options: MotionOptions) -> list[str]:

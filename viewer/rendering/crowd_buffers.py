@@ -48,9 +48,7 @@ _PER_INSTANCE = (
     ("in_model_x", 4),
     ("in_model_y", 4),
     ("in_model_z", 4),
-    ("in_turn_x", 4),
-    ("in_turn_y", 4),
-    ("in_turn_z", 4),
+    ("in_actor_color", 3),
     ("in_rest_shift", 3),
     ("in_center", 3),
 )
@@ -173,18 +171,9 @@ class CrowdBuffers:
         model = view.matrix @ np.stack([actor.placement for actor in actors]) @ placements(poses)
         centers = self._centers[: self.count]
         model[:, :3, 3] += np.einsum("aij,aj->ai", model[:, :3, :3], centers)
-        turn = np.swapaxes(np.linalg.inv(model[:, :3, :3]), 1, 2)
         colors = np.array([actor.color or SKIN_COLOR for actor in actors])
-        rows = np.concatenate(
-            [
-                model[:, :3].reshape(-1, 12),
-                np.concatenate([turn, colors[:, :, None]], axis=2).reshape(-1, 12),
-                self.mesh.center - centers,
-                centers,
-            ],
-            axis=1,
-        )
-        self._instances.write(float32(rows))
+        rows = [model[:, :3].reshape(-1, 12), colors, self.mesh.center - centers, centers]
+        self._instances.write(float32(np.concatenate(rows, axis=1)))
 
     def use(self, program: moderngl.Program, view: View) -> None:
         """Set what ``crowd.vert`` needs beside its attributes."""
@@ -226,9 +215,7 @@ class CrowdBuffers:
                 for buffer, layout, name in (
                     (self._rest.positions, "3f4", "in_position"),
                     (self._rest.normals, "3f4", "in_normal"),
-                    (skin.influences, "2u4", "in_influences"),
-                    (skin.excess, "f4", "in_excess"),
-                    (mesh.source_ids, "i4", "in_source"),
+                    (skin.bindings, "4u4", "in_bindings"),
                     (mesh.uvs, "2f4", "in_uv"),
                     (mesh.colors, "3f4", "in_color"),
                 )

@@ -71,7 +71,6 @@ class MeshBuffers:
         self.uvs: moderngl.Buffer | None = None
         if mesh.uvs is not None and len(mesh.uvs):
             self.uvs = keep(buffer(self.context, mesh.uvs[uv_indices], "f4"))
-        self.source_ids = keep(buffer(self.context, self.sources, "i4"))
         self._textures = [
             None
             if material.image is None or self.uvs is None

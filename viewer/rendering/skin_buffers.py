@@ -27,6 +27,8 @@ class SkinBuffers:
 
     Attributes
     ----------
+    bindings : moderngl.Buffer
+        A row of each split vertex, see ``skinning.glsl``.
     joint_shares : (J,)
         Each joint's part in all weights: their mean motion is that of the figure.
     """
@@ -40,7 +42,7 @@ class SkinBuffers:
         keep = self._owner.keep
         if skin is None:
             self.joint_shares: Floats = np.zeros(0)
-            ranges, excess = np.zeros((len(sources), 2)), np.zeros(len(sources))
+            ranges, excess = np.zeros((len(sources), 2), "u4"), np.zeros(len(sources))
             self.pairs = keep(pair_texture(context, [], []))
         else:
             skin = strongest_first(skin)
@@ -51,8 +53,11 @@ class SkinBuffers:
             self.joint_shares = sums / (sums.sum() or 1.0)
             # Summed in float64: in float32 even thirds miss 1, which far away moves a vertex.
             excess = (weight_sums(skin) - 1.0)[sources]
-        self.influences = keep(buffer(context, ranges, "u4"))
-        self.excess = keep(buffer(context, excess, "f4"))
+        # One attribute of four words: drivers in software spend as long on each as on a product.
+        bindings = np.empty((len(sources), 4), dtype="u4")
+        bindings[:, :2], bindings[:, 2] = ranges, sources
+        bindings[:, 3] = excess.astype("f4").view("u4")
+        self.bindings = keep(buffer(context, bindings, "u4"))
 
     def release(self) -> None:
         """Free everything."""

@@ -163,13 +163,9 @@ class PosedMesh:
             attributes = [
                 (positions, "3f4", "in_position"),
                 (normals, "3f4", "in_normal"),
-                (skin.influences, "2u4", "in_influences"),
-                (skin.excess, "f4", "in_excess"),
-                (mesh.source_ids, "i4", "in_source"),
+                (skin.bindings, "4u4", "in_bindings"),
             ]
-            self._arrays[key] = self.context.vertex_array(
-                program, [item for item in attributes if item[2] in program]
-            )
+            self._arrays[key] = self.context.vertex_array(program, attributes)
         return self._arrays[key]
 
     def read(self) -> tuple[Floats, Floats]:
