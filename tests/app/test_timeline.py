@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from viewer.app.stream import Stream
-from viewer.loading import Builder
+from viewer.loading.capturing import Builder
 from viewer.rig.body_motion import BodyMotion
 from viewer.rig.capture import Capture, CapturePart
 from viewer.rig.clip import Channel, Clip

@@ -25,7 +25,8 @@ from viewer.app.state import AppState
 from viewer.app.stream import Stream
 from viewer.errors import RenderError, ViewerError, printable
 from viewer.formats import FORMATS, free_path, save_image
-from viewer.loading import Builder, Contents, add_to_actor, bundled_body, bundled_files
+from viewer.loading import Contents, add_to_actor, bundled_body, bundled_files
+from viewer.loading.capturing import Builder
 from viewer.rendering.renderer import Renderer
 from viewer.rendering.target import Target
 from viewer.rig.arrays import Bytes

@@ -7,10 +7,14 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from viewer.errors import ViewerError
-from viewer.loading import Builder, Contents, MotionSettings, begin, is_body, read_files
+from viewer.loading import Contents, MotionSettings, begin, read_files
 from viewer.rig.scene import Scene
+
+if TYPE_CHECKING:
+    from viewer.loading.capturing import Builder
 
 __all__ = ["Loader"]
 
@@ -88,6 +92,8 @@ class Loader:
 
     def _join(self, contents: Contents, paths: Sequence[Path]) -> None:
         """Give motions to the figures that are open; what they do not fit stands alone."""
+        from viewer.loading.driving import is_body
+
         opened = read_files(self._opened, settings=self._settings)
         figures = opened.figures
         if contents.only_bodies and not any(is_body(figure) for _, figure in figures):

@@ -16,7 +16,7 @@ from viewer.app.record_dialog import RecordSettings
 from viewer.app.state import AppState
 from viewer.errors import OutputError, printable
 from viewer.export import refuse_inputs
-from viewer.formats._video import MOST_GIF_RATE
+from viewer.formats._video_kinds import MOST_GIF_RATE
 from viewer.rendering.recorder import Follow, Recording, Sink, record
 from viewer.rendering.renderer import Renderer
 from viewer.rig.arrays import Floats

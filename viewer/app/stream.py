@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable, Sequence
 
 from viewer.errors import ViewerError
-from viewer.loading import Builder
+from viewer.loading.capturing import Builder
 from viewer.rig.capture import CapturePart
 from viewer.rig.scene import Actor
 

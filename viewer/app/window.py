@@ -26,7 +26,7 @@ from viewer.app.recent import (  # noqa: E402
 from viewer.app.state import AppState  # noqa: E402
 from viewer.app.theme import apply_theme, change_scale  # noqa: E402
 from viewer.errors import RenderError, printable  # noqa: E402
-from viewer.loading import Builder  # noqa: E402
+from viewer.loading.capturing import Builder  # noqa: E402
 from viewer.rendering.camera import Camera, fit  # noqa: E402
 from viewer.rendering.context import explain  # noqa: E402
 from viewer.rendering.options import DisplayOptions  # noqa: E402

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from viewer.errors import OutputError, printable
-from viewer.export import refuse_inputs
+from viewer.formats._save import refuse_inputs
 
 __all__ = ["STDOUT", "check_output"]
 

@@ -15,7 +15,6 @@ from viewer.formats import Source, read
 from viewer.rig.arrays import Floats
 from viewer.rig.hands import hand_vectors
 from viewer.rig.mirror import mirror_pose
-from viewer.rig.motion import pose_actor, scene_rate, time_span
 from viewer.rig.pose_record import PoseRecord, apply_record
 from viewer.rig.pose_vector import set_joint_rotations
 from viewer.rig.rotation import rotation_vector_to_matrix
@@ -181,6 +180,8 @@ def _apply_time(scene: Scene, arguments: argparse.Namespace) -> None:
     """Pose every actor that has a clip as it is at a time."""
     if arguments.frame is None and arguments.time is None:
         return
+    from viewer.rig.motion import pose_actor, scene_rate, time_span
+
     option = "--time" if arguments.frame is None else "--frame"
     if arguments.frame is not None and arguments.time is not None:
         raise ViewerError("--frame and --time: expected one of them, found both")

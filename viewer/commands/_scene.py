@@ -8,14 +8,17 @@ import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from viewer.commands._pose import add_pose_arguments, apply_pose
 from viewer.commands._progress import Progress
 from viewer.errors import FormatError, ViewerError, printable
-from viewer.loading import Builder, MotionSettings, begin, bundled_body, bundled_files, read_files
+from viewer.loading import MotionSettings, begin, bundled_body, bundled_files, read_files
 from viewer.models import known_models, load_model_folder, resolve, save_model_folder
-from viewer.rig.keypoint_layouts import TITLES
 from viewer.rig.scene import Scene
+
+if TYPE_CHECKING:
+    from viewer.loading.capturing import Builder
 
 __all__ = [
     "add_scene_arguments",
@@ -26,6 +29,9 @@ __all__ = [
     "print_warnings",
     "scene_files",
 ]
+
+LAYOUTS = ("body19", "panoptic", "coco", "h36m")
+"""Keypoint layouts that share their number of points with another."""
 
 _SLOW_BYTES = 60e6  # about a second of reading
 _UNITS = {"k": 1 << 10, "m": 1 << 20, "g": 1 << 30}
@@ -65,7 +71,7 @@ def _add_motion_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--unit", choices=("m", "cm", "mm"), help="of BVH lengths")
     group.add_argument(
         "--layout",
-        choices=[title for titles in TITLES.values() if len(titles) > 1 for title in titles],
+        choices=LAYOUTS,
         help="what captured keypoints are where their number leaves a choice",
     )
     group.add_argument(

@@ -19,7 +19,7 @@ from viewer.commands._scene import print_warnings
 from viewer.commands._shots import Range, Shots, Turntable, parse_range, parse_turntable, shots_of
 from viewer.commands._view import camera_of
 from viewer.errors import OutputError, ViewerError, printable
-from viewer.formats._video import VIDEOS
+from viewer.formats._video_kinds import VIDEOS
 from viewer.rig.scene import Scene
 
 if TYPE_CHECKING:

@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from viewer.errors import ViewerError, printable
-from viewer.formats._video import MOST_GIF_RATE
+from viewer.formats._video_kinds import MOST_GIF_RATE
 from viewer.rig.arrays import Floats
-from viewer.rig.motion import scene_rate, time_span
 from viewer.rig.scene import Scene
 
 if TYPE_CHECKING:
@@ -127,6 +126,8 @@ def shots_of(request: Request, arguments: argparse.Namespace, scene: Scene) -> S
         raise ViewerError(f"nothing moves: {found} (--turntable turns the camera)")
     if not moves and request.range is not None:
         raise ViewerError("--frames: no file is a clip")
+    from viewer.rig.motion import scene_rate, time_span
+
     counted = arguments.fps or scene_rate(scene.actors)
     rate, notes = counted, []
     if request.kind == "video" and request.output.suffix.lower() == ".gif" and rate > MOST_GIF_RATE:
@@ -154,6 +155,8 @@ def _places(
     request: Request, arguments: argparse.Namespace, scene: Scene, counted: float, rate: float
 ) -> tuple[Floats, list[str]]:
     """Return the frames that are drawn, as numbers that need not be whole, and notes."""
+    from viewer.rig.motion import time_span
+
     start, end = time_span(scene.actors)
     total = math.floor((end - start) * counted + 1e-6) + 1
     asked = request.range or Range(0, None, 1)

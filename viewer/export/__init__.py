@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 
-from viewer.errors import OutputError, RigError, UnsupportedFormatError, printable
+from viewer.errors import RigError, UnsupportedFormatError
 from viewer.export._options import MotionOptions
+from viewer.formats._save import refuse_inputs
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import Skinning
@@ -200,27 +200,6 @@ def files_written(path: str | Path) -> list[Path]:
     if Path(path).suffix.lower() == ".gltf":
         return [Path(path), Path(path).with_suffix(".bin")]
     return [Path(path)]
-
-
-def refuse_inputs(files: Sequence[Path], inputs: Sequence[Path]) -> None:
-    """Refuse to replace what was opened, or a file inside an opened folder.
-
-    Raises
-    ------
-    OutputError
-        With the file's name.
-    """
-    for file in files:
-        for opened in inputs:
-            try:
-                inside = opened.is_dir() and file.exists() and file.parent.samefile(opened)
-                same = opened.exists() and file.exists() and file.samefile(opened)
-            except (OSError, ValueError):
-                continue  # what cannot be looked at cannot be replaced either
-            if same or inside:
-                raise OutputError(
-                    f"{printable(file, 300)}: is an input file, which is never replaced"
-                )
 
 
 def require_mesh(actor: Actor, what: str) -> None:

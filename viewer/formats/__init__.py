@@ -13,15 +13,28 @@ from viewer.errors import FormatError, UnsupportedFormatError, printable
 from viewer.formats._image import is_picture, read_picture, save_image
 from viewer.formats._save import all_or_none, free_path, save_arrays, save_bytes, save_text
 from viewer.formats._source import MAX_SIZE, Source
-from viewer.rig.clip import Clip
-from viewer.rig.figure import Figure
-from viewer.rig.pose_record import PoseRecord
-from viewer.rig.skeleton_motion import SkeletonMotion
 
 if TYPE_CHECKING:
     from viewer.formats._archive import Archive
+    from viewer.formats.rig import NamedFiles
     from viewer.rig.body_motion import BodyMotion
     from viewer.rig.capture import Capture
+    from viewer.rig.clip import Clip
+    from viewer.rig.figure import Figure
+    from viewer.rig.morph_target import MorphTarget
+    from viewer.rig.pose_record import PoseRecord
+    from viewer.rig.skeleton_motion import SkeletonMotion
+
+    Content = (
+        Figure
+        | Clip
+        | PoseRecord
+        | SkeletonMotion
+        | BodyMotion
+        | Capture
+        | MorphTarget
+        | NamedFiles
+    )
 
 __all__ = [
     "FORMATS",
@@ -233,7 +246,7 @@ def _pose_or_motion(archive: Archive) -> str:
     return "pose" if is_pose and not is_other and not has_frames(archive) else "amass"
 
 
-def read(source: Source) -> Figure | Clip | PoseRecord | SkeletonMotion | BodyMotion | Capture:
+def read(source: Source) -> Content:
     """Read whatever the file holds; see the format modules for what they raise."""
     return import_module(f"{__name__}.{detect(source)}").read(source)
 

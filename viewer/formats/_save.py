@@ -9,7 +9,7 @@ import shutil
 import stat
 import tempfile
 import zipfile
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,7 @@ __all__ = [
     "all_or_none",
     "as_words",
     "free_path",
+    "refuse_inputs",
     "save_arrays",
     "save_bytes",
     "save_text",
@@ -283,3 +284,24 @@ def _replace(target: Path, data: bytes, permissions: int) -> None:
 def _require_folder(target: Path) -> None:
     if not target.parent.is_dir():
         raise FileNotFoundError(None, f"the folder {printable(target.parent, 300)} does not exist")
+
+
+def refuse_inputs(files: Sequence[Path], inputs: Sequence[Path]) -> None:
+    """Refuse to replace what was opened, or a file inside an opened folder.
+
+    Raises
+    ------
+    OutputError
+        With the file's name.
+    """
+    for file in files:
+        for opened in inputs:
+            try:
+                inside = opened.is_dir() and file.exists() and file.parent.samefile(opened)
+                same = opened.exists() and file.exists() and file.samefile(opened)
+            except (OSError, ValueError):
+                continue  # what cannot be looked at cannot be replaced either
+            if same or inside:
+                raise OutputError(
+                    f"{printable(file, 300)}: is an input file, which is never replaced"
+                )

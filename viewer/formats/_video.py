@@ -8,7 +8,6 @@ point 1), so that players show the colours that were drawn.
 from __future__ import annotations
 
 import contextlib
-from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
 from types import ModuleType
@@ -16,9 +15,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from viewer.errors import UnsupportedFormatError, ViewerError, printable
+from viewer.errors import ViewerError, printable
 from viewer.formats._gif_palette import PaletteChooser, PaletteUser
 from viewer.formats._save import Replacement
+from viewer.formats._video_kinds import MOST_GIF_RATE, VideoKind, video_kind
 from viewer.rig.arrays import Bytes
 
 if TYPE_CHECKING:
@@ -27,66 +27,11 @@ if TYPE_CHECKING:
     import av
     from av.video.frame import VideoFrame
 
-__all__ = ["MOST_GIF_RATE", "VIDEOS", "VideoSink", "video_kind"]
-
-MOST_GIF_RATE = 50.0
-"""Frames a second: viewers show delays below 2/100 s as 10/100 s."""
+__all__ = ["VideoSink"]
 
 _BT709, _LIMITED = 1, 1  # H.273's code points; FFmpeg's AVColorSpace and AVColorRange
 _QUALITY = 75.0
 _GIF_SAMPLES = 12  # frames whose colours are looked at
-
-
-@dataclass(frozen=True, slots=True)
-class VideoKind:
-    """What can be said of a kind of video before anything is imported.
-
-    Attributes
-    ----------
-    title : str
-        For menus.
-    encoders : tuple of str
-        FFmpeg's names, the best first.
-    has_alpha : bool
-        Whether it can be transparent.
-    needs_even : bool
-        Whether width and height must be even: colours have half the resolution.
-    """
-
-    title: str
-    encoders: tuple[str, ...]
-    has_alpha: bool
-    needs_even: bool
-    muxer: dict[str, str] = field(default_factory=dict)
-
-
-VIDEOS = {
-    ".mp4": VideoKind(
-        "MP4 video (H.264)",
-        ("libx264", "libopenh264", "mpeg4"),
-        False,
-        True,
-        {"movflags": "+faststart"},  # the index first, so that browsers start at once
-    ),
-    ".webm": VideoKind("WebM video (VP9)", ("libvpx-vp9",), True, True),
-    ".gif": VideoKind("animated GIF", ("gif",), True, False),
-}
-"""Kinds of video by suffix."""
-
-
-def video_kind(path: Path) -> VideoKind:
-    """Return the kind of video that a file of this name is.
-
-    Raises
-    ------
-    UnsupportedFormatError
-        If it is none; the message lists those there are.
-    """
-    suffix = path.suffix.lower()
-    if suffix not in VIDEOS:
-        known = ", ".join(VIDEOS)
-        raise UnsupportedFormatError(f'videos cannot be written as "{suffix}"; there are: {known}')
-    return VIDEOS[suffix]
 
 
 class VideoSink:

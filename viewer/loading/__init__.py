@@ -8,14 +8,11 @@ from viewer.formats import MAX_SIZE
 from viewer.loading.additions import add_to_actor
 from viewer.loading.assembly import assemble, begin
 from viewer.loading.bundled import bundled_body, bundled_files
-from viewer.loading.capturing import Builder
 from viewer.loading.contents import Contents, read_files
-from viewer.loading.driving import is_body
 from viewer.loading.settings import MotionSettings
 from viewer.rig.scene import Scene
 
 __all__ = [
-    "Builder",
     "Contents",
     "MotionSettings",
     "add_to_actor",
@@ -23,7 +20,6 @@ __all__ = [
     "begin",
     "bundled_body",
     "bundled_files",
-    "is_body",
     "load",
     "read_files",
 ]

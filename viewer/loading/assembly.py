@@ -4,22 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from viewer.errors import FormatError, RigError, printable
 from viewer.loading.additions import apply_pose, with_texture
-from viewer.loading.capturing import Builder
+from viewer.loading.cast import Cast
 from viewer.loading.contents import Contents
-from viewer.loading.driving import Cast, drive
 from viewer.loading.settings import MotionSettings
 from viewer.rig.arrays import Bytes
 from viewer.rig.figure import Figure
-from viewer.rig.morph_target import on_one_joint, with_morphs
-from viewer.rig.motion import pose_actor, time_span
 from viewer.rig.pose_record import PoseRecord
 from viewer.rig.scene import Actor, Scene, scene_box
 from viewer.rig.transform import rotation_transform, translation_matrix
+
+if TYPE_CHECKING:
+    from viewer.loading.capturing import Builder
 
 __all__ = ["assemble", "begin"]
 
@@ -71,10 +72,14 @@ def begin(
         figure = _join([figures[index] for index in pair])
         cast.add(Actor(figure), figure.up, placed=False)
     _give_morphs(contents, cast)
-    drive(contents, cast, settings or MotionSettings())
-    start = time_span(cast.actors)[0]
-    for actor in cast.actors:
-        pose_actor(actor, start)
+    if contents.has_motion:
+        from viewer.loading.driving import drive
+        from viewer.rig.motion import pose_actor, time_span
+
+        drive(contents, cast, settings or MotionSettings())
+        start = time_span(cast.actors)[0]
+        for actor in cast.actors:
+            pose_actor(actor, start)
     for path, record in contents.poses:
         cast.notes += _assign_pose(path, record, cast.actors)
     for path, pixels in contents.pictures:
@@ -122,6 +127,8 @@ def _fits_by_name(skeleton: Figure, skin: Figure) -> bool:
 def _give_morphs(contents: Contents, cast: Cast) -> None:
     """Give targets to the first mesh that has their vertices, all that fit to the same one."""
     actors = cast.actors
+    from viewer.rig.morph_target import on_one_joint, with_morphs
+
     for path, target in contents.morphs:
         problem: RigError | None = None
         for index, actor in enumerate(actors):

@@ -5,26 +5,26 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING, cast
 
 from viewer.errors import FormatError
 from viewer.formats import MAX_SIZE, Source, claims, detect, is_picture, read, read_picture
-from viewer.formats.rig import NamedFiles
 from viewer.loading.settings import MotionSettings
 from viewer.rig.arrays import Bytes
-from viewer.rig.body_motion import BodyMotion
-from viewer.rig.capture import Capture
-from viewer.rig.clip import Clip
 from viewer.rig.figure import Figure
-from viewer.rig.morph_target import MorphTarget
-from viewer.rig.motion import DEFAULT_RATE
-from viewer.rig.pose_record import PoseRecord
-from viewer.rig.skeleton_motion import SkeletonMotion
+
+if TYPE_CHECKING:
+    from viewer.formats import Content
+    from viewer.formats.rig import NamedFiles
+    from viewer.rig.body_motion import BodyMotion
+    from viewer.rig.capture import Capture
+    from viewer.rig.clip import Clip
+    from viewer.rig.morph_target import MorphTarget
+    from viewer.rig.pose_record import PoseRecord
+    from viewer.rig.skeleton_motion import SkeletonMotion
 
 __all__ = ["Contents", "read_files"]
 
-Content = (
-    Figure | Clip | PoseRecord | BodyMotion | SkeletonMotion | Capture | MorphTarget | NamedFiles
-)
 
 _PEEK = 16  # bytes that tell a picture
 
@@ -87,26 +87,27 @@ def read_files(
     return contents
 
 
+_LISTS = {
+    "Clip": "clips",
+    "PoseRecord": "poses",
+    "BodyMotion": "body_motions",
+    "SkeletonMotion": "skeleton_motions",
+    "Capture": "captures",
+    "MorphTarget": "morphs",
+    "Figure": "figures",
+}
+"""Where each class belongs, by name: only readers that make one import its module."""
+
+
 def _sort(source: Source, contents: Contents, settings: MotionSettings) -> tuple[Path, ...]:
     """Read a file and put what it holds where its kind belongs; return files that it names."""
-    content, path = _read(source, settings), source.path
-    if isinstance(content, NamedFiles):
-        return content.paths
-    if isinstance(content, Clip):
-        contents.clips.append((path, content))
-    elif isinstance(content, PoseRecord):
-        contents.poses.append((path, content))
-    elif isinstance(content, BodyMotion):
-        contents.body_motions.append((path, content))
-    elif isinstance(content, SkeletonMotion):
-        contents.skeleton_motions.append((path, content))
-    elif isinstance(content, MorphTarget):
-        contents.morphs.append((path, content))
-    elif isinstance(content, Capture):
-        contents.captures.append((path, content))
-    else:
-        figure = _with_own_picture(source, content) if source.is_folder else content
-        contents.figures.append((path, figure))
+    content = _read(source, settings)
+    kind = type(content).__name__
+    if kind == "NamedFiles":
+        return cast("NamedFiles", content).paths
+    if isinstance(content, Figure) and source.is_folder:
+        content = _with_own_picture(source, content)
+    getattr(contents, _LISTS[kind]).append((source.path, content))
     return ()
 
 
@@ -115,6 +116,7 @@ def _read(source: Source, settings: MotionSettings) -> Content:
     kind = detect(source)
     if kind == "easymocap":
         from viewer.formats.easymocap import open_capture
+        from viewer.rig.motion import DEFAULT_RATE
 
         return open_capture(
             source,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -12,10 +12,10 @@ from viewer.errors import RigError, printable
 from viewer.formats import Source, read
 from viewer.loading.bundled import bundled_body
 from viewer.loading.capturing import Builder
+from viewer.loading.cast import Cast
 from viewer.loading.contents import Contents
 from viewer.loading.settings import METRES, MotionSettings
 from viewer.rig.body_motion import BodyMotion, body_clip
-from viewer.rig.camera_view import CameraView
 from viewer.rig.capture import Capture
 from viewer.rig.clip import Clip, suits
 from viewer.rig.figure import Figure
@@ -23,43 +23,9 @@ from viewer.rig.scene import Actor
 from viewer.rig.skeleton_motion import SkeletonMotion
 from viewer.rig.transform import rotation_transform
 
-__all__ = ["Cast", "drive", "is_body"]
+__all__ = ["drive", "is_body"]
 
 _ROOTS = ("pelvis", "wrist", "global")  # of the SMPL family's members
-
-
-@dataclass(slots=True)
-class Cast:
-    """The actors of a scene that is being put together.
-
-    Attributes
-    ----------
-    actors : list of Actor
-        Those of figures that were opened first.
-    ups : list of "y" or "z"
-        The axis that points up where each of them stands.
-    placed : list of bool
-        Whether its motion says where it is.
-    builders : list of Builder
-        Captures that are still being read.
-    views : list of CameraView
-        Calibrated cameras, in the scene.
-    notes : list of str
-        One line each.
-    """
-
-    actors: list[Actor]
-    ups: list[str] = field(default_factory=list)
-    placed: list[bool] = field(default_factory=list)
-    builders: list[Builder] = field(default_factory=list)
-    views: list[CameraView] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-
-    def add(self, actor: Actor, up: str, placed: bool) -> None:
-        """Add one actor at the end."""
-        self.actors.append(actor)
-        self.ups.append(up)
-        self.placed.append(placed)
 
 
 def drive(contents: Contents, cast: Cast, settings: MotionSettings) -> None:

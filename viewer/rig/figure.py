@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -14,11 +14,13 @@ from viewer.rig.blendshapes import BlendShapes, Correctives, JointRegressor
 from viewer.rig.hands import Hand
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.mesh import Mesh
-from viewer.rig.points import PointLayout
 from viewer.rig.pose import Pose
 from viewer.rig.pose_vector import PoseLayout
 from viewer.rig.skeleton import Skeleton
 from viewer.rig.skin import Skin
+
+if TYPE_CHECKING:
+    from viewer.rig.points import PointLayout
 
 __all__ = ["Figure", "skeleton_points"]
 

@@ -3,25 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 
 from viewer.rig.arrays import Floats
-from viewer.rig.camera_view import CameraView
-from viewer.rig.clip import Clip
 from viewer.rig.figure import Figure, skeleton_points
 from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.points import PointClip
 from viewer.rig.pose import Pose, placement_matrix, rest_pose
-from viewer.rig.sampled_clip import SampledClip
 from viewer.rig.shape import shaped
 from viewer.rig.skinning import deform
 from viewer.rig.transform import apply_transform
 
 __all__ = ["Actor", "Motion", "Scene", "actor_points", "figure_pose", "scene_box", "scene_points"]
 
-Motion = Clip | SampledClip | PointClip
+if TYPE_CHECKING:
+    from viewer.rig.camera_view import CameraView
+    from viewer.rig.clip import Clip
+    from viewer.rig.points import PointClip
+    from viewer.rig.sampled_clip import SampledClip
+
+Motion: TypeAlias = "Clip | SampledClip | PointClip"
 """Whatever moves an actor; all have ``name``, ``start`` and ``end`` in seconds."""
 
 _OUTLIER_SHARE = 0.001  # the camera fits the box of the other 99.9 % of the points

@@ -1,0 +1,65 @@
+"""What can be said of videos before anything that writes them is imported."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from viewer.errors import UnsupportedFormatError
+
+__all__ = ["MOST_GIF_RATE", "VIDEOS", "VideoKind", "video_kind"]
+
+MOST_GIF_RATE = 50.0
+"""Frames a second: viewers show delays below 2/100 s as 10/100 s."""
+
+
+@dataclass(frozen=True, slots=True)
+class VideoKind:
+    """What can be said of a kind of video before anything is imported.
+
+    Attributes
+    ----------
+    title : str
+        For menus.
+    encoders : tuple of str
+        FFmpeg's names, the best first.
+    has_alpha : bool
+        Whether it can be transparent.
+    needs_even : bool
+        Whether width and height must be even: colours have half the resolution.
+    """
+
+    title: str
+    encoders: tuple[str, ...]
+    has_alpha: bool
+    needs_even: bool
+    muxer: dict[str, str] = field(default_factory=dict)
+
+
+VIDEOS = {
+    ".mp4": VideoKind(
+        "MP4 video (H.264)",
+        ("libx264", "libopenh264", "mpeg4"),
+        False,
+        True,
+        {"movflags": "+faststart"},  # the index first, so that browsers start at once
+    ),
+    ".webm": VideoKind("WebM video (VP9)", ("libvpx-vp9",), True, True),
+    ".gif": VideoKind("animated GIF", ("gif",), True, False),
+}
+"""Kinds of video by suffix."""
+
+
+def video_kind(path: Path) -> VideoKind:
+    """Return the kind of video that a file of this name is.
+
+    Raises
+    ------
+    UnsupportedFormatError
+        If it is none; the message lists those there are.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in VIDEOS:
+        known = ", ".join(VIDEOS)
+        raise UnsupportedFormatError(f'videos cannot be written as "{suffix}"; there are: {known}')
+    return VIDEOS[suffix]
