@@ -20,7 +20,7 @@ from viewer.formats import _save, all_or_none, save_text
 
 SUFFIXES = [kind.suffixes[0] for kind in EXPORTERS.values() if kind.writes_pose]
 # Files that each one writes for the figure below, which has two pictures.
-SAVES = {".obj": 4, ".ply": 1, ".npz": 1, ".json": 1, ".skel": 4}
+SAVES = {".obj": 4, ".ply": 1, ".npz": 1, ".json": 1, ".skel": 4, ".glb": 1}
 # What is there already, by the suffix of the output.
 BESIDE = {".skel": (".skin",)}
 

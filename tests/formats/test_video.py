@@ -14,8 +14,9 @@ import pytest
 from PIL import Image
 
 from viewer.errors import OutputError, UnsupportedFormatError, ViewerError
-from viewer.formats import _video
-from viewer.formats._video import VideoSink, video_kind
+from viewer.formats import _video_kinds
+from viewer.formats._video import VideoSink
+from viewer.formats._video_kinds import video_kind
 
 av = pytest.importorskip("av")
 ROOT = Path(__file__).resolve().parents[2]
@@ -261,8 +262,8 @@ def test_better_quality_is_larger_and_nearer(tmp_path):
 
 
 def test_encoder_that_stands_in_works(tmp_path, monkeypatch):
-    kind = _video.VideoKind("MP4 video (H.264)", ("no_such", "mpeg4"), False, True)
-    monkeypatch.setitem(_video.VIDEOS, ".mp4", kind)
+    kind = _video_kinds.VideoKind("MP4 video (H.264)", ("no_such", "mpeg4"), False, True)
+    monkeypatch.setitem(_video_kinds.VIDEOS, ".mp4", kind)
     path = tmp_path / "x.mp4"
     sink = VideoSink(path, (64, 48), 25.0)
     write(sink, [quarters(64, 48)] * 3)
@@ -274,8 +275,8 @@ def test_encoder_that_stands_in_works(tmp_path, monkeypatch):
 
 
 def test_missing_encoder_is_one_line(tmp_path, monkeypatch):
-    kind = _video.VideoKind("MP4 video (H.264)", ("no_such", "nor_this"), False, True)
-    monkeypatch.setitem(_video.VIDEOS, ".mp4", kind)
+    kind = _video_kinds.VideoKind("MP4 video (H.264)", ("no_such", "nor_this"), False, True)
+    monkeypatch.setitem(_video_kinds.VIDEOS, ".mp4", kind)
     path = tmp_path / "x.mp4"
     with pytest.raises(ViewerError) as caught:
         VideoSink(path, (64, 48), 25.0)

@@ -9,8 +9,9 @@ import pytest
 from drawn_figures import arm, bent, checker, random_figure, random_pose
 
 import viewer
+from viewer.errors import RenderError
 from viewer.loading import bundled_body
-from viewer.rendering import crowd_pass
+from viewer.rendering import crowd_buffers, crowd_pass
 from viewer.rendering.camera import Camera
 from viewer.rendering.crowd_buffers import CrowdBuffers
 from viewer.rendering.crowd_pass import FEWEST, crowds_of
@@ -22,6 +23,7 @@ from viewer.rendering.rest_buffers import WAYS
 from viewer.rendering.view import View
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import bounding_box, box_size
+from viewer.rig.points import PointLayout
 from viewer.rig.scene import Actor, Scene, figure_pose, scene_box
 from viewer.rig.skinning import METHODS, Skinning
 
@@ -270,3 +272,57 @@ def test_crowds_of_a_figure_that_left_are_freed(offscreen):
     offscreen.render(rows_of_arms(2), (50, 50), camera, DisplayOptions(), box)
     assert crowd._palette is None
     assert len(offscreen.renderer.buffers._crowds) == 0
+
+
+def test_a_refused_upload_is_tried_again(ctx, monkeypatch):
+    figure = random_figure(np.random.default_rng(7), 6)
+    crowd, actors = Crowd(ctx, figure), cast(figure, 3)
+    poses = [actor.pose for actor in actors]
+
+    def refuse(*_):
+        raise RenderError("no room")
+
+    with monkeypatch.context() as patch, pytest.raises(RenderError):
+        patch.setattr(crowd_buffers, "write_stacked", refuse)
+        crowd.crowd.update(poses, Skinning())
+    check(crowd, actors, Skinning())
+    crowd.release()
+
+
+def test_skeletons_of_many_actors_are_those_of_each(offscreen):
+    scene = rows_of_arms(5)
+    scene.actors[3].pose.scales[:] = 1.5
+    for show in ("skeleton", "both"):
+        options = DisplayOptions(show=show, background="transparent", grid=False)
+        camera, box = default_camera(scene, (150, 150)), scene_box(scene)
+        together = offscreen.render(scene, (150, 150), camera, options, box)
+        with Offscreen() as other:
+            for actor in scene.actors:
+                other.render(Scene([actor]), (150, 150), camera, options, box)
+            for actor in scene.actors:
+                found = offscreen.renderer.buffers.skeleton(actor).world.read()
+                other.render(Scene([actor]), (150, 150), camera, options, box)
+                assert found == other.renderer.buffers.skeleton(actor).world.read()
+        assert together[..., 3].any()
+
+
+def test_figures_of_points_alone_go_through_every_view(offscreen):
+    layout = PointLayout("one", ("a", "b"), [[0, 1]], [0, 0])
+    actors = [Actor(Figure("points", points=layout)) for _ in range(FEWEST)]
+    for number, actor in enumerate(actors[1:]):
+        actor.points = np.array([[number, 0, 0, 1.0], [number, 1, 0, 1.0]])
+    scene = Scene(actors)
+    offscreen.renderer.buffers.keep_only([])
+    with offscreen.context:
+        offscreen.renderer.prepare(scene)
+    for changes in (
+        {},
+        {"show": "both"},
+        {"show": "skeleton"},
+        {"show": "binding"},
+        {"shading": "scalar"},
+        {"wireframe": True, "normals": True, "keypoints": True},
+    ):
+        options = DisplayOptions(**changes)
+        camera = default_camera(scene, (60, 60))
+        assert offscreen.render(scene, (60, 60), camera, options, scene_box(scene)).any()
