@@ -13,7 +13,6 @@ in vec3 in_rest_shift;      // per instance: rest centre minus posed centre
 in vec3 in_center;          // per instance: posed centre, figure space
 
 uniform mat4 u_projection;
-uniform int u_n_joints;     // matrices of one instance
 uniform bool u_has_colors;  // in_color counts
 
 out vec3 v_position;        // camera space
@@ -29,8 +28,6 @@ flat out int v_instance;
 void main() {
     rest_shift = in_rest_shift;
     center = in_center;
-    first_joint = gl_InstanceID * u_n_joints;
-    first_offset = gl_InstanceID * u_n_offsets;
     vec3 position, normal;
     pose_vertex(true, position, normal);
     vec4 point = vec4(position, 1.0);

@@ -15,6 +15,5 @@ out vec3 v_normal;       // figure space, unit length
 void main() {
     rest_shift = u_rest_shift;
     center = u_center;
-    first_joint = first_offset = 0;
     pose_vertex(u_attached, v_position, v_normal);
 }

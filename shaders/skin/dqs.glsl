@@ -4,7 +4,7 @@ uniform sampler2D u_rigid;      // five texels a joint: real part, dual part, st
 
 // Texels of a joint in u_rigid: upload.py's rows hold 128 joints.
 vec4 rigid_texel(int joint, int texel) {
-    int index = first_joint + joint;
+    int index = gl_InstanceID * u_n_joints + joint;
     return texelFetch(u_rigid, ivec2(5 * (index & 127) + texel, index >> 7), 0);
 }
 

@@ -6,8 +6,19 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
-NAMES = ("start", "memory", "models", "skinning", "bodies", "deform", "crowd", "motion")
-NAMES += ("read", "captures", "video")
+NAMES = [
+    "start",
+    "memory",
+    "models",
+    "skinning",
+    "bodies",
+    "deform",
+    "crowd",
+    "motion",
+    "read",
+    "captures",
+    "video",
+]
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "formats")]

@@ -36,7 +36,7 @@ def build(ctx, name: str):
             return programs.drawing("crowd", fragment="pick", skin="dqs")
         if name.startswith("trail"):
             return programs.drawing("trail")
-        if name.startswith("skin"):
+        if name.startswith(("skin", "include")):
             return programs.feedback("skin", "lbs", VARYINGS)
         if name.startswith(("mesh", "shade")):
             return programs.drawing("mesh", "phong")
@@ -63,7 +63,7 @@ def lines_to_break(text: str) -> list[int]:
         "shade/phong.glsl",
         "skin.vert",
         "skin/lbs.glsl",
-        "skinning.glsl",
+        "include/skinning.glsl",
         "crowd.vert",
         "point.vert",
         "trail.vert",

@@ -34,6 +34,7 @@ def test_other_threads_run_while_the_driver_is_waited_for(ctx):
     array = ctx.vertex_array(program, [(buffer, "2f", "in_corner")])
     target = ctx.simple_framebuffer((256, 256))
     target.use()
+    ctx.enable_only(ctx.NOTHING)  # other tests leave the depth test on
     waiter, ticks, done = Waiter(ctx), [], threading.Event()
 
     def tick() -> None:

@@ -201,6 +201,7 @@ class Playback:
         if key == self._posed and not again:
             return False
         self._posed = key
+        scene.time = self.time
         pose_actors(scene.actors, self.time, self.fill_gaps)
         return True
 

@@ -113,13 +113,14 @@ class CrowdBuffers:
         keys = [skinning_key(pose) for pose in poses]
         old = self._keys if words == self._words else []
         changed = [row for row, key in enumerate(keys) if row >= len(old) or key != old[row]]
-        self._how, self._words, self._keys, self.count = how, words, keys, len(poses)
-        if not changed:
-            return
-        self._reserve(len(poses))
-        self._rest.update(figure, poses[0], correct=False)
-        self._write(figure, [poses[row] for row in changed], np.array(changed))
-        self.n_updates += 1
+        self._how, self._words, self.count = how, words, len(poses)
+        if changed:
+            self._keys = []  # a refusal leaves nothing that passes for done
+            self._reserve(len(poses))
+            self._rest.update(figure, poses[0], correct=False)
+            self._write(figure, [poses[row] for row in changed], np.array(changed))
+            self.n_updates += 1
+        self._keys = keys
 
     def _reserve(self, count: int) -> None:
         """Make room; textures grow by half, so that a growing crowd is not copied each time."""
@@ -183,7 +184,8 @@ class CrowdBuffers:
             "u_orthographic": view.camera.is_parallel,
             "u_share": self._how.share,
             "u_n_joints": self._n_joints,
-            "u_n_offsets": self._offsets.per_instance,
+            "u_n_summed": self._offsets.n_summed,
+            "u_n_offsets": self._offsets.n_listed,
             "u_n_sources": len(self.mesh.copies),
             "u_palette": _PALETTE_UNIT,
             "u_pairs": _PAIRS_UNIT,

@@ -64,14 +64,27 @@ class SkeletonBuffers:
         self._arrays: dict[int, moderngl.VertexArray] = {}
         self._key: tuple[bytes, ...] | None = None
 
-    def update(self, pose: Pose) -> None:
-        """Upload the joints' matrices if the pose changed."""
+    def is_current(self, pose: Pose) -> bool:
+        """Return whether the joints' matrices are those of a pose."""
+        return self._key == skinning_key(pose)
+
+    def update(self, pose: Pose, world: Floats | None = None) -> None:
+        """Upload the joints' matrices if the pose changed.
+
+        Parameters
+        ----------
+        pose : Pose
+            DOFs in lengths and radians.
+        world : (J, 4, 4), optional
+            Its joint-to-figure matrices, if they are known; they are changed.
+        """
         key = skinning_key(pose)
         if key == self._key:
             return
-        skeleton = shaped(self.figure, pose.shape_weights).skeleton
-        assert skeleton is not None  # shaping keeps it
-        world = world_matrices(skeleton, pose)
+        if world is None:
+            skeleton = shaped(self.figure, pose.shape_weights).skeleton
+            assert skeleton is not None  # shaping keeps it
+            world = world_matrices(skeleton, pose)
         self.center = bounding_box(world[:, :3, 3]).mean(axis=0)
         world[:, :3, 3] -= self.center
         if self.n_joints > _CROWD:

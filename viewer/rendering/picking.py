@@ -23,6 +23,7 @@ from viewer.rendering.shown import (
     shows_mesh,
     shows_skeleton,
     update_meshes,
+    update_skeletons,
 )
 from viewer.rendering.skin_pass import PosedMesh
 from viewer.rendering.view import View, in_front, set_model
@@ -120,6 +121,7 @@ class PickPass:
         near = replace(view, projection=_window(size, pixel) @ view.projection)
         self._found, self._is_small = [], []
         self._draw_meshes(scene, near, options)
+        update_skeletons(self.passes.buffers, scene.actors, options)
         for index, actor in enumerate(scene.actors):
             if shows_skeleton(actor, options):
                 self._draw_boxes(index, actor, near, options)
@@ -192,9 +194,7 @@ class PickPass:
         array.render(moderngl.TRIANGLES, vertices=indices.n_indices, instances=crowd.count)
 
     def _draw_boxes(self, index: int, actor: Actor, view: View, options: DisplayOptions) -> None:
-        assert actor.pose is not None  # whoever has a skeleton has a pose
         skeleton = self.passes.buffers.skeleton(actor)
-        skeleton.update(actor.pose)
         # Over a skin it is drawn in front of it.
         view = in_front(view) if shows_mesh(actor.figure, options) else view
         program = self.passes.programs.drawing("joint", fragment="pick")

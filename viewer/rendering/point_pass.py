@@ -1,4 +1,8 @@
-"""Draws captured keypoints as small spheres, and the limbs between them, coloured by side."""
+"""Draws captured keypoints as small spheres, and the limbs between them, coloured by side.
+
+A limb is never left out for its length, as some viewers do beyond two metres: files do not say
+their unit, and a limb that is far too long shows a keypoint that is far off.
+"""
 
 from __future__ import annotations
 

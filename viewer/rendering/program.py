@@ -150,8 +150,8 @@ def _compose(name: str, chunk: str, files: list[str]) -> str:
 
 def _included(name: str, files: list[str]) -> str:
     """Return the text of a file that several shaders share."""
-    text = resource("shaders", f"{name}.glsl").read_text("utf-8")
-    files.append(f"{name}.glsl")
+    text = resource("shaders", "include", f"{name}.glsl").read_text("utf-8")
+    files.append(f"include/{name}.glsl")
     return f"#line {(len(files) - 1) * _LINES_PER_FILE + 1}\n{text}"
 
 

@@ -23,6 +23,7 @@ from viewer.rendering.shown import (
     shows_mesh,
     shows_skeleton,
     update_meshes,
+    update_skeletons,
 )
 from viewer.rendering.skin_pass import PosedMesh
 from viewer.rendering.target import Target
@@ -103,6 +104,7 @@ class Renderer:
         target.framebuffer.use()
         view = view_of(camera, target.size, box)
         has_meshes = self._draw_meshes(scene, view, options, target)
+        update_skeletons(self.buffers, scene.actors, options)
         skeletons = [
             (actor, selected[1] if index == selected[0] else -1)
             for index, actor in enumerate(scene.actors)
@@ -226,10 +228,7 @@ class Renderer:
         selected: int,
         opacity: float,
     ) -> None:
-        assert actor.pose is not None  # whoever has a skeleton has a pose
-        skeleton = self.buffers.skeleton(actor)
-        skeleton.update(actor.pose)
-        placement = placement_of(actor, options)
+        skeleton, placement = self.buffers.skeleton(actor), placement_of(actor, options)
         self.joint_pass.draw(skeleton, placement, view, options, selected, opacity, actor.color)
 
     def _draw_markers(self, actor: Actor, view: View, options: DisplayOptions) -> None:

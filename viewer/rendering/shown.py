@@ -11,9 +11,11 @@ from viewer.rendering.crowd_pass import crowds_of
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.skin_pass import PosedMesh
 from viewer.rig.arrays import Floats
+from viewer.rig.crowd import worlds
 from viewer.rig.figure import Figure
-from viewer.rig.pose import placement_matrix
+from viewer.rig.pose import Pose, placement_matrix
 from viewer.rig.scene import Actor
+from viewer.rig.shape import shaped
 
 __all__ = [
     "Meshes",
@@ -24,6 +26,7 @@ __all__ = [
     "shows_mesh",
     "shows_skeleton",
     "update_meshes",
+    "update_skeletons",
 ]
 
 
@@ -96,6 +99,36 @@ def update_meshes(
         if options.shading == "scalar":
             mesh.scalars.update(options.scalar, pose, options.skinning)
     return meshes
+
+
+def update_skeletons(
+    buffers: ActorBuffers, actors: Sequence[Actor], options: DisplayOptions
+) -> None:
+    """Send the joints' matrices of all drawn skeletons that moved, computed figure by figure.
+
+    Parameters
+    ----------
+    buffers : ActorBuffers
+        Gets what is new.
+    actors : sequence of Actor
+        Of a scene.
+    options : DisplayOptions
+        What is shown.
+    """
+    groups: dict[tuple[int, bytes], list[tuple[Actor, Pose]]] = {}
+    for actor in actors:
+        pose = actor.pose
+        if pose is None or not shows_skeleton(actor, options):
+            continue
+        if not buffers.skeleton(actor).is_current(pose):
+            key = id(actor.figure), pose.shape_weights.tobytes()
+            groups.setdefault(key, []).append((actor, pose))
+    for group in groups.values():
+        poses = [pose for _, pose in group]
+        skeleton = shaped(group[0][0].figure, poses[0].shape_weights).skeleton
+        assert skeleton is not None  # it is shown
+        for (actor, pose), world in zip(group, worlds(skeleton, poses), strict=True):
+            buffers.skeleton(actor).update(pose, world)
 
 
 def shows_mesh(figure: Figure, options: DisplayOptions) -> bool:

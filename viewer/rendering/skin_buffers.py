@@ -28,7 +28,7 @@ class SkinBuffers:
     Attributes
     ----------
     bindings : moderngl.Buffer
-        A row of each split vertex, see ``skinning.glsl``.
+        A row of each split vertex, see ``include/skinning.glsl``.
     joint_shares : (J,)
         Each joint's part in all weights: their mean motion is that of the figure.
     """

@@ -15,11 +15,10 @@ __all__ = ["SummedOffsets"]
 
 
 class SummedOffsets:
-    """What ``skinning.glsl`` adds to the vertices of each instance.
+    """What ``include/skinning.glsl`` adds to the vertices of each instance.
 
     Where the shader sums, its list holds the weights of all instances. Where the processor does,
-    one product of matrices makes a row of offsets for every instance, and each one's list is that
-    row alone.
+    one product of matrices makes a row of offsets for every instance.
 
     Parameters
     ----------
@@ -32,13 +31,15 @@ class SummedOffsets:
 
     Attributes
     ----------
-    per_instance : int
-        Rows of each instance's list; 0 if nothing is added.
+    n_listed : int
+        Rows of each instance's list; 0 if there is nothing to sum.
+    n_summed : int
+        1 if there is a row of sums for each instance, else 0.
     """
 
     def __init__(self, context: moderngl.Context, mesh: MeshBuffers, way: str) -> None:
         self.context, self.mesh, self.way = context, mesh, way
-        self.per_instance = 0
+        self.n_listed = self.n_summed = 0
         self._weights: NDArray[np.float32] = np.zeros((0, 0), "f4")
         self._sums: NDArray[np.float32] = np.zeros((0, 0), "f4")
         self._list: moderngl.Texture | None = None
@@ -56,7 +57,7 @@ class SummedOffsets:
         count : int
             Number of all instances, A.
         """
-        self.per_instance = 0
+        self.n_listed = self.n_summed = 0
         if rotations is None:
             self._weights = np.zeros((0, 0), "f4")
             return
@@ -77,8 +78,14 @@ class SummedOffsets:
 
     def _list_weights(self, count: int) -> None:
         columns = np.flatnonzero(self._weights[:count].any(axis=0))
-        self.per_instance = len(columns)
-        self._write_list(np.tile(columns, count), self._weights[:count, columns].ravel())
+        self.n_listed = len(columns)
+        indices, weights = np.tile(columns, count), self._weights[:count, columns].ravel()
+        if self._list is None or self._list.width * self._list.height < len(indices):
+            if self._list is not None:
+                self._list.release()
+            self._list = pair_texture(self.context, indices, weights)
+        else:
+            write_pairs(self._list, indices, weights)
 
     def _sum(self, rows: NDArray[np.intp], count: int) -> None:
         """Multiply the weights of all changed instances by the offsets, at once."""
@@ -96,24 +103,15 @@ class SummedOffsets:
                 self._summed.release()
             self._summed = empty_offsets(self.context, texels)
         write_stacked(self._summed, self._sums[:count])
-        self.per_instance = 1
-        self._write_list(np.arange(count), np.ones(count, "f4"))
-
-    def _write_list(self, indices: NDArray[np.intp], weights: NDArray[np.float32]) -> None:
-        if self._list is None or self._list.width * self._list.height < len(indices):
-            if self._list is not None:
-                self._list.release()
-            self._list = pair_texture(self.context, indices, weights)
-        else:
-            write_pairs(self._list, indices, weights)
+        self.n_summed = 1
 
     def use(self, list_unit: int, offsets_unit: int) -> None:
         """Bind what the shader sums, if it has to."""
-        if self.per_instance and self._list is not None:
+        if self.n_listed and self._list is not None:
             self._list.use(list_unit)
-            offsets = self.mesh.offsets if self.way == "texture" else self._summed
-            assert offsets is not None  # there is a list of its rows
-            offsets.use(offsets_unit)
+            self.mesh.offsets.use(offsets_unit)
+        if self.n_summed and self._summed is not None:
+            self._summed.use(offsets_unit)
 
     def release(self) -> None:
         """Free the textures."""

@@ -26,7 +26,7 @@ __all__ = [
     "with_rest_mesh",
 ]
 
-_shaped: Memo[Figure, Figure] = Memo(kept=8)
+_shaped: Memo[Figure, Figure] = Memo(kept=32)  # shapes that are in one scene
 
 
 def shaped(figure: Figure, weights: Floats) -> Figure:

@@ -9,6 +9,8 @@ in uvec4 in_bindings;    // first pair, number of pairs, the vertex in u_offsets
 
 uniform sampler2D u_palette;    // skinning matrices, three rows each, instance after instance
 uniform sampler2D u_pairs;      // joint and weight, each vertex's strongest first
+uniform int u_n_joints;         // matrices of one instance
+uniform int u_n_summed;         // 1: u_offsets has the sum for each instance, 0: it has not
 uniform int u_n_offsets;        // rows of u_offset_list for one instance; 0: none
 uniform int u_n_sources;        // vertices in each row of u_offsets
 uniform sampler2D u_offset_list;  // row of u_offsets and its weight, instance after instance
@@ -17,8 +19,6 @@ uniform sampler2D u_offsets;    // pose correctives, row after row
 // Of the instance; main sets them before anything is called.
 vec3 rest_shift;     // rest centre minus posed centre
 vec3 center;         // posed centre, figure space
-int first_joint;     // its first matrix
-int first_offset;    // its first row of u_offset_list
 
 // Sum of the vertex's weights, minus 1.
 float excess() {
@@ -35,7 +35,7 @@ vec2 influence(uint index) {
 
 // One row of a joint's skinning matrix.
 vec4 palette_row(int joint, int row) {
-    int index = first_joint + joint;
+    int index = gl_InstanceID * u_n_joints + joint;
     return texelFetch(u_palette, ivec2(3 * (index & 255) + row, index >> 8), 0);
 }
 
@@ -44,13 +44,22 @@ vec3 unit(vec3 v) {
     return size > 0.0 ? v / size : v;
 }
 
-// Sum of the pose correctives of one vertex: upload.py's rows hold 4096 offsets.
-vec3 offset(int vertex) {
+// One offset of a vertex: upload.py's rows hold 4096.
+vec3 offset(int row, int vertex) {
+    int index = row * u_n_sources + vertex;
+    return texelFetch(u_offsets, ivec2(index & 4095, index >> 12), 0).rgb;
+}
+
+// Sum of the pose correctives of one vertex. Loops, as processors run what a condition skips.
+vec3 corrective(int vertex) {
     vec3 sum = vec3(0.0);
-    for (int i = first_offset; i < first_offset + u_n_offsets; ++i) {
-        vec2 row = vec2(float(i),1.0);
-        int index = int(row.x) * u_n_sources + vertex;
-        sum += row.y * texelFetch(u_offsets, ivec2(index & 4095, index >> 12), 0).rgb;
+    for (int i = 0; i < u_n_summed; ++i) {
+        sum += offset(gl_InstanceID, vertex);
+    }
+    int first = gl_InstanceID * u_n_offsets;
+    for (int i = first; i < first + u_n_offsets; ++i) {
+        vec2 row = texelFetch(u_offset_list, ivec2(i & 1023, i >> 10), 0).rg;
+        sum += row.y * offset(int(row.x), vertex);
     }
     return sum;
 }
@@ -59,10 +68,7 @@ void skin(inout vec3 position, inout vec3 normal);  // of the chunk
 
 // Position in figure space minus the posed centre, and unit normal.
 void pose_vertex(bool attached, out vec3 position, out vec3 normal) {
-    position = in_position;
-    if (u_n_offsets > 0) {
-        position += offset(int(in_bindings.z));
-    }
+    position = in_position + corrective(int(in_bindings.z));
     normal = in_normal;
     if (attached && in_bindings.y > 0u) {
         skin(position, normal);
