@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
 import moderngl
 
-from viewer.rendering.crowd_buffers import CrowdBuffers
 from viewer.rendering.joint_pass import SkeletonBuffers
-from viewer.rendering.keypoint_pass import KeypointBuffers
 from viewer.rendering.mesh_buffers import MeshBuffers
-from viewer.rendering.point_pass import PointBuffers
 from viewer.rendering.program import Programs
 from viewer.rendering.skin_pass import PosedMesh
-from viewer.rendering.trail_pass import TrailBuffers
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor
+
+if TYPE_CHECKING:
+    from viewer.rendering.crowd_buffers import CrowdBuffers
+    from viewer.rendering.keypoint_pass import KeypointBuffers
+    from viewer.rendering.point_pass import PointBuffers
+    from viewer.rendering.trail_pass import TrailBuffers
 
 __all__ = ["ActorBuffers", "Kept"]
 
@@ -121,22 +123,30 @@ class ActorBuffers:
 
     def keypoints_of(self, actor: Actor) -> KeypointBuffers:
         """Return the markers of an actor's own keypoints; its figure must have some."""
+        from viewer.rendering.keypoint_pass import KeypointBuffers
+
         figure = actor.figure
         make = lambda: KeypointBuffers(self.context, figure, self._cube)  # noqa: E731
         return self.keypoints.get(actor, make)
 
     def points_of(self, actor: Actor) -> PointBuffers:
         """Return an actor's captured points; its figure must be made of some."""
+        from viewer.rendering.point_pass import PointBuffers
+
         layout = actor.figure.points
         assert layout is not None  # the caller looked
         return self.points.get(actor, lambda: PointBuffers(self.context, layout))
 
     def trail(self, actor: Actor) -> TrailBuffers:
         """Return an actor's paths."""
+        from viewer.rendering.trail_pass import TrailBuffers
+
         return self.trails.get(actor, lambda: TrailBuffers(self.context))
 
     def crowds(self, figure: Figure, count: int) -> list[CrowdBuffers]:
         """Return as many crowds of a figure, the same ones in the same order as before."""
+        from viewer.rendering.crowd_buffers import CrowdBuffers
+
         kept = self._crowds.get(figure, _Crowds).items
         while len(kept) > count:
             kept.pop().release()

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-from viewer.rendering.crowd_buffers import CrowdBuffers
 from viewer.rendering.mesh_pass import draw_runs, set_surface
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.program import Programs
 from viewer.rendering.view import View, set_lights
 from viewer.rig.scene import Actor
+
+if TYPE_CHECKING:
+    from viewer.rendering.crowd_buffers import CrowdBuffers
 
 __all__ = ["FEWEST", "crowds_of", "draw_crowd"]
 

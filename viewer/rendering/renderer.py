@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+from typing import TYPE_CHECKING
+
 import moderngl
 
 from viewer.rendering.actor_buffers import ActorBuffers
@@ -9,11 +12,8 @@ from viewer.rendering.camera import Camera
 from viewer.rendering.crowd_pass import draw_crowd
 from viewer.rendering.ground_pass import GroundPass
 from viewer.rendering.joint_pass import JointPass
-from viewer.rendering.keypoint_pass import KeypointPass
 from viewer.rendering.mesh_pass import MeshPass
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.picking import Passes, Pick, PickPass
-from viewer.rendering.point_pass import PointPass
 from viewer.rendering.program import Programs
 from viewer.rendering.shown import (
     has_markers,
@@ -27,12 +27,17 @@ from viewer.rendering.shown import (
 )
 from viewer.rendering.skin_pass import PosedMesh
 from viewer.rendering.target import Target
-from viewer.rendering.trail_pass import Moment, TrailPass
 from viewer.rendering.view import View, view_of
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.scalars import SCALARS
 from viewer.rig.scene import Actor, Scene
+
+if TYPE_CHECKING:
+    from viewer.rendering.keypoint_pass import KeypointPass
+    from viewer.rendering.picking import Pick, PickPass
+    from viewer.rendering.point_pass import PointPass
+    from viewer.rendering.trail_pass import TrailPass
 
 __all__ = ["Renderer"]
 
@@ -62,15 +67,46 @@ class Renderer:
         self.programs = Programs(context)
         self.mesh_pass = MeshPass(context, self.programs)
         self.joint_pass = JointPass(context, self.programs)
-        self.keypoint_pass = KeypointPass(self.joint_pass)
-        self.point_pass = PointPass(context, self.programs)
-        self.trail_pass = TrailPass(context, self.programs)
         self.ground_pass = GroundPass(context, self.programs)
         self.buffers = ActorBuffers(
             context, self.programs, self.joint_pass.cube, self.notes, self.mesh_pass.forget
         )
+        self._late: list[PointPass | PickPass] = []
+
+    # What many scenes never need is imported and made when it is first asked for.
+
+    @cached_property
+    def keypoint_pass(self) -> KeypointPass:
+        """Draws keypoints that figures themselves have."""
+        from viewer.rendering.keypoint_pass import KeypointPass
+
+        return KeypointPass(self.joint_pass)
+
+    @cached_property
+    def point_pass(self) -> PointPass:
+        """Draws captured points."""
+        from viewer.rendering.point_pass import PointPass
+
+        points = PointPass(self.context, self.programs)
+        self._late.append(points)
+        return points
+
+    @cached_property
+    def trail_pass(self) -> TrailPass:
+        """Draws paths of joints."""
+        from viewer.rendering.trail_pass import TrailPass
+
+        return TrailPass(self.context, self.programs)
+
+    @cached_property
+    def pick_pass(self) -> PickPass:
+        """Finds what is seen at a pixel."""
+        from viewer.rendering.picking import Passes, PickPass
+
         passes = Passes(self.programs, self.mesh_pass, self.point_pass, self.buffers)
-        self.pick_pass = PickPass(context, passes)
+        picks = PickPass(self.context, passes)
+        self._late.append(picks)
+        return picks
 
     def draw(
         self,
@@ -241,6 +277,10 @@ class Renderer:
     def _draw_trails(
         self, scene: Scene, view: View, options: DisplayOptions, size: tuple[int, int]
     ) -> None:
+        if not options.trail_joints:
+            return
+        from viewer.rendering.trail_pass import Moment
+
         at = Moment(scene.time or 0.0, options.trail_seconds)
         for index, actor in enumerate(scene.actors):
             joints = tuple(joint for owner, joint in options.trail_joints if owner == index)
@@ -262,6 +302,6 @@ class Renderer:
     def release(self) -> None:
         """Free everything."""
         self.buffers.keep_only([])
-        passes = self.mesh_pass, self.joint_pass, self.point_pass, self.ground_pass, self.pick_pass
+        passes = self.mesh_pass, self.joint_pass, self.ground_pass, *self._late
         for item in (*passes, self.programs):
             item.release()

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from viewer.rendering.actor_buffers import ActorBuffers
-from viewer.rendering.crowd_buffers import CrowdBuffers
 from viewer.rendering.crowd_pass import crowds_of
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.skin_pass import PosedMesh
 from viewer.rig.arrays import Floats
-from viewer.rig.crowd import worlds
 from viewer.rig.figure import Figure
 from viewer.rig.pose import Pose, placement_matrix
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
+
+if TYPE_CHECKING:
+    from viewer.rendering.crowd_buffers import CrowdBuffers
 
 __all__ = [
     "Meshes",
@@ -124,6 +126,8 @@ def update_skeletons(
             key = id(actor.figure), pose.shape_weights.tobytes()
             groups.setdefault(key, []).append((actor, pose))
     for group in groups.values():
+        from viewer.rig.crowd import worlds
+
         poses = [pose for _, pose in group]
         skeleton = shaped(group[0][0].figure, poses[0].shape_weights).skeleton
         assert skeleton is not None  # it is shown
