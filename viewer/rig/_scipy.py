@@ -1,0 +1,29 @@
+"""SciPy, which only rigging needs: imported when asked for, missed with one line."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from types import ModuleType
+
+from viewer.errors import RigError
+
+__all__ = ["scipy_part"]
+
+
+def scipy_part(name: str) -> ModuleType:
+    """Import a part of SciPy.
+
+    Parameters
+    ----------
+    name : str
+        Below ``scipy``, such as ``sparse.linalg``.
+
+    Raises
+    ------
+    RigError
+        If SciPy is not installed: it is the optional extra ``rig``.
+    """
+    try:
+        return import_module(f"scipy.{name}")
+    except ModuleNotFoundError:
+        raise RigError('rigging needs scipy: pip install "skinning-viewer[rig]"') from None
