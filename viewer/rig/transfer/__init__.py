@@ -1,0 +1,1 @@
+"""A rig carried over from one figure to another mesh."""

@@ -1,0 +1,181 @@
+"""A mesh as one connected surface: coincident vertices joined, islands told apart.
+
+Files repeat a vertex along seams of texture coordinates and hard edges. What is solved over a
+surface must not see these as borders, or the mesh would tear there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from viewer.rig._scipy import scipy_part
+from viewer.rig.arrays import Floats, Ints
+
+__all__ = ["Welded", "edges", "islands", "non_manifold_edges", "weld"]
+
+_NEAR = 1e-4  # of the median edge: as far apart as rounding in a text file puts equal vertices
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Welded:
+    """A mesh whose coincident vertices are one.
+
+    Attributes
+    ----------
+    positions : (W, 3)
+        Of the first of the vertices that were joined.
+    triangles : (F, 3) int32
+        Those that have three different corners.
+    vertices : (V,) int32
+        The welded vertex of each vertex of the mesh.
+    islands : (W,) int32
+        Which connected component each welded vertex belongs to, counted from 0. A vertex of no
+        triangle is an island of its own.
+    """
+
+    positions: Floats
+    triangles: Ints
+    vertices: Ints
+    islands: Ints
+
+    @property
+    def n_islands(self) -> int:
+        """Number of connected components."""
+        return int(self.islands.max()) + 1 if len(self.islands) else 0
+
+
+def weld(positions: Floats, triangles: Ints) -> Welded:
+    """Join coincident vertices, drop triangles that become edges, and find the islands.
+
+    Parameters
+    ----------
+    positions : (V, 3)
+        Any unit. Vertices nearer than 1e-4 of the median edge count as coincident.
+    triangles : (T, 3)
+        Vertex indices.
+
+    Returns
+    -------
+    Welded
+        A triangle without area stays if its corners differ: it closes a gap, where one side of
+        an edge has a vertex that the other has not.
+
+    Raises
+    ------
+    RigError
+        If SciPy is missing.
+    """
+    first, vertices = _joined_exactly(positions)
+    tolerance = _NEAR * _median_edge(positions, triangles)
+    if tolerance > 0.0:
+        nearby = _joined_nearby(positions[first], tolerance)
+        vertices = nearby[vertices]
+        first = first[np.unique(nearby, return_index=True)[1]]
+    welded, corners = positions[first], vertices[triangles].astype(np.int32)
+    kept = corners[(corners != np.roll(corners, 1, axis=1)).all(axis=1)]
+    return Welded(
+        positions=welded,
+        triangles=kept,
+        vertices=vertices.astype(np.int32),
+        islands=islands(len(welded), kept),
+    )
+
+
+def islands(n_vertices: int, triangles: Ints) -> Ints:
+    """Return the connected component of each vertex.
+
+    Parameters
+    ----------
+    n_vertices : int
+        V.
+    triangles : (T, 3)
+        Vertex indices.
+
+    Returns
+    -------
+    (V,) int32
+        Numbers from 0, in the order of their first vertices.
+    """
+    sparse, graph = scipy_part("sparse"), scipy_part("sparse.csgraph")
+    links = edges(triangles)
+    matrix = sparse.csr_array(
+        (np.ones(len(links), dtype=np.int8), (links[:, 0], links[:, 1])),
+        shape=(n_vertices, n_vertices),
+    )
+    return _in_order(graph.connected_components(matrix, directed=False)[1])
+
+
+def edges(triangles: Ints) -> Ints:
+    """Return the undirected edges of triangles, each once: (E, 2) int32, lower index first."""
+    pairs, _ = _counted_edges(triangles)
+    return pairs
+
+
+def non_manifold_edges(triangles: Ints) -> Ints:
+    """Return the edges that more than two triangles share: (E, 2) int32."""
+    pairs, counts = _counted_edges(triangles)
+    return pairs[counts > 2]
+
+
+def _counted_edges(triangles: Ints) -> tuple[Ints, Any]:
+    corners = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    width = int(corners.max(initial=0)) + 1
+    keys = low[low != high].astype(np.int64) * width + high[low != high]
+    unique, counts = np.unique(keys, return_counts=True)
+    return np.stack([unique // width, unique % width], axis=1).astype(np.int32), counts
+
+
+def _joined_exactly(positions: Floats) -> tuple[Any, Any]:
+    """Return the first vertex at each place, in vertex order, and each vertex's place."""
+    # Adding 0 turns -0.0 into 0.0, whose bytes differ.
+    rows = np.ascontiguousarray(positions + 0.0).view(np.dtype((np.void, 24))).ravel()
+    _, first, inverse = np.unique(rows, return_index=True, return_inverse=True)
+    rank = np.empty(len(first), dtype=np.int64)
+    rank[np.argsort(first)] = np.arange(len(first))
+    return np.sort(first), rank[inverse]
+
+
+def _joined_nearby(positions: Floats, tolerance: float) -> Any:
+    """Return a number for each place, the same for those within the tolerance.
+
+    Each round joins every place to its nearest one, so rounds at least halve a cluster; asking
+    for all pairs at once would take memory with the square of a cluster's size.
+    """
+    sparse, graph = scipy_part("sparse"), scipy_part("sparse.csgraph")
+    spatial = scipy_part("spatial")
+    labels: Any = np.arange(len(positions))
+    kept = labels
+    while True:
+        tree = spatial.cKDTree(positions[kept])
+        nearest = tree.query(positions[kept], k=[2], distance_upper_bound=tolerance, workers=-1)[1][
+            :, 0
+        ]
+        rows = np.nonzero(nearest < len(kept))[0]
+        if len(rows) == 0:
+            return labels
+        links = sparse.csr_array(
+            (np.ones(len(rows), dtype=np.int8), (rows, nearest[rows])),
+            shape=(len(kept), len(kept)),
+        )
+        joined = _in_order(graph.connected_components(links, directed=False)[1])
+        labels = joined[labels]
+        kept = kept[np.unique(joined, return_index=True)[1]]
+
+
+def _in_order(labels: Ints) -> Ints:
+    """Renumber labels by their first occurrence."""
+    _, first, inverse = np.unique(labels, return_index=True, return_inverse=True)
+    rank = np.empty(len(first), dtype=np.int32)
+    rank[np.argsort(first)] = np.arange(len(first), dtype=np.int32)
+    return rank[inverse]
+
+
+def _median_edge(positions: Floats, triangles: Ints) -> float:
+    links = edges(triangles)
+    lengths = np.linalg.norm(positions[links[:, 0]] - positions[links[:, 1]], axis=1)
+    lengths = lengths[lengths > 0.0]
+    return float(np.median(lengths)) if len(lengths) else 0.0
