@@ -1,0 +1,242 @@
+"""Two figures or two motions held against each other: how far apart they are, and where."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from viewer.rig.arrays import Floats
+from viewer.rig.closest_point import Surface, SurfacePoints
+from viewer.rig.comparison.difference import Difference, Measure, Tally
+from viewer.rig.comparison.pairs import Pairs, pair_joints, pair_names, rotation_distance
+from viewer.rig.comparison.steps import FrameRange, Steps, steps_of
+from viewer.rig.comparison.weights import row_distances, skin_at
+from viewer.rig.kinematics import world_matrices
+from viewer.rig.mesh import Mesh, bounding_box, box_size
+from viewer.rig.pose import placement_matrix
+from viewer.rig.rotation import nearest_rotations
+from viewer.rig.scene import Actor, actor_points
+from viewer.rig.shape import shaped
+from viewer.rig.skinning import Skinning, deform
+
+__all__ = ["Difference", "Measure", "compare", "rotation_distance"]
+
+_MOST_SEARCHES = 32  # steps in which closest points are sought; each takes about a second
+
+
+def compare(
+    first: Actor,
+    second: Actor,
+    skinning: Skinning | None = None,
+    n_poses: int = 8,
+    frames: FrameRange | None = None,
+    report: Callable[[int, int], None] | None = None,
+) -> Difference:
+    """Hold two actors against each other; placements in their scenes are left out.
+
+    Joints are matched by name. Vertices are compared by number where the triangles are the
+    same, else by the closest point of the other's surface, in both directions. Both actors are
+    posed on the way.
+
+    Parameters
+    ----------
+    first, second : Actor
+        The first is the reference: lengths are in its unit and as shares of its size.
+    skinning : Skinning, optional
+        How joints move both meshes.
+    n_poses : int
+        Test poses for figures without motion, see ``steps_of``.
+    frames : (int or None, int or None), optional
+        First frame and the one behind the last, as the first motion numbers them.
+    report : callable, optional
+        Called with the number of steps done and of all.
+
+    Returns
+    -------
+    Difference
+        With a mismatch for everything that only one of them has.
+
+    Raises
+    ------
+    RigError
+        If the range of frames holds none, or SciPy is missing where surfaces differ.
+    """
+    steps = steps_of(first, second, n_poses, frames)
+    return _Comparison(first, second, skinning or Skinning(), steps).run(report)
+
+
+class _Comparison:
+    """Two actors, what of them can be paired, and the tallies."""
+
+    def __init__(self, first: Actor, second: Actor, skinning: Skinning, steps: Steps) -> None:
+        self.first, self.second, self.skinning, self.steps = first, second, skinning, steps
+        self.mismatches, self.notes = list(steps.mismatches), list(steps.notes)
+        self.tallies: list[Tally] = []
+        self._pair_skeletons()
+        self._pair_meshes()
+        self._pair_points()
+        if first.figure.up != second.figure.up:
+            ups = f"{first.figure.up} and {second.figure.up}"
+            self.notes.append(f"{ups} point up: compared as they are")
+
+    def _pair_skeletons(self) -> None:
+        first, second = self.first.figure.skeleton, self.second.figure.skeleton
+        self.joints: Pairs | None = None
+        if first is None or second is None:
+            self._lone("skeleton", first, second)
+            return
+        self.joints = pair_joints(first, second)
+        self.mismatches += self.joints.mismatches
+        self.notes += self.joints.notes
+        names = self.joints.names
+        self.places = self._tally("joint positions", "length", len(names), names)
+        self.turns = self._tally("joint orientations", "angle", len(names), names)
+
+    def _pair_meshes(self) -> None:
+        first, second = self.first.figure.mesh, self.second.figure.mesh
+        self.has_meshes, self.is_same = False, False
+        if first is None or second is None:
+            self._lone("mesh", first, second)
+            return
+        self.has_meshes, self.is_same = True, _is_same_topology(first, second)
+        if self.is_same:
+            self.vertices = self._tally("vertices", "length", first.n_vertices)
+            return
+        counts = [
+            f"{m.n_vertices:,} vertices, {m.n_triangles:,} triangles" for m in (first, second)
+        ]
+        self.notes.append(f"meshes differ ({counts[0]}; {counts[1]}): closest points are compared")
+        self.vertices = self._tally("surface, from the first", "length", first.n_vertices)
+        self.back = self._tally("surface, from the second", "length", second.n_vertices)
+
+    def _pair_points(self) -> None:
+        first, second = self.first.figure.points, self.second.figure.points
+        self.points: Pairs | None = None
+        if first is None or second is None:
+            self._lone("captured points", first, second)
+            return
+        self.points = pair_names(first.names, second.names, "points")
+        self.mismatches += self.points.mismatches
+        self.notes += self.points.notes
+        names = self.points.names
+        self.captured = self._tally("captured points", "length", len(names), names)
+
+    def _lone(self, what: str, first: object, second: object) -> None:
+        if first is not None or second is not None:
+            owner = "first" if second is None else "second"
+            self.mismatches.append(f"only the {owner} has {'' if what[-1] == 's' else 'a '}{what}")
+
+    def _tally(self, name: str, kind: str, count: int, items: tuple[str, ...] = ()) -> Tally:
+        self.tallies.append(Tally(name, kind, count, items))
+        return self.tallies[-1]
+
+    def run(self, report: Callable[[int, int], None] | None) -> Difference:
+        """Go through all steps."""
+        count, size = self.steps.count, 0.0
+        n_searches = min(count, _MOST_SEARCHES)
+        searched = set(np.linspace(0, count - 1, n_searches).round().astype(int).tolist())
+        if self.has_meshes and not self.is_same and count > _MOST_SEARCHES:
+            self.notes.append(f"closest points in {n_searches} of {count} frames")
+        absent = 0
+        for number, step in enumerate(self.steps.run(self.first, self.second)):
+            if report is not None:
+                report(number, count)
+            if self.first.is_present != self.second.is_present:
+                absent += 1
+            if not (self.first.is_present and self.second.is_present):
+                continue
+            if size == 0.0:
+                size = box_size(bounding_box(_own_points(self.first)))
+                self._compare_weights(step)
+            self._compare_joints(step)
+            self._compare_points(step)
+            self._compare_meshes(step, number in searched)
+        if absent:
+            self.mismatches.append(f"in {absent} frames only one of them is there")
+        measures = [tally.result() for tally in self.tallies]
+        return Difference(
+            measures=tuple(measure for measure in measures if measure is not None),
+            mismatches=tuple(self.mismatches),
+            notes=tuple(self.notes),
+            size=size,
+            unit=self.first.figure.unit,
+        )
+
+    def _compare_joints(self, step: str) -> None:
+        if self.joints is None:
+            return
+        worlds = [
+            _joint_frames(actor)[chosen]
+            for actor, chosen in (
+                (self.first, self.joints.first),
+                (self.second, self.joints.second),
+            )
+        ]
+        offsets = worlds[0][:, :3, 3] - worlds[1][:, :3, 3]
+        self.places.add(step, np.linalg.norm(offsets, axis=1))
+        turns = [nearest_rotations(world[:, :3, :3])[0] for world in worlds]
+        self.turns.add(step, rotation_distance(turns[0], turns[1]))
+
+    def _compare_points(self, step: str) -> None:
+        if self.points is None or self.first.points is None or self.second.points is None:
+            return
+        one = self.first.points[self.points.first]
+        other = self.second.points[self.points.second]
+        distances = np.linalg.norm(one[:, :3] - other[:, :3], axis=1)
+        seen = (one[:, 3] > 0.0) & (other[:, 3] > 0.0)
+        self.captured.add(step, np.where(seen, distances, np.nan))
+
+    def _compare_meshes(self, step: str, searches: bool) -> None:
+        if not self.has_meshes or not (self.is_same or searches):
+            return
+        one, other = self._posed(self.first), self._posed(self.second)
+        if self.is_same:
+            self.vertices.add(step, np.linalg.norm(one - other, axis=1))
+            return
+        self.vertices.add(step, _closest(one, other, self.second).distances)
+        self.back.add(step, _closest(other, one, self.first).distances)
+
+    def _compare_weights(self, step: str) -> None:
+        """Compare weights once: they are the same in every pose."""
+        first, second = self.first.figure, self.second.figure
+        if first.skin is None or second.skin is None or self.joints is None:
+            return
+        other = second.skin
+        if not self.is_same:
+            found = _closest(self._posed(self.first), self._posed(self.second), self.second)
+            assert second.mesh is not None  # a skin has one
+            other = skin_at(second.skin, second.mesh.triangles, found)
+        tally = self._tally("weights", "weight", first.skin.n_vertices)
+        tally.add(
+            "every pose" if self.is_same else step, row_distances(first.skin, other, self.joints)
+        )
+
+    def _posed(self, actor: Actor) -> Floats:
+        return deform(actor.figure, actor.pose, self.skinning)[0]
+
+
+def _closest(points: Floats, positions: Floats, actor: Actor) -> SurfacePoints:
+    assert actor.figure.mesh is not None  # the caller has its positions
+    return Surface(positions, actor.figure.mesh.triangles).closest(points)
+
+
+def _is_same_topology(first: Mesh, second: Mesh) -> bool:
+    return first.n_vertices == second.n_vertices and np.array_equal(
+        first.triangles, second.triangles
+    )
+
+
+def _joint_frames(actor: Actor) -> Floats:
+    """Return the joints' matrices with the figure's own place: (J, 4, 4)."""
+    assert actor.pose is not None  # a figure with a skeleton has one
+    shape = shaped(actor.figure, actor.pose.shape_weights).skeleton
+    assert shape is not None  # shaping keeps it
+    return placement_matrix(actor.pose) @ world_matrices(shape, actor.pose)
+
+
+def _own_points(actor: Actor) -> Floats:
+    """Return what spans an actor, without its placement in the scene."""
+    inverse = np.linalg.inv(actor.placement)
+    points = actor_points(actor)
+    return points @ inverse[:3, :3].T + inverse[:3, 3]

@@ -1,0 +1,135 @@
+"""What a comparison found: measures with their maximum, mean and place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.rig.arrays import Floats
+
+__all__ = ["Difference", "Measure", "Tally"]
+
+
+@dataclass(frozen=True, slots=True)
+class Measure:
+    """How far one thing is off.
+
+    Attributes
+    ----------
+    name : str
+        ``"joint positions"``, ``"joint orientations"``, ``"vertices"`` …
+    kind : "length", "angle" or "weight"
+        Lengths are in the first figure's unit, angles in radians, weights plain.
+    maximum, mean : float
+        Over all items and steps that were compared.
+    step, item : str
+        Where the maximum is: a frame or test pose, a joint or vertex.
+    items : tuple of str
+        What each entry of ``item_maxima`` is; empty for vertices, which are numbered.
+    item_maxima : (N,)
+        Largest value of each joint or vertex over all steps; 0 where nothing was compared.
+    n_compared : int
+        Numbers that went into the mean.
+    """
+
+    name: str
+    kind: str
+    maximum: float
+    mean: float
+    step: str
+    item: str
+    items: tuple[str, ...]
+    item_maxima: Floats
+    n_compared: int
+
+    def relative(self, size: float) -> float:
+        """Return what a tolerance is held against: lengths as a share of the size."""
+        return self.maximum / size if self.kind == "length" and size > 0.0 else self.maximum
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """How two figures or motions differ.
+
+    Attributes
+    ----------
+    measures : tuple of Measure
+        What could be compared.
+    mismatches : tuple of str
+        What one has and the other lacks: joints, frames, triangles. No tolerance covers them.
+    notes : tuple of str
+        How it was compared.
+    size : float
+        Diagonal of the first figure's box, in its unit.
+    unit : str
+        The first figure's, as in ``Figure.unit``.
+    """
+
+    measures: tuple[Measure, ...]
+    mismatches: tuple[str, ...]
+    notes: tuple[str, ...]
+    size: float
+    unit: str
+
+    def exceeds(self, tolerance: float) -> bool:
+        """Return whether anything differs by more.
+
+        Parameters
+        ----------
+        tolerance : float
+            Lengths count as shares of the size, angles in radians, weights as they are.
+        """
+        # "Not within" instead of "more than", so that NaN exceeds.
+        within = all(measure.relative(self.size) <= tolerance for measure in self.measures)
+        return bool(self.mismatches) or not within or not self.measures
+
+
+class Tally:
+    """Gathers a measure step by step.
+
+    Parameters
+    ----------
+    name, kind : str
+        As in ``Measure``.
+    count : int
+        Joints or vertices.
+    items : tuple of str
+        Their names; empty for numbers.
+    """
+
+    def __init__(self, name: str, kind: str, count: int, items: tuple[str, ...] = ()) -> None:
+        self.name, self.kind, self.items = name, kind, items
+        self._maxima = np.zeros(count)
+        self._sum, self._count = 0.0, 0
+        self._worst, self._step, self._item = -1.0, "", -1
+
+    def add(self, step: str, values: Floats) -> None:
+        """Take in the values of one step, NaN where nothing can be compared."""
+        known = ~np.isnan(values)
+        if not known.any():
+            return
+        filled = np.where(known, values, 0.0)
+        np.maximum(self._maxima, filled, out=self._maxima)
+        self._sum += float(filled.sum())
+        self._count += int(known.sum())
+        item = int(filled.argmax())
+        if filled[item] > self._worst:
+            self._worst, self._step, self._item = float(filled[item]), step, item
+
+    def result(self) -> Measure | None:
+        """Return the measure; None if nothing was compared."""
+        if self._count == 0:
+            return None
+        item = self.items[self._item] if self.items else f"vertex {self._item}"
+        return Measure(
+            name=self.name,
+            kind=self.kind,
+            maximum=self._worst,
+            mean=self._sum / self._count,
+            step=self._step,
+            item=item,
+            items=self.items,
+            item_maxima=self._maxima,
+            n_compared=self._count,
+        )

@@ -1,0 +1,123 @@
+"""Which joint of one figure is which of another, and how far their frames are apart."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.skeleton import Skeleton, joint_labels
+
+__all__ = ["Pairs", "pair_joints", "pair_names", "rotation_distance"]
+
+_LISTED = 6  # names in a message
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pairs:
+    """Matched names.
+
+    Attributes
+    ----------
+    first, second : (N,) int32
+        Indices into both lists, in the first's order.
+    names : tuple of N str
+        As the first calls them.
+    mismatches, notes : tuple of str
+        What has no partner; how partners were found, if not by name.
+    """
+
+    first: Ints
+    second: Ints
+    names: tuple[str, ...]
+    mismatches: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def pair_joints(first: Skeleton, second: Skeleton) -> Pairs:
+    """Match joints by name, or by number where no name is shared and the numbers agree.
+
+    Parameters
+    ----------
+    first, second : Skeleton
+        Of two figures.
+
+    Returns
+    -------
+    Pairs
+        With a mismatch for joints without a partner, and for partners with other parents.
+    """
+    pairs = pair_names(joint_labels(first), joint_labels(second), "joints")
+    parents = [
+        np.append(np.arange(len(pairs.first)), -1)[_places(found, skeleton.n_joints)[above]]
+        for found, skeleton in ((pairs.first, first), (pairs.second, second))
+        for above in (skeleton.parents[found],)
+    ]
+    other = np.flatnonzero(parents[0] != parents[1])
+    if not len(other):
+        return pairs
+    text = f"other parents: {_listed([pairs.names[place] for place in other])}"
+    return Pairs(pairs.first, pairs.second, pairs.names, (*pairs.mismatches, text), pairs.notes)
+
+
+def _places(found: Ints, count: int) -> Ints:
+    """Return where each joint is in a list of some, -1 for those outside; one more for "none"."""
+    places = np.full(count + 1, -1, dtype=np.int32)
+    places[found] = np.arange(len(found))
+    return places
+
+
+def pair_names(first: Sequence[str], second: Sequence[str], what: str) -> Pairs:
+    """Match two lists of names.
+
+    Parameters
+    ----------
+    first, second : sequences of str
+        Each without repetition.
+    what : str
+        Plural, for messages: ``"joints"``.
+    """
+    numbers = {name: number for number, name in enumerate(second)}
+    shared = [(number, numbers[name]) for number, name in enumerate(first) if name in numbers]
+    if not shared and len(first) == len(second) > 0:
+        same = np.arange(len(first), dtype=np.int32)
+        note = f"{what} share no name: compared by number"
+        return Pairs(same, same, tuple(first), notes=(note,))
+    both = np.array(shared, dtype=np.int32).reshape(-1, 2)
+    mismatches = []
+    for ordinal, names, others in (("first", first, second), ("second", second, first)):
+        lone = [name for name in names if name not in set(others)]
+        if lone:
+            mismatches.append(f"{len(lone)} {what} only in the {ordinal}: {_listed(lone)}")
+    names = tuple(first[number] for number in both[:, 0])
+    return Pairs(both[:, 0], both[:, 1], names, tuple(mismatches))
+
+
+def _listed(names: Sequence[str]) -> str:
+    rest = len(names) - _LISTED
+    return ", ".join(names[:_LISTED]) + (f", … and {rest} more" if rest > 0 else "")
+
+
+def rotation_distance(first: Floats, second: Floats) -> Floats:
+    """Return the angle between rotations: 2 asin(|A - B| / sqrt(8)), Frobenius norm.
+
+    It is exact to rounding for small angles, where the arc cosine of the trace is not.
+
+    Parameters
+    ----------
+    first, second : (..., 3, 3)
+        Rotation matrices.
+
+    Returns
+    -------
+    (...)
+        Radians, 0 to pi.
+
+    >>> turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    >>> round(float(rotation_distance(np.eye(3), turn)), 12) == round(np.pi / 2, 12)
+    True
+    """
+    norm = np.linalg.norm(first - second, axis=(-2, -1))
+    return 2.0 * np.arcsin(np.minimum(norm / np.sqrt(8.0), 1.0))

@@ -1,0 +1,169 @@
+"""The poses in which two actors are compared: frames of their clips, or test poses."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.clip import Clip
+from viewer.rig.comparison.pairs import pair_names
+from viewer.rig.motion import frame_rate, pose_actor
+from viewer.rig.scene import Actor, figure_pose
+from viewer.rig.skeleton import Skeleton, dof_label
+
+__all__ = ["FrameRange", "Steps", "steps_of"]
+
+FrameRange = tuple[int | None, int | None]
+"""First frame and the one behind the last, as the first motion numbers them."""
+
+_FREE = 0.7  # radians to each side that a rotation without limits is turned
+_SHIFT = 0.05  # of the skeleton's reach that a translation without limits is moved
+_SAME_TIME = 1e-6  # seconds
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Steps:
+    """Poses to compare.
+
+    Attributes
+    ----------
+    times : (F,)
+        Seconds, for two motions; empty for test poses.
+    dofs : (N, D)
+        Test poses: values of the DOFs that both share.
+    first, second : (D,) int32
+        Those DOFs' rows in both.
+    first_frame : int
+        What the first frame is called.
+    mismatches, notes : tuple of str
+        What one has and the other lacks; how steps were chosen.
+    """
+
+    times: Floats
+    dofs: Floats
+    first: Ints
+    second: Ints
+    first_frame: int = 0
+    mismatches: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def count(self) -> int:
+        """Number of steps."""
+        return len(self.times) or 1 + len(self.dofs)
+
+    def run(self, first: Actor, second: Actor) -> Iterator[str]:
+        """Pose both actors by one step after the other, and name each."""
+        if len(self.times):
+            for number, time in enumerate(self.times.tolist()):
+                # Both from their own start: captures may count from any frame.
+                for actor in (first, second):
+                    assert actor.clip is not None  # or there were no times
+                    pose_actor(actor, time + actor.clip.start + actor.offset)
+                yield f"frame {self.first_frame + number}"
+            return
+        for actor in (first, second):
+            if actor.clip is not None:  # the other has none: its motion has no partner
+                actor.pose = None if actor.figure.skeleton is None else figure_pose(actor.figure)
+        yield "own pose"
+        for number, values in enumerate(self.dofs):
+            assert first.pose is not None and second.pose is not None  # or there were no DOFs
+            first.pose.dofs[self.first] = values
+            second.pose.dofs[self.second] = values
+            yield f"test pose {number + 1}"
+
+
+def steps_of(first: Actor, second: Actor, n_poses: int, frames: FrameRange | None = None) -> Steps:
+    """Choose the poses in which two actors are compared.
+
+    Two motions are compared frame by frame at the first's rate, each from its own start, as far
+    as both last. Figures at rest are compared in their files' own poses and, where both have
+    DOFs of the same names, in ``n_poses`` test poses drawn within the limits of both: always the
+    same ones for the same names and limits.
+
+    Parameters
+    ----------
+    first, second : Actor
+        Left as they are.
+    n_poses : int
+        Test poses for figures without motion.
+    frames : (int or None, int or None), optional
+        First frame and the one behind the last, as the first motion numbers them.
+
+    Raises
+    ------
+    RigError
+        If the range holds no frame.
+    """
+    none = np.zeros(0, dtype=np.int32)
+    if first.clip is not None and second.clip is not None:
+        return _motion_steps(first, second, frames)
+    if (first.clip is None) != (second.clip is None):
+        lacking = "second" if second.clip is None else "first"
+        return Steps(
+            np.zeros(0), np.zeros((0, 0)), none, none, 0, (f"the {lacking} has no motion",)
+        )
+    if first.figure.skeleton is None or second.figure.skeleton is None or n_poses == 0:
+        return Steps(np.zeros(0), np.zeros((0, 0)), none, none)
+    return _test_poses(first.figure.skeleton, second.figure.skeleton, n_poses)
+
+
+def _motion_steps(first: Actor, second: Actor, frames: FrameRange | None) -> Steps:
+    assert first.clip is not None and second.clip is not None  # the caller looked
+    rates = frame_rate(first.clip), frame_rate(second.clip)
+    lasts = first.clip.end - first.clip.start, second.clip.end - second.clip.start
+    mismatches = []
+    if abs(lasts[0] - lasts[1]) > 0.5 / rates[0]:
+        mismatches.append(f"one lasts {lasts[0]:.6g} s, the other {lasts[1]:.6g} s")
+    notes = []
+    if abs(rates[0] - rates[1]) > _SAME_TIME * rates[0]:
+        notes.append(f"{rates[0]:g} and {rates[1]:g} frames a second: compared at the first's")
+    base = 0 if isinstance(first.clip, Clip) else first.clip.timing.first_frame
+    last = base + int(np.floor(min(lasts) * rates[0] + _SAME_TIME))
+    start, end = (None, None) if frames is None else frames
+    chosen = np.arange(
+        base if start is None else max(start, base), last + 1 if end is None else min(end, last + 1)
+    )
+    if not len(chosen):
+        raise RigError(f"no frame in {start}:{end}; both have frames {base} to {last}")
+    none = np.zeros(0, dtype=np.int32)
+    texts = tuple(mismatches), tuple(notes)
+    times = (chosen - base) / rates[0]
+    return Steps(times, np.zeros((0, 0)), none, none, int(chosen[0]), *texts)
+
+
+def _test_poses(first: Skeleton, second: Skeleton, n_poses: int) -> Steps:
+    labels = [dof_label(first, dof) for dof in range(first.n_dofs)]
+    others = [dof_label(second, dof) for dof in range(second.n_dofs)]
+    pairs = pair_names(labels, others, "DOFs")
+    limits = np.stack([first.dof_limits[pairs.first], second.dof_limits[pairs.second]])
+    mismatches = list(pairs.mismatches)
+    other = np.flatnonzero((limits[0] != limits[1]).any(axis=1))
+    if len(other):
+        dof = int(other[0])
+        low, high = limits[0][dof].tolist(), limits[1][dof].tolist()
+        mismatches.append(
+            f"other limits of {len(other)} DOFs, as {pairs.names[dof]}: "
+            f"{low[0]:.6g} to {low[1]:.6g} and {high[0]:.6g} to {high[1]:.6g}"
+        )
+    dofs = _drawn(first, pairs.first, limits, n_poses)
+    none = np.zeros(0)
+    return Steps(none, dofs, pairs.first, pairs.second, 0, tuple(mismatches), pairs.notes)
+
+
+def _drawn(skeleton: Skeleton, rows: Ints, limits: Floats, count: int) -> Floats:
+    """Draw DOF values within both limits; where those do not meet, the first's count."""
+    turns = skeleton.dof_kinds[rows] >= 3
+    # A reach of unit length keeps bare skeletons in view without knowing their unit.
+    reach = _SHIFT * float(np.abs(skeleton.rest_translations).sum(axis=0).max())
+    free = np.where(turns, _FREE, reach)
+    low = np.maximum(limits[:, :, 0].max(axis=0), -free)
+    high = np.minimum(limits[:, :, 1].min(axis=0), free)
+    # Limits that lie wholly outside the usual range are taken at their near end.
+    low, high = np.minimum(low, limits[:, :, 1].min(axis=0)), np.maximum(high, low)
+    shares = np.random.default_rng(0).random((count, len(rows)))
+    return np.clip(low + shares * (high - low), limits[0, :, 0], limits[0, :, 1])
