@@ -458,7 +458,7 @@ def test_a_file_moves_the_body_it_was_made_from(body: Figure, tmp_path: Path) ->
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"unit": "inch"}, 'unit: expected one of m, cm, mm, found "inch"'),
+        ({"unit": "inch"}, 'unit: expected one of m, cm, mm, in, found "inch"'),
         ({"up": "x"}, 'up axis: expected one of y, z, found "x"'),
         (
             {"rotation_order": "zyz"},

@@ -11,8 +11,12 @@ from plain_smpl import smpl_forward
 from seamed import POSITIONS, TRIANGLES, UV_TRIANGLES, UVS, seamed_actor, seamed_mesh
 
 import viewer
-from viewer.export import export
+from viewer.errors import RigError
+from viewer.export import MotionOptions, export
+from viewer.export.npz import export_points
 from viewer.rig.figure import Figure
+from viewer.rig.point_take import PointTake
+from viewer.rig.points import PointLayout
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import ball_skeleton
 
@@ -112,3 +116,59 @@ def test_the_same_pose_gives_the_same_bytes(tmp_path):
 def test_arrays_are_listed(tmp_path):
     (note,) = export(seamed_actor(), tmp_path / "out.npz")
     assert note.startswith(f"{tmp_path / 'out.npz'}: name, up, unit, vertices, normals, triangles")
+
+
+# Captured points
+
+
+LAYOUT = PointLayout("two", ("a", "b"), np.array([[0, 1]]), np.array([-1, 1]))
+
+
+def point_take(present=(True, False)):
+    points = np.full((2, 2, 3), np.nan)
+    points[0, 0] = 1.0, 2.0, 3.0
+    confidences = np.array([[0.5, 0.0], [0.0, 0.0]])
+    times = np.array([0.0, 0.1])
+    return PointTake("two 4", LAYOUT, 10.0, 7, times, np.array(present), points, confidences)
+
+
+def test_points_of_all_frames(tmp_path):
+    path = tmp_path / "two.npz"
+    (line,) = export_points(point_take(), path, MotionOptions(world_up="z"))
+    assert line == (
+        f"{path}: 2 frames at 10 a second; 1 of them missing, NaN, z up: name, up, frame_rate, "
+        "times, frames, present, points, confidences, joint_names, limbs, sides, layout"
+    )
+    with np.load(path, allow_pickle=False) as arrays:
+        assert (str(arrays["name"]), str(arrays["up"])) == ("two 4", "z")
+        assert (str(arrays["layout"]), float(arrays["frame_rate"])) == ("two", 10.0)
+        assert arrays["frames"].tolist() == [7, 8] and arrays["present"].tolist() == [True, False]
+        assert arrays["joint_names"].tolist() == ["a", "b"]
+        assert_array_equal(arrays["points"], point_take().points)
+        assert arrays["confidences"].tolist() == [[0.5, 0.0], [0.0, 0.0]]
+        assert (arrays["limbs"].tolist(), arrays["sides"].tolist()) == ([[0, 1]], [-1, 1])
+
+
+@pytest.mark.parametrize(
+    ("options", "present", "message"),
+    [
+        (MotionOptions(up="z"), True, 'up axis of arrays: expected y, as in the scene, found "z"'),
+        (
+            MotionOptions(unit="cm"),
+            True,
+            'unit of arrays: expected none, as in the scene, found "cm"',
+        ),
+        (MotionOptions(), False, "two 4: every frame is missing, there is nothing to write"),
+    ],
+)
+def test_points_that_cannot_be_written_are_refused(tmp_path, options, present, message):
+    with pytest.raises(RigError) as caught:
+        export_points(point_take((present, False)), tmp_path / "two.npz", options)
+    assert str(caught.value) == message and not any(tmp_path.iterdir())
+
+
+def test_points_at_one_time(tmp_path):
+    points = np.array([[1.0, 2.0, 3.0, 0.5], [9.0, 9.0, 9.0, 0.0]])
+    arrays = write(tmp_path, Actor(Figure("two", points=LAYOUT, up="z"), points=points))
+    assert str(arrays["up"]) == "z" and arrays["confidences"].tolist() == [0.5, 0.0]
+    assert_array_equal(arrays["points"], [[1.0, 2.0, 3.0], [np.nan] * 3])

@@ -43,11 +43,13 @@ Frame Time: 0.0333333
 
 
 def read(text: str | bytes) -> tuple[SkeletonMotion, list[str]]:
-    """Read a text; return also the warnings without the path."""
+    """Read a text; return also what was noticed and guessed, without the path."""
     data = text if isinstance(text, bytes) else text.encode()
     source = Source("a.bvh", data)
     motion = bvh.read(source)
-    return motion, [line.removeprefix("a.bvh:").strip() for line in source.warnings]
+    warnings = [line.removeprefix("a.bvh:").strip() for line in source.warnings]
+    guesses = [motion.unit_note] * bool(motion.unit_note)
+    return motion, [*warnings, *guesses, *motion.up_notes]
 
 
 def one_joint(channels: str, frames: str, extra: str = "") -> str:
@@ -58,3 +60,46 @@ def one_joint(channels: str, frames: str, extra: str = "") -> str:
         f"End Site {{ OFFSET 0 1.7 0 }} }} MOTION Frames: {len(frames.splitlines())} "
         f"Frame Time: 0.04\n{frames}\n"
     )
+
+
+def person(scale: float = 1.0) -> str:
+    """Return a person of 1.7 with hips, knees and a head, standing, then turned by 90 degrees.
+
+    In the second frame the root is at (0.5, 0.9, 0.25), and turned about z.
+    """
+
+    def offset(*place: float) -> str:
+        return "OFFSET " + " ".join(f"{scale * number:.6f}" for number in place)
+
+    turns = "CHANNELS 3 Zrotation Yrotation Xrotation"
+
+    def leg(side: str, x: float) -> str:
+        hip, knee = offset(x, -0.05, 0), offset(0, -0.4, 0)
+        below = f"JOINT {side}_knee {{ {knee} {turns} End Site {{ {offset(0, -0.45, 0)} }} }}"
+        return f"JOINT {side}_hip {{ {hip} {turns} {below} }}\n"
+
+    root = "CHANNELS 6 Xposition Yposition Zposition Zrotation Yrotation Xrotation"
+    rest = " 0 0 0" * 5
+    first, second = (
+        " ".join(f"{scale * number:.6f}" for number in place)
+        for place in ((0, 0.9, 0), (0.5, 0.9, 0.25))
+    )
+    return (
+        f"HIERARCHY ROOT pelvis {{ {offset(0, 0, 0)} {root}\n"
+        + leg("left", 0.1)
+        + leg("right", -0.1)
+        + f"JOINT head {{ {offset(0, 0.6, 0)} {turns} End Site {{ {offset(0, 0.2, 0)} }} }} }}\n"
+        f"MOTION Frames: 2 Frame Time: 0.1\n{first} 0 0 0{rest}\n{second} 90 0 0{rest}\n"
+    )
+
+
+PERSON_JOINTS = ("pelvis", "left_hip", "left_knee", "right_hip", "right_knee", "head")
+PERSON_TURNED = [
+    [0.5, 0.9, 0.25],
+    [0.55, 1.0, 0.25],
+    [0.95, 1.0, 0.25],
+    [0.55, 0.8, 0.25],
+    [0.95, 0.8, 0.25],
+    [-0.1, 0.9, 0.25],
+]
+"""Where ``person()`` has its joints in the second frame: (x, y) at rest becomes (-y, x)."""

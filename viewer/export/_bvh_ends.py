@@ -6,6 +6,7 @@ import numpy as np
 
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
+from viewer.rig.units import METRES
 
 __all__ = ["end_offsets"]
 
@@ -13,8 +14,8 @@ _MOSTLY = 0.5  # a weight from which on a vertex belongs to a joint
 _FEW = 4  # vertices that say nothing of a joint's extent
 _TOO_SHORT = 0.1  # of the bone before: shorter ends are not believed
 _HALF = 0.5  # of the bone before: what is written without better knowledge
-_NO_SIZE = {"m": 0.1}  # the end of a skeleton without any bone
-_DEFAULT_END = 1.0
+_NO_SIZE = 0.1  # metres: the end of a skeleton without any bone
+_DEFAULT_END = 1.0  # ... whose unit is not known
 
 
 def end_offsets(figure: Figure, rest: Floats, leaves: Ints) -> Floats:
@@ -40,7 +41,7 @@ def end_offsets(figure: Figure, rest: Floats, leaves: Ints) -> Floats:
     size = float(np.ptp(rest[:, :3, 3], axis=0).max())
     for row, leaf in enumerate(leaves):
         bone = _last_bone(skeleton.parents, rest, int(leaf))
-        length = float(np.linalg.norm(bone)) or size or _NO_SIZE.get(figure.unit, _DEFAULT_END)
+        length = float(np.linalg.norm(bone)) or size or _bare_end(figure.unit)
         if not bone.any():
             bone = np.eye(3)["xyz".index(figure.up)] * length
         ends[row] = _HALF * bone
@@ -50,6 +51,10 @@ def end_offsets(figure: Figure, rest: Floats, leaves: Ints) -> Floats:
         if known is not None and np.linalg.norm(known) > _TOO_SHORT * length:
             ends[row] = known
     return ends
+
+
+def _bare_end(unit: str) -> float:
+    return _NO_SIZE / METRES[unit] if unit in METRES else _DEFAULT_END
 
 
 def _last_bone(parents: Ints, rest: Floats, joint: int) -> Floats:

@@ -16,8 +16,9 @@ from viewer.rig.quaternion import multiply, rotation_vector_to_quaternion
 from viewer.rig.rotation import rotation_vector_to_matrix
 from viewer.rig.smpl_family import FAMILY, Member
 from viewer.rig.take import Take
+from viewer.rig.units import METRES, WORDS
 
-__all__ = ["FamilyFrames", "family_frames", "member_of_figure", "up_axis"]
+__all__ = ["FamilyFrames", "check_unit", "family_frames", "member_of_figure", "up_axis"]
 
 _OWN_SHAPE = "stature"  # SMPL's shapes have numbers, those of the bundled body names
 _NEGLIGIBLE = 1e-6  # metres, and parts of a scale of 1
@@ -34,9 +35,9 @@ class FamilyFrames:
     vectors : (F, J, 3)
         Rotation vectors in the member's own order, angles up to pi.
     translations : (F, 3)
-        t, in the unit of the figure.
+        t, metres.
     roots : (F, 3) or (1, 3)
-        J0, the rest position of the root.
+        J0, the rest position of the root, metres.
     shape, expression : (F, S) or (1, S)
         Coefficients; one row where they never change.
     """
@@ -78,7 +79,7 @@ def member_of_figure(figure: Figure, what: str, roots: tuple[str, ...]) -> Membe
     Raises
     ------
     RigError
-        If it has others, or more, or fewer.
+        If it has others, or more, or fewer, or if its unit is not known.
     """
     names = () if figure.skeleton is None else figure.skeleton.names
     member = FAMILY.get(len(names))
@@ -88,7 +89,24 @@ def member_of_figure(figure: Figure, what: str, roots: tuple[str, ...]) -> Membe
             f"{figure.name} cannot be written as {what}: expected the joints of "
             f"{', '.join(titles[:-1])} or {titles[-1]}, found others"
         )
+    if figure.unit not in METRES:
+        raise RigError(
+            f"{figure.name} cannot be written as {what}, which is in metres: its unit is not known "
+            "(of a BVH, --unit says it)"
+        )
     return member
+
+
+def check_unit(options: MotionOptions, title: str) -> None:
+    """Refuse units other than metres.
+
+    Raises
+    ------
+    RigError
+        If another one is asked for.
+    """
+    if options.unit not in ("", "m"):
+        raise RigError(f'unit of {title}: expected m, found "{options.unit}"')
 
 
 def up_axis(options: MotionOptions) -> str:
@@ -110,12 +128,13 @@ def family_frames(
 ) -> tuple[FamilyFrames, list[str]]:
     """Return a take as parameters of the family.
 
-    With another up axis the world turns by Q about its x axis: R' = Q R, t' = Q (t + J0) - J0.
+    The root joint is at t + J0, so that t is how far it is from its place at rest. With another up
+    axis the world turns by Q about its x axis: R' = Q R, t' = Q (t + J0) - J0.
 
     Parameters
     ----------
     take : Take
-        Gives the figure.
+        Gives the figure, whose unit is known.
     frames : Frames
         Its frames, where a row that is not present means nothing.
     member : Member
@@ -139,9 +158,10 @@ def family_frames(
     assert skeleton is not None  # whoever has a member has a skeleton
     order = [skeleton.names.index(name) for name in member.names]
     rotations = frames.rotations[:, order]
-    moved = frames.translations[:, order]
-    translations = frames.figure_translations + moved[:, 0]
-    roots = root_positions(figure, frames.shape_weights)
+    metres = METRES[figure.unit]
+    moved = metres * frames.translations[:, order]
+    translations = metres * frames.figure_translations + moved[:, 0]
+    roots = metres * root_positions(figure, frames.shape_weights)
     if up_axis(options) != options.world_up:
         angle = np.pi / 2 if up_axis(options) == "z" else -np.pi / 2
         turn = np.array([angle, 0.0, 0.0])
@@ -166,7 +186,8 @@ def family_frames(
     parts = (found.vectors, found.translations)
     if not all(np.isfinite(part[present]).all() for part in parts):
         raise RigError(f"{take.name}: expected finite numbers in every frame")
-    return found, _losses(frames, moved[:, 1:]) + _own_shapes(figure)
+    notes = _losses(frames, moved[:, 1:]) + _own_shapes(figure)
+    return found, notes + _bare_skeleton(figure, roots[0])
 
 
 def _vectors(quaternions: Floats) -> Floats:
@@ -188,6 +209,20 @@ def _own_shapes(figure: Figure) -> list[str]:
         f"shape and translation are meant for {figure.name}, which is no SMPL body: other models "
         "stand elsewhere with them, by the distance of their rest pelvises"
     ]
+
+
+def _bare_skeleton(figure: Figure, root: Floats) -> list[str]:
+    """Say in which unit a skeleton was, and where its root rests, which models have elsewhere."""
+    notes = []
+    if figure.unit != "m":
+        notes.append(f"lengths were {WORDS[figure.unit]}, and are written as metres")
+    if figure.mesh is None:
+        place = ", ".join(f"{number:.4g}" for number in (root + 0.0).tolist())
+        notes.append(
+            f"places count from the skeleton's own root at rest, ({place}) m: a model whose root "
+            "rests elsewhere stands off by the difference (--model drives one, and is exact)"
+        )
+    return notes
 
 
 def _losses(frames: Frames, moved: Floats) -> list[str]:

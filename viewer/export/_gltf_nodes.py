@@ -1,8 +1,9 @@
-"""Nodes of a glTF file: what turns z up into y up, the figure's place, its joints.
+"""Nodes of a glTF file: what makes y up and lengths metres, the figure's place, its joints.
 
 ::
 
-    z up                     only if z is up: turned by -90 degrees about x
+    z up, centimetres        if z is up: turned by -90 degrees about x; if the unit is known and not
+    │                        the metre: scaled to metres; missing if it would do neither
     └── the figure's name    figure_translation and figure_scale
         ├── joints           T R S, by the figure's names
         ├── fixed            only if vertices follow no joint: they follow this, which never moves
@@ -22,6 +23,7 @@ from viewer.rig.arrays import Floats
 from viewer.rig.pose import Pose, joint_rotations, local_matrices
 from viewer.rig.rotation import matrix_to_quaternion
 from viewer.rig.skeleton import Skeleton
+from viewer.rig.units import METRES, WORDS
 
 __all__ = ["Locals", "Tree", "add_nodes", "locals_of"]
 
@@ -84,6 +86,7 @@ def add_nodes(
     document: Document,
     name: str,
     up: str,
+    unit: str,
     skeleton: Skeleton | None,
     pose: Pose | None,
     still: Locals | None,
@@ -99,6 +102,8 @@ def add_nodes(
         The figure's.
     up : "y" or "z"
         The axis that points up in the world that the figure is in.
+    unit : str
+        As in ``Figure.unit``.
     skeleton, still : Skeleton and Locals, or None
         The joints and where they are.
     pose : Pose or None
@@ -113,9 +118,9 @@ def add_nodes(
     """
     top: dict[str, Any] = {"name": text_of(name)}
     place = root = document.add("nodes", top)
-    if up == "z":
-        turned = {"name": "z up", "rotation": _Z_TO_Y, "children": [place]}
-        root = document.add("nodes", turned)
+    above = _above(up, unit)
+    if above:
+        root = document.add("nodes", {**above, "children": [place]})
     children: list[int] = []
     if pose is not None:
         _put(top, "translation", pose.figure_translation, 0.0)
@@ -130,6 +135,18 @@ def add_nodes(
     if children:
         top["children"] = children
     return Tree(root, place, joints, fixed)
+
+
+def _above(up: str, unit: str) -> dict[str, Any]:
+    """Return what turns and scales the whole figure, with a name that says it; may be empty."""
+    names, node = [], {}
+    if up == "z":
+        names.append("z up")
+        node["rotation"] = _Z_TO_Y
+    if METRES.get(unit, 1.0) != 1.0:
+        names.append(WORDS[unit])
+        node["scale"] = [METRES[unit]] * 3
+    return {"name": ", ".join(names), **node} if names else {}
 
 
 def _add_joints(document: Document, skeleton: Skeleton, still: Locals) -> list[int]:

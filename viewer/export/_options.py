@@ -6,10 +6,7 @@ from dataclasses import dataclass, field
 
 from viewer.rig.skinning import Skinning
 
-__all__ = ["GAPS", "ROTATION_ORDERS", "UNITS", "MotionOptions"]
-
-UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
-"""Units of length, in metres."""
+__all__ = ["GAPS", "ROTATION_ORDERS", "MotionOptions"]
 
 ROTATION_ORDERS = ("zyx", "zxy", "xyz", "xzy", "yxz", "yzx")
 """Orders of rotation channels as BVH lists them: the product R = Rz Ry Rx is ``zyx``."""
@@ -29,7 +26,7 @@ class MotionOptions:
     Attributes
     ----------
     unit : str
-        A key of ``UNITS``; empty for the format's default.
+        A key of ``viewer.rig.units.METRES``; empty for the format's default.
     up : "y", "z" or ""
         The axis that points up in the file; empty for the format's default.
     rotation_order : str

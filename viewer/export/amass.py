@@ -18,7 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.errors import RigError, printable
-from viewer.export._family_frames import FamilyFrames, family_frames, member_of_figure, up_axis
+from viewer.export._family_frames import (
+    FamilyFrames,
+    check_unit,
+    family_frames,
+    member_of_figure,
+    up_axis,
+)
 from viewer.export._gaps import filled, gaps_text, runs
 from viewer.export._options import GAPS, MotionOptions
 from viewer.formats import all_or_none, save_arrays
@@ -51,10 +57,12 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
     Raises
     ------
     RigError
-        If the figure has other joints, or no frame is present.
+        If the figure has other joints or an unknown unit, another unit than metres is asked for,
+        or no frame is present.
     OutputError
         If a file cannot be written.
     """
+    check_unit(options, "AMASS")
     member = member_of_figure(take.figure, "an AMASS motion", ("pelvis",))
     present = take.frames.present
     if options.gaps not in GAPS:

@@ -13,7 +13,7 @@ from viewer.export._bvh_body import Body, Space, body_of, rest_matrices, shape_a
 from viewer.export._bvh_ends import end_offsets
 from viewer.export._bvh_text import bvh_text
 from viewer.export._gaps import filled, gaps_text, runs
-from viewer.export._options import GAPS, ROTATION_ORDERS, UNITS, MotionOptions
+from viewer.export._options import GAPS, ROTATION_ORDERS, MotionOptions
 from viewer.formats import Source, all_or_none, bvh, save_bytes
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
@@ -24,11 +24,11 @@ from viewer.rig.scalars import length_text
 from viewer.rig.shape import shaped
 from viewer.rig.skeleton import joint_label
 from viewer.rig.take import Take
+from viewer.rig.units import METRES, WORDS
 
 __all__ = ["export_take"]
 
 _DEFAULT_UNIT = "cm"
-_WORDS = {"m": "metres", "cm": "centimetres", "mm": "millimetres"}
 _BLOCK = 4096  # frames at a time, when the file is read back
 _SHORTEST_END = 2e-3  # Blender invents a direction for bones below 1e-3
 _MOST_DIGITS = 15
@@ -106,7 +106,7 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
 
 def _check(options: MotionOptions) -> None:
     for what, value, known in (
-        ("unit", options.unit, ("", *UNITS)),
+        ("unit", options.unit, ("", *METRES)),
         ("up axis", options.up, ("", "y", "z")),
         ("up axis of the scene", options.world_up, ("y", "z")),
         ("rotation order", options.rotation_order, ROTATION_ORDERS),
@@ -122,8 +122,8 @@ def _check(options: MotionOptions) -> None:
 def _space(figure: Figure, options: MotionOptions) -> Space:
     up = options.up or "y"
     factor = 1.0
-    if figure.unit == "m":
-        factor = 1.0 / UNITS[options.unit or _DEFAULT_UNIT]
+    if figure.unit in METRES:
+        factor = METRES[figure.unit] / METRES[options.unit or _DEFAULT_UNIT]
     return Space(_turn(figure.up, up), _turn(options.world_up, up), factor)
 
 
@@ -243,14 +243,14 @@ class _Writer:
 
     def length(self, length: float) -> str:
         """Return a small length of the figure in plain decimals."""
-        if self.figure.unit == "m":
-            return f"{1000.0 * length:.6f} mm"
+        if self.figure.unit in METRES:
+            return f"{1000.0 * METRES[self.figure.unit] * length:.6f} mm"
         return f"{length:.2g} in the figure's own unit"
 
     def summary(self, path: Path, start: int, stop: int) -> str:
         """Return what a file holds."""
-        unit = _WORDS[self.options.unit or _DEFAULT_UNIT]
-        unit = unit if self.figure.unit == "m" else "the figure's own unit"
+        unit = WORDS[self.options.unit or _DEFAULT_UNIT]
+        unit = unit if self.figure.unit in METRES else "the figure's own unit"
         first = self.take.first_frame + start
         rest = "the rest pose and " * self.options.rest_frame
         return (
@@ -273,7 +273,7 @@ def _remarks(
         done = {"hold": "the last pose is held", "interpolate": "interpolated, held at both ends"}
         text = gaps_text(frames.present, take.first_frame)
         notes.append(f"missing {text}: {done.get(options.gaps, 'one file for each run of frames')}")
-    if figure.unit != "m" and options.unit:
+    if figure.unit not in METRES and options.unit:
         notes.append(f"lengths stay as they are: {take.figure.name} does not say its unit")
     moving = [joint_label(skeleton, int(joint)) for joint in np.flatnonzero(body.moves)]
     if moving:

@@ -22,10 +22,17 @@ from pathlib import Path
 import numpy as np
 
 from viewer.errors import OutputError, RigError, printable
-from viewer.export._family_frames import FamilyFrames, family_frames, member_of_figure, up_axis
+from viewer.export._family_frames import (
+    FamilyFrames,
+    check_unit,
+    family_frames,
+    member_of_figure,
+    up_axis,
+)
 from viewer.export._gaps import gaps_text
 from viewer.export._options import MotionOptions
 from viewer.rig.arrays import Floats
+from viewer.rig.person import person_label
 from viewer.rig.take import Take
 
 __all__ = ["export_take", "export_takes"]
@@ -60,7 +67,7 @@ def export_takes(
     options : MotionOptions
         Up axis (that of the scene if empty). Gaps stay gaps.
     persons : sequence of int, optional
-        What each is called; 0, 1, 2 … if omitted.
+        What each is called; 0, 1, 2 … if omitted, below 0 for people without a track.
 
     Returns
     -------
@@ -70,19 +77,20 @@ def export_takes(
     Raises
     ------
     RigError
-        If a figure has other joints, frame rates differ, two people have one number, or no frame
-        is present.
+        If a figure has other joints or an unknown unit, another unit than metres is asked for,
+        frame rates differ, two people have one number, or no frame is present.
     OutputError
         If the folder cannot be written, or holds something else.
     """
     persons = range(len(takes)) if persons is None else persons
+    check_unit(options, "EasyMocap")
     _check(takes, persons)
     people, notes = [], []
     for take, person in zip(takes, persons, strict=True):
         member = member_of_figure(take.figure, "an EasyMocap folder", ("pelvis", "wrist"))
         body, losses = family_frames(take, take.frames, member, options)
         people.append((person, take, _Records(person, body)))
-        who = f"person {person}: " if len(takes) > 1 else ""
+        who = f"{person_label(person)}: " if len(takes) > 1 else ""
         notes += [f"{who}{loss}" for loss in losses]
         if not take.frames.present.all():
             missing = gaps_text(take.frames.present, take.first_frame)
@@ -130,7 +138,7 @@ class _Records:
         count = len(body.vectors)
         poses = body.vectors.reshape(count, -1).copy()
         poses[:, :3] = 0.0
-        self.head = f'    {{\n        "id": {person}'
+        self.head = f'    {{\n        "id": {max(person, -1)}'  # all who have no track are -1
         self.parts: list[tuple[str, Floats]] = [
             ("Rh", body.vectors[:, 0]),
             ("Th", body.about_origin()),

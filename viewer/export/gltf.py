@@ -1,7 +1,8 @@
 """Write figures as glTF 2.0, ``.glb`` or ``.gltf`` with a ``.bin``: mesh, skin, pose and motion.
 
 Facts are those of the Khronos specification: ``registry.khronos.org/glTF/specs/2.0``. Lengths are
-metres, y is up. Data stay as they are: a node above the figure turns what has z up.
+metres, y is up. Data stay as they are: a node above the figure turns what has z up, and scales
+what is in another unit.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from viewer.rig.scene import Actor, figure_pose
 from viewer.rig.skeleton import joint_label
 from viewer.rig.skinning import Skinning, skin_used
 from viewer.rig.take import Take
+from viewer.rig.units import METRES, WORDS
 
 __all__ = ["export", "export_take"]
 
@@ -167,7 +169,7 @@ def _add_body(
     """Add nodes, mesh and skin of a figure; return their indices and how many there are."""
     figure, influences = body.figure, body.influences
     fixes = influences is not None and influences.n_fixed > 0
-    tree = add_nodes(document, figure.name, up, figure.skeleton, pose, still, fixes)
+    tree = add_nodes(document, figure.name, up, figure.unit, figure.skeleton, pose, still, fixes)
     scene, counts, node = [tree.root], [], None
     if figure.mesh is not None and figure.mesh.n_vertices:
         mesh, written = add_mesh(document, figure.name, body.shape, influences, color)
@@ -241,7 +243,12 @@ def _remarks(body: _Body, up: str) -> list[str]:
     figure, notes = body.figure, []
     if up == "z":
         notes.append("z is up: a node above the figure turns it by -90 degrees about x")
-    if figure.unit != "m":
+    if METRES.get(figure.unit, 1.0) != 1.0:
+        notes.append(
+            f"lengths are {WORDS[figure.unit]}: a node above the figure scales them to metres, by "
+            f"{METRES[figure.unit]:g}"
+        )
+    elif figure.unit not in METRES:
         notes.append(
             f"lengths stay as they are: {printable(figure.name, 100)} does not say its unit, and "
             "programs take glTF's for metres"

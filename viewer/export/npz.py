@@ -10,24 +10,33 @@ Of a motion, F frames: ``vertices`` (F, V, 3), ``joints`` (F, J, 3), ``world`` (
 ``rotations`` (F, J, 4) within the parents as (x, y, z, w), ``shape_weights`` (F, S) or (1, S),
 ``times`` (F,), ``frames`` (F,), ``present`` (F,), ``frame_rate``; where a frame is not present its
 rows are NaN.
+
+Of K captured points: ``points`` (K, 3) or (F, K, 3), NaN where they are not seen, ``confidences``
+(K,) or (F, K), ``joint_names`` (K,), ``limbs`` (L, 2), ``sides`` (K,) -1 for right, 1 for left,
+``layout``.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from viewer.errors import printable
+from viewer.errors import RigError, printable
 from viewer.export import MotionOptions
 from viewer.formats import save_arrays
+from viewer.rig.arrays import Bools, Floats
 from viewer.rig.motion import pose_of, world_frames
+from viewer.rig.point_take import PointTake
+from viewer.rig.points import PointLayout
 from viewer.rig.pose_vector import write_vector
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import Skinning, deform, joint_matrices
 from viewer.rig.take import Take
 
-__all__ = ["export", "export_take"]
+__all__ = ["export", "export_points", "export_take"]
 
 
 def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
@@ -54,6 +63,10 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
             "own_numbers": write_vector(figure.pose_layout, figure.skeleton, pose),
             "shape_weights": pose.shape_weights,
         }
+    if figure.points is not None and actor.points is not None:
+        confidences = actor.points[:, 3]
+        places = np.where(confidences[:, None] > 0.0, actor.points[:, :3], np.nan)
+        arrays |= _point_arrays(figure.points, places, confidences)
     save_arrays(path, arrays)
     return [f"{printable(path, 300)}: {', '.join(arrays)}"]
 
@@ -61,6 +74,7 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
 def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
     """Write float64 arrays of all frames; see ``viewer.export.export_take``."""
     figure, frames = take.figure, take.frames
+    _check(take.name, frames.present, figure.unit, options)
     skeleton = figure.skeleton
     assert skeleton is not None  # whoever has a take has a skeleton
     world = world_frames(figure, frames)
@@ -90,7 +104,77 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
             vertices[frame] = deform(figure, pose, options.skinning)[0]
         arrays["vertices"] = vertices
     save_arrays(path, arrays)
-    missing = int((~frames.present).sum())
-    gaps = f"; {missing} of them missing, NaN" if missing else ""
-    count = f"{frames.n_frames} frames at {take.frame_rate:g} a second{gaps}"
+    count = _count(frames.present, take.frame_rate)
     return [f"{printable(path, 300)}: {count}: {', '.join(arrays)}"]
+
+
+def export_points(take: PointTake, path: Path, options: MotionOptions) -> list[str]:
+    """Write captured points of all frames as float64 arrays.
+
+    Parameters
+    ----------
+    take : PointTake
+        One person's.
+    path : Path
+        Replaced if it exists.
+    options : MotionOptions
+        ``world_up``, which is written beside.
+
+    Returns
+    -------
+    list of str
+        What was written.
+
+    Raises
+    ------
+    RigError
+        If another unit or up axis is asked for, or no frame is present.
+    OutputError
+        If the file cannot be written.
+    """
+    _check(take.name, take.present, "", options)
+    arrays: dict[str, NDArray[Any]] = {
+        "name": np.array(take.name),
+        "up": np.array(options.world_up),
+        "frame_rate": np.array(take.frame_rate),
+        "times": take.times,
+        "frames": take.first_frame + np.arange(len(take.times)),
+        "present": take.present,
+    }
+    arrays |= _point_arrays(take.layout, take.points, take.confidences)
+    save_arrays(path, arrays)
+    count = _count(take.present, take.frame_rate)
+    return [f"{printable(path, 300)}: {count}, {options.world_up} up: {', '.join(arrays)}"]
+
+
+def _check(name: str, present: Bools, unit: str, options: MotionOptions) -> None:
+    """Refuse what arrays in the scene's own numbers cannot do."""
+    for what, asked, own in (
+        ("unit", options.unit, unit),
+        ("up axis", options.up, options.world_up),
+    ):
+        if asked not in ("", own):
+            raise RigError(
+                f'{what} of arrays: expected {own or "none"}, as in the scene, found "{asked}"'
+            )
+    if not present.any():
+        raise RigError(f"{name}: every frame is missing, there is nothing to write")
+
+
+def _point_arrays(
+    layout: PointLayout, places: Floats, confidences: Floats
+) -> dict[str, NDArray[Any]]:
+    return {
+        "points": places,
+        "confidences": confidences,
+        "joint_names": np.array(layout.names),
+        "limbs": layout.limbs,
+        "sides": layout.sides,
+        "layout": np.array(layout.title),
+    }
+
+
+def _count(present: Bools, rate: float) -> str:
+    missing = int((~present).sum())
+    gaps = f"; {missing} of them missing, NaN" if missing else ""
+    return f"{len(present)} frames at {rate:g} a second{gaps}"

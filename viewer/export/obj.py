@@ -19,6 +19,7 @@ from viewer.rig.motion import pose_of
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import Skinning, deform
 from viewer.rig.take import Take
+from viewer.rig.units import WORDS
 
 __all__ = ["export", "export_take"]
 
@@ -33,7 +34,8 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
     positions, normals = deform(actor.figure, actor.pose, skinning)
     name = "_".join(printable(actor.figure.name, 100).split()) or "figure"
     beside = _materials(mesh, path)
-    parts = [f"# {name}: {actor.figure.up} up{', metres' * (actor.figure.unit == 'm')}\n"]
+    unit = f", {WORDS[actor.figure.unit]}" if actor.figure.unit in WORDS else ""
+    parts = [f"# {name}: {actor.figure.up} up{unit}\n"]
     if beside:
         parts.append(f"mtllib {list(beside)[-1].name}\n")
     parts += [f"o {name}\n", _rows("v", positions)]

@@ -12,18 +12,13 @@ from viewer.rig.figure import Figure
 from viewer.rig.joint_names import canonical_names
 from viewer.rig.motion import DEFAULT_RATE, frames_of, world_frames
 from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.units import METRES, SIZES, WORDS
 
 __all__ = ["frame_rate", "guess_unit", "guess_up"]
 
 Facts = tuple[tuple[str, str], ...]
 
-_SIZES = (
-    ("m", "metres", 0.3, 3.5, 1.0),
-    ("cm", "centimetres", 50.0, 350.0, 0.01),
-    ("mm", "millimetres", 500.0, 3500.0, 0.001),
-)
 _INCHES = (30.0, 90.0)
-_INCH = 0.0254  # metres
 _RATES = (
     *(12.0, 15.0, 24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 72.0, 90.0, 100.0, 120.0, 144.0, 150.0),
     *(180.0, 200.0, 240.0, 250.0, 300.0, 480.0, 500.0, 1000.0),
@@ -57,45 +52,44 @@ def frame_rate(source: Source, frame_time: bytes | None) -> float:
     return nearest if abs(nearest * seconds - 1.0) <= rounding * (1.0 + 1e-9) else exact
 
 
-def guess_unit(source: Source, points: Floats) -> tuple[str, Facts]:
-    """Return the figure's unit, ``"m"`` or nothing, and what was found out.
+def guess_unit(points: Floats) -> tuple[str, Facts, str]:
+    """Return the figure's unit, and what was found out.
 
     Parameters
     ----------
-    source : Source
-        Gets a warning unless the lengths are those of metres.
     points : (P, 3)
         The rest pose.
 
     Returns
     -------
     unit : str
-        As in ``Figure.unit``.
+        As in ``Figure.unit``: metres, centimetres or millimetres, whichever makes a size between
+        that of a child and that of a giant; empty if none does.
     facts : tuple of (str, str)
         As in ``Figure.facts``: ``("unit", "cm, taken from …")``.
+    note : str
+        As in ``SkeletonMotion.unit_note``; empty if the lengths are those of metres.
     """
     size = float(np.ptp(points, axis=0).max())
-    inches = f"; inches would be {size * _INCH:.3g} m" if _INCHES[0] < size < _INCHES[1] else ""
-    for unit, words, low, high, _ in _SIZES:
+    metres = size * METRES["in"]
+    inches = f"; inches would be {metres:.3g} m" if _INCHES[0] < size < _INCHES[1] else ""
+    for unit, (low, high) in SIZES.items():
         if low <= size <= high:
             fact = f"{unit}, taken from the skeleton's size of {size:.4g}{inches}"
-            if unit != "m":
-                source.warn(f"taken for {words} (skeleton {size:.4g} high{inches}); --unit sets it")
-            return (unit if unit == "m" else ""), (("unit", fact),)
-    if size > 0.0:
-        source.warn(f"unit unknown (skeleton {size:.4g} high{inches}); --unit sets it")
-    return "", (("unit", f"unknown, the skeleton's size is {size:.4g}{inches}"),)
+            note = f"taken for {WORDS[unit]} (skeleton {size:.4g} high{inches})"
+            return unit, (("unit", fact),), note * (unit != "m")
+    fact = f"unknown, the skeleton's size is {size:.4g}{inches}"
+    note = f"unit unknown (skeleton {size:.4g} high{inches})"
+    return "", (("unit", fact),), note * (size > 0.0)
 
 
 def guess_up(
-    source: Source, figure: Figure, clip: SampledClip, points: Floats
-) -> tuple[Literal["y", "z"], Facts]:
+    figure: Figure, clip: SampledClip, points: Floats
+) -> tuple[Literal["y", "z"], Facts, tuple[str, ...]]:
     """Return the up axis of the rest skeleton: where the head is from the feet, else its long side.
 
     Parameters
     ----------
-    source : Source
-        Gets a warning unless that is y, in the rest pose and in the frames.
     figure, clip : Figure, SampledClip
         As read.
     points : (P, 3)
@@ -107,6 +101,8 @@ def guess_up(
         As in ``Figure.up``.
     facts : tuple of (str, str)
         As in ``Figure.facts``.
+    notes : tuple of str
+        As in ``SkeletonMotion.up_notes``; empty if that is y, in the rest pose and in the frames.
     """
     skeleton = figure.skeleton
     assert skeleton is not None  # the reader made it
@@ -117,24 +113,25 @@ def guess_up(
     if not upper or not lower:
         _, deep, high = np.ptp(points, axis=0)[[0, 1, 2]]
         if high > _LONG * deep:
-            source.warn("z taken for up: the rest skeleton is longest along z; --up sets it")
-            return "z", (("up", "z, along which the rest skeleton is longest"),)
-        return "y", ()
+            note = "z taken for up: the rest skeleton is longest along z"
+            return "z", (("up", "z, along which the rest skeleton is longest"),), (note,)
+        return "y", (), ()
     joints = points[: skeleton.n_joints]
     rest = _axis(joints[upper].mean(axis=0) - joints[lower].mean(axis=0))
     up: Literal["y", "z"] = "z" if rest == "+z" else "y"
+    notes = []
     if up == "z":
-        source.warn("z taken for up: the head is above the feet along z; --up sets it")
+        notes.append("z taken for up: the head is above the feet along z")
     elif rest not in ("+y", ""):
-        source.warn(f"y taken for up, though the rest skeleton stands along {rest}; --up sets it")
+        notes.append(f"y taken for up, though the rest skeleton stands along {rest}")
     every = (
         np.linspace(0, clip.n_rows - 1, min(_LOOKS, clip.n_rows)).round() / clip.timing.frame_rate
     )
     posed = world_frames(figure, frames_of(figure, clip, every))[:, :, :3, 3]
     stands = _axis((posed[:, upper].mean(axis=1) - posed[:, lower].mean(axis=1)).mean(axis=0))
     if stands in ("+y", "+z") and stands[1] != up:
-        source.warn(f"{up} taken for up, but in its frames it stands along {stands}; --up sets it")
-    return up, (("up", f"{up}, from the rest skeleton"),)
+        notes.append(f"{up} taken for up, but in its frames it stands along {stands}")
+    return up, (("up", f"{up}, from the rest skeleton"),), tuple(notes)
 
 
 def _axis(direction: Floats) -> str:

@@ -13,7 +13,7 @@ Words are separated by any white space, line ends among them, and keywords come 
 has one number per channel, joints in the order of the file. Angles are degrees; a joint's rotation
 channels multiply from left to right, ``Zrotation Yrotation Xrotation`` is R = Rz Ry Rx. Position
 channels replace the joint's OFFSET. Unit and up axis are not in the file: both are guessed, and
-the guess is said.
+the motion says how, for whoever was not told better.
 """
 
 from __future__ import annotations
@@ -77,11 +77,11 @@ def read(source: Source) -> SkeletonMotion:
         _translations(source, table, motion.values),
     )
     points = _rest_points(table, skeleton)
-    unit, facts = guess_unit(source, points)
+    unit, facts, unit_note = guess_unit(points)
     figure = Figure(source.path.stem, skeleton=skeleton, unit=unit)
-    up, more = guess_up(source, figure, clip, points)
+    up, more, up_notes = guess_up(figure, clip, points)
     facts += (*more, ("frames", f"{len(motion.values)} at {rate:g} a second"))
-    return SkeletonMotion(replace(figure, up=up, facts=facts), clip)
+    return SkeletonMotion(replace(figure, up=up, facts=facts), clip, unit_note, up_notes)
 
 
 @dataclass(frozen=True, slots=True)

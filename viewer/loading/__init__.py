@@ -33,7 +33,8 @@ def load(
     Files are recognised by content. A skeleton takes the first skin that has its number of
     joints, one of the same name if there is one. A figure without a partner opens alone; several
     actors stand side by side. A clip goes to the first actor without one that has its number of
-    channels. A BVH drives the first figure whose joints it names, or stands as a skeleton.
+    channels. A BVH drives the model if one is asked for, else the first figure whose joints it
+    names, or stands as a skeleton: in metres beside others, else with the numbers of its file.
     Captured bodies are drawn with the first body model among the files, or the bundled body. All
     actors are posed as at the start of their motions. A pose goes to the first actor that it
     fits, a picture to the first with texture coordinates and no texture.

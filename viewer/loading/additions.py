@@ -83,6 +83,7 @@ def apply_pose(path: Path, record: PoseRecord, actor: Actor) -> list[str]:
     assert actor.pose is not None  # the callers looked
     shown = printable(path, 300)
     try:
-        return [f"{shown}: {note}" for note in apply_record(record, actor.figure, actor.pose)]
+        notes = apply_record(record, actor.figure, actor.pose, cut=True)
+        return [f"{shown}: {note}" for note in notes]
     except RigError as problem:
         raise RigError(f"{shown}: {problem}") from None

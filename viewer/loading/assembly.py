@@ -197,7 +197,8 @@ def _join(parts: list[tuple[Path, Figure]]) -> Figure:
             f"{skin_path} has {skin.n_joints} binding matrices, "
             f"{skel_path} has {skeleton.n_joints} joints"
         )
-    return Figure(paths[1].stem, figures[1].mesh, skeleton, skin)
+    facts = (*figures[0].facts, *figures[1].facts)
+    return Figure(paths[1].stem, figures[1].mesh, skeleton, skin, facts=facts)
 
 
 def _stand_up(cast: Cast, world_up: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from viewer.rig.body_motion import BodyMotion, body_clip
 from viewer.rig.capture import Capture, CapturePart
 from viewer.rig.figure import Figure
 from viewer.rig.motion import pose_actor
+from viewer.rig.person import is_tracked, person_label
 from viewer.rig.points import PointClip, PointLayout
 from viewer.rig.sampled_clip import SampledClip, joined
 from viewer.rig.scene import Actor
@@ -48,6 +50,8 @@ class Builder:
         Whether the capture's shape coefficients mean something to the model.
     placement : (4, 4)
         Of every actor.
+    up : "y" or "z"
+        The axis along which people stand before they are placed.
     n_read : int
         Frames that have been taken in.
     is_cut : bool
@@ -60,6 +64,7 @@ class Builder:
     model: Figure
     keeps_shape: bool = True
     placement: Floats = field(default_factory=lambda: np.eye(4))
+    up: Literal["y", "z"] = "y"
     n_read: int = 0
     is_cut: bool = False
     has_shape: bool = False
@@ -104,9 +109,9 @@ class Builder:
         """
         new: list[Actor] = []
         notes = [*part.warnings]
-        for person, motion in sorted(part.bodies.items()):
+        for person, motion in sorted(part.bodies.items(), key=_order):
             notes += self._add_body(person, motion, new)
-        for person, (layout, clip) in sorted(part.points.items()):
+        for person, (layout, clip) in sorted(part.points.items(), key=_order):
             notes += self._add_points(person, layout, clip, new)
         self.n_read = max(self.n_read, part.stop)
         for actor in new:
@@ -137,7 +142,7 @@ class Builder:
     ) -> list[str]:
         actor = self._points.get(person)
         if actor is None:
-            figure = Figure(layout.title, points=layout)
+            figure = Figure(layout.title, points=layout, up=self.up)
             actor = Actor(figure, clip=clip, placement=self.placement.copy(), person=person)
             self._points[person] = actor
             new.append(actor)
@@ -145,10 +150,10 @@ class Builder:
         known = actor.figure.points
         assert isinstance(actor.clip, PointClip) and known is not None  # as it was made above
         if len(known.names) != len(layout.names):
+            frame = self.n_read + self.capture.first_frame
             return [
-                f"{self.capture.name}: person {person} has {len(layout.names)} keypoints in frames "
-                f"from {self.n_read + self.capture.first_frame} on, {len(known.names)} before; "
-                "those frames are left out"
+                f"{self.capture.name}: {person_label(person)} has {len(layout.names)} keypoints in "
+                f"frames from {frame} on, {len(known.names)} before; those frames are left out"
             ]
         actor.clip = joined_points(actor.clip, clip)
         return []
@@ -159,7 +164,16 @@ class Builder:
         return [*self._bodies.values(), *self._points.values()]
 
     def place(self, up: str) -> None:
-        """Stand everybody up, also those who come later, if an axis points down in the world."""
+        """Stand everybody up, also those who come later, if an axis points down in the world.
+
+        Parameters
+        ----------
+        up : "y", "z", "-y" or "-z"
+            The axis that points up in the capture.
+        """
+        self.up = "z" if up.endswith("z") else "y"
+        for actor in self._points.values():
+            actor.figure = replace(actor.figure, up=self.up)
         if up.startswith("-"):
             self.placement = rotation_transform(0, np.pi)
             for actor in self.actors:
@@ -169,6 +183,12 @@ class Builder:
         """Return a refusal that says which model would fit."""
         wanted = f"a {self.capture.model} model" if self.capture.model else "the model"
         return RigError(f"{self.capture.name}: {problem}; name {wanted} with --model")
+
+
+def _order(item: tuple[int, object]) -> tuple[bool, int]:
+    """Sort people by number, those without a track behind all others."""
+    person = item[0]
+    return not is_tracked(person), abs(person)
 
 
 def joined_timing(first: Timing, second: Timing, shift: int) -> Timing:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,14 +14,16 @@ from viewer.loading.bundled import bundled_body
 from viewer.loading.capturing import Builder
 from viewer.loading.cast import Cast
 from viewer.loading.contents import Contents
-from viewer.loading.settings import METRES, MotionSettings
+from viewer.loading.settings import MotionSettings
 from viewer.rig.body_motion import BodyMotion, body_clip
 from viewer.rig.capture import Capture
-from viewer.rig.clip import Clip, suits
+from viewer.rig.clip import Clip, misfit, suits
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor
-from viewer.rig.skeleton_motion import SkeletonMotion
 from viewer.rig.transform import rotation_transform
+
+if TYPE_CHECKING:
+    from viewer.loading.skeleton_motions import Lone
 
 __all__ = ["drive", "is_body"]
 
@@ -36,18 +38,43 @@ def drive(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
     FormatError
         If the model cannot be read.
     RigError
-        If a clip fits no skeleton, or bodies do not fit the model.
+        If a clip fits no skeleton, or bodies or BVH do not fit the model.
     """
     for path, clip in contents.clips:
         _give_clip(path, clip, cast, contents)
-    for path, motion in contents.skeleton_motions:
-        _give_skeleton_motion(path, motion, cast, settings)
-    if contents.body_motions or contents.captures:
-        model, is_bundled = _model(cast, settings)
+    bodies = bool(contents.body_motions or contents.captures)
+    drives = bool(contents.skeleton_motions) and settings.drives
+    named = _named_model(cast, settings.model) if bodies or drives else None
+    if settings.model is not None and named is None and contents.skeleton_motions:
+        cast.notes.append(
+            f"--model {printable(settings.model, 300)}: with --beside nothing moves it"
+        )
+    lone = _give_skeleton_motions(contents, cast, settings, named)
+    if bodies:
+        model, is_bundled = _model(cast, named)
         for path, body in contents.body_motions:
             _give_body_motion(path, body, cast, settings, model, is_bundled)
         for path, capture in contents.captures:
             _begin_capture(path, capture, cast, settings, model, is_bundled)
+    if lone:
+        from viewer.loading.skeleton_motions import agree_on_units
+
+        agree_on_units(cast, lone)
+
+
+def _give_skeleton_motions(
+    contents: Contents, cast: Cast, settings: MotionSettings, named: Figure | None
+) -> list[Lone]:
+    """Let BVH drive figures; return those that stand alone."""
+    if not contents.skeleton_motions:
+        return []
+    from viewer.loading.skeleton_motions import give_skeleton_motion
+
+    found = [
+        give_skeleton_motion(path, motion, cast, settings, named)
+        for path, motion in contents.skeleton_motions
+    ]
+    return [lone for lone in found if lone is not None]
 
 
 def _give_clip(path: Path, clip: Clip, cast: Cast, contents: Contents) -> None:
@@ -69,42 +96,7 @@ def _give_clip(path: Path, clip: Clip, cast: Cast, contents: Contents) -> None:
     if any(skeleton is not None and suits(clip, skeleton) for skeleton in skeletons):
         raise RigError(f"{shown}: every skeleton that it fits has a clip already")
     owner = next(path for path, figure in contents.figures if figure.skeleton)
-    raise RigError(
-        f"{shown} has {count} channels, {printable(owner, 300)} needs "
-        f"{first.n_dofs} (3 + 3 x {first.n_joints} joints)"
-    )
-
-
-def _give_skeleton_motion(
-    path: Path, motion: SkeletonMotion, cast: Cast, settings: MotionSettings
-) -> None:
-    """Let a motion drive the first figure with a mesh whose joints it names, or stand alone."""
-    from viewer.rig.retarget import retarget, scaled_motion
-
-    if settings.unit:
-        motion = scaled_motion(motion, METRES[settings.unit], "m")
-    if settings.up:
-        up: Literal["y", "z"] = "z" if settings.up.endswith("z") else "y"
-        motion = replace(motion, figure=replace(motion.figure, up=up))
-    if settings.frame_rate is not None:
-        timing = replace(motion.clip.timing, frame_rate=settings.frame_rate)
-        motion = replace(motion, clip=replace(motion.clip, timing=timing))
-    if settings.drives:
-        refusal = ""
-        for actor in cast.actors:
-            if actor.clip is None and actor.figure.is_attached:
-                try:
-                    actor.clip, notes = retarget(motion, actor.figure)
-                except RigError as problem:
-                    refusal = refusal or str(problem)
-                    continue
-                cast.notes += [f"{printable(path, 300)}: {note}" for note in notes]
-                return
-        if refusal:
-            cast.notes.append(f"{printable(path, 300)} stands alone: {refusal}")
-    placement = rotation_transform(0, np.pi) if settings.up.startswith("-") else np.eye(4)
-    actor = Actor(motion.figure, clip=motion.clip, placement=placement)
-    cast.add(actor, motion.figure.up, placed=False)
+    raise RigError(f"{shown} has {count} channels, {printable(owner, 300)} {misfit(clip, first)}")
 
 
 def is_body(figure: Figure) -> bool:
@@ -113,18 +105,25 @@ def is_body(figure: Figure) -> bool:
     return skeleton is not None and figure.mesh is not None and skeleton.names[0] in _ROOTS
 
 
-def _model(cast: Cast, settings: MotionSettings) -> tuple[Figure, bool]:
+def _named_model(cast: Cast, path: Path | None) -> Figure | None:
+    """Return the body model that ``--model`` names, if it names one."""
+    if path is None:
+        return None
+    source = Source.open(path)
+    model = read(source)
+    if not isinstance(model, Figure) or model.skeleton is None or model.mesh is None:
+        raise source.error("--model: expected a body model")
+    cast.notes += source.warnings
+    return model
+
+
+def _model(cast: Cast, named: Figure | None) -> tuple[Figure, bool]:
     """Return what captured bodies are drawn with, and whether it is the bundled body.
 
     A figure among the files that is one's model does not stand about itself.
     """
-    if settings.model is not None:
-        source = Source.open(settings.model)
-        model = read(source)
-        if not isinstance(model, Figure) or model.skeleton is None or model.mesh is None:
-            raise source.error("--model: expected a body model")
-        cast.notes += source.warnings
-        return model, False
+    if named is not None:
+        return named, False
     for index, actor in enumerate(cast.actors):
         if actor.clip is None and is_body(actor.figure):
             del cast.actors[index], cast.ups[index], cast.placed[index]

@@ -5,10 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ["METRES", "MotionSettings"]
-
-METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
-"""Units that BVH lengths may be in."""
+__all__ = ["MotionSettings"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,14 +15,15 @@ class MotionSettings:
     Attributes
     ----------
     model : Path or None
-        The figure that captured bodies are drawn with; None for one among the files, or the
-        bundled body.
+        The figure that captured bodies are drawn with, and that BVH drives; None for one among
+        the files, or for captures the bundled body.
     frame_rate : float or None
         Frames a second; None for the file's own, or 30 where it does not say.
     up : "y", "z", "-y", "-z" or ""
         The axis that points up in captures and BVH; empty to judge by the bodies.
-    unit : "m", "cm", "mm" or ""
-        Of BVH lengths; empty to judge by the skeleton's height.
+    unit : str
+        Of BVH lengths, which then become metres: a key of ``viewer.rig.units.METRES``; empty to
+        judge by the skeleton's size.
     flat_hands : bool or None
         Whether hand components leave the mean hand out; None for the model's custom.
     layout : str

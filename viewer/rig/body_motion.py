@@ -10,6 +10,7 @@ from viewer.errors import RigError
 from viewer.rig.arrays import Floats, frozen
 from viewer.rig.figure import Figure
 from viewer.rig.hands import Hand
+from viewer.rig.pose_record import unused_coefficients
 from viewer.rig.quaternion import multiply, rotation_vector_to_quaternion
 from viewer.rig.rotation import quaternion_to_matrix
 from viewer.rig.sampled_clip import SampledClip
@@ -17,6 +18,8 @@ from viewer.rig.shape import joint_directions, rest_joints
 from viewer.rig.timing import Timing
 
 __all__ = ["BodyMotion", "body_clip", "root_positions"]
+
+_LISTED = 6  # joints in a note
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -126,8 +129,10 @@ def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[str
             lost.append(name)
     notes += _put_hands(motion, figure, vectors)
     if lost:
+        rest = f", … and {len(lost) - _LISTED} more" * (len(lost) > _LISTED)
         notes.append(
-            f"{len(lost)} joints that {figure.name} lacks were left out: {', '.join(lost[:6])}"
+            f"{len(lost)} joints that {figure.name} lacks were left out: "
+            f"{', '.join(lost[:_LISTED])}{rest}"
         )
     weights, more = _weights(motion, figure)
     rotations = rotation_vector_to_quaternion(vectors)
@@ -194,10 +199,5 @@ def _weights(motion: BodyMotion, figure: Figure) -> tuple[Floats, list[str]]:
         columns = [index for index, name in enumerate(groups) if name == group]
         used = min(len(columns), values.shape[1])
         weights[:, columns[:used]] = values[:, :used]
-        if values[:, used:].any():
-            largest = np.abs(values[:, used:]).max()
-            notes.append(
-                f"{group} coefficients beyond the {used} of {figure.name} were left out "
-                f"(largest {largest:.3g})"
-            )
+        notes += unused_coefficients(group, values, len(columns), figure.name)
     return weights, notes

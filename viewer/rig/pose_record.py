@@ -17,7 +17,7 @@ from viewer.rig.rotation import rotation_vector_to_matrix
 from viewer.rig.skeleton import Skeleton, clamp_dofs, dof_label, find_dof
 from viewer.rig.smpl_family import members_by_numbers
 
-__all__ = ["PARTS", "PoseRecord", "apply_record", "record_of"]
+__all__ = ["PARTS", "PoseRecord", "apply_record", "record_of", "unused_coefficients"]
 
 PARTS = {
     "global_orient": ("pelvis", "wrist", "global"),
@@ -98,7 +98,7 @@ def record_of(figure: Figure, pose: Pose) -> PoseRecord:
     )
 
 
-def apply_record(record: PoseRecord, figure: Figure, pose: Pose) -> list[str]:
+def apply_record(record: PoseRecord, figure: Figure, pose: Pose, cut: bool = False) -> list[str]:
     """Pose a figure by a record, in place.
 
     Parameters
@@ -109,6 +109,9 @@ def apply_record(record: PoseRecord, figure: Figure, pose: Pose) -> list[str]:
         With a skeleton.
     pose : Pose
         Changed; what the record does not mention stays.
+    cut : bool
+        Leave coefficients out that a figure with shapes has not, as files made for its kin need,
+        instead of refusing them.
 
     Returns
     -------
@@ -130,8 +133,8 @@ def apply_record(record: PoseRecord, figure: Figure, pose: Pose) -> list[str]:
         notes += _apply_vector(record.vector, figure, work)
     for name, values in record.parts.items():
         notes += _apply_part(name, values, record, figure, work)
-    _apply_weights("shape", record.shape, figure, work)
-    _apply_weights("expression", record.expression, figure, work)
+    notes += _apply_weights("shape", record.shape, figure, work, cut)
+    notes += _apply_weights("expression", record.expression, figure, work, cut)
     if record.translation is not None:
         work.figure_translation = np.array(record.translation, dtype=np.float64)
     if record.scale is not None:
@@ -291,14 +294,42 @@ def _turn(figure: Figure, pose: Pose, joints: Ints, numbers: Floats) -> None:
     set_joint_rotations(figure.skeleton, pose, joints, rotations)
 
 
-def _apply_weights(group: str, values: Floats | None, figure: Figure, pose: Pose) -> None:
+def unused_coefficients(group: str, values: Floats, used: int, name: str) -> list[str]:
+    """Return a line on coefficients that a figure does not have; none if all of those are 0.
+
+    Parameters
+    ----------
+    group : str
+        ``"shape"`` or ``"expression"``.
+    values : (..., S)
+        All that are given.
+    used : int
+        How many the figure has.
+    name : str
+        Of the figure.
+    """
+    rest, count = values[..., used:], values.shape[-1]
+    if not rest.any():
+        return []
+    lost = (
+        f"coefficients {used + 1} to {count} were"
+        if count > used + 1
+        else f"coefficient {count} was"
+    )
+    return [f"{group} {lost} left out, as {name} has {used} (largest {np.abs(rest).max():.3g})"]
+
+
+def _apply_weights(
+    group: str, values: Floats | None, figure: Figure, pose: Pose, cut: bool
+) -> list[str]:
     if values is None or len(values) == 0:
-        return
+        return []
     groups = figure.blend_shapes.groups if figure.blend_shapes else ()
     # Whatever is no shape was recorded as an expression, morphs among them.
     rows = [index for index, name in enumerate(groups) if (name == "shape") == (group == "shape")]
     values = np.asarray(values, dtype=np.float64).ravel()
-    if len(values) > len(rows) and values[len(rows) :].any():
+    notes = unused_coefficients(group, values, len(rows), figure.name)
+    if notes and not (cut and "shape" in groups):
         raise RigError(f"{figure.name} has {len(rows)} {group} coefficients, found {len(values)}")
     if np.abs(values).max() > _MOST_SIGMA:
         raise RigError(
@@ -311,3 +342,4 @@ def _apply_weights(group: str, values: Floats | None, figure: Figure, pose: Pose
     weights[rows] = 0.0
     weights[rows[:count]] = values[:count]
     pose.shape_weights = weights
+    return notes

@@ -65,9 +65,10 @@ def scaled_motion(motion: SkeletonMotion, factor: float, unit: str = "") -> Skel
         moved = skeleton.rest_translations * factor
         skeleton = replace(skeleton, rest_translations=moved, boxes=boxes)
     shifts, place = clip.translations, clip.figure_translations
-    return SkeletonMotion(
-        replace(figure, skeleton=skeleton, unit=unit),
-        replace(
+    return replace(
+        motion,
+        figure=replace(figure, skeleton=skeleton, unit=unit),
+        clip=replace(
             clip,
             translations=None if shifts is None else shifts * factor,
             figure_translations=None if place is None else place * factor,

@@ -10,6 +10,7 @@ import numpy as np
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure, skeleton_points
 from viewer.rig.mesh import bounding_box, box_size
+from viewer.rig.person import person_name
 from viewer.rig.pose import Pose, placement_matrix, rest_pose
 from viewer.rig.shape import shaped
 from viewer.rig.skinning import deform
@@ -49,7 +50,7 @@ class Actor:
     offset : float
         Seconds by which its clip starts later than the scene's clock.
     person : int or None
-        Its number in a capture of several people.
+        Its number in a capture of several people; below 0 where it has no track.
     color : (r, g, b) or None
         Its own, linear, 0 to 1; None for the usual one.
     points : (K, 4) or None
@@ -71,9 +72,9 @@ class Actor:
 
     @property
     def name(self) -> str:
-        """What menus and files call it: its figure's name, and the person's number."""
+        """What menus and files call it: its figure's name, and the person's."""
         name = self.figure.name
-        return name if self.person is None else f"{name} {self.person}"
+        return name if self.person is None else f"{name} {person_name(self.person)}"
 
     @property
     def is_drawn(self) -> bool:

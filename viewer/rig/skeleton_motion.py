@@ -20,7 +20,13 @@ class SkeletonMotion:
         A skeleton without a mesh.
     clip : SampledClip
         Its motion.
+    unit_note : str
+        How the figure's unit was guessed, in words; empty if there is nothing to say.
+    up_notes : tuple of str
+        How its up axis was guessed, and what speaks against it.
     """
 
     figure: Figure
     clip: SampledClip
+    unit_note: str = ""
+    up_notes: tuple[str, ...] = ()

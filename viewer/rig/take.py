@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -11,11 +12,13 @@ from viewer.rig.arrays import Floats
 from viewer.rig.clip import Clip
 from viewer.rig.figure import Figure
 from viewer.rig.motion import DEFAULT_RATE, Frames, frame_rate, frames_of, rest_translations_of
+from viewer.rig.points import PointClip
 from viewer.rig.quaternion import multiply
 from viewer.rig.sampled_clip import SampledClip
-from viewer.rig.scene import Actor, Scene
+from viewer.rig.scene import Actor, Motion, Scene
+from viewer.rig.upright import own_up
 
-__all__ = ["Take", "take_of", "upright_take"]
+__all__ = ["Take", "frame_range", "take_of", "upright_take"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,17 +79,32 @@ def take_of(
         raise RigError(f"{actor.name} has no motion of joints")
     own = frame_rate(motion) if isinstance(motion, SampledClip) else DEFAULT_RATE
     rate = own if rate is None else rate
-    count = int(np.floor((motion.end - motion.start) * rate + 1e-6)) + 1
-    first, stop = (0, None) if frames is None else frames
-    stop = count if stop is None else stop
-    if isinstance(motion, SampledClip):
-        stop = min(stop, count)  # curves go on behind their keys, captures do not
-    if not 0 <= first < stop:
-        raise RigError(f"frames: expected a range within 0 to {count}, found {first} to {stop}")
+    first, stop = frame_range(motion, rate, frames)
     times: Floats = motion.start + np.arange(first, stop) / rate
     shift = motion.timing.first_frame if isinstance(motion, SampledClip) and rate == own else 0
     sampled = frames_of(figure, motion, times, actor.pose, fill)
     return Take(actor.name, figure, rate, first + shift, sampled, motion)
+
+
+def frame_range(
+    motion: Motion, rate: float, frames: tuple[int, int | None] | None
+) -> tuple[int, int]:
+    """Return the first frame and the one behind the last; arguments as for ``take_of``.
+
+    Raises
+    ------
+    RigError
+        If no frame is in that range.
+    """
+    count = int(np.floor((motion.end - motion.start) * rate + 1e-6)) + 1
+    first, asked = (0, None) if frames is None else frames
+    stop = count if asked is None else asked
+    if isinstance(motion, SampledClip | PointClip):
+        stop = min(stop, count)  # curves go on behind their keys, captures do not
+    if not 0 <= first < stop:
+        found = f"{first} to {'the end' if asked is None else asked}"
+        raise RigError(f"frames: expected a range within 0 to {count}, found {found}")
+    return first, stop
 
 
 def upright_take(
@@ -95,7 +113,7 @@ def upright_take(
     rate: float | None = None,
     frames: tuple[int, int | None] | None = None,
     fill: bool = False,
-) -> tuple[Take, str]:
+) -> tuple[Take, Literal["y", "z"]]:
     """Sample an actor's clip, stood up where its own world hangs head down.
 
     Parameters
@@ -113,13 +131,8 @@ def upright_take(
         The axis that points up in them.
     """
     take = take_of(actor, rate, frames, fill)
-    up = np.zeros(3)
-    up["xyz".index(scene.up)] = 1.0
-    own = np.linalg.solve(actor.placement[:3, :3], up)
-    axis = int(np.abs(own).argmax())
-    if own[axis] < 0.0:
-        take = replace(take, frames=_turned_over(take))
-    return take, "xyz"[axis] if axis else scene.up
+    up, hangs = own_up(scene, actor)
+    return (replace(take, frames=_turned_over(take)) if hangs else take), up
 
 
 def _turned_over(take: Take) -> Frames:

@@ -1,0 +1,38 @@
+"""Units of length: one table, and what looks like metres."""
+
+import numpy as np
+import pytest
+
+from viewer.rig.figure import Figure
+from viewer.rig.scalars import length_text, length_unit
+from viewer.rig.skeleton import ball_skeleton
+from viewer.rig.units import METRES, SIZES, WORDS, is_metres
+
+
+def test_factors_are_those_of_the_units():
+    assert METRES == {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
+    assert WORDS.keys() == METRES.keys() and SIZES.keys() < METRES.keys()
+
+
+@pytest.mark.parametrize("unit", SIZES)
+def test_sizes_hold_people_from_newborn_to_tallest(unit):
+    low, high = SIZES[unit]
+    smallest = 0.5 if unit != "m" else 0.3
+    assert low * METRES[unit] <= smallest and high * METRES[unit] == pytest.approx(3.5)
+
+
+@pytest.mark.parametrize(
+    ("size", "expected"), [(0.0, False), (0.29, False), (0.3, True), (3.5, True), (3.6, False)]
+)
+def test_metres_are_between_infant_and_giant(size, expected):
+    assert is_metres(size) == expected
+
+
+@pytest.mark.parametrize(
+    ("unit", "text"), [("m", "2000 mm"), ("cm", "20 mm"), ("mm", "2 mm"), ("in", "50.8 mm")]
+)
+def test_small_lengths_are_millimetres_in_every_known_unit(unit, text):
+    skeleton = ball_skeleton(("a",), np.array([-1]), np.zeros((1, 3)))
+    figure = Figure("a", skeleton=skeleton, unit=unit)
+    assert length_text(figure, 2.0) == text
+    assert length_unit(figure) == (pytest.approx(1000 * METRES[unit]), "mm")

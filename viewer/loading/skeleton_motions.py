@@ -1,0 +1,176 @@
+"""Give the motions of BVH files to figures, or let them stand as skeletons of their own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from viewer.errors import RigError, printable
+from viewer.loading.cast import Cast
+from viewer.loading.settings import MotionSettings
+from viewer.rig.arrays import Floats
+from viewer.rig.figure import Figure
+from viewer.rig.retarget import retarget, scaled_motion
+from viewer.rig.scene import Actor, Scene, scene_box
+from viewer.rig.skeleton_motion import SkeletonMotion
+from viewer.rig.transform import rotation_transform
+from viewer.rig.units import METRES, is_metres
+
+__all__ = ["Lone", "agree_on_units", "give_skeleton_motion"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lone:
+    """A motion that drives nobody.
+
+    Attributes
+    ----------
+    path : Path
+        Its file.
+    motion : SkeletonMotion
+        As asked for.
+    actor : Actor
+        Its skeleton in the scene.
+    """
+
+    path: Path
+    motion: SkeletonMotion
+    actor: Actor
+
+
+def give_skeleton_motion(
+    path: Path,
+    motion: SkeletonMotion,
+    cast: Cast,
+    settings: MotionSettings,
+    model: Figure | None,
+) -> Lone | None:
+    """Let a motion drive the model, else the first figure whose joints it names, or stand alone.
+
+    Parameters
+    ----------
+    path : Path
+        Its file, for messages.
+    motion : SkeletonMotion
+        As read.
+    cast : Cast
+        Gets a clip, or an actor.
+    settings : MotionSettings
+        Unit, up axis, frame rate, and whether it drives anything.
+    model : Figure or None
+        What it has to drive, each motion one of its own.
+
+    Returns
+    -------
+    Lone or None
+        The skeleton, if it stands alone.
+
+    Raises
+    ------
+    RigError
+        If it does not fit the model.
+    """
+    motion, shown = _as_asked(motion, settings), printable(path, 300)
+    cast.notes += [f"{shown}: {note}; --up sets it" for note in motion.up_notes]
+    turn = rotation_transform(0, np.pi) if settings.up.startswith("-") else np.eye(4)
+    if settings.drives and model is not None:
+        try:
+            clip, notes = retarget(motion, model)
+        except RigError as problem:
+            raise RigError(f"{shown}: {problem} (--model names the model)") from None
+        cast.notes += [f"{shown}: {note}" for note in notes]
+        cast.add(Actor(model, clip=clip, placement=turn), model.up, placed=False)
+        return None
+    if settings.drives and _drives_somebody(shown, motion, cast, turn):
+        return None
+    actor = Actor(motion.figure, clip=motion.clip, placement=turn)
+    cast.add(actor, motion.figure.up, placed=False)
+    return Lone(path, motion, actor)
+
+
+def _as_asked(motion: SkeletonMotion, settings: MotionSettings) -> SkeletonMotion:
+    """Return a motion in the unit, world and rate that were asked for; nothing else is guessed."""
+    if settings.unit:
+        motion = _in_metres(motion, settings.unit, f"{settings.unit} in the file, as asked")
+    if settings.up:
+        up: Literal["y", "z"] = "z" if settings.up.endswith("z") else "y"
+        motion = replace(motion, figure=replace(motion.figure, up=up), up_notes=())
+    if settings.frame_rate is not None:
+        timing = replace(motion.clip.timing, frame_rate=settings.frame_rate)
+        motion = replace(motion, clip=replace(motion.clip, timing=timing))
+    return motion
+
+
+def _in_metres(motion: SkeletonMotion, unit: str, fact: str) -> SkeletonMotion:
+    """Return a motion scaled to metres from a unit, and say so in what is known of it."""
+    scaled = scaled_motion(motion, METRES[unit], "m")
+    facts = dict(motion.figure.facts)
+    facts["unit"] = f"{fact}; scaled to metres" if unit != "m" else fact
+    kept = tuple(facts.items())
+    return replace(scaled, figure=replace(scaled.figure, facts=kept), unit_note="")
+
+
+def _drives_somebody(shown: str, motion: SkeletonMotion, cast: Cast, turn: Floats) -> bool:
+    """Give a motion to the first figure with a mesh and no clip that it fits, if there is one."""
+    refusal = ""
+    for actor in cast.actors:
+        if actor.clip is not None or not actor.figure.is_attached:
+            continue
+        try:
+            actor.clip, notes = retarget(motion, actor.figure)
+        except RigError as problem:
+            refusal = refusal or str(problem)
+            continue
+        actor.placement = turn @ actor.placement
+        cast.notes += [f"{shown}: {note}" for note in notes]
+        return True
+    if refusal:
+        cast.notes.append(f"{shown} stands alone: {refusal}")
+    return False
+
+
+def agree_on_units(cast: Cast, lone: list[Lone]) -> None:
+    """Scale skeletons to metres that stand beside others of another unit; say what was guessed.
+
+    One alone, or among others in its own unit, keeps the numbers of its file.
+
+    Parameters
+    ----------
+    cast : Cast
+        Complete but for people who come later; actors of scaled skeletons are replaced.
+    lone : list of Lone
+        Skeletons in it.
+    """
+    chosen = [one for one in lone if _is_odd(one, cast.actors)]
+    for one in lone:
+        if one in chosen:
+            unit, facts = one.motion.figure.unit, dict(one.motion.figure.facts)
+            scaled = _in_metres(one.motion, unit, facts.get("unit", unit))
+            place = next(n for n, actor in enumerate(cast.actors) if actor is one.actor)
+            cast.actors[place] = replace(
+                one.actor, figure=scaled.figure, clip=scaled.clip, pose=None
+            )
+        if one.motion.unit_note:
+            done = ", and scaled to metres beside others" * (one in chosen)
+            shown = printable(one.path, 300)
+            cast.notes.append(f"{shown}: {one.motion.unit_note}{done}; --unit sets it")
+
+
+def _is_odd(one: Lone, actors: list[Actor]) -> bool:
+    """Return whether a skeleton's unit is known, no metre, and not that of all other actors."""
+    unit = one.motion.figure.unit
+    if unit == "m" or unit not in METRES:
+        return False
+    return any(_is_otherwise(actor, unit) for actor in actors if actor is not one.actor)
+
+
+def _is_otherwise(actor: Actor, unit: str) -> bool:
+    figure = actor.figure
+    if figure.points is not None:  # captured keypoints are in metres
+        return True
+    if figure.unit in METRES:
+        return figure.unit != unit
+    return is_metres(float(np.ptp(scene_box(Scene([actor])), axis=0).max()))
