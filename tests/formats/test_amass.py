@@ -113,8 +113,10 @@ def test_second_release(tmp_path):
         poses=waves(3, 165),
         betas=waves(16),
         num_betas=np.array(16),
-        root_orient=waves(3, 3),
-        pose_body=waves(3, 63),
+        # Parts as float32 have them are the same, and the fingers need not be there.
+        root_orient=waves(3, 165)[:, :3].astype(np.float32),
+        pose_body=waves(3, 165)[:, 3:66],
+        pose_eye=waves(3, 165)[:, 69:75],
         markers_latent=np.zeros((5, 3)),
         latent_labels=np.array(["a"]),
     )
@@ -209,7 +211,8 @@ def test_poses_alone_are_a_motion_if_there_are_several(tmp_path, shape, names):
     [
         {"poses": waves(1, 72), "trans": waves(1, 3)},
         {"poses": waves(24, 3)},
-        {"poses": waves(1, 156), "mocap_framerate": np.array(120.0), "dmpls": np.zeros((1, 8))},
+        {"poses": waves(156), "mocap_framerate": np.array(120.0)},
+        {"poses": waves(24, 3), "fps": np.array(120.0)},
         {"global_orient": waves(3), "body_pose": waves(21, 3)},
         {"betas": waves(10), "gender": np.array("male")},
     ],
@@ -218,6 +221,84 @@ def test_one_frame_is_still_a_pose(tmp_path, arrays):
     source = Source.open(saved(tmp_path / "a.npz", **arrays))
     assert detect(source) == "pose"
     assert isinstance(read(source), PoseRecord)
+
+
+@pytest.mark.parametrize(
+    ("arrays", "names"),
+    [
+        (first_release(1), SMPLH),
+        ({"poses": waves(1, 24, 3), "fps": np.array(30)}, SMPL),
+        ({"root_orient": waves(1, 3), "pose_body": waves(1, 63), "fps": np.array(30)}, SMPL[:22]),
+    ],
+)
+def test_one_frame_at_a_frame_rate_is_a_motion(tmp_path, arrays, names):
+    motion, _ = motion_of(saved(tmp_path / "a.npz", **arrays))
+    assert (motion.joint_names, motion.n_rows, motion.timing.rows.tolist()) == (names, 1, [0])
+
+
+@pytest.mark.parametrize(
+    ("arrays", "key"),
+    [
+        (first_release(0), "poses"),
+        ({"poses": np.zeros((0, 72)), "betas": waves(10)}, "poses"),
+        ({"poses": np.zeros((0, 24, 3))}, "poses"),
+        ({"root_orient": np.zeros((0, 3)), "pose_body": np.zeros((0, 63))}, "root_orient"),
+        ({"global_orient": np.zeros((0, 3)), "body_pose": np.zeros((0, 69))}, "global_orient"),
+    ],
+)
+def test_no_frames_are_refused(tmp_path, arrays, key):
+    path = saved(tmp_path / "a.npz", **arrays)
+    with pytest.raises(FormatError) as caught:
+        read(Source.open(path))
+    assert str(caught.value) == f"{path}: {key}: expected frames, found none"
+
+
+# The same thing twice
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"root_orient": waves(4, 3, seed=9)}, "poses and root_orient differ: poses is taken"),
+        ({"pose_body": waves(4, 63, seed=9), "pose_hand": waves(4, 90, seed=9)},
+         "poses and pose_body, pose_hand differ: poses is taken"),
+        ({"root_orient": waves(4, 156)[:3, :3]}, "poses and root_orient differ: poses is taken"),
+        ({"root_orient": np.array("none")}, "poses and root_orient differ: poses is taken"),
+        ({"fullpose": waves(4, 156, seed=9)}, "poses and fullpose differ: poses is taken"),
+        ({"transl": waves(4, 3)}, "trans and transl differ: trans is taken"),
+        ({"shape": waves(10)}, "betas and shape differ: betas is taken"),
+    ],
+)  # fmt: skip
+def test_what_is_there_twice_and_differs_is_said(tmp_path, changes, message):
+    motion, warnings = motion_of(saved(tmp_path / "a.npz", **first_release(**changes)))
+    assert warnings == [message]
+    assert_array_equal(motion.vectors, waves(4, 156).reshape(4, 52, 3))
+    assert_array_equal(motion.translations, waves(4, 3, seed=1))
+
+
+def test_what_is_there_twice_and_the_same_is_not_said(tmp_path):
+    same = {"fullpose": waves(4, 156), "transl": waves(4, 1, 3, seed=1), "shape": waves(16, seed=2)}
+    same |= {"root_orient": waves(4, 156)[:, :3] + 9e-6, "pose_hand": waves(4, 156)[:, 66:]}
+    assert motion_of(saved(tmp_path / "a.npz", **first_release(**same)))[1] == []
+
+
+def test_hand_components_beside_whole_poses_are_not_compared(tmp_path):
+    beside = {"left_hand_pose": waves(4, 45), "use_pca": np.array(True)}
+    assert motion_of(saved(tmp_path / "a.npz", **first_release(**beside)))[1] == []
+    beside = {"right_hand_pose": waves(4, 12)}
+    assert motion_of(saved(tmp_path / "b.npz", **first_release(**beside)))[1] == []
+
+
+def test_parts_of_the_same_joints_are_taken_once(tmp_path):
+    parts = {"root_orient": waves(3, 3), "pose_body": waves(3, 63), "pose_eye": waves(3, 6)}
+    parts |= {"leye_pose": waves(3, 3, seed=2), "reye_pose": waves(3, 6)[:, 3:]}
+    path = saved(tmp_path / "a.npz", **parts, trans=waves(3, 3), fps=np.array(30))
+    motion, warnings = motion_of(path)
+    assert motion.joint_names == (*SMPL[:22], "left_eye", "right_eye")
+    assert_array_equal(motion.vectors[:, 22:].reshape(3, 6), waves(3, 6))
+    assert warnings == [
+        "leye_pose and the part before it with the same joints differ: leye_pose is left out"
+    ]
 
 
 def test_marks_of_our_own_files_are_read(tmp_path):

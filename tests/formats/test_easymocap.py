@@ -156,6 +156,10 @@ def test_people_without_a_track_are_told_apart_within_a_frame(tmp_path):
     write_frames(tmp_path / "smpl", {0: [body(-1), body(0), body(-1, seed=1.0), body(-1)]})
     _, parts, _ = opened(tmp_path)
     assert list(parts[0].bodies) == [-1, 0, -2, -3]
+    assert parts[0].warnings == (
+        f"{tmp_path}/smpl/000000.json: people without a track (id -1) are called "
+        '"untracked" and numbered within each frame: nobody says who of them is who in the next',
+    )
     assert_array_equal(parts[0].bodies[-2].translations[0], waves(3, seed=3.0))
 
 
@@ -321,6 +325,17 @@ def test_one_hand_beside_a_coco_body(tmp_path):
     assert layout.names[17:19] == ("right_hand_wrist", "right_thumb1")
     # The hand grows from the body's right wrist, number 10 of coco.
     assert [10, 18] in layout.limbs.tolist()
+
+
+def test_keypoints_twice_are_said_to_be_left_out(tmp_path):
+    folder = write_frames(tmp_path / "smpl", {0: [body(0) | points(0, seed=1.0)]})
+    write_frames(tmp_path / "keypoints3d", {0: [points(0)]})
+    _, parts, _ = opened(tmp_path)
+    assert_array_equal(parts[0].points[0][1].points, [points(0)["keypoints3d"]])
+    assert parts[0].warnings == (
+        f"{folder}/000000.json: keypoints3d in it and beside it: those in the folder keypoints3d "
+        "count",
+    )
 
 
 def test_keypoints_in_body_records_are_read(tmp_path):

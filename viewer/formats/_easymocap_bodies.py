@@ -9,24 +9,27 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from viewer.formats._easymocap_json import MisfitError, row_of, take_row
+from viewer.formats._easymocap_shapes import COEFFICIENTS, carry, last_given
 from viewer.formats._numbers import LARGEST
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.body_motion import BodyMotion
 from viewer.rig.smpl_family import FAMILY, members_by_numbers
 from viewer.rig.timing import Timing
 
-__all__ = ["BodyLayout", "BodyRows", "Rows", "body_layout"]
+__all__ = ["BodyLayout", "BodyRows", "Rows", "body_layout", "with_coefficients"]
 
 _SMPL, _SMPLH, _SMPLX, _MANO = FAMILY[24], FAMILY[52], FAMILY[55], FAMILY[16]
 _BODY = members_by_numbers()[66]
 _FACE = _SMPLX.names[22:25]
 _VPOSER = 32
+_LAST = "no {} in this record: the person's last ones are kept, wherever there are none"
+_NO_LAST = "no {} in this record, nor in earlier ones of the same person: 0 is taken"
 _SHAPES = 10  # shape numbers that the legacy code puts before those of the expression
 
 
@@ -101,7 +104,7 @@ def body_layout(record: dict[str, Any]) -> BodyLayout:
         known = ", ".join(str(number) for number in sorted(_LAYOUTS))
         raise MisfitError(f"poses: expected {known} numbers, found {count}")
     widths = [("Rh", 3), ("Th", 3), ("poses", count)]
-    widths += [(key, len(row_of(record, key))) for key in ("shapes", "expression") if key in record]
+    widths += [(key, len(row_of(record, key))) for key in COEFFICIENTS if key in record]
     hands = layout.hands
     if count == 63:
         keys = [key for key in ("handl", "handr") if key in record]
@@ -115,6 +118,20 @@ def body_layout(record: dict[str, Any]) -> BodyLayout:
         layout.is_flat,
         tuple(widths),
     )
+
+
+def with_coefficients(layout: BodyLayout, record: dict[str, Any]) -> BodyLayout:
+    """Return a layout with the coefficients that a record is the first to have, at its end.
+
+    Raises
+    ------
+    MisfitError
+        If they are no numbers.
+    """
+    known = [key for key, _ in layout.widths]
+    new = [key for key in COEFFICIENTS if key in record and key not in known]
+    more = [(key, len(row_of(record, key))) for key in new]
+    return replace(layout, widths=(*layout.widths, *more))
 
 
 @dataclass(slots=True)
@@ -143,16 +160,31 @@ class BodyRows(Rows):
     ----------
     layout : BodyLayout
         Of all records.
+    known : mapping of str to (C,), or None
+        The person's last coefficients before these rows, which ``values`` brings up to date; None
+        for people without a track, whose rows have nothing to do with one another.
     buffers : list of array
         Numbers of the layout's keys, one record behind the other.
+    remarks : list of (str, str)
+        Found by ``values``: file and text of what is odd but no fault.
     """
 
     layout: BodyLayout
+    known: dict[str, Floats] | None = None
     buffers: list[array[float]] = field(default_factory=list)
+    remarks: list[tuple[str, str]] = field(default_factory=list)
+    _lacking: dict[str, list[int]] = field(default_factory=dict)
     _plan: list[tuple[str, int, Callable[[list[Any]], None]]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.buffers = [array("d") for _ in self.layout.widths]
+        self.widen(self.layout)
+
+    def widen(self, layout: BodyLayout) -> None:
+        """Make room for coefficients that no record had so far; see ``with_coefficients``."""
+        self.layout = layout
+        for key, count in layout.widths[len(self.buffers) :]:
+            self.buffers.append(array("d", bytes(8 * count * len(self.frames))))
+            self._lacking[key] = [*range(len(self.frames))]
         self._plan = [(key, count, buffer.fromlist) for (key, count), buffer in self._buffers()]
 
     def add(self, record: dict[str, Any], frame: int, path: str) -> None:
@@ -165,6 +197,9 @@ class BodyRows(Rows):
         """
         try:
             for key, count, put in self._plan:
+                if key not in record:
+                    self._lack(key, count, put)
+                    continue
                 values = record[key]
                 if len(values) == 1:
                     values = values[0]
@@ -178,16 +213,31 @@ class BodyRows(Rows):
 
     def _take_slowly(self, record: dict[str, Any]) -> None:
         """Take in what may be odd, and say what is wrong with it."""
-        widths = [(count, buffer) for (_, count), buffer in self._buffers()]
-        for count, buffer in widths:
-            del buffer[count * len(self.frames) :]
+        self._drop_unfinished()
         try:
             for key, count, put in self._plan:
-                take_row(record, key, count, put)
+                if key in record or key not in COEFFICIENTS:
+                    take_row(record, key, count, put)
+                else:
+                    self._lack(key, count, put)
         except MisfitError:
-            for count, buffer in widths:
-                del buffer[count * len(self.frames) :]
+            self._drop_unfinished()
             raise
+
+    def _lack(self, key: str, count: int, put: Callable[[list[Any]], None]) -> None:
+        """Leave room for coefficients that the person's other records have."""
+        if key not in COEFFICIENTS:
+            raise KeyError(key)
+        put([0.0] * count)
+        self._lacking[key].append(len(self.frames))
+
+    def _drop_unfinished(self) -> None:
+        row = len(self.frames)
+        for (_, count), buffer in self._buffers():
+            del buffer[count * row :]
+        for rows in self._lacking.values():
+            if rows and rows[-1] == row:
+                rows.pop()
 
     def _buffers(self) -> Iterator[tuple[tuple[str, int], array[float]]]:
         return zip(self.layout.widths, self.buffers, strict=True)
@@ -208,6 +258,8 @@ class BodyRows(Rows):
         values, faults = {}, []
         for (key, count), buffer in self._buffers():
             rows = np.frombuffer(buffer, dtype=np.float64).reshape(-1, count)
+            if key in COEFFICIENTS:
+                rows = self._carried(key, rows)
             values[key] = rows
             # NaN passes through the sum; the rows are looked at only if something is wrong.
             if rows.size and not -LARGEST <= rows.min() <= rows.max() <= LARGEST:
@@ -220,6 +272,27 @@ class BodyRows(Rows):
         if faults:
             values = {key: rows[keep] for key, rows in values.items()}
         return values, keep, faults
+
+    def _carried(self, key: str, rows: Floats) -> Floats:
+        """Fill coefficients that records leave out, and say whence."""
+        lacking = self._lacking[key]
+        is_given: Bools = np.ones(len(rows), dtype=np.bool_)
+        is_given[lacking] = False
+        if self.known is None:
+            if lacking:
+                self.remarks.append((self.paths[lacking[0]], _NO_LAST.format(key)))
+            return rows
+        before = self.known.get(key)
+        filled = carry(rows, is_given, before)
+        last = last_given(rows, is_given)
+        if last is not None:
+            self.known[key] = last
+        if lacking:
+            is_first = before is None and lacking[0] == 0
+            self.remarks.append(
+                (self.paths[lacking[0]], (_NO_LAST if is_first else _LAST).format(key))
+            )
+        return filled
 
     def motion(
         self,

@@ -8,18 +8,31 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from viewer.errors import FormatError, printable
-from viewer.formats._easymocap_bodies import BodyLayout, BodyRows, body_layout
+from viewer.formats._easymocap_bodies import (
+    BodyLayout,
+    BodyRows,
+    body_layout,
+    with_coefficients,
+)
 from viewer.formats._easymocap_files import FrameFiles, FrameFolder
 from viewer.formats._easymocap_json import MisfitError, load_people, person_of
 from viewer.formats._easymocap_points import KEY, Parts, PointRows, point_layout
+from viewer.formats._easymocap_shapes import COEFFICIENTS
+from viewer.rig.arrays import Floats
 from viewer.rig.body_motion import BodyMotion
 from viewer.rig.capture import CapturePart
+from viewer.rig.person import is_tracked, person_label
 from viewer.rig.points import PointClip, PointLayout
 
 __all__ = ["Options", "Reading"]
 
 _SIZES = (64, 256, 1024, 4096)  # frames of a part; all further ones have the last number
 _MOST_WARNINGS = 20
+_LISTED = 6  # people in one line
+_UNTRACKED = (
+    'people without a track (id -1) are called "untracked" and numbered within each frame: '
+    "nobody says who of them is who in the next"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +67,7 @@ class Reading:
     options : Options
         What the files leave open.
     body_layout, point_layout : layouts or None
-        Of the first record that had one; all others must be alike.
+        Of the first record that had one; all others must be alike, but may bring coefficients.
     first_fault : FormatError or None
         What was wrong first.
     """
@@ -66,6 +79,9 @@ class Reading:
     first_fault: FormatError | None = None
     _prefixes: list[str] = field(default_factory=list)
     _n_faults: int = 0
+    _known: dict[int, dict[str, Floats]] = field(default_factory=dict)
+    _awaited: tuple[str, ...] = ()
+    _has_seen: dict[int, bool] = field(default_factory=dict)
     _texts: list[str] = field(default_factory=list)
     _said: set[str] = field(default_factory=set)
 
@@ -108,36 +124,76 @@ class Reading:
                 continue
             if person < 0:  # nobody knows who: told apart within the frame
                 person = min(seen) - 1 if -1 in seen else -1
+                self._say_once(path, _UNTRACKED)
             if person in seen:
                 self._fault(FormatError(path, f"person {person} is there twice: the first counts"))
                 continue
-            if "id" not in record and "personID" not in record:
-                self._say_once(path, "people without id: numbered in the order of their lists")
+            if "id" not in record or "personID" in record:
+                self._say_of_ids(path, record)
             seen.add(person)
-            has_body = folder.has_bodies and "poses" in record
-            has_points = folder.has_points and KEY in record
-            try:
-                if has_points:
-                    self._add_points(part, person, record, frame, path)
-                if has_body:
-                    self._add_body(part, person, record, frame, path)
-                elif not has_points:
-                    raise MisfitError(_lacks(record, folder))
-            except MisfitError as problem:
-                self._fault(FormatError(path, f"person {person}: {problem}"))
+            self._take_person(person, record, folder, frame, path, part)
+
+    def _say_of_ids(self, path: str, record: dict[str, Any]) -> None:
+        """Say whose number is used where there is none, or two that differ."""
+        if "id" not in record and "personID" not in record:
+            self._say_once(path, "people without id: numbered in the order of their lists")
+        elif "id" in record and record["id"] != record["personID"]:
+            self._say_once(path, "people whose id and personID differ: id counts everywhere")
+
+    def _take_person(
+        self,
+        person: int,
+        record: dict[str, Any],
+        folder: FrameFolder,
+        frame: int,
+        path: str,
+        part: _Part,
+    ) -> None:
+        has_body = folder.has_bodies and "poses" in record
+        has_points = folder.has_points and KEY in record
+        try:
+            if has_points:
+                self._add_points(part, person, record, frame, path)
+            if has_body:
+                self._add_body(part, person, record, frame, path)
+            elif not has_points:
+                raise MisfitError(_lacks(record, folder))
+        except MisfitError as problem:
+            self._fault(FormatError(path, f"{person_label(person)}: {problem}"))
+        if has_body and KEY in record and not has_points:
+            self._say_once(path, f"{KEY} in it and beside it: those in the folder {KEY} count")
+        elif has_points and "poses" in record and not has_body:
+            self._say_once(path, "poses in it and beside it: those beside it count")
 
     def _add_body(
         self, part: _Part, person: int, record: dict[str, Any], frame: int, path: str
     ) -> None:
+        layout = self._layout_of(record, path)
         rows = part.bodies.get(person)
         if rows is None:
-            if self.body_layout is None:
-                self.body_layout = body_layout(record)
-            rows = BodyRows(layout=self.body_layout)
+            known = self._known.setdefault(person, {}) if is_tracked(person) else None
+            rows = BodyRows(layout=layout, known=known)
+        elif rows.layout is not layout:
+            rows.widen(layout)
         rows.add(record, frame, path)
         part.bodies[person] = rows
         if "vertices" in record:
             self._say_once(path, "vertices are not needed, and left out everywhere")
+
+    def _layout_of(self, record: dict[str, Any], path: str) -> BodyLayout:
+        """Return the layout of all bodies, wider from the first record with coefficients on."""
+        layout = self.body_layout
+        if layout is None:
+            layout = body_layout(record)
+        elif any(key in record for key in self._awaited):
+            first = [key for key in self._awaited if key in record]
+            layout = with_coefficients(layout, record)
+            self._say_once(path, f"the first record with {' and '.join(first)}: 0 before it")
+        else:
+            return layout
+        self.body_layout, keys = layout, [key for key, _ in layout.widths]
+        self._awaited = tuple(key for key in COEFFICIENTS if key not in keys)
+        return layout
 
     def _add_points(
         self, part: _Part, person: int, record: dict[str, Any], frame: int, path: str
@@ -160,6 +216,8 @@ class Reading:
         for person, rows in part.bodies.items():
             values, keep, faults = rows.values()
             self._faults(person, faults)
+            for path, text in rows.remarks:
+                self._say_once(path, text)
             if keep.any():
                 bodies[person] = rows.motion(
                     options.name,
@@ -172,17 +230,31 @@ class Reading:
         for person, seen in part.points.items():
             places, faults = seen.points()
             self._faults(person, faults)
+            is_seen = bool(places[..., 3].any())
+            self._has_seen[person] = self._has_seen.get(person, False) or is_seen
             clip = PointClip(options.name, seen.timing(*where), places)
             points[person] = seen.layout, clip
-        if stop == files.n_frames and self._n_faults > _MOST_WARNINGS:
-            more = self._n_faults - _MOST_WARNINGS
-            self._texts.append(f"{printable(options.name)}: {more} more faults in frame files")
+        if stop == files.n_frames:
+            self._texts += self._last_words()
         texts, self._texts = self._texts, []
         return CapturePart(stop, bodies, points, tuple(texts))
 
+    def _last_words(self) -> list[str]:
+        """Return what is only known when everything was read."""
+        name, texts = printable(self.options.name), []
+        unseen = [person for person, has_seen in self._has_seen.items() if not has_seen]
+        if unseen:
+            who = ", ".join(map(person_label, unseen[:_LISTED]))
+            more = f" and {len(unseen) - _LISTED} more" * (len(unseen) > _LISTED)
+            texts.append(f"{name}: no keypoint of {who}{more} is ever seen: every confidence is 0")
+        if self._n_faults > _MOST_WARNINGS:
+            more = f"{self._n_faults - _MOST_WARNINGS} more faults"
+            texts.append(f"{name}: {more} in frame files")
+        return texts
+
     def _faults(self, person: int, faults: list[tuple[str, str]]) -> None:
         for path, text in faults:
-            self._fault(FormatError(path, f"person {person}: {text}"))
+            self._fault(FormatError(path, f"{person_label(person)}: {text}"))
 
     def _fault(self, fault: FormatError) -> None:
         self.first_fault = self.first_fault or fault

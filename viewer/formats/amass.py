@@ -64,21 +64,24 @@ _KNOWN = {
     *_POSES, *_TRANSLATIONS, *_SHAPES, *_EXPRESSIONS, *_RATES, *_FLAGS, *_OWN, *_BESIDES.split(),
     *(key for keys, _ in _PARTS for key in keys),
 }  # fmt: skip
+_OF_MOTIONS = (*_RATES, "mocap_time_length")
 _OF_AMASS = ("mocap_framerate", "mocap_frame_rate", "mocap_time_length", "dmpls", "pose_body")
 _RATE, _RATE_OF_AIST = 30.0, 60.0
+_SAME = 1e-5  # radians or metres: what float32 leaves of numbers below 100
 
 
 def has_frames(archive: Archive) -> bool:
-    """Return whether an archive holds more than one pose, so that it is a motion.
+    """Return whether an archive is a motion rather than one pose, which may be J x 3 numbers.
 
-    Poses of one frame may be J x 3 numbers.
+    A motion has several frames, or none, or one in an array of frames beside a frame rate.
     """
+    is_timed = any(archive.has(key) for key in _OF_MOTIONS)
     for key in (*_POSES, "body_pose", "pose_body", *_ROOTS):
         value = archive.get(key) if archive.has(key) else None
         if isinstance(value, Deferred):
-            shape = value.shape
-            is_per_joint = shape[-1:] == (3,) and key not in _ROOTS
-            return math.prod(shape[: -2 if is_per_joint else -1]) > 1
+            is_per_joint = value.shape[-1:] == (3,) and key not in _ROOTS
+            frames = value.shape[: -2 if is_per_joint else -1]
+            return math.prod(frames) != 1 or (is_timed and bool(frames))
     return False
 
 
@@ -101,12 +104,13 @@ def read(source: Source) -> BodyMotion:
         If there are no poses, or arrays differ in their number of frames.
     """
     archive = archive_of(source)
-    found = next((key for key in _POSES if archive.has(key)), None)
+    found = _first_key(source, archive, _POSES)
     hands: dict[str, Floats] = {}
     if found is not None:
         names, vectors = _whole_poses(archive, found)
+        _compare_parts(source, archive, found, names, vectors)
     else:
-        found = next((key for key in _ROOTS if archive.has(key)), None)
+        found = _first_key(source, archive, _ROOTS)
         if found is None:
             raise source.error(_refusal(source, archive))
         names, vectors, hands = _split_poses(source, archive, found)
@@ -119,8 +123,8 @@ def read(source: Source) -> BodyMotion:
         names,
         vectors,
         _translations(source, archive, count, found),
-        shape=_coefficients(archive, _SHAPES, count, found),
-        expression=_coefficients(archive, _EXPRESSIONS, count, found),
+        shape=_coefficients(source, archive, _SHAPES, count, found),
+        expression=_coefficients(source, archive, _EXPRESSIONS, count, found),
         hands=hands,
         flat_hands=_flag(archive, "flat_hand_mean"),
         up=_up(archive, is_aist),
@@ -162,6 +166,50 @@ def _whole_poses(archive: Archive, key: str) -> tuple[tuple[str, ...], Floats]:
     return known[rows.shape[1]], rows.reshape(len(rows), -1, 3)
 
 
+def _first_key(source: Source, archive: Archive, keys: tuple[str, ...]) -> str | None:
+    """Return the first spelling that is there; say so if another one says something else."""
+    there = [key for key in keys if archive.has(key)]
+    for key in there[1:]:
+        if not _are_same(_numbers(archive, there[0]), _numbers(archive, key)):
+            source.warn(f"{there[0]} and {key} differ: {there[0]} is taken")
+    return there[0] if there else None
+
+
+def _numbers(archive: Archive, key: str) -> Floats:
+    """Return what is only compared with something else; nothing where it is no array of numbers."""
+    try:
+        return np.asarray(archive.array(key).values(), dtype=np.float64).ravel()
+    except FormatError:
+        return np.zeros(0)
+
+
+def _are_same(first: Floats, second: Floats) -> bool:
+    return first.shape == second.shape and np.allclose(first, second, rtol=0, atol=_SAME)
+
+
+def _compare_parts(
+    source: Source, archive: Archive, key: str, names: tuple[str, ...], vectors: Floats
+) -> None:
+    """Say which parts are there beside whole poses and turn the same joints in another way."""
+    has_angles = not _flag(archive, "use_pca")
+    has_angles &= not archive.has("flat_hand_mean") or _flag(archive, "flat_hand_mean")
+    odd = []
+    for keys, joints in _PARTS:
+        part = next((part for part in keys if archive.has(part)), None)
+        if part is None or (part in _HANDS and not has_angles):
+            continue
+        numbers = _numbers(archive, part)
+        usual = () if part in _HANDS else next(iter(joints.values()))
+        turned = joints.get(len(numbers) // len(vectors), usual)
+        if not turned or not set(turned) <= set(names):
+            continue  # components of hands, or joints that the poses do not have
+        columns = [names.index(name) for name in turned]
+        if not _are_same(vectors[:, columns].ravel(), numbers):
+            odd.append(part)
+    if odd:
+        source.warn(f"{key} and {', '.join(odd)} differ: {key} is taken")
+
+
 def _split_poses(
     source: Source, archive: Archive, root: str
 ) -> tuple[tuple[str, ...], Floats, dict[str, Floats]]:
@@ -171,7 +219,7 @@ def _split_poses(
     parts: list[Floats] = []
     hands: dict[str, Floats] = {}
     for keys, joints in _PARTS:
-        key = next((key for key in keys if archive.has(key)), None)
+        key = root if keys == _ROOTS else _first_key(source, archive, keys)
         if key is None:
             continue
         rows = _rows(archive, key, count, root)
@@ -184,10 +232,28 @@ def _split_poses(
             raise archive.error(key, f"expected {wanted} numbers a frame, found {columns}")
         if key in _HANDS and archive.has("flat_hand_mean") and not _flag(archive, "flat_hand_mean"):
             source.warn(f"{key}: angles are taken as they are; the mean hand is not added to them")
+        if set(joints[columns]) <= set(names):  # pose_eye holds both, leye_pose one of them
+            _compare_again(source, key, joints[columns], rows, names, parts)
+            continue
         names += joints[columns]
         parts.append(rows)
     vectors = np.concatenate(parts, axis=1).reshape(count, -1, 3)
     return tuple(names), vectors, hands
+
+
+def _compare_again(
+    source: Source,
+    key: str,
+    joints: tuple[str, ...],
+    rows: Floats,
+    names: list[str],
+    parts: list[Floats],
+) -> None:
+    """Say so if a part turns joints in another way than an earlier part has done."""
+    vectors = np.concatenate(parts, axis=1).reshape(len(rows), -1, 3)
+    columns = [names.index(name) for name in joints]
+    if not _are_same(vectors[:, columns].ravel(), rows.ravel()):
+        source.warn(f"{key} and the part before it with the same joints differ: {key} is left out")
 
 
 def _flag(archive: Archive, key: str) -> bool:
@@ -195,7 +261,7 @@ def _flag(archive: Archive, key: str) -> bool:
 
 
 def _translations(source: Source, archive: Archive, count: int, first: str) -> Floats:
-    key = next((key for key in _TRANSLATIONS if archive.has(key)), None)
+    key = _first_key(source, archive, _TRANSLATIONS)
     if key is None:
         source.warn("no trans in it: the body stays in its place")
         return np.zeros((count, 3))
@@ -208,8 +274,10 @@ def _translations(source: Source, archive: Archive, count: int, first: str) -> F
     return rows / scale
 
 
-def _coefficients(archive: Archive, keys: tuple[str, ...], count: int, first: str) -> Floats | None:
-    key = next((key for key in keys if archive.has(key)), None)
+def _coefficients(
+    source: Source, archive: Archive, keys: tuple[str, ...], count: int, first: str
+) -> Floats | None:
+    key = _first_key(source, archive, keys)
     if key is None:
         return None
     array = archive.array(key)

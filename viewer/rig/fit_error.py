@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from viewer.rig.keypoint_layouts import matching_joints
+from viewer.rig.person import is_tracked
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import joint_matrices
 from viewer.rig.transform import apply_transform
@@ -15,9 +16,12 @@ __all__ = ["fitted_body", "keypoint_distances"]
 
 
 def fitted_body(points: Actor, actors: Sequence[Actor]) -> Actor | None:
-    """Return the body of the same person as captured keypoints, None if there is none."""
+    """Return the body of the same person as captured keypoints, None if there is none.
+
+    People without a track have none: nobody knows whose body it is.
+    """
     for actor in actors:
-        same = actor.person == points.person and actor.person is not None
+        same = actor.person == points.person and is_tracked(actor.person)
         if same and actor.pose is not None and actor.figure.mesh is not None:
             return actor
     return None

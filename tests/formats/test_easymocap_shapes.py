@@ -1,0 +1,126 @@
+"""Coefficients that records leave out: which of the earlier ones they get."""
+
+import numpy as np
+from capture_files import body, opened, rows_of, waves, write_frames
+from numpy.testing import assert_array_equal
+
+from viewer.formats._easymocap_shapes import carry, last_given
+
+ROWS = np.array([[9.0, 9.0], [1.0, 2.0], [9.0, 9.0], [np.nan, 3.0], [9.0, 9.0]])
+GIVEN = np.array([False, True, False, True, False])
+
+
+def test_rows_repeat_the_last_good_one():
+    expected = [[0.0, 0.0], [1.0, 2.0], [1.0, 2.0], [np.nan, 3.0], [1.0, 2.0]]
+    assert_array_equal(carry(ROWS, GIVEN, None), expected)
+
+
+def test_rows_begin_with_what_was_known():
+    assert_array_equal(carry(ROWS, GIVEN, np.array([7.0, 8.0]))[0], [7.0, 8.0])
+
+
+def test_complete_rows_stay_as_they_are():
+    assert carry(ROWS, np.ones(5, dtype=bool), None) is ROWS
+
+
+def test_last_good_row_is_remembered():
+    assert_array_equal(last_given(ROWS, GIVEN), [1.0, 2.0])
+    assert last_given(ROWS, np.zeros(5, dtype=bool)) is None
+    assert last_given(np.zeros((0, 2)), np.zeros(0, dtype=bool)) is None
+
+
+# In recordings
+
+
+def shapes_of(parts, person):
+    """Return the shape of every row of a person, as the records have it."""
+    motions = [part.bodies[person] for part in parts if person in part.bodies]
+    rows = [np.broadcast_to(motion.shape, (motion.n_rows, 10)) for motion in motions]
+    return np.concatenate(rows)[:, 0].tolist()
+
+
+def test_shapes_of_the_first_record_count_for_all(tmp_path):
+    bare = [body(0, shapes=None), body(1, shapes=None)]
+    first = [body(0, shapes=[[2.0] * 10]), body(1, shapes=[[3.0] * 10])]
+    folder = write_frames(tmp_path / "smpl", {0: first, **dict.fromkeys(range(1, 100), bare)})
+    _, parts, _ = opened(tmp_path)
+    assert len(parts) == 3 and rows_of(parts, 1) == list(range(100))
+    assert shapes_of(parts, 0) == [2.0] * 100 and shapes_of(parts, 1) == [3.0] * 100
+    assert all(part.bodies[0].shape.shape == (1, 10) for part in parts)
+    assert [text for part in parts for text in part.warnings] == [
+        f"{folder}/000001.json: no shapes in this record: the person's last ones are kept, "
+        "wherever there are none"
+    ]
+
+
+def test_last_good_shapes_are_kept(tmp_path):
+    def record(value):
+        return [body(0, shapes=None if value is None else [[value] * 10])]
+
+    values = [None, 1.0, None, 2.0, float("nan"), None, None, 4.0]
+    write_frames(tmp_path / "smpl", {frame: record(value) for frame, value in enumerate(values)})
+    _, parts, _ = opened(tmp_path)
+    # The record that is no number is a gap, and nobody's shape.
+    assert rows_of(parts, 0) == [0, 1, 2, 3, 5, 6, 7]
+    found = [0.0, 1.0, 1.0, 2.0, 2.0, 2.0, 4.0]
+    rows = [part.bodies[0] for part in parts]
+    assert rows[0].shape is None  # nobody had said a word of shapes
+    assert shapes_of(parts[1:], 0) == found[1:]
+    texts = [text.removeprefix(f"{tmp_path}/smpl/") for part in parts for text in part.warnings]
+    assert texts == [
+        "000001.json: the first record with shapes: 0 before it",
+        "000004.json: person 0: shapes: expected finite numbers, found nan",
+        "000002.json: no shapes in this record: the person's last ones are kept, wherever there "
+        "are none",
+    ]
+
+
+def test_who_never_had_shapes_has_those_of_the_mean_body(tmp_path):
+    folder = write_frames(tmp_path / "smpl", {0: [body(0), body(1, shapes=None)]})
+    _, parts, _ = opened(tmp_path)
+    assert_array_equal(parts[0].bodies[1].shape, np.zeros((1, 10)))
+    assert_array_equal(parts[0].bodies[0].shape, [waves(10, seed=3)])
+    assert parts[0].warnings == (
+        f"{folder}/000000.json: no shapes in this record, nor in earlier ones of the same person: "
+        "0 is taken",
+    )
+
+
+def test_untracked_people_do_not_inherit_shapes(tmp_path):
+    frames = {0: [body(-1, shapes=[[5.0] * 10])], 1: [body(-1, shapes=None)], 2: [body(-1)]}
+    write_frames(tmp_path / "smpl", frames)
+    _, parts, _ = opened(tmp_path)
+    assert shapes_of(parts, -1) == [5.0, 0.0, waves(10, seed=2)[0]]
+
+
+def test_expression_is_carried_on_too(tmp_path):
+    said = {"expression": [[0.5] * 10]}
+    frames = {0: [body(0, 87)], 1: [body(0, 87, **said)], 2: [body(0, 87)]}
+    write_frames(tmp_path / "smpl", frames)
+    _, parts, _ = opened(tmp_path)
+    assert parts[0].bodies[0].expression is None
+    assert_array_equal(parts[1].bodies[0].expression, np.full((1, 10), 0.5))
+    assert parts[1].bodies[0].n_rows == 2
+
+
+def test_expression_that_comes_in_the_middle_of_a_part(tmp_path):
+    frames = {frame: [body(0, 87), body(1, 87)] for frame in range(5)}
+    frames[3] = [body(0, 87), body(1, 87, expression=[[0.5] * 10])]
+    write_frames(tmp_path / "smpl", frames)
+    _, parts, _ = opened(tmp_path)
+    assert_array_equal(parts[1].bodies[0].expression, np.zeros((1, 10)))
+    assert parts[1].bodies[1].expression[:, 0].tolist() == [0.0, 0.0, 0.5, 0.5]
+
+
+def test_record_without_poses_stays_a_gap(tmp_path):
+    write_frames(tmp_path / "smpl", {0: [body(0)], 1: [body(0, poses=None)], 2: [body(0)]})
+    _, parts, _ = opened(tmp_path)
+    assert rows_of(parts, 0) == [0, 2]
+
+
+def test_faulty_record_without_shapes_leaves_the_others_alone(tmp_path):
+    bare = body(0, shapes=None)
+    frames = {0: [body(0, shapes=[[2.0] * 10])], 1: [bare], 2: [bare | {"Th": [[1, "x", 3]]}]}
+    write_frames(tmp_path / "smpl", {**frames, 3: [bare]})
+    _, parts, _ = opened(tmp_path)
+    assert rows_of(parts, 0) == [0, 1, 3] and shapes_of(parts, 0) == [2.0] * 3
