@@ -1,0 +1,370 @@
+"""``.obj`` files: what is read, what is said, and what is refused."""
+
+import time
+
+import numpy as np
+import pytest
+
+import viewer
+from viewer.errors import FormatError
+from viewer.formats import Source, detect, obj
+from viewer.formats._png import encode_png
+from viewer.rig.mesh import triangle_areas, volume
+
+SQUARE = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\n"
+
+
+def read(text, path="a.obj"):
+    """Return the figure and the warnings of a text."""
+    source = Source(path, text if isinstance(text, bytes) else text.encode())
+    return obj.read(source), source.warnings
+
+
+def silent(text):
+    figure, warnings = read(text)
+    assert warnings == []
+    return figure
+
+
+def refusal(text):
+    with pytest.raises(FormatError) as caught:
+        read(text)
+    return str(caught.value)
+
+
+def test_triangles_keep_vertices_and_order() -> None:
+    figure = silent(SQUARE + "f 1 2 3\nf 3 4 1\n")
+    assert figure.mesh.positions.tolist() == [[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]]
+    assert figure.mesh.triangles.tolist() == [[0, 1, 2], [2, 3, 0]]
+    assert figure.mesh.uvs is None and figure.mesh.materials == ()
+    assert figure.skeleton is None and figure.skin is None
+    assert (figure.name, figure.up, figure.unit) == ("a", "y", "")
+
+
+def test_missing_normals_are_computed_and_said_in_the_facts() -> None:
+    figure = silent(SQUARE + "f 1 2 3\n")
+    assert figure.mesh.normals.tolist()[:3] == [[0, 0, 1]] * 3
+    assert figure.facts == (("normals", "none in the file: computed from the triangles"),)
+
+
+def test_corners_name_texture_coordinates_and_normals() -> None:
+    text = SQUARE + "vt 0 0\nvt 1 0\nvt 1 1\nvt .5 .25 0\nvn 0 1 0\nvn 1 0 0\n"
+    figure = silent(text + "f 1/1/1 2/2/2 3/3/1\nf 3/4/1 4/1/1 1/2/1\n")
+    mesh = figure.mesh
+    assert mesh.uvs.tolist() == [[0, 0], [1, 0], [1, 1], [0.5, 0.25]]
+    assert mesh.uv_triangles.tolist() == [[0, 1, 2], [3, 0, 1]]
+    assert mesh.normals.tolist() == [[0, 1, 0], [1, 0, 0], [0, 1, 0], [0, 1, 0]]
+
+
+def test_normals_without_texture_coordinates() -> None:
+    mesh = silent(SQUARE + "vn 0 1 0\nf 1//1 2//1 3//1\n").mesh
+    assert mesh.uvs is None
+    # The fourth vertex has no normal and no triangle.
+    assert mesh.normals.tolist() == [[0, 1, 0]] * 4
+
+
+def test_faces_of_different_kinds_are_mixed() -> None:
+    figure, warnings = read(
+        SQUARE + "vt 1 1\nvn 1 0 0\nf 1//1 2//1 3//1\nf 1/1/1 3/1/1 4/1/1\nf 1 2 4"
+    )
+    assert figure.mesh.triangles.tolist() == [[0, 1, 2], [0, 2, 3], [0, 1, 3]]
+    assert figure.mesh.uvs.tolist() == [[1, 1], [0, 0]]
+    assert figure.mesh.uv_triangles.tolist() == [[1, 1, 1], [0, 0, 0], [1, 1, 1]]
+    assert warnings == ["a.obj: 6 corners of triangles without vt: they get 0 0"]
+
+
+def test_negative_indices_count_back_from_the_line() -> None:
+    text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\nv 0 0 1\nf -1 -3 -2\nf 1 -1 2\n"
+    assert silent(text).mesh.triangles.tolist() == [[0, 1, 2], [3, 1, 2], [0, 3, 1]]
+
+
+def test_negative_indices_reach_back_over_pieces() -> None:
+    # 40,000 quads of their own four vertices are more than one piece of the file.
+    block = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf -4 -3 -2 -1\n"
+    mesh = silent(block * 40_000).mesh
+    expected = np.arange(160_000).reshape(-1, 4)
+    assert np.array_equal(mesh.triangles[0::2], expected[:, [0, 1, 2]])
+    assert np.array_equal(mesh.triangles[1::2], expected[:, [0, 2, 3]])
+
+
+def test_indices_may_point_forward() -> None:
+    assert silent("f 1 2 3\n" + SQUARE).mesh.triangles.tolist() == [[0, 1, 2]]
+
+
+def test_polygons_are_cut_and_counted() -> None:
+    text = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 1 3 0\nv 0 2 0\nf 1 2 3 4 5\nf 1 2 3 5\nf 1 2 3\n"
+    figure = silent(text)
+    triangles = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 1, 2], [0, 2, 4], [0, 1, 2]]
+    assert figure.mesh.triangles.tolist() == triangles
+    text = "1 triangles, 1 quads, 1 with 5 or more corners: 6 triangles in all"
+    assert ("polygons", text) in figure.facts
+
+
+def test_a_quad_with_a_dent_is_split_along_it() -> None:
+    # The fourth corner lies inside the triangle of the others: only its diagonal stays inside.
+    text = "v 0 0 0\nv 4 0 0\nv 0 4 0\nv 1 1 0\nf 1 2 4 3\nf 4 3 1 2\nf 2 4 3 1\nf 3 1 2 4\n"
+    mesh = silent(text).mesh
+    areas = triangle_areas(mesh.positions, mesh.triangles).reshape(4, 2)
+    assert areas.sum(axis=1) == pytest.approx([4.0] * 4)  # two of 1 * 4 / 2
+    a, b, c = (mesh.positions[mesh.triangles[:, k], :2] for k in range(3))
+    crosses = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+    assert (crosses > 0).all()
+
+
+@pytest.mark.parametrize("turn", range(0, 12, 3))
+def test_a_polygon_that_is_not_convex_is_covered_exactly(turn: int) -> None:
+    # A comb of three teeth: 12 corners, area by the shoelace formula, in a slanted plane.
+    flat = [(0, 0), (5, 0), (5, 3), (4, 3), (4, 1), (3, 1), (3, 3), (2, 3), (2, 1), (1, 1), (1, 3),
+            (0, 3)]  # fmt: skip
+    flat = flat[turn:] + flat[:turn]
+    shoelace = sum(x * w - z * y for (x, y), (z, w) in zip(flat, flat[1:] + flat[:1], strict=True))
+    lines = "".join(f"v {x} {y} {2 * x - y}\n" for x, y in flat)
+    mesh = silent(lines + "f " + " ".join(str(i + 1) for i in range(12))).mesh
+    flat_points = mesh.positions[:, :2]
+    a, b, c = (flat_points[mesh.triangles[:, k]] for k in range(3))
+    crosses = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+    assert len(crosses) == 10 and (crosses > 0).all()
+    assert crosses.sum() == pytest.approx(shoelace)
+
+
+def test_a_polygon_of_very_many_corners_takes_no_time() -> None:
+    angles = np.linspace(0, 2 * np.pi, 60_000, endpoint=False)
+    radii = 1.0 + 0.1 * np.cos(9 * angles)  # not convex: nine dents
+    points = np.stack([radii * np.cos(angles), radii * np.sin(angles)], axis=1)
+    text = "".join(f"v {x} {y} 0\n" for x, y in points.tolist())
+    start = time.perf_counter()
+    mesh = silent(text + "f " + " ".join(map(str, range(1, 60_001)))).mesh
+    assert mesh.n_triangles == 59_998
+    assert time.perf_counter() - start < 5.0
+
+
+def test_triangles_of_a_closed_box_of_quads_enclose_its_volume() -> None:
+    corners = "".join(f"v {x} {y} {z}\n" for x in (0, 2) for y in (0, 3) for z in (0, 5))
+    quads = "f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\n"
+    mesh = silent(corners + quads).mesh
+    assert volume(mesh.positions, mesh.triangles) == pytest.approx(30.0)
+
+
+def test_colours_and_weights_are_left_out_and_said_once() -> None:
+    figure, warnings = read(
+        "v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0\nv 0 0 1 2\nv 0 0 1 1\nf 1 2 3\n"
+    )
+    assert figure.mesh.positions.tolist()[:3] == [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+    assert warnings == [
+        "a.obj:1: the colour of 2 vertices is not used",
+        "a.obj:4: the w of 1 vertices is not used",
+    ]
+
+
+def test_continued_lines_comments_and_blanks() -> None:
+    text = "# a comment \\\nstill one\r\n\n  v 0 \\\n  0 0\n\tv 1 0 0 \nv 0 1\\\r\n 0\nf 1 \\\n2 3"
+    assert silent(text).mesh.triangles.tolist() == [[0, 1, 2]]
+
+
+@pytest.mark.parametrize("end", ["\r\n", "\r", "\r\r\n"])
+def test_line_ends(end: str) -> None:
+    mesh = silent((SQUARE + "f 1 2 3\n").replace("\n", end)).mesh
+    assert mesh.positions.shape == (4, 3) and mesh.triangles.tolist() == [[0, 1, 2]]
+
+
+def test_unused_vertices_are_kept() -> None:
+    mesh = silent("v 9 9 9\n" + SQUARE + "f 2 3 4\n").mesh
+    assert mesh.n_vertices == 5 and mesh.triangles.tolist() == [[1, 2, 3]]
+
+
+def test_a_vertex_with_several_normals_gets_their_mean() -> None:
+    text = SQUARE + "vn 0 0 1\nvn 0 1 0\nf 1//1 2//1 3//1\nf 1//2 3//1 4//1\nf 1//2 4//1 2//1\n"
+    figure, warnings = read(text)
+    # Two faces share the second normal, which counts once: (0, 1, 1) / sqrt(2).
+    half = 0.5**0.5
+    np.testing.assert_allclose(figure.mesh.normals[0], [0, half, half], atol=1e-15)
+    assert figure.mesh.normals[1:].tolist() == [[0, 0, 1]] * 3
+    assert warnings == [
+        "a.obj: 1 vertices have several normals, first 0: they get the mean, "
+        "so hard edges are drawn smooth"
+    ]
+
+
+def test_normals_of_length_0_are_computed() -> None:
+    figure, warnings = read(SQUARE + "vn 0 0 0\nvn 1 0 0\nf 1//1 2//2 3//2\n")
+    assert figure.mesh.normals.tolist()[:3] == [[0, 0, 1], [1, 0, 0], [1, 0, 0]]
+    assert warnings == [
+        "a.obj: 1 normals of length 0, first of vertex 0: computed from the triangles"
+    ]
+
+
+def test_materials_are_kept_as_runs() -> None:
+    figure = silent(
+        SQUARE + "f 1 2 3\nusemtl red\nf 1 2 3\nf 1 2 4\nusemtl a b\nf 1 2 3\nusemtl red\nf 2 3 4"
+    )
+    assert [material.name for material in figure.mesh.materials] == ["red", "a b"]
+    assert figure.mesh.material_indices.tolist() == [-1, 0, 0, 1, 0]
+
+
+def test_groups_become_materials_where_there_are_none() -> None:
+    figure = silent(SQUARE + "o body\nf 1 2 3\ng shoe\nf 1 2 3 4\no body\nf 2 3 4")
+    assert [material.name for material in figure.mesh.materials] == ["body", "shoe"]
+    assert figure.mesh.material_indices.tolist() == [0, 1, 1, 0]
+    assert ("parts", "2 groups and objects") in figure.facts
+
+
+def test_one_object_is_no_material() -> None:
+    figure = silent("o body\n" + SQUARE + "s 1\nf 1 2 3\n")
+    assert figure.mesh.materials == ()
+
+
+def test_textures_come_from_the_library(tmp_path) -> None:
+    pixels = np.full((2, 2, 4), 255, np.uint8)
+    (tmp_path / "two words.png").write_bytes(encode_png(pixels))
+    (tmp_path / "m.mtl").write_text(
+        "# colours\nnewmtl skin\nKd 1 0 0\nmap_Kd -s 1 1 1 -clamp on two words.png\nnewmtl plain\n"
+    )
+    text = (
+        "mtllib m.mtl\n"
+        + SQUARE
+        + "vt 0 0\nusemtl skin\nf 1/1 2/1 3/1\nusemtl plain\nf 1/1 2/1 3/1"
+    )
+    (tmp_path / "a.obj").write_text(text)
+    source = Source.open(tmp_path / "a.obj")
+    mesh = obj.read(source).mesh
+    assert source.warnings == []
+    assert mesh.materials[0].texture == "two words.png"
+    assert np.array_equal(mesh.materials[0].image, pixels)
+    assert mesh.materials[1].image is None
+
+
+def test_what_libraries_lack_is_said(tmp_path) -> None:
+    (tmp_path / "m.mtl").write_text("newmtl a\nmap_Kd gone.png\nnewmtl b\nmap_Kd ../b.png\n")
+    text = SQUARE + "vt 0 0\nmtllib m.mtl none.mtl ../up.mtl\n"
+    text += "".join(f"usemtl {name}\nf 1/1 2/1 3/1\n" for name in "abc")
+    (tmp_path / "a.obj").write_text(text)
+    source = Source.open(tmp_path / "a.obj")
+    obj.read(source)
+    here = tmp_path
+    assert source.warnings == [
+        f"{here}/a.obj:6: material library {here}/none.mtl: cannot be read: "
+        "No such file or directory; drawn without textures",
+        f"{here}/a.obj:6: material library ../up.mtl lies outside the folder: not read",
+        f"{here}/a.obj: 1 materials are in no library, first c: drawn without a texture",
+        f"{here}/m.mtl:2: texture {here}/gone.png: cannot be read: "
+        "No such file or directory; drawn untextured",
+        f"{here}/m.mtl:4: texture ../b.png lies outside the folder: not read",
+    ]
+
+
+def test_what_is_not_drawn_is_said() -> None:
+    text = SQUARE + "f 1 2 3\nl 1 2 3\nl 2 3\np 1\ncstype bezier\ncstype bezier\nvp 0 0\n"
+    _, warnings = read(text)
+    assert warnings == [
+        'a.obj:9: skipped unknown "cstype"',
+        "a.obj: 2 lines are not drawn",
+        "a.obj: 1 points are not drawn",
+    ]
+
+
+def test_points_alone_are_a_warning() -> None:
+    figure, warnings = read(SQUARE)
+    assert figure.mesh.n_triangles == 0
+    assert warnings == ["a.obj: no faces: 4 points, of which nothing is drawn"]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "a.obj: expected a mesh, found no `v` line (an empty file)"),
+        ("\0" * 9, "a.obj: expected a mesh, found no `v` line (zeros)"),
+        ("vt 0 0\n", "a.obj: expected a mesh, found no `v` line"),
+        ("v 0 0\n", "a.obj:1: v: expected 3 numbers, found 2"),
+        ("v 0 0 0\nv\n", "a.obj:2: v: expected 3 numbers, found 0"),
+        ("v 0 0 0 0 0\n",
+         "a.obj:1: v: expected 3 numbers, or 4, 6 or 7 with w or a colour, found 5"),
+        ("\nv 0 up 0\n", 'a.obj:2: v: expected a number, found "up"'),
+        ("v 0 nan 0\n", 'a.obj:1: v: expected a number, found "nan"'),
+        ("v 0 1e39 0\n", 'a.obj:1: v: expected a number, found "1e39"'),
+        ("v 0 0,5 0\n", 'a.obj:1: v: expected a number, found "0,5"'),
+        (SQUARE + "vn 0 1\n", "a.obj:5: vn: expected 3 numbers, found 2"),
+        (SQUARE + "vt\n", "a.obj:5: vt: expected 1 numbers, found 0"),
+        (SQUARE + "f 1 2\n", "a.obj:5: f: expected 3 or more corners, found 2"),
+        (SQUARE + "f 1 2 0\n", "a.obj:5: f: expected an index from 1, found 0"),
+        (SQUARE + "vt 0 0\n\nf 1/1 2/0 3/1\n", "a.obj:7: f: expected an index from 1, found 0"),
+        (SQUARE + "f 1 2 3\nf 1 2 5\n", "a.obj:6: f: expected a vertex 1 to 4, found 5"),
+        (SQUARE + "f 1 2 -5\n", "a.obj:5: f: expected a vertex -1 to -4, found -5"),
+        ("v 0 0 0\nf -1 -1 -2\n" + SQUARE, "a.obj:2: f: expected a vertex -1 to -1, found -2"),
+        ("f -1 -1 -2\n" + SQUARE, "a.obj:1: f: expected a vertex after the first, found -1"),
+        (SQUARE + "f 1/1 2/1 3/1\n",
+         "a.obj:5: f: expected a texture coordinate only where the file has one, found 1"),
+        (SQUARE + "vn 0 0 1\nf 1//1 2//2 3//1\n",
+         "a.obj:6: f: expected a normal 1 to 1, found 2"),
+        (SQUARE + "f 1 2 x\n",
+         'a.obj:5: f: expected a corner v, v/vt, v//vn or v/vt/vn, found "x"'),
+        (SQUARE + "f 1 2 3/x\n",
+         'a.obj:5: f: expected a corner v, v/vt, v//vn or v/vt/vn, found "3/x"'),
+        (SQUARE + "f 1 2 1.5\n",
+         'a.obj:5: f: expected a corner v, v/vt, v//vn or v/vt/vn, found "1.5"'),
+        (SQUARE + "f 1/ 2/ 3/\n",
+         'a.obj:5: f: expected a corner v, v/vt, v//vn or v/vt/vn, found "1/"'),
+        (SQUARE + "vt 0 0\nf 1/1 /1 3/1\n",
+         'a.obj:6: f: expected a corner v, v/vt, v//vn or v/vt/vn, found "/1"'),
+        (SQUARE + "f 1///1 2 3\n",
+         'a.obj:5: f: expected a corner v, v/vt, v//vn or v/vt/vn, found "1///1"'),
+        (SQUARE + "f 1/1/1/1 2 3\n",
+         'a.obj:5: f: expected a corner v, v/vt, v//vn or v/vt/vn, found "1/1/1/1"'),
+        (SQUARE + "f 1 2 99999999999999999999\n",
+         'a.obj:5: f: expected a corner v, v/vt, v//vn or v/vt/vn, found "99999999999999999999"'),
+    ],
+)  # fmt: skip
+def test_broken_files_say_where_and_what(text: str, message: str) -> None:
+    assert refusal(text) == message
+
+
+def test_it_is_found_by_content_and_by_suffix() -> None:
+    assert detect(Source("a.obj", b"# made by hand\n" + SQUARE.encode())) == "obj"
+    assert detect(Source("a.txt", SQUARE.encode())) == "obj"
+    assert detect(Source("a.obj", b"g nothing\n")) == "obj"
+
+
+def test_our_own_files_come_back(tmp_path) -> None:
+    actor = viewer.load().actors[0]
+    viewer.export(actor, tmp_path / "fox.obj")
+    scene = viewer.load(tmp_path / "fox.obj")
+    written, mesh = actor.figure.mesh, scene.actors[0].figure.mesh
+    assert scene.warnings == ()
+    posed, normals = viewer.deform(actor.figure, actor.pose)
+    # Nine digits of lengths up to 10.
+    np.testing.assert_allclose(mesh.positions, posed, atol=1e-8)
+    np.testing.assert_allclose(mesh.normals, normals, atol=1e-8)
+    assert np.array_equal(mesh.triangles, written.triangles)
+    corners = written.triangles if written.uv_triangles is None else written.uv_triangles
+    np.testing.assert_allclose(mesh.uvs[mesh.uv_triangles], written.uvs[corners], atol=1e-8)
+    assert np.array_equal(mesh.materials[0].image, written.materials[0].image)
+
+
+def test_our_own_files_say_what_is_up() -> None:
+    figure = silent("# pig: z up, metres\n" + SQUARE + "f 1 2 3\n")
+    assert (figure.up, figure.unit) == ("z", "m")
+
+
+def test_random_damage_is_refused_in_one_line_or_read() -> None:
+    good = (
+        SQUARE
+        + "vt 0 0\nvt 1 1\nvn 0 0 1\nusemtl a\nf 1/1/1 2/2/1 3/1/1 4/2/1\nf -1//1 -2//1 -3//1\n"
+    ).encode()
+    rng = np.random.default_rng(5)
+    for _ in range(400):
+        damaged = bytearray(good)
+        for _ in range(rng.integers(1, 4)):
+            at = int(rng.integers(len(damaged)))
+            kind = rng.integers(3)
+            if kind == 0:
+                damaged[at] = int(rng.integers(256))
+            elif kind == 1:
+                del damaged[at : at + int(rng.integers(1, 9))]
+            else:
+                damaged[at:at] = bytes(damaged[at : at + 7])
+        try:
+            figure, _ = read(bytes(damaged))
+        except FormatError as problem:
+            assert str(problem).startswith("a.obj") and "\n" not in str(problem)
+        else:
+            assert np.isfinite(figure.mesh.positions).all()
+            assert np.isfinite(figure.mesh.normals).all()

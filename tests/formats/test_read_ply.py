@@ -1,0 +1,333 @@
+"""``.ply`` files: text and both byte orders, what is said, and what is refused."""
+
+import struct
+
+import numpy as np
+import pytest
+
+import viewer
+from viewer.errors import FormatError
+from viewer.formats import Source, detect, ply
+from viewer.formats._png import encode_png
+
+VERTEX = "element vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+FACE = "element face 2\nproperty list uchar int vertex_indices\n"
+HEAD = "ply\nformat ascii 1.0\n"
+POINTS = "0 0 0\n2 0 0\n2 2 0\n0 2 0\n"
+GOOD = f"{HEAD}{VERTEX}{FACE}end_header\n{POINTS}3 0 1 2\n4 0 1 2 3\n"
+SQUARE = [[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]]
+CODES = {"char": "b", "uchar": "B", "short": "h", "ushort": "H", "int": "i", "uint": "I",
+         "float": "f", "double": "d"}  # fmt: skip
+
+
+def read(data, path="a.ply"):
+    """Return the figure and the warnings of a text."""
+    source = Source(path, data if isinstance(data, bytes) else data.encode())
+    return ply.read(source), source.warnings
+
+
+def silent(data):
+    figure, warnings = read(data)
+    assert warnings == []
+    return figure
+
+
+def refusal(data):
+    with pytest.raises(FormatError) as caught:
+        read(data)
+    return str(caught.value)
+
+
+def binary(order, elements, comments=()) -> bytes:
+    """Write elements, each (name, properties, rows), with struct alone."""
+    kind = {"<": "little", ">": "big"}[order]
+    lines = ["ply", f"format binary_{kind}_endian 1.0", *comments]
+    body = b""
+    for name, properties, rows in elements:
+        lines.append(f"element {name} {len(rows)}")
+        lines += [f"property {text}" for text in properties]
+        for row in rows:
+            for text, value in zip(properties, row, strict=True):
+                words = text.split()
+                if words[0] == "list":
+                    body += struct.pack(order + CODES[words[1]], len(value))
+                    body += struct.pack(f"{order}{len(value)}{CODES[words[2]]}", *value)
+                else:
+                    body += struct.pack(order + CODES[words[0]], value)
+    return "\n".join([*lines, "end_header\n"]).encode() + body
+
+
+def test_text() -> None:
+    figure = silent(GOOD)
+    assert figure.mesh.positions.tolist() == SQUARE
+    assert figure.mesh.triangles.tolist() == [[0, 1, 2], [0, 1, 2], [0, 2, 3]]
+    assert figure.mesh.normals.tolist() == [[0, 0, 1]] * 4
+    assert figure.facts == (
+        ("polygons", "1 triangles, 1 quads: 3 triangles in all"),
+        ("normals", "none in the file: computed from the triangles"),
+    )
+    assert (figure.name, figure.up, figure.unit) == ("a", "y", "")
+
+
+@pytest.mark.parametrize("order", "<>")
+@pytest.mark.parametrize("number", ["float", "double", "short"])
+@pytest.mark.parametrize("index", ["uchar", "short", "int", "uint"])
+def test_bytes_of_every_type_and_order(order: str, number: str, index: str) -> None:
+    vertices = [[x, y, z] for x, y, z in [(0, 0, 0), (2, 0, 0), (2, 2, 0), (-3, 2, 7)]]
+    faces = [[[0, 1, 2]], [[0, 2, 3]]]
+    data = binary(
+        order,
+        [
+            ("vertex", [f"{number} {name}" for name in "xyz"], vertices),
+            ("face", [f"list uchar {index} vertex_index"], faces),
+        ],
+    )
+    mesh = silent(data).mesh
+    assert mesh.positions.tolist() == vertices
+    assert mesh.triangles.tolist() == [[0, 1, 2], [0, 2, 3]]
+
+
+@pytest.mark.parametrize("order", "<>")
+def test_properties_in_any_order_and_elements_that_are_not_known(order: str) -> None:
+    data = binary(
+        order,
+        [
+            ("camera", ["float near", "list uint double poses"], [[1.5, [1, 2, 3]], [2.5, []]]),
+            (
+                "vertex",
+                ["uchar red", "float z", "double ny", "float x", "float nz", "short y",
+                 "float nx", "float t", "float s"],
+                [[9, 3, 1, 1, 0, 2, 0, 0.25, 0.5]] * 3,
+            ),
+            ("face", ["uchar flags", "list int uint vertex_indices", "float quality"],
+             [[1, [0, 1, 2], 0.5], [0, [0, 1, 2, 1], 0.5], [1, [2, 1, 0], 1.0]]),
+        ],
+    )  # fmt: skip
+    figure, warnings = read(data)
+    assert figure.mesh.positions.tolist() == [[1, 2, 3]] * 3
+    assert figure.mesh.normals.tolist() == [[0, 1, 0]] * 3
+    assert figure.mesh.uvs.tolist() == [[0.5, 0.25]] * 3
+    assert figure.mesh.n_triangles == 4
+    assert figure.mesh.triangles[[0, 3]].tolist() == [[0, 1, 2], [2, 1, 0]]
+    assert warnings == ["a.ply: not used: element camera, vertex red, face flags, face quality"]
+
+
+def test_a_last_byte_that_ends_texts_is_a_number_here() -> None:
+    data = binary("<", [("vertex", ["float x", "float y", "uchar z"], [[0, 0, 26]] * 3),
+                        ("face", ["list uchar uchar vertex_indices"], [])])  # fmt: skip
+    mesh, _ = read(data)
+    assert mesh.mesh.positions[:, 2].tolist() == [26] * 3
+
+
+def test_texture_coordinates_of_corners_become_seams() -> None:
+    data = binary(
+        "<",
+        [
+            ("vertex", ["float x", "float y", "float z"], SQUARE),
+            (
+                "face",
+                ["list uchar int vertex_indices", "list uchar float texcoord"],
+                [[[0, 1, 2], [0, 0, 1, 0, 1, 1]], [[0, 2, 3], [0.5, 0, 1, 1, 0, 1]]],
+            ),
+        ],
+    )
+    mesh = silent(data).mesh
+    assert mesh.uvs[mesh.uv_triangles].tolist() == [
+        [[0, 0], [1, 0], [1, 1]], [[0.5, 0], [1, 1], [0, 1]]
+    ]  # fmt: skip
+    assert len(mesh.uvs) == 5  # (1, 1) is shared
+
+
+def test_texture_coordinates_that_are_not_two_a_corner_are_left_out() -> None:
+    text = GOOD.replace("indices\nend", "indices\nproperty list uchar float texcoord\nend")
+    text = text.replace("3 0 1 2\n", "3 0 1 2 0\n").replace("0 1 2 3\n", "0 1 2 3 2 .5 .5\n")
+    figure, warnings = read(text)
+    assert figure.mesh.uvs is None
+    assert warnings == [
+        "a.ply: texcoord of 2 faces is not two numbers a corner, first face 0: "
+        "texture coordinates are left out",
+        "a.ply: not used: face texcoord",
+    ]
+
+
+def test_a_comment_names_the_texture(tmp_path) -> None:
+    pixels = np.full((2, 2, 4), 128, np.uint8)
+    (tmp_path / "my skin.png").write_bytes(encode_png(pixels))
+    text = GOOD.replace("float z\n", "float z\nproperty float u\nproperty float v\n")
+    text = text.replace("1.0\n", "1.0\ncomment TextureFile my skin.png\n")
+    for row in POINTS.splitlines():
+        text = text.replace(f"\n{row}\n", f"\n{row} 0.5 1\n")
+    (tmp_path / "a.ply").write_text(text)
+    source = Source.open(tmp_path / "a.ply")
+    mesh = ply.read(source).mesh
+    assert source.warnings == []
+    assert mesh.uvs.tolist() == [[0.5, 1]] * 4
+    assert np.array_equal(mesh.materials[0].image, pixels)
+    assert mesh.material_indices.tolist() == [0, 0, 0]
+
+
+def test_line_ends_of_the_header() -> None:
+    assert silent(GOOD.replace("\n", "\r\n")).mesh.n_triangles == 3
+    assert silent(GOOD.replace("\n", "\r")).mesh.n_triangles == 3
+    rows = [[10.0, 0, 0]] * 3  # 10.0 as a big-endian float begins with 65, as a byte 10 below
+    data = binary("<", [("vertex", ["uchar x", "uchar y", "uchar z"], [[10, 1, 2]] * len(rows))])
+    head, body = data.split(b"end_header\n")
+    figure, _ = read(head + b"end_header\n" + body)
+    assert figure.mesh.positions.tolist() == [[10, 1, 2]] * 3
+    carriage = (head + b"end_header\n").replace(b"\n", b"\r") + body
+    assert read(carriage)[0].mesh.positions.tolist() == [[10, 1, 2]] * 3
+
+
+def test_points_alone_are_a_warning() -> None:
+    figure, warnings = read(f"{HEAD}{VERTEX}end_header\n{POINTS}")
+    assert figure.mesh.n_vertices == 4 and figure.mesh.n_triangles == 0
+    assert warnings == ["a.ply: no faces: 4 points, of which nothing is drawn"]
+
+
+def test_what_is_left_over_is_said() -> None:
+    assert read(GOOD + "1 2 3\n")[1] == ["a.ply: ignored 1 lines after the last element"]
+    data = binary("<", [("vertex", ["float x", "float y", "float z"], SQUARE)])
+    assert read(data + b"abc")[1][0] == "a.ply: ignored 3 bytes after the last element"
+
+
+def test_faces_with_fewer_than_three_corners_are_left_out() -> None:
+    figure, warnings = read(GOOD.replace("3 0 1 2\n", "2 0 1\n"))
+    assert figure.mesh.triangles.tolist() == [[0, 1, 2], [0, 2, 3]]
+    assert warnings == ["a.ply: left out 1 faces with fewer than 3 corners, first face 0"]
+
+
+def changed(old: str, new: str) -> str:
+    assert old in GOOD
+    return GOOD.replace(old, new, 1)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "a.ply:1: expected end_header, found the end of the header"),
+        ("plx\n", 'a.ply:1: expected "ply" in the first line, found "plx"'),
+        ("ply\n\n", "a.ply:3: expected end_header, found the end of the header"),
+        (changed("format ascii 1.0\n", ""),
+         "a.ply:8: expected a line `format`, found none before end_header"),
+        (changed("ascii 1.0", "ascii 2.0"),
+         "a.ply:2: format: expected one of ascii, binary_little_endian, binary_big_endian "
+         'and 1.0, found "ascii 2.0"'),
+        (changed("ascii 1.0", "text 1.0"),
+         "a.ply:2: format: expected one of ascii, binary_little_endian, binary_big_endian "
+         'and 1.0, found "text 1.0"'),
+        (changed("vertex 4", "vertex four"),
+         'a.ply:3: element: expected a name and a count, found "vertex four"'),
+        (changed("vertex 4", "vertex -4"),
+         'a.ply:3: element: expected a name and a count, found "vertex -4"'),
+        (changed("float y", "real y"),
+         "a.ply:5: property: expected a type and a name, or list, two types and a name, "
+         'found "real y"'),
+        (changed("float y", "float x"), 'a.ply:5: property: expected a new name, found "x" again'),
+        (changed("list uchar int vertex_indices", "list uchar vertex_indices"),
+         "a.ply:8: property: expected a type and a name, or list, two types and a name, "
+         'found "list uchar vertex_indices"'),
+        (changed("list uchar", "list float"),
+         'a.ply:8: property: expected a list counted in whole numbers, found "float"'),
+        (HEAD + "property float x\n",
+         "a.ply:3: property: expected an element before it, found none"),
+        (changed("float y", "float y\nhello"),
+         'a.ply:6: expected element, property, comment or end_header, found "hello"'),
+        (HEAD + "element face 0\nend_header\n", "a.ply: expected an element vertex, found face"),
+        (HEAD + "end_header\n", "a.ply: expected an element vertex, found none"),
+        (changed("float z", "float w"),
+         "a.ply:3: expected vertices with x, y and z, found one without x, y and z"),
+        (HEAD + VERTEX.replace("4", "0") + "end_header\n",
+         "a.ply:3: expected vertices with x, y and z, found none"),
+        (changed("vertex_indices", "corners"),
+         "a.ply:7: face: expected a list vertex_indices, found none"),
+        (changed("face 2", "tristrips 2"),
+         "a.ply:7: expected an element face, found tristrips"),
+        (changed("2 0 0\n", "2 0\n"), "a.ply:11: expected 3 or more numbers in the line, found 2"),
+        (changed("2 0 0\n", "2 0 0 1\n"), "a.ply:11: expected 3 numbers in the line, found 4"),
+        (changed("2 0 0\n", "2 up 0\n"), 'a.ply:11: expected a number, found "up"'),
+        (changed("2 0 0\n", "2 nan 0\n"), 'a.ply:11: expected a number, found "nan"'),
+        (changed("3 0 1 2\n", "3 0 1\n"),
+         "a.ply:14: expected 4 or more numbers in the line, found 3"),
+        (changed("3 0 1 2\n", "3 0 1 2 3\n"), "a.ply:14: expected 4 numbers in the line, found 5"),
+        (changed("3 0 1 2\n", "1.5 0 1 2\n"),
+         "a.ply:14: face: expected how many follow, found 1.5"),
+        (changed("3 0 1 2\n", "-1 0 1 2\n"), "a.ply:14: face: expected how many follow, found -1"),
+        (changed("3 0 1 2\n", "3 0 1 4\n"),
+         "a.ply: face 0: expected a vertex from 0 to 3, found 4"),
+        (changed("0 1 2 3\n", "0 1 -1 3\n"),
+         "a.ply: face 1: expected a vertex from 0 to 3, found -1"),
+        (changed("face 2", "face 3"), "a.ply:7: face: expected 3 lines, found 2"),
+        (changed("vertex 4", "vertex 99999999999"),
+         "a.ply:3: vertex: expected 99999999999 lines, found 6"),
+    ],
+)  # fmt: skip
+def test_broken_texts_say_where_and_what(text: str, message: str) -> None:
+    assert refusal(text) == message
+
+
+def test_broken_bytes_say_where_and_what() -> None:
+    elements = [
+        ("vertex", ["float x", "float y", "float z"], SQUARE),
+        ("face", ["list char int vertex_indices"], [[[0, 1, 2]], [[0, 1, 2, 3]]]),
+    ]
+    data = binary("<", elements)
+    assert refusal(data[:-1]) == (
+        "a.ply:7: face: expected 2 rows, found the end of the file after 29 bytes of them"
+    )
+    many = data.replace(b"vertex 4", b"vertex 999999999999")
+    assert refusal(many) == (
+        "a.ply:3: vertex: expected 999999999999 rows, found the end of the file "
+        "after 78 bytes of them"
+    )
+    start = data.index(b"end_header\n") + 11
+    nan = data[: start + 16] + struct.pack("<f", float("nan")) + data[start + 20 :]
+    assert refusal(nan) == "a.ply: vertex 1: expected finite x y z, found nan"
+    negative = data[: start + 48] + b"\xff" + data[start + 49 :]
+    assert refusal(negative).startswith("a.ply")
+
+
+def test_it_is_found_by_content() -> None:
+    assert detect(Source("a.ply", GOOD.encode())) == "ply"
+    assert detect(Source("a.txt", GOOD.encode())) == "ply"
+
+
+def test_our_own_files_come_back(tmp_path) -> None:
+    actor = viewer.load().actors[0]
+    viewer.export(actor, tmp_path / "fox.ply")
+    scene = viewer.load(tmp_path / "fox.ply")
+    written, mesh = actor.figure.mesh, scene.actors[0].figure.mesh
+    assert scene.warnings == ()
+    posed, _ = viewer.deform(actor.figure, actor.pose)
+    np.testing.assert_allclose(mesh.positions, posed, atol=1e-6)  # float32 of lengths up to 10
+    assert np.array_equal(mesh.triangles, written.triangles)
+    corners = written.triangles if written.uv_triangles is None else written.uv_triangles
+    np.testing.assert_allclose(mesh.uvs[mesh.uv_triangles], written.uvs[corners], atol=1e-7)
+
+
+def test_random_damage_is_refused_in_one_line_or_read() -> None:
+    good = [
+        GOOD.encode(),
+        binary(
+            ">",
+            [
+                ("vertex", ["float x", "float y", "float z"], SQUARE),
+                ("face", ["list uchar int vertex_indices"], [[[0, 1, 2]], [[0, 1, 2, 3]]]),
+            ],
+        ),
+    ]
+    rng = np.random.default_rng(5)
+    for number in range(600):
+        damaged = bytearray(good[number % 2])
+        for _ in range(rng.integers(1, 4)):
+            at = int(rng.integers(len(damaged)))
+            if rng.integers(2):
+                damaged[at] = int(rng.integers(256))
+            else:
+                del damaged[at : at + int(rng.integers(1, 9))]
+        try:
+            figure, _ = read(bytes(damaged))
+        except FormatError as problem:
+            assert str(problem).startswith("a.ply") and "\n" not in str(problem)
+        else:
+            assert np.isfinite(figure.mesh.positions).all()
+            assert np.isfinite(figure.mesh.normals).all()

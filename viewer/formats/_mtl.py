@@ -1,0 +1,125 @@
+"""Material libraries (``.mtl``) that an ``.obj`` names: the picture of each material.
+
+::
+
+    mtl  = line*
+    line = "newmtl" name | "map_Kd" option* file | anything else
+
+Colours and other maps are not shown. An option is a word that begins with ``-`` and its values.
+"""
+
+from __future__ import annotations
+
+from viewer.errors import FormatError, printable
+from viewer.formats._source import Source
+from viewer.formats._surface import is_below, texture
+from viewer.rig.arrays import Bytes
+from viewer.rig.mesh import Material
+
+__all__ = ["read_libraries"]
+
+# How many values follow each option of a map; the numbers of -o, -s and -t may be one to three.
+_OPTIONS = {
+    "-blendu": 1, "-blendv": 1, "-boost": 1, "-mm": 2, "-texres": 1, "-clamp": 1, "-bm": 1,
+    "-imfchan": 1, "-type": 1, "-cc": 1,
+}  # fmt: skip
+_VECTORS = ("-o", "-s", "-t")
+
+
+def read_libraries(
+    source: Source, libraries: list[tuple[bytes, int]], names: list[str]
+) -> tuple[Material, ...]:
+    """Return materials by name, with their pictures where these can be read.
+
+    Parameters
+    ----------
+    source : Source
+        The ``.obj``; warned of libraries, materials and pictures that are missing.
+    libraries : list of (bytes, int)
+        What follows each ``mtllib``, and where.
+    names : list of str
+        The materials that faces use.
+    """
+    pictures: dict[str, tuple[str, int, Source]] = {}
+    known: set[str] = set()
+    for text, offset in libraries:
+        for library in _opened(source, text, offset):
+            _read(library, pictures, known)
+    missing = [name for name in names if name not in known]
+    if missing and libraries:
+        source.warn(
+            f"{len(missing)} materials are in no library, first {printable(missing[0], 60)}: "
+            "drawn without a texture"
+        )
+    loaded: dict[str, Bytes | None] = {}
+    materials = []
+    for name in names:
+        if name not in pictures:
+            materials.append(Material(name))
+            continue
+        file, where, library = pictures[name]
+        if file not in loaded:
+            loaded[file] = texture(library, file, where)
+        materials.append(Material(name, file, loaded[file]))
+    return tuple(materials)
+
+
+def _opened(source: Source, text: bytes, offset: int) -> list[Source]:
+    """Return the libraries of one ``mtllib``: one whose name may hold blanks, or several."""
+    whole = text.decode("utf-8", "surrogateescape")
+    names = [whole]
+    if " " in whole and not (is_below(whole) and (source.path.parent / whole).is_file()):
+        names = whole.split()
+    found = []
+    for name in names:
+        if not is_below(name):
+            source.warn(
+                f"material library {printable(name)} lies outside the folder: not read", offset
+            )
+            continue
+        library = source.beside(name.replace("\\", "/"))
+        try:
+            _ = library.data
+        except FormatError as problem:
+            source.warn(f"material library {problem}; drawn without textures", offset)
+            continue
+        found.append(library)
+    return found
+
+
+def _read(library: Source, pictures: dict[str, tuple[str, int, Source]], known: set[str]) -> None:
+    """Note where each material's picture is."""
+    name = ""
+    position = 0
+    for line in library.data.replace(b"\r", b"\n").split(b"\n"):
+        words = line.split(None, 1)
+        rest = words[1].strip().decode("utf-8", "surrogateescape") if len(words) > 1 else ""
+        if words and words[0] == b"newmtl":
+            name = rest
+            known.add(name)
+        elif words and words[0].lower() == b"map_kd" and name:
+            file = _without_options(rest)
+            if file:
+                pictures.setdefault(name, (file, position, library))
+        position += len(line) + 1
+
+
+def _without_options(text: str) -> str:
+    """Return the file's name behind the options of a map; it may hold blanks."""
+    rest = text
+    while rest.startswith("-"):
+        option, _, behind = rest.partition(" ")
+        rest = behind.lstrip()
+        limit = 3 if option in _VECTORS else _OPTIONS.get(option, 0)
+        for _ in range(limit):
+            value, _, behind = rest.partition(" ")
+            if option in _VECTORS and not _is_number(value):
+                break
+            rest = behind.lstrip()
+        if option not in _VECTORS and option not in _OPTIONS:
+            return text  # a file whose name begins with "-"
+    return rest
+
+
+def _is_number(word: str) -> bool:
+    return word.lstrip("+-").replace(".", "", 1).isdecimal()

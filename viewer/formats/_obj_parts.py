@@ -1,0 +1,188 @@
+"""Everything an ``.obj`` holds, as arrays, before anything is put together."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from viewer.formats._obj_faces import CORNER_KINDS, FaceRows, read_faces
+from viewer.formats._obj_lines import KEYWORDS, Lines, Places, number_rows, pieces
+from viewer.formats._source import Source, shown
+from viewer.rig.arrays import Floats
+
+__all__ = ["ObjParts", "read_parts"]
+
+# Smoothing groups and what programs other than viewers need.
+_QUIET = frozenset((b"s", b"lod", b"vp", b"shadow_obj", b"trace_obj", b"bevel"))
+_SHAPES = {b"l": "lines", b"p": "points"}
+_RUNS = (b"usemtl", b"g", b"o")
+
+
+@dataclass(slots=True)
+class ObjParts:
+    """What the file holds.
+
+    Attributes
+    ----------
+    positions, normals : (V, 3), (N, 3)
+        As listed.
+    uvs : (U, 2)
+        As listed, v = 0 at the bottom row.
+    counts : (F,)
+        Corners of each face.
+    corners : (C, 3)
+        Vertex, texture coordinate and normal of each; -1 where it has none.
+    runs : dict of bytes to list of (int, str)
+        For ``usemtl``, ``g`` and ``o`` the names, and before which face each stands.
+    libraries : list of (bytes, int)
+        What follows each ``mtllib``, and where.
+    """
+
+    positions: Floats
+    normals: Floats
+    uvs: Floats
+    counts: Places
+    corners: Places
+    runs: dict[bytes, list[tuple[int, str]]]
+    libraries: list[tuple[bytes, int]]
+
+
+@dataclass(slots=True)
+class _Gathered:
+    """Parts of a file that is being read, piece by piece."""
+
+    tables: dict[str, list[Floats]] = field(default_factory=lambda: {k: [] for k in KEYWORDS})
+    faces: list[FaceRows] = field(default_factory=list)
+    before: dict[str, int] = field(default_factory=lambda: dict.fromkeys(KEYWORDS, 0))
+    runs: dict[bytes, list[tuple[int, str]]] = field(
+        default_factory=lambda: {word: [] for word in _RUNS}
+    )
+    libraries: list[tuple[bytes, int]] = field(default_factory=list)
+    odd: Counter[bytes] = field(default_factory=Counter)
+    # What is left out: how many vertices, and where the first is.
+    unused: dict[str, list[int]] = field(default_factory=dict)
+
+    def leave_out(self, what: str, count: int, offset: int) -> None:
+        """Count what is said once, when the whole file is read."""
+        self.unused.setdefault(what, [0, offset])[0] += count
+
+
+def read_parts(source: Source) -> ObjParts:
+    """Read a whole file.
+
+    Parameters
+    ----------
+    source : Source
+        Is warned of what is left out.
+
+    Raises
+    ------
+    FormatError
+        With the line that breaks the grammar, or refers to what is not there.
+    """
+    gathered = _Gathered()
+    for lines in pieces(source):
+        _read_piece(source, lines, gathered)
+    for what, (count, offset) in gathered.unused.items():
+        source.warn(f"{what} of {count} vertices is not used", offset)
+    for keyword, name in _SHAPES.items():
+        if gathered.odd[keyword]:
+            source.warn(f"{gathered.odd[keyword]} {name} are not drawn")
+    _check_indices(source, gathered)
+    corners = [rows.corners for rows in gathered.faces]
+    return ObjParts(
+        positions=_stacked(gathered.tables["v"], 3),
+        normals=_stacked(gathered.tables["vn"], 3),
+        uvs=_stacked(gathered.tables["vt"], 2),
+        counts=np.concatenate([np.zeros(0, np.int64), *(rows.counts for rows in gathered.faces)]),
+        corners=np.concatenate([np.zeros((0, 3), np.int64), *corners]),
+        runs=gathered.runs,
+        libraries=gathered.libraries,
+    )
+
+
+def _stacked(tables: list[Floats], width: int) -> Floats:
+    return np.concatenate([np.zeros((0, width)), *tables])
+
+
+def _read_piece(source: Source, lines: Lines, gathered: _Gathered) -> None:
+    for keyword, read in (("v", _positions), ("vt", _uvs), ("vn", _normals)):
+        if len(lines.of[keyword]):
+            gathered.tables[keyword].append(read(source, lines, gathered))
+    if len(lines.of["f"]):
+        gathered.faces.append(read_faces(source, lines, gathered.before))
+    _read_others(source, lines, gathered)
+    for keyword, found in lines.of.items():
+        gathered.before[keyword] += len(found)
+
+
+def _positions(source: Source, lines: Lines, gathered: _Gathered) -> Floats:
+    table, counts, values, rows = number_rows(source, lines, "v", 3)
+    if len(values) == table.size:
+        return table
+    wrong = np.flatnonzero((counts == 5) | (counts > 7))
+    if len(wrong):
+        raise source.error(
+            f"v: expected 3 numbers, or 4, 6 or 7 with w or a colour, found {counts[wrong[0]]}",
+            int(rows.origins[wrong[0]]) - 1,
+        )
+    colored = np.flatnonzero(counts >= 6)
+    if len(colored):
+        gathered.leave_out("the colour", len(colored), int(rows.origins[colored[0]]) - 1)
+    firsts = np.cumsum(counts) - counts
+    fourth = np.flatnonzero(counts == 4)
+    weighted = fourth[values[firsts[fourth] + 3] != 1.0]
+    if len(weighted):
+        gathered.leave_out("the w", len(weighted), int(rows.origins[weighted[0]]) - 1)
+    return table
+
+
+def _uvs(source: Source, lines: Lines, gathered: _Gathered) -> Floats:
+    table, counts, values, _ = number_rows(source, lines, "vt", 1)
+    uvs = np.zeros((len(counts), 2))
+    uvs[:, :1] = table
+    firsts = np.cumsum(counts) - counts
+    has_v = counts > 1
+    uvs[has_v, 1] = values[firsts[has_v] + 1]
+    return uvs
+
+
+def _normals(source: Source, lines: Lines, gathered: _Gathered) -> Floats:
+    return number_rows(source, lines, "vn", 3)[0]
+
+
+def _read_others(source: Source, lines: Lines, gathered: _Gathered) -> None:
+    """Take in names of materials, groups and objects; say what is not known."""
+    for line in lines.others.tolist():
+        words = lines.text(line).split(None, 1)
+        rest = words[1] if len(words) > 1 else b""
+        offset = lines.base + int(lines.starts[line])
+        if words[0] in gathered.runs:
+            face = gathered.before["f"] + int(np.searchsorted(lines.of["f"], line))
+            name = rest.decode("utf-8", "surrogateescape")
+            gathered.runs[words[0]].append((face, name))
+        elif words[0] == b"mtllib":
+            gathered.libraries.append((rest, offset))
+        elif words[0] not in _QUIET:
+            if words[0] not in _SHAPES and not gathered.odd[words[0]]:
+                source.warn(f"skipped unknown {shown(words[0])}", offset)
+            gathered.odd[words[0]] += 1
+
+
+def _check_indices(source: Source, gathered: _Gathered) -> None:
+    """Refuse faces that refer to what is nowhere in the file."""
+    for column, (keyword, kind) in enumerate(CORNER_KINDS.items()):
+        end = gathered.before[keyword]
+        for rows in gathered.faces:
+            corners = rows.corners[:, column]
+            if corners.max() < end:
+                continue
+            corner = int((corners >= end).argmax())
+            face = int(np.searchsorted(np.cumsum(rows.counts), corner, side="right"))
+            limits = f"1 to {end}" if end else "only where the file has one"
+            raise source.error(
+                f"f: expected a {kind} {limits}, found {corners[corner] + 1}",
+                int(rows.offsets[face]),
+            )

@@ -1,0 +1,171 @@
+"""The header of a ``.ply``: its elements, their properties, and where the numbers begin."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+
+from viewer.errors import FormatError, printable
+from viewer.formats._source import Source, shown
+
+__all__ = ["Element", "Header", "Property", "read_header"]
+
+TYPES = {
+    "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
+    "float": "f4", "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2",
+    "int32": "i4", "uint32": "u4", "float32": "f4", "float64": "f8",
+}  # fmt: skip
+_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+_LINE = re.compile(rb"([^\r\n]*)(\r\n|\r+\n|\n|\r|\Z)")
+_LONGEST = 1 << 20  # bytes of a header
+
+
+@dataclass(frozen=True, slots=True)
+class Property:
+    """One property: its type as numpy has it, and that of its count if it is a list."""
+
+    name: str
+    kind: str
+    count_kind: str = ""
+
+
+@dataclass(slots=True)
+class Element:
+    """Rows of the same properties, one after the other."""
+
+    name: str
+    count: int
+    offset: int
+    properties: list[Property] = field(default_factory=list)
+
+    @property
+    def has_lists(self) -> bool:
+        """Whether rows may differ in size."""
+        return any(prop.count_kind for prop in self.properties)
+
+
+@dataclass(slots=True)
+class Header:
+    """What a file holds, and where.
+
+    Attributes
+    ----------
+    order : "", "<" or ">"
+        Empty for text, else the order of bytes.
+    elements : list of Element
+        In file order.
+    comments : list of (str, int)
+        And where they are.
+    end : int
+        Where the numbers begin.
+    """
+
+    order: str = ""
+    elements: list[Element] = field(default_factory=list)
+    comments: list[tuple[str, int]] = field(default_factory=list)
+    end: int = 0
+
+
+def read_header(source: Source) -> Header:
+    """Read the lines up to ``end_header``.
+
+    Raises
+    ------
+    FormatError
+        With the line of what is not understood.
+    """
+    header = Header()
+    position, number, has_format = 0, 0, False
+    while position < min(len(source.data), _LONGEST):
+        match = _LINE.match(source.data, position)
+        assert match is not None  # the pattern matches anything
+        words = match[1].decode("utf-8", "surrogateescape").split()
+        if number == 0 and words != ["ply"]:
+            looks = source.looks_like() or shown(match[1][:40])
+            raise source.error(f'expected "ply" in the first line, found {looks}', 0)
+        if words == ["end_header"]:
+            if not has_format:
+                raise source.error(
+                    "expected a line `format`, found none before end_header", position
+                )
+            header.end = _behind(source.data, match)
+            return header
+        if words and words[0] == "format":
+            header.order, has_format = _order(source, words, position), True
+        elif number:
+            _take(source, header, words, match[1], position)
+        position, number = match.end(), number + 1
+    raise source.error("expected end_header, found the end of the header", position)
+
+
+def _behind(data: bytes, match: re.Match[bytes]) -> int:
+    """Return where numbers begin: the first may look like the second half of a line's end."""
+    if match[2] == b"\r\n" and not data.startswith((b"ply\r\n", b"ply \r\n")):
+        return match.end() - 1
+    return match.end()
+
+
+def _order(source: Source, words: list[str], offset: int) -> str:
+    if len(words) != 3 or words[1] not in _ORDERS or words[2] != "1.0":
+        known = ", ".join(_ORDERS)
+        raise source.error(
+            f"format: expected one of {known} and 1.0, found {_quoted(*words[1:])}",
+            offset,
+        )
+    return _ORDERS[words[1]]
+
+
+def _take(source: Source, header: Header, words: list[str], line: bytes, offset: int) -> None:
+    """Take in one line behind the first two."""
+    keyword = words[0] if words else ""
+    if keyword in ("comment", "obj_info"):
+        text = line.decode("utf-8", "surrogateescape").strip()
+        header.comments.append((text[len(keyword) :].strip(), offset))
+    elif keyword == "element":
+        header.elements.append(_element(source, words, offset))
+    elif keyword == "property":
+        if not header.elements:
+            raise source.error("property: expected an element before it, found none", offset)
+        _add(source, header.elements[-1], words, offset)
+    elif keyword:
+        raise source.error(
+            f"expected element, property, comment or end_header, found {_quoted(keyword)}",
+            offset,
+        )
+
+
+def _element(source: Source, words: list[str], offset: int) -> Element:
+    is_count = len(words) == 3 and words[2].isascii() and words[2].isdecimal()
+    if not is_count or len(words[2]) > 18:
+        raise source.error(
+            f"element: expected a name and a count, found {_quoted(*words[1:])}",
+            offset,
+        )
+    return Element(words[1], int(words[2]), offset)
+
+
+def _add(source: Source, element: Element, words: list[str], offset: int) -> None:
+    kinds, name = (words[2:-1], words[-1]) if words[1:2] == ["list"] else (words[1:-1], words[-1])
+    is_list = words[1:2] == ["list"]
+    if len(kinds) != 1 + is_list or any(kind not in TYPES for kind in kinds):
+        raise _property_error(source, words, offset)
+    if any(prop.name == name for prop in element.properties):
+        raise source.error(f"property: expected a new name, found {_quoted(name)} again", offset)
+    if is_list and TYPES[kinds[0]].startswith("f"):
+        raise source.error(
+            f"property: expected a list counted in whole numbers, found {_quoted(kinds[0])}",
+            offset,
+        )
+    element.properties.append(Property(name, TYPES[kinds[-1]], TYPES[kinds[0]] if is_list else ""))
+
+
+def _quoted(*words: str) -> str:
+    return f'"{printable(" ".join(words), 60)}"'
+
+
+def _property_error(source: Source, words: list[str], offset: int) -> FormatError:
+    return source.error(
+        "property: expected a type and a name, or list, two types and a name, "
+        f"found {_quoted(*words[1:])}",
+        offset,
+    )

@@ -1,0 +1,144 @@
+"""Polygons cut into triangles: fans where they are convex, ears where they are not."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.rig.arrays import Bools, Floats
+
+__all__ = ["triangulate"]
+
+Picks = NDArray[np.int64]
+
+_MOST_CORNERS = 400  # beyond, ears would take seconds: such a polygon becomes a fan
+_CHUNK = 4_000_000  # (corner, corner) pairs that are looked at together
+
+
+def triangulate(positions: Floats, corners: Picks, counts: Picks) -> tuple[Picks, Picks]:
+    """Cut polygons into triangles that cover them, in their order and winding.
+
+    A quad is split along the diagonal that leaves both halves facing as the whole does; a larger
+    polygon becomes a fan if its first corner sees all others, else ears are cut off one by one
+    (Meisters 1975), in the plane of its area vector (Newell).
+
+    Parameters
+    ----------
+    positions : (V, 3)
+        Figure units.
+    corners : (C,)
+        Vertices of all polygons, one polygon after the other.
+    counts : (F,)
+        Corners of each polygon, 3 or more.
+
+    Returns
+    -------
+    picks : (T, 3)
+        Indices into ``corners``: whatever else a corner has follows them.
+    faces : (T,)
+        The polygon that each triangle is a part of, never falling.
+    """
+    starts = np.cumsum(counts) - counts
+    if (counts == 3).all():
+        return starts[:, None] + np.arange(3), np.arange(len(counts))
+    picks: list[Picks] = []
+    faces: list[Picks] = []
+    for size in np.unique(counts).tolist():
+        rows = np.flatnonzero(counts == size)
+        places = starts[rows, None] + np.arange(size)
+        if size == 3:
+            local = np.broadcast_to(np.arange(3), (len(rows), 1, 3))
+        else:
+            local = _cut(positions[corners[places]])
+        picks.append(np.take_along_axis(places[:, None], local, axis=2).reshape(-1, 3))
+        faces.append(np.repeat(rows, size - 2))
+    owners = np.concatenate(faces)
+    order = np.argsort(owners, kind="stable")
+    return np.concatenate(picks)[order], owners[order]
+
+
+def _cut(points: Floats) -> Picks:
+    """Return the triangles of polygons with equally many corners: (F, n, 3) to (F, n - 2, 3)."""
+    count, size = points.shape[:2]
+    normals = _area_vectors(points)
+    fan = _fan(size)
+    result = np.tile(fan, (count, 1, 1))
+    hidden = ~_is_covered(points, fan, normals)
+    if size == 4:
+        turned = (fan + 1) % 4
+        better = hidden & _is_covered(points, turned, normals)
+        result[better] = turned
+    elif size <= _MOST_CORNERS:
+        odd = np.flatnonzero(hidden & normals.any(axis=1))
+        step = max(1, _CHUNK // (size * size))
+        for first in range(0, len(odd), step):
+            some = odd[first : first + step]
+            result[some] = _ears(_flattened(points[some], normals[some]))
+    return result
+
+
+def _fan(size: int) -> Picks:
+    inner = np.arange(1, size - 1)
+    return np.stack([np.zeros_like(inner), inner, inner + 1], axis=1)
+
+
+def _area_vectors(points: Floats) -> Floats:
+    """Return twice each polygon's area along its normal (Newell): (F, 3)."""
+    relative = points - points[:, :1]
+    return np.cross(relative, np.roll(relative, -1, axis=1)).sum(axis=1)
+
+
+def _is_covered(points: Floats, triangles: Picks, normals: Floats) -> Bools:
+    """Return which polygons' triangles all face as the polygon does."""
+    a, b, c = (points[:, triangles[:, corner]] for corner in range(3))
+    facing = np.einsum("fta,fa->ft", np.cross(b - a, c - a), normals)
+    return (facing > 0.0).all(axis=1)
+
+
+def _flattened(points: Floats, normals: Floats) -> Floats:
+    """Return polygons in their own planes, counter-clockwise: (F, n, 2)."""
+    normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    # The axis that the normal is farthest from makes a safe first direction.
+    axes = np.eye(3)[np.abs(normals).argmin(axis=1)]
+    first = np.cross(axes, normals)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    second = np.cross(normals, first)
+    plane = np.stack([first, second], axis=1)
+    return np.einsum("fka,fna->fnk", plane, points - points[:, :1])
+
+
+def _ears(points: Floats) -> Picks:
+    """Cut ears off all polygons at once, one each a round: (F, n, 2) to (F, n - 2, 3)."""
+    count, size = points.shape[:2]
+    left = np.tile(np.arange(size), (count, 1))
+    rows = np.arange(count)
+    found = []
+    while left.shape[1] > 3:
+        before, after = np.roll(left, 1, axis=1), np.roll(left, -1, axis=1)
+        corners = [points[rows[:, None], index] for index in (before, left, after)]
+        areas = _cross(corners[1] - corners[0], corners[2] - corners[0])
+        is_ear = (areas > 0.0) & ~_has_inside(corners, corners[1])
+        # Where no ear is left (a polygon that crosses itself) the widest corner goes.
+        chosen = np.where(is_ear.any(axis=1), is_ear.argmax(axis=1), areas.argmax(axis=1))
+        found.append(np.stack([part[rows, chosen] for part in (before, left, after)], axis=1))
+        keeps = np.ones(left.shape, dtype=np.bool_)
+        keeps[rows, chosen] = False
+        left = left[keeps].reshape(count, -1)
+    found.append(left)
+    return np.stack(found, axis=1)
+
+
+def _has_inside(corners: list[Floats], points: Floats) -> Bools:
+    """Return which triangles hold a point that is none of their corners: (F, k) for k points."""
+    inside = np.ones((*points.shape[:2], points.shape[1]), dtype=np.bool_)
+    spots = points[:, None]
+    for start, end in ((0, 1), (1, 2), (2, 0)):
+        a, b = corners[start][:, :, None], corners[end][:, :, None]
+        inside &= _cross(b - a, spots - a) >= 0.0
+        inside &= (spots != a).any(axis=-1)
+    result: Bools = np.any(inside, axis=2)
+    return result
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]

@@ -1,0 +1,84 @@
+"""What readers of plain meshes share: normals for every vertex, textures, the up axis."""
+
+from __future__ import annotations
+
+import re
+from pathlib import PurePath
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.errors import printable
+from viewer.formats._image import load_image
+from viewer.formats._source import Source
+from viewer.rig.arrays import Bytes, Floats, Ints
+from viewer.rig.mesh import vertex_normals
+
+__all__ = ["filled_normals", "is_below", "polygon_text", "stated_unit", "stated_up", "texture"]
+
+_SHORTEST = 1e-15  # of a normal: the square of a shorter one is 0 in float32
+_SIZES = {3: "triangles", 4: "quads"}
+
+
+def filled_normals(
+    source: Source, normals: Floats | None, positions: Floats, triangles: Ints
+) -> Floats:
+    """Return a normal for every vertex: those of the file, computed where it has none.
+
+    Parameters
+    ----------
+    source : Source
+        Is warned of normals of length 0.
+    normals : (V, 3) or None
+        NaN where the file gives none.
+    positions, triangles : (V, 3), (T, 3)
+        The mesh.
+    """
+    if normals is None:
+        return vertex_normals(positions, triangles)
+    absent = np.isnan(normals[:, 0])
+    zero = np.abs(normals).max(axis=1) < _SHORTEST
+    if zero.any():
+        source.warn(
+            f"{zero.sum()} normals of length 0, first of vertex {zero.argmax()}: "
+            "computed from the triangles"
+        )
+    missing = absent | zero
+    if not missing.any():
+        return normals
+    return np.where(missing[:, None], vertex_normals(positions, triangles), normals)
+
+
+def polygon_text(counts: NDArray[np.int64], n_triangles: int) -> str:
+    """Return how many polygons of which size were cut: ``"2 quads, 1 with 5 or more corners"``."""
+    sizes = [f"{(counts == size).sum()} {name}" for size, name in _SIZES.items()]
+    large = int((counts > 4).sum())
+    parts = [text for text in sizes if not text.startswith("0 ")]
+    parts += [f"{large} with 5 or more corners"] * (large > 0)
+    return f"{', '.join(parts)}: {n_triangles} triangles in all"
+
+
+def texture(source: Source, name: str, offset: int) -> Bytes | None:
+    """Return the pixels of a picture below the file's folder; a warning where there are none."""
+    if not is_below(name):
+        source.warn(f"texture {printable(name)} lies outside the folder: not read", offset)
+        return None
+    return load_image(source, name, offset)
+
+
+def is_below(name: str) -> bool:
+    """Return whether a path stays inside the folder that it is relative to."""
+    path = PurePath(name.replace("\\", "/"))
+    has_drive = re.match(r"[A-Za-z]:", name) is not None
+    return not (path.is_absolute() or has_drive or ".." in path.parts or not path.parts)
+
+
+def stated_up(comment: str) -> Literal["y", "z"]:
+    """Return the axis that a comment calls up, as our own files do; y if it says nothing."""
+    return "z" if re.search(r"\bz up\b", comment) else "y"
+
+
+def stated_unit(comment: str) -> str:
+    """Return ``"m"`` if a comment of our own files says metres."""
+    return "m" if re.search(r"\b[yz] up, metres\b", comment) else ""

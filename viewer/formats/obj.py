@@ -1,0 +1,169 @@
+r"""Read Wavefront ``.obj`` meshes, without a rig.
+
+::
+
+    obj    = line*                                   a "\" at its end continues a line
+    line   = "v" x y z (w | r g b | r g b a)? | "vt" u v? w? | "vn" x y z
+           | "f" corner corner corner+ | "usemtl" name | "mtllib" file | "g" name* | "o" name
+           | "#" comment | other
+    corner = v | v/vt | v//vn | v/vt/vn              from 1, or from -1 for the last one so far
+
+Vertices keep the file's numbers, also those of no face. Polygons are cut into triangles. A vertex
+with several normals gets their mean: our meshes have one for each vertex.
+"""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from viewer.formats._mtl import read_libraries
+from viewer.formats._obj_lines import Places
+from viewer.formats._obj_parts import ObjParts, read_parts
+from viewer.formats._polygons import triangulate
+from viewer.formats._source import Source
+from viewer.formats._surface import filled_normals, polygon_text, stated_unit, stated_up
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import Material, Mesh
+
+__all__ = ["read"]
+
+_HEAD = 4096  # bytes in which our own files say what is up
+_SHORTEST = 1e-9  # of a mean of unit normals that point everywhere
+
+
+def read(source: Source) -> Figure:
+    """Read a mesh.
+
+    Parameters
+    ----------
+    source : Source
+        The file; what is odd or left out is added to its warnings.
+
+    Returns
+    -------
+    Figure
+        Without skeleton and skin; y up and without a unit, unless a comment of our own says.
+
+    Raises
+    ------
+    FormatError
+        With file and line, if the text breaks the grammar.
+    """
+    parts = read_parts(source)
+    if len(parts.positions) == 0:
+        looks = source.looks_like()
+        raise source.error(f"expected a mesh, found no `v` line{f' ({looks})' * bool(looks)}")
+    picks, owners = triangulate(parts.positions, parts.corners[:, 0], parts.counts)
+    triangles = parts.corners[picks, 0].astype(np.int32)
+    normals = _normals(source, parts)
+    uvs, uv_triangles = _uvs(source, parts, picks)
+    materials, of_face = _materials(source, parts)
+    mesh = Mesh(
+        positions=parts.positions,
+        normals=filled_normals(source, normals, parts.positions, triangles),
+        triangles=triangles,
+        uvs=uvs,
+        uv_triangles=uv_triangles,
+        materials=materials,
+        triangle_materials=of_face[owners],
+    )
+    if mesh.n_triangles == 0:
+        source.warn(f"no faces: {mesh.n_vertices} points, of which nothing is drawn")
+    if uvs is None and any(material.texture for material in materials):
+        source.warn("a texture without vt lines: drawn untextured")
+    head = source.data[:_HEAD].decode("ascii", "replace")
+    comments = "\n".join(re.findall(r"^#.*$", head, re.MULTILINE))
+    return Figure(
+        name=source.path.stem,
+        mesh=mesh,
+        up=stated_up(comments),
+        unit=stated_unit(comments),
+        facts=_facts(parts, mesh, has_normals=normals is not None),
+    )
+
+
+def _facts(parts: ObjParts, mesh: Mesh, has_normals: bool) -> tuple[tuple[str, str], ...]:
+    facts = []
+    if (parts.counts > 3).any():
+        facts.append(("polygons", polygon_text(parts.counts, mesh.n_triangles)))
+    if not has_normals:
+        facts.append(("normals", "none in the file: computed from the triangles"))
+    names = {name for word in (b"g", b"o") for _, name in parts.runs[word]}
+    if len(names) > 1:
+        facts.append(("parts", f"{len(names)} groups and objects"))
+    return tuple(facts)
+
+
+def _uvs(source: Source, parts: ObjParts, picks: Places) -> tuple[Floats | None, Ints | None]:
+    """Return the table of texture coordinates, and which ones the triangles' corners have."""
+    uvs = parts.uvs
+    if len(uvs) == 0:
+        return None, None
+    corners = parts.corners[picks, 1]
+    absent = corners < 0
+    if absent.all():
+        source.warn(f"{len(uvs)} texture coordinates that no face uses: left out")
+        return None, None
+    if absent.any():
+        source.warn(f"{absent.sum()} corners of triangles without vt: they get 0 0")
+        corners = np.where(absent, len(uvs), corners)
+        uvs = np.vstack([uvs, [0.0, 0.0]])
+    return uvs, corners.astype(np.int32)
+
+
+def _normals(source: Source, parts: ObjParts) -> Floats | None:
+    """Return one normal for every vertex, NaN where no corner has one."""
+    listed, n_vertices = parts.normals, len(parts.positions)
+    if len(listed) == 0:
+        return None
+    used = parts.corners[:, 2] >= 0
+    if not used.any():
+        source.warn(f"{len(listed)} normals that no face uses: left out")
+        return None
+    vertices, indices = parts.corners[used, 0], parts.corners[used, 2]
+    result = np.full((n_vertices, 3), np.nan)
+    result[vertices] = listed[indices]
+    differs = (result[vertices] != listed[indices]).any(axis=1)
+    several = np.bincount(vertices, differs, minlength=n_vertices) > 0
+    if several.any():
+        source.warn(
+            f"{several.sum()} vertices have several normals, first {several.argmax()}: "
+            "they get the mean, so hard edges are drawn smooth"
+        )
+        result[several] = _means(n_vertices, vertices, indices, listed)[several]
+    return result
+
+
+def _means(n_vertices: int, vertices: Places, indices: Places, listed: Floats) -> Floats:
+    """Return the mean of each vertex's normals, of which each counts once: (V, 3)."""
+    pairs = np.unique(vertices * len(listed) + indices)
+    owners, normals = pairs // len(listed), listed[pairs % len(listed)]
+    sums = np.stack(
+        [np.bincount(owners, normals[:, axis], minlength=n_vertices) for axis in range(3)], axis=1
+    )
+    lengths = np.linalg.norm(sums, axis=1, keepdims=True)
+    return np.divide(sums, lengths, out=np.zeros_like(sums), where=lengths > _SHORTEST)
+
+
+def _materials(source: Source, parts: ObjParts) -> tuple[tuple[Material, ...], Ints]:
+    """Return the materials, and that of each face.
+
+    Without any ``usemtl``, several groups or objects become materials, so that their names stay.
+    """
+    used = parts.runs[b"usemtl"]
+    by_name = bool(used)
+    if not used:
+        used = sorted(parts.runs[b"g"] + parts.runs[b"o"], key=lambda run: run[0])
+    names = list(dict.fromkeys(name for _, name in used))
+    if not by_name and len(names) < 2:
+        used, names = [], []
+    numbers = {name: index for index, name in enumerate(names)}
+    of_run = np.array([-1, *(numbers[name] for _, name in used)], dtype=np.int32)
+    faces = np.arange(len(parts.counts))
+    of_face = of_run[np.searchsorted([face for face, _ in used], faces, side="right")]
+    if by_name:
+        return read_libraries(source, parts.libraries, names), of_face
+    return tuple(map(Material, names)), of_face

@@ -1,0 +1,229 @@
+"""Read ``.ply`` meshes (Stanford polygons), without a rig: text and binary of both byte orders.
+
+::
+
+    ply      = "ply" format line* "end_header" rows
+    line     = "comment" text | "element" name count | "property" type name
+             | "property" "list" type type name
+
+Of ``vertex`` are used x y z, nx ny nz, and s t (or u v, texture_u texture_v); of ``face`` the
+corners (``vertex_indices`` or ``vertex_index``) and ``texcoord``, two numbers a corner. A comment
+``TextureFile`` names a picture. Polygons are cut into triangles; all else is named and left out.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.errors import printable
+from viewer.formats._numbers import LARGEST
+from viewer.formats._ply_header import Header, read_header
+from viewer.formats._ply_rows import Table, read_tables
+from viewer.formats._polygons import triangulate
+from viewer.formats._source import Source
+from viewer.formats._surface import filled_normals, polygon_text, stated_unit, stated_up, texture
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import Material, Mesh
+
+__all__ = ["read"]
+
+Indices = NDArray[np.int64]
+
+_CORNERS = ("vertex_indices", "vertex_index")
+_UVS = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
+_TEXTURE = "texturefile"
+_SHOWN = 12  # names in a warning
+
+
+def read(source: Source) -> Figure:
+    """Read a mesh.
+
+    Parameters
+    ----------
+    source : Source
+        The file; what is odd or left out is added to its warnings.
+
+    Returns
+    -------
+    Figure
+        Without skeleton and skin; y up and without a unit, unless a comment of our own says.
+
+    Raises
+    ------
+    FormatError
+        With file and line, or the number of the vertex or face, if the file is broken.
+    """
+    header = read_header(source)
+    tables = read_tables(source, header)
+    vertices, positions = _vertices(source, tables)
+    counts, corners, uv_corners = _faces(source, tables, len(positions))
+    picks, owners = triangulate(positions, corners, counts)
+    triangles = corners[picks].astype(np.int32)
+    normals = _columns(source, vertices, ("nx", "ny", "nz"))
+    uvs, uv_triangles = _uvs(source, vertices, uv_corners, picks)
+    materials = _materials(source, header, uvs is not None)
+    mesh = Mesh(
+        positions=positions,
+        normals=filled_normals(source, normals, positions, triangles),
+        triangles=triangles,
+        uvs=uvs,
+        uv_triangles=uv_triangles,
+        materials=materials,
+        triangle_materials=np.zeros(len(owners), np.int32) if materials else None,
+    )
+    _report(source, tables, uv_corners is not None)
+    if mesh.n_triangles == 0:
+        source.warn(f"no faces: {mesh.n_vertices} points, of which nothing is drawn")
+    comments = "\n".join(text for text, _ in header.comments)
+    facts = []
+    if (counts > 3).any():
+        facts.append(("polygons", polygon_text(counts, mesh.n_triangles)))
+    if normals is None:
+        facts.append(("normals", "none in the file: computed from the triangles"))
+    return Figure(
+        name=source.path.stem,
+        mesh=mesh,
+        up=stated_up(comments),
+        unit=stated_unit(comments),
+        facts=tuple(facts),
+    )
+
+
+def _vertices(source: Source, tables: dict[str, Table]) -> tuple[Table, Floats]:
+    """Return the element of the vertices, and where they are."""
+    if "vertex" not in tables:
+        names = ", ".join(printable(name, 40) for name in list(tables)[:_SHOWN]) or "none"
+        raise source.error(f"expected an element vertex, found {names}")
+    vertices = tables["vertex"]
+    positions = _columns(source, vertices, ("x", "y", "z"))
+    if positions is None or len(positions) == 0:
+        found = "none" if positions is not None else "one without x, y and z"
+        raise source.error(
+            f"expected vertices with x, y and z, found {found}", vertices.element.offset
+        )
+    return vertices, positions
+
+
+def _columns(source: Source, table: Table, names: tuple[str, ...]) -> Floats | None:
+    """Return properties side by side, (N, len(names)); None if one is missing."""
+    if any(name not in table.columns for name in names):
+        return None
+    with np.errstate(over="ignore"):
+        values = np.stack([table.columns[name].astype(np.float64) for name in names], axis=1)
+    odd = np.flatnonzero(~(np.abs(values) <= LARGEST).all(axis=1))
+    if len(odd):
+        row = values[odd[0]]
+        worst = row[~(np.abs(row) <= LARGEST)][0]
+        raise source.error(
+            f"{table.element.name} {odd[0]}: expected finite {' '.join(names)}, found {worst:g}"
+        )
+    return values
+
+
+def _faces(
+    source: Source, tables: dict[str, Table], n_vertices: int
+) -> tuple[Indices, Indices, Floats | None]:
+    """Return corners of each face, all corners, and their texture coordinates if they have some."""
+    faces = tables.get("face")
+    nothing = np.zeros(0, np.int64)
+    if faces is None:
+        if "tristrips" in tables:
+            raise source.error(
+                "expected an element face, found tristrips", tables["tristrips"].element.offset
+            )
+        return nothing, nothing, None
+    name = next((name for name in _CORNERS if name in faces.lists), None)
+    if name is None:
+        raise source.error("face: expected a list vertex_indices, found none", faces.element.offset)
+    counts, values = faces.lists[name]
+    corners = values.astype(np.int64)
+    first = np.cumsum(counts) - counts
+    wrong = np.flatnonzero((corners != values) | (corners < 0) | (corners >= n_vertices))
+    if len(wrong):
+        face = int(np.searchsorted(first, wrong[0], side="right")) - 1
+        raise source.error(
+            f"face {face}: expected a vertex from 0 to {n_vertices - 1}, found {values[wrong[0]]:g}"
+        )
+    small = counts < 3
+    uvs = _wedges(source, faces, counts)
+    if small.any():
+        source.warn(
+            f"left out {small.sum()} faces with fewer than 3 corners, first face {small.argmax()}"
+        )
+        keeps = np.repeat(~small, counts)
+        counts, corners = counts[~small], corners[keeps]
+        uvs = None if uvs is None else uvs[keeps]
+    return counts, corners, uvs
+
+
+def _wedges(source: Source, faces: Table, counts: Indices) -> Floats | None:
+    """Return texture coordinates of corners, (C, 2), if every face has two numbers a corner."""
+    if "texcoord" not in faces.lists:
+        return None
+    found, values = faces.lists["texcoord"]
+    wrong = np.flatnonzero(found != 2 * counts)
+    if len(wrong):
+        source.warn(
+            f"texcoord of {len(wrong)} faces is not two numbers a corner, first face {wrong[0]}: "
+            "texture coordinates are left out"
+        )
+        return None
+    uvs = values.astype(np.float64).reshape(-1, 2)
+    odd = np.flatnonzero(~(np.abs(uvs) <= LARGEST).all(axis=1))
+    if len(odd):
+        face = int(np.searchsorted(np.cumsum(counts), odd[0], side="right"))
+        raise source.error(f"face {face}: expected finite texcoord, found {uvs[odd[0]].max():g}")
+    return uvs
+
+
+def _uvs(
+    source: Source, vertices: Table, wedges: Floats | None, picks: Indices
+) -> tuple[Floats | None, Ints | None]:
+    """Return texture coordinates: those of corners, each different one once, or of vertices."""
+    if wedges is not None and len(wedges):
+        # Two numbers of a corner as one, so that sorting finds equal pairs.
+        pairs = np.ascontiguousarray(wedges + 0.0).view(np.complex128).ravel()
+        unique, inverse = np.unique(pairs, return_inverse=True)
+        uvs = np.stack([unique.real, unique.imag], axis=1)
+        return uvs, inverse[picks].astype(np.int32)
+    for names in _UVS:
+        uvs_of_vertices = _columns(source, vertices, names)
+        if uvs_of_vertices is not None:
+            return uvs_of_vertices, None
+    return None, None
+
+
+def _materials(source: Source, header: Header, has_uvs: bool) -> tuple[Material, ...]:
+    """Return the picture that a comment names; one covers all faces."""
+    named = [
+        (text.split(None, 1)[1].strip(), offset)
+        for text, offset in header.comments
+        if text.lower().startswith(_TEXTURE) and len(text.split(None, 1)) > 1
+    ]
+    if not named or not has_uvs:
+        return ()
+    if len(named) > 1:
+        source.warn(f"{len(named)} textures: only the first is used", named[1][1])
+    name, offset = named[0]
+    return (Material(name, name, texture(source, name, offset)),)
+
+
+def _report(source: Source, tables: dict[str, Table], uses_wedges: bool) -> None:
+    """Warn, once, of everything that the file holds and the mesh does not."""
+    used = {
+        "vertex": {"x", "y", "z", "nx", "ny", "nz", *(name for pair in _UVS for name in pair)},
+        "face": {*_CORNERS, *(("texcoord",) if uses_wedges else ())},
+    }
+    left = []
+    for name, table in tables.items():
+        if name not in used:
+            left.append(f"element {name}")
+            continue
+        others = [prop.name for prop in table.element.properties if prop.name not in used[name]]
+        left += [f"{name} {other}" for other in others]
+    if left:
+        names = ", ".join(printable(name, 40) for name in left[:_SHOWN])
+        more = f" and {len(left) - _SHOWN} more" * (len(left) > _SHOWN)
+        source.warn(f"not used: {names}{more}")
