@@ -60,7 +60,14 @@ class FormatError(ViewerError):
         What was expected and what was found.
     line : int, optional
         Line of the fault, counted from 1, if the format has lines.
+
+    Attributes
+    ----------
+    code : str
+        Which fault of ``viewer lint`` it is, where the words alone do not tell.
     """
+
+    code = ""
 
     def __init__(self, path: str | Path, message: str, line: int | None = None) -> None:
         self.path = Path(path)

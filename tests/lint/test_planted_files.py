@@ -1,0 +1,225 @@
+"""Faults planted in files: those that a reader refuses, and those that it only remarks on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from formats import bvh_text, capture_files, pig_text, skel_text, skin_text, synthetic_smpl
+
+from viewer.lint import CODES, Finding, LintOptions, lint_files
+
+STILL = "channel { extrapolate constant constant keys 1 { 0 0 flat flat } }\n"
+CLIP = (
+    "animation { range 0 1 numchannels 9\n"
+    + STILL * 8
+    + "channel { extrapolate constant constant keys 2 {\n0 0 flat flat\n1 1 flat flat } } }\n"
+)
+LATE_KEYS = CLIP.replace("0 0 flat flat\n1 1", "1 0 flat flat\n0.5 1")
+
+
+def linted(folder: Path, texts: dict[str, str | bytes]) -> list[Finding]:
+    """Write files, lint them together, and return what was found, files without their folder."""
+    paths = []
+    for name, text in texts.items():
+        paths.append(folder / name)
+        paths[-1].write_bytes(text if isinstance(text, bytes) else text.encode())
+    return lint_files(paths)[1]
+
+
+def skin(old: str, new: str) -> dict[str, str]:
+    assert old in skin_text.GOOD
+    return {"a.skel": skel_text.GOOD, "a.skin": skin_text.GOOD.replace(old, new, 1)}
+
+
+def skel(old: str, new: str) -> dict[str, str]:
+    assert old in skel_text.GOOD
+    return {"a.skel": skel_text.GOOD.replace(old, new, 1)}
+
+
+RIG = {"a.skel": skel_text.GOOD, "a.skin": skin_text.GOOD}
+
+# name: (texts, code, severity, file, line)
+FAULTS: dict[str, tuple[dict[str, str], str, str, str, int | None]] = {
+    "not a number": (skin("2 0 0", "2 up 0"), "F002", "error", "a.skin", 3),
+    "not finite": (skin("2 0 0", "2 nan 0"), "F003", "error", "a.skin", 3),
+    "weight not finite": (skin("1 0 1.0", "1 0 nan"), "W003", "error", "a.skin", 12),
+    "weight of no joint": (skin("1 1 1\n}", "1 2 1\n}"), "W010", "error", "a.skin", 14),
+    "weights without bindings": (
+        {"a.skin": skin_text.GOOD.replace(skin_text.BINDINGS, "")}, "B001", "error", "a.skin", None
+    ),
+    "singular binding": (skin("0 1 0\n  0 0 1\n  5", "0 0 0\n  0 0 1\n  5"), "B002", "error",
+                         "a.skin", 19),
+    "too few bindings": (
+        {"a.skel": skel_text.GOOD.replace("offset 0 1 0\n", "balljoint b { }\n"),
+         "a.skin": skin_text.GOOD}, "B001", "error", "a.skin", None,
+    ),
+    "sum not 1": (skin("2 0 0.25", "2 0 0.5"), "W001", "warning", "a.skin", 11),
+    "negative weight": (skin("0.25 1 0.75", "-0.25 1 1.25"), "W002", "warning", "a.skin", 11),
+    "no weight": (skin("1 1 1\n}", "0\n}"), "W004", "warning", "a.skin", 11),
+    "normal of length 0": (skin("0 0 1\n  0 1 0", "0 0 0\n  0 1 0"), "M007", "warning",
+                           "a.skin", 6),
+    "texture missing": (
+        skin("triangles 1",
+             "texcoords 3 { 0 0 0 0 0 0 }\nmaterial { texture gone.png\n}\ntriangles 1"),
+        "F005", "warning", "a.skin", 17,
+    ),
+    "unknown section": (skin("triangles 1", "colours 1 { 2 }\ntriangles 1"), "F006", "warning",
+                        "a.skin", 16),
+    "limit turned around": (skel("rotxlimit -1 1", "rotxlimit 1 -1"), "S003", "error",
+                            "a.skel", 1),
+    "pose outside limits": (skel("pose 0.5", "pose 1.5"), "S004", "warning", "a.skel", None),
+    "same name": (skel("arm", "root"), "S006", "warning", "a.skel", None),
+    "clip of another skeleton": (
+        {"a.skel": skel_text.GOOD,
+         "a.anim": CLIP.replace("channels 9", "channels 6").replace(STILL * 3, "", 1)},
+        "C009", "error", "a.anim", None,
+    ),
+    "keys out of order": ({"a.skel": skel_text.GOOD, "a.anim": LATE_KEYS}, "C001", "warning",
+                          "a.anim", None),
+    "clip alone": ({"a.anim": CLIP}, "F004", "error", "a.anim", None),
+    "obj index": ({"a.obj": "v 0 0 0\nf 1 1 2\n"}, "F002", "error", "a.obj", 2),
+    "bvh number": ({"a.bvh": bvh_text.GOOD.replace("0.1 0.0 0.0", "0.1 nan 0.0")}, "F003",
+                   "error", "a.bvh", 8),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_planted_fault_is_found_with_its_file_and_line(tmp_path: Path, name: str) -> None:
+    texts, code, severity, file, line = FAULTS[name]
+    found = [finding for finding in linted(tmp_path, texts) if finding.code == code]
+    assert [(f.severity, f.file, f.line) for f in found] == [(severity, tmp_path / file, line)]
+    assert "\n" not in found[0].message and str(tmp_path / file) + ":" not in found[0].message
+
+
+def test_the_texts_that_faults_are_planted_in_have_none(tmp_path: Path) -> None:
+    clip = {"a.skel": skel_text.GOOD, "a.anim": CLIP}
+    for texts in (RIG, clip, {"a.bvh": bvh_text.GOOD}):
+        heavy = [f.message for f in linted(tmp_path, texts) if f.severity == "error"]
+        assert heavy == []
+
+
+def test_other_files_are_still_looked_at(tmp_path: Path) -> None:
+    texts = {
+        "bad.skel": "balljoint a { offset 1 }",
+        **skin("2 0 0.25", "2 0 0.5"),
+        "none.obj": "v 1",
+    }
+    found = linted(tmp_path, texts)
+    assert [(f.code, f.file.name, f.line) for f in found if f.severity == "error"] == [
+        ("F002", "bad.skel", 1),
+        ("F002", "none.obj", 1),
+    ]
+    assert [f.code for f in found if f.code == "W001"] == ["W001"]
+
+
+def test_a_missing_file_is_a_finding(tmp_path: Path) -> None:
+    scene, found = lint_files([tmp_path / "none.npz"])
+    assert [(f.code, f.severity, f.message) for f in found] == [
+        ("F001", "error", "cannot be read: No such file or directory")
+    ]
+    assert scene.actors == []
+
+
+def test_a_skin_that_does_not_fit_is_looked_at_alone(tmp_path: Path) -> None:
+    texts, *_ = FAULTS["too few bindings"]
+    texts = {**texts, "a.skin": texts["a.skin"].replace("2 0 0.25", "2 0 0.5", 1)}
+    assert {"B001", "W001"} <= {finding.code for finding in linted(tmp_path, texts)}
+
+
+def smpl(change: Callable[[dict[str, np.ndarray]], None]) -> Callable[[Path], Path]:
+    def write(folder: Path) -> Path:
+        arrays = synthetic_smpl.model("smpl")
+        change(arrays)
+        np.savez(folder / "m.npz", **arrays)
+        return folder / "m.npz"
+
+    return write
+
+
+def parents(joint: int, parent: int) -> Callable[[dict[str, np.ndarray]], None]:
+    def change(arrays: dict[str, np.ndarray]) -> None:
+        arrays["kintree_table"] = arrays["kintree_table"].copy()
+        arrays["kintree_table"][0, joint] = parent
+
+    return change
+
+
+def put(key: str, place: tuple[int, ...], value: float) -> Callable[[dict[str, np.ndarray]], None]:
+    def change(arrays: dict[str, np.ndarray]) -> None:
+        arrays[key] = arrays[key].copy()
+        arrays[key][place] = value
+
+    return change
+
+
+MODELS = {
+    "parent after its child": (smpl(parents(1, 9)), "S001"),  # 9 hangs from 6, 3 and 0
+    "own parent": (smpl(parents(5, 5)), "S002"),
+    "cycle": (smpl(parents(1, 4)), "S002"),  # the knee 4 hangs from the hip 1
+    "late parent": (smpl(parents(1, 2)), "S001"),
+    "negative weight": (smpl(put("weights", (3, 0), -0.5)), "W002"),
+    "weight not finite": (smpl(put("weights", (3, 0), np.nan)), "W003"),
+    "position not finite": (smpl(put("v_template", (3, 0), np.inf)), "F003"),
+    "sum not 1": (smpl(put("weights", (3, 0), 7.0)), "W001"),
+}
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_faults_of_body_models(tmp_path: Path, name: str) -> None:
+    write, code = MODELS[name]
+    path = write(tmp_path)
+    found = lint_files([path])[1]
+    assert [(f.code, f.severity, f.file) for f in found] == [(code, "error", path)]
+
+
+@pytest.mark.parametrize(
+    ("parents_text", "code", "line"), [("-1\n2\n1\n", "S002", 2), ("-1\n2\n0\n", "S001", 2)]
+)
+def test_parents_of_a_pig(tmp_path: Path, parents_text: str, code: str, line: int) -> None:
+    folder = pig_text.write(tmp_path / "pig", parents=parents_text)
+    found = lint_files([folder])[1]
+    assert [(f.code, f.file, f.line) for f in found] == [(code, folder / "parents.txt", line)]
+
+
+def test_captures_with_gaps_and_low_confidence(tmp_path: Path) -> None:
+    frames = {frame: [capture_files.points(0)] for frame in range(20)}
+    del frames[7], frames[8]
+    folder = capture_files.write_frames(tmp_path / "keypoints3d", frames)
+    found = {f.code: f for f in lint_files([folder], LintOptions(confidence=0.7))[1]}
+    assert found["C005"].frames.tolist() == [7, 8]
+    assert found["C005"].message == "2 of 20 frames are missing in 1 gaps, first frame 7"
+    # All 25 points, in all 18 frames, as the confidences are: 0.7 + 0.5 * waves.
+    confidence = 0.7 + 0.5 * capture_files.waves(25, 4)[:, 3]
+    share = 100 * (confidence < 0.7).mean()
+    assert f"{share:.0f} % of what is seen" in found["C011"].message
+
+
+def test_a_damaged_frame_is_a_gap_and_named(tmp_path: Path) -> None:
+    frames: dict[int | str, object] = {frame: [capture_files.points(0)] for frame in range(9)}
+    folder = capture_files.write_frames(tmp_path / "keypoints3d", {**frames, 4: "[{"})
+    found = lint_files([folder])[1]
+    assert [f.frames.tolist() for f in found if f.code == "C005" and len(f.frames)] == [[4]]
+    assert any("000004" in f"{f.file} {f.message}" for f in found)
+
+
+def test_a_model_that_cannot_be_read_is_a_finding(tmp_path: Path) -> None:
+    from viewer.loading import MotionSettings
+
+    frames = {frame: [capture_files.body(0)] for frame in range(3)}
+    folder = capture_files.write_frames(tmp_path / "smpl", frames)
+    found = lint_files([folder], settings=MotionSettings(model=tmp_path / "gone.npz"))[1]
+    assert [(f.code, f.file) for f in found if f.severity == "error"] == [
+        ("F001", tmp_path / "gone.npz")
+    ]
+
+
+def test_every_code_is_planted_somewhere() -> None:
+    from lint.test_planted_faults import FAULTS as FIGURES
+
+    planted = {code for _, code, *_ in FAULTS.values()} | {c for _, c, *_ in FIGURES.values()}
+    planted |= {code for _, code in MODELS.values()} | {"F001"}
+    # What nobody can plant in a file that is read: remarks are not faults.
+    assert set(CODES) - planted == {"F007"}

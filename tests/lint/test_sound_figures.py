@@ -1,0 +1,65 @@
+"""Sound figures have no errors and no warnings; real faults of real files are listed here."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from app.tiny import write_rig
+
+from viewer.lint import Finding, lint_files
+from viewer.loading import bundled_body, bundled_files
+
+
+def heavy(findings: list[Finding]) -> list[tuple[str, str]]:
+    return [(finding.code, finding.message) for finding in findings if finding.severity != "note"]
+
+
+def notes(findings: list[Finding]) -> set[str]:
+    return {finding.code for finding in findings if finding.severity == "note"}
+
+
+def test_the_bundled_fox_is_sound() -> None:
+    _, findings = lint_files(bundled_files())
+    assert heavy(findings) == []
+    assert notes(findings) == {"W007", "W008", "S005"}  # up to 14 influences; hinges
+
+
+def test_the_bundled_body_is_sound() -> None:
+    _, findings = lint_files([bundled_body()])
+    assert findings == []
+
+
+def test_a_tiny_rig_is_sound(tmp_path: Path) -> None:
+    _, findings = lint_files(write_rig(tmp_path))
+    assert [finding for finding in findings if finding.severity == "error"] == []
+
+
+COURSE = {
+    ("wasp.skel", "wasp.skin", "wasp_walk.anim"): set(),
+    ("tube.skel", "tube.skin"): set(),
+    # The right knee's pose is -3, 1, 2, its limits are -2 to 0, 0 and 0: truly a fault.
+    ("test.skel",): {"S004"},
+}
+
+
+@pytest.mark.parametrize("names", COURSE)
+def test_files_of_the_course(shared: Path, names: tuple[str, ...]) -> None:
+    _, findings = lint_files([shared / name for name in names])
+    assert {code for code, _ in heavy(findings)} == COURSE[names]
+
+
+def test_the_pig_has_two_pairs_of_joints_of_one_name(shared_data: Path) -> None:
+    for name in ("PIG_core.pkl", "core_txt_files"):
+        _, findings = lint_files([shared_data / "pig" / name])
+        assert heavy(findings) == [
+            ("S006", '4 joints share their names with others: "R leg" (2), "L leg" (2)')
+        ]
+        # Its weights are raw, and off by 0.002 at most.
+        assert "W001" in notes(findings)
+
+
+@pytest.mark.parametrize("name", ["SMPL_NEUTRAL.npz", "SMPL_NEUTRAL.pkl", "easymocap"])
+def test_synthetic_models_and_captures_are_sound(shared_data: Path, name: str) -> None:
+    _, findings = lint_files([shared_data / "smpl_synthetic" / name])
+    assert heavy(findings) == []

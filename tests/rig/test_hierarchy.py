@@ -1,0 +1,38 @@
+"""Cycles among parents, held to a walk from every joint."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from viewer.rig.hierarchy import cycle_members
+
+
+def walks_back(parents: list[int], joint: int) -> bool:
+    """Return whether somebody who walks up from a joint comes back to it."""
+    at = joint
+    for _ in parents:
+        at = parents[at] if 0 <= at < len(parents) else -1
+        if at == joint:
+            return True
+    return False
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_members_of_cycles_are_those_who_meet_themselves(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    parents = rng.integers(-1, 30, 30)
+    expected = [walks_back(parents.tolist(), joint) for joint in range(30)]
+    assert cycle_members(parents).tolist() == expected
+
+
+def test_what_is_no_index_is_no_parent() -> None:
+    parents = np.array([-1.0, 0.5, np.nan, 99.0, -7.0, 5.0])
+    assert cycle_members(parents).tolist() == [False] * 5 + [True]
+
+
+def test_a_long_ring() -> None:
+    parents = np.roll(np.arange(1000), 1)
+    assert cycle_members(parents).all()
+    parents[0] = -1
+    assert not cycle_members(parents).any()

@@ -1,0 +1,139 @@
+"""Check rigs and motions: every fault has a code, a place, and what to do about it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from viewer.lint._aim import points_of
+from viewer.lint._codes import CODES, SEVERITIES, Code
+from viewer.lint._finding import Finding, LintOptions, Subject
+from viewer.rig.scene import Scene
+
+if TYPE_CHECKING:
+    from viewer.loading import MotionSettings
+
+__all__ = [
+    "CHECKS",
+    "CODES",
+    "SEVERITIES",
+    "Check",
+    "Code",
+    "Finding",
+    "LintOptions",
+    "Progress",
+    "Subject",
+    "lint_files",
+    "lint_scene",
+    "points_of",
+]
+
+Progress = Callable[[int, int, str], None]
+"""Called with the steps done, all steps, and what comes next; may raise to stop."""
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """What must be known of a check before its module is imported.
+
+    Attributes
+    ----------
+    title : str
+        What it looks at, for progress.
+    of_motion : bool
+        Whether it looks at what moves an actor; else actors of one figure are looked at once.
+    """
+
+    title: str
+    of_motion: bool = False
+
+
+CHECKS = {
+    "weights": Check("weights"),
+    "bindings": Check("bind matrices"),
+    "skeletons": Check("skeleton", of_motion=True),  # the pose is the actor's own
+    "meshes": Check("mesh"),
+    "symmetry": Check("symmetry"),
+    "clips": Check("clip", of_motion=True),
+    "feet": Check("feet", of_motion=True),
+    "captures": Check("captured points", of_motion=True),
+}
+"""Modules in this folder, each with ``check(subject)``, in the order in which they run."""
+
+
+def lint_scene(
+    scene: Scene, options: LintOptions | None = None, progress: Progress | None = None
+) -> list[Finding]:
+    """Check everything in an open scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        Is not changed.
+    options : LintOptions, optional
+        What counts as a fault.
+    progress : callable, optional
+        Called before every step with the steps done, their number, and what is looked at; what it
+        raises ends the checks.
+
+    Returns
+    -------
+    list of Finding
+        By actor, in the order of ``CHECKS``; each names the actor and the places in it.
+    """
+    chosen = options or LintOptions()
+    known: set[int] = set()
+    steps: list[tuple[Subject, str]] = []
+    for index, actor in enumerate(scene.actors):
+        subject = Subject(actor, index, scene.up, chosen)
+        is_new = id(actor.figure) not in known
+        known.add(id(actor.figure))
+        steps += [(subject, name) for name, kind in CHECKS.items() if is_new or kind.of_motion]
+    findings: list[Finding] = []
+    for number, (subject, name) in enumerate(steps):
+        if progress is not None:
+            progress(number, len(steps), f"{subject.actor.name}: {CHECKS[name].title}")
+        findings += import_module(f"{__name__}.{name}").check(subject)
+        if name == next(reversed(CHECKS)):
+            subject.tracks.clear()  # a long motion takes much memory, and is not needed again
+    return findings
+
+
+def lint_files(
+    paths: Sequence[str | Path],
+    options: LintOptions | None = None,
+    settings: MotionSettings | None = None,
+    max_size: int | None = None,
+    progress: Progress | None = None,
+) -> tuple[Scene, list[Finding]]:
+    """Open files together and check everything; what cannot be opened is a finding too.
+
+    Parameters
+    ----------
+    paths : sequence of str or Path
+        As for ``viewer.loading.load``.
+    options : LintOptions, optional
+        What counts as a fault.
+    settings : MotionSettings, optional
+        How motions are taken.
+    max_size : int, optional
+        Larger files, in bytes, are not read.
+    progress : callable, optional
+        As for ``lint_scene``; reading counts as well.
+
+    Returns
+    -------
+    scene : Scene
+        What could be opened; findings refer to its actors.
+    findings : list of Finding
+        First what readers say, then what the checks find, each with its file where it is known.
+    """
+    from viewer.formats import MAX_SIZE
+    from viewer.lint._opening import open_files, with_files
+
+    size = MAX_SIZE if max_size is None else max_size
+    opened = open_files(paths, settings, size, progress)
+    return opened.scene, with_files(opened, lint_scene(opened.scene, options, progress))

@@ -1,0 +1,180 @@
+"""What a check finds, and what it is given to look at."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.lint._codes import CODES
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.scalars import length_text
+from viewer.rig.scene import Actor
+
+if TYPE_CHECKING:
+    from viewer.lint._tracks import Track
+
+__all__ = ["Finding", "LintOptions", "Subject", "listed"]
+
+_NONE: Ints = np.zeros(0, dtype=np.int32)
+_NO_TIMES: Floats = np.zeros(0)
+
+Indices = NDArray[np.int64] | Ints | list[int]
+
+
+@dataclass(frozen=True, slots=True)
+class LintOptions:
+    """What counts as a fault where only the person who asks can know.
+
+    Attributes
+    ----------
+    max_speed : float or None
+        Of a joint or keypoint, figure units a second; None for 15 times the figure's size.
+    max_turn : float
+        Of a joint against its parent, radians a second.
+    confidence : float
+        Of captured keypoints: what is below is low.
+    rate : float
+        Frames a second at which clips of keys are looked at.
+    """
+
+    max_speed: float | None = None
+    max_turn: float = 60.0
+    confidence: float = 0.3
+    rate: float = 60.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Finding:
+    """One fault, or something worth knowing.
+
+    Attributes
+    ----------
+    code : str
+        A key of ``CODES``.
+    message : str
+        One line with numbers.
+    severity : str
+        One of ``SEVERITIES``.
+    file : Path or None
+        Where it comes from, if that is known.
+    line : int or None
+        In that file, from 1.
+    actor : int or None
+        Index in the scene.
+    name : str
+        What the actor is called.
+    part : "", "mesh", "skeleton" or "clip"
+        What of the actor it is about.
+    vertices, triangles, joints : (N,) int32
+        Of the actor's figure, the worst first; keypoints of captures count as joints.
+    frames : (N,) int32
+        As the file numbers them, the worst first.
+    times : (N,)
+        Seconds of the scene's clock at which these frames are shown.
+    """
+
+    code: str
+    message: str
+    severity: str = ""
+    file: Path | None = None
+    line: int | None = None
+    actor: int | None = None
+    name: str = ""
+    part: Literal["", "mesh", "skeleton", "clip"] = ""
+    vertices: Ints = field(default_factory=lambda: _NONE)
+    triangles: Ints = field(default_factory=lambda: _NONE)
+    joints: Ints = field(default_factory=lambda: _NONE)
+    frames: Ints = field(default_factory=lambda: _NONE)
+    times: Floats = field(default_factory=lambda: _NO_TIMES)
+
+    def __post_init__(self) -> None:
+        if not self.severity:
+            object.__setattr__(self, "severity", CODES[self.code].severity)
+
+    @property
+    def title(self) -> str:
+        """What this kind of finding is called."""
+        return CODES[self.code].title
+
+    @property
+    def hint(self) -> str:
+        """What to do about it."""
+        return CODES[self.code].hint
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Subject:
+    """One actor that is looked at.
+
+    Attributes
+    ----------
+    actor : Actor
+        Is not changed.
+    index : int
+        In its scene.
+    up : "y" or "z"
+        The scene's.
+    options : LintOptions
+        What counts as a fault.
+    tracks : list of Track
+        Empty, or that of the actor's clip.
+    """
+
+    actor: Actor
+    index: int = 0
+    up: Literal["y", "z"] = "y"
+    options: LintOptions = field(default_factory=LintOptions)
+    # What several checks need is made once: ``track_of`` keeps it here.
+    tracks: list[Track] = field(default_factory=list)
+
+    def length(self, length: float) -> str:
+        """Return a length in words: millimetres if the unit is known."""
+        return length_text(self.actor.figure, length)
+
+    def speed(self, speed: float) -> str:
+        """Return a speed in words: metres a second if the unit is known."""
+        if self.actor.figure.unit == "m":
+            return f"{speed:.3g} m/s"
+        return f"{self.length(speed)} a second"
+
+    def found(
+        self,
+        code: str,
+        message: str,
+        *,
+        part: Literal["mesh", "skeleton", "clip"] = "mesh",
+        severity: str = "",
+        vertices: Indices = _NONE,
+        triangles: Indices = _NONE,
+        joints: Indices = _NONE,
+        frames: Indices = _NONE,
+        times: Floats = _NO_TIMES,
+    ) -> Finding:
+        """Return a finding about this actor."""
+        return Finding(
+            code=code,
+            message=message,
+            severity=severity,
+            actor=self.index,
+            name=self.actor.name,
+            part=part,
+            vertices=np.asarray(vertices, dtype=np.int32),
+            triangles=np.asarray(triangles, dtype=np.int32),
+            joints=np.asarray(joints, dtype=np.int32),
+            frames=np.asarray(frames, dtype=np.int32),
+            times=times,
+        )
+
+
+def listed(names: list[str], limit: int = 6) -> str:
+    """Return names in one line, not too many.
+
+    >>> listed(["a", "b", "c"], 2)
+    'a, b and 1 more'
+    """
+    more = f" and {len(names) - limit} more" * (len(names) > limit)
+    return ", ".join(names[:limit]) + more

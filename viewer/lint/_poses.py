@@ -1,0 +1,46 @@
+"""Some poses of an actor in which a rig shows what it is worth."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.rig.motion import frames_of, pose_of
+from viewer.rig.points import PointClip
+from viewer.rig.pose import Pose
+from viewer.rig.scene import Actor, figure_pose
+from viewer.rig.skeleton import clamp_dofs
+
+__all__ = ["some_poses"]
+
+_COUNT = 4  # of poses besides rest and the present one
+_SWING = 0.6  # radians: about the largest turn of most joints in a walk
+_SEED = 5  # so that the same file gives the same numbers
+_FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
+
+
+def some_poses(actor: Actor) -> list[Pose]:
+    """Return the rest pose, the present one, and some of the clip's, or else made up within limits.
+
+    Parameters
+    ----------
+    actor : Actor
+        With a skeleton.
+    """
+    figure, clip = actor.figure, actor.clip
+    assert figure.skeleton is not None and actor.pose is not None  # the callers looked
+    rest = figure_pose(figure)
+    poses = [rest, actor.pose]
+    if clip is not None and not isinstance(clip, PointClip):
+        times = np.linspace(clip.start, clip.end, _COUNT)
+        frames = frames_of(figure, clip, times, actor.pose, fill=True)
+        return poses + [
+            pose_of(figure, frames, int(frame)) for frame in np.flatnonzero(frames.present)
+        ]
+    rng = np.random.default_rng(_SEED)
+    turns = figure.skeleton.dof_kinds >= _FIRST_ROTATION
+    for _ in range(_COUNT):
+        pose = actor.pose.copy()
+        pose.dofs[turns] += rng.uniform(-_SWING, _SWING, int(turns.sum()))
+        pose.dofs[:] = clamp_dofs(figure.skeleton, pose.dofs)
+        poses.append(pose)
+    return poses

@@ -1,0 +1,95 @@
+"""Bind matrices: whether they can be inverted, and whether they fit the skeleton at rest."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.lint._finding import Finding, Subject, listed
+from viewer.rig.arrays import Floats
+from viewer.rig.figure import Figure
+from viewer.rig.kinematics import world_matrices
+from viewer.rig.mesh import bounding_box, box_size
+from viewer.rig.pose import rest_pose
+from viewer.rig.shape import rest_joints
+from viewer.rig.skeleton import joint_labels
+
+__all__ = ["check"]
+
+_SINGULAR = 1e-12  # determinant relative to the product of the column lengths
+_NEARLY = 1e6  # condition number
+_AFFINE = 1e-6  # of the last row
+_ELSEWHERE = 0.01  # of the figure's size: nearer than that is rounding of old files
+
+
+def check(subject: Subject) -> list[Finding]:
+    """Look at the inverse bind matrices of a figure with a skin."""
+    skin = subject.actor.figure.skin
+    if skin is None or skin.n_joints == 0:
+        return []
+    linear = skin.inverse_bind[:, :3, :3]
+    lengths = np.linalg.norm(linear, axis=1).prod(axis=1)
+    determinants = np.linalg.det(linear)
+    flat = np.abs(determinants) <= _SINGULAR * lengths
+    findings = _about(
+        subject, "B002", flat, determinants, "matrices cannot be inverted", "determinant"
+    )
+    conditions = np.zeros(len(linear))
+    conditions[~flat] = np.linalg.cond(linear[~flat])
+    findings += _about(
+        subject, "B003", conditions > _NEARLY, conditions, "matrices can hardly be inverted",
+        "condition number",
+    )  # fmt: skip
+    mirrors = (determinants < 0.0) & ~flat
+    findings += _about(subject, "B005", mirrors, determinants, "matrices mirror", "determinant")
+    off = np.abs(skin.inverse_bind[:, 3] - [0.0, 0.0, 0.0, 1.0]).max(axis=1)
+    findings += _about(subject, "B006", off > _AFFINE, off, "matrices are not affine", "error")
+    return findings if flat.any() else findings + _elsewhere(subject, subject.actor.figure)
+
+
+def _about(
+    subject: Subject, code: str, wrong: np.ndarray, values: Floats, what: str, measure: str
+) -> list[Finding]:
+    joints = np.flatnonzero(wrong)
+    if len(joints) == 0:
+        return []
+    skeleton = subject.actor.figure.skeleton
+    names = [f"#{joint}" for joint in joints]
+    if skeleton is not None:
+        labels = joint_labels(skeleton)
+        names = [labels[joint] for joint in joints]
+    return [
+        subject.found(
+            code,
+            f"{len(joints)} of {len(values)} bind {what}: {listed(names)} "
+            f"({measure} {values[joints[0]]:.3g})",
+            joints=joints,
+        )
+    ]
+
+
+def _elsewhere(subject: Subject, figure: Figure) -> list[Finding]:
+    """Compare where joints were bound with where the skeleton has them.
+
+    Figures are bound with all DOFs at 0 or in their files' own pose; the nearer one counts.
+    """
+    skin, mesh, skeleton = figure.skin, figure.mesh, figure.skeleton
+    if skin is None or mesh is None or skeleton is None:
+        return []
+    bound = np.linalg.inv(skin.inverse_bind)[:, :3, 3]
+    own = world_matrices(skeleton, rest_pose(skeleton))[:, :3, 3]
+    both = [np.linalg.norm(bound - joints, axis=1) for joints in (rest_joints(figure), own)]
+    distances = min(both, key=np.max)
+    size = box_size(bounding_box(mesh.positions))
+    away = np.flatnonzero(distances > _ELSEWHERE * size)
+    if len(away) == 0:
+        return []
+    away = away[np.argsort(-distances[away], kind="stable")]
+    label = joint_labels(skeleton)[away[0]]
+    return [
+        subject.found(
+            "B004",
+            f"{len(away)} joints were bound away from where they rest, {label} by "
+            f"{subject.length(distances[away[0]])}: at rest the mesh is not as it was bound",
+            joints=away,
+        )
+    ]

@@ -1,0 +1,157 @@
+"""Clips: keys in time order and within limits, frames that are there, joints that do not jump."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.lint._finding import Finding, Subject
+from viewer.lint._tracks import Track, track_of
+from viewer.rig.arrays import Floats
+from viewer.rig.clip import SHORTEST, Clip
+from viewer.rig.clip_table import evaluate_all
+from viewer.rig.points import PointClip
+from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.skeleton import Skeleton, dof_label, joint_labels
+from viewer.rig.timing import Timing
+
+__all__ = ["check", "missing_frames"]
+
+_SIZES = 15.0  # of a figure that a joint may move in a second: some 30 m/s for a person
+_ALIKE = 1e-9  # share by which speeds of joints that move together differ
+_ROUNDING = 1e-6  # radians or lengths beyond a limit
+
+
+def check(subject: Subject) -> list[Finding]:
+    """Look at the clip of an actor with a skeleton."""
+    clip, skeleton = subject.actor.clip, subject.actor.figure.skeleton
+    if clip is None or skeleton is None or isinstance(clip, PointClip):
+        return []
+    findings = []
+    if isinstance(clip, SampledClip):
+        findings += missing_frames(subject, clip.timing)
+    else:
+        findings += _keys(subject, clip)
+        findings += _outside(subject, clip, skeleton)
+    if clip.end - clip.start <= SHORTEST:
+        text = f"it begins and ends at {clip.start:g} s"
+        return [*findings, subject.found("C010", text, part="clip")]
+    track = track_of(subject)
+    assert track is not None  # there is a clip and a skeleton
+    return findings + _jumps(subject, track, skeleton) + _turns(subject, track, skeleton)
+
+
+def missing_frames(subject: Subject, timing: Timing) -> list[Finding]:
+    """Report gaps between the first and the last frame in which somebody is there."""
+    present = timing.present
+    there = np.flatnonzero(present)
+    if len(there) == 0:
+        return []
+    # Who comes later or leaves earlier than others is no fault.
+    gaps = np.flatnonzero(~present[there[0] : there[-1]]) + there[0]
+    if len(gaps) == 0:
+        return []
+    runs = 1 + int((np.diff(gaps) > 1).sum())
+    numbers = gaps + timing.first_frame
+    return [
+        subject.found(
+            "C005",
+            f"{len(gaps)} of {timing.n_frames} frames are missing in {runs} gaps, first frame "
+            f"{numbers[0]}",
+            part="clip",
+            frames=numbers,
+            times=timing.start + gaps / timing.frame_rate + subject.actor.offset,
+        )
+    ]
+
+
+def _keys(subject: Subject, clip: Clip) -> list[Finding]:
+    """Report keys that share their time with the one before."""
+    times = [channel.times[1:][np.diff(channel.times) <= SHORTEST] for channel in clip.channels]
+    count = sum(map(len, times))
+    if count == 0:
+        return []
+    channel = next(index for index, found in enumerate(times) if len(found))
+    return [
+        subject.found(
+            "C002",
+            f"{count} keys lie at the time of the one before, first in channel {channel} at "
+            f"{times[channel][0]:g} s",
+            part="clip",
+            times=np.unique(np.concatenate(times)) + subject.actor.offset,
+        )
+    ]
+
+
+def _outside(subject: Subject, clip: Clip, skeleton: Skeleton) -> list[Finding]:
+    """Report curves that leave the limits: they are held there while playing."""
+    count = max(2, int((clip.end - clip.start) * subject.options.rate) + 1)
+    times = np.linspace(clip.start, clip.end, min(count, 20_000))
+    targets, values = evaluate_all(clip, times)
+    low, high = skeleton.dof_limits[targets].T
+    beyond = np.maximum(low - values, values - high)
+    outside = np.flatnonzero(beyond.max(axis=0) > _ROUNDING)
+    if len(outside) == 0:
+        return []
+    worst = int(outside[beyond[:, outside].max(axis=0).argmax()])
+    frame = int(beyond[:, worst].argmax())
+    order = np.flatnonzero((beyond > _ROUNDING).any(axis=1))
+    return [
+        subject.found(
+            "C006",
+            f"{len(outside)} curves leave their limits: {dof_label(skeleton, targets[worst])} is "
+            f"{values[frame, worst]:.4g} at {times[frame]:.3g} s, its limits are "
+            f"{low[worst]:.4g} and {high[worst]:.4g}",
+            part="clip",
+            joints=np.unique(skeleton.dof_joints[targets[outside]]),
+            times=times[order] + subject.actor.offset,
+        )
+    ]
+
+
+def _jumps(subject: Subject, track: Track, skeleton: Skeleton) -> list[Finding]:
+    limit = subject.options.max_speed
+    limit = _SIZES * track.size if limit is None else limit * track.scale
+    speeds = np.zeros((len(track.times), skeleton.n_joints))
+    steps = np.linalg.norm(np.diff(track.positions, axis=0), axis=2)
+    speeds[1:] = steps / np.diff(track.times)[:, None]
+    return _too_fast(subject, track, skeleton, speeds, limit, "C003")
+
+
+def _turns(subject: Subject, track: Track, skeleton: Skeleton) -> list[Finding]:
+    rates = np.zeros((len(track.times), skeleton.n_joints))
+    cosines = np.abs(np.einsum("fjq,fjq->fj", track.rotations[1:], track.rotations[:-1]))
+    rates[1:] = 2.0 * np.arccos(np.minimum(cosines, 1.0)) / np.diff(track.times)[:, None]
+    return _too_fast(subject, track, skeleton, rates, subject.options.max_turn, "C004")
+
+
+def _too_fast(
+    subject: Subject, track: Track, skeleton: Skeleton, rates: Floats, limit: float, code: str
+) -> list[Finding]:
+    """Report frames in which a joint came from the frame before faster than the limit."""
+    rates[1:][~(track.present[1:] & track.present[:-1])] = 0.0
+    fastest = rates.max(axis=1)
+    frames = np.flatnonzero(fastest > limit)
+    if len(frames) == 0:
+        return []
+    frames = frames[np.argsort(-fastest[frames], kind="stable")]
+    rate = float(fastest[frames[0]])
+    # Of joints that move as one, up to rounding, the parent of the others is named.
+    joint = int((rates[frames[0]] >= (1.0 - _ALIKE) * rate).argmax())
+    label = joint_labels(skeleton)[joint]
+    if code == "C003":
+        speed, most = (subject.speed(value / track.scale) for value in (rate, limit))
+        how = f"moves at {speed} (limit {most})"
+    else:
+        how = f"turns by {np.degrees(rate):.0f} degrees a second (limit {np.degrees(limit):.0f})"
+    joints = np.flatnonzero((rates > limit).any(axis=0))
+    return [
+        subject.found(
+            code,
+            f"{len(frames)} of {len(track.times)} frames: {label} {how} to frame "
+            f"{track.numbers[frames[0]]} at {track.times[frames[0]]:.3f} s",
+            part="clip",
+            joints=np.concatenate([[joint], joints[joints != joint]]),
+            frames=track.numbers[frames],
+            times=track.times[frames],
+        )
+    ]

@@ -1,0 +1,254 @@
+"""Meshes: triangles that are flat or flipped, borders, edges, normals, vertices out of place."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.lint._finding import Finding, Subject
+from viewer.lint._topology import edges_of, orientations, welded
+from viewer.rig.arrays import Bools, Floats
+from viewer.rig.mesh import Mesh, triangle_areas, vertex_normals
+
+__all__ = ["check"]
+
+Indices = NDArray[np.int64]
+
+_FLAT = 1e-7  # height of a triangle relative to the mesh: the rounding of float32
+_UNIT = 0.01  # of a normal's length from 1
+_ZERO = 1e-12  # of a normal's length
+_AGAINST = 0.5  # share of vertices whose normal points against their triangles
+_CLOSED = 0.25  # border edges squared, by triangles: holes up to this leave a volume its sign
+_FAR = 1e6  # times the median distance of vertices from their median
+_SAMPLE = 4096  # vertices that tell where the others are
+
+
+def check(subject: Subject) -> list[Finding]:
+    """Look at the mesh of a figure."""
+    mesh = subject.actor.figure.mesh
+    if mesh is None:
+        return []
+    findings = [*_normals(subject, mesh), *_vertices(subject, mesh)]
+    if mesh.n_triangles == 0:
+        return findings
+    flat = _heights(mesh) <= _FLAT * _typical(mesh)[1]
+    sound = np.flatnonzero(~flat)
+    # What has no area has no neighbours and no sides either.
+    corners = welded(mesh.positions, mesh.triangles)[sound]
+    return [
+        *findings,
+        *_flat(subject, flat),
+        *_doubled(subject, mesh),
+        *_crowded_edges(subject, mesh),
+        *_sides(subject, mesh, sound, corners),
+    ]
+
+
+def _heights(mesh: Mesh) -> Floats:
+    """Return the height of each triangle over its longest edge; 0 for a point. (T,)."""
+    corners = mesh.positions[mesh.triangles]
+    edges = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2).max(axis=1)
+    areas = triangle_areas(mesh.positions, mesh.triangles)
+    return np.divide(2.0 * areas, edges, out=np.zeros_like(areas), where=edges > 0.0)
+
+
+def _typical(mesh: Mesh) -> tuple[Floats, float]:
+    """Return the middle of the mesh and the median distance from it, which no stray moves."""
+    some = mesh.positions[:: max(1, mesh.n_vertices // _SAMPLE)]
+    center: Floats = np.median(some, axis=0)
+    return center, float(np.median(np.abs(some - center).max(axis=1)))
+
+
+def _flat(subject: Subject, flat: Bools) -> list[Finding]:
+    triangles = np.flatnonzero(flat)
+    if len(triangles) == 0:
+        return []
+    return [
+        subject.found(
+            "M001",
+            f"{len(triangles)} of {len(flat)} triangles have no area, first triangle "
+            f"{triangles[0]}",
+            triangles=triangles,
+        )
+    ]
+
+
+def _doubled(subject: Subject, mesh: Mesh) -> list[Finding]:
+    rows = np.sort(mesh.triangles, axis=1).astype(np.int64)
+    keys = (rows[:, 0] * mesh.n_vertices + rows[:, 1]) * mesh.n_vertices + rows[:, 2]
+    if mesh.n_vertices > 2_000_000:  # the product of three would not fit
+        keys = np.unique(rows, axis=0, return_inverse=True)[1].ravel()
+    order = np.argsort(keys, kind="stable")
+    copies = np.sort(order[1:][np.diff(keys[order]) == 0])
+    if len(copies) == 0:
+        return []
+    return [
+        subject.found(
+            "M011",
+            f"{len(copies)} triangles have the corners of another one, first triangle {copies[0]}",
+            triangles=copies,
+        )
+    ]
+
+
+def _crowded_edges(subject: Subject, mesh: Mesh) -> list[Finding]:
+    """Report edges of more than two triangles, of vertices as listed: parts may touch."""
+    edges = edges_of(mesh.triangles.astype(np.int64))
+    places = np.flatnonzero(edges.counts > 2)
+    if len(places) == 0:
+        return []
+    triangles = np.unique(places // 3)
+    vertices = np.unique(mesh.triangles.ravel()[places])
+    return [
+        subject.found(
+            "M006",
+            f"{len(np.unique(edges.keys[places]))} edges belong to more than two triangles, at "
+            f"most {int(edges.counts.max())}, first at vertex {vertices[0]}",
+            triangles=triangles,
+            vertices=vertices,
+        )
+    ]
+
+
+def _sides(subject: Subject, mesh: Mesh, sound: Indices, corners: Indices) -> list[Finding]:
+    """Report flipped triangles, components inside out or of one side, and open borders."""
+    edges = edges_of(corners)
+    component, flipped, one_sided = orientations(len(corners), edges)
+    findings = []
+    if flipped.any():
+        triangles = sound[flipped]
+        findings.append(
+            subject.found(
+                "M002",
+                f"{len(triangles)} of {mesh.n_triangles} triangles are wound against their "
+                f"neighbours, first triangle {triangles[0]}",
+                triangles=triangles,
+            )
+        )
+    if one_sided.any():
+        triangles = sound[one_sided]
+        findings.append(
+            subject.found(
+                "M012",
+                f"a surface of {len(triangles)} triangles has no two sides, with triangle "
+                f"{triangles[0]}",
+                triangles=triangles,
+            )
+        )
+    border = edges.counts == 1
+    findings += _inside_out(subject, mesh, sound, component, flipped, border.reshape(-1, 3))
+    if border.any():
+        vertices = np.unique(mesh.triangles[sound].ravel()[border])
+        findings.append(
+            subject.found(
+                "M005",
+                f"{int(border.sum())} edges belong to one triangle only, first at vertex "
+                f"{vertices[0]}",
+                vertices=vertices,
+                triangles=sound[np.unique(np.flatnonzero(border) // 3)],
+            )
+        )
+    return findings
+
+
+def _inside_out(
+    subject: Subject,
+    mesh: Mesh,
+    sound: Indices,
+    component: Indices,
+    flipped: Bools,
+    border: Bools,
+) -> list[Finding]:
+    """Report closed components whose volume is negative, sum a . (b x c) / 6."""
+    count = len(sound)
+    members = np.bincount(component, minlength=count)
+    open_edges = np.bincount(component, border.sum(axis=1), minlength=count)
+    centers = mesh.positions[mesh.triangles[sound]].mean(axis=1)
+    sums = [np.bincount(component, centers[:, axis], minlength=count) for axis in range(3)]
+    middle = np.stack(sums, axis=1) / np.maximum(members, 1)[:, None]
+    a, b, c = (mesh.positions[mesh.triangles[sound, k]] - middle[component] for k in range(3))
+    volumes = np.einsum("ta,ta->t", a, np.cross(b, c))
+    volumes[flipped] *= -1.0  # they are reported already
+    total = np.bincount(component, volumes, minlength=count)
+    is_closed = open_edges**2 <= _CLOSED * members
+    wrong = np.flatnonzero((total < 0.0) & is_closed & (members >= 4))
+    if len(wrong) == 0:
+        return []
+    triangles = sound[np.isin(component, wrong)]
+    return [
+        subject.found(
+            "M003",
+            f"{len(wrong)} closed parts with {len(triangles)} triangles are inside out, "
+            f"first triangle {triangles[0]}",
+            triangles=triangles,
+        )
+    ]
+
+
+def _normals(subject: Subject, mesh: Mesh) -> list[Finding]:
+    lengths = np.linalg.norm(mesh.normals, axis=1)
+    findings = []
+    zero = np.flatnonzero(lengths < _ZERO)
+    if len(zero):
+        findings.append(
+            subject.found(
+                "M007",
+                f"{len(zero)} normals have length 0, first of vertex {zero[0]}",
+                vertices=zero,
+            )
+        )
+    odd = np.flatnonzero((np.abs(lengths - 1.0) > _UNIT) & (lengths >= _ZERO))
+    if len(odd):
+        odd = odd[np.argsort(-np.abs(lengths[odd] - 1.0), kind="stable")]
+        findings.append(
+            subject.found(
+                "M008",
+                f"{len(odd)} normals are not of length 1, that of vertex {odd[0]} is "
+                f"{lengths[odd[0]]:.4g} long",
+                vertices=odd,
+            )
+        )
+    used = np.unique(mesh.triangles)
+    facing = np.einsum(
+        "va,va->v", mesh.normals[used], vertex_normals(mesh.positions, mesh.triangles)[used]
+    )
+    against = used[facing < 0.0]
+    if len(against) > _AGAINST * max(len(used), 1):
+        findings.append(
+            subject.found(
+                "M009",
+                f"{len(against)} of {len(used)} normals point against their triangles",
+                vertices=against,
+            )
+        )
+    return findings
+
+
+def _vertices(subject: Subject, mesh: Mesh) -> list[Finding]:
+    findings = []
+    is_used = np.zeros(mesh.n_vertices, dtype=np.bool_)
+    is_used[mesh.triangles] = True
+    unused = np.flatnonzero(~is_used)
+    if len(unused):
+        findings.append(
+            subject.found(
+                "M004",
+                f"{len(unused)} of {mesh.n_vertices} vertices belong to no triangle, first vertex "
+                f"{unused[0]}",
+                vertices=unused,
+            )
+        )
+    center, typical = _typical(mesh)
+    distances = np.abs(mesh.positions - center).max(axis=1)
+    far = np.flatnonzero(distances > _FAR * typical) if typical > 0.0 else np.zeros(0, np.int64)
+    if len(far):
+        far = far[np.argsort(-distances[far], kind="stable")]
+        findings.append(
+            subject.found(
+                "M010",
+                f"{len(far)} vertices are far from the others, vertex {far[0]} by "
+                f"{distances[far[0]] / typical:.2g} times what is usual",
+                vertices=far,
+            )
+        )
+    return findings

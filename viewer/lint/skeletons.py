@@ -1,0 +1,146 @@
+"""Skeletons: names, roots, rest transforms, locked DOFs, and poses that leave the limits."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+
+import numpy as np
+
+from viewer.errors import printable
+from viewer.lint._finding import Finding, Subject, listed
+from viewer.rig.pose import Pose
+from viewer.rig.skeleton import Skeleton, dof_label, joint_labels
+
+__all__ = ["check"]
+
+OUTSIDE = "pose outside limits"
+"""Heading of the fact by which a reader says that it clamped the file's own pose."""
+
+_UNIT = 1e-3  # of a quaternion's length: files of three digits
+_ROUNDING = 1e-9  # radians or lengths beyond a limit
+
+
+def check(subject: Subject) -> list[Finding]:
+    """Look at the skeleton and the present pose of an actor."""
+    skeleton, pose = subject.actor.figure.skeleton, subject.actor.pose
+    if skeleton is None:
+        return []
+    return [
+        *_names(subject, skeleton),
+        *_rest(subject, skeleton),
+        *_limits(subject, skeleton, pose),
+    ]
+
+
+def _names(subject: Subject, skeleton: Skeleton) -> list[Finding]:
+    findings = []
+    counts = Counter(skeleton.names)
+    repeated = [j for j, name in enumerate(skeleton.names) if name and counts[name] > 1]
+    if repeated:
+        names = list(dict.fromkeys(skeleton.names[joint] for joint in repeated))
+        shown = listed([f'"{printable(name, 40)}" ({counts[name]})' for name in names])
+        findings.append(
+            subject.found(
+                "S006",
+                f"{len(repeated)} joints share their names with others: {shown}",
+                part="skeleton",
+                joints=repeated,
+            )
+        )
+    nameless = [joint for joint, name in enumerate(skeleton.names) if not name.strip()]
+    if nameless:
+        findings.append(
+            subject.found(
+                "S007",
+                f"{len(nameless)} joints have no name, first joint {nameless[0]}",
+                part="skeleton",
+                joints=nameless,
+            )
+        )
+    roots = np.flatnonzero(skeleton.parents < 0)
+    if len(roots) > 1:
+        labels = joint_labels(skeleton)
+        findings.append(
+            subject.found(
+                "S008",
+                f"{len(roots)} joints have no parent: {listed([labels[j] for j in roots])}",
+                part="skeleton",
+                joints=roots,
+            )
+        )
+    return findings
+
+
+def _rest(subject: Subject, skeleton: Skeleton) -> list[Finding]:
+    labels = joint_labels(skeleton)
+    findings = []
+    lengths = np.linalg.norm(skeleton.rest_rotations, axis=1)
+    odd = np.flatnonzero(np.abs(lengths - 1.0) > _UNIT)
+    if len(odd):
+        findings.append(
+            subject.found(
+                "S009",
+                f"{len(odd)} rest rotations are not of length 1, {labels[odd[0]]} has "
+                f"{lengths[odd[0]]:.4g}",
+                part="skeleton",
+                joints=odd,
+            )
+        )
+    flat = np.flatnonzero((skeleton.rest_scales <= 0.0).any(axis=1))
+    if len(flat):
+        scale = " ".join(f"{value:g}" for value in skeleton.rest_scales[flat[0]])
+        findings.append(
+            subject.found(
+                "S010",
+                f"{len(flat)} rest scales are 0 or less, {labels[flat[0]]} has {scale}",
+                part="skeleton",
+                joints=flat,
+            )
+        )
+    return findings
+
+
+def _named(skeleton: Skeleton, text: str) -> list[int]:
+    """Return the joint of the DOF that a reader's words name, if it can be told."""
+    labels = joint_labels(skeleton)
+    found = re.match(r"\d+ DOFs, (.+)\.\w+ is ", text)
+    return [labels.index(found[1])] if found is not None and found[1] in labels else []
+
+
+def _limits(subject: Subject, skeleton: Skeleton, pose: Pose | None) -> list[Finding]:
+    findings = [
+        subject.found("S004", text, part="skeleton", joints=_named(skeleton, text))
+        for heading, text in subject.actor.figure.facts
+        if heading == OUTSIDE
+    ]
+    low, high = skeleton.dof_limits.T
+    if pose is not None:
+        beyond = np.maximum(low - pose.dofs, pose.dofs - high)
+        outside = np.flatnonzero(beyond > _ROUNDING)
+        if len(outside):
+            outside = outside[np.argsort(-beyond[outside], kind="stable")]
+            worst = outside[0]
+            findings.append(
+                subject.found(
+                    "S004",
+                    f"{len(outside)} DOFs of the pose are outside their limits: "
+                    f"{dof_label(skeleton, worst)} is {pose.dofs[worst]:.4g}, "
+                    f"its limits are {low[worst]:.4g} and {high[worst]:.4g}",
+                    part="skeleton",
+                    joints=np.unique(skeleton.dof_joints[outside]),
+                )
+            )
+    locked = np.flatnonzero(skeleton.locked)
+    if len(locked):
+        labels = [dof_label(skeleton, dof) for dof in locked[:6]]
+        more = f" and {len(locked) - 6} more" * (len(locked) > 6)
+        findings.append(
+            subject.found(
+                "S005",
+                f"{len(locked)} of {skeleton.n_dofs} DOFs are locked: {', '.join(labels)}{more}",
+                part="skeleton",
+                joints=np.unique(skeleton.dof_joints[locked]),
+            )
+        )
+    return findings

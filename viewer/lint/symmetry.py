@@ -1,0 +1,103 @@
+"""Left and right, of figures whose file pairs their vertices: positions and weights."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.lint._finding import Finding, Subject
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import Mesh, bounding_box, box_size
+from viewer.rig.mirror import asymmetry, joint_partners
+from viewer.rig.skin import Skin, normalized, owners
+
+__all__ = ["check"]
+
+_MOVED = 1e-3  # of the figure's size: worth knowing
+_ASKEW = 1e-2  # of the figure's size: to be seen
+_SHIFTED = 0.02  # sum of differences of a vertex's weights
+_UNEQUAL = 0.2
+
+
+def check(subject: Subject) -> list[Finding]:
+    """Compare both sides of a figure with a symmetry map."""
+    figure = subject.actor.figure
+    if figure.symmetry is None or figure.mesh is None:
+        return []
+    findings = _positions(subject, figure, figure.mesh)
+    if figure.skin is None or figure.skeleton is None:
+        return findings
+    try:
+        partners = joint_partners(figure)
+    except RigError:
+        return findings  # joints that mirror onto none say nothing of weights
+    return findings + _weights(subject, figure.skin, figure.symmetry, partners)
+
+
+def _positions(subject: Subject, figure: Figure, mesh: Mesh) -> list[Finding]:
+    distances = asymmetry(figure)
+    size = box_size(bounding_box(mesh.positions))
+    off = np.flatnonzero(distances > _MOVED * size)
+    if len(off) == 0:
+        return []
+    off = off[np.argsort(-distances[off], kind="stable")]
+    worst = int(off[0])
+    return [
+        subject.found(
+            "Y001",
+            f"{len(off)} vertices are not where their partners' mirror images are: "
+            f"{subject.length(distances[worst])} at vertex {worst}",
+            severity="warning" if distances[worst] > _ASKEW * size else "note",
+            vertices=off,
+        )
+    ]
+
+
+def _weights(subject: Subject, skin: Skin, symmetry: Ints, partners: Ints) -> list[Finding]:
+    differences = weight_differences(skin, symmetry, partners)
+    off = np.flatnonzero(differences > _SHIFTED)
+    if len(off) == 0:
+        return []
+    off = off[np.argsort(-differences[off], kind="stable")]
+    worst = int(off[0])
+    return [
+        subject.found(
+            "Y002",
+            f"weights of {len(off)} vertices differ from their partners': by "
+            f"{differences[worst]:.3g} in sum at vertex {worst}",
+            severity="warning" if differences[worst] > _UNEQUAL else "note",
+            vertices=off,
+        )
+    ]
+
+
+def weight_differences(skin: Skin, symmetry: Ints, partners: Ints) -> Floats:
+    """Return how much each vertex's weights differ from its partner's, sides exchanged.
+
+    The sum over joints of |w(v, j) - w(partner of v, partner of j)|, weights scaled to a sum of 1.
+
+    Parameters
+    ----------
+    skin : Skin
+        V vertices, J joints.
+    symmetry : (V,)
+        Each vertex's partner.
+    partners : (J,)
+        Each joint's partner.
+
+    Returns
+    -------
+    (V,)
+        0 to 2.
+    """
+    whole = normalized(skin)
+    vertices, joints = owners(whole).astype(np.int64), whole.joints
+    # Each influence, and with a minus sign what the partner would have of it.
+    keys = np.concatenate(
+        [vertices * skin.n_joints + joints, symmetry[vertices] * skin.n_joints + partners[joints]]
+    )
+    weights = np.concatenate([whole.weights, -whole.weights])
+    unique, inverse = np.unique(keys, return_inverse=True)
+    rest = np.abs(np.bincount(inverse, weights, minlength=len(unique)))
+    return np.bincount(unique // skin.n_joints, rest, minlength=skin.n_vertices).astype(np.float64)

@@ -1,0 +1,192 @@
+"""Weights: their sums and signs, vertices nobody moves, and what cutting influences would cost."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.lint._finding import Finding, Subject, listed
+from viewer.lint._poses import some_poses
+from viewer.lint._topology import components, welded
+from viewer.rig.arrays import Bools, Floats
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import Mesh
+from viewer.rig.skeleton import joint_labels
+from viewer.rig.skin import Skin, has_influence, influence_counts, merged, owners, weight_sums
+from viewer.rig.skinning import Skinning, deform
+
+__all__ = ["check"]
+
+_NOTED = 1e-3  # of a sum from 1: files round to three digits
+_WRONG = 5e-3  # four influences of three digits, each off by half of the last, and to spare
+
+
+def check(subject: Subject) -> list[Finding]:
+    """Look at the weights of a figure with a skin."""
+    figure = subject.actor.figure
+    if figure.skin is None or figure.mesh is None:
+        return []
+    moved = has_influence(figure.skin)
+    return [
+        *_sums(subject, figure.skin, moved),
+        *_negative(subject, figure.skin),
+        *_bare(subject, figure.skin, figure.mesh, moved),
+        *_idle_joints(subject, figure, figure.skin),
+        *_doubled(subject, figure.skin),
+        *_crowded(subject, figure),
+    ]
+
+
+def _sums(subject: Subject, skin: Skin, moved: Bools) -> list[Finding]:
+    sums = weight_sums(skin)
+    errors = np.where(moved, np.abs(sums - 1.0), 0.0)
+    off = np.flatnonzero(errors > _NOTED)
+    if len(off) == 0:
+        return []
+    off = off[np.argsort(-errors[off], kind="stable")]
+    worst = int(off[0])
+    return [
+        subject.found(
+            "W001",
+            f"weights of {len(off)} vertices do not sum to 1: {sums[worst]:.6g} at vertex {worst}, "
+            f"an error of {errors[worst]:.3g}",
+            severity="warning" if errors[worst] > _WRONG else "note",
+            vertices=off,
+        )
+    ]
+
+
+def _negative(subject: Subject, skin: Skin) -> list[Finding]:
+    negative = np.flatnonzero(skin.weights < 0.0)
+    if len(negative) == 0:
+        return []
+    negative = negative[np.argsort(skin.weights[negative], kind="stable")]
+    vertices = owners(skin)[negative]
+    first = negative[0]
+    return [
+        subject.found(
+            "W002",
+            f"{len(negative)} weights are negative: {skin.weights[first]:.6g} at vertex "
+            f"{vertices[0]} for joint {_label(subject, int(skin.joints[first]))}",
+            vertices=_distinct(vertices),
+            joints=_distinct(skin.joints[negative]),
+        )
+    ]
+
+
+def _bare(subject: Subject, skin: Skin, mesh: Mesh, moved: Bools) -> list[Finding]:
+    """Report islands that nothing moves at all, and single vertices apart from them."""
+    bare = ~moved
+    if not bare.any():
+        return []
+    findings = []
+    corners = welded(mesh.positions, mesh.triangles)
+    pairs = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]]])
+    islands = components(mesh.n_vertices, pairs)[corners[:, 0]]
+    # An island counts by its triangles: a loose vertex is none.
+    held = np.bincount(islands, moved[mesh.triangles].any(axis=1), minlength=mesh.n_vertices)
+    lost = held[islands] == 0
+    if lost.any():
+        vertices = np.unique(mesh.triangles[lost])
+        names = np.unique(islands[lost])
+        findings.append(
+            subject.found(
+                "W005",
+                f"{len(names)} islands with {len(vertices)} vertices have no weight at all, "
+                f"first at vertex {vertices[0]}: they stay where they were bound",
+                vertices=vertices,
+                triangles=np.flatnonzero(lost),
+            )
+        )
+        bare = bare.copy()
+        bare[vertices] = False
+    single = np.flatnonzero(bare)
+    if len(single):
+        findings.append(
+            subject.found(
+                "W004",
+                f"{len(single)} vertices without influence stay where they were bound, "
+                f"first vertex {single[0]}",
+                vertices=single,
+            )
+        )
+    return findings
+
+
+def _idle_joints(subject: Subject, figure: Figure, skin: Skin) -> list[Finding]:
+    strengths = np.bincount(skin.joints, np.abs(skin.weights), minlength=skin.n_joints)
+    idle = np.flatnonzero(strengths == 0.0)
+    if len(idle) == 0:
+        return []
+    labels = [_label(subject, int(joint)) for joint in idle]
+    return [
+        subject.found("W006", f"{len(idle)} joints move no vertex: {listed(labels)}", joints=idle)
+    ]
+
+
+def _doubled(subject: Subject, skin: Skin) -> list[Finding]:
+    plain = merged(skin)
+    fewer = np.flatnonzero(influence_counts(plain) != influence_counts(skin))
+    if len(fewer) == 0:
+        return []
+    return [
+        subject.found(
+            "W009",
+            f"{len(fewer)} vertices list a joint more than once, first vertex {fewer[0]}",
+            vertices=fewer,
+        )
+    ]
+
+
+def _crowded(subject: Subject, figure: Figure) -> list[Finding]:
+    """Report more influences than engines take, with what their cut would move."""
+    skin = figure.skin
+    assert skin is not None  # the caller looked
+    plain = merged(skin)
+    used = np.bincount(owners(plain), plain.weights != 0.0, minlength=plain.n_vertices)
+    findings = []
+    for code, limit in (("W007", 4), ("W008", 8)):
+        crowded = np.flatnonzero(used > limit)
+        if len(crowded) == 0:
+            continue
+        cost = ""
+        if figure.is_attached:
+            errors, n_poses = _cut_errors(subject, limit)
+            worst = int(errors.argmax())
+            crowded = crowded[np.argsort(-errors[crowded], kind="stable")]
+            cost = (
+                f"; kept to {limit} the mesh moves by up to {subject.length(errors[worst])} "
+                f"(vertex {worst}), {subject.length(float(errors[crowded].mean()))} on average "
+                f"of these, over {n_poses} poses"
+            )
+        findings.append(
+            subject.found(
+                code,
+                f"{len(crowded)} vertices have more than {limit} influences, "
+                f"at most {int(used.max())}{cost}",
+                vertices=crowded,
+            )
+        )
+    return findings
+
+
+def _cut_errors(subject: Subject, limit: int) -> tuple[Floats, int]:
+    """Return how far each vertex moves at most if only so many influences are kept."""
+    figure = subject.actor.figure
+    poses = some_poses(subject.actor)
+    whole, cut = Skinning(normalize=True), Skinning(max_influences=limit)
+    errors = np.zeros(0 if figure.mesh is None else figure.mesh.n_vertices)
+    for pose in poses:
+        moved = deform(figure, pose, whole)[0] - deform(figure, pose, cut)[0]
+        errors = np.maximum(errors, np.linalg.norm(moved, axis=1))
+    return errors, len(poses)
+
+
+def _label(subject: Subject, joint: int) -> str:
+    skeleton = subject.actor.figure.skeleton
+    return f"#{joint}" if skeleton is None else joint_labels(skeleton)[joint]
+
+
+def _distinct(values: np.ndarray) -> np.ndarray:
+    """Return each value once, in the order given."""
+    _, first = np.unique(values, return_index=True)
+    return values[np.sort(first)]
