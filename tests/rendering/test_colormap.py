@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
-from viewer.rendering.colormap import color_at, colormap
+from viewer.rendering.colormap import colormap
 
 # sRGB to CIE XYZ, IEC 61966-2-1; then OKLab's lightness (Ottosson 2020), from XYZ.
 TO_XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
@@ -61,11 +60,3 @@ def test_any_number_of_colours_spans_the_same_map():
         step = 255 / (count - 1)
         if step == int(step):
             assert np.array_equal(colormap(count), whole[:: int(step)])
-
-
-@pytest.mark.parametrize(
-    ("share", "row"), [(0.0, 0), (1.0, 255), (-3.0, 0), (7.0, 255), (0.2, 51), (0.4, 102)]
-)
-def test_color_at_a_place_is_that_of_the_map(share, row):
-    expected = colormap()[row, :3] / 255.0
-    assert color_at(share) == pytest.approx(tuple(expected))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from drawn_figures import arm
@@ -9,7 +11,13 @@ from moving import moving_arm
 
 from viewer.errors import RigError
 from viewer.rendering.camera import Camera, fit
-from viewer.rendering.framing import find_follow, fit_turning, frame_motion, outermost
+from viewer.rendering.framing import (
+    find_follow,
+    fit_turning,
+    follow_candidates,
+    frame_motion,
+    outermost,
+)
 from viewer.rendering.recorder import Follow, Recording
 from viewer.rig.figure import Figure
 from viewer.rig.motion import pose_actor
@@ -154,6 +162,10 @@ def captured(person: int | None = None) -> Actor:
         ("keypoints 4", 1, -1, (2, 2, 2)),
         ("nose", 1, 1, (3, 2, 1)),
         ("keypoints 4/left_knee", 1, 0, (1, 2, 3)),
+        ("4", 1, -1, (2, 2, 2)),
+        ("4:nose", 1, 1, (3, 2, 1)),
+        ("4/Left_Knee", 1, 0, (1, 2, 3)),
+        ("arm:j1", 0, 1, (1.5, 0, 0)),
     ],
 )
 def test_name_finds_actor_or_joint(name, actor, joint, origin):
@@ -164,7 +176,25 @@ def test_name_finds_actor_or_joint(name, actor, joint, origin):
     np.testing.assert_allclose(follow.origin, origin, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", ["leg", "leg/j1", "arm/j9", "", "/"])
+def test_name_may_mean_several():
+    scene = Scene([Actor(arm(3)), captured(4), Actor(arm(2)), captured(7)])
+    assert follow_candidates(scene, "j1") == [(0, 1), (2, 1)]
+    assert follow_candidates(scene, "arm") == [(0, 0), (2, 0)]
+    assert follow_candidates(scene, "arm:j2") == [(0, 2)]
+    assert follow_candidates(scene, "nose") == [(1, 1), (3, 1)]
+    assert follow_candidates(scene, "7:nose") == [(3, 1)] and follow_candidates(scene, "5") == []
+
+
+def test_joints_may_have_a_colon_in_their_names():
+    figure = arm(2)
+    names = ("mixamorig:Hips", "mixamorig:Spine")
+    named = replace(figure, skeleton=replace(figure.skeleton, names=names))
+    scene = Scene([Actor(named), Actor(named, person=2)])
+    assert follow_candidates(scene, "mixamorig:spine") == [(0, 1), (1, 1)]
+    assert follow_candidates(scene, "2:mixamorig:spine") == [(1, 1)]
+
+
+@pytest.mark.parametrize("name", ["leg", "leg/j1", "arm/j9", "", "/", ":", "none:j1", ":j1"])
 def test_unknown_name_lists_the_actors(name):
     with pytest.raises(RigError) as caught:
         find_follow(Scene([Actor(arm(3)), captured()]), name)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from drawn_figures import arm, bent
 from golden_motion import SHOTS as MOTION_SHOTS
+from golden_scalars import SHOTS as SCALAR_SHOTS
 from golden_scenes import BEND, SIZE, Shot, options
 from golden_scenes import SHOTS as STILL_SHOTS
 from picture_metrics import complaints, silhouette_share, ssim_error
@@ -23,7 +24,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh
 from viewer.rig.scene import Scene, scene_box
 
-SHOTS = {**STILL_SHOTS, **MOTION_SHOTS}
+SHOTS = {**STILL_SHOTS, **MOTION_SHOTS, **SCALAR_SHOTS}
 GOLDEN = Path(__file__).resolve().parents[1] / "golden"
 REGENERATE = os.environ.get("VIEWER_UPDATE_GOLDEN") == "1"
 KEEP = os.environ.get("VIEWER_GOLDEN_FAILED")  # a folder for pictures that differ

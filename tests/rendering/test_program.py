@@ -38,6 +38,10 @@ def build(ctx, name: str):
             return programs.drawing("trail")
         if name.startswith(("skin", "include")):
             return programs.feedback("skin", "lbs", VARYINGS)
+        if name.startswith(("corners", "shade/scalar")):
+            return programs.drawing("mesh", "scalar", geometry="corners")
+        if name.startswith("overlay"):
+            return programs.drawing("overlay")
         if name.startswith(("mesh", "shade")):
             return programs.drawing("mesh", "phong")
         if name.startswith("joint"):
@@ -61,6 +65,10 @@ def lines_to_break(text: str) -> list[int]:
         "mesh.vert",
         "mesh.frag",
         "shade/phong.glsl",
+        "shade/scalar.glsl",
+        "corners.geom",
+        "overlay.vert",
+        "overlay.frag",
         "skin.vert",
         "skin/lbs.glsl",
         "include/skinning.glsl",

@@ -1,6 +1,7 @@
 """Scalar views: lengths per vertex, each worked out by hand on a few points."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,10 +9,24 @@ from hand_made import mesh, skeleton
 from numpy.testing import assert_allclose
 
 from viewer.errors import RigError
+from viewer.rig import scalars
+from viewer.rig.annotations import BodyParts, VertexField
 from viewer.rig.blendshapes import Correctives
 from viewer.rig.figure import Figure
 from viewer.rig.pose import rest_pose
-from viewer.rig.scalars import SCALARS, compute, length_unit, strongest
+from viewer.rig.scalars import (
+    SCALARS,
+    categories,
+    compute,
+    find_view,
+    joint_of,
+    length_unit,
+    missing_part,
+    shown_unit,
+    split_name,
+    strongest,
+    view_title,
+)
 from viewer.rig.skin import skin_from_lists
 from viewer.rig.skinning import Skinning
 
@@ -105,12 +120,37 @@ def test_asymmetry_without_a_map_is_nothing():
     assert compute("asymmetry", figure, slid(figure, 1), Skinning()).tolist() == [0, 0, 0]
 
 
-@pytest.mark.parametrize("name", SCALARS)
+FAR = VertexField("far", "How far", np.array([0.5, 2.0, 0.0]), "length")
+KINDS_OF_MATCH = VertexField("match", "How found", np.array([0, 1, 1]), names=("near", "filled"))
+MOVING = [name for name, view in SCALARS.items() if view.moves]
+
+
+@pytest.mark.parametrize("name", MOVING)
 def test_mesh_in_its_binding_space_shows_nothing(name):
     figure = sliding([[(0, 0.5), (1, 0.2)]] * 3)
     assert compute(name, figure, None, Skinning()).tolist() == [0, 0, 0]
+
+
+@pytest.mark.parametrize("name", SCALARS)
+def test_figure_without_what_a_view_shows_has_nothing(name):
+    figure = sliding([[(0, 1.0)]] * 3)
     bare = Figure("bare", mesh(POINTS), figure.skeleton)
-    assert compute(name, bare, slid(figure, 5), Skinning()).tolist() == [0, 0, 0]
+    nothing = -1 if SCALARS[name].kind == "categorical" else 0
+    assert compute(name, bare, slid(figure, 5), Skinning()).tolist() == [nothing] * 3
+    assert missing_part(name, bare) == SCALARS[name].needs != ""
+
+
+@pytest.mark.parametrize("name", [name for name in SCALARS if name not in MOVING])
+def test_views_of_weights_and_parts_need_no_pose(name):
+    parts = BodyParts(("a", "b"), np.array([0, 1, 1]))
+    figure = replace(
+        sliding([[(0, 0.5), (1, 0.2)]] * 3, body_parts=parts),
+        fields=(FAR, KINDS_OF_MATCH),
+    )
+    view = "weight:j1" if name == "weight" else name
+    still = compute(view, figure, None, Skinning())
+    assert still.tolist() == compute(view, figure, slid(figure, 5), Skinning()).tolist()
+    assert name == "dominant" or still.any()
 
 
 def test_unknown_view_is_refused():
@@ -119,15 +159,123 @@ def test_unknown_view_is_refused():
     assert str(caught.value) == f'no scalar view "magic"; there are: {", ".join(SCALARS)}'
 
 
-def test_colours_begin_at_zero_and_never_have_no_range():
-    shown = SCALARS["cut"].shown
-    assert shown(0.25, 2.0) == (0.0, 2.0)
-    assert shown(0.0, 0.0) == (0.0, 1.0)
+@pytest.mark.parametrize(
+    ("name", "low", "high", "ends"),
+    [
+        ("cut", 0.25, 2.0, (0.0, 2.0)),
+        ("cut", 0.0, 0.0, (0.0, 1.0)),
+        ("weight", 0.0, 0.4, (0.0, 1.0)),
+        ("weight", -0.5, 1.5, (-0.5, 1.5)),
+        ("stretch", -50.0, 20.0, (-50.0, 50.0)),
+        ("stretch", -5.0, 20.0, (-20.0, 20.0)),
+        ("area", 0.0, 0.0, (-1.0, 1.0)),
+        ("influences", 1.0, 4.0, (0.0, 4.0)),
+    ],
+)
+def test_automatic_range_of_a_view(name, low, high, ends):
+    assert SCALARS[name].shown(low, high) == ends
+
+
+def test_parts_are_the_indices_of_the_parts():
+    parts = BodyParts(("foot", "head"), np.array([1, 0, 1]))
+    figure = sliding([[]] * 3, body_parts=parts)
+    assert compute("parts", figure, None, Skinning()).tolist() == [1, 0, 1]
+    assert categories("parts", figure) == ("foot", "head")
+    assert categories("parts", sliding([[]] * 3)) == ()
+    assert categories("dominant", figure) == ("j0", "j1", "j2", "j3", "j4", "j5")
+
+
+def test_name_of_a_view_may_hold_a_joint():
+    assert split_name("weight:left:knee") == ("weight", "left:knee")
+    assert split_name("stretch") == ("stretch", "")
+    assert find_view("weight:#4") is SCALARS["weight"]
+    with pytest.raises(RigError) as caught:
+        split_name("stretch:knee")
+    assert str(caught.value) == 'scalar view "stretch": expected no joint, found "knee"'
+
+
+def named(*names) -> Figure:
+    """Return a point bound to joints of these names."""
+    bones = skeleton([-1] * len(names), names=names)
+    skin = skin_from_lists([[(0, 1.0)]], np.tile(np.eye(4), (len(names), 1, 1)))
+    return Figure("named", mesh([[0.0, 0, 0]]), bones, skin)
+
+
+@pytest.mark.parametrize(
+    ("text", "joint"),
+    [("Left_Knee", 1), ("left_knee", 1), ("#2", 2), ("2", 2), ("", 3), ("#3", 3), ("7", 4)],
+)
+def test_joint_is_found_by_name_or_index(text, joint):
+    assert joint_of(named("hip", "left_knee", "right_knee", "", "7"), text) == joint
+
+
+@pytest.mark.parametrize(
+    ("names", "text", "message"),
+    [
+        (
+            ("hip", "left_knee", "right_knee"),
+            "left_kne",
+            'no joint is called "left_kne"; close to it: left_knee',
+        ),
+        (("hip", "L_Knee", "R_Knee"), "knee", 'no joint is called "knee"; close to it: '
+         "L_Knee, R_Knee"),
+        (
+            ("a", "b", "c", "d", "e", "f"),
+            "tail",
+            'no joint is called "tail"; there are 6: a, b, c, d, e, …',
+        ),
+        (("a", "b"), "#2", 'no joint is called "#2"; there are 2: a, b'),
+        (("a", "a"), "a", '"a" names 2 joints: say which one, a#0, a#1'),
+    ],
+)  # fmt: skip
+def test_unknown_joint_is_refused_with_names_that_are_close(names, text, message):
+    with pytest.raises(RigError) as caught:
+        joint_of(named(*names), text)
+    assert str(caught.value) == message
+    with pytest.raises(RigError, match="joint"):
+        compute(f"weight:{text}", named(*names), None, Skinning())
+
+
+def test_joints_without_a_skeleton_have_indices():
+    skin = skin_from_lists([[(1, 0.25)]], np.tile(np.eye(4), (2, 1, 1)))
+    figure = Figure("skin", mesh([[0.0, 0, 0]]), None, skin)
+    assert compute("weight:#1", figure, None, Skinning()).tolist() == [0.25]
+    assert categories("dominant", figure) == ("#0", "#1")
+    assert view_title("weight:1", figure) == "Weight of #1"
+    with pytest.raises(RigError) as caught:
+        joint_of(figure, "knee")
+    assert str(caught.value) == 'no joint "knee"; without a skeleton there are #0 to #1'
+
+
+def test_what_a_figure_lacks_for_the_weight_of_a_joint():
+    figure = named("hip", "knee")
+    assert missing_part("weight:knee", figure) == ""
+    assert missing_part("weight", figure) == "a selected joint"
+    assert missing_part("weight:toe", figure) == 'a joint "toe"'
+    assert view_title("weight:KNEE", figure) == "Weight of knee"
+    assert view_title("weight:toe", figure) == view_title("weight", figure) == "Weight of a joint"
+
+
+def test_units_of_views():
+    figure = sliding([[]] * 3, unit="m")
+    found = {name: shown_unit(name, figure) for name in ("cut", "stretch", "entropy", "weight")}
+    assert found == {
+        "cut": (1000.0, "mm"), "stretch": (1.0, "%"), "entropy": (1.0, "bits"), "weight": (1.0, "")
+    }  # fmt: skip
+
+
+def test_every_module_of_the_folder_is_in_the_table():
+    folder = Path(scalars.__file__).parent
+    modules = {path.stem for path in folder.glob("*.py") if not path.name.startswith("_")}
+    assert modules == {view.module for view in SCALARS.values()}
 
 
 def test_small_lengths_are_millimetres_or_a_share_of_the_size():
     figure = sliding([[]] * 3, unit="m")
     assert length_unit(figure) == (1000.0, "mm")
+    # A centimetre is 10 mm, an inch 25.4.
+    assert length_unit(replace(figure, unit="cm")) == (10.0, "mm")
+    assert length_unit(replace(figure, unit="in"))[0] == pytest.approx(25.4)
     # Box of 1 x 2 x 3: a diagonal of sqrt 14.
     factor, word = length_unit(replace(figure, unit=""))
     assert word == "% of the size"
@@ -139,3 +287,16 @@ def test_strongest_is_the_largest_number_of_influences():
     assert strongest(sliding([[], [(0, 0.5)] * 3, [(1, 1.0)]])) == 3
     assert strongest(sliding([[]] * 3)) == 0
     assert strongest(Figure("bare", mesh(POINTS))) == 0
+
+
+def test_fields_are_shown_by_name_or_the_first_of_their_kind():
+    figure = replace(sliding([[(0, 1.0)]] * 3), fields=(FAR, KINDS_OF_MATCH), unit="m")
+    for name in ("field", "field:far", "field:FAR"):
+        assert compute(name, figure, None, Skinning()).tolist() == [0.5, 2.0, 0.0]
+        assert view_title(name, figure) == "How far" and shown_unit(name, figure) == (1000.0, "mm")
+    assert compute("class:match", figure, None, Skinning()).tolist() == [0.0, 1.0, 1.0]
+    assert categories("class", figure) == ("near", "filled")
+    assert missing_part("field:near", figure) == 'a field "near"'
+    assert missing_part("class", replace(figure, fields=(FAR,))) == "classes"
+    with pytest.raises(RigError, match=r'^no field is called "match"; there are: far$'):
+        compute("field:match", figure, None, Skinning())

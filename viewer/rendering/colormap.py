@@ -1,4 +1,4 @@
-"""The colour map of scalar views: dark to bright, evenly as the eye sees it."""
+"""The colour maps of scalar views: even steps as the eye sees them, also with other eyes."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from viewer.rig.arrays import Bytes, Floats
 
-__all__ = ["color_at", "colormap"]
+__all__ = ["colormap", "diverging_map", "from_linear", "oklab", "to_linear"]
 
 # Anchors in OKLab (Ottosson 2020): lightness rises evenly from violet over red to yellow, so
 # the map reads in grey and to colour-blind eyes, like matplotlib's "inferno".
@@ -19,6 +19,18 @@ _ANCHORS = np.array(
         [0.96, -0.020, 0.130],
     ]
 )
+# From blue over white to red: lightness falls evenly to both sides, and the two hues stay apart
+# for people who do not tell red from green.
+_DIVERGING = np.array(
+    [
+        [0.36, -0.020, -0.130],
+        [0.60, -0.035, -0.115],
+        [0.97, 0.000, 0.000],
+        [0.60, 0.140, 0.080],
+        [0.36, 0.120, 0.070],
+    ]
+)
+_DIVERGING_PLACES = np.array([0.0, 0.2, 0.5, 0.8, 1.0])
 _FROM_OKLAB = np.array(
     [
         [1.0, 0.3963377774, 0.2158037573],
@@ -41,22 +53,39 @@ def colormap(count: int = 256) -> Bytes:
     >>> colormap(2).shape
     (2, 4)
     """
-    places = np.linspace(0.0, len(_ANCHORS) - 1.0, count)
-    channels = [np.interp(places, np.arange(len(_ANCHORS)), column) for column in _ANCHORS.T]
-    rgb = _to_srgb(np.stack(channels, axis=1))
+    return _pixels(_ANCHORS, np.linspace(0.0, 1.0, len(_ANCHORS)), count)
+
+
+def diverging_map(count: int = 256) -> Bytes:
+    """Return the map of differences as pixels: (count, 4) sRGB with alpha, white in the middle.
+
+    >>> diverging_map(3)[1].tolist()
+    [245, 245, 245, 255]
+    """
+    return _pixels(_DIVERGING, _DIVERGING_PLACES, count)
+
+
+def _pixels(anchors: Floats, places: Floats, count: int) -> Bytes:
+    """Return ``count`` colours between anchors in OKLab."""
+    wanted = np.linspace(0.0, 1.0, count)
+    lab = np.stack([np.interp(wanted, places, column) for column in anchors.T], axis=1)
     pixels = np.full((count, 4), 255, dtype=np.uint8)
-    pixels[:, :3] = np.round(255.0 * rgb)
+    pixels[:, :3] = np.round(255.0 * from_linear((lab @ _FROM_OKLAB.T) ** 3 @ _TO_LINEAR_RGB.T))
     return pixels
 
 
-def color_at(share: float) -> tuple[float, float, float]:
-    """Return the sRGB colour, 0 to 1, at a place between lowest (0) and highest (1)."""
-    pixels = colormap()
-    index = round(min(max(share, 0.0), 1.0) * (len(pixels) - 1))
-    r, g, b = (float(channel) / 255.0 for channel in pixels[index, :3])
-    return r, g, b
-
-
-def _to_srgb(lab: Floats) -> Floats:
-    linear = np.clip((lab @ _FROM_OKLAB.T) ** 3 @ _TO_LINEAR_RGB.T, 0.0, 1.0)
+def from_linear(colors: Floats) -> Floats:
+    """Return linear colours as sRGB, 0 to 1, cut to what screens show (IEC 61966-2-1)."""
+    linear = np.clip(colors, 0.0, 1.0)
     return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+
+
+def to_linear(colors: Floats) -> Floats:
+    """Return sRGB colours, 0 to 1, as linear ones (IEC 61966-2-1)."""
+    return np.where(colors <= 0.04045, colors / 12.92, ((colors + 0.055) / 1.055) ** 2.4)
+
+
+def oklab(colors: Floats) -> Floats:
+    """Return linear colours, (..., 3), in OKLab, where distances are as the eye sees them."""
+    cones = np.cbrt(np.maximum(colors @ np.linalg.inv(_TO_LINEAR_RGB).T, 0.0))
+    return cones @ np.linalg.inv(_FROM_OKLAB).T

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from viewer.rig.follow import followed_point
 from viewer.rig.mesh import bounding_box
 from viewer.rig.scene import Actor, Scene, scene_points
 
-__all__ = ["find_follow", "fit_turning", "frame_motion", "outermost"]
+__all__ = ["find_follow", "fit_turning", "follow_candidates", "frame_motion", "outermost"]
 
 _MOST_FRAMES, _MOST_POINTS = 32, 10_000_000  # looked at for fitting
 _N_DIRECTIONS = 1000
@@ -134,25 +135,48 @@ def find_follow(scene: Scene, name: str) -> Follow:
     scene : Scene
         Posed as it was when the camera was aimed.
     name : str
-        Of an actor, for its root joint or the middle of its points; or of a joint or captured
-        point of the first actor that has it; or both, as ``fox/head``.
+        See ``follow_candidates``, of which the first is taken.
 
     Raises
     ------
     RigError
         If nobody and nothing is called that.
     """
-    who, slash, part = name.lower().rpartition("/")
-    called = [actor.name.lower() for actor in scene.actors]
-    if name.lower() in called:
-        index = called.index(name.lower())
-        return _followed(scene, index, _root(scene.actors[index]))
-    for index, actor in enumerate(scene.actors):
-        joint = _joint(actor, part) if not slash or called[index] == who else -1
-        if joint >= 0:
-            return _followed(scene, index, joint)
+    for index, joint in follow_candidates(scene, name):
+        return _followed(scene, index, joint)
     names = ", ".join(actor.name for actor in scene.actors)
     raise RigError(f'no actor, joint or point is called "{name}"; actors: {names}')
+
+
+def follow_candidates(scene: Scene, name: str) -> list[tuple[int, int]]:
+    """Return all whom a name may mean: indices of actors, and of a joint or point of each.
+
+    Parameters
+    ----------
+    scene : Scene
+        With any number of actors.
+    name : str
+        Of an actor, for its root joint or the middle of its points; or of a joint or captured
+        point; or a person's number; or somebody's joint, as ``fox/head`` or ``1:pelvis``.
+    """
+    wanted = name.lower()
+    numbers = [() if actor.person is None else (str(actor.person),) for actor in scene.actors]
+    called = [(actor.name.lower(), *own) for actor, own in zip(scene.actors, numbers, strict=True)]
+    roots = [_root(actor) for actor in scene.actors]
+    found = [(index, roots[index]) for index, who in enumerate(called) if who[0] == wanted]
+    found = found or _with_joint(scene, range(len(called)), wanted)
+    found = found or [(index, roots[index]) for index, who in enumerate(called) if wanted in who]
+    # Joints may have a colon in their names, as mixamorig:Hips.
+    for place, sign in enumerate(wanted):
+        if sign in "/:" and not found:
+            whose = [index for index, who in enumerate(called) if wanted[:place] in who]
+            found = _with_joint(scene, whose, wanted[place + 1 :])
+    return found
+
+
+def _with_joint(scene: Scene, actors: Iterable[int], name: str) -> list[tuple[int, int]]:
+    found = [(index, _joint(scene.actors[index], name)) for index in actors]
+    return [(index, joint) for index, joint in found if joint >= 0]
 
 
 def _followed(scene: Scene, actor: int, joint: int) -> Follow:

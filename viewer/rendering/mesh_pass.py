@@ -7,13 +7,11 @@ from typing import Any
 import moderngl
 import numpy as np
 
-from viewer.rendering.colormap import colormap
 from viewer.rendering.index_sets import IndexSet
 from viewer.rendering.mesh_buffers import MeshBuffers
 from viewer.rendering.options import Color, DisplayOptions
 from viewer.rendering.program import Programs, set_uniforms
 from viewer.rendering.skin_pass import PosedMesh
-from viewer.rendering.upload import ramp_texture
 from viewer.rendering.view import View, set_lights, set_model
 from viewer.rig.arrays import Floats
 
@@ -42,7 +40,6 @@ class MeshPass:
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
         self.context, self.programs = context, programs
         self._arrays: dict[tuple[int, int, int], tuple[PosedMesh, moderngl.VertexArray]] = {}
-        self._colormap = ramp_texture(context, colormap())
 
     def draw(
         self,
@@ -67,18 +64,16 @@ class MeshPass:
         color : (r, g, b), optional
             Of what has no texture, linear; ``SKIN_COLOR`` if omitted.
         """
-        program = self.programs.drawing("mesh", options.shading)
+        is_scalar = options.shading == "scalar"
+        corners = "corners" if is_scalar else ""
+        program = self.programs.drawing("mesh", options.shading, geometry=corners)
         set_model(program, view, placement, mesh.center)
         set_lights(program, view, options.lights)
         set_surface(program, mesh.mesh, options)
-        values = {
-            "u_color": SKIN_COLOR if color is None else color,
-            "u_scalar_range": mesh.scalars.shown,
-            "u_colormap": _COLORMAP_UNIT,
-        }
-        set_uniforms(program, values)
-        if options.shading == "scalar":
-            self._colormap.use(_COLORMAP_UNIT)
+        set_uniforms(program, {"u_color": SKIN_COLOR if color is None else color})
+        if is_scalar and mesh.scalars.look is not None:
+            set_uniforms(program, {"u_colormap": _COLORMAP_UNIT, **mesh.scalars.look.uniforms})
+            mesh.scalars.use(_COLORMAP_UNIT)
         indices = mesh.mesh.index_set(options.reduced, options.hidden_parts)
         draw_runs(self.array(mesh, program, indices), indices, options.texture)
 
@@ -137,7 +132,6 @@ class MeshPass:
         for _, array in self._arrays.values():
             array.release()
         self._arrays.clear()
-        self._colormap.release()
 
 
 def set_surface(program: moderngl.Program, mesh: MeshBuffers, options: DisplayOptions) -> None:

@@ -92,7 +92,16 @@ class DisplayOptions:
     skinning : Skinning
         How joints move the mesh.
     scalar : str
-        A key of ``viewer.rig.scalars.SCALARS``: what the shading ``"scalar"`` shows.
+        What the shading ``"scalar"`` shows: a key of ``viewer.rig.scalars.SCALARS``, with a joint
+        behind a colon for a view of one (``"weight:left_knee"``, ``"weight:#4"``); without one the
+        selected joint is shown.
+    scalar_range : (float, float) or None
+        What the ends of its colour map stand for, in the unit of the legend; None for all that
+        there is.
+    isolines : bool or None
+        Lines at every tenth of the range; None for those views where they are usual.
+    legend : bool
+        Draw what the colours stand for into the picture.
     reduced : bool
         Draw the coarser mesh of figures that have one.
     keypoints : bool
@@ -121,6 +130,9 @@ class DisplayOptions:
     lights: Lights = field(default_factory=Lights)
     skinning: Skinning = field(default_factory=Skinning)
     scalar: str = "cut"
+    scalar_range: tuple[float, float] | None = None
+    isolines: bool | None = None
+    legend: bool = False
     reduced: bool = False
     keypoints: bool = False
     hidden_parts: tuple[int, ...] = ()

@@ -62,7 +62,7 @@ class Programs:
         self._cache: dict[tuple[str, ...], moderngl.Program] = {}
 
     def drawing(
-        self, name: str, chunk: str = "", fragment: str = "", skin: str = ""
+        self, name: str, chunk: str = "", fragment: str = "", skin: str = "", geometry: str = ""
     ) -> moderngl.Program:
         """Return the program of ``name.vert`` and a fragment shader, each with its chunk.
 
@@ -76,27 +76,38 @@ class Programs:
             Of the fragment shader; the same name if omitted.
         skin : str
             A key of ``viewer.rig.skinning.METHODS``, for vertex shaders that skin.
+        geometry : str
+            Of the geometry shader, if there is one between the two.
 
         Raises
         ------
         RenderError
             If the driver refuses a shader; the message names our file and its line.
         """
-        return self._get((name, skin, fragment or name, chunk), ())
+        return self._get((name, skin, fragment or name, chunk, geometry), ())
 
     def feedback(self, name: str, chunk: str, outputs: tuple[str, ...]) -> moderngl.Program:
         """Return a program without fragments whose outputs are captured, interleaved."""
-        return self._get((name, chunk, "", ""), outputs)
+        return self._get((name, chunk, "", "", ""), outputs)
 
-    def _get(self, key: tuple[str, str, str, str], outputs: tuple[str, ...]) -> moderngl.Program:
+    def _get(
+        self, key: tuple[str, str, str, str, str], outputs: tuple[str, ...]
+    ) -> moderngl.Program:
         if key not in self._cache:
-            name, skin, fragment_name, chunk = key
+            name, skin, fragment_name, chunk, middle = key
             files: list[str] = []
             vertex = _compose(f"{name}.vert", skin, files)
             fragment = _compose(f"{fragment_name}.frag", chunk, files) if fragment_name else None
+            geometry = _compose(f"{middle}.geom", "", files) if middle else None
+            if geometry:
+                # Both take and give the fragment shader's inputs: those of the first are renamed.
+                vertex = re.sub(r"\bv_(\w+)", r"v_vertex_\1", vertex)
             try:
                 self._cache[key] = self.context.program(
-                    vertex_shader=vertex, fragment_shader=fragment, varyings=outputs
+                    vertex_shader=vertex,
+                    fragment_shader=fragment,
+                    geometry_shader=geometry,
+                    varyings=outputs,
                 )
             except moderngl.Error as problem:
                 raise RenderError(self._explain(str(problem), files)) from None

@@ -15,6 +15,7 @@ from viewer.rendering.joint_pass import JointPass
 from viewer.rendering.mesh_pass import MeshPass
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.program import Programs
+from viewer.rendering.scalar_views import ScalarViews
 from viewer.rendering.shown import (
     has_markers,
     has_points,
@@ -30,11 +31,12 @@ from viewer.rendering.target import Target
 from viewer.rendering.view import View, view_of
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.scalars import SCALARS
 from viewer.rig.scene import Actor, Scene
 
 if TYPE_CHECKING:
     from viewer.rendering.keypoint_pass import KeypointPass
+    from viewer.rendering.legend import Legend
+    from viewer.rendering.legend_pass import LegendPass
     from viewer.rendering.picking import Pick, PickPass
     from viewer.rendering.point_pass import PointPass
     from viewer.rendering.trail_pass import TrailPass
@@ -54,8 +56,8 @@ class Renderer:
     ----------
     notes : list of str
         What the driver could not do as asked, one line each.
-    scalar_range : (float, float)
-        Lowest and highest number of the scalar view drawn last, over all figures.
+    scalars : ScalarViews
+        Range and legend of the scalar view drawn last.
     buffers : ActorBuffers
         What was uploaded for figures and actors.
     """
@@ -63,7 +65,7 @@ class Renderer:
     def __init__(self, context: moderngl.Context) -> None:
         self.context = context
         self.notes: list[str] = []
-        self.scalar_range = 0.0, 0.0
+        self.scalars = ScalarViews()
         self.programs = Programs(context)
         self.mesh_pass = MeshPass(context, self.programs)
         self.joint_pass = JointPass(context, self.programs)
@@ -71,7 +73,7 @@ class Renderer:
         self.buffers = ActorBuffers(
             context, self.programs, self.joint_pass.cube, self.notes, self.mesh_pass.forget
         )
-        self._late: list[PointPass | PickPass] = []
+        self._late: list[PointPass | PickPass | LegendPass] = []
 
     # What many scenes never need is imported and made when it is first asked for.
 
@@ -108,6 +110,25 @@ class Renderer:
         self._late.append(picks)
         return picks
 
+    @cached_property
+    def legend_pass(self) -> LegendPass:
+        """Draws legends into pictures."""
+        from viewer.rendering.legend_pass import LegendPass
+
+        legends = LegendPass(self.context, self.programs)
+        self._late.append(legends)
+        return legends
+
+    @property
+    def scalar_range(self) -> tuple[float, float]:
+        """Lowest and highest number of the scalar view drawn last, over all figures."""
+        return self.scalars.range
+
+    @property
+    def legend(self) -> Legend | None:
+        """What the colours of the scalar view drawn last stand for, None before there was one."""
+        return self.scalars.legend
+
     def draw(
         self,
         scene: Scene,
@@ -133,13 +154,14 @@ class Renderer:
             What the grid lies under and the depth range covers, scene space: ``scene_box`` of
             the pose in which the scene was opened.
         selected : (int, int)
-            An actor's index and a joint of it that is drawn in a highlight colour, -1 for none.
+            An actor's index and a joint of it that is drawn in a highlight colour, and that a
+            scalar view is about which is of no joint by itself; -1 for none.
         """
         self._note_samples(target)
         self.buffers.keep_only(scene.actors)
         target.framebuffer.use()
         view = view_of(camera, target.size, box)
-        has_meshes = self._draw_meshes(scene, view, options, target)
+        has_meshes = self._draw_meshes(scene, view, options, target, selected)
         update_skeletons(self.buffers, scene.actors, options)
         skeletons = [
             (actor, selected[1] if index == selected[0] else -1)
@@ -162,6 +184,8 @@ class Renderer:
         for actor in scene.actors:
             if has_markers(actor, options):
                 self._draw_markers(actor, view, options)
+        if options.legend and options.shading == "scalar" and has_meshes:
+            self._draw_legend(target.size)
 
     def pick(
         self,
@@ -207,12 +231,19 @@ class Renderer:
                 self.buffers.skeleton(actor)
 
     def _draw_meshes(
-        self, scene: Scene, view: View, options: DisplayOptions, target: Target
+        self,
+        scene: Scene,
+        view: View,
+        options: DisplayOptions,
+        target: Target,
+        selected: tuple[int, int],
     ) -> bool:
         """Skin what changed, clear the picture, and draw background and surfaces if there are."""
         meshes = update_meshes(self.buffers, scene.actors, options)
         if options.shading == "scalar" and meshes.singles:
-            self._share_range(options.scalar, [mesh for _, mesh in meshes.singles])
+            index, joint = selected
+            whose = scene.actors[index] if 0 <= index < len(scene.actors) else None
+            self.scalars.update(meshes.singles, options, (whose, joint))
         self._prepare(target)
         self.ground_pass.draw_background(options.background)
         for actor, mesh in meshes.singles:
@@ -232,13 +263,11 @@ class Renderer:
         context.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
         context.depth_func = "<"
 
-    def _share_range(self, name: str, meshes: list[PosedMesh]) -> None:
-        """Let the same colour mean the same number on all figures."""
-        ranges = [mesh.scalars.range for mesh in meshes]
-        low, high = min(low for low, _ in ranges), max(high for _, high in ranges)
-        self.scalar_range = low, high
-        for mesh in meshes:
-            mesh.scalars.shown = SCALARS[name].shown(low, high)
+    def _draw_legend(self, size: tuple[int, int]) -> None:
+        assert self.legend is not None  # meshes were drawn with their numbers
+        note = f"a picture of {size[0]} x {size[1]} pixels has no room for a legend"
+        if not self.legend_pass.draw(self.legend, size) and note not in self.notes:
+            self.notes.append(note)
 
     def _draw_mesh(
         self, actor: Actor, mesh: PosedMesh, view: View, options: DisplayOptions

@@ -98,8 +98,6 @@ def update_meshes(
     for actor, mesh in meshes.singles:
         pose = None if options.show == "binding" else actor.pose
         mesh.update(pose, options.skinning)
-        if options.shading == "scalar":
-            mesh.scalars.update(options.scalar, pose, options.skinning)
     return meshes
 
 

@@ -1,4 +1,4 @@
-"""What a file says about a figure beyond how it moves: body parts, keypoints, coarser meshes."""
+"""What is known of a figure beyond how it moves: parts, keypoints, coarser meshes, fields."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints, frozen
 
-__all__ = ["BodyParts", "Keypoints", "ReducedMesh", "keypoint_positions"]
+__all__ = ["BodyParts", "Keypoints", "ReducedMesh", "VertexField", "keypoint_positions"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,6 +90,41 @@ class ReducedMesh:
             raise RigError(
                 f"reduced triangles: expected 0 to {len(self.vertices) - 1}, "
                 f"found {corners.min()} to {corners.max()}"
+            )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class VertexField:
+    """A number for every vertex that somebody computed: a distance, a confidence.
+
+    Attributes
+    ----------
+    name : str
+        One word, for the command line.
+    title : str
+        For menus and the legend.
+    values : (V,)
+        In ``unit``, or indices into ``names``.
+    unit : str
+        ``"length"``: figure units; else the word for it, empty for none.
+    names : tuple of str
+        What the numbers stand for if those are indices: ``("matched", "filled")``.
+    """
+
+    name: str
+    title: str
+    values: Floats
+    unit: str = ""
+    names: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "values", frozen("values", self.values, (None,)))
+        low, high = (0.0, len(self.names) - 1.0) if self.names else (-np.inf, np.inf)
+        values = self.values
+        if len(values) and not low <= values.min() <= values.max() <= high:
+            raise RigError(
+                f"field {self.name}: expected {low:g} to {high:g}, "
+                f"found {values.min():g} to {values.max():g}"
             )
 
 

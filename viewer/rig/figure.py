@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from viewer.errors import RigError
-from viewer.rig.annotations import BodyParts, Keypoints, ReducedMesh
+from viewer.rig.annotations import BodyParts, Keypoints, ReducedMesh, VertexField
 from viewer.rig.arrays import Floats, Ints, frozen
 from viewer.rig.blendshapes import BlendShapes, Correctives, JointRegressor
 from viewer.rig.hands import Hand
@@ -42,7 +42,7 @@ class Figure:
     up : "y" or "z"
         The axis that points up in the file; the camera obeys it.
     unit : str
-        Of its lengths, ``"m"`` for metres; empty if the file does not say.
+        Of its lengths, a key of ``viewer.rig.units.METRES``, known or guessed; empty if neither.
     blend_shapes : BlendShapes or None
         Directions in which the rest mesh changes; joints follow.
     correctives : Correctives or None
@@ -59,6 +59,8 @@ class Figure:
         Each vertex's mirror partner.
     points : PointLayout or None
         Of a figure that is nothing but captured keypoints.
+    fields : tuple of VertexField
+        Numbers of the vertices that can be shown as colours.
     facts : tuple of (str, str)
         What the reader found out, for ``viewer info``: a heading and a text each.
     """
@@ -79,6 +81,7 @@ class Figure:
     reduced: ReducedMesh | None = None
     symmetry: Ints | None = None
     points: PointLayout | None = None
+    fields: tuple[VertexField, ...] = ()
     facts: tuple[tuple[str, str], ...] = ()
 
     def __post_init__(self) -> None:
@@ -110,6 +113,7 @@ class Figure:
             "correctives": self.correctives.n_vertices if self.correctives else None,
             "body parts": len(self.body_parts.of_vertex) if self.body_parts else None,
         }
+        ends |= {f"field {field.name}": len(field.values) for field in self.fields}
         for what, found in ends.items():
             if found is not None and found != count:
                 raise RigError(

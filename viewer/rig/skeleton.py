@@ -17,6 +17,7 @@ __all__ = [
     "clamp_dofs",
     "dof_label",
     "find_dof",
+    "find_joint",
     "joint_label",
     "joint_labels",
 ]
@@ -244,7 +245,7 @@ def find_dof(skeleton: Skeleton, label: str) -> int:
     joint_text, dot, kind = label.rpartition(".")
     if not dot or kind.lower() not in DOF_KINDS:
         raise RigError(f'"{label}": expected JOINT.KIND with KIND one of {", ".join(DOF_KINDS)}')
-    joint = _find_joint(skeleton, joint_text)
+    joint = find_joint(skeleton, joint_text)
     code = DOF_KINDS.index(kind.lower())
     rows = np.flatnonzero((skeleton.dof_joints == joint) & (skeleton.dof_kinds == code))
     if len(rows) == 0:
@@ -252,7 +253,21 @@ def find_dof(skeleton: Skeleton, label: str) -> int:
     return int(rows[0])
 
 
-def _find_joint(skeleton: Skeleton, text: str) -> int:
+def find_joint(skeleton: Skeleton, text: str) -> int:
+    """Return the index of the joint called ``text``.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Holds the names.
+    text : str
+        A joint's name in any case of letters, ``"NAME#INDEX"`` or ``"#INDEX"``.
+
+    Raises
+    ------
+    RigError
+        If there is none, or several joints have that name.
+    """
     name, hash_sign, index = text.rpartition("#")
     if hash_sign and index.isdecimal() and len(index) < 10 and int(index) < skeleton.n_joints:
         joint = int(index)

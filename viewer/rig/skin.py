@@ -16,7 +16,9 @@ __all__ = [
     "has_influence",
     "influence_counts",
     "limit_influences",
+    "merged",
     "normalized",
+    "owners",
     "skin_from_entries",
     "skin_from_lists",
     "skin_rows",
@@ -128,7 +130,7 @@ def influence_counts(skin: Skin) -> Ints:
 
 def weight_sums(skin: Skin) -> Floats:
     """Return the sum of each vertex's weights: (V,), 0 where it lists none."""
-    sums = np.bincount(_owners(skin), weights=skin.weights, minlength=skin.n_vertices)
+    sums = np.bincount(owners(skin), weights=skin.weights, minlength=skin.n_vertices)
     return sums.astype(np.float64, copy=False)
 
 
@@ -141,7 +143,7 @@ def has_influence(skin: Skin) -> Bools:
     zero = skin.weights == 0.0
     if not zero.any():
         return counts > 0
-    return np.bincount(_owners(skin), weights=~zero, minlength=skin.n_vertices) > 0
+    return np.bincount(owners(skin), weights=~zero, minlength=skin.n_vertices) > 0
 
 
 def skin_from_entries(
@@ -185,7 +187,7 @@ def skin_rows(skin: Skin, vertices: Ints) -> Skin:
 
 def strongest_first(skin: Skin) -> Skin:
     """Return the same influences, each vertex's sorted by falling weight, ties as they were."""
-    order = np.lexsort((-skin.weights, _owners(skin)))
+    order = np.lexsort((-skin.weights, owners(skin)))
     return replace(skin, joints=skin.joints[order], weights=skin.weights[order])
 
 
@@ -204,13 +206,12 @@ def limit_influences(skin: Skin, count: int) -> Skin:
     Skin
         Influences of one joint added up first, then cut, then scaled to a sum of 1.
     """
-    merged = _merged(skin)
-    ordered = strongest_first(merged)
+    ordered = strongest_first(merged(skin))
     rank = np.arange(len(ordered.joints)) - np.repeat(
         ordered.starts[:-1], influence_counts(ordered)
     )
     kept = rank < count
-    counts = np.bincount(_owners(ordered)[kept], minlength=skin.n_vertices)
+    counts = np.bincount(owners(ordered)[kept], minlength=skin.n_vertices)
     cut = Skin(
         starts=np.concatenate([[0], np.cumsum(counts)]).astype(np.int32),
         joints=ordered.joints[kept],
@@ -224,12 +225,12 @@ def normalized(skin: Skin) -> Skin:
     """Return the skin with each vertex's weights scaled to a sum of 1; sums of 0 stay."""
     sums = weight_sums(skin)
     factors = np.divide(1.0, sums, out=np.ones_like(sums), where=np.abs(sums) > _NO_SUM)
-    return replace(skin, weights=skin.weights * factors[_owners(skin)])
+    return replace(skin, weights=skin.weights * factors[owners(skin)])
 
 
-def _merged(skin: Skin) -> Skin:
-    """Add up the weights that a vertex lists for one joint several times."""
-    keys = _owners(skin).astype(np.int64) * skin.n_joints + skin.joints
+def merged(skin: Skin) -> Skin:
+    """Return the skin with the weights added up that a vertex lists for one joint several times."""
+    keys = owners(skin).astype(np.int64) * skin.n_joints + skin.joints
     unique, inverse = np.unique(keys, return_inverse=True)
     if len(unique) == len(keys):
         return skin
@@ -240,6 +241,6 @@ def _merged(skin: Skin) -> Skin:
     )
 
 
-def _owners(skin: Skin) -> Ints:
+def owners(skin: Skin) -> Ints:
     """Return the vertex of each influence: (N,) int32."""
     return np.repeat(np.arange(skin.n_vertices, dtype=np.int32), influence_counts(skin))

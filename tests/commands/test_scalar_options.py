@@ -1,0 +1,157 @@
+"""Scalar views on the command line: what is drawn, what is said, what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from viewer.cli import run
+from viewer.resources import resource
+
+
+@pytest.fixture(scope="module")
+def body():
+    return str(resource("assets", "samples", "body.npz"))
+
+
+@pytest.fixture
+def render(tmp_path, capsys):
+    """Draw a small picture; return its pixels, or None, with what was said."""
+
+    def drawn(*arguments):
+        path = tmp_path / "x.png"
+        path.unlink(missing_ok=True)
+        code = run(["render", *arguments, "--size", "160x120", "-o", str(path)])
+        said = capsys.readouterr()
+        if code:
+            assert not path.exists()
+            return code, said.err
+        return np.array(Image.open(path)), said.out.partition(": 160 x 120")[2] + said.err
+
+    return drawn
+
+
+def test_line_says_what_the_numbers_are(render, body):
+    for name, text in (
+        ("weight:LEFT_KNEE", "Weight of left_knee: 0 to 1"),
+        ("influences", "Number of influences: 0 to 4"),
+        ("dominant", "Dominant joint: 24 of 24"),
+        ("sums", "|sum of weights - 1|: 0 to 0"),
+        ("stretch", "Edge stretch, largest: 0 to 0 %"),
+        ("cut", "Distance to few influences: 0 to 0 mm"),
+    ):
+        assert render(body, "--scalar", name, "--no-grid")[1] == f", {text}\n"
+
+
+def test_joint_by_index_is_the_joint_by_name(render, body):
+    by_name, by_index, by_number = (
+        render(body, "--scalar", f"weight:{joint}")[0] for joint in ("left_knee", "#4", "4")
+    )
+    np.testing.assert_array_equal(by_name, by_index)
+    np.testing.assert_array_equal(by_name, by_number)
+    assert (by_name != render(body, "--scalar", "weight:right_knee")[0]).any()
+
+
+def test_legend_lines_and_range_change_the_picture(render, body):
+    view = [body, "--scalar", "weight:left_knee"]
+    plain = render(*view)[0]
+    for option in ("--legend", "--no-isolines", "--scalar-range=0:0.5"):
+        assert (render(*view, option)[0] != plain).any(), option
+    np.testing.assert_array_equal(render(*view, "--isolines")[0], plain)
+
+
+def test_legend_stays_in_its_corner(render, body):
+    view = [body, "--scalar", "dominant"]
+    changed = (render(*view)[0] != render(*view, "--legend")[0]).any(axis=2)
+    rows, columns = np.nonzero(changed)
+    assert rows.min() == columns.min() == 2
+    assert columns.max() < 0.6 * 160
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (
+            ["--scalar", "weight:left_kneee"],
+            '--scalar weight:left_kneee: no joint is called "left_kneee"; close to it: left_knee',
+        ),
+        (
+            ["--scalar", "weight"],
+            "--scalar weight: expected a joint, as weight:pelvis or weight:#0",
+        ),
+        (
+            ["--scalar", "stretch:pelvis"],
+            'argument --scalar: scalar view "stretch": expected no joint, found "pelvis"',
+        ),
+        (["--legend"], "--legend: expected --scalar NAME, whose colours it is about"),
+        (["--no-isolines", "--shading", "parts"], None),
+        (
+            ["--scalar-range", "0:1"],
+            "--scalar-range: expected --scalar NAME, whose colours it is about",
+        ),
+        (
+            ["--scalar", "cut", "--scalar-range", "5:1"],
+            '--scalar-range: expected A:B, two numbers with A below B, found "5:1"',
+        ),
+        (
+            ["--scalar", "cut", "--scalar-range", "nan:inf"],
+            '--scalar-range: expected A:B, two numbers with A below B, found "nan:inf"',
+        ),
+        (
+            ["--scalar", "cut", "--scalar-range", "7"],
+            '--scalar-range: expected A:B, two numbers with A below B, found "7"',
+        ),
+        (
+            ["--scalar", "dominant", "--scalar-range", "0:3"],
+            "--scalar-range: dominant has a colour for each whole number",
+        ),
+    ],
+)  # fmt: skip
+def test_what_makes_no_sense_is_refused_in_one_line(render, body, arguments, message):
+    if message is None:
+        assert render(body, *arguments)[0].shape == (120, 160, 3)
+        return
+    code, said = render(body, *arguments)
+    assert code == 2
+    lines = said.splitlines()
+    assert lines[0].startswith(f"viewer: {message}") and len(lines) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "note"),
+    [
+        ("parts", "--scalar parts: Body parts: no figure has body parts"),
+        ("asymmetry", "--scalar asymmetry: Asymmetry: no figure has a symmetry map"),
+        ("correctives", "--scalar correctives: Effect of pose correctives: no figure has pose "
+                        "correctives"),
+    ],
+)  # fmt: skip
+def test_figure_without_what_is_asked_is_drawn_with_one_line(render, name, note):
+    picture, said = render("--scalar", name, "--legend")
+    assert picture.shape[:2] == (120, 160)
+    assert said.splitlines()[-1] == f"warning: {note}"
+
+
+def test_skeleton_alone_has_no_weights(render, tmp_path):
+    from viewer.resources import resource
+
+    skel = str(resource("assets", "samples", "fox.skel"))
+    _, said = render(skel, "--scalar", "weight:head", "--legend")
+    note = "--scalar weight:head: Weight of a joint: no figure has weights"
+    assert said.splitlines()[-1] == f"warning: {note}"
+
+
+def test_numbers_of_a_sequence_are_drawn_with_their_legend(body, tmp_path):
+    sheets = []
+    for option in ("--legend", "--samples=4"):
+        path = tmp_path / "sheet.png"
+        arguments = ["--scalar", "dominant", "--turntable", "180deg", "--contact-sheet", "2"]
+        more = ["--size", "480x180", "--force", "-o", str(path)]
+        assert run(["render", body, *arguments, option, *more]) == 0
+        sheets.append(np.array(Image.open(path)).astype(int))
+    changed = np.abs(sheets[0] - sheets[1]).sum(axis=2) > 0
+    half = changed.shape[1] // 2
+    for cell in (changed[:, :half], changed[:, half:]):
+        rows, columns = np.nonzero(cell)
+        assert rows.min() <= 3 and columns.min() <= 3 and columns.max() < 0.7 * half

@@ -1,0 +1,163 @@
+"""Options of scalar views: which number is shown, over which range, with what beside it."""
+
+from __future__ import annotations
+
+import argparse
+import math
+
+import numpy as np
+
+from viewer.errors import RigError, ViewerError, printable
+from viewer.rendering.options import DisplayOptions
+from viewer.rig.arrays import Floats
+from viewer.rig.scalars import (
+    SCALARS,
+    categories,
+    compute,
+    find_view,
+    joint_of,
+    length_text,
+    missing_part,
+    shown_unit,
+    split_name,
+    view_title,
+)
+from viewer.rig.scene import Scene
+
+__all__ = ["add_scalar_arguments", "check_joint", "scalar_notes", "scalar_text", "set_scalar"]
+
+_WHOLE = ("discrete", "categorical")
+
+
+def add_scalar_arguments(group: argparse._ArgumentGroup) -> None:
+    """Add the options that show numbers as colours."""
+    group.add_argument(
+        "--scalar",
+        type=_view_name,
+        metavar="NAME[:JOINT]",
+        help=f"show a number of each vertex as a colour: weight:JOINT, {', '.join([*SCALARS][1:])}",
+    )
+    group.add_argument(
+        "--scalar-range",
+        metavar="A:B",
+        help="what the ends of the colours stand for, in the legend's unit (default: all that "
+        "there is); write --scalar-range=-20:20 if A is below 0",
+    )
+    group.add_argument(
+        "--isolines",
+        action=argparse.BooleanOptionalAction,
+        help="lines at every tenth of the range (default: for weights)",
+    )
+    group.add_argument("--legend", action="store_true", help="say in the picture what colours mean")
+
+
+def _view_name(text: str) -> str:
+    """Return the name of a scalar view; argparse words the refusal."""
+    try:
+        split_name(text)
+    except RigError as problem:
+        raise argparse.ArgumentTypeError(str(problem)) from None
+    return text
+
+
+def set_scalar(arguments: argparse.Namespace, options: DisplayOptions) -> None:
+    """Set what is asked for of a scalar view.
+
+    Raises
+    ------
+    ViewerError
+        If options need a view and there is none, or a range makes no sense.
+    """
+    if arguments.scalar:
+        options.shading, options.scalar = "scalar", arguments.scalar
+    for name in ("legend", "scalar_range", "isolines"):
+        if getattr(arguments, name) not in (None, False) and options.shading != "scalar":
+            option = f"--{name.replace('_', '-')}"
+            raise ViewerError(f"{option}: expected --scalar NAME, whose colours it is about")
+    options.legend, options.isolines = arguments.legend, arguments.isolines
+    if arguments.scalar_range is not None:
+        if find_view(options.scalar).kind in _WHOLE:
+            raise ViewerError(
+                f"--scalar-range: {options.scalar} has a colour for each whole number"
+            )
+        options.scalar_range = _parse_range(arguments.scalar_range)
+
+
+def _parse_range(text: str) -> tuple[float, float]:
+    low_text, _, high_text = text.partition(":")
+    try:
+        low, high = float(low_text), float(high_text)
+    except ValueError:
+        low = high = math.nan
+    if not (math.isfinite(low) and math.isfinite(high) and low < high):
+        raise ViewerError(
+            "--scalar-range: expected A:B, two numbers with A below B, "
+            f'found "{printable(text, 60)}"'
+        )
+    return low, high
+
+
+def check_joint(options: DisplayOptions) -> None:
+    """Refuse a view that is about the selected joint where none can be selected."""
+    if options.shading != "scalar":
+        return
+    key, joint = split_name(options.scalar)
+    if SCALARS[key].takes_joint and not joint:
+        raise ViewerError(f"--scalar {key}: expected a joint, as {key}:pelvis or {key}:#0")
+
+
+def scalar_notes(scene: Scene, options: DisplayOptions) -> list[str]:
+    """Return one line if no figure has what a scalar view shows.
+
+    Raises
+    ------
+    ViewerError
+        If the view is about a joint that no figure has; the message lists close names.
+    """
+    if options.shading != "scalar" or not scene.actors:
+        return []
+    figures = [actor.figure for actor in scene.actors]
+    missing = [missing_part(options.scalar, figure) for figure in figures]
+    if not all(missing):
+        return []
+    key, joint = split_name(options.scalar)
+    bound = next((figure for figure in figures if figure.skin is not None), None)
+    if joint and bound is not None and SCALARS[key].takes_joint:
+        try:
+            joint_of(bound, joint)
+        except RigError as problem:
+            raise ViewerError(f"--scalar {printable(options.scalar, 60)}: {problem}") from None
+    if SCALARS[key].takes_joint and not joint and bound is not None:
+        return [f"--scalar {key}: shows the joint that is selected, or name one: {key}:#0"]
+    return [f"--scalar {options.scalar}: {SCALARS[key].title}: no figure has {missing[0]}"]
+
+
+def scalar_text(scene: Scene, options: DisplayOptions) -> str:
+    """Return what the numbers shown are, for the line that names the picture."""
+    if options.shading != "scalar" or options.show == "skeleton":
+        return ""
+    name, view = options.scalar, find_view(options.scalar)
+    having = [
+        actor
+        for actor in scene.actors
+        if actor.figure.mesh is not None and actor.visible and not missing_part(name, actor.figure)
+    ]
+    if not having:
+        text = length_text(scene.actors[0].figure, 0.0) if view.unit == "length" else "0"
+        return f", {view.title}: 0 to {text}"
+    title = view_title(name, having[0].figure)
+    values = [compute(name, actor.figure, actor.pose, options.skinning) for actor in having]
+    if view.kind == "categorical":
+        return f", {title}: {_n_different(name, scene, values)}"
+    low = min(min(float(numbers.min()) for numbers in values), 0.0)
+    high = max(float(numbers.max()) for numbers in values)
+    if view.unit == "length":
+        return f", {title}: 0 to {length_text(having[0].figure, high)}"
+    unit = shown_unit(name, having[0].figure)[1]
+    return f", {title}: {low:.3g} to {high:.3g}{f' {unit}' if unit else ''}"
+
+
+def _n_different(name: str, scene: Scene, values: list[Floats]) -> str:
+    """Return how many joints or parts are seen, of how many: ``"22 of 24"``."""
+    found = len(np.unique(np.concatenate([numbers[numbers >= 0] for numbers in values])))
+    return f"{found} of {max(len(categories(name, actor.figure)) for actor in scene.actors)}"

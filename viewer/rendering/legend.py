@@ -1,0 +1,212 @@
+"""What the colours of a scalar view stand for, as data that pictures and panels draw alike."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from viewer.rendering.palettes import NOTHING
+from viewer.rendering.scalar_look import ScalarLook
+from viewer.rig.arrays import Bytes, Floats
+from viewer.rig.figure import Figure
+from viewer.rig.memo import Memo
+from viewer.rig.mesh import triangle_areas
+from viewer.rig.scalars import categories, find_view, missing_part, shown_unit, view_title
+
+__all__ = ["Entry", "Legend", "Shown", "Tick", "legend_of", "round_ticks"]
+
+_MOST_TICKS = 6
+_MOST_COUNTS = 10  # blocks of a bar that each have a number
+
+
+@dataclass(frozen=True, slots=True)
+class Tick:
+    """A number beside the bar: where, from 0 at its left end to 1, and what it says."""
+
+    place: float
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A thing with a name: its colour, sRGB 0 to 255, and what it is called."""
+
+    color: tuple[int, int, int]
+    text: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Legend:
+    """What the colours stand for.
+
+    Attributes
+    ----------
+    title, unit : str
+        Of the numbers; the unit may be empty.
+    colors : (N, 4) uint8
+        The bar from left to right, sRGB; none for things with names.
+    ticks : tuple of Tick
+        Round numbers along the bar.
+    entries : tuple of Entry
+        Things with names, those with the largest area first.
+    lines : tuple of float
+        Where isolines are, as places on the bar.
+    note : str
+        A line beneath: the numbers that there are, or why there is nothing to see.
+    """
+
+    title: str
+    unit: str = ""
+    colors: Bytes = field(default_factory=lambda: np.zeros((0, 4), dtype=np.uint8))
+    ticks: tuple[Tick, ...] = ()
+    entries: tuple[Entry, ...] = ()
+    lines: tuple[float, ...] = ()
+    note: str = ""
+
+    @property
+    def heading(self) -> str:
+        """Title and unit: ``"Distance LBS to DQS, mm"``."""
+        return f"{self.title}, {self.unit}" if self.unit else self.title
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shown:
+    """A figure with the numbers of a view, and how they are coloured.
+
+    Attributes
+    ----------
+    figure : Figure
+        With a mesh.
+    numbers : (V,)
+        As ``viewer.rig.scalars.compute`` gives them.
+    look : ScalarLook
+        Of this figure.
+    """
+
+    figure: Figure
+    numbers: Floats
+    look: ScalarLook
+
+
+def legend_of(name: str, shown: Sequence[Shown]) -> Legend:
+    """Return the legend of a view.
+
+    Parameters
+    ----------
+    name : str
+        Of the view.
+    shown : sequence of Shown
+        All figures that are drawn, at least one. The first that has what the view shows gives
+        title and unit.
+    """
+    missing = [missing_part(name, one.figure) for one in shown]
+    if all(missing):
+        return Legend(find_view(name).title, note=f"no figure has {missing[0]}")
+    having = [one for one, lacks in zip(shown, missing, strict=True) if not lacks]
+    title = view_title(name, having[0].figure)
+    kind = find_view(name).kind
+    if kind == "categorical":
+        return Legend(title, entries=_entries(name, having))
+    if kind == "discrete":
+        return _counts(title, having)
+    return _bar(name, title, having)
+
+
+def round_ticks(low: float, high: float, signed: bool = False) -> tuple[Tick, ...]:
+    """Return at most six round numbers within a range: multiples of 1, 2 or 5 times 10 to the n.
+
+    Parameters
+    ----------
+    low, high : float
+        Ends of the range, low < high.
+    signed : bool
+        Whether numbers above 0 have a plus sign.
+
+    >>> [tick.text for tick in round_ticks(0.0, 12.3)]
+    ['0', '5', '10']
+    """
+    least = (high - low) / (_MOST_TICKS - 1)
+    power = 10.0 ** math.floor(math.log10(least))
+    step = power * next(factor for factor in (1, 2, 5, 10) if factor * power >= 0.999 * least)
+    digits = max(0, -math.floor(math.log10(step) + 1e-9))
+    numbers = range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1)
+    ticks = []
+    for number in numbers:
+        value = number * step
+        is_plain = digits <= 4 and abs(value) < 1e6
+        text = f"{value:+.{digits}f}" if is_plain else f"{value:+.3g}"
+        text = text if (signed and number) or number < 0 else text[1:]
+        ticks.append(Tick((value - low) / (high - low), text if number else "0"))
+    return tuple(ticks)
+
+
+def _bar(name: str, title: str, shown: Sequence[Shown]) -> Legend:
+    factor, unit = shown_unit(name, shown[0].figure)
+    look = shown[0].look
+    low = factor * min(float(one.numbers.min()) for one in shown)
+    high = factor * max(float(one.numbers.max()) for one in shown)
+    is_signed = find_view(name).kind == "diverging"
+    ends = factor * look.ends[0], factor * look.ends[1]
+    is_flat = low == high == 0.0
+    span = f"from {_text(low, is_signed)} to {_text(high, is_signed)}"
+    return Legend(
+        title,
+        unit,
+        look.colors,
+        () if is_flat else round_ticks(*ends, is_signed),
+        (Entry(NOTHING, "no weight"),) if look.dark_zero else (),
+        tuple(tenth / 10.0 for tenth in range(1, 10)) if look.isolines else (),
+        "0 everywhere" if is_flat else span,
+    )
+
+
+def _counts(title: str, shown: Sequence[Shown]) -> Legend:
+    """Return the legend of a count: a block for each number, from the lowest that there is."""
+    first = min(int(one.numbers.min()) for one in shown)
+    colors = shown[0].look.colors[first:]
+    step = -(-len(colors) // _MOST_COUNTS)
+    ticks = [
+        Tick((block + 0.5) / len(colors), str(first + block))
+        for block in range(len(colors))
+        if (first + block) % step == 0 or len(colors) == 1
+    ]
+    return Legend(title, "", colors, tuple(ticks))
+
+
+def _entries(name: str, shown: Sequence[Shown]) -> tuple[Entry, ...]:
+    """Return the things that are to be seen, largest areas first; equal ones of figures as one."""
+    areas: dict[Entry, float] = {}
+    for one in shown:
+        names = categories(name, one.figure)
+        indices = one.numbers.astype(int)
+        found = np.bincount(indices + 1, _vertex_areas(one.figure), len(names) + 1)
+        for index in np.unique(indices).tolist():
+            color = NOTHING if index < 0 else tuple(one.look.colors[index, :3].tolist())
+            entry = Entry(color, "no influence" if index < 0 else names[index])
+            areas[entry] = areas.get(entry, 0.0) + float(found[index + 1])
+    return tuple(sorted(areas, key=lambda entry: -areas[entry]))
+
+
+_areas: Memo[Figure, Floats] = Memo()
+
+
+def _vertex_areas(figure: Figure) -> Floats:
+    """Return a third of the area of the triangles around each vertex at rest: (V,)."""
+    mesh = figure.mesh
+    assert mesh is not None  # it is drawn
+
+    def make() -> Floats:
+        thirds = np.repeat(triangle_areas(mesh.positions, mesh.triangles) / 3.0, 3)
+        found = np.bincount(mesh.triangles.ravel(), thirds, mesh.n_vertices)
+        return found.astype(np.float64, copy=False)
+
+    return _areas.get(figure, (), make)
+
+
+def _text(number: float, signed: bool) -> str:
+    """Return a number with three digits."""
+    text = f"{number:.3g}" if abs(number) < 999.5 else f"{number:,.0f}"
+    return f"+{text}" if signed and number > 0.0 else text

@@ -1,0 +1,120 @@
+"""Colours that tell things apart: joints, body parts, counts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.rendering.colormap import colormap, from_linear, oklab, to_linear
+from viewer.rendering.part_colors import part_colors
+from viewer.rig.arrays import Bytes, Floats, Ints
+
+__all__ = ["NOTHING", "count_palette", "joint_palette", "part_palette"]
+
+NOTHING = (52, 54, 58)
+"""Of what has no weight or no number, sRGB: a dark grey that no map contains."""
+
+# The first seven are Okabe and Ito's (2008); the others are those of a regular grid in sRGB that
+# lie farthest from all before them, in OKLab, for usual eyes and for eyes without long or middle
+# cones.
+_DISTINCT = np.array(
+    [
+        [86, 180, 233], [230, 159, 0], [0, 158, 115], [240, 228, 66],
+        [0, 114, 178], [213, 94, 0], [204, 121, 167], [85, 255, 221],
+        [119, 136, 255], [153, 204, 136], [170, 51, 51], [153, 68, 119],
+        [153, 255, 153], [153, 221, 255], [221, 170, 187], [119, 136, 204],
+    ]
+)  # fmt: skip
+_ROUNDS = (1.0, 0.55, 0.3)  # brightness: three of each colour
+_RELUCTANCE = 0.04  # in OKLab: so much farther must a darker colour be to be taken
+
+# What eyes without long or middle cones see of linear colours (Machado et al. 2009, severity 1).
+_EYES = np.array(
+    [
+        np.eye(3),
+        [
+            [0.152286, 1.052583, -0.204868],
+            [0.114503, 0.786281, 0.099216],
+            [-0.003882, -0.048116, 1.051998],
+        ],
+        [
+            [0.367322, 0.860646, -0.227968],
+            [0.280085, 0.672501, 0.047413],
+            [-0.011820, 0.042940, 0.968881],
+        ],
+    ]
+)
+_ENOUGH = 0.3  # in OKLab: colours further apart are not told apart any better
+
+
+def joint_palette(parents: Ints) -> Bytes:
+    """Return a colour for every joint: neighbours differ clearly, for colour-blind eyes too.
+
+    Neighbours of a joint are its parent, its parent's parent, its siblings and its parent's
+    siblings. Of the colours used least the one farthest from all neighbours is taken.
+
+    Parameters
+    ----------
+    parents : (J,)
+        Smaller than the joint's own index; -1 for a root.
+
+    Returns
+    -------
+    (J, 4) uint8
+        sRGB and alpha.
+
+    >>> joint_palette(np.array([-1, 0, 1])).shape
+    (3, 4)
+    """
+    bright = to_linear(_DISTINCT / 255.0)
+    linear = np.concatenate([brightness * bright for brightness in _ROUNDS])
+    distances = _distances(linear)
+    # Bright colours come first where both would do.
+    reluctance = np.repeat(_RELUCTANCE * np.arange(len(_ROUNDS)), len(bright))
+    chosen = np.zeros(len(parents), dtype=np.int32)
+    uses = np.zeros(len(linear), dtype=np.int32)
+    for joint, parent in enumerate(parents):
+        near = _neighbours(parents, joint, parent)
+        score = distances[:, chosen[near]].min(axis=1, initial=_ENOUGH) - reluctance
+        score[uses > uses.min()] -= 1.0
+        chosen[joint] = score.argmax()
+        uses[chosen[joint]] += 1
+    return _pixels(linear[chosen])
+
+
+def part_palette(count: int) -> Bytes:
+    """Return the colours of body parts, as the shading of body parts has them: (count, 4)."""
+    return _pixels(part_colors(count))
+
+
+def count_palette(most: int) -> Bytes:
+    """Return a colour for each of the counts 0 to ``most``: (most + 1, 4), dark grey for none."""
+    pixels = np.full((most + 1, 4), 255, dtype=np.uint8)
+    pixels[0, :3] = NOTHING
+    # Not from the map's end: almost black is for none.
+    pixels[1:] = colormap(256)[np.linspace(56, 255, max(most, 1)).astype(int)][:most]
+    return pixels
+
+
+def _neighbours(parents: Ints, joint: int, parent: int) -> Ints:
+    """Return the joints before one that must not look like it."""
+    before = parents[:joint]
+    near = before == parent
+    if parent >= 0:
+        near[parent] = True
+        above = parents[parent]
+        near |= before == above
+        if above >= 0:
+            near[above] = True
+    return np.flatnonzero(near).astype(np.int32)
+
+
+def _distances(linear: Floats) -> Floats:
+    """Return how far colours are apart for the eyes that see the least difference: (C, C)."""
+    seen = oklab(np.clip(np.einsum("eab,cb->eca", _EYES, linear), 0.0, 1.0))
+    return np.linalg.norm(seen[:, :, None] - seen[:, None], axis=-1).min(axis=0)
+
+
+def _pixels(linear: Floats) -> Bytes:
+    pixels = np.full((len(linear), 4), 255, dtype=np.uint8)
+    pixels[:, :3] = np.round(255.0 * from_linear(linear))
+    return pixels

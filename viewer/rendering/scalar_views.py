@@ -1,0 +1,100 @@
+"""Scalar views of all figures of a scene: computed, coloured alike, and explained by one legend."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from viewer.rendering.legend import Legend, Shown, legend_of
+from viewer.rendering.options import DisplayOptions
+from viewer.rendering.scalar_look import look_of, shown_ends
+from viewer.rendering.skin_pass import PosedMesh
+from viewer.rig.scalars import find_view, joint_text, missing_part
+from viewer.rig.scene import Actor
+
+__all__ = ["ScalarViews", "name_for"]
+
+
+class ScalarViews:
+    """Keeps the numbers of all figures that are drawn up to date.
+
+    Attributes
+    ----------
+    range : (float, float)
+        Lowest and highest number of the view drawn last, over all figures.
+    legend : Legend or None
+        Of that view.
+    """
+
+    def __init__(self) -> None:
+        self.range = 0.0, 0.0
+        self.legend: Legend | None = None
+        self._key: tuple[object, ...] = ()
+
+    def update(
+        self,
+        meshes: Sequence[tuple[Actor, PosedMesh]],
+        options: DisplayOptions,
+        selected: tuple[Actor | None, int],
+    ) -> None:
+        """Compute what changed; the same colour means the same number on all figures.
+
+        Parameters
+        ----------
+        meshes : sequence of (Actor, PosedMesh)
+            At least one.
+        options : DisplayOptions
+            The view, its range and lines.
+        selected : (Actor or None, int)
+            The actor and its joint that a view without a joint of its own is about; -1 for none.
+        """
+        name = name_for(options.scalar, *selected)
+        for actor, mesh in meshes:
+            pose = None if options.show == "binding" else actor.pose
+            # The selected joint has an index, whatever it is called; elsewhere its name counts.
+            is_selected = actor is selected[0] and name != options.scalar
+            its_name = f"{options.scalar}:#{selected[1]}" if is_selected else name
+            mesh.scalars.update(its_name, pose, options.skinning)
+        key = (
+            name,
+            options.scalar_range,
+            options.isolines,
+            *((id(mesh), mesh.scalars.version) for _, mesh in meshes),
+        )
+        # A new mesh may have the id and version of one that is gone.
+        if key != self._key or any(mesh.scalars.look is None for _, mesh in meshes):
+            self._show(name, meshes, options)
+            self._key = key
+
+    def _show(
+        self, name: str, meshes: Sequence[tuple[Actor, PosedMesh]], options: DisplayOptions
+    ) -> None:
+        figures = [actor.figure for actor, _ in meshes]
+        first = next((one for one in figures if not missing_part(name, one)), figures[0])
+        ranges = [mesh.scalars.range for _, mesh in meshes]
+        self.range = min(low for low, _ in ranges), max(high for _, high in ranges)
+        ends = shown_ends(name, first, ranges, options)
+        shown = []
+        for actor, mesh in meshes:
+            look = look_of(name, actor.figure, ends, options)
+            mesh.scalars.show(look)
+            shown.append(Shown(actor.figure, mesh.scalars.numbers, look))
+        self.legend = legend_of(name, shown)
+
+
+def name_for(name: str, actor: Actor | None, joint: int) -> str:
+    """Return the name of a view with the selected joint, if it is about one and has none.
+
+    Parameters
+    ----------
+    name : str
+        Of the view.
+    actor : Actor or None
+        Whose joint is selected.
+    joint : int
+        Its index, -1 for none.
+    """
+    if actor is None or joint < 0 or ":" in name or not find_view(name).takes_joint:
+        return name
+    if actor.figure.skin is None or joint >= actor.figure.skin.n_joints:
+        return name
+    return f"{name}:{joint_text(actor.figure, joint)}"

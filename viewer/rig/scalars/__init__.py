@@ -1,0 +1,284 @@
+"""Scalar views: a number for every vertex of a posed figure, to be shown as a colour.
+
+A view is named by its key, one that is about something as ``"weight:left_knee"``, ``"weight:#4"``,
+``"field:distance"``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import import_module
+from keyword import iskeyword
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.rig.arrays import Floats
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import bounding_box, box_size
+from viewer.rig.pose import Pose
+from viewer.rig.scalars._asked import Asked
+from viewer.rig.scalars._fields import field_of
+from viewer.rig.scalars._joints import joint_of, joint_text
+from viewer.rig.scalars._lengths import length_text, length_unit
+from viewer.rig.skeleton import joint_labels
+from viewer.rig.skinning import Skinning
+
+__all__ = [
+    "SCALARS",
+    "Scalar",
+    "categories",
+    "compute",
+    "find_view",
+    "joint_of",
+    "joint_text",
+    "length_text",
+    "length_unit",
+    "missing_part",
+    "shown_unit",
+    "split_name",
+    "strongest",
+    "view_title",
+]
+
+_NOISE = 1e-9  # of the figure's size for lengths, else of 1
+
+
+@dataclass(frozen=True, slots=True)
+class Scalar:
+    """A scalar view.
+
+    Attributes
+    ----------
+    title : str
+        For menus and the legend.
+    module : str
+        In this folder; its function is called like the view.
+    needs : str
+        What a figure must have, for the message that says it has not.
+    kind : str
+        ``"sequential"``: from nothing to much; ``"diverging"``: less or more than 0;
+        ``"discrete"``: a count; ``"categorical"``: the index of a thing with a name.
+    unit : str
+        ``"length"``: figure units; else as the numbers are, empty for none.
+    moves : bool
+        Whether the numbers depend on the pose.
+    about : str
+        ``"joint"`` or ``"field"`` for a view of one of those, which its name may say; else empty.
+    isolines : bool
+        Whether lines of equal number are drawn unless asked otherwise.
+    least : float
+        The automatic range ends there at least.
+    """
+
+    title: str
+    module: str
+    needs: str
+    kind: str = "sequential"
+    unit: str = "length"
+    moves: bool = True
+    about: str = ""
+    isolines: bool = False
+    least: float = 0.0
+
+    @property
+    def takes_joint(self) -> bool:
+        """Whether the view is about one joint."""
+        return self.about == "joint"
+
+    def shown(self, low: float, high: float) -> tuple[float, float]:
+        """Return what the ends of the colour map stand for, given the lowest and highest number.
+
+        Amounts begin at 0, differences reach as far down as up.
+        """
+        if self.kind == "diverging":
+            most = max(-low, high) or 1.0
+            return -most, most
+        most = max(high, self.least)
+        return min(low, 0.0), most if most > 0.0 else 1.0
+
+
+SCALARS = {
+    "weight": Scalar(
+        "Weight of a joint", "weights", "weights", unit="", moves=False, about="joint",
+        isolines=True, least=1.0,
+    ),
+    "dominant": Scalar("Dominant joint", "weights", "weights", "categorical", "", moves=False),
+    "influences": Scalar(
+        "Number of influences", "weights", "weights", "discrete", "", moves=False
+    ),
+    "sums": Scalar("|sum of weights - 1|", "weights", "weights", unit="", moves=False),
+    "entropy": Scalar("Entropy of weights", "weights", "weights", unit="bits", moves=False),
+    "stretch": Scalar("Edge stretch, largest", "strain", "a skin", "diverging", "%"),
+    "stretch-mean": Scalar("Edge stretch, mean", "strain", "a skin", "diverging", "%"),
+    "area": Scalar("Area change", "strain", "a skin", "diverging", "%"),
+    "methods": Scalar("Distance LBS to DQS", "distances", "a skin"),
+    "cut": Scalar("Distance to few influences", "distances", "a skin"),
+    "normalized": Scalar("Effect of normalising weights", "distances", "a skin"),
+    "correctives": Scalar("Effect of pose correctives", "distances", "pose correctives"),
+    "asymmetry": Scalar("Asymmetry", "distances", "a symmetry map"),
+    "parts": Scalar("Body parts", "parts", "body parts", "categorical", "", moves=False),
+    "field": Scalar("Field", "fields", "fields", unit="", moves=False, about="field"),
+    "class": Scalar("Classes", "fields", "classes", "categorical", "", moves=False, about="field"),
+}  # fmt: skip
+"""Views by name, in the order of menus."""
+
+
+def split_name(name: str) -> tuple[str, str]:
+    """Return a view's key and what stands behind its colon: a joint or field, empty for none.
+
+    Parameters
+    ----------
+    name : str
+        ``"stretch"``, ``"weight:left_knee"``.
+
+    Raises
+    ------
+    RigError
+        If there is no such view, or it is about nothing and something is given.
+    """
+    key, colon, about = name.partition(":")
+    if key not in SCALARS:
+        raise RigError(f'no scalar view "{key}"; there are: {", ".join(SCALARS)}')
+    if colon and not SCALARS[key].about:
+        raise RigError(f'scalar view "{key}": expected no joint, found "{about}"')
+    return key, about
+
+
+def find_view(name: str) -> Scalar:
+    """Return the view of a name, with or without a joint.
+
+    Raises
+    ------
+    RigError
+        As ``split_name``.
+    """
+    return SCALARS[split_name(name)[0]]
+
+
+def compute(name: str, figure: Figure, pose: Pose | None, skinning: Skinning) -> Floats:
+    """Return a scalar view's numbers.
+
+    Parameters
+    ----------
+    name : str
+        A key of ``SCALARS``, with a joint if the view is about one.
+    figure : Figure
+        With a mesh.
+    pose : Pose or None
+        None for the mesh in its binding space.
+    skinning : Skinning
+        How the mesh is drawn.
+
+    Returns
+    -------
+    (V,)
+        In figure units or the view's own; zeros if the figure lacks what the view shows, -1 where
+        that is a thing with a name.
+
+    Raises
+    ------
+    RigError
+        If the view is unknown, or is about a joint or field and the figure has not that one.
+    """
+    key, about = split_name(name)
+    view = SCALARS[key]
+    assert figure.mesh is not None  # the caller draws it
+    if _missing(view.needs, figure) or (view.moves and pose is None):
+        return np.full(figure.mesh.n_vertices, -1.0 if view.kind == "categorical" else 0.0)
+    index = joint_of(figure, about) if view.takes_joint else -1
+    module = import_module(f"{__name__}.{view.module}")
+    values: Floats = getattr(module, f"{key}_" if iskeyword(key) else key.replace("-", "_"))(
+        Asked(figure, pose, skinning, index, about)
+    )
+    if view.moves:
+        # Rounding is no effect, and must not fill the colour map where there is nothing else.
+        size = box_size(bounding_box(figure.mesh.positions)) if view.unit == "length" else 1.0
+        values[np.abs(values) < _NOISE * size] = 0.0
+    return values
+
+
+def categories(name: str, figure: Figure) -> tuple[str, ...]:
+    """Return what the numbers of a categorical view stand for: names of joints, parts, classes."""
+    key, about = split_name(name)
+    if key == "parts":
+        return () if figure.body_parts is None else figure.body_parts.names
+    if key == "class":
+        field = field_of(figure, about, is_class=True)
+        return () if field is None else field.names
+    if figure.skeleton is not None:
+        return joint_labels(figure.skeleton)
+    count = 0 if figure.skin is None else figure.skin.n_joints
+    return tuple(f"#{joint}" for joint in range(count))
+
+
+def view_title(name: str, figure: Figure) -> str:
+    """Return what a view of a figure is called: ``"Weight of left_knee"``.
+
+    Raises
+    ------
+    RigError
+        If the view is unknown.
+    """
+    view, (key, about) = find_view(name), split_name(name)
+    if missing_part(name, figure):
+        return view.title
+    field = field_of(figure, about, key == "class") if view.about == "field" else None
+    if field is not None:
+        return field.title
+    return f"Weight of {joint_text(figure, joint_of(figure, about))}" if about else view.title
+
+
+def shown_unit(name: str, figure: Figure) -> tuple[float, str]:
+    """Return the factor and the word for a view's numbers as people read them.
+
+    Raises
+    ------
+    RigError
+        If the view is unknown.
+    """
+    view, (key, about) = find_view(name), split_name(name)
+    field = field_of(figure, about, key == "class") if view.about == "field" else None
+    unit = view.unit if field is None else field.unit
+    return length_unit(figure) if unit == "length" else (1.0, unit)
+
+
+def missing_part(name: str, figure: Figure) -> str:
+    """Return what a figure lacks for a view, in words; empty if it has it.
+
+    Raises
+    ------
+    RigError
+        If the view is unknown.
+    """
+    view, (key, about) = find_view(name), split_name(name)
+    lacks = _missing(view.needs, figure)
+    if lacks or not view.about:
+        return lacks
+    if view.about == "field":
+        return "" if field_of(figure, about, key == "class") else f'a field "{about}"'
+    if not about:
+        return "a selected joint"
+    try:
+        joint_of(figure, about)
+    except RigError:
+        return f'a joint "{about}"'
+    return ""
+
+
+def _missing(needs: str, figure: Figure) -> str:
+    has = {
+        "weights": figure.skin is not None,
+        "a skin": figure.is_attached,
+        "pose correctives": figure.is_attached and figure.correctives is not None,
+        "a symmetry map": figure.is_attached and figure.symmetry is not None,
+        "body parts": figure.body_parts is not None,
+        "fields": field_of(figure, "", is_class=False) is not None,
+        "classes": field_of(figure, "", is_class=True) is not None,
+    }
+    return "" if has[needs] else needs
+
+
+def strongest(figure: Figure) -> int:
+    """Return the largest number of influences that a vertex lists."""
+    return 0 if figure.skin is None else int(np.diff(figure.skin.starts).max(initial=0))

@@ -1,0 +1,43 @@
+"""What the numbers of a scalar view are computed from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from viewer.rig.figure import Figure
+from viewer.rig.pose import Pose
+from viewer.rig.skin import Skin
+from viewer.rig.skinning import Skinning, skin_used
+
+__all__ = ["Asked"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Asked:
+    """A figure as it is drawn, and the joint that a view is about.
+
+    Attributes
+    ----------
+    figure : Figure
+        Has what the view needs.
+    pose : Pose or None
+        Never None for views that depend on the pose.
+    skinning : Skinning
+        How the mesh is drawn.
+    joint : int
+        Of the skin, -1 for views that are about no joint.
+    about : str
+        What the view's name says behind its colon.
+    """
+
+    figure: Figure
+    pose: Pose | None
+    skinning: Skinning
+    joint: int = -1
+    about: str = ""
+
+    @property
+    def skin(self) -> Skin:
+        """The influences that count: all as stored, or cut and scaled as asked."""
+        assert self.figure.skin is not None  # the view needs weights
+        return skin_used(self.figure.skin, self.skinning)

@@ -1,0 +1,24 @@
+"""Small lengths in words: millimetres if the figure's unit is known, else shares of its size."""
+
+from __future__ import annotations
+
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import bounding_box, box_size
+from viewer.rig.units import METRES
+
+__all__ = ["length_text", "length_unit"]
+
+
+def length_unit(figure: Figure) -> tuple[float, str]:
+    """Return the factor and the word for small lengths: millimetres if the unit is known."""
+    if figure.unit in METRES:
+        return 1000.0 * METRES[figure.unit], "mm"
+    size = 0.0 if figure.mesh is None else box_size(bounding_box(figure.mesh.positions))
+    return (100.0 / size, "% of the size") if size > 0.0 else (1.0, "units")
+
+
+def length_text(figure: Figure, length: float) -> str:
+    """Return a small length in words, to three digits: ``"12.3 mm"``."""
+    factor, unit = length_unit(figure)
+    number = factor * length
+    return f"{number:.0f} {unit}" if number >= 999.5 else f"{number:.3g} {unit}"

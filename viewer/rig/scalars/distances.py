@@ -1,0 +1,58 @@
+"""Views of how far a choice moves each vertex: skinning methods, fewer influences, correctives."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from viewer.rig.arrays import Floats
+from viewer.rig.mirror import mirror_axis
+from viewer.rig.scalars._asked import Asked
+from viewer.rig.skinning import Skinning, deform
+
+__all__ = ["asymmetry", "correctives", "cut", "methods", "normalized"]
+
+_FOUR = 4  # influences of most engines, if no other number is chosen
+
+
+def cut(asked: Asked) -> Floats:
+    """Return the distance between all influences and the strongest few: (V,), figure units."""
+    count = asked.skinning.max_influences or _FOUR
+    # Against normalised weights: what scaling alone does is a view of its own.
+    whole = replace(asked.skinning, max_influences=0, normalize=True)
+    return _distance(asked, whole, replace(asked.skinning, max_influences=count))
+
+
+def normalized(asked: Asked) -> Floats:
+    """Return the distance between weights as stored and scaled to a sum of 1: (V,)."""
+    stored = replace(asked.skinning, normalize=False, max_influences=0)
+    return _distance(asked, stored, replace(stored, normalize=True))
+
+
+def methods(asked: Asked) -> Floats:
+    """Return the distance between linear blend and dual quaternion skinning: (V,)."""
+    how = asked.skinning
+    return _distance(asked, replace(how, method="lbs"), replace(how, method="dqs"))
+
+
+def correctives(asked: Asked) -> Floats:
+    """Return how far the pose correctives move each vertex: (V,), figure units."""
+    how = asked.skinning
+    return _distance(asked, replace(how, correctives=True), replace(how, correctives=False))
+
+
+def asymmetry(asked: Asked) -> Floats:
+    """Return how far each vertex is from the mirror image of its partner: (V,), figure units."""
+    figure, pose = asked.figure, asked.pose
+    assert figure.symmetry is not None and pose is not None  # the view needs them
+    positions = deform(figure, pose, asked.skinning)[0]
+    positions -= pose.figure_translation  # a figure that stands aside is no less symmetric
+    mirrored = positions[figure.symmetry].copy()
+    mirrored[:, mirror_axis(figure)] *= -1.0
+    return np.linalg.norm(positions - mirrored, axis=1)
+
+
+def _distance(asked: Asked, one: Skinning, other: Skinning) -> Floats:
+    a, b = (deform(asked.figure, asked.pose, how)[0] for how in (one, other))
+    return np.linalg.norm(a - b, axis=1)

@@ -1,0 +1,28 @@
+"""Views of what somebody computed for a figure: distances to another one, how a rig was found."""
+
+from __future__ import annotations
+
+from viewer.errors import RigError
+from viewer.rig.arrays import Floats
+from viewer.rig.scalars._asked import Asked
+from viewer.rig.scalars._fields import field_of
+
+__all__ = ["class_", "field"]
+
+
+def field(asked: Asked) -> Floats:
+    """Return a field's numbers: (V,), in its own unit."""
+    return _values(asked, is_class=False)
+
+
+def class_(asked: Asked) -> Floats:
+    """Return the class of each vertex: (V,), whole, an index into the field's names."""
+    return _values(asked, is_class=True)
+
+
+def _values(asked: Asked, is_class: bool) -> Floats:
+    found = field_of(asked.figure, asked.about, is_class)
+    if found is None:
+        names = ", ".join(one.name for one in asked.figure.fields if bool(one.names) == is_class)
+        raise RigError(f'no field is called "{asked.about}"; there are: {names}')
+    return found.values.copy()

@@ -1,0 +1,104 @@
+"""Views of what the pose does to the surface: how edges and triangles change their size.
+
+Compared are the posed mesh, the figure's own scale left out, and the shaped mesh in its binding
+space.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.figure import Figure
+from viewer.rig.memo import Memo
+from viewer.rig.mesh import bounding_box, box_size, triangle_areas
+from viewer.rig.scalars._asked import Asked
+from viewer.rig.shape import shaped
+from viewer.rig.skinning import deform
+
+__all__ = ["area", "stretch", "stretch_mean"]
+
+_NO_LENGTH = 1e-9  # of the figure's size: shorter edges have no ratio
+_PERCENT = 100.0
+
+_edges: Memo[Figure, Ints] = Memo()
+
+
+def stretch(asked: Asked) -> Floats:
+    """Return the change of the edge around each vertex that changes most: (V,), percent.
+
+    100 (posed length / rest length - 1), with its sign; 0 for a vertex without edges.
+    """
+    figure = asked.figure
+    edges, changes = _edge_changes(asked)
+    assert figure.mesh is not None  # it is attached
+    longest, shortest = np.zeros((2, figure.mesh.n_vertices))
+    for end in edges.T:
+        np.maximum.at(longest, end, changes)
+        np.minimum.at(shortest, end, changes)
+    return np.where(longest >= -shortest, longest, shortest)
+
+
+def stretch_mean(asked: Asked) -> Floats:
+    """Return the mean change of the edges around each vertex: (V,), percent."""
+    figure = asked.figure
+    edges, changes = _edge_changes(asked)
+    assert figure.mesh is not None  # it is attached
+    ends = edges.ravel()
+    counts = np.bincount(ends, minlength=figure.mesh.n_vertices)
+    totals = np.bincount(ends, np.repeat(changes, 2), figure.mesh.n_vertices)
+    return totals / np.maximum(counts, 1)
+
+
+def area(asked: Asked) -> Floats:
+    """Return how the triangles around each vertex change in area: (V,), percent.
+
+    100 (sum of their posed areas / sum of their rest areas - 1); 0 where they have none at rest.
+    """
+    figure = asked.figure
+    assert figure.mesh is not None  # it is attached
+    corners = figure.mesh.triangles
+    rest, posed = (
+        np.bincount(
+            corners.ravel(), np.repeat(triangle_areas(places, corners), 3), len(places)
+        ).astype(np.float64, copy=False)
+        for places in _rest_and_posed(asked)
+    )
+    has_area = rest > (_NO_LENGTH * box_size(bounding_box(figure.mesh.positions))) ** 2
+    ratio = np.divide(posed, rest, out=np.ones_like(rest), where=has_area)
+    return _PERCENT * (ratio - 1.0)
+
+
+def _edge_changes(asked: Asked) -> tuple[Ints, Floats]:
+    """Return the edges that have a length, (E, 2), and by how much each changes, percent."""
+    edges = _edges.get(asked.figure, (), lambda: _edges_of(asked.figure))
+    rest, posed = _rest_and_posed(asked)
+    before, after = (
+        np.linalg.norm(places[edges[:, 1]] - places[edges[:, 0]], axis=1)
+        for places in (rest, posed)
+    )
+    has_length = before > _NO_LENGTH * box_size(bounding_box(rest))
+    edges, before, after = edges[has_length], before[has_length], after[has_length]
+    return edges, _PERCENT * (after / before - 1.0)
+
+
+def _rest_and_posed(asked: Asked) -> tuple[Floats, Floats]:
+    """Return the vertices in binding space, and as posed in a figure of scale 1."""
+    assert asked.pose is not None  # the view depends on it
+    rest = shaped(asked.figure, asked.pose.shape_weights).mesh
+    assert rest is not None  # shaping keeps it
+    pose = replace(asked.pose, figure_scale=1.0)
+    return rest.positions, deform(asked.figure, pose, asked.skinning)[0]
+
+
+def _edges_of(figure: Figure) -> Ints:
+    """Return each edge of the triangles once: (E, 2) int32, the lower index first."""
+    assert figure.mesh is not None  # it is attached
+    corners = figure.mesh.triangles
+    pairs = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
+    pairs.sort(axis=1)
+    pairs = pairs[pairs[:, 0] != pairs[:, 1]].astype(np.int64)
+    keys = np.unique(pairs[:, 0] * figure.mesh.n_vertices + pairs[:, 1])
+    return np.stack(np.divmod(keys, figure.mesh.n_vertices), axis=1).astype(np.int32)
