@@ -233,6 +233,38 @@ def test_add_key_adds_one_to_each_shown_curve_at_the_present_time(curves):
     assert curves.undo_steps == 1
 
 
+def test_keys_work_while_the_mouse_is_on_a_key_or_line(curves):
+    curves.click(_center(curves, "key arm.x 1"))
+    assert _chosen(curves) == [(ARM_X, 1)]
+    curves.key("delete")  # the mouse is still there
+    curves.step(2)
+    assert_array_equal(_arm(curves).times, [0.0, 2.0])
+    curves.state.playback.seek(1.3)
+    curves.step(2)
+    curves.move(_at(curves, 1.3, 5.0))  # on the line of the present time
+    curves.key("insert")
+    curves.step(2)
+    assert _arm(curves).times == pytest.approx([0.0, 1.3, 2.0], abs=0.02)
+
+
+def test_insert_on_a_key_chooses_it_and_makes_no_second_one(curves):
+    curves.move(_center(curves, "key arm.x 1"))
+    curves.key("insert")
+    curves.step(2)
+    assert_array_equal(_arm(curves).times, [0.0, 1.0, 2.0])
+    assert _chosen(curves) == [(ARM_X, 1)]
+    assert curves.says("There is a key at 1 s already") and curves.undo_steps == 0
+
+
+def test_delete_does_nothing_while_a_key_is_dragged(curves):
+    curves.move(_center(curves, "key arm.x 1"))
+    curves.press()
+    curves.key("delete")
+    curves.let_go()
+    curves.step(2)
+    assert len(_arm(curves).times) == 3
+
+
 def test_delete_removes_the_chosen_keys(curves):
     curves.click(_center(curves, "key arm.x 1"))
     curves.move(_at(curves, 1.5, 10.0))

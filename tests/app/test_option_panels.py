@@ -38,7 +38,6 @@ def test_radio_button_chooses_what_is_shown(tall, shown):
         ("Flat", "flat"),
         ("Wireframe", "wireframe"),
         ("Vertex normals", "normals"),
-        ("Texture", "texture"),
         ("Cull back faces", "cull"),
         ("grid", "grid"),
     ],

@@ -167,16 +167,20 @@ def test_scalar_range_is_that_of_the_vertices(wide, texts, name):
     wide.click("engine")
     wide.drag("Influences", 0.34, "Influences")
     assert _chosen(wide).max_influences == 2
-    wide.state.options.scalar = name
+    wide.state.options.scalar, wide.state.selected_joint = name, 0
     wide.click("Heat map")
     wide.step(2)
     actor = wide.state.actor
-    values = compute(name, actor.figure, actor.pose, _chosen(wide))
+    joint = ":#0" if SCALARS[name].takes_joint else ""
+    values = compute(f"{name}{joint}", actor.figure, actor.pose, _chosen(wide))
     low, high = wide.state.stats.scalar_range
     assert (low, high) == (values.min(), values.max())
     texts.clear()
     wide.step()
     shown = [text for text in texts if text.startswith("up to")]
+    if SCALARS[name].unit != "length":
+        assert not shown
+        return
     assert shown and shown[0].endswith("mm in this pose")
     # Three digits, in millimetres.
     said = float(shown[0].split()[2].replace(",", ""))
@@ -234,3 +238,50 @@ def test_panel_of_a_lone_skeleton_says_so(drive, rig, texts):
     hand.step()
     assert "This figure has no skin that follows a skeleton." in texts
     assert "engine" not in hand.state.item_rects
+
+
+def test_legend_of_joints_lists_them(wide, texts):
+    wide.state.options.scalar = "dominant"
+    wide.click("Heat map")
+    wide.step(2)
+    texts.clear()
+    wide.step()
+    entries = wide.state.stats.legend.entries
+    assert len(entries) > 2
+    shown = [entry.text for entry in entries if entry.text in texts]
+    assert shown == [entry.text for entry in entries[: len(shown)]] and len(shown) > 2
+    hidden = len(entries) - len(shown)
+    assert hidden == 0 or f"and {hidden} more" in texts
+
+
+def test_weight_of_a_joint_is_that_of_the_selected_one(wide, texts):
+    wide.state.options.scalar = "weight"
+    wide.click("Heat map")
+    for joint in (0, 1):
+        wide.state.selected_joint = joint
+        wide.step(2)
+        texts.clear()
+        wide.step()
+        assert f"Weight of {wide.state.actor.figure.skeleton.names[joint]}" in texts
+    wide.state.selected_joint = -1
+    wide.step(2)
+    texts.clear()
+    wide.step()
+    assert "no figure has a selected joint" in texts
+
+
+def test_list_keeps_the_joint_of_the_command_line(wide):
+    wide.state.options.scalar = "weight:#1"
+    wide.click("Heat map")
+    wide.step(2)
+    assert wide.state.options.scalar == "weight:#1"
+
+
+def test_picture_with_its_own_legend_has_no_second_one(wide, texts):
+    wide.state.options.legend = True
+    wide.click("Heat map")
+    wide.step(2)
+    texts.clear()
+    wide.step()
+    assert "Distance to few influences, mm" not in texts
+    assert _legend_colours(wide) is not None  # drawn into the picture

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from viewer.app.reasons import no_motion
 from viewer.app.state import AppState
 from viewer.errors import ViewerError, printable
 from viewer.rendering.camera import VIEWS, Camera, camera_from_view, fit
@@ -146,9 +147,11 @@ def redo(state: AppState) -> None:
 
 def play(state: AppState) -> None:
     """Play or pause."""
-    if state.playback.has_motion:
-        state.playback.toggle()
-        state.say_status("Playing" if state.playback.playing else "Paused")
+    if not state.playback.has_motion:
+        state.say_status(no_motion(state))
+        return
+    state.playback.toggle()
+    state.say_status("Playing" if state.playback.playing else "Paused")
 
 
 def step(state: AppState, frames: int) -> None:
@@ -213,6 +216,8 @@ def cancel(state: AppState) -> None:
         state.error = ""
     elif state.dialog is not None:
         state.dialog = None
+    elif state.messages_visible:
+        state.messages_visible = False
     elif state.loader is not None:
         state.loader = None
         state.say_status("Opening was cancelled")

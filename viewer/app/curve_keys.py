@@ -19,13 +19,14 @@ from viewer.app.curve_edit import (
 )
 from viewer.app.curve_view import KeyPlace
 from viewer.rig.arrays import Floats
-from viewer.rig.clip import Channel, slopes
+from viewer.rig.clip import Channel, Clip, slopes
 
 __all__ = ["draw_keys", "edit"]
 
 _CHOSEN, _HANDLE = (1.0, 1.0, 1.0, 1.0), (1.0, 0.85, 0.4, 1.0)
 _FAINT = (0.75, 0.75, 0.8, 0.8)
 _MOST_KEYS = 300  # that can be taken hold of at once
+_SAME_KEY = 2.0  # points: keys nearer than this to one another could not be told apart
 _HANDLE_LENGTH = 4.0  # letters' heights
 _HANDLE_ID = 16
 _FIRST_KEY_ID = 32
@@ -169,23 +170,48 @@ def edit(plot: Plot, touched: bool) -> None:
         Whether the mouse is at a key or tangent, so that a click is not meant for the plot.
     """
     state, view, clip = plot.state, plot.view, clip_of(plot.state)
-    if clip is None or not implot.is_plot_hovered() or state.error or state.dialog is not None:
+    if clip is None or state.error or state.dialog is not None or not _is_mouse_inside():
         return
     left, io = imgui.MouseButton_.left, imgui.get_io()
+    # Keys and lines that can be dragged hide the plot from the mouse, but not from the keyboard.
+    is_free = implot.is_plot_hovered()
     is_second = io.mouse_clicked_last_count[left] > 1
     was_dragged = io.mouse_drag_max_distance_sqr[left] >= io.mouse_drag_threshold**2
-    adds = imgui.is_mouse_double_clicked(left) and not touched
+    adds = is_free and imgui.is_mouse_double_clicked(left) and not touched
     if adds or _is_pressed(imgui.Key.insert):
         mouse = implot.get_plot_mouse_pos()
         factors = [plot.factor(row) for row in view.rows]
         row = nearest_row(clip, view, mouse.x, mouse.y, factors)
         if row >= 0:
-            add_key_at(state, [row], mouse.x)
+            _add_key(plot, clip, row, mouse.x)
     elif _is_pressed(imgui.Key.delete):
         delete_chosen(state)
-    elif imgui.is_mouse_released(left) and not (touched or was_dragged or is_second):
+    elif is_free and imgui.is_mouse_released(left) and not (touched or was_dragged or is_second):
         view.keys = frozenset()
 
 
+def _add_key(plot: Plot, clip: Clip, row: int, time: float) -> None:
+    """Add a key where the mouse is; one that is drawn there already is chosen instead."""
+    channel = channel_of(clip, row)
+    times = np.zeros(0) if channel is None else channel.times
+    near = np.flatnonzero(np.abs(times - time) * plot.scale[0] <= _SAME_KEY)
+    if len(near):
+        plot.view.keys = frozenset({(row, int(near[0]))})
+        plot.state.say_status(f"There is a key at {times[near[0]]:.4g} s already")
+    else:
+        add_key_at(plot.state, [row], time)
+
+
+def _is_mouse_inside() -> bool:
+    """Return whether the mouse is over the plot, whatever of it, and no window lies between."""
+    flags = imgui.HoveredFlags_.allow_when_blocked_by_active_item
+    place, size = implot.get_plot_pos(), implot.get_plot_size()
+    corner = (place.x + size.x, place.y + size.y)
+    return imgui.is_window_hovered(flags) and imgui.is_mouse_hovering_rect(place, corner)
+
+
 def _is_pressed(key: imgui.Key) -> bool:
-    return imgui.is_key_pressed(key, False) and not imgui.get_io().want_text_input
+    """Return whether a key went down while nothing is typed or dragged."""
+    is_dragging = imgui.is_mouse_down(imgui.MouseButton_.left)
+    is_free = not (is_dragging or imgui.get_io().want_text_input)
+    return is_free and imgui.is_key_pressed(key, False)

@@ -7,9 +7,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from viewer.app.frame_rate import with_rate
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.clip import Clip
+from viewer.rig.points import PointClip
 from viewer.rig.pose import Pose, pose_key
+from viewer.rig.sampled_clip import SampledClip
 from viewer.rig.scene import Actor, Motion, Scene
 
 __all__ = ["History"]
@@ -91,7 +93,7 @@ class History:
             count = len(one.poses)
             clips = [look.clip for look in whole.looks]
             looks = (
-                replace(look, clip=clip) if is_grown(look.clip, clip) else look
+                replace(look, clip=_grown(look.clip, clip))
                 for look, clip in zip(one.looks, clips[:count], strict=True)
             )
             return replace(
@@ -99,9 +101,6 @@ class History:
                 poses=(*one.poses, *whole.poses[count:]),
                 looks=(*looks, *whole.looks[count:]),
             )
-
-        def is_grown(old: Motion | None, new: Motion | None) -> bool:
-            return type(old) is type(new) and not isinstance(old, Clip) and old is not None
 
         self._undo[:] = map(extended, self._undo)
         self._redo[:] = map(extended, self._redo)
@@ -141,6 +140,15 @@ class History:
         _restore(self._now, scene, options)
         self.time, self.has_restored = self._now.time, True
         return True
+
+
+def _grown(old: Motion | None, new: Motion | None) -> Motion | None:
+    """Return what a clip of an earlier step is now that more of its capture has been read."""
+    if isinstance(old, SampledClip) and isinstance(new, SampledClip):
+        return with_rate(new, old.timing.frame_rate)
+    if isinstance(old, PointClip) and isinstance(new, PointClip):
+        return with_rate(new, old.timing.frame_rate)
+    return old
 
 
 def _take(scene: Scene, options: DisplayOptions, time: float) -> _Snapshot:

@@ -51,6 +51,10 @@ class FileDialog:
         Files that are listed; all that can be opened if empty.
     name : str
         Suggested name of the file to write; its suffix is added to names that have none.
+    more : callable, optional
+        Draws what else is asked for, given the state and the dialog.
+    written : callable, optional
+        Returns all files that are written for a name; that file alone if omitted.
     """
 
     def __init__(
@@ -61,7 +65,10 @@ class FileDialog:
         title: str = "Open files",
         suffixes: tuple[str, ...] = (),
         name: str = "",
+        more: Callable[[AppState, FileDialog], None] | None = None,
+        written: Callable[[Path], list[Path]] | None = None,
     ) -> None:
+        self.more, self.written = more, written
         self.done, self.purpose, self.title, self.name = done, purpose, title, name
         self.suffixes = set(suffixes or opened_suffixes())
         self.suffix = Path(name).suffix
@@ -172,18 +179,19 @@ def _draw_content(state: AppState, dialog: FileDialog) -> list[Path]:
 def _draw_buttons(state: AppState, dialog: FileDialog) -> list[Path]:
     """Draw what confirms and cancels; return what was confirmed."""
     result: list[Path] = []
+    if dialog.more is not None:
+        dialog.more(state, dialog)
     if dialog.purpose == "save":
         imgui.set_next_item_width(0.5 * imgui.get_content_region_avail().x)
         dialog.name = imgui.input_text("##name", dialog.name)[1]
         note_item(state, "Name")
         imgui.same_line()
     count, label = _confirmation(dialog)
-    imgui.begin_disabled(count == 0)
-    pressed = button(state, label)
+    missing = "give it a name" if dialog.purpose == "save" else "choose a file"
+    pressed = button(state, label, "" if count else missing)
     by_key = count and dialog.purpose == "open" and imgui.is_key_pressed(imgui.Key.enter, False)
     if pressed or by_key:
         result = _confirmed(dialog)
-    imgui.end_disabled()
     imgui.same_line()
     if button(state, "Cancel"):
         state.dialog = None
@@ -198,8 +206,9 @@ def _confirmation(dialog: FileDialog) -> tuple[int, str]:
         return 1, "Use this folder"
     if dialog.purpose == "save":
         target = dialog.target()
-        # Path.is_file() would raise for a name that is too long.
-        exists = target is not None and os.path.isfile(target)  # noqa: PTH113
+        files = [] if target is None else dialog.written(target) if dialog.written else [target]
+        # Path.exists() would raise for a name that is too long.
+        exists = any(map(os.path.exists, files))
         return int(target is not None), "Replace###Save" if exists else "Save###Save"
     count = len(dialog.chosen)
     return count, f"Open {count} files###Open" if count > 1 else "Open###Open"
@@ -216,9 +225,7 @@ def _confirmed(dialog: FileDialog) -> list[Path]:
 
 def _draw_list(state: AppState, dialog: FileDialog) -> list[Path]:
     result: list[Path] = []
-    if imgui.begin_child(
-        "files", (0.0, -1.5 * imgui.get_frame_height()), imgui.ChildFlags_.borders
-    ):
+    if imgui.begin_child("files", (0.0, -_foot_height(dialog)), imgui.ChildFlags_.borders):
         for number, path in enumerate(dialog.listed()):
             is_folder = path.is_dir()
             name = printable(path.name, 90) + ("/" if is_folder else "")
@@ -248,6 +255,12 @@ def _draw_list(state: AppState, dialog: FileDialog) -> list[Path]:
                 dialog.chosen = {path}
     imgui.end_child()
     return result
+
+
+def _foot_height(dialog: FileDialog) -> float:
+    """Return the height of what lies below the list."""
+    more = 0.0 if dialog.more is None else imgui.get_frame_height_with_spacing()
+    return 1.5 * imgui.get_frame_height() + more
 
 
 def _is_model_folder(dialog: FileDialog, path: Path) -> bool:

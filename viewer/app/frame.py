@@ -14,11 +14,12 @@ from imgui_bundle import imgui
 
 from viewer.app.actions import follow_actor, take_pick
 from viewer.app.file_dialog import PICTURES, FileDialog, draw_file_dialog, folder_of
-from viewer.app.interface import draw_hints, draw_interface
+from viewer.app.interface import draw_interface
 from viewer.app.jobs import FrameJob
 from viewer.app.keys import handle_keys
 from viewer.app.loader import Loader
 from viewer.app.mouse import handle_mouse
+from viewer.app.overlays import draw_hints
 from viewer.app.recent import remember
 from viewer.app.record_dialog import draw_record_dialog
 from viewer.app.state import AppState
@@ -122,6 +123,10 @@ class Frame:
         changed = clips != self._clips
         if changed:
             self._clips = clips
+            if not (self._is_first or state.history.has_restored):
+                # Undoing goes back to the time and poses from before the clock follows.
+                busy = imgui.is_any_item_active()
+                state.history.observe(state.scene, state.options, busy)
             state.playback.follow(state.scene.actors)
         if state.history.has_restored:
             # Undoing has brought back poses with their time: they stay as they were.
@@ -231,6 +236,7 @@ class Frame:
             target.resolve()
             state.stats.samples = target.samples
             state.stats.scalar_range = self.renderer.scalar_range
+            state.stats.legend = self.renderer.legend
         except ViewerError as problem:
             state.error = str(problem)
         state.say(*self.renderer.notes)

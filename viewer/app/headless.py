@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from imgui_bundle import imgui, implot
 
 from viewer.app.actions import fit_view
@@ -71,7 +73,12 @@ class HeadlessApp:
         self.context.__enter__()  # type: ignore[no-untyped-call]
 
     def picture(self, fits: bool = True) -> Bytes:
-        """Return the whole interface as pixels, (H, W, 4) uint8, the view fitted to its room."""
+        """Return the whole interface as pixels, (H, W, 4) uint8, the view fitted to its room.
+
+        Messages do not time out, however long drawing takes.
+        """
+        for note in self.state.notes:
+            note.until = math.inf
         self.step(_SETTLE_FRAMES)
         if fits:
             distance = self.state.camera.distance

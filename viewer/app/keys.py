@@ -53,6 +53,10 @@ def _toggle_keys(state: AppState) -> None:
     state.keys_visible = not state.keys_visible
 
 
+def _toggle_messages(state: AppState) -> None:
+    state.messages_visible = not state.messages_visible
+
+
 _K = imgui.Key
 
 KEYS = (
@@ -70,6 +74,7 @@ KEYS = (
     Shortcut((_K._5, _K.keypad5), "5", "orthographic or perspective", actions.toggle_projection),
     Shortcut((_K.tab,), "Tab", "hide or show the panels", _toggle_panels),
     Shortcut((_K.h, _SHIFT | _K.slash, _K.f1), "H or ?", "this list", _toggle_keys),
+    Shortcut((_CTRL | _K.m,), "Ctrl+M", "all messages so far", _toggle_messages),
     Shortcut((_K.f12,), "F12", "save a screenshot", _want("screenshot")),
     Shortcut((_CTRL | _K.o,), "Ctrl+O", "open files", _want("open dialog")),
     Shortcut((_CTRL | _K.z,), "Ctrl+Z", "undo", actions.undo),

@@ -7,9 +7,9 @@ from pathlib import Path
 from imgui_bundle import imgui
 
 from viewer.app.actions import redo, reset_pose, undo
-from viewer.app.clip_actions import can_have_keys, new_clip
+from viewer.app.clip_actions import new_clip
 from viewer.app.file_dialog import FileDialog, folder_of
-from viewer.app.motion_actions import motion_suffixes, moving_actors, save_motion
+from viewer.app.motion_dialog import ask_for_motion
 from viewer.app.panels import PANELS
 from viewer.app.pose_actions import (
     copy_numbers,
@@ -18,6 +18,15 @@ from viewer.app.pose_actions import (
     paste_pose,
     save_export,
     save_pose,
+)
+from viewer.app.reasons import (
+    no_job_room,
+    no_new_clip,
+    no_panel,
+    no_pose,
+    no_redo,
+    no_undo,
+    nothing_to_export,
 )
 from viewer.app.record_dialog import RecordSettings
 from viewer.app.state import AppState
@@ -43,9 +52,12 @@ def draw_menus(state: AppState) -> list[Path]:
         imgui.end_menu()
     if begin_menu(state, "Window"):
         for name, panel in PANELS.items():
-            if menu_item(state, panel.title, "", name not in state.closed_panels):
+            why = no_panel(state, panel.needs)
+            if menu_item(state, panel.title, "", name not in state.closed_panels, why):
                 state.closed_panels ^= {name}
         imgui.separator()
+        if menu_item(state, "Messages", "Ctrl+M", state.messages_visible):
+            state.messages_visible = not state.messages_visible
         if menu_item(state, "Reset layout"):
             state.wants_layout_reset = True
         imgui.end_menu()
@@ -78,14 +90,13 @@ def _draw_file_menu(state: AppState) -> list[Path]:
         chosen = _draw_models(state) or chosen
         imgui.end_menu()
     imgui.separator()
-    has_pose = state.actor.pose is not None
-    if menu_item(state, "Save pose…", enabled=has_pose):
+    if menu_item(state, "Save pose…", why=no_pose(state)):
         _ask_for_pose(state)
     if menu_item(state, "Export…"):
         _ask_for_export(state)
-    if menu_item(state, "Export motion…", enabled=state.actor in moving_actors(state)):
-        _ask_for_motion(state)
-    if menu_item(state, "Record pictures or video…", enabled=state.job is None):
+    if menu_item(state, "Export motion…", why=nothing_to_export(state) or no_job_room(state)):
+        ask_for_motion(state)
+    if menu_item(state, "Record pictures or video…", why=no_job_room(state)):
         state.record = RecordSettings()
     if menu_item(state, "Save screenshot", "F12"):
         state.wants.add("screenshot")
@@ -151,34 +162,22 @@ def _ask_for_export(state: AppState) -> None:
     )
 
 
-def _ask_for_motion(state: AppState) -> None:
-    suffixes = motion_suffixes()
-    state.dialog = FileDialog(
-        folder_of(state.paths),
-        lambda state, paths: save_motion(state, paths[0]),
-        "save",
-        f"Export motion: {', '.join(suffixes)}",
-        suffixes,
-        f"{printable(state.actor.name, 60).replace(' ', '_')}.bvh",
-    )
-
-
 def _draw_edit_menu(state: AppState) -> None:
-    if menu_item(state, "Undo", "Ctrl+Z", enabled=state.history.can_undo):
+    if menu_item(state, "Undo", "Ctrl+Z", why=no_undo(state)):
         undo(state)
-    if menu_item(state, "Redo", "Ctrl+Shift+Z", enabled=state.history.can_redo):
+    if menu_item(state, "Redo", "Ctrl+Shift+Z", why=no_redo(state)):
         redo(state)
     imgui.separator()
-    has_pose = state.actor.pose is not None
+    why = no_pose(state)
     if menu_item(state, "Reset pose", "R"):
         reset_pose(state)
-    if menu_item(state, "Mirror pose", "M", enabled=has_pose):
+    if menu_item(state, "Mirror pose", "M", why=why):
         mirror(state)
-    if menu_item(state, "New clip", enabled=can_have_keys(state)):
+    if menu_item(state, "New clip", why=no_new_clip(state)):
         new_clip(state)
-    if menu_item(state, "Copy pose", "Ctrl+C", enabled=has_pose):
+    if menu_item(state, "Copy pose", "Ctrl+C", why=why):
         copy_pose(state)
-    if menu_item(state, "Copy pose as numbers", "Ctrl+Shift+C", enabled=has_pose):
+    if menu_item(state, "Copy pose as numbers", "Ctrl+Shift+C", why=why):
         copy_numbers(state)
-    if menu_item(state, "Paste pose", "Ctrl+V", enabled=has_pose):
+    if menu_item(state, "Paste pose", "Ctrl+V", why=why):
         paste_pose(state)

@@ -47,6 +47,8 @@ class Playback:
         Frames a second by which one steps and counts.
     first_frame : int
         What the frame at ``whole[0]`` is called.
+    keyed_rate : float
+        The same where nothing consists of frames: keyed clips have no rate of their own.
     has_frames : bool
         Whether some motion consists of frames: each is then shown for its whole duration.
     fill_gaps : bool
@@ -61,6 +63,7 @@ class Playback:
     end: float = 0.0
     whole: tuple[float, float] = (0.0, 0.0)
     frame_rate: float = DEFAULT_RATE
+    keyed_rate: float = DEFAULT_RATE
     first_frame: int = 0
     has_frames: bool = False
     fill_gaps: bool = False
@@ -72,13 +75,19 @@ class Playback:
     def show(self, scene: Scene) -> None:
         """Take over the range of a scene's clips, and go to its start, or where it is."""
         self.playing, self.mode, self.speed = False, "loop", 1.0
+        self.keyed_rate, self.has_frames = DEFAULT_RATE, False
         self.follow(scene.actors)
         self.start, self.end = self.whole
         self.seek(self.start if scene.time is None else scene.time)
 
     def follow(self, actors: Sequence[Actor]) -> None:
-        """Keep up with clips that changed or grew; a range that was all of them stays all."""
+        """Keep up with clips that changed or grew; a range that was all of them stays all.
+
+        Where the same frames come faster or slower, time and range stay on their frames.
+        """
         was_whole = (self.start, self.end) == self.whole
+        counted = self.n_frames if self.has_frames else 0
+        low, rate = self.whole[0], self.frame_rate
         moving = [actor for actor in actors if actor.clip is not None]
         sampled = [
             actor.clip for actor in moving if actor.clip and not isinstance(actor.clip, Clip)
@@ -86,12 +95,23 @@ class Playback:
         self.has_motion, self.has_frames = bool(moving), bool(sampled)
         self.whole = time_span(moving)
         longest = max(sampled, key=lambda clip: clip.end - clip.start, default=None)
-        self.frame_rate = frame_rate(longest)
+        self.frame_rate = self.keyed_rate if longest is None else frame_rate(longest)
         self.first_frame = longest.timing.first_frame if longest is not None else 0
+        if self.has_frames and counted == self.n_frames and rate != self.frame_rate:
+            self.time, self.start, self.end = (
+                self.whole[0] + (time - low) * rate / self.frame_rate
+                for time in (self.time, self.start, self.end)
+            )
         if was_whole:
             self.start, self.end = self.whole
         else:
             self.set_range(self.start, self.end)
+
+    def count_by(self, rate: float) -> None:
+        """Say how many frames a second motions have that consist of none."""
+        self.keyed_rate = rate
+        if not self.has_frames:
+            self.frame_rate = rate
 
     @property
     def n_frames(self) -> int:

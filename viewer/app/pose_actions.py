@@ -17,6 +17,7 @@ from viewer.rig.mirror import mirror_pose
 from viewer.rig.pose_record import PoseRecord, apply_record, record_of
 from viewer.rig.pose_vector import write_vector
 from viewer.rig.scene import figure_pose
+from viewer.rig.upright import upright_actor
 
 __all__ = [
     "copy_numbers",
@@ -94,7 +95,8 @@ def save_export(state: AppState, path: Path) -> None:
     except ViewerError as problem:
         state.error = str(problem)
         return
-    save_files(state, lambda: state.say(*export(state.actor, path, state.options.skinning)), files)
+    actor = upright_actor(state.scene, state.actor)
+    save_files(state, lambda: state.say(*export(actor, path, state.options.skinning)), files)
 
 
 def save_files(state: AppState, act: Callable[[], None], files: list[Path]) -> None:

@@ -12,8 +12,10 @@ import numpy as np
 
 from viewer.app.curve_view import CurveView
 from viewer.app.edits import History
+from viewer.app.messages import MessageLog
 from viewer.app.playback import Playback
 from viewer.rendering.camera import Camera, fit
+from viewer.rendering.legend import Legend
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import bounding_box, box_size
@@ -60,6 +62,7 @@ class Stats:
     samples: int = 0
     skin_updates: int = 0
     scalar_range: tuple[float, float] = (0.0, 0.0)
+    legend: Legend | None = None
 
 
 @dataclass(slots=True)
@@ -108,6 +111,14 @@ class AppState:
         Work that goes on beside the frame loop.
     record : RecordSettings or None
         What the window "Record" asks for, while it is open.
+    log : MessageLog
+        Everything that was said.
+    messages_visible : bool
+        Whether the window "Messages" is open.
+    logs_status : bool
+        Whether it lists what keys and buttons did as well.
+    logged_error : str
+        The error that the log has already, while it is shown.
     wants_pick : (x, y, aims) or None
         Where the view was clicked, from its corner; whether the camera aims there.
     wants_recording : Path or None
@@ -135,6 +146,8 @@ class AppState:
     models: dict[str, Path] = field(default_factory=dict)
     panels_visible: bool = True
     keys_visible: bool = False
+    messages_visible: bool = False
+    logs_status: bool = False
     held_modifiers: int = 0
     wants_layout_reset: bool = False
     joint_filter: str = ""
@@ -145,7 +158,9 @@ class AppState:
     wants: set[str] = field(default_factory=set)
     wants_open: list[Path] = field(default_factory=list)
     error: str = ""
+    logged_error: str = ""
     notes: list[Note] = field(default_factory=list)
+    log: MessageLog = field(default_factory=MessageLog)
     stats: Stats = field(default_factory=Stats)
     history: History = field(default_factory=History)
     playback: Playback = field(default_factory=Playback)
@@ -166,6 +181,7 @@ class AppState:
         self.history.time = self.playback.time
         self.history.start(self.scene, self.options)
         self.opened_joints = _first_opened(self.actor)
+        self.say(*self.scene.warnings)
 
     @property
     def actor(self) -> Actor:
@@ -216,14 +232,25 @@ class AppState:
     def say(self, *texts: str) -> None:
         """Show messages that go away by themselves; longer ones stay longer."""
         for text in texts:
-            seconds = _NOTE_SECONDS + len(text) / 30.0
-            self.notes.append(Note(text, time.monotonic() + seconds))
+            self._note(text)
 
     def say_status(self, text: str) -> None:
         """Show what a key did, in place of what the key before did."""
         self.notes[:] = [note for note in self.notes if not note.is_status]
-        self.say(text)
-        self.notes[-1].is_status = True
+        self._note(text, is_status=True)
+
+    def _note(self, text: str, is_status: bool = False) -> None:
+        until = time.monotonic() + _NOTE_SECONDS + len(text) / 30.0
+        # What is said again stays longer, and does not push others out of the view.
+        self.notes[:] = [note for note in self.notes if note.text != text]
+        self.notes.append(Note(text, until, is_status))
+        self.log.add(text, "status" if is_status else "note")
+
+    def log_error(self) -> None:
+        """Keep the error that is shown in the log, once while it is shown."""
+        if self.error and self.error != self.logged_error:
+            self.log.add(self.error, "error")
+        self.logged_error = self.error
 
     def drop_old_notes(self) -> None:
         """Forget messages whose time is over."""

@@ -6,9 +6,13 @@ import queue
 import threading
 from collections.abc import Callable, Sequence
 
+from viewer.app.frame_rate import with_rate
 from viewer.errors import ViewerError
 from viewer.loading.capturing import Builder
 from viewer.rig.capture import CapturePart
+from viewer.rig.motion import frame_rate
+from viewer.rig.points import PointClip
+from viewer.rig.sampled_clip import SampledClip
 from viewer.rig.scene import Actor
 
 __all__ = ["Stream"]
@@ -89,7 +93,10 @@ class Stream:
                 builder, part = self._parts.get_nowait()
             except queue.Empty:
                 return new, notes, grew
+            known = builder.actors
             more, said = builder.add(part)
+            # The rate may have been changed since the first of them appeared.
+            _keep_rate(known[:1], more)
             new += more
             notes += said
             grew = True
@@ -117,3 +124,11 @@ class Stream:
             self._thread.join(0.01)
             if self._parts.full():
                 return
+
+
+def _keep_rate(known: Sequence[Actor], new: Sequence[Actor]) -> None:
+    """Give people who appear the frame rate of those who are there."""
+    for first in known:
+        for actor in new:
+            if isinstance(actor.clip, SampledClip | PointClip):
+                actor.clip = with_rate(actor.clip, frame_rate(first.clip))

@@ -3,23 +3,29 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from imgui_bundle import imgui
 
 from viewer.app.playback import Playback
+from viewer.app.srgb import encode_srgb
 from viewer.app.state import AppState
 from viewer.app.widgets import note_item
 from viewer.errors import printable
 from viewer.rig.clip import Clip
 from viewer.rig.scene import Actor, Motion
 
-__all__ = ["draw_tracks", "nice_step", "present_spans"]
+__all__ = ["bars", "draw_tracks", "nice_step", "present_spans"]
 
 _NAME_WIDTH = 9.0  # letters' heights
 _TICK_GAP = 5.0  # the same: smallest distance of two numbers on the ruler
 _TIME = (1.0, 0.62, 0.25, 1.0)
-_BAR, _CHOSEN_BAR = (0.36, 0.52, 0.68, 0.9), (0.50, 0.70, 0.90, 1.0)
+_PLAIN = (0.44, 0.62, 0.80)  # of actors without a colour of their own, sRGB
+_QUIET = 0.6  # opacity of the tracks of actors that are not chosen
+_CHOSEN_EDGE = (1.0, 1.0, 1.0, 0.85)
+_NARROWEST = 0.35  # letters' heights, of a bar: a single frame between gaps is to be seen
+_NARROWEST_GAP = 1.0  # points between two bars that are as narrow as that
 _OUTSIDE = (0.0, 0.0, 0.0, 0.35)
 _LINE, _TEXT = (1.0, 1.0, 1.0, 0.13), (1.0, 1.0, 1.0, 0.6)
 _BACK = (1.0, 1.0, 1.0, 0.03)
@@ -90,12 +96,41 @@ def _draw_track(
     gap = 0.16 * height
     back = imgui.get_color_u32(_BACK)
     draw_list.add_rect_filled((left, top + gap), (left + width, top + height - gap), back)
-    color = imgui.get_color_u32(_CHOSEN_BAR if chosen else _BAR)
+    red, green, blue = encode_srgb(actor.color) if actor.color is not None else _PLAIN
+    color = imgui.get_color_u32((red, green, blue, 1.0 if chosen else _QUIET))
+    edge = imgui.get_color_u32(_CHOSEN_EDGE)
     assert actor.clip is not None  # it has a track
-    for start, end in present_spans(actor.clip, 1.0 / scale):
-        x0 = left + (start + actor.offset - low) * scale
-        x1 = max(left + (end + actor.offset - low) * scale, x0 + 2.0)
+    spans = present_spans(actor.clip, 1.0 / scale)
+    places = [left + (time + actor.offset - low) * scale for span in spans for time in span]
+    for x0, x1 in bars(places, _NARROWEST * imgui.get_font_size(), left + width):
         draw_list.add_rect_filled((x0, top + gap), (x1, top + height - gap), color, 2.0)
+        if chosen:
+            draw_list.add_rect((x0, top + gap), (x1, top + height - gap), edge, 2.0)
+
+
+def bars(places: Sequence[float], narrowest: float, end: float) -> list[tuple[float, float]]:
+    """Return from where to where bars are drawn, none too narrow to be seen.
+
+    Parameters
+    ----------
+    places : sequence of float
+        Start and end of each, one after the other, in points.
+    narrowest : float
+        Width of a bar; less only between others that leave no room for it.
+    end : float
+        The right end of all.
+
+    >>> bars([0, 9, 20, 20, 22, 30, 40, 40], 5, 40)
+    [(0, 9), (16, 21), (22, 30), (35, 40)]
+    """
+    found: list[tuple[float, float]] = []
+    for number in range(0, len(places), 2):
+        x0, x1 = places[number], places[number + 1]
+        following = places[number + 2] - _NARROWEST_GAP if number + 2 < len(places) else end
+        x1 = max(x1, min(x0 + narrowest, following))
+        before = found[-1][1] + _NARROWEST_GAP if found else x1 - narrowest
+        found.append((min(x0, max(x1 - narrowest, before)), x1))
+    return found
 
 
 def present_spans(clip: Motion, shortest: float) -> list[tuple[float, float]]:

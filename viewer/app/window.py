@@ -89,7 +89,7 @@ def show(
     state = AppState(scene, camera, options, bounding_box(points), files)
     state.recent = load_recent()
     state.closed_panels = load_closed_panels()
-    state.say(*scene.warnings, *filter(None, [remember(state.recent, files)]))
+    state.say(*filter(None, [remember(state.recent, files)]))
     state.playback.playing = plays and state.playback.has_motion
     window = _Window(state, scale)
     try:
@@ -202,13 +202,10 @@ class _Window:
         if is_settling or state.playback.playing or state.job:
             glfw.poll_events()
         else:
-            glfw.wait_events_timeout(
-                _BUSY_SECONDS if state.loader or state.stream else _IDLE_SECONDS
-            )
+            moves = bool(state.loader or state.stream) or _awaits_tooltip(self._imgui)
+            glfw.wait_events_timeout(_BUSY_SECONDS if moves else _IDLE_SECONDS)
             # Messages that time out, the bar of a file being read, a text cursor that blinks.
-            self._is_dirty |= bool(
-                state.notes or state.loader or state.stream or imgui.get_io().want_text_input
-            )
+            self._is_dirty |= moves or bool(state.notes or imgui.get_io().want_text_input)
         self._is_dirty |= state.playback.playing or state.job is not None
         return self._is_dirty or bool(self._dropped) or len(self._imgui.input_events_queue) > 0
 
@@ -249,6 +246,12 @@ class _Window:
         self.frame.release()
         self.context.release()
         glfw.destroy_window(self.handle)
+
+
+def _awaits_tooltip(context: Any) -> bool:
+    """Return whether the mouse rests on something whose tooltip comes after a while."""
+    delay = imgui.get_style().hover_delay_normal
+    return context.hover_item_delay_id != 0 and context.hover_item_delay_timer < delay
 
 
 def _title(state: AppState) -> str:

@@ -7,7 +7,7 @@ from imgui_bundle import imgui
 
 from viewer.app.actions import start_following, stop_following
 from viewer.app.state import AppState
-from viewer.app.widgets import button, checkbox, note_item, same_line_if_room
+from viewer.app.widgets import button, checkbox, explain, note_item, same_line_if_room
 from viewer.errors import printable
 from viewer.rig.fit_error import fitted_body, keypoint_distances
 from viewer.rig.mesh import box_size
@@ -78,7 +78,7 @@ def _draw_place(state: AppState, actor: Actor) -> None:
         note_item(state, "Starts at")
         if changed and abs(value) < 1e6:
             actor.offset = value
-        _explain("seconds by which its motion starts later than the scene's clock")
+        explain("seconds by which its motion starts later than the scene's clock")
     size = box_size(state.box) or 1.0
     place = actor.placement[:3, 3].tolist()
     changed, moved = imgui.drag_float3("Stands at", place, 0.002 * size, 0.0, 0.0, "%.3f")
@@ -125,7 +125,7 @@ def _draw_trails(state: AppState, actor: Actor) -> None:
             "Seconds around now", options.trail_seconds, 0.02, 0.0, 1e4, "%.2f s"
         )
         note_item(state, "Seconds around now")
-        _explain("how far paths go back and forth; 0 shows all of the motion")
+        explain("how far paths go back and forth; 0 shows all of the motion")
         if changed:
             options.trail_seconds = max(value, 0.0)
 
@@ -149,8 +149,3 @@ def _draw_fit(state: AppState, actor: Actor) -> None:
             imgui.text_unformatted(f"{factor * distance:8.1f} {unit}  {printable(name, 40)}")
         imgui.tree_pop()
     note_item(state, "fit")
-
-
-def _explain(text: str) -> None:
-    if imgui.is_item_hovered(imgui.HoveredFlags_.delay_normal):
-        imgui.set_tooltip(text)

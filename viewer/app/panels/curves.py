@@ -22,7 +22,7 @@ from viewer.app.curve_edit import (
 from viewer.app.curve_plot import draw_plot
 from viewer.app.curve_view import KeyPlace
 from viewer.app.state import AppState
-from viewer.app.widgets import button, choice, note_item, same_line_if_room
+from viewer.app.widgets import button, choice, explain, note_item, same_line_if_room
 from viewer.rig.clip import EXTRAPOLATIONS, TANGENT_RULES, Channel, Clip, slopes
 
 __all__ = ["draw"]
@@ -178,7 +178,7 @@ def _draw_tools(state: AppState) -> None:
     view = state.curves
     if button(state, "Fit"):
         view.wants_fit = True
-    _explain("show the chosen curves whole")
+    explain("show the chosen curves whole")
     if clip_of(state) is None:
         imgui.same_line()
         imgui.text_disabled("frames, not keys: to be looked at")
@@ -196,7 +196,7 @@ def _draw_tools(state: AppState) -> None:
 def _button_beside(state: AppState, text: str, words: str) -> bool:
     same_line_if_room(text)
     pressed = button(state, text)
-    _explain(words)
+    explain(words)
     return pressed
 
 
@@ -214,7 +214,7 @@ def _draw_modes(state: AppState) -> None:
             same_line_if_room(_WIDE)
         now = channel.extrapolation[side]
         new = choice(state, text, now, _MODES)
-        _explain("of the curves with chosen keys, or else of all that are shown")
+        explain("of the curves with chosen keys, or else of all that are shown")
         for mode in EXTRAPOLATIONS:
             if new == mode != now:
                 extrapolate(state, side, mode)
@@ -290,8 +290,3 @@ def _draw_slopes(state: AppState, channel: Channel, place: KeyPlace, factor: flo
         typed = _field(state, f"{_SIDES[side]} slope", factor * slope)
         if typed is not None:
             turn_tangent(state, [place], side, typed / factor)
-
-
-def _explain(text: str) -> None:
-    if imgui.is_item_hovered(imgui.HoveredFlags_.delay_normal):
-        imgui.set_tooltip(text)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from viewer.app.actions import show
+from viewer.app.reasons import no_mesh, no_skeleton, no_skin, no_texture
 from viewer.app.state import AppState
-from viewer.app.widgets import checkbox, choice, note_item, slider
+from viewer.app.widgets import checkbox, choice, disabled, explain, note_item, slider
 from viewer.errors import printable
 from viewer.rendering.ground_pass import grid_step, parse_color
 from viewer.rendering.options import SHOWN
@@ -22,10 +23,18 @@ _BACKGROUNDS = {"gradient": "Gradient", "transparent": "Transparent", "#": "Colo
 def draw(state: AppState) -> None:
     """Draw the panel."""
     options = state.options
+    missing = {
+        "skin": no_mesh(state),
+        "skeleton": no_skeleton(state),
+        "both": no_mesh(state) or no_skeleton(state),
+        "binding": no_skin(state),
+    }
     for key, text in SHOWN.items():
-        if imgui.radio_button(text, options.show == key):
-            show(state, key)
-        note_item(state, text)
+        with disabled(missing[key]):
+            if imgui.radio_button(text, options.show == key):
+                show(state, key)
+            note_item(state, text)
+            explain("", missing[key])
     if options.show == "both":
         options.skeleton_opacity = slider(
             state, "Skeleton opacity", options.skeleton_opacity, 0.0, 1.0, flags=_CLAMP
@@ -33,13 +42,14 @@ def draw(state: AppState) -> None:
     imgui.separator()
     options.shading = choice(state, "Shading", options.shading, SHADING)
     _draw_extras(state)
-    options.flat = checkbox(state, "Flat", options.flat)
+    why = no_mesh(state)
+    options.flat = checkbox(state, "Flat", options.flat, why)
     _beside("Wireframe")
-    options.wireframe = checkbox(state, "Wireframe", options.wireframe)
-    options.normals = checkbox(state, "Vertex normals", options.normals)
+    options.wireframe = checkbox(state, "Wireframe", options.wireframe, why)
+    options.normals = checkbox(state, "Vertex normals", options.normals, why)
     _beside("Texture")
-    options.texture = checkbox(state, "Texture", options.texture)
-    options.cull = checkbox(state, "Cull back faces", options.cull)
+    options.texture = checkbox(state, "Texture", options.texture, no_texture(state))
+    options.cull = checkbox(state, "Cull back faces", options.cull, why)
     _beside("Grid (0.5)")
     options.grid = checkbox(state, f"Grid ({grid_step(state.box):g})###Grid", options.grid)
     _draw_background(state)

@@ -10,6 +10,7 @@ from imgui_bundle import imgui
 
 from viewer.app.actions import reset_pose
 from viewer.app.panels._ball_joint import draw_own_numbers, draw_vector_component, is_ball
+from viewer.app.panels._captured_points import draw_captured_points
 from viewer.app.panels._figure_place import draw_figure_place
 from viewer.app.pose_actions import copy_numbers, copy_pose, mirror, paste_pose
 from viewer.app.state import AppState
@@ -41,6 +42,9 @@ def draw(state: AppState) -> None:
     """Draw the panel for the chosen actor."""
     _draw_actor_choice(state)
     actor = state.actor
+    if actor.figure.points is not None:
+        draw_captured_points(state, actor, actor.figure.points)
+        return
     if actor.figure.skeleton is None or actor.pose is None:
         imgui.text_wrapped("This figure has no skeleton: open its .skel with it.")
         return
@@ -236,9 +240,11 @@ def _draw_dof(
         if imgui.is_mouse_double_clicked(imgui.MouseButton_.left) and not locked:
             value = float(skeleton.rest_dofs[dof])
     if imgui.begin_popup_context_item(f"menu of DOF {dof}"):
-        if menu_item(state, "Reset", enabled=not locked):
+        why = f"locked at {low:g}" if locked else ""
+        if menu_item(state, "Reset", why=why):
             value = float(skeleton.rest_dofs[dof])
-        if menu_item(state, "Set to 0", enabled=bool(low <= 0.0 <= high) and not locked):
+        outside = "" if low <= 0.0 <= high else "0 is outside of its limits"
+        if menu_item(state, "Set to 0", why=why or outside):
             value = 0.0
         if menu_item(state, "Copy value"):
             imgui.set_clipboard_text(repr(float(pose.dofs[dof])))

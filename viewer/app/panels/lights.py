@@ -5,9 +5,10 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from viewer.app.actions import reset_lights
+from viewer.app.srgb import decode_srgb, encode_srgb
 from viewer.app.state import AppState
 from viewer.app.widgets import button, checkbox, note_item, slider
-from viewer.rendering.options import Color, Light
+from viewer.rendering.options import Light
 
 __all__ = ["draw"]
 
@@ -32,11 +33,11 @@ def draw(state: AppState) -> None:
 
 def _draw_light(state: AppState, name: str, light: Light) -> None:
     changed, picked = imgui.color_edit3(
-        f"{name} light", list(_encode(light.color)), imgui.ColorEditFlags_.no_inputs
+        f"{name} light", list(encode_srgb(light.color)), imgui.ColorEditFlags_.no_inputs
     )
     note_item(state, f"{name} light")
     if changed:
-        light.color = _decode((picked[0], picked[1], picked[2]))
+        light.color = decode_srgb((picked[0], picked[1], picked[2]))
     imgui.push_id(name)
     for attribute, text, low, high, unit in (
         ("strength", "Strength", 0.0, 4.0, "%.2f"),
@@ -50,15 +51,3 @@ def _draw_light(state: AppState, name: str, light: Light) -> None:
         if changed:
             setattr(light, attribute, value)
     imgui.pop_id()
-
-
-def _encode(color: Color) -> Color:
-    """Return linear light as sRGB (IEC 61966-2-1): colour pickers show that."""
-    r, g, b = (12.92 * c if c <= 0.0031308 else 1.055 * c ** (1 / 2.4) - 0.055 for c in color)
-    return r, g, b
-
-
-def _decode(color: Color) -> Color:
-    """Return sRGB as linear light."""
-    r, g, b = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in color)
-    return r, g, b

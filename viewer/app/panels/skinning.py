@@ -7,7 +7,7 @@ from imgui_bundle import imgui
 from viewer.app.state import AppState
 from viewer.app.widgets import checkbox, choice, note_item, number_text, slider
 from viewer.rig.figure import Figure
-from viewer.rig.scalars import SCALARS, length_unit, strongest
+from viewer.rig.scalars import SCALARS, length_unit, split_name, strongest
 from viewer.rig.skinning import METHODS, Skinning
 
 __all__ = ["draw"]
@@ -75,8 +75,11 @@ def _draw_heat_map(state: AppState, figure: Figure) -> None:
         options.shading = "phong" if shows else "scalar"
     titles = {name: view.title for name, view in SCALARS.items()}
     imgui.set_next_item_width(-1.0)
-    options.scalar = choice(state, "##Heat map of", options.scalar, titles)
-    if shows:
+    key = split_name(options.scalar)[0]
+    chosen = choice(state, "##Heat map of", key, titles)
+    if chosen != key:
+        options.scalar = chosen
+    if shows and SCALARS[chosen].unit == "length":
         factor, unit = length_unit(figure)
         most = number_text(factor * state.stats.scalar_range[1])
         imgui.text_wrapped(f"up to {most} {unit} in this pose")

@@ -5,24 +5,38 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from viewer.app.actions import go_to_end, play, step
+from viewer.app.frame_rate import foreign_rate, rate_of, set_rate
 from viewer.app.playback import FASTEST, MODES
+from viewer.app.reasons import no_gaps, no_motion
 from viewer.app.state import AppState
 from viewer.app.tracks import draw_tracks
-from viewer.app.widgets import button, checkbox, choice, note_item, same_line_if_room, slider
+from viewer.app.widgets import (
+    button,
+    checkbox,
+    choice,
+    disabled,
+    explain,
+    note_item,
+    same_line_if_room,
+    slider,
+)
 
 __all__ = ["draw"]
 
 _CLAMP = imgui.SliderFlags_.always_clamp
+_TYPED = imgui.InputTextFlags_.enter_returns_true | imgui.InputTextFlags_.auto_select_all
 
 
 def draw(state: AppState) -> None:
     """Draw the panel."""
     if not state.playback.has_motion:
-        imgui.text_disabled("nothing moves: open a clip, a capture or a BVH")
+        imgui.text_disabled(no_motion(state))
         return
     _draw_transport(state)
     same_line_if_room("000000")
     _draw_place(state)
+    same_line_if_room("M" * 9)
+    _draw_rate(state)
     _draw_settings(state)
     draw_tracks(state)
 
@@ -31,34 +45,35 @@ def _draw_transport(state: AppState) -> None:
     playback = state.playback
     if button(state, "|<"):
         go_to_end(state, last=False)
-    _explain("first frame (Home)")
+    explain("first frame (Home)")
     imgui.same_line()
     if button(state, "<"):
         step(state, -1)
-    _explain("one frame back (Left)")
+    explain("one frame back (Left)")
     imgui.same_line()
     # One width for both words, or the buttons behind it would jump.
     width = imgui.calc_text_size("Pause").x + 2 * imgui.get_style().frame_padding.x
     if imgui.button("Pause###play" if playback.playing else "Play###play", (width, 0.0)):
         play(state)
     note_item(state, "Play")
-    _explain("play or pause (Space)")
+    explain("play or pause (Space)")
     imgui.same_line()
     if button(state, ">"):
         step(state, 1)
-    _explain("one frame on (Right)")
+    explain("one frame on (Right)")
     imgui.same_line()
     if button(state, ">|"):
         go_to_end(state, last=True)
-    _explain("last frame (End)")
+    explain("last frame (End)")
 
 
 def _draw_place(state: AppState) -> None:
     playback = state.playback
-    imgui.set_next_item_width(6.5 * imgui.get_font_size())
+    imgui.set_next_item_width(4.5 * imgui.get_font_size())
     shown = playback.frame + playback.first_frame
     changed, frame = imgui.input_int("##frame", shown, 0, 0)
     note_item(state, "Frame")
+    explain("the frame that is shown")
     if changed and frame != shown:
         playback.playing = False
         playback.seek(playback.frame_time(frame - playback.first_frame))
@@ -68,11 +83,26 @@ def _draw_place(state: AppState) -> None:
     imgui.text_unformatted(text)
 
 
+def _draw_rate(state: AppState) -> None:
+    """Draw how many frames a second there are; a number that is typed and entered sets it."""
+    foreign = foreign_rate(state)
+    with disabled(foreign):
+        imgui.set_next_item_width(4.0 * imgui.get_font_size())
+        entered, typed = imgui.input_double(
+            "Frames a second##rate", rate_of(state), 0.0, 0.0, "%.6g", _TYPED
+        )
+        note_item(state, "Frame rate")
+        explain("Enter sets it: the same frames faster or slower", foreign)
+    if entered:
+        set_rate(state, typed)
+
+
 def _draw_settings(state: AppState) -> None:
     playback = state.playback
     size = imgui.get_font_size()
     imgui.set_next_item_width(8 * size)
     playback.mode = choice(state, "Mode", playback.mode, MODES)
+    explain("what happens at the end of the range")
     if playback.mode != "run on":
         playback.time = min(max(playback.time, playback.whole[0]), playback.whole[1])
     same_line_if_room("M" * 12)
@@ -80,12 +110,14 @@ def _draw_settings(state: AppState) -> None:
     playback.speed = slider(state, "Speed", playback.speed, -FASTEST, FASTEST, "%.2f x", _CLAMP)
     if imgui.is_item_clicked(imgui.MouseButton_.right):
         playback.speed = 1.0
-    _explain("seconds of motion a second; a right click sets 1")
+    explain("seconds of motion a second; a right click sets 1")
     same_line_if_room("M" * 14)
     _draw_range(state)
     same_line_if_room("Fill gaps")
-    playback.fill_gaps = checkbox(state, "Fill gaps", playback.fill_gaps)
-    _explain("show captures in their gaps too, on the way from the frame before to the one after")
+    gapless = no_gaps(state)
+    playback.fill_gaps = checkbox(state, "Fill gaps", playback.fill_gaps, gapless)
+    text = "show captures in their gaps too, on the way from the frame before to the one after"
+    explain(text, gapless)
 
 
 def _draw_range(state: AppState) -> None:
@@ -100,7 +132,8 @@ def _draw_range(state: AppState) -> None:
         playback.first_frame + playback.n_frames - 1,
     )  # fmt: skip
     note_item(state, "Range")
-    _explain("frames that are played; I and O set them to the present one, a right click to all")
+    text = "frames that are played; I and O set them to the present one, a right click to all"
+    explain(text)
     if imgui.is_item_clicked(imgui.MouseButton_.right):
         playback.set_range(*playback.whole)
     elif changed:
@@ -108,8 +141,3 @@ def _draw_range(state: AppState) -> None:
         start = playback.frame_time(low - playback.first_frame) if low != first else playback.start
         end = playback.frame_time(high - playback.first_frame) if high != last else playback.end
         playback.set_range(start, end)
-
-
-def _explain(text: str) -> None:
-    if imgui.is_item_hovered(imgui.HoveredFlags_.delay_normal):
-        imgui.set_tooltip(text)

@@ -1,0 +1,59 @@
+"""The Joints panel of captured keypoints: what they are, their names and confidences."""
+
+from __future__ import annotations
+
+import pytest
+from app.captured import NAMES, dots
+from imgui_bundle import imgui
+
+from viewer.rig.scene import Scene
+
+
+@pytest.fixture
+def points(drive):
+    """A hand on four points; frame 1 is less sure of them."""
+    return drive(scene=Scene([dots([0.9, 0.05, 0.0, 0.5])]), size=(900, 900), samples=1)
+
+
+def at_frame(hand, frame, texts):
+    hand.state.playback.seek(frame / 10.0)
+    hand.step(2)
+    texts.clear()
+    hand.step(1)
+
+
+def test_panel_says_what_the_points_are(points, texts):
+    at_frame(points, 0, texts)
+    assert "4 captured points (face4), not a skeleton: there are no joints to turn." in texts
+    assert "4 are seen at this time." in texts
+    assert not any("open its .skel" in text for text in texts)
+
+
+def test_panel_lists_names_and_how_sure_each_is_now(points, texts, monkeypatch):
+    bars = []
+    draw = imgui.progress_bar
+
+    def bar(share, size, text):
+        bars.append((round(share, 3), text))
+        draw(share, size, text)
+
+    monkeypatch.setattr(imgui, "progress_bar", bar)
+    at_frame(points, 1, texts)
+    assert [text for text in texts if text in NAMES] == list(NAMES)
+    assert bars[-3:] == [(0.9, "0.9"), (0.05, "0.05"), (0.5, "0.5")]
+    assert texts.count("not seen") == 1
+    assert "3 are seen at this time, 1 of them below 0.1 and not drawn." in texts
+
+
+def test_points_that_are_not_there_are_said_to_be_so(points, texts):
+    points.state.playback.mode = "run on"
+    at_frame(points, 9, texts)
+    assert "Not there at this time." in texts and texts.count("not seen") == 4
+
+
+def test_filter_lists_points_by_name(points, texts):
+    points.click("Filter")
+    points.type("eye")
+    points.step(1)
+    listed = {label for label in points.state.item_rects if label.startswith("point ")}
+    assert listed == {"point left_eye", "point right_eye"}

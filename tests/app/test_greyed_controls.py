@@ -1,0 +1,160 @@
+"""Controls that cannot act are greyed and say why; the window wakes up to show tooltips."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+from app.captured import dots, people
+from imgui_bundle import imgui
+
+from viewer.app import reasons
+from viewer.app.window import _awaits_tooltip
+from viewer.rig.scene import Scene
+
+NOTHING_MOVES = "nothing moves: open a clip, a capture or a BVH"
+
+
+@pytest.fixture
+def tooltips(monkeypatch):
+    """What tooltips said."""
+    said = []
+
+    def record(text):
+        said.append(text)
+
+    monkeypatch.setattr(imgui, "set_tooltip", record)
+    return said
+
+
+def rest(hand, label):
+    """Let the mouse rest on a widget until its tooltip comes."""
+    hand.move(hand.place(label))
+    hand.step(40)
+
+
+@pytest.mark.parametrize(
+    ("title", "why"),
+    [
+        ("Timeline", NOTHING_MOVES),
+        ("Curves", NOTHING_MOVES),
+        ("Actors", NOTHING_MOVES),
+        ("Shape", "this figure has no blend shapes"),
+        ("Hands", "this figure has no hands"),
+    ],
+)
+def test_panels_that_have_nothing_to_show_are_greyed(hand, tooltips, title, why):
+    hand.menu("menu Window", title)
+    assert hand.state.closed_panels == set()
+    if title not in hand.state.item_rects:
+        hand.click("menu Window")
+    rest(hand, title)
+    assert tooltips[-1] == why
+
+
+def test_space_without_motion_says_why_nothing_happens(hand):
+    hand.key("space")
+    assert not hand.state.playback.playing and hand.says(NOTHING_MOVES)
+
+
+def test_controls_of_a_motion_act(drive, rig, tooltips):
+    hand = drive(scene=people(rig, [True] * 9), size=(1280, 800), samples=1)
+    rest(hand, "Play")
+    assert tooltips[-1] == "play or pause (Space)"
+    hand.click("Play")
+    assert hand.state.playback.playing
+
+
+def test_gaps_can_be_filled_where_there_are_some(drive, rig):
+    hand = drive(scene=people(rig, [True, False, True]), size=(1280, 800), samples=1)
+    hand.click("Fill gaps")
+    assert hand.state.playback.fill_gaps
+
+
+def test_gaps_cannot_be_filled_where_there_are_none(drive, rig, tooltips):
+    scene = people(rig, [True] * 9)
+    clip = scene.actors[0].clip
+    # Nobody is missing before the first and after the last frame either.
+    scene.actors[0].clip = replace(clip, timing=replace(clip.timing, holds=True))
+    hand = drive(scene=scene, size=(1280, 800), samples=1)
+    hand.click("Fill gaps")
+    assert not hand.state.playback.fill_gaps
+    rest(hand, "Fill gaps")
+    assert tooltips[-1].endswith("no frame of any motion is missing")
+
+
+def test_undo_with_nothing_to_undo_is_greyed(hand, tooltips):
+    hand.click("menu Edit")
+    rest(hand, "Undo")
+    assert tooltips[-1] == "nothing was changed"
+    hand.key("escape")
+    hand.drag("arm.x", 0.9)
+    assert reasons.no_undo(hand.state) == ""
+    assert reasons.no_redo(hand.state) == "nothing was undone"
+
+
+def test_menu_of_a_figure_without_joints_is_greyed(drive, tooltips):
+    hand = drive(scene=Scene([dots([1, 1, 1, 1])]), samples=1)
+    hand.click("menu Edit")
+    for label in ("Mirror pose", "Copy pose", "Paste pose", "New clip"):
+        rest(hand, label)
+        assert tooltips[-1] == "a set of captured points has no joints to pose"
+    hand.key("escape")
+    hand.click("menu File")
+    rest(hand, "Export motion…")
+    assert tooltips[-1] == "captured points alone move, and no joints"
+
+
+def test_ways_to_draw_what_is_not_there_are_greyed(drive, tooltips):
+    hand = drive(scene=Scene([dots([1, 1, 1, 1])]), size=(900, 1000), samples=1)
+    before = hand.state.options.show
+    for label, why in (
+        ("Attached skin", "there is no mesh"),
+        ("Skeleton", "there is no skeleton"),
+        ("Skin in binding space", "there is no skin that follows a skeleton"),
+        ("Wireframe", "there is no mesh"),
+    ):
+        hand.click(label)
+        rest(hand, label)
+        assert tooltips[-1] == why
+    assert hand.state.options.show == before and not hand.state.options.wireframe
+
+
+def test_texture_is_greyed_where_there_is_none(hand, tooltips):
+    hand.click("Texture")
+    rest(hand, "Texture")
+    assert hand.state.options.texture
+    assert tooltips[-1] == "no figure here has a texture: drop a picture on the window"
+
+
+def test_texture_can_be_switched_where_there_is_one(drive):
+    fox = drive(size=(900, 1000))
+    fox.click("Texture")
+    assert not fox.state.options.texture and fox.undo_steps == 1
+    fox.click("Texture")
+    assert fox.state.options.texture
+
+
+def test_recording_waits_for_other_work(hand, tooltips):
+    hand.state.job = SimpleNamespace(
+        title="Writing walk.bvh", progress=(0, 0), can_cancel=False, is_done=False,
+        error="", lines=[], step=lambda: None, cancel=lambda: None,
+    )  # fmt: skip
+    hand.click("menu File")
+    rest(hand, "Record pictures or video…")
+    assert tooltips[-1] == "wait for: Writing walk.bvh"
+    hand.state.job = None
+
+
+def test_window_goes_on_drawing_until_a_tooltip_is_due(drive, rig):
+    hand = drive(scene=people(rig, [True] * 9), size=(1280, 800), samples=1)
+    context = hand.app._imgui
+    hand.move(hand.middle)
+    hand.step(40)
+    assert not _awaits_tooltip(context)
+    hand.move("Play")
+    hand.step(3)
+    assert _awaits_tooltip(context)
+    hand.step(40)
+    assert not _awaits_tooltip(context)

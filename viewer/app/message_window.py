@@ -1,0 +1,91 @@
+"""The window "Messages", with everything that was said, and the message that something failed."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from viewer.app.messages import Message, message_line
+from viewer.app.state import AppState
+from viewer.app.widgets import button, checkbox, explain, same_line_if_room
+from viewer.errors import printable
+
+__all__ = ["draw_error", "draw_message_window"]
+
+_ERROR_TITLE = "This did not work"
+_TITLE = "Messages"
+_SIZE = (42.0, 22.0)  # letters' heights
+_ERROR_COLOR = (1.0, 0.5, 0.42, 1.0)
+_LONGEST = 1000  # characters shown of one message
+
+
+def draw_message_window(state: AppState) -> None:
+    """Draw the window if it is open."""
+    if not state.messages_visible:
+        return
+    size, viewport = imgui.get_font_size(), imgui.get_main_viewport()
+    room = (
+        min(_SIZE[0] * size, 0.95 * viewport.size.x),
+        min(_SIZE[1] * size, 0.9 * viewport.size.y),
+    )
+    imgui.set_next_window_size(room, imgui.Cond_.appearing)
+    imgui.set_next_window_pos(viewport.get_center(), imgui.Cond_.appearing, (0.5, 0.5))
+    flags = imgui.WindowFlags_.no_docking | imgui.WindowFlags_.no_saved_settings
+    flags |= imgui.WindowFlags_.no_collapse
+    shown, stays = imgui.begin(_TITLE, True, flags)
+    if shown:
+        _draw_content(state)
+    imgui.end()
+    state.messages_visible = bool(stays)
+
+
+def _draw_content(state: AppState) -> None:
+    listed = state.log.listed(state.logs_status)
+    if button(state, "Copy all", "" if listed else "nothing was said yet"):
+        imgui.set_clipboard_text("\n".join(map(message_line, listed)))
+    explain("to the clipboard, a line each")
+    text = "What keys and buttons did"
+    same_line_if_room(text)
+    state.logs_status = checkbox(state, text, state.logs_status)
+    if imgui.begin_child("##messages", (0.0, 0.0), imgui.ChildFlags_.borders):
+        # New messages come at the end, which stays in view unless one has scrolled away from it.
+        follows = imgui.get_scroll_y() >= imgui.get_scroll_max_y()
+        if not listed:
+            imgui.text_disabled("nothing was said yet")
+        for message in listed:
+            _draw_message(message)
+        if follows:
+            imgui.set_scroll_here_y(1.0)
+    imgui.end_child()
+
+
+def _draw_message(message: Message) -> None:
+    is_error = message.kind == "error"
+    if is_error:
+        imgui.push_style_color(imgui.Col_.text, _ERROR_COLOR)
+    imgui.text_wrapped(printable(message_line(message), _LONGEST))
+    if is_error:
+        imgui.pop_style_color()
+
+
+def draw_error(state: AppState) -> None:
+    """Draw the message that something did not work, over everything, if there is one."""
+    state.log_error()
+    if not state.error:
+        return
+    imgui.open_popup(_ERROR_TITLE)
+    center = imgui.get_main_viewport().get_center()
+    imgui.set_next_window_pos(center, imgui.Cond_.always, (0.5, 0.5))
+    width = min(560.0, 0.92 * imgui.get_main_viewport().size.x)
+    imgui.set_next_window_size((width, 0.0))
+    opened, stays = imgui.begin_popup_modal(_ERROR_TITLE, True, imgui.WindowFlags_.no_resize)
+    if opened:
+        imgui.text_wrapped(printable(state.error, 1000))
+        if button(state, "OK"):
+            stays = False
+        imgui.same_line()
+        if button(state, "Copy"):
+            imgui.set_clipboard_text(state.error)
+        if not stays:
+            state.error = ""
+            imgui.close_current_popup()
+        imgui.end_popup()

@@ -1,0 +1,183 @@
+"""What lies over the view: progress, messages, the list of keys, and the hints in its corner.
+
+None covers another: the legend of colours is at the top left, progress at the top beside it or
+below it, and messages grow from the bottom up to whatever is above them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from imgui_bundle import imgui
+
+from viewer.app.actions import cancel
+from viewer.app.keys import KEYS, MOUSE
+from viewer.app.legend import draw_legend
+from viewer.app.state import AppState
+from viewer.app.widgets import Rect, begin_overlay, button, overlay_rect
+from viewer.errors import printable
+from viewer.rendering.ground_pass import grid_step
+
+__all__ = ["draw_hints", "draw_overlays"]
+
+_SHOW_PROGRESS_AFTER = 0.3  # seconds
+_BAR_WIDTH = 260.0  # points
+_GAP = 10.0  # points from the edges of the view
+_BETWEEN = 6.0  # points between one overlay and another
+_MOST_NOTES = 8
+_LONGEST_NOTE = 400  # characters
+
+
+def draw_overlays(state: AppState) -> None:
+    """Draw all of them but the hints, which lie behind the panels."""
+    legend = draw_legend(state)
+    progress = _draw_progress(state, legend)
+    _draw_notes(state, [rect for rect in (legend, progress) if rect is not None])
+    _draw_keys(state)
+
+
+def draw_hints(state: AppState) -> None:
+    """Say what the grid measures and where the keys are listed, in the corner of the view.
+
+    Drawn behind the panels like the picture of the scene, so it has to come after that.
+    """
+    x, y, width, height = state.view_rect
+    grid = f"grid {grid_step(state.box):g} units   " if state.options.grid else ""
+    text = f"{grid}H keys"
+    size = imgui.calc_text_size(text)
+    place = (x + width - size.x - 10, y + height - size.y - 8)
+    draw_list = imgui.get_background_draw_list()
+    shadow, color = imgui.get_color_u32((0, 0, 0, 0.5)), imgui.get_color_u32((1, 1, 1, 0.85))
+    draw_list.add_text((place[0] + 1, place[1] + 1), shadow, text)
+    draw_list.add_text(place, color, text)
+
+
+class _Progress(NamedTuple):
+    """What is said of work that goes on; a negative share is a bar that moves."""
+
+    title: str
+    share: float
+    text: str
+    label: str
+    is_aside: bool = False
+
+
+def _progress(state: AppState) -> _Progress | None:
+    """Return what is going on, if anything is."""
+    loader, stream, job = state.loader, state.stream, state.job
+    if loader is not None and loader.seconds >= _SHOW_PROGRESS_AFTER:
+        title = f"Opening {printable(loader.paths[-1].name, 60)}"
+        return _Progress(title, -loader.seconds, f"{loader.seconds:.0f} s", "Cancel opening")
+    if stream is not None:
+        read, total = stream.progress
+        names = ", ".join(builder.capture.name for builder in stream.builders)
+        text = f"{read:,} of {total:,} frames"
+        title = f"Reading {printable(names, 60)}"
+        return _Progress(title, read / max(total, 1), text, "Cancel reading", is_aside=True)
+    if job is not None:
+        done, total = job.progress
+        label = "Cancel" if job.can_cancel else ""
+        if total:
+            return _Progress(job.title, done / total, f"{done:,} of {total:,}", label)
+        return _Progress(job.title, -imgui.get_time(), "", label)
+    return None
+
+
+def _draw_progress(state: AppState, legend: Rect | None) -> Rect | None:
+    """Draw a bar for what is going on; return where."""
+    shown = _progress(state)
+    if shown is None:
+        return None
+    x, y, width, _ = state.view_rect
+    bar = max(min(_BAR_WIDTH, width - 4 * _GAP), 60.0)
+    whole = bar + 2.0 * imgui.get_style().window_padding.x
+    left = x + (width - whole - _GAP if shown.is_aside else 0.5 * (width - whole))
+    top = y + _GAP
+    if legend is not None and left < legend[2] + _BETWEEN:
+        top = legend[3] + _BETWEEN
+    imgui.set_next_window_pos((left, top), imgui.Cond_.always)
+    flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.always_auto_resize
+    flags |= imgui.WindowFlags_.no_docking | imgui.WindowFlags_.no_saved_settings
+    flags |= imgui.WindowFlags_.no_focus_on_appearing
+    if imgui.begin("##progress", None, flags)[0]:
+        imgui.push_text_wrap_pos(imgui.get_cursor_pos_x() + bar)
+        imgui.text_unformatted(shown.title)
+        imgui.pop_text_wrap_pos()
+        imgui.progress_bar(shown.share, (bar, 0.0), shown.text)
+        if shown.label and button(state, shown.label):
+            cancel(state)
+    rect = overlay_rect(state, "##progress")
+    imgui.end()
+    return rect
+
+
+def _draw_notes(state: AppState, above: Sequence[Rect]) -> None:
+    """Draw the newest messages for which there is room, and say how many more there are."""
+    state.drop_old_notes()
+    x, y, width, height = state.view_rect
+    if not state.notes or width <= 40:
+        return
+    style = imgui.get_style()
+    wrap = max(width - 40.0, 50.0)
+    texts = [printable(note.text, _LONGEST_NOTE) for note in state.notes]
+    line = imgui.get_text_line_height_with_spacing()
+    heights = [imgui.calc_text_size(text, False, wrap).y + style.item_spacing.y for text in texts]
+    top = max((rect[3] + _BETWEEN for rect in above), default=y + _GAP)
+    room = y + height - _GAP - top - 2.0 * style.window_padding.y + style.item_spacing.y
+    count = _newest(heights, line, room)
+    if not count and not above:
+        count = 1  # better cut off than not seen
+    if not count and room < line:
+        return
+    if begin_overlay("##notes", x + _GAP, y + height - _GAP, (0.0, 1.0)):
+        imgui.push_text_wrap_pos(imgui.get_cursor_pos_x() + wrap)
+        for text in texts[len(texts) - count :]:
+            imgui.text_unformatted(text)
+        left = len(texts) - count
+        if left:
+            words = f"and {left:,} more" if count else f"{left:,} messages"
+            imgui.text_disabled(f"{words} (Window > Messages)")
+        imgui.pop_text_wrap_pos()
+    overlay_rect(state, "##notes")
+    imgui.end()
+
+
+def _newest(heights: Sequence[float], line: float, room: float) -> int:
+    """Return how many texts at the end fit, with a line that tells how many are left out.
+
+    >>> _newest([10, 10, 10], 10, 30), _newest([10, 10, 10], 10, 29), _newest([10] * 20, 10, 500)
+    (3, 1, 8)
+    """
+    count, used = 0, 0.0
+    for height in reversed(heights):
+        used += height
+        is_last = count + 1 == len(heights)
+        if count == _MOST_NOTES or used + (0.0 if is_last else line) > room:
+            break
+        count += 1
+    return count
+
+
+def _draw_keys(state: AppState) -> None:
+    if not state.keys_visible:
+        return
+    lines = [*((key.label, key.text) for key in KEYS), *MOUSE]
+    viewport = imgui.get_main_viewport()
+    fits = (len(lines) + 3) * imgui.get_text_line_height_with_spacing() <= viewport.size.y
+    style = imgui.get_style()
+    # In a low window the lines move together and get smaller rather than go out of it.
+    room = (viewport.size.y - 3 * style.window_padding.y) / len(lines)
+    share = 1.0 if fits else max(min(room / imgui.get_text_line_height(), 1.0), 0.5)
+    gap = (style.item_spacing.x, style.item_spacing.y if fits else 0.0)
+    imgui.push_style_var(imgui.StyleVar_.item_spacing, gap)
+    imgui.push_font(None, share * style.font_size_base)
+    center = viewport.get_center()
+    if begin_overlay("##keys", center.x, center.y, (0.5, 0.5)):
+        for label, text in lines:
+            imgui.text_colored((1.0, 0.78, 0.45, 1.0), label)
+            imgui.same_line(11 * imgui.get_font_size())
+            imgui.text_unformatted(text)
+    imgui.end()
+    imgui.pop_font()
+    imgui.pop_style_var()
