@@ -1,0 +1,48 @@
+"""What ``viewer diff`` compares: files, files joined by "+", or folders with a rig in them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from viewer.errors import FormatError
+from viewer.formats import FORMATS, Source, detect
+
+__all__ = ["input_files"]
+
+
+def input_files(text: str) -> list[Path]:
+    """Return the files that one argument stands for.
+
+    Parameters
+    ----------
+    text : str
+        A file; several joined by ``+``; a folder of a known kind (PIG, EasyMocap); or any folder
+        with rig files, all of which are opened together, as for a submission.
+
+    Raises
+    ------
+    FormatError
+        If it is a folder without a file that opens.
+
+    >>> input_files("arm.skel+arm.skin") == [Path("arm.skel"), Path("arm.skin")]
+    True
+    """
+    path = Path(text)
+    if not path.exists() and "+" in text:
+        return [Path(part) for part in text.split("+") if part]
+    if not path.is_dir() or _is_known_folder(path):
+        return [path]
+    suffixes = [suffix for kind in FORMATS.values() for suffix in kind.suffixes if suffix != ".txt"]
+    files = sorted(file for file in path.iterdir() if file.suffix.lower() in suffixes)
+    if not files:
+        known = ", ".join(dict.fromkeys(suffixes))
+        raise FormatError(path, f"expected a folder with files of a rig ({known}), found none")
+    return files
+
+
+def _is_known_folder(path: Path) -> bool:
+    try:
+        detect(Source.open(path))
+    except FormatError:
+        return False
+    return True

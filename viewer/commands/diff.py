@@ -1,0 +1,236 @@
+"""Hold figures or motions against a reference: a grader's command."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from viewer.commands._diff_inputs import input_files
+from viewer.commands._diff_picture import Heat, heat_of, save_heat
+from viewer.commands._diff_report import Compared, json_text, lines_of, table_of
+from viewer.commands._frame_numbers import parse_range
+from viewer.commands._output import PICTURES, check_output
+from viewer.commands._pose import add_skinning_arguments, skinning_of
+from viewer.commands._progress import Progress
+from viewer.commands._scene import print_warnings
+from viewer.errors import OutputError, ViewerError, printable
+from viewer.loading import MotionSettings, load
+from viewer.rig.comparison import Difference, compare
+from viewer.rig.comparison.steps import FrameRange
+from viewer.rig.scene import Actor, Scene
+from viewer.rig.skinning import Skinning
+from viewer.rig.units import METRES
+
+__all__ = ["add_arguments", "run"]
+
+_DIFFERS = 1  # exit code
+_UNREADABLE = 2
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    files = parser.add_argument_group("files")
+    files.add_argument(
+        "reference",
+        metavar="REFERENCE",
+        help="a file, several joined by + (arm.skel+arm.skin), or a folder with a rig in it",
+    )
+    files.add_argument("files", nargs="+", metavar="OTHER", help="what is held against it")
+    files.add_argument(
+        "--with",
+        dest="common",
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="opened with the reference and with each other: the .skel of .anim files, say",
+    )
+    files.add_argument("--up", choices=("y", "z", "-y", "-z"), help="up axis of captures and BVH")
+    files.add_argument("--unit", choices=METRES, help="unit of lengths in BVH")
+    _add_poses(parser)
+    _add_results(parser)
+    add_skinning_arguments(parser)
+
+
+def _add_poses(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("poses")
+    group.add_argument(
+        "--poses",
+        type=int,
+        default=8,
+        metavar="N",
+        help="test poses for figures without motion, within the limits (default: 8)",
+    )
+    group.add_argument(
+        "--frames",
+        metavar="A:B",
+        help="frames A to B - 1 of motions, as the reference numbers them (default: all)",
+    )
+
+
+def _add_results(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("results")
+    group.add_argument(
+        "--tolerance",
+        type=float,
+        metavar="X",
+        help="exit with 1 if anything differs by more: lengths as a share of the reference's size, "
+        "angles in radians, weights as they are",
+    )
+    group.add_argument("--json", action="store_true", help="print everything as JSON")
+    group.add_argument(
+        "-o",
+        "--output",
+        metavar="FILE",
+        help="a picture of the reference, coloured by distance where it is largest; of several "
+        "comparisons a sheet with one scale",
+    )
+    group.add_argument("--force", action="store_true", help="replace an existing picture")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Compare, say what differs, and return whether it is more than allowed."""
+    tolerance = arguments.tolerance
+    if tolerance is not None and not (tolerance >= 0.0 and math.isfinite(tolerance)):
+        raise ViewerError(f"--tolerance: expected a number from 0, found {tolerance:g}")
+    if not 0 <= arguments.poses <= 10_000:
+        raise ViewerError(f"--poses: expected 0 to 10000, found {arguments.poses}")
+    frames = _frames(arguments.frames)
+    output = _checked_output(arguments)
+    open_one = _opener(arguments)
+    reference = open_one(arguments.reference)
+    print_warnings(reference.warnings)
+    skinning = skinning_of(arguments)
+    rows: list[Compared] = []
+    heats: list[Heat] = []
+    for name in arguments.files:
+        try:
+            row, heat = _compared(
+                name, reference, open_one(name), skinning, arguments.poses, frames
+            )
+        except ViewerError as problem:
+            row, heat = Compared(name, error=printable(problem, 500)), None
+        rows.append(row)
+        heats += [] if heat is None else [heat]
+    _print(arguments, rows)
+    if output is not None:
+        said = save_heat(heats, output, skinning)
+        print(said, file=sys.stderr if arguments.json else sys.stdout)
+    if any(row.error for row in rows):
+        return _UNREADABLE
+    exceeds = tolerance is not None and any(row.exceeds(tolerance) for row in rows)
+    return _DIFFERS if exceeds else 0
+
+
+def _checked_output(arguments: argparse.Namespace) -> Path | None:
+    """Refuse a picture that cannot be written before anything is compared."""
+    if arguments.output is None:
+        return None
+    output = Path(arguments.output)
+    if output.suffix.lower() not in PICTURES:
+        raise OutputError(
+            f"{printable(output, 300)}: pictures cannot be written as "
+            f'"{output.suffix}"; there are: {", ".join(PICTURES)}'
+        )
+    if not output.parent.is_dir():
+        raise OutputError(f"{printable(output, 300)}: the folder does not exist")
+    asked = [arguments.reference, *arguments.files]
+    inputs = [file for text in asked for file in _inputs(text)]
+    check_output(output, [*inputs, *map(Path, arguments.common)], arguments.force)
+    return output
+
+
+def _inputs(text: str) -> list[Path]:
+    """Return what an argument stands for, if it is there; opening it will say what is wrong."""
+    try:
+        return input_files(text)
+    except ViewerError:
+        return []
+
+
+def _frames(text: str | None) -> FrameRange | None:
+    if text is None:
+        return None
+    found = parse_range(text)
+    if found.step != 1:
+        raise ViewerError(f"--frames: expected A:B without a step, found {text}")
+    return found.first, found.stop
+
+
+def _opener(arguments: argparse.Namespace) -> Callable[[str], Scene]:
+    settings = MotionSettings(up=arguments.up or "", unit=arguments.unit or "")
+
+    def open_one(text: str) -> Scene:
+        return load(*arguments.common, *input_files(text), motion=settings)
+
+    return open_one
+
+
+def _compared(
+    name: str,
+    reference: Scene,
+    other: Scene,
+    skinning: Skinning,
+    n_poses: int,
+    frames: FrameRange | None,
+) -> tuple[Compared, Heat | None]:
+    pairs, mismatches = _pair_actors(reference.actors, other.actors)
+    found: list[tuple[Actor, Difference]] = []
+    for first, second in pairs:
+        # The reference is posed on the way, and must start alike for everybody.
+        with Progress(f"comparing {Path(name).name}", 1) as progress:
+
+            def report(done: int, count: int, progress: Progress = progress) -> None:
+                progress.total = count
+                progress.show(done)
+
+            posed = _copy(first)
+            difference = compare(posed, second, skinning, n_poses, frames, report)
+        found.append((posed, difference))
+    differences = tuple((actor.name, difference) for actor, difference in found)
+    row = Compared(name, differences, mismatches, warnings=other.warnings)
+    return row, heat_of(name, found)
+
+
+def _copy(actor: Actor) -> Actor:
+    return Actor(
+        actor.figure,
+        None if actor.pose is None else actor.pose.copy(),
+        actor.clip,
+        offset=actor.offset,
+        person=actor.person,
+        points=actor.points,
+        is_present=actor.is_present,
+    )
+
+
+def _pair_actors(
+    first: Sequence[Actor], second: Sequence[Actor]
+) -> tuple[list[tuple[Actor, Actor]], tuple[str, ...]]:
+    """Pair actors: people of captures by their number, others in order."""
+    left = list(second)
+    pairs, mismatches = [], []
+    for actor in first:
+        same = [other for other in left if other.person == actor.person]
+        alike = [o for o in same if (o.figure.points is None) == (actor.figure.points is None)]
+        chosen = next(iter(alike or same), None)
+        if chosen is None:
+            mismatches.append(f"{actor.name} only in the reference")
+        else:
+            left.remove(chosen)
+            pairs.append((actor, chosen))
+    mismatches += [f"{actor.name} not in the reference" for actor in left]
+    return pairs, tuple(mismatches)
+
+
+def _print(arguments: argparse.Namespace, rows: Sequence[Compared]) -> None:
+    tolerance = arguments.tolerance
+    if arguments.json:
+        print(json_text(arguments.reference, rows, tolerance))
+    elif len(rows) > 1:
+        print("\n".join(table_of(rows, tolerance)))
+    else:
+        print_warnings(rows[0].warnings)
+        print("\n".join(lines_of(rows[0], tolerance)))
