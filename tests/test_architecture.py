@@ -23,6 +23,7 @@ ALLOWED = {
         "app",
         "export",
         "formats",
+        "lint",
         "loading",
         "models",
         "rendering",
@@ -30,6 +31,7 @@ ALLOWED = {
         "errors",
         "resources",
     },
+    "lint": {"lint", "loading", "formats", "rig", "errors"},
     "models": {"formats", "errors"},
     "errors": set(),
     "resources": {"errors"},
@@ -40,7 +42,7 @@ HOMES = {
     "pyrr": {"rendering/camera.py"},
     "glfw": {"app"},
     "imgui_bundle": {"app"},
-    "PIL": {"formats/_image.py"},
+    "PIL": {"formats/_image.py", "rendering/legend_picture.py"},
     "av": {"formats/_video.py"},
 }
 

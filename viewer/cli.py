@@ -23,7 +23,8 @@ _EPILOG = """\
 Without a command, FILES open in a window; without files, the bundled figure does.
 "viewer COMMAND --help" lists a command's options.
 
-exit codes: 0 done, 2 bad input, 4 no usable OpenGL, 5 output could not be written
+exit codes: 0 done, 1 lint found or diff measured too much, 2 bad input, 4 no usable OpenGL,
+5 output could not be written
 """
 
 

@@ -18,7 +18,10 @@ from viewer.export import EXPORTERS
 
 DIGITS = 5e-9  # half of the ninth digit, of numbers below 10
 EXACT = 1e-12
-SUFFIXES = ", ".join(dict.fromkeys(s for kind in EXPORTERS.values() for s in kind.suffixes))
+SUFFIXES = ", ".join(
+    {"/": "a folder for EasyMocap"}.get(suffix, suffix)
+    for suffix in dict.fromkeys(s for kind in EXPORTERS.values() for s in kind.suffixes)
+)
 NO_FILE = "cannot be read: No such file or directory"
 
 

@@ -99,7 +99,8 @@ NUMBERS_WANTED = "expected numbers separated by commas, found"
         ("twist.skel move.anim --frame -1", "--frame: expected 0 or more, found -1"),
         (
             "twist.skel move.anim --frame 1 --fps 0",
-            "argument --fps: expected more than 0, found 0 (viewer info --help lists the options)",
+            "argument --fps: expected 0.001 to 100,000 frames a second, found 0 "
+            "(viewer info --help lists the options)",
         ),
         (
             "twist.skel move.anim --frame 1 --time 1",

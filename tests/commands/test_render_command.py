@@ -300,13 +300,22 @@ def test_format_that_cannot_be_written_is_exit_code_5(rig, tmp_path, suffix, cap
     assert capsys.readouterr().err.count("\n") == 1 and not out.exists()
 
 
-@pytest.mark.parametrize("suffix", [".xyz", ".svg", ".skin"])
+@pytest.mark.parametrize("suffix", [".xyz", ".svg", ".skin", ".avi"])
 def test_picture_under_another_kind_of_name_is_refused(rig, tmp_path, suffix, capsys):
     out = tmp_path / f"x{suffix}"
     out.write_text("precious")
     assert run(["render", *map(str, rig), "-o", str(out), "--force"]) == 5
-    assert f"pictures cannot be written as {suffix}" in capsys.readouterr().err
+    assert capsys.readouterr().err == (
+        f"viewer: {out}: expected a picture (.png, .jpg, .jpeg, .bmp, .gif, .ppm, .tga, .tif, "
+        f".tiff, .webp) or a video (.mp4, .webm, .gif), found {suffix}\n"
+    )
     assert out.read_text() == "precious"
+
+
+def test_kinds_of_video_are_listed_also_where_frames_are_asked_for(rig, tmp_path, capsys):
+    out = tmp_path / "x.mov"
+    assert run(["render", *map(str, rig), "-o", str(out), "--frames", "0:5"]) == 5
+    assert " or a video (.mp4, .webm, .gif), found .mov\n" in capsys.readouterr().err
 
 
 def test_transparency_that_the_format_lacks_is_a_warning(rig, tmp_path, capsys):

@@ -12,11 +12,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from app.tiny import write_rig
+from formats.capture_files import body, write_frames
+from formats.synthetic_smpl import model
 from PIL import Image
 
 import viewer
 from viewer.cli import run
-from viewer.commands._shots import Range, Turntable, parse_range, parse_turntable
+from viewer.commands._shots import Turntable, parse_turntable
 from viewer.rig.motion import pose_actor
 
 av = pytest.importorskip("av")
@@ -201,11 +203,12 @@ def test_bad_ranges_are_one_line(draw, walk, text):
 
 def test_range_that_begins_behind_the_end_says_how_many_there_are(draw, walk):
     said = draw(walk, "{frame}.png", "--frames", "31:", code=2)
-    assert said.err == "viewer: --frames: there are 31 frames, 0 to 30\n"
+    assert said.err == (
+        "viewer: --frames: expected a range within 0:31 (frames 0 to 30), found 31:\n"
+    )
 
 
-def test_ranges_and_turntables_are_read():
-    assert parse_range("3:") == Range(3, None, 1) and parse_range(" :9:2") == Range(0, 9, 2)
+def test_turntables_are_read():
     assert parse_turntable("2.5") == Turntable(360.0, 2.5) == parse_turntable("2.5s")
     assert parse_turntable("-45deg") == Turntable(-45.0, None)
 
@@ -242,7 +245,10 @@ def test_video_shows_the_whole_clip(draw, fox, tmp_path, suffix):
     [
         (["--fps", "10"], 11, 10),
         (["--frames", "10:20"], 10, 30),
-        (["--frames", "0:20:4"], 5, 30),
+        (["--frames", "0:20:4"], 5, 7.5),
+        (["--frames", "0:20:4", "--fps", "30"], 5, 30),
+        (["--frames", "0:20:4", "--speed", "0.5"], 10, 7.5),
+        (["--frames", ":20:4", "--turntable", "2"], 15, 7.5),
         (["--speed", "0.5"], 61, 30),
         (["--speed", "2"], 16, 30),
         (["--speed", "-1", "--frames", "0:10"], 10, 30),
@@ -256,6 +262,18 @@ def test_video_has_as_many_frames_as_asked_for(draw, walk, tmp_path, options, co
     with av.open(str(tmp_path / "x.mp4")) as container:
         assert float(container.streams.video[0].average_rate) == rate
     assert len(frames(tmp_path / "x.mp4")) == count
+
+
+def test_video_that_skips_frames_keeps_the_motions_pace(draw, walk):
+    said = draw(walk, "x.mp4", "--frames", "0:30:3", size="32x32")
+    wanted = "10 frames, 1 s, 32 x 32, 10 frames a second (one of 3 frames, at the motion's own "
+    assert f"{wanted}pace; --fps sets it), " in said.out and said.err == ""
+    said = draw(walk, "y.mp4", "--frames", "0:30:3", "--fps", "30", size="32x32")
+    assert "10 frames, 0.333 s, 32 x 32, 30 frames a second, " in said.out
+    said = draw(walk, "z.gif", "--frames", "0:31:3", size="32x32")
+    assert "11 frames, 1.1 s, 32 x 32, 10 frames a second (one of 3 frames" in said.out
+    said = draw(walk, "{frame}.png", "--frames", "0:31:3", size="16x16")
+    assert "one of" not in said.out  # nobody plays pictures
 
 
 def test_speed_below_0_plays_backwards(draw, walk, tmp_path):
@@ -318,6 +336,40 @@ def test_options_that_a_motion_overrides_are_said(draw, walk):
     ]
 
 
+@pytest.fixture
+def pair(tmp_path) -> list[str]:
+    """A model, and two frames of persons 3 and 5, who stand 4 apart."""
+    np.savez(tmp_path / "SMPL.npz", **model("smpl", 32))
+    people = [body(person, Th=[[2.0 * person, 0.0, 0.0]]) for person in (3, 5)]
+    folder = write_frames(tmp_path / "take" / "smpl", {0: people, 1: people})
+    return [str(folder), "--model", str(tmp_path / "SMPL.npz"), "--up", "y"]
+
+
+def test_follow_says_whom_where_two_have_the_joint(draw, pair):
+    size = "16x16"
+    said = draw(pair, "a.mp4", "--follow", "pelvis", size=size)
+    assert said.err == (
+        "warning: --follow pelvis: 2 have it; the first, SMPL 3, is followed "
+        "(--follow 5:pelvis follows another)\n"
+    )
+    for index, name in enumerate(("5:pelvis", "SMPL 3:head", "smpl 5/left_foot", "5", "SMPL 3")):
+        assert draw(pair, f"{index}.mp4", "--follow", name, size=size).err == ""
+    said = draw(pair, "x.mp4", "--follow", "4:pelvis", size=size, code=2)
+    assert said.err == (
+        'viewer: no actor, joint or point is called "4:pelvis"; actors: SMPL 3, SMPL 5\n'
+    )
+
+
+def test_follow_of_figures_without_numbers_says_that_it_is_the_first(draw, walk):
+    said = draw([*walk, *walk[:2]], "x.mp4", "--follow", "arm", size="16x16")
+    assert said.err == ("warning: --follow arm: 2 have it; the first, tiny, is followed\n")
+
+
+def test_shapes_that_a_capture_overrides_are_said(draw, pair):
+    said = draw(pair, "x.mp4", "--shape", "1", size="16x16")
+    assert said.err == "warning: --shape: only figures without a motion keep it\n"
+
+
 # Contact sheets
 
 
@@ -336,6 +388,11 @@ def test_contact_sheet_spreads_frames_over_the_motion(draw, walk, tmp_path):
 def test_contact_sheet_of_few_frames_has_no_more(draw, walk, tmp_path):
     said = draw(walk, "sheet.png", "--contact-sheet", "9", "--frames", "0:3", size="240x180")
     assert ": 3 frames of " in said.out
+    assert said.err == (
+        "warning: --contact-sheet: there are 3 frames, not 9; none is shown twice\n"
+    )
+    said = draw(walk, "one.png", "--contact-sheet", "2", "--frames", "0:1", size="240x180")
+    assert said.err == ("warning: --contact-sheet: there is 1 frame, not 2; none is shown twice\n")
 
 
 def test_contact_sheet_of_a_turntable(draw, tmp_path):

@@ -118,7 +118,6 @@ def test_pipe_among_the_frames_is_not_opened(tmp_path):
         ({"Th": 3}, "Th: expected numbers, found 3"),
         ({"Th": {"x": 1, "y": 2, "z": 3}}, "Th: expected numbers, found a dict of 3"),
         ({"shapes": [[1.0] * 9]}, "shapes: expected 10 numbers, found 9"),
-        ({"shapes": None}, "shapes: expected numbers, found no such key"),
     ],
 )  # fmt: skip
 def test_broken_record_is_a_gap_for_one_person(tmp_path, changes, message):
@@ -169,6 +168,21 @@ def test_first_of_two_with_one_number_counts(tmp_path):
     assert parts[1].bodies[0].translations[0, 0] == body(0, seed=1.0)["Th"][0][0]
 
 
+def test_untracked_people_are_named_in_messages(tmp_path):
+    warnings, _ = gap(tmp_path, [body(-1), body(-1, Th=[[float("nan"), 0.0, 0.0]])])
+    assert warnings == [
+        ': people without a track (id -1) are called "untracked" and numbered within each frame: '
+        "nobody says who of them is who in the next",
+        ": untracked 2: Th: expected finite numbers, found nan",
+    ]
+
+
+def test_two_numbers_of_one_person_are_noticed(tmp_path):
+    warnings, parts = gap(tmp_path, [body(0, personID=4), body(1, personID=1)])
+    assert warnings == [": people whose id and personID differ: id counts everywhere"]
+    assert rows_of(parts, 1) == [1]
+
+
 def test_keypoints_that_are_no_numbers_are_not_seen(tmp_path):
     record = points(0)
     rows = record["keypoints3d"]
@@ -200,6 +214,20 @@ def test_broken_keypoints_are_a_gap(tmp_path, rows, message):
     warnings, parts = gap(tmp_path, [{"id": 0, "keypoints3d": rows}], "keypoints3d")
     assert warnings == [f": person 0: {message}"]
     assert len(parts[1].points[0][1].points) == 1
+
+
+def test_keypoints_that_nobody_saw_are_noticed_at_the_end(tmp_path):
+    unseen = points(3)
+    unseen["keypoints3d"] = [[0.0] * 4] * 25
+    late = {
+        frame: [unseen, points(4) if frame == 70 else unseen | {"id": 4}] for frame in range(80)
+    }
+    folder = write_frames(tmp_path / "take" / "keypoints3d", late)
+    _, parts, _ = opened(folder)
+    assert [part.warnings for part in parts[:-1]] == [()] * (len(parts) - 1)
+    assert parts[-1].warnings == (
+        "take: no keypoint of person 3 is ever seen: every confidence is 0",
+    )
 
 
 def test_many_faults_are_counted(tmp_path):

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from formats.synthetic_smpl import model
 
 from viewer.errors import FormatError, RigError, UnsupportedFormatError
 from viewer.formats import Source, detect, read, write
@@ -223,6 +224,20 @@ def test_clip_of_another_skeleton_names_both_numbers(tmp_path: Path) -> None:
         load(tmp_path / "a.skel", tmp_path / "a.anim")
     assert str(caught.value) == (
         f"{tmp_path / 'a.anim'} has 1 channels, {tmp_path / 'a.skel'} needs 6 (3 + 3 x 1 joints)"
+    )
+
+
+def test_clip_of_a_body_says_why_it_does_not_fit(tmp_path: Path) -> None:
+    """The wasp's 72 channels and SMPL's 72 numbers mean different things."""
+    np.savez(tmp_path / "smpl.npz", **model("smpl", 32))
+    channel = "channel { extrapolate linear linear keys 1 { 0 0 flat flat } } "
+    (tmp_path / "a.anim").write_text(f"animation {{ range 1 2 numchannels 72 {72 * channel} }}")
+    with pytest.raises(RigError) as caught:
+        load(tmp_path / "smpl.npz", tmp_path / "a.anim")
+    assert str(caught.value) == (
+        f"{tmp_path / 'a.anim'} has 72 channels, {tmp_path / 'smpl.npz'} is no course rig, whose "
+        "clips move the root along x, y, z and turn each joint about x, y, z: "
+        "joint pelvis has DOFs x, y, z"
     )
 
 

@@ -164,9 +164,9 @@ def test_what_a_figure_lacks_is_noted(family):
     assert notes == [
         "the left hand: smpl has no hand components",
         "2 joints that smpl lacks were left out: jaw, left_middle3",
-        "shape coefficients beyond the 10 of smpl were left out "
+        "shape coefficients 11 to 12 were left out, as smpl has 10 "
         f"(largest {np.abs(waves(12)[10:]).max():.3g})",
-        f"expression coefficients beyond the 0 of smpl were left out "
+        f"expression coefficients 1 to 10 were left out, as smpl has 0 "
         f"(largest {np.abs(waves(10)).max():.3g})",
     ]
 
@@ -182,3 +182,18 @@ def test_arrays_must_fit():
         motion(("pelvis",), TURN, world_turns=np.zeros((2, 3)))
     with pytest.raises(RigError, match=r"^translations: expected shape 1 x 3, found 1 x 2$"):
         motion(("pelvis",), TURN, translations=np.zeros((1, 2)))
+
+
+def test_of_many_joints_left_out_six_are_named(family):
+    names = (*FAMILY[55].names,)
+    vectors = np.zeros((1, 55, 3))
+    vectors[:, 22:] = 0.1
+    _, notes = posed(family("smpl"), motion(names, vectors))
+    lost = [name for name in names[22:] if name not in family("smpl").skeleton.names]
+    listed = ", ".join(lost[:6])
+    assert len(lost) == 33
+    assert notes == [f"33 joints that smpl lacks were left out: {listed}, … and 27 more"]
+    vectors[:, 28:] = 0.0
+    assert posed(family("smpl"), motion(names, vectors))[1] == [
+        f"6 joints that smpl lacks were left out: {listed}"
+    ]

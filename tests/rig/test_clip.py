@@ -17,8 +17,10 @@ from viewer.rig.clip import (
     check_fit,
     evaluate,
     is_course_rig,
+    misfit,
     slopes,
 )
+from viewer.rig.skeleton import DOF_KINDS
 
 SHARED = Path(__file__).resolve().parents[2].parent / "shared" / "data" / "cse169"
 
@@ -147,8 +149,43 @@ def test_check_fit_refuses_skeletons_that_move_otherwise() -> None:
     """A body of 24 ball joints has 72 DOFs too, as the wasp's 23 joints and root have."""
     skeleton = hand_made.skeleton([-1, 0], [(j, axis, 0.0) for j in (0, 1) for axis in "xyz"])
     assert not is_course_rig(skeleton)
-    with pytest.raises(RigError, match="moves a root and three angles of each joint, which is not"):
+    with pytest.raises(RigError) as caught:
         check_fit(Clip("walk", (), 0.0, 1.0), skeleton)
+    assert str(caught.value) == (
+        "clip walk: the skeleton is no course rig, whose clips move the root along x, y, z and "
+        "turn each joint about x, y, z: joint j0 has DOFs x, y, z"
+    )
+
+
+@pytest.mark.parametrize(
+    ("rows", "reason"),
+    [
+        ([], "joint j0 has no DOFs"),
+        ([(0, kind) for kind in DOF_KINDS], "joint j1 has no DOFs"),
+        ([(0, kind) for kind in DOF_KINDS] + [(1, "z")], "joint j1 has DOFs z"),
+        (
+            [(0, kind) for kind in DOF_KINDS] + [(1, kind) for kind in "zyx"],
+            "joint j1 has DOFs z, y, x",
+        ),
+        (
+            [(1, kind) for kind in "xyz"] + [(0, kind) for kind in DOF_KINDS],
+            "its DOFs are not in the order of its joints",
+        ),
+    ],
+)
+def test_misfit_names_what_is_no_course_rig(rows, reason) -> None:
+    skeleton = hand_made.skeleton([-1, 0], [(*row, 0.0) for row in rows])
+    found = misfit(Clip("walk", (), 0.0, 1.0), skeleton)
+    assert found.startswith("is no course rig, ") and found.endswith(f": {reason}")
+
+
+def test_misfit_is_empty_where_a_clip_fits() -> None:
+    skeleton = hand_made.skeleton([-1], [(0, kind, 0.0) for kind in DOF_KINDS])
+    still = [Channel(dof, [0.0], [0.0], (("flat", "flat"),)) for dof in range(6)]
+    assert misfit(Clip("still", tuple(still), 0.0, 1.0), skeleton) == ""
+    assert misfit(Clip("short", tuple(still[:5]), 0.0, 1.0), skeleton) == (
+        "needs 6 (3 + 3 x 1 joints)"
+    )
 
 
 def test_course_rigs_list_translation_then_rotations_joint_by_joint() -> None:

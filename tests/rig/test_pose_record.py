@@ -310,6 +310,24 @@ def test_more_coefficients_than_the_figure_has_must_be_zero(family):
     assert message == f"{figure.name} has 0 expression coefficients, found 1"
 
 
+def test_more_coefficients_than_the_figure_has_can_be_left_out(family):
+    figure = family("smpl")
+    pose = figure_pose(figure)
+    record = PoseRecord(shape=np.array([0.5] * 14 + [-3.0, 0.0]), expression=np.array([2.0]))
+    assert apply_record(record, figure, pose, cut=True) == [
+        f"shape coefficients 11 to 16 were left out, as {figure.name} has 10 (largest 3)",
+        f"expression coefficient 1 was left out, as {figure.name} has 0 (largest 2)",
+    ]
+    assert pose.shape_weights.tolist() == [0.5] * 10
+
+
+def test_shapes_for_a_figure_without_any_are_refused_all_the_same():
+    rig = Figure("bones", skeleton=skeleton((-1,)))
+    with pytest.raises(RigError) as caught:
+        apply_record(PoseRecord(shape=np.ones(3)), rig, figure_pose(rig), cut=True)
+    assert str(caught.value) == "bones has 0 shape coefficients, found 3"
+
+
 def test_place_is_taken_and_what_is_missing_stays(family):
     figure = family("smpl")
     pose = figure_pose(figure)

@@ -80,7 +80,8 @@ def clip_lines(clip: dict[str, Any]) -> list[str]:
 
 
 def _rows_text(clip: dict[str, Any]) -> str:
-    frames = f"{clip['frames']} frames at {clip['frame_rate']:g} a second"
+    frames = f"{clip['frames']} frame{'s' * (clip['frames'] != 1)}"
+    frames += f" at {clip['frame_rate']:g} a second"
     if clip["kind"] == "points":
         return f"{frames}, {clip['points']} points, {100 * clip['seen']:.1f} % of them seen"
     shape = "a shape of its own in each frame" if clip["shape_varies"] else "one shape"
@@ -91,7 +92,11 @@ def _gap_lines(clip: dict[str, Any]) -> list[str]:
     missing = clip["frames"] - clip["present_frames"]
     if not missing:
         return []
-    shown = [f"{first} to {last}" for first, last in clip["gaps"][:_SHOWN_GAPS]]
+    shown = [
+        f"{first}" if first == last else f"{first} to {last}"
+        for first, last in clip["gaps"][:_SHOWN_GAPS]
+    ]
     more = len(clip["gaps"]) - len(shown)
     tail = f" and {more} more" if more else ""
-    return [f"    {missing} frames are missing: {', '.join(shown)}{tail}"]
+    what = "1 frame is" if missing == 1 else f"{missing} frames are"
+    return [f"    {what} missing: {', '.join(shown)}{tail}"]

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
+from viewer.commands._frame_numbers import numbering_of, parse_range
 from viewer.commands._numbers import number
-from viewer.commands._shots import parse_range
 from viewer.errors import OutputError, RigError, UnsupportedFormatError, ViewerError, printable
 from viewer.export import (
     EXPORTERS,
@@ -15,23 +17,30 @@ from viewer.export import (
     motion_exporters,
     suited_exporter,
 )
-from viewer.export._options import GAPS, ROTATION_ORDERS, UNITS
+from viewer.export._motion_paths import motion_paths
+from viewer.export._options import GAPS, ROTATION_ORDERS
+from viewer.rig.arrays import Bools
 from viewer.rig.clip import Clip
+from viewer.rig.person import is_tracked, person_label
+from viewer.rig.point_take import PointTake, upright_point_take
 from viewer.rig.points import PointClip
 from viewer.rig.sampled_clip import SampledClip
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import Skinning
-from viewer.rig.take import upright_take
+from viewer.rig.take import Take, upright_take
+from viewer.rig.units import METRES
 
 __all__ = [
     "add_motion_arguments",
     "check_frame_field",
     "is_motion",
     "motion_paths",
+    "moving_actors",
     "write_motions",
 ]
 
 _MOST_DIGITS = 15
+_OF_POINTS = "npz"  # the exporter that takes captured points
 _ONE_A_FRAME = (".obj",)  # their motions are many files, which nobody wants by accident
 
 
@@ -45,15 +54,20 @@ def add_motion_arguments(parser: argparse.ArgumentParser) -> None:
         choices=[*EXPORTERS],
         help=f"what to write, where a suffix leaves a choice; motions: {', '.join(kinds)}",
     )
-    group.add_argument("--frames", metavar="A:B", help="frames A to B - 1 of the motion, from 0")
-    group.add_argument("--gaps", choices=GAPS, default="hold", help="missing frames: default hold")
-    group.add_argument("--to-unit", choices=UNITS, help="unit of the file (BVH: default cm)")
-    group.add_argument("--to-up", choices=("y", "z"), help="up axis of the file (BVH: default y)")
     group.add_argument(
-        "--rotation-order", choices=ROTATION_ORDERS, default="zyx", help="of BVH: default zyx"
+        "--gaps", choices=GAPS, default="hold", help="missing frames (default: hold)"
+    )
+    group.add_argument("--to-unit", choices=METRES, help="of the file (default: cm in BVH)")
+    group.add_argument(
+        "--to-up", choices=("y", "z"), help="up axis of the file (default: y in BVH)"
+    )
+    group.add_argument(
+        "--rotation-order", choices=ROTATION_ORDERS, default="zyx", help="of BVH (default: zyx)"
     )
     group.add_argument("--rest-frame", action="store_true", help="BVH: first a frame at rest")
-    group.add_argument("--digits", type=number, default=6, metavar="N", help="decimals: default 6")
+    group.add_argument(
+        "--digits", type=number, default=6, metavar="N", help="BVH: decimals, 1 to 15 (default: 6)"
+    )
 
 
 def is_motion(arguments: argparse.Namespace, output: Path, scene: Scene) -> bool:
@@ -70,6 +84,8 @@ def is_motion(arguments: argparse.Namespace, output: Path, scene: Scene) -> bool
     if not any(kind.writes_pose for kind in kinds):
         return True
     moves = any(isinstance(actor.clip, Clip | SampledClip) for actor in scene.actors)
+    if EXPORTERS[_OF_POINTS] in kinds and scene.actors:
+        moves = moves or all(isinstance(actor.clip, PointClip) for actor in scene.actors)
     wants_one = arguments.time is not None or arguments.frame is not None
     return moves and not wants_one and suffix not in _ONE_A_FRAME
 
@@ -77,8 +93,8 @@ def is_motion(arguments: argparse.Namespace, output: Path, scene: Scene) -> bool
 def motion_options(arguments: argparse.Namespace, skinning: Skinning) -> MotionOptions:
     """Return how motions are asked to be written."""
     digits = int(arguments.digits)
-    if not 0 <= digits <= _MOST_DIGITS or digits != arguments.digits:
-        raise ViewerError(f"--digits: expected 0 to {_MOST_DIGITS}, found {arguments.digits:g}")
+    if not 1 <= digits <= _MOST_DIGITS or digits != arguments.digits:
+        raise ViewerError(f"--digits: expected 1 to {_MOST_DIGITS}, found {arguments.digits:g}")
     return MotionOptions(
         unit=arguments.to_unit or "",
         up=arguments.to_up or "",
@@ -95,73 +111,144 @@ def write_motions(
 ) -> list[str]:
     """Write every actor's motion; return lines that say what was written and what was lost.
 
+    People who are in none of the frames are left out, and the others keep the names of their files.
+
     Raises
     ------
     ViewerError
-        If no actor has a motion that the format can hold.
+        If no actor has a motion that the format can hold, or nobody is in the frames; nothing has
+        been written then.
     """
     options = motion_options(arguments, skinning)
     key = _exporter(arguments, output, scene)
-    actors = _moving(scene)
-    takes = []
-    for actor in actors:
-        take, options.world_up = upright_take(
-            scene, actor, arguments.fps, _frames(arguments.frames), arguments.fill_gaps
-        )
-        takes.append(take)
-    if key == "easymocap":
-        from viewer.export.easymocap import export_takes
+    actors = moving_actors(scene)
+    parts = []
+    for actor, path in zip(actors, motion_paths(output, actors), strict=True):
+        sample = upright_point_take if isinstance(actor.clip, PointClip) else upright_take
+        frames = _frames(arguments, actor)
+        take, up = sample(scene, actor, arguments.fps, frames, arguments.fill_gaps)
+        parts.append(_Part(actor, take, up, path))
+    there = [part for part in parts if part.present.any()]
+    if not there:
+        raise RigError(f"nobody is there in {parts[0].span}: there is nothing to write")
+    lines = _write(there, output, key, options) + _untracked_lines(there, key)
+    away = [part for part in parts if not part.present.any()]
+    lines += [f"{printable(p.take.name)}: not there in {p.span}, and not written" for p in away]
+    return lines + _lost_points(scene, actors)
 
-        persons = [index if a.person is None else a.person for index, a in enumerate(actors)]
-        return export_takes(takes, output, options, persons)
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Part:
+    """What is written of one actor: its frames, the axis that is up in them, and their file."""
+
+    actor: Actor
+    take: Take | PointTake
+    up: Literal["y", "z"]
+    path: Path
+
+    @property
+    def present(self) -> Bools:
+        take = self.take
+        return take.frames.present if isinstance(take, Take) else take.present
+
+    @property
+    def span(self) -> str:
+        first = self.take.first_frame
+        last = first + len(self.present) - 1
+        return f"frame {first}" if first == last else f"frames {first} to {last}"
+
+
+def _write(parts: list[_Part], output: Path, key: str, options: MotionOptions) -> list[str]:
+    """Write the motions of whoever is there; return what the exporters say."""
+    if key == "easymocap":
+        return _write_capture(parts, output, options)
     lines: list[str] = []
-    for take, path in zip(takes, motion_paths(output, actors), strict=True):
-        lines += export_take(take, path, key, options)
+    for part in parts:
+        options.world_up = part.up
+        if isinstance(part.take, Take):
+            lines += export_take(part.take, part.path, key, options)
+        else:
+            from viewer.export.npz import export_points
+
+            lines += export_points(part.take, part.path, options)
     return lines
 
 
-def motion_paths(output: Path, actors: list[Actor]) -> list[Path]:
-    """Return the file of each actor: persons by their number, others counted from 2 on."""
-    if len(actors) == 1:
-        return [output]
-    persons = [actor.person for actor in actors]
-    by_person = None not in persons and len(set(persons)) == len(persons)
+def _write_capture(parts: list[_Part], output: Path, options: MotionOptions) -> list[str]:
+    """Write everybody into one folder."""
+    from viewer.export.easymocap import export_takes
+
+    ups = sorted({part.up for part in parts})
+    if len(ups) > 1:
+        raise RigError(f"expected one up axis for all people, found {' and '.join(ups)}")
+    options.world_up = parts[0].up
+    takes = [part.take for part in parts if isinstance(part.take, Take)]
+    actors = [part.actor for part in parts]
+    people = [index if a.person is None else a.person for index, a in enumerate(actors)]
+    return export_takes(takes, output, options, people)
+
+
+def _untracked_lines(parts: list[_Part], key: str) -> list[str]:
+    """Say which files hold people without a track."""
     names = [
-        f"-{person}" if by_person else (f"-{number}" if number > 1 else "")
-        for number, person in enumerate(persons, 1)
+        printable(part.path.name) if key != "easymocap" else person_label(part.actor.person)
+        for part in parts
+        if part.actor.person is not None and not is_tracked(part.actor.person)
     ]
-    return [output.with_name(f"{output.stem}{name}{output.suffix}") for name in names]
+    if not names:
+        return []
+    return [f"{', '.join(names)}: without a track, perhaps somebody else in each frame"]
 
 
-def _moving(scene: Scene) -> list[Actor]:
+def _lost_points(scene: Scene, written: list[Actor]) -> list[str]:
+    """Say whose captured points are not written beside the bodies."""
+    left = [a for a in scene.actors if isinstance(a.clip, PointClip) and a not in written]
+    if not left:
+        return []
+    names = ", ".join(printable(actor.name) for actor in left)
+    return [f"keypoints beside bodies are not written ({names}): open the keypoints3d folder alone"]
+
+
+def moving_actors(scene: Scene) -> list[Actor]:
+    """Return the actors whose motions are written: bodies, or captured points if there are none.
+
+    Raises
+    ------
+    RigError
+        If nothing moves.
+    """
     moving = [actor for actor in scene.actors if actor.clip is not None]
     bodies = [actor for actor in moving if not isinstance(actor.clip, PointClip)]
     if not moving:
         raise RigError("no file moves anything: a motion cannot be written")
-    if not bodies:
-        raise RigError("there are only keypoints: a motion of joints cannot be written")
-    return bodies
+    return bodies or moving
 
 
 def _exporter(arguments: argparse.Namespace, output: Path, scene: Scene) -> str:
     """Return the exporter asked for, or the first that suits the suffix and the figures."""
-    found = motion_exporters(output)
+    found, actors = motion_exporters(output), moving_actors(scene)
+    if isinstance(actors[0].clip, PointClip):
+        if _OF_POINTS not in found or arguments.kind not in (None, _OF_POINTS):
+            raise RigError(
+                "there are only keypoints: a motion of joints cannot be written (.npz holds points)"
+            )
+        return _OF_POINTS
     if arguments.kind is not None:
         if arguments.kind not in found:
             known = ", ".join(EXPORTERS[arguments.kind].suffixes)
             raise UnsupportedFormatError(f"--as {arguments.kind}: expected a name with {known}")
         return str(arguments.kind)
-    return suited_exporter(output, _moving(scene)[0].figure)
+    return suited_exporter(output, actors[0].figure)
 
 
-def _frames(text: str | None) -> tuple[int, int | None] | None:
-    """Return the range of ``A:B``: the first frame and the one behind the last."""
-    if text is None:
+def _frames(arguments: argparse.Namespace, actor: Actor) -> tuple[int, int | None] | None:
+    """Return the range asked for of a motion, from 0: its first frame and the one behind it."""
+    if arguments.frames is None:
         return None
-    found = parse_range(text)
+    found = parse_range(arguments.frames)
     if found.step != 1:
-        raise ViewerError(f"--frames: expected A:B (--fps thins out), found {printable(text, 40)}")
-    return found.first, found.stop
+        raise ViewerError(f"--frames: expected A:B, found {printable(arguments.frames, 40)}")
+    return numbering_of([actor], arguments.fps).span(found)
 
 
 def check_frame_field(output: Path) -> None:

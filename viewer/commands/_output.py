@@ -7,7 +7,10 @@ from pathlib import Path
 from viewer.errors import OutputError, printable
 from viewer.formats._save import refuse_inputs
 
-__all__ = ["STDOUT", "check_output"]
+__all__ = ["PICTURES", "STDOUT", "check_output"]
+
+PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".ppm", ".tga", ".tif", ".tiff", ".webp")
+"""Suffixes of pictures that can be written."""
 
 STDOUT = ("/dev/stdout", "/dev/fd/1", "/proc/self/fd/1")
 """Names of the output stream."""

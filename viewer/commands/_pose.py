@@ -9,6 +9,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from viewer.commands._frame_numbers import apply_time
+from viewer.commands._morph_weights import has_only_morphs, is_named, morph_record, named_record
 from viewer.commands._numbers import number
 from viewer.errors import RigError, ViewerError, printable
 from viewer.formats import Source, read
@@ -31,25 +33,11 @@ __all__ = [
 ]
 
 _FIGURE = "figure."  # label of the DOFs that a figure has as a whole
-_MOST_FRAMES = 1_000_000_000
 
 
 def add_pose_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options that shape and pose."""
     group = parser.add_argument_group("shape and pose, in this order")
-    group.add_argument(
-        "--time", type=number, metavar="S", help="pose by the clip at S seconds (default its start)"
-    )
-    group.add_argument(
-        "--frame", type=int, metavar="N", help="pose by the clip at frame N, counted from 0"
-    )
-    group.add_argument(
-        "--fps",
-        type=_rate,
-        metavar="R",
-        help="frames a second; of captures that do not say, and what --frame counts "
-        "(default: the file's own, or 30)",
-    )
     group.add_argument("--hands", choices=("flat", "mean"), help="start from flat or mean hands")
     group.add_argument(
         "--pose",
@@ -57,9 +45,14 @@ def add_pose_arguments(parser: argparse.ArgumentParser) -> None:
         help="a pose file (.json, .npz, .txt), or the model's own numbers",
     )
     group.add_argument(
-        "--shape", metavar="A,B,…", help="shape coefficients (betas) of a body model"
+        "--shape",
+        metavar="A,B,…|NAME=A,…",
+        help="shape coefficients (betas) of a body model, or weights of morphs, 1 for a target "
+        "reached; all from the first on, or some by name, as open=0.5,wide=1",
     )
-    group.add_argument("--expression", metavar="A,B,…", help="expression coefficients")
+    group.add_argument(
+        "--expression", metavar="A,B,…", help="expression coefficients of a body model"
+    )
     group.add_argument(
         "--dof",
         action="append",
@@ -75,12 +68,25 @@ def add_pose_arguments(parser: argparse.ArgumentParser) -> None:
 def add_skinning_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options that choose how joints move the mesh."""
     group = parser.add_argument_group("skinning")
-    group.add_argument("--method", choices=METHODS, default="lbs", help="default: lbs")
     group.add_argument(
-        "--dqs-share", type=number, default=0.5, metavar="S", help="of DQS with --method mix"
+        "--method",
+        choices=METHODS,
+        default="lbs",
+        help="linear blend skinning, dual quaternions, or between the two (default: lbs)",
     )
     group.add_argument(
-        "--influences", type=int, default=0, metavar="N", help="only each vertex's N strongest"
+        "--dqs-share",
+        type=number,
+        default=0.5,
+        metavar="S",
+        help="of dual quaternions with --method mix, 0 to 1 (default: 0.5)",
+    )
+    group.add_argument(
+        "--influences",
+        type=int,
+        default=0,
+        metavar="N",
+        help="only each vertex's N strongest (default: all)",
     )
     group.add_argument(
         "--normalize", action="store_true", help="scale each vertex's weights to a sum of 1"
@@ -116,7 +122,7 @@ def apply_pose(scene: Scene, arguments: argparse.Namespace) -> list[str]:
     ViewerError
         If an option makes no sense for what was opened.
     """
-    _apply_time(scene, arguments)
+    apply_time(scene, arguments)
     notes: list[str] = []
     if arguments.hands:
         _apply_hands(scene, arguments.hands)
@@ -124,9 +130,8 @@ def apply_pose(scene: Scene, arguments: argparse.Namespace) -> list[str]:
         record, warnings = _pose(arguments.pose)
         notes += [*warnings, *_apply_record("--pose", record, scene)]
     # What is asked for here counts more than what a pose file says.
-    shape = _numbers("--shape", arguments.shape)
-    if shape is not None:
-        notes += _apply_record("--shape", PoseRecord(shape=shape), scene)
+    if arguments.shape is not None:
+        notes += _apply_shape(scene, arguments.shape)
     expression = _numbers("--expression", arguments.expression)
     if expression is not None:
         notes += _apply_record("--expression", PoseRecord(expression=expression), scene)
@@ -169,45 +174,34 @@ def _numbers(option: str, text: str | None) -> Floats | None:
         ) from None
 
 
-def _rate(text: str) -> float:
-    value = number(text)
-    if not 0.0 < value < 1e6:
-        raise argparse.ArgumentTypeError(f"expected more than 0, found {text}")
-    return value
-
-
-def _apply_time(scene: Scene, arguments: argparse.Namespace) -> None:
-    """Pose every actor that has a clip as it is at a time."""
-    if arguments.frame is None and arguments.time is None:
-        return
-    from viewer.rig.motion import pose_actor, scene_rate, time_span
-
-    option = "--time" if arguments.frame is None else "--frame"
-    if arguments.frame is not None and arguments.time is not None:
-        raise ViewerError("--frame and --time: expected one of them, found both")
-    if all(actor.clip is None for actor in scene.actors):
-        raise ViewerError(f"{option}: no file is a clip")
-    time = arguments.time
-    if arguments.frame is not None:
-        if not 0 <= arguments.frame <= _MOST_FRAMES:
-            raise ViewerError(f"--frame: expected 0 or more, found {arguments.frame}")
-        rate = arguments.fps or scene_rate(scene.actors)
-        time = time_span(scene.actors)[0] + arguments.frame / rate
-    scene.time = time
-    for actor in scene.actors:
-        pose_actor(actor, time, arguments.fill_gaps)
-
-
 def _apply_record(option: str, record: PoseRecord, scene: Scene) -> list[str]:
     """Apply a record to the first actor that takes it."""
     problem: RigError | None = None
     for actor in scene.actors:
         if actor.pose is not None:
             try:
-                return apply_record(record, actor.figure, actor.pose)
+                return apply_record(record, actor.figure, actor.pose, cut=option == "--pose")
             except RigError as found:
                 problem = problem or found
     raise ViewerError(f"{option}: {problem or 'no file has a skeleton'}")
+
+
+def _apply_shape(scene: Scene, text: str) -> list[str]:
+    """Set shapes by name, or all from the first on; figures without shapes may have morphs."""
+    if is_named(text):
+        actor, record = named_record(scene, text)
+        assert actor.pose is not None  # named_record looked
+        return apply_record(record, actor.figure, actor.pose)
+    values = _numbers("--shape", text)
+    assert values is not None  # there is a text
+    posed = [actor for actor in scene.actors if actor.pose is not None]
+    morphed = [actor for actor in posed if has_only_morphs(actor.figure)]
+    others = [actor for actor in posed if actor not in morphed]
+    if morphed and not any(actor.figure.n_shapes for actor in others):
+        pose = morphed[0].pose
+        assert pose is not None
+        return apply_record(morph_record(morphed[0].figure, values), morphed[0].figure, pose)
+    return _apply_record("--shape", PoseRecord(shape=values), scene)
 
 
 def _apply_hands(scene: Scene, which: str) -> None:

@@ -10,17 +10,21 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from viewer.commands._frame_numbers import add_frame_arguments
 from viewer.commands._pose import add_pose_arguments, apply_pose
 from viewer.commands._progress import Progress
 from viewer.errors import FormatError, ViewerError, printable
 from viewer.loading import MotionSettings, begin, bundled_body, bundled_files, read_files
 from viewer.models import known_models, load_model_folder, resolve, save_model_folder
 from viewer.rig.scene import Scene
+from viewer.rig.units import METRES
 
 if TYPE_CHECKING:
     from viewer.loading.capturing import Builder
 
 __all__ = [
+    "add_capture_arguments",
+    "add_file_arguments",
     "add_scene_arguments",
     "begin_scene",
     "finish",
@@ -28,6 +32,7 @@ __all__ = [
     "open_scene",
     "print_warnings",
     "scene_files",
+    "size_limit",
 ]
 
 LAYOUTS = ("body19", "panoptic", "coco", "h36m")
@@ -39,36 +44,48 @@ _UNITS = {"k": 1 << 10, "m": 1 << 20, "g": 1 << 30}
 
 def add_scene_arguments(parser: argparse.ArgumentParser) -> None:
     """Add FILES and the options that pose what they hold."""
-    parser.add_argument(
-        "files",
-        nargs="*",
-        metavar="FILES",
-        help=".skel, .skin, .anim, .morph files; body models (.npz, .pkl) or their names in the "
-        "model folder, as smplx:neutral; PIG folders; EasyMocap folders, AMASS and BVH files; "
-        "poses; a texture picture",
-    )
-    parser.add_argument("--body", action="store_true", help="open the bundled human body too")
-    parser.add_argument(
-        "--model-path", metavar="FOLDER", help="where body models are; remembered from then on"
-    )
-    parser.add_argument(
-        "--max-size", default="2G", metavar="SIZE", help="refuse larger files (default 2G)"
-    )
-    _add_motion_arguments(parser)
+    add_file_arguments(parser)
+    add_capture_arguments(parser)
+    add_frame_arguments(parser)
     add_pose_arguments(parser)
 
 
-def _add_motion_arguments(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group("motion")
+def add_file_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add FILES and the options that say where they are."""
+    group = parser.add_argument_group("files")
+    group.add_argument(
+        "files",
+        nargs="*",
+        metavar="FILES",
+        help=".skel, .skin, .anim, .morph, .rig files; .obj and .ply meshes; body models (.npz, "
+        ".pkl) or their names in the model folder, as smplx:neutral; PIG folders; EasyMocap "
+        "folders, AMASS and BVH files; poses; a texture picture (default: the bundled figure)",
+    )
+    group.add_argument("--body", action="store_true", help="open the bundled human body too")
+    group.add_argument(
+        "--model-path", metavar="FOLDER", help="where body models are; remembered from then on"
+    )
+    group.add_argument(
+        "--max-size",
+        default="2G",
+        metavar="SIZE",
+        help="refuse larger files, with k, M or G (default: 2G)",
+    )
+
+
+def add_capture_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options that say how captures and BVH are taken."""
+    group = parser.add_argument_group("captures and BVH")
     group.add_argument(
         "--model",
         metavar="FIGURE",
-        help="draw captured bodies with this model (default: one among FILES, or the bundled body)",
+        help="draw captured bodies with this model, and let BVH drive it (default: one among "
+        "FILES, for captured bodies else the bundled one)",
     )
     group.add_argument(
         "--up", choices=("y", "z", "-y", "-z"), help="the axis that points up in captures and BVH"
     )
-    group.add_argument("--unit", choices=("m", "cm", "mm"), help="of BVH lengths")
+    group.add_argument("--unit", choices=METRES, help="unit of lengths in BVH (default: judged)")
     group.add_argument(
         "--layout",
         choices=LAYOUTS,
@@ -100,6 +117,11 @@ def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
         legacy_expression=arguments.legacy_expression,
         drives=not arguments.beside,
     )
+
+
+def size_limit(arguments: argparse.Namespace) -> int:
+    """Return the size, in bytes, above which files are refused."""
+    return _parse_bytes(arguments.max_size)
 
 
 def _parse_bytes(text: str) -> int:
@@ -135,6 +157,7 @@ def finish(builder: Builder, scene: Scene) -> None:
             scene.actors += new
             notes += said
             progress.show(builder.n_read)
+    scene.warnings = (*scene.warnings, *notes)  # the window and its pictures show them too
     print_warnings(notes)
 
 

@@ -11,12 +11,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from viewer.commands._frame_numbers import Range, parse_range
 from viewer.commands._numbers import number
 from viewer.commands._output import check_output
 from viewer.commands._pose import pose_files
 from viewer.commands._progress import Progress
 from viewer.commands._scene import print_warnings
-from viewer.commands._shots import Range, Shots, Turntable, parse_range, parse_turntable, shots_of
+from viewer.commands._shots import Shots, Turntable, parse_turntable, shots_of
 from viewer.commands._view import camera_of
 from viewer.errors import OutputError, ViewerError, printable
 from viewer.formats._video_kinds import VIDEOS
@@ -61,14 +62,7 @@ class Request:
 
 def add_sequence_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of pictures in motion."""
-    group = parser.add_argument_group(
-        "motion: -o frame_{frame:05}.png for numbered pictures, -o walk.mp4, .webm or .gif"
-    )
-    group.add_argument(
-        "--frames",
-        metavar="A:B[:STEP]",
-        help="frames A to B - 1 counted from 0, as --fps counts (default: the whole motion)",
-    )
+    group = parser.add_argument_group("videos, numbered pictures, contact sheets")
     group.add_argument(
         "--turntable",
         nargs="?",
@@ -77,13 +71,19 @@ def add_sequence_arguments(parser: argparse.ArgumentParser) -> None:
         help="turn the camera once around, in so many seconds, or by so many degrees",
     )
     group.add_argument(
-        "--contact-sheet", type=int, metavar="N", help="one picture of N frames, numbered"
+        "--contact-sheet",
+        type=int,
+        metavar="N",
+        help="one picture of N frames spread over the motion, numbered",
     )
     group.add_argument(
         "--speed", type=number, metavar="S", help="of videos: 0.5 is half as fast, -1 backwards"
     )
     group.add_argument(
-        "--follow", metavar="NAME", help="the camera goes with an actor or joint (or ACTOR/JOINT)"
+        "--follow",
+        metavar="NAME",
+        help="the camera goes with an actor or joint: fox, head, or fox/head; of captured people, "
+        "by their numbers, 1 or 1:pelvis",
     )
     group.add_argument(
         "--quality", type=number, metavar="Q", help="of .mp4 and .webm: 0 to 100 (default 75)"
@@ -190,7 +190,7 @@ def draw_sequence(
     inputs = [Path(file) for file in [*arguments.files, *pose_files(arguments)]]
     _check_outputs(outputs, inputs, arguments.force)
     sink = _sink(request, arguments, options, shots, outputs, size)
-    print_warnings([*shots.notes, *getattr(sink, "notes", [])])
+    print_warnings([*shots.notes, *_follow_notes(scene, arguments), *getattr(sink, "notes", [])])
     frame_size = getattr(sink, "cell", size)
     recording = _recording(arguments, scene, shots, options, frame_size)
     title = f"drawing {printable(outputs[0].name)}"
@@ -272,6 +272,28 @@ def _recording(
     return recording
 
 
+def _follow_notes(scene: Scene, arguments: argparse.Namespace) -> list[str]:
+    """Say whom the camera follows where a name may mean several."""
+    from viewer.rendering.framing import follow_candidates
+
+    name = arguments.follow
+    actors = [] if name is None else [scene.actors[i] for i, _ in follow_candidates(scene, name)]
+    # A person's body and keypoints are the same.
+    others = [
+        actor for actor in actors[1:] if actor.person is None or actor.person != actors[0].person
+    ]
+    if not others:
+        return []
+    # Whoever has no number stands for himself.
+    count = len({-1 - i if a.person is None else a.person for i, a in enumerate(actors)})
+    person = others[0].person
+    how = "" if person is None else f" (--follow {person}:{printable(name, 60)} follows another)"
+    return [
+        f"--follow {printable(name, 60)}: {count} have it; the first, "
+        f"{printable(actors[0].name, 60)}, is followed{how}"
+    ]
+
+
 def _summary(
     request: Request,
     shots: Shots,
@@ -284,7 +306,7 @@ def _summary(
     pixels = f"{size[0]} x {size[1]}"
     weight = f"{sink.n_bytes / 1e6:.2f} MB"
     if request.kind == "video":
-        seconds, rate = count / shots.rate, f"{shots.rate:g} frames a second"
+        seconds, rate = count / shots.rate, f"{shots.rate:g} frames a second{shots.remark}"
         return f"{name}: {frames}, {seconds:.3g} s, {pixels}, {rate}, {weight}"
     if request.kind == "sheet":
         return f"{name}: {frames} of {pixels}, {weight}"

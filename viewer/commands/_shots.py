@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from viewer.commands._frame_numbers import Numbering, numbering_of
 from viewer.errors import ViewerError, printable
 from viewer.formats._video_kinds import MOST_GIF_RATE
 from viewer.rig.arrays import Floats
@@ -18,21 +19,11 @@ from viewer.rig.scene import Scene
 if TYPE_CHECKING:
     from viewer.commands._sequence import Request
 
-__all__ = ["Range", "Shots", "Turntable", "parse_range", "parse_turntable", "shots_of"]
+__all__ = ["Shots", "Turntable", "parse_turntable", "shots_of"]
 
 _MOST_FRAMES = 1_000_000
-_LAST_NUMBER = 1_000_000_000
 _TURN_SECONDS = 6.0  # of a turntable of something that does not move
 _FULL = 360.0  # degrees
-
-
-@dataclass(frozen=True, slots=True)
-class Range:
-    """Frames ``first``, ``first + step`` … below ``stop``; None for the motion's end."""
-
-    first: int
-    stop: int | None
-    step: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +52,8 @@ class Shots:
         Degrees that the camera turns over all frames.
     seconds : float
         How long it takes to see all frames.
+    remark : str
+        What is to be said of the rate, after it; may be empty.
     notes : list of str
         What is not as one might expect.
     """
@@ -71,24 +64,8 @@ class Shots:
     moves: bool
     turn: float
     seconds: float
+    remark: str = ""
     notes: list[str] = field(default_factory=list)
-
-
-def parse_range(text: str) -> Range:
-    """Return the range that ``A:B`` or ``A:B:STEP`` stands for; A and B may be left out.
-
-    >>> parse_range("10:20:2"), parse_range(":5")
-    (Range(first=10, stop=20, step=2), Range(first=0, stop=5, step=1))
-    """
-    found = re.fullmatch(r"(\d{0,9}):(\d{0,9})(?::(\d{1,9}))?", text.strip(), re.ASCII)
-    if found:
-        first, stop = int(found[1] or 0), int(found[2]) if found[2] else None
-        step = int(found[3] or 1)
-        if step >= 1 and (stop is None or first < stop <= _LAST_NUMBER):
-            return Range(first, stop, step)
-    raise ViewerError(
-        f'--frames: expected A:B or A:B:STEP with A below B, as 0:100, found "{printable(text)}"'
-    )
 
 
 def parse_turntable(text: str) -> Turntable:
@@ -126,56 +103,76 @@ def shots_of(request: Request, arguments: argparse.Namespace, scene: Scene) -> S
         raise ViewerError(f"nothing moves: {found} (--turntable turns the camera)")
     if not moves and request.range is not None:
         raise ViewerError("--frames: no file is a clip")
-    from viewer.rig.motion import scene_rate, time_span
-
-    counted = arguments.fps or scene_rate(scene.actors)
-    rate, notes = counted, []
-    if request.kind == "video" and request.output.suffix.lower() == ".gif" and rate > MOST_GIF_RATE:
-        rate = MOST_GIF_RATE
-        notes.append(
-            f"GIFs show at most {rate:g} frames a second: drawn at {rate:g}, not {counted:g}"
-        )
+    numbering = numbering_of(scene.actors, arguments.fps)
+    rates = _rates(request, arguments, numbering.rate)
+    notes = [*rates.notes]
     if moves:
-        places, more = _places(request, arguments, scene, counted, rate)
-        notes += [*more, *_overridden(arguments)]
+        places, more = _places(request, arguments, numbering, rates)
+        notes += [*more, *_overridden(arguments, scene)]
     else:
         assert request.turntable is not None  # or nothing would move
-        places = np.zeros(_count((request.turntable.seconds or _TURN_SECONDS) * rate))
-    seconds = len(places) / rate
+        places = np.zeros(_count((request.turntable.seconds or _TURN_SECONDS) * rates.drawn))
+    seconds = len(places) / rates.drawn
     if request.kind == "sheet":
         places = _spread(places, arguments.contact_sheet, moves)
+        notes += _too_few(len(places), arguments.contact_sheet)
+    # What goes round for longer than the motion lasts shows its frames again.
     is_counted = moves and (request.turntable is None or request.turntable.seconds is None)
-    numbers = np.rint(places).astype(int).tolist() if is_counted else list(range(len(places)))
-    start = time_span(scene.actors)[0] if moves else 0.0
+    first = numbering.first if is_counted else 0
+    numbers = np.rint(places).astype(int) if is_counted else np.arange(len(places))
     turn = 0.0 if request.turntable is None else request.turntable.degrees
-    return Shots(start + places / counted, numbers, rate, moves, turn, seconds, notes)
+    times = (numbering.start if moves else 0.0) + places / numbering.rate
+    called = (first + numbers).tolist()
+    return Shots(times, called, rates.drawn, moves, turn, seconds, rates.remark, notes)
+
+
+@dataclass(frozen=True, slots=True)
+class _Rates:
+    """Frames a second: of the motion that is played in real time, and of what is drawn."""
+
+    played: float
+    drawn: float
+    remark: str
+    notes: tuple[str, ...]
+
+
+def _rates(request: Request, arguments: argparse.Namespace, counted: float) -> _Rates:
+    """Return how fast frames follow each other; videos that skip frames keep the motion's pace."""
+    step = 1 if request.range is None else request.range.step
+    skips = step > 1 and request.kind == "video" and arguments.fps is None
+    # A frame is shown as long as those that were skipped would have been.
+    played = counted / step if skips else counted
+    is_gif = request.kind == "video" and request.output.suffix.lower() == ".gif"
+    drawn = min(played, MOST_GIF_RATE) if is_gif else played
+    notes: tuple[str, ...] = ()
+    if drawn < played:
+        notes = (
+            f"GIFs show at most {drawn:g} frames a second: drawn at {drawn:g}, not {played:g}",
+        )
+    remark = f" (one of {step} frames, at the motion's own pace; --fps sets it)" if skips else ""
+    return _Rates(played, drawn, remark, notes)
 
 
 def _places(
-    request: Request, arguments: argparse.Namespace, scene: Scene, counted: float, rate: float
+    request: Request, arguments: argparse.Namespace, numbering: Numbering, rates: _Rates
 ) -> tuple[Floats, list[str]]:
-    """Return the frames that are drawn, as numbers that need not be whole, and notes."""
-    from viewer.rig.motion import time_span
-
-    start, end = time_span(scene.actors)
-    total = math.floor((end - start) * counted + 1e-6) + 1
-    asked = request.range or Range(0, None, 1)
-    stop = total if asked.stop is None else asked.stop
-    if asked.first >= stop:
-        raise ViewerError(f"--frames: there are {total} frames, 0 to {total - 1}")
-    behind = f"frames {max(total, asked.first)} to {stop - 1}"
+    """Return the frames that are drawn, from 0 at the start, not always whole; and notes."""
+    start, stop = numbering.span(request.range)
+    total, first = numbering.count, numbering.first
+    behind = f"frames {first + max(total, start)} to {first + stop - 1}"
     notes = [f"--frames: {behind} are behind the motion's end"] if stop > total else []
     # Frames of the motion from one drawn frame to the next.
-    pace = asked.step * (arguments.speed or 1.0) * counted / rate
-    length = stop - asked.first
-    begin = asked.first if pace > 0.0 else stop - 1
+    step = 1 if request.range is None else request.range.step
+    pace = step * (arguments.speed or 1.0) * rates.played / rates.drawn
+    length = stop - start
+    begin = start if pace > 0.0 else stop - 1
     seconds = None if request.turntable is None else request.turntable.seconds
     if seconds is None:
         count = _count(math.floor((length - 1) / abs(pace) + 1e-9) + 1)
         return begin + np.arange(count) * pace, notes
     # The motion begins again until the camera is all the way round.
-    run = begin - asked.first + np.arange(_count(seconds * rate)) * pace
-    return asked.first + np.minimum(np.mod(run, length), length - 1), notes
+    run = begin - start + np.arange(_count(seconds * rates.drawn)) * pace
+    return start + np.minimum(np.mod(run, length), length - 1), notes
 
 
 def _count(frames: float) -> int:
@@ -193,7 +190,21 @@ def _spread(places: Floats, count: int, moves: bool) -> Floats:
     return places[chosen]
 
 
-def _overridden(arguments: argparse.Namespace) -> list[str]:
-    """Return which options pose figures that the motion then poses anew."""
-    given = [name for name in ("pose", "dof", "mirror") if getattr(arguments, name)]
+def _too_few(found: int, wanted: int) -> list[str]:
+    """Say that there are fewer frames than cells; none is shown twice."""
+    if found == wanted:
+        return []
+    frames = "is 1 frame" if found == 1 else f"are {found} frames"
+    return [f"--contact-sheet: there {frames}, not {wanted}; none is shown twice"]
+
+
+def _overridden(arguments: argparse.Namespace, scene: Scene) -> list[str]:
+    """Return which options shape or pose figures that the motion then shapes or poses anew."""
+    from viewer.rig.sampled_clip import SampledClip
+
+    names = ["pose", "dof", "mirror"]
+    clips = [actor.clip for actor in scene.actors if isinstance(actor.clip, SampledClip)]
+    if any(clip.shape_weights is not None for clip in clips):
+        names += ["shape", "expression"]
+    given = [name for name in names if getattr(arguments, name)]
     return [f"--{name}: only figures without a motion keep it" for name in given]

@@ -6,7 +6,8 @@ import argparse
 import re
 
 from viewer.commands._numbers import number
-from viewer.commands._pose import add_skinning_arguments, skinning_of
+from viewer.commands._pose import skinning_of
+from viewer.commands._scalar import add_scalar_arguments, scalar_notes, set_scalar
 from viewer.errors import ViewerError, printable
 from viewer.rendering.camera import Camera, camera_from_view, fit
 from viewer.rendering.ground_pass import parse_color
@@ -15,7 +16,6 @@ from viewer.rendering.program import SHADING
 from viewer.rig.arrays import Floats
 from viewer.rig.camera_view import CameraView
 from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.scalars import SCALARS, compute, length_text, missing_part
 from viewer.rig.scene import Scene
 
 __all__ = [
@@ -25,54 +25,65 @@ __all__ = [
     "display_of",
     "hide_parts",
     "parse_size",
-    "scalar_text",
     "warn_of_missing",
 ]
 
 
 def add_camera_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options that aim the camera; what is not given fits the scene."""
-    parser.add_argument("--azimuth", type=number, metavar="A", help="degrees about the up axis")
-    parser.add_argument("--inclination", type=number, metavar="I", help="degrees above the horizon")
-    parser.add_argument("--distance", type=number, metavar="D", help="from the target, in units")
-    parser.add_argument(
-        "--view", metavar="NAME|N", help="look through a calibrated camera of a capture"
+    group = parser.add_argument_group("camera")
+    group.add_argument("--azimuth", type=number, metavar="A", help="degrees about the up axis")
+    group.add_argument("--inclination", type=number, metavar="I", help="degrees above the horizon")
+    group.add_argument(
+        "--distance", type=number, metavar="D", help="from the target, in units (default: fits)"
     )
-    parser.add_argument("--orthographic", action="store_true", help="parallel projection")
+    group.add_argument("--orthographic", action="store_true", help="parallel projection")
+    group.add_argument(
+        "--view",
+        metavar="NAME|N",
+        help="look through a calibrated camera of a capture, by name or number from 1",
+    )
 
 
 def add_display_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options that choose what is shown and how."""
-    parser.add_argument("--show", choices=SHOWN, default="skin", help="default: skin")
-    parser.add_argument("--shading", choices=SHADING, default="phong", help="default: phong")
-    parser.add_argument(
+    group = parser.add_argument_group("what is shown")
+    group.add_argument(
+        "--show",
+        choices=SHOWN,
+        default="skin",
+        help="what of the figures; binding is the skin where it was attached (default: skin)",
+    )
+    group.add_argument(
+        "--shading", choices=SHADING, default="phong", help="how surfaces look (default: phong)"
+    )
+    add_scalar_arguments(group)
+    group.add_argument(
         "--background",
         default="gradient",
         metavar="NAME|#rrggbb",
-        help="gradient, transparent or a colour",
+        help="gradient, transparent or a colour (default: gradient)",
     )
-    parser.add_argument("--samples", type=int, default=4, metavar="N", help="samples a pixel")
+    group.add_argument(
+        "--samples", type=int, default=4, metavar="N", help="samples a pixel (default: 4)"
+    )
     for name, text in (
         ("flat", "one normal per triangle"),
         ("wireframe", "edges on top"),
         ("normals", "vertex normals as lines"),
         ("no-texture", "plain colour instead of the texture"),
         ("no-grid", "leave out the ground grid"),
+        ("keypoints", "a model's keypoints as markers"),
+        ("reduced", "the coarser mesh, if there is one"),
     ):
-        parser.add_argument(f"--{name}", action="store_true", help=text)
-    parser.add_argument(
-        "--scalar", choices=SCALARS, help="show a number of each vertex as a colour"
-    )
-    parser.add_argument("--keypoints", action="store_true", help="keypoints as markers")
-    parser.add_argument("--reduced", action="store_true", help="the coarser mesh, if there is one")
-    parser.add_argument(
+        group.add_argument(f"--{name}", action="store_true", help=text)
+    group.add_argument(
         "--hide-part",
         action="append",
         default=[],
         metavar="NAME",
         help="leave out a body part; may be repeated",
     )
-    add_skinning_arguments(parser)
 
 
 def parse_size(text: str) -> tuple[int, int]:
@@ -130,10 +141,9 @@ def display_of(arguments: argparse.Namespace) -> DisplayOptions:
         parse_color(arguments.background)
     if arguments.samples < 1:
         raise ViewerError(f"--samples: expected at least 1, found {arguments.samples}")
-    return DisplayOptions(
+    options = DisplayOptions(
         show=arguments.show,
-        shading="scalar" if arguments.scalar else arguments.shading,
-        scalar=arguments.scalar or DisplayOptions().scalar,
+        shading=arguments.shading,
         flat=arguments.flat,
         wireframe=arguments.wireframe,
         normals=arguments.normals,
@@ -145,6 +155,8 @@ def display_of(arguments: argparse.Namespace) -> DisplayOptions:
         keypoints=arguments.keypoints,
         reduced=arguments.reduced,
     )
+    set_scalar(arguments, options)
+    return options
 
 
 def hide_parts(arguments: argparse.Namespace, scene: Scene, options: DisplayOptions) -> None:
@@ -174,27 +186,9 @@ def hide_parts(arguments: argparse.Namespace, scene: Scene, options: DisplayOpti
 def warn_of_missing(scene: Scene, options: DisplayOptions) -> list[str]:
     """Return what was asked to be shown and no figure has, one line each."""
     figures = [actor.figure for actor in scene.actors]
-    notes = []
-    if options.shading == "scalar":
-        missing = [missing_part(options.scalar, figure) for figure in figures]
-        if all(missing):
-            title = SCALARS[options.scalar].title
-            notes.append(f"--scalar {options.scalar}: {title}: no figure has {missing[0]}")
+    notes = scalar_notes(scene, options)
     if options.reduced and not any(figure.reduced for figure in figures):
         notes.append("--reduced: no figure has a reduced mesh")
     if options.keypoints and not any(figure.keypoints for figure in figures):
         notes.append("--keypoints: no figure has keypoints")
     return notes
-
-
-def scalar_text(scene: Scene, options: DisplayOptions) -> str:
-    """Return what the ends of the colour map stand for, for the line that names the picture."""
-    if options.shading != "scalar" or options.show == "skeleton":
-        return ""
-    largest = [
-        float(compute(options.scalar, actor.figure, actor.pose, options.skinning).max())
-        for actor in scene.actors
-        if actor.figure.mesh is not None and actor.visible
-    ]
-    text = length_text(scene.actors[0].figure, max(largest, default=0.0))
-    return f", {SCALARS[options.scalar].title}: 0 to {text}"

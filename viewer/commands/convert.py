@@ -5,35 +5,61 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from viewer.commands._frame_numbers import add_frame_arguments
 from viewer.commands._motion_export import (
     add_motion_arguments,
     check_frame_field,
     is_motion,
     motion_paths,
+    moving_actors,
     write_motions,
 )
 from viewer.commands._output import check_output
-from viewer.commands._pose import add_skinning_arguments, pose_files, skinning_of
-from viewer.commands._scene import add_scene_arguments, open_scene, scene_files
-from viewer.errors import OutputError, UnsupportedFormatError, printable
+from viewer.commands._pose import (
+    add_pose_arguments,
+    add_skinning_arguments,
+    pose_files,
+    skinning_of,
+)
+from viewer.commands._scene import (
+    add_capture_arguments,
+    add_file_arguments,
+    open_scene,
+    scene_files,
+)
+from viewer.errors import OutputError, RigError, UnsupportedFormatError, printable
 from viewer.export import EXPORTERS, export, files_written
 from viewer.formats import all_or_none
-from viewer.rig.clip import Clip
-from viewer.rig.sampled_clip import SampledClip
 from viewer.rig.scene import Scene
 from viewer.rig.skinning import Skinning
+from viewer.rig.upright import upright_actor
 
 __all__ = ["add_arguments", "run"]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    add_scene_arguments(parser)
-    kinds = dict.fromkeys(suffix for kind in EXPORTERS.values() for suffix in kind.suffixes)
-    parser.add_argument("-o", "--output", required=True, metavar="FILE", help=", ".join(kinds))
-    parser.add_argument("--force", action="store_true", help="replace existing files")
+    parser.usage = "%(prog)s [FILES ...] -o FILE [options]"
+    add_file_arguments(parser)
+    group = parser.add_argument_group("output")
+    group.add_argument(
+        "-o",
+        "--output",
+        required=True,
+        metavar="FILE",
+        help=f"one of {_known_suffixes()}; walk_{{frame:05}}.obj for numbered meshes",
+    )
+    group.add_argument("--force", action="store_true", help="replace existing files")
     add_motion_arguments(parser)
+    add_frame_arguments(parser, "A:B")
+    add_capture_arguments(parser)
+    add_pose_arguments(parser)
     add_skinning_arguments(parser)
+
+
+def _known_suffixes() -> str:
+    suffixes = dict.fromkeys(suffix for kind in EXPORTERS.values() for suffix in kind.suffixes)
+    return ", ".join("a folder for EasyMocap" if each == "/" else each for each in suffixes)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -53,8 +79,7 @@ def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:
     suffix = output.suffix.lower() or "/"
     kinds = [kind for kind in EXPORTERS.values() if suffix in kind.suffixes]
     if not kinds:
-        known = dict.fromkeys(suffix for kind in EXPORTERS.values() for suffix in kind.suffixes)
-        raise UnsupportedFormatError(f'no exporter for "{suffix}"; there are: {", ".join(known)}')
+        raise UnsupportedFormatError(f'no exporter for "{suffix}"; there are: {_known_suffixes()}')
     if all(kind.writes_pose for kind in kinds) and "{frame" not in output.name:
         for path in _written(output):
             check_output(path, _inputs(arguments), arguments.force)
@@ -67,26 +92,26 @@ def _write_poses(
     arguments: argparse.Namespace, scene: Scene, output: Path, skinning: Skinning
 ) -> list[str]:
     inputs = _inputs(arguments)  # --model-path counts from now on
+    places = dict(zip(scene.actors, motion_paths(output, scene.actors), strict=True))
     actors = [actor for actor in scene.actors if actor.is_present]
-    paths = [output] + [
-        output.with_name(f"{output.stem}-{number}{output.suffix}")
-        for number in range(2, len(actors) + 1)
-    ]
-    files = [file for path in paths for file in _written(path)]
+    if not actors:
+        raise RigError("nobody is there at that time: there is nothing to write")
+    files = [file for actor in actors for file in _written(places[actor])]
     for file in files:
         check_output(file, inputs, arguments.force)
     lines = []
     with all_or_none(files):
-        for actor, path in zip(actors, paths, strict=True):
-            lines += export(actor, path, skinning)
-    return lines
+        for actor in actors:
+            lines += export(upright_actor(scene, actor), places[actor], skinning)
+    away = [actor for actor in scene.actors if not actor.is_present]
+    return lines + [f"{printable(a.name)}: not there at that time, and not written" for a in away]
 
 
 def _write_motions(
     arguments: argparse.Namespace, scene: Scene, output: Path, skinning: Skinning
 ) -> list[str]:
     inputs = _inputs(arguments)
-    moving = [actor for actor in scene.actors if isinstance(actor.clip, Clip | SampledClip)]
+    moving = moving_actors(scene)
     if "{frame" in output.name or (arguments.frames and output.suffix.lower() == ".obj"):
         check_frame_field(output)
     elif not output.suffix:

@@ -14,7 +14,9 @@ from viewer.commands._model_info import describe_model, model_lines
 from viewer.commands._pose import add_skinning_arguments, skinning_of
 from viewer.commands._scene import add_scene_arguments, open_scene
 from viewer.errors import printable
+from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.mesh import Mesh, bounding_box, box_size, triangle_areas
+from viewer.rig.morph_target import MORPH_GROUP
 from viewer.rig.scene import Actor, Scene, actor_points
 from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_labels
 from viewer.rig.skin import Skin, has_influence, influence_counts, weight_sums
@@ -56,23 +58,29 @@ def describe(scene: Scene, skinning: Skinning | None = None) -> dict[str, Any]:
     how = skinning or Skinning()
     return {
         "actors": [
-            _describe_actor(actor) | {"model": describe_model(actor, how)} for actor in scene.actors
+            _describe_actor(actor, scene.up) | {"model": describe_model(actor, how)}
+            for actor in scene.actors
         ],
         "warnings": list(scene.warnings),
     }
 
 
-def _describe_actor(actor: Actor) -> dict[str, Any]:
+def _describe_actor(actor: Actor, up: str) -> dict[str, Any]:
+    """Return what there is to say of an actor; its box is in the scene, where ``up`` is up."""
     figure = actor.figure
-    box = bounding_box(actor_points(actor))
-    parts: dict[str, Any] = {"name": figure.name, "up": figure.up}
-    parts |= {"box": box.tolist(), "size": box_size(box), "attached": figure.is_attached}
+    points = actor_points(actor) if actor.is_present else np.zeros((0, 3))
+    box = bounding_box(points) if len(points) else None
+    parts: dict[str, Any] = {"name": actor.name, "up": up, "present": actor.is_present}
+    parts |= {"box": None if box is None else box.tolist()}
+    parts |= {"size": None if box is None else box_size(box), "attached": figure.is_attached}
     if figure.skeleton is not None and actor.pose is not None:
         parts["skeleton"] = _describe_skeleton(figure.skeleton, actor.pose.dofs.tolist())
     if figure.mesh is not None:
         parts["mesh"] = _describe_mesh(figure.mesh)
     if figure.skin is not None:
         parts["skin"] = _describe_skin(figure.skin)
+    if figure.blend_shapes is not None and MORPH_GROUP in figure.blend_shapes.groups:
+        parts["morphs"] = _describe_morphs(figure.blend_shapes)
     if actor.clip is not None:
         parts["clip"] = describe_clip(actor.clip)
     return parts
@@ -152,21 +160,42 @@ def _describe_skin(skin: Skin) -> dict[str, Any]:
     }
 
 
-def _lines(actor: dict[str, Any]) -> list[str]:
-    low, high = actor["box"]
-    lines = [
-        f"{printable(actor['name'])}",
-        f"  box        {_point(low)} to {_point(high)}, size {actor['size']:.6g}, {actor['up']} up",
+def _describe_morphs(shapes: BlendShapes) -> list[dict[str, Any]]:
+    """Return the morph targets, and how many vertices each of them moves."""
+    rows = [row for row, group in enumerate(shapes.groups) if group == MORPH_GROUP]
+    counts = shapes.direction_values()[rows].any(axis=2).sum(axis=1)
+    return [
+        {"name": shapes.names[row], "vertices": int(count)}
+        for row, count in zip(rows, counts, strict=True)
     ]
+
+
+def _lines(actor: dict[str, Any]) -> list[str]:
+    lines = [f"{printable(actor['name'])}", f"  box        {_box_text(actor)}, {actor['up']} up"]
     if "skeleton" in actor:
         lines += _skeleton_lines(actor["skeleton"])
     if "mesh" in actor:
         lines += _mesh_lines(actor["mesh"])
     if "skin" in actor:
         lines += _skin_lines(actor["skin"])
+    lines += [
+        f"  morph      {printable(morph['name'])}: moves {_vertices(morph['vertices'])}"
+        for morph in actor.get("morphs", [])
+    ]
     if "clip" in actor:
         lines += clip_lines(actor["clip"])
     return lines
+
+
+def _box_text(actor: dict[str, Any]) -> str:
+    if actor["box"] is None:
+        return "none: nothing is seen" if actor["present"] else "none: not there at this time"
+    low, high = actor["box"]
+    return f"{_point(low)} to {_point(high)}, size {actor['size']:.6g}"
+
+
+def _vertices(count: int) -> str:
+    return "1 vertex" if count == 1 else f"{count} vertices"
 
 
 def _skeleton_lines(skeleton: dict[str, Any]) -> list[str]:

@@ -6,8 +6,16 @@ import argparse
 import sys
 from pathlib import Path
 
-from viewer.commands._output import STDOUT, check_output
-from viewer.commands._scene import add_scene_arguments, open_scene, print_warnings
+from viewer.commands._frame_numbers import add_frame_arguments
+from viewer.commands._output import PICTURES, STDOUT, check_output
+from viewer.commands._pose import add_pose_arguments, add_skinning_arguments
+from viewer.commands._scalar import check_joint, scalar_text
+from viewer.commands._scene import (
+    add_capture_arguments,
+    add_file_arguments,
+    open_scene,
+    print_warnings,
+)
 from viewer.commands._sequence import add_sequence_arguments, draw_sequence, request_of
 from viewer.commands._view import (
     add_camera_arguments,
@@ -16,10 +24,10 @@ from viewer.commands._view import (
     display_of,
     hide_parts,
     parse_size,
-    scalar_text,
     warn_of_missing,
 )
 from viewer.errors import OutputError, ViewerError, printable
+from viewer.formats._video_kinds import VIDEOS
 from viewer.rendering.camera import Camera
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.arrays import Bytes, Floats
@@ -28,34 +36,51 @@ from viewer.rig.scene import Scene, scene_points
 
 __all__ = ["add_arguments", "run"]
 
-_PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".ppm", ".tga", ".tif", ".tiff", ".webp")
 _OPAQUE = (".jpg", ".jpeg", ".bmp", ".ppm")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    add_scene_arguments(parser)
-    parser.add_argument("-o", "--output", required=True, metavar="FILE", help=".png, .jpg, … .mp4")
-    parser.add_argument("--force", action="store_true", help="replace existing files")
-    parser.add_argument("--size", default="1280x720", metavar="WxH", help="default: 1280x720")
+    parser.usage = "%(prog)s [FILES ...] -o FILE [options]"
+    add_file_arguments(parser)
+    _add_output_arguments(parser)
+    add_capture_arguments(parser)
+    add_frame_arguments(parser, "A:B[:STEP]")
     add_sequence_arguments(parser)
+    add_pose_arguments(parser)
     add_camera_arguments(parser)
     add_display_arguments(parser)
-    parser.add_argument("--panels", action="store_true", help="draw the whole interface too")
-    parser.add_argument("--gpu", type=int, metavar="N", help="use EGL device N (see doctor)")
+    add_skinning_arguments(parser)
+
+
+def _add_output_arguments(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("output")
+    group.add_argument(
+        "-o",
+        "--output",
+        required=True,
+        metavar="FILE",
+        help="a picture (.png, .jpg, …), a video (.mp4, .webm, .gif), or numbered pictures, "
+        "as frame_{frame:05}.png",
+    )
+    group.add_argument("--force", action="store_true", help="replace existing files")
+    group.add_argument(
+        "--size", default="1280x720", metavar="WxH", help="in pixels (default: 1280x720)"
+    )
+    group.add_argument("--panels", action="store_true", help="draw the whole interface too")
+    group.add_argument("--gpu", type=int, metavar="N", help="use EGL device N (see doctor)")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Draw the picture or pictures, write them, and say where they are."""
     size = parse_size(arguments.size)
     output = Path(arguments.output)
+    _check_suffix(arguments, output)
     request = request_of(arguments, output)
-    is_video = request is not None and request.kind == "video"
     if request is None or request.kind != "pictures":
         check_output(output, [Path(file) for file in arguments.files], arguments.force)
-    if not is_video:
-        _check_suffix(output)
     options = display_of(arguments)
+    check_joint(options)
     if options.background == "transparent" and output.suffix.lower() in _OPAQUE:
         print_warnings([f"{printable(output)}: this format knows no transparency"])
     scene = open_scene(arguments)
@@ -88,17 +113,19 @@ def _draw_still(
     print(f"{printable(output)}: {size[0]} x {size[1]}{grid}{colors}", file=stream)
 
 
-def _check_suffix(output: Path) -> None:
-    """Refuse a suffix that no picture has."""
+def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:
+    """Refuse a suffix that neither pictures nor videos have."""
     suffix = output.suffix.lower()
     try:
         is_ours = output.is_file() or not output.exists()
     except (OSError, ValueError):
         return  # check_output says what is wrong
-    if suffix not in ("", *_PICTURES) and is_ours:
+    if suffix not in ("", *PICTURES, *VIDEOS) and is_ours:
+        # That it is an input is worse, and said first.
+        check_output(output, [Path(file) for file in arguments.files], arguments.force)
         raise OutputError(
-            f"{printable(output, 300)}: pictures cannot be written as {suffix}; there are: "
-            f"{', '.join(_PICTURES)}"
+            f"{printable(output, 300)}: expected a picture ({', '.join(PICTURES)}) or a video "
+            f"({', '.join(VIDEOS)}), found {suffix}"
         )
 
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from viewer.commands._frame_numbers import add_frame_arguments
 from viewer.commands._numbers import number
-from viewer.commands._pose import apply_pose
+from viewer.commands._pose import add_pose_arguments, add_skinning_arguments, apply_pose
 from viewer.commands._scene import (
-    add_scene_arguments,
+    add_capture_arguments,
+    add_file_arguments,
     begin_scene,
     finish,
     print_warnings,
@@ -38,11 +40,17 @@ SIZE = (1280, 720)
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    add_scene_arguments(parser)
+    parser.usage = "%(prog)s [FILES ...] [options]"
+    add_file_arguments(parser)
+    group = parser.add_argument_group("window")
+    group.add_argument("--play", action="store_true", help="let motions play at once")
+    group.add_argument("--scale", type=_scale, metavar="S", help="size of the interface, as 1.5")
+    add_capture_arguments(parser)
+    add_frame_arguments(parser)
+    add_pose_arguments(parser)
     add_camera_arguments(parser)
     add_display_arguments(parser)
-    parser.add_argument("--play", action="store_true", help="let motions play at once")
-    parser.add_argument("--scale", type=_scale, metavar="S", help="size of the interface, e.g. 1.5")
+    add_skinning_arguments(parser)
 
 
 def _scale(text: str) -> float:

@@ -103,7 +103,15 @@ FORMATS = {
         "morph (CSE169)", (".morph",), rb"(?:^|[\s}])(?:positions|normals)\s+\d", writes=False
     ),
     "rig": Format("rig (CSE169)", (".rig",), rb"\Arig\b[^{}]*\{", writes=False),
+    "obj": Format(
+        "mesh (Wavefront)",
+        (".obj",),
+        rb"(?:^|[\r\n])[ \t]*v[ \t]+[-+.\d]\S*[ \t]+[-+.\d]\S*[ \t]+[-+.\d]",
+        writes=False,
+    ),
+    "ply": Format("mesh (PLY)", (".ply",), rb"\Aply[ \t]*[\r\n]", writes=False),
     "bvh": Format("BVH motion", (".bvh",), rb"(?i:\A\s*HIERARCHY\b)", writes=False),
+    "rigged": Format("rigged mesh", (".npz",), keys=("viewer_rig",), writes=False),
     "smpl": Format(
         "SMPL family",
         (".npz", ".pkl"),

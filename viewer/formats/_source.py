@@ -21,6 +21,7 @@ MAX_SIZE = 2 << 30
 _MAX_WARNINGS = 100  # a file that earns more is no figure; nobody reads on
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _CONTROL_Z = b"\x1a"  # ends a text file written under CP/M or DOS
+_ANY_END = (b"ply\n", b"ply\r")  # numbers follow, whose last byte may be any
 _WORD = re.compile(rb"[{}]|[^{} \t\n\r\v\f]+")
 _CARRIAGE_RETURNS = re.compile(rb"\r+\n?")
 _MAGIC = (
@@ -149,6 +150,12 @@ class Source:
         source.warnings, source._warned = self.warnings, self._warned
         return source
 
+    def beside(self, name: str) -> Source:
+        """Return a file next to this one; its warnings are this source's own."""
+        source = Source(self.path.parent / name, max_size=self.max_size)
+        source.warnings, source._warned = self.warnings, self._warned
+        return source
+
     def words(self, start: int = 0, end: int | None = None) -> Iterator[re.Match[bytes]]:
         """Yield words and braces, braces always on their own, with their offsets."""
         return _WORD.finditer(self.data, start, len(self.data) if end is None else end)
@@ -216,6 +223,8 @@ class Source:
 
 
 def _without_marks(data: bytes) -> bytes:
+    if data.startswith(_ANY_END):
+        return data
     return data.removeprefix(_BYTE_ORDER_MARK).rstrip(_CONTROL_Z)
 
 

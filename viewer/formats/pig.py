@@ -26,6 +26,7 @@ from viewer.rig.annotations import BodyParts, Keypoints, ReducedMesh
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.blendshapes import JointRegressor, regress_joints
 from viewer.rig.figure import Figure
+from viewer.rig.hierarchy import cycle_members
 from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.pose_vector import PoseLayout
 from viewer.rig.skeleton import ball_skeleton
@@ -123,7 +124,10 @@ def _parents(part: Part) -> Ints:
         if joint == 0 and parent != -1.0:
             raise part.error(f"joint 0: expected -1, the root, found {parent:g}", 0)
         if joint > 0 and not (0 <= parent < joint and parent == int(parent)):
-            raise part.error(f"joint {joint}: expected a parent before it, found {parent:g}", joint)
+            wanted = "expected a parent before it"
+            problem = part.error(f"joint {joint}: {wanted}, found {parent:g}", joint)
+            problem.code = "S002" if cycle_members(parents)[joint] else ""
+            raise problem
     return parents.astype(np.int32)
 
 

@@ -27,7 +27,7 @@ from viewer.formats._save import as_words, save_text
 from viewer.formats._source import Source, shown
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
-from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_label
+from viewer.rig.skeleton import DOF_KINDS, Skeleton, dof_label, joint_label
 
 __all__ = ["read", "write"]
 
@@ -79,7 +79,22 @@ def read(source: Source) -> Figure:
     if not joints:
         looks = source.looks_like()
         raise source.error(f"expected a skeleton, found no balljoint{f' ({looks})' * bool(looks)}")
-    return Figure(name=source.path.stem, skeleton=_skeleton(source, joints))
+    skeleton, dofs = _skeleton(source, joints)
+    return Figure(name=source.path.stem, skeleton=skeleton, facts=_facts(skeleton, dofs))
+
+
+def _facts(skeleton: Skeleton, dofs: Floats) -> tuple[tuple[str, str], ...]:
+    """Say which DOFs of the file's own pose had to be brought within their limits."""
+    moved = np.flatnonzero(skeleton.rest_dofs != dofs)
+    if len(moved) == 0:
+        return ()
+    first = moved[0]
+    low, high = skeleton.dof_limits[first]
+    text = (
+        f"{len(moved)} DOFs, {dof_label(skeleton, first)} is {dofs[first]:g}, its limits are "
+        f"{low:g} and {high:g}: clamped"
+    )
+    return (("pose outside limits", text),)
 
 
 class _Parser:
@@ -223,7 +238,8 @@ def _called(joint: _Joint) -> str:
     return shown(joint.name.encode("utf-8", "surrogateescape"))[1:-1] or "without a name"
 
 
-def _skeleton(source: Source, joints: list[_Joint]) -> Skeleton:
+def _skeleton(source: Source, joints: list[_Joint]) -> tuple[Skeleton, Floats]:
+    """Return the skeleton, and its pose as the file has it."""
     n_joints = len(joints)
     # The root's translations come first, as in the channels of .anim.
     kinds = np.concatenate([np.arange(6), np.tile([3, 4, 5], n_joints - 1)])
@@ -233,7 +249,7 @@ def _skeleton(source: Source, joints: list[_Joint]) -> Skeleton:
     limits = np.concatenate([np.tile([-np.inf, np.inf], (3, 1)), rotation_limits])
     dofs = np.concatenate([np.zeros(3), np.array([joint.pose for joint in joints]).ravel()])
     corners = np.array([[joint.boxmin, joint.boxmax] for joint in joints])
-    return Skeleton(
+    skeleton = Skeleton(
         names=tuple(joint.name for joint in joints),
         parents=np.array([joint.parent for joint in joints], dtype=np.int32),
         rest_translations=np.array([joint.offset for joint in joints]),
@@ -246,6 +262,7 @@ def _skeleton(source: Source, joints: list[_Joint]) -> Skeleton:
         # Corners may be exchanged on an axis, which would turn faces inside out.
         boxes=np.sort(corners, axis=1),
     )
+    return skeleton, dofs
 
 
 def _check_limits(source: Source, joints: list[_Joint], limits: Floats) -> None:

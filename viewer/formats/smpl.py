@@ -31,6 +31,7 @@ from viewer.formats._source import Source
 from viewer.rig.arrays import Deferred, Floats, Ints
 from viewer.rig.blendshapes import BlendShapes, Correctives, JointRegressor, regress_joints
 from viewer.rig.figure import Figure
+from viewer.rig.hierarchy import cycle_members
 from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.pose_vector import PoseLayout
 from viewer.rig.skeleton import ball_skeleton
@@ -147,9 +148,11 @@ def _parents(archive: Archive, used: list[str]) -> Ints:
             raise archive.error("kintree_table", f"expected one root, found joints 0 and {joint}")
         if not (parent == -1 if joint == 0 else 0 <= parent < joint and parent % 1 == 0):
             wanted = "a parent before it" if joint else "the root, whose parent is -1"
-            raise archive.error(
+            problem = archive.error(
                 "kintree_table", f"joint {joint}: expected {wanted}, found {parent:g}"
             )
+            problem.code = "S002" if cycle_members(parents)[joint] else ""
+            raise problem
     used.append("kintree_table")
     return parents.astype(np.int32)
 

@@ -11,7 +11,7 @@ import numpy as np
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, frozen
 from viewer.rig.pose import Pose
-from viewer.rig.skeleton import Skeleton, clamp_dofs
+from viewer.rig.skeleton import DOF_KINDS, Skeleton, clamp_dofs, joint_label
 
 __all__ = [
     "EXTRAPOLATIONS",
@@ -24,6 +24,7 @@ __all__ = [
     "check_fit",
     "evaluate",
     "is_course_rig",
+    "misfit",
     "sample",
     "slopes",
     "suits",
@@ -220,7 +221,29 @@ def is_course_rig(skeleton: Skeleton) -> bool:
 
 def suits(clip: Clip, skeleton: Skeleton) -> bool:
     """Return whether a clip's channels are the DOFs of a skeleton; see ``check_fit``."""
-    return is_course_rig(skeleton) and skeleton.n_dofs == len(clip.channels)
+    return not misfit(clip, skeleton)
+
+
+def misfit(clip: Clip, skeleton: Skeleton) -> str:
+    """Return why a clip cannot move a skeleton, in words that follow its name; "" if it can."""
+    if not is_course_rig(skeleton):
+        return (
+            "is no course rig, whose clips move the root along x, y, z and turn each joint about "
+            f"x, y, z: {_strange_joint(skeleton)}"
+        )
+    if len(clip.channels) != skeleton.n_dofs:
+        return f"needs {skeleton.n_dofs} (3 + 3 x {skeleton.n_joints} joints)"
+    return ""
+
+
+def _strange_joint(skeleton: Skeleton) -> str:
+    """Return the first joint whose DOFs are not those of a course rig, and what they are."""
+    for joint in range(skeleton.n_joints):
+        kinds = [DOF_KINDS[kind] for kind in skeleton.dof_kinds[skeleton.dof_joints == joint]]
+        if kinds != list(DOF_KINDS if joint == 0 else DOF_KINDS[3:]):
+            found = f"DOFs {', '.join(kinds)}" if kinds else "no DOFs"
+            return f"joint {joint_label(skeleton, joint)} has {found}"
+    return "its DOFs are not in the order of its joints"
 
 
 def check_fit(clip: Clip, skeleton: Skeleton) -> None:
@@ -232,12 +255,9 @@ def check_fit(clip: Clip, skeleton: Skeleton) -> None:
         With both numbers, or if the DOFs are not those of ``is_course_rig``.
     """
     if not is_course_rig(skeleton):
-        raise RigError(
-            f"clip {clip.name} moves a root and three angles of each joint, "
-            "which is not how this skeleton moves"
-        )
+        raise RigError(f"clip {clip.name}: the skeleton {misfit(clip, skeleton)}")
     if len(clip.channels) != skeleton.n_dofs:
         raise RigError(
-            f"clip {clip.name} has {len(clip.channels)} channels, the skeleton needs "
-            f"{skeleton.n_dofs} (3 + 3 x {skeleton.n_joints} joints)"
+            f"clip {clip.name} has {len(clip.channels)} channels, "
+            f"the skeleton {misfit(clip, skeleton)}"
         )

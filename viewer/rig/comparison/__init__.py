@@ -37,7 +37,7 @@ def compare(
 
     Joints are matched by name. Vertices are compared by number where the triangles are the
     same, else by the closest point of the other's surface, in both directions. Both actors are
-    posed on the way.
+    posed on the way, and left as they are where the meshes are farthest apart.
 
     Parameters
     ----------
@@ -147,13 +147,14 @@ class _Comparison:
             if not (self.first.is_present and self.second.is_present):
                 continue
             if size == 0.0:
-                size = box_size(bounding_box(_own_points(self.first)))
+                size = _size(self.first)
                 self._compare_weights(step)
             self._compare_joints(step)
             self._compare_points(step)
             self._compare_meshes(step, number in searched)
         if absent:
             self.mismatches.append(f"in {absent} frames only one of them is there")
+        self._pose_at_worst()
         measures = [tally.result() for tally in self.tallies]
         return Difference(
             measures=tuple(measure for measure in measures if measure is not None),
@@ -162,6 +163,17 @@ class _Comparison:
             size=size,
             unit=self.first.figure.unit,
         )
+
+    def _pose_at_worst(self) -> None:
+        """Pose both as in the step in which the meshes, or the joints, are farthest apart."""
+        told = [tally for tally in self.tallies if tally.kind == "length" and tally.step]
+        if not told:
+            return
+        of_meshes = [tally for tally in told if not tally.items]
+        worst = max(of_meshes or told, key=lambda tally: tally.worst).step
+        for step in self.steps.run(self.first, self.second):
+            if step == worst:
+                break
 
     def _compare_joints(self, step: str) -> None:
         if self.joints is None:
@@ -235,8 +247,8 @@ def _joint_frames(actor: Actor) -> Floats:
     return placement_matrix(actor.pose) @ world_matrices(shape, actor.pose)
 
 
-def _own_points(actor: Actor) -> Floats:
-    """Return what spans an actor, without its placement in the scene."""
-    inverse = np.linalg.inv(actor.placement)
-    points = actor_points(actor)
-    return points @ inverse[:3, :3].T + inverse[:3, 3]
+def _size(actor: Actor) -> float:
+    """Return the diagonal of the rest mesh's box, without a mesh that of what is posed."""
+    mesh = actor.figure.mesh
+    points = actor_points(actor) if mesh is None else mesh.positions
+    return box_size(bounding_box(points))

@@ -61,7 +61,7 @@ class Difference:
     notes : tuple of str
         How it was compared.
     size : float
-        Diagonal of the first figure's box, in its unit.
+        Diagonal of the box of the first figure's rest mesh, or of its skeleton, in its unit.
     unit : str
         The first figure's, as in ``Figure.unit``.
     """
@@ -96,13 +96,20 @@ class Tally:
         Joints or vertices.
     items : tuple of str
         Their names; empty for numbers.
+
+    Attributes
+    ----------
+    worst : float
+        Largest value so far, below 0 before there is one.
+    step : str
+        Where that was.
     """
 
     def __init__(self, name: str, kind: str, count: int, items: tuple[str, ...] = ()) -> None:
         self.name, self.kind, self.items = name, kind, items
         self._maxima = np.zeros(count)
         self._sum, self._count = 0.0, 0
-        self._worst, self._step, self._item = -1.0, "", -1
+        self.worst, self.step, self._item = -1.0, "", -1
 
     def add(self, step: str, values: Floats) -> None:
         """Take in the values of one step, NaN where nothing can be compared."""
@@ -114,8 +121,8 @@ class Tally:
         self._sum += float(filled.sum())
         self._count += int(known.sum())
         item = int(filled.argmax())
-        if filled[item] > self._worst:
-            self._worst, self._step, self._item = float(filled[item]), step, item
+        if filled[item] > self.worst:
+            self.worst, self.step, self._item = float(filled[item]), step, item
 
     def result(self) -> Measure | None:
         """Return the measure; None if nothing was compared."""
@@ -125,9 +132,9 @@ class Tally:
         return Measure(
             name=self.name,
             kind=self.kind,
-            maximum=self._worst,
+            maximum=self.worst,
             mean=self._sum / self._count,
-            step=self._step,
+            step=self.step,
             item=item,
             items=self.items,
             item_maxima=self._maxima,

@@ -1,0 +1,171 @@
+"""``viewer convert`` with captures: keypoints alone, people who are away, or without a track."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from formats.capture_files import body, points, write_frames
+from formats.synthetic_smpl import model
+from numpy.testing import assert_allclose, assert_array_equal
+
+from viewer.cli import run
+
+
+def convert(*arguments):
+    return run(["convert", *map(str, arguments)])
+
+
+def standing(person, x):
+    """Return keypoints of somebody upright along z: only hips and nose are seen."""
+    rows = np.zeros((25, 4))
+    rows[8], rows[0] = (x, 0, 1, 1.0), (x, 0, 1.6, 0.5)
+    return {"id": person, "keypoints3d": rows.tolist()}
+
+
+@pytest.fixture
+def keypoints(tmp_path):
+    """Frames 10 to 12: person 0 in all, person 4 in the last."""
+    frames = {10: [standing(0, 0.0)], 11: [standing(0, 0.1)]}
+    write_frames(
+        tmp_path / "kp" / "keypoints3d", {**frames, 12: [standing(0, 0.2), standing(4, 2)]}
+    )
+    return tmp_path / "kp"
+
+
+@pytest.fixture
+def recording(tmp_path):
+    """A model, and bodies in frames 20 to 23: person 0 always, 7 in the first two."""
+    path = tmp_path / "SMPL.npz"
+    np.savez(path, **model("smpl"))
+    frames = {frame: [body(0), body(7)] if frame < 22 else [body(0)] for frame in range(20, 24)}
+    write_frames(tmp_path / "take" / "smpl", frames)
+    return tmp_path / "take", "--model", path
+
+
+def test_keypoints_are_written_person_by_person(keypoints, tmp_path, capsys):
+    assert convert(keypoints, "-o", tmp_path / "m.npz") == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith(f"{tmp_path}/m-0.npz: 3 frames at 30 a second, z up: name, up, ")
+    assert lines[1].startswith(f"{tmp_path}/m-4.npz: 3 frames at 30 a second; 2 of them missing")
+    with np.load(tmp_path / "m-4.npz") as arrays:
+        assert (str(arrays["name"]), str(arrays["up"])) == ("body25 4", "z")
+        assert arrays["frames"].tolist() == [10, 11, 12]
+        assert arrays["present"].tolist() == [False, False, True]
+        assert arrays["joint_names"][[0, 8]].tolist() == ["nose", "mid_hip"]
+        assert_array_equal(arrays["points"][2, [0, 8]], [[2, 0, 1.6], [2, 0, 1]])
+        assert_array_equal(arrays["confidences"][2, [0, 1, 8]], [0.5, 0.0, 1.0])
+        assert np.isnan(arrays["points"][2, 1]).all()
+
+
+def test_keypoints_that_hang_are_written_upright(keypoints, tmp_path):
+    assert convert(keypoints, "--up=-z", "-o", tmp_path / "m.npz") == 0
+    with np.load(tmp_path / "m-4.npz") as arrays:
+        assert str(arrays["up"]) == "z"
+        assert_allclose(arrays["points"][2, 0], [2, 0, -1.6], rtol=0, atol=1e-15)
+
+
+def test_keypoints_at_one_frame_keep_their_numbers(keypoints, tmp_path, capsys):
+    assert convert(keypoints, "-o", tmp_path / "m.npz", "--frame", 11) == 0
+    assert capsys.readouterr().out.splitlines()[1:] == [
+        "body25 4: not there at that time, and not written"
+    ]
+    assert [path.name for path in tmp_path.glob("*.npz")] == ["m-0.npz"]
+    with np.load(tmp_path / "m-0.npz") as arrays:
+        assert str(arrays["up"]) == "z" and arrays["points"].shape == (25, 3)
+        assert_array_equal(arrays["points"][0], [0.1, 0, 1.6])
+
+
+@pytest.mark.parametrize("arguments", [["m.bvh"], ["m"], ["m.npz", "--as", "amass"]])
+def test_keypoints_alone_are_no_motion_of_joints(keypoints, tmp_path, capsys, arguments):
+    name, *others = arguments
+    assert convert(keypoints, "-o", tmp_path / name, *others) == 2
+    assert capsys.readouterr().err == (
+        "viewer: there are only keypoints: a motion of joints cannot be written "
+        "(.npz holds points)\n"
+    )
+    assert not [*tmp_path.glob("m*")]
+
+
+def test_keypoints_beside_bodies_are_said_to_be_left_out(recording, tmp_path, capsys):
+    write_frames(tmp_path / "take" / "keypoints3d", {20: [points(0)]})
+    assert convert(*recording, "-o", tmp_path / "w.bvh") == 0
+    assert capsys.readouterr().out.splitlines()[-1] == (
+        "keypoints beside bodies are not written (body25 0): open the keypoints3d folder alone"
+    )
+
+
+@pytest.mark.parametrize("name", ["w.bvh", "w.npz", "w.glb"])
+def test_who_is_away_is_left_out_and_the_others_keep_their_names(recording, tmp_path, capsys, name):
+    assert convert(*recording, "-o", tmp_path / name, "--frames", "22:24") == 0
+    stem, _, suffix = name.partition(".")
+    assert [path.name for path in tmp_path.glob("w*")] == [f"{stem}-0.{suffix}"]
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[-1] == "SMPL 7: not there in frames 22 to 23, and not written"
+
+
+def test_who_is_away_is_left_out_of_folders(recording, tmp_path, capsys):
+    assert convert(*recording, "-o", tmp_path / "w", "--frames", "23:24") == 0
+    text = capsys.readouterr().out
+    assert "1 frames of 1 person" in text and "SMPL 7: not there in frame 23, and not" in text
+    (frame,) = (tmp_path / "w" / "smpl").iterdir()
+    assert [record["id"] for record in json.loads(frame.read_text())] == [0]
+
+
+@pytest.mark.parametrize("name", ["w.bvh", "w.npz", "w.glb", "w"])
+def test_nobody_there_is_refused_before_anything_is_written(recording, tmp_path, capsys, name):
+    (tmp_path / "take" / "smpl" / "000023.json").write_text("[]")
+    before = {path.name for path in tmp_path.iterdir()}
+    assert convert(*recording, "-o", tmp_path / name, "--frames", "23:24") == 2
+    message = "nobody is there in frame 23: there is nothing to write"
+    assert capsys.readouterr().err == f"viewer: {message}\n"
+    assert {path.name for path in tmp_path.iterdir()} == before
+
+
+def test_nobody_there_at_one_time_is_refused(recording, tmp_path, capsys):
+    (tmp_path / "take" / "smpl" / "000023.json").write_text("[]")
+    assert convert(*recording, "-o", tmp_path / "w.obj", "--frame", 23) == 2
+    message = "nobody is there at that time: there is nothing to write"
+    assert capsys.readouterr().err == f"viewer: {message}\n"
+
+
+def test_people_without_a_track_have_names_of_their_own(recording, tmp_path, capsys):
+    frames = {0: [body(-1), body(3), body(-1, seed=1.0)], 1: [body(3), body(-1)]}
+    folder = write_frames(tmp_path / "un" / "smpl", frames)
+    assert convert(folder, *recording[1:], "-o", tmp_path / "w.bvh") == 0
+    names = sorted(path.name for path in tmp_path.glob("w*"))
+    assert names == ["w-3.bvh", "w-untracked-2.bvh", "w-untracked.bvh"]
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[-1] == (
+        "w-untracked.bvh, w-untracked-2.bvh: without a track, perhaps somebody else in each frame"
+    )
+    assert lines[0].startswith(f"{tmp_path}/w-3.bvh")  # whoever has a track comes first
+
+
+def test_people_without_a_track_come_back_without_one(recording, tmp_path):
+    frames = {0: [body(-1), body(3), body(-1, seed=1.0)], 1: [body(3), body(-1)]}
+    folder = write_frames(tmp_path / "un" / "smpl", frames)
+    assert convert(folder, *recording[1:], "-o", tmp_path / "back") == 0
+    written = sorted((tmp_path / "back" / "smpl").iterdir())
+    ids = [[record["id"] for record in json.loads(path.read_text())] for path in written]
+    assert ids == [[3, -1, -1], [3, -1]]
+    people = json.loads(written[0].read_text())
+    assert_allclose(people[2]["Th"][0], body(-1, seed=1.0)["Th"][0], rtol=0, atol=1e-6)
+
+
+def test_motion_of_one_frame_is_written(recording, tmp_path):
+    path = tmp_path / "one.npz"
+    arrays = {"poses": np.zeros((1, 72)), "trans": np.ones((1, 3)), "betas": np.zeros(16)}
+    np.savez(path, **arrays, mocap_framerate=np.array(60.0))
+    assert convert(path, *recording[1:], "-o", tmp_path / "w.bvh") == 0
+    lines = (tmp_path / "w.bvh").read_text().splitlines()
+    assert lines[lines.index("MOTION") + 1] == "Frames: 1"
+
+
+def test_keypoints_that_hang_are_written_upright_at_one_frame_too(keypoints, tmp_path):
+    assert convert(keypoints, "--up=-z", "-o", tmp_path / "m.npz", "--frame", 12) == 0
+    with np.load(tmp_path / "m-4.npz") as arrays:
+        assert str(arrays["up"]) == "z"
+        assert_allclose(arrays["points"][0], [2, 0, -1.6], rtol=0, atol=1e-15)
+        assert arrays["confidences"][0] == 0.5

@@ -1,0 +1,61 @@
+"""Help: every option is explained, in groups that follow the order of work."""
+
+from __future__ import annotations
+
+import argparse
+from importlib import import_module
+
+import pytest
+
+from viewer.cli import run
+from viewer.commands import COMMANDS
+
+
+def parser_of(command: str) -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog=f"viewer {command}")
+    import_module(f"viewer.commands.{command}").add_arguments(parser)
+    return parser
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_no_option_is_undocumented(command):
+    for action in parser_of(command)._actions:
+        assert action.help and len(action.help) > 8, action.option_strings
+
+
+@pytest.mark.parametrize(
+    ("command", "titles"),
+    [
+        (
+            "render",
+            "files, output, captures and BVH, which frames, videos, shape and pose, camera, "
+            "what is shown, skinning",
+        ),
+        (
+            "convert",
+            "files, output, writing motions, which frames, captures and BVH, shape and pose, "
+            "skinning",
+        ),
+        (
+            "view",
+            "files, window, captures and BVH, which frames, shape and pose, camera, "
+            "what is shown, skinning",
+        ),
+    ],
+)
+def test_groups_follow_the_order_of_work(command, titles):
+    groups = [group for group in parser_of(command)._action_groups if group._group_actions]
+    assert groups[0].title == "options"
+    assert [action.dest for action in groups[0]._group_actions] == ["help"]
+    found = [group.title for group in groups[1:]]
+    wanted = titles.split(", ")
+    assert len(found) == len(wanted)
+    assert all(title.startswith(start) for title, start in zip(found, wanted, strict=True)), found
+
+
+@pytest.mark.parametrize("command", ["render", "convert"])
+def test_usage_is_one_line(command, capsys):
+    with pytest.raises(SystemExit):
+        run([command, "--help"])
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == f"usage: viewer {command} [FILES ...] -o FILE [options]" and not lines[1]

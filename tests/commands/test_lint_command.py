@@ -1,0 +1,102 @@
+"""``viewer lint``: lines for editors, JSON for programs, and exit codes."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from app.tiny import write_rig
+from formats import skel_text, skin_text
+
+from viewer.cli import run
+from viewer.lint import CODES
+
+
+@pytest.fixture
+def rig(tmp_path: Path) -> list[str]:
+    """A skeleton and a skin with one wrong sum of weights."""
+    (tmp_path / "a.skel").write_text(skel_text.GOOD)
+    (tmp_path / "a.skin").write_text(skin_text.GOOD.replace("2 0 0.25", "2 0 0.5", 1))
+    return [str(tmp_path / "a.skel"), str(tmp_path / "a.skin")]
+
+
+def test_a_finding_is_a_line_with_its_place_and_a_hint(rig, capsys) -> None:
+    assert run(["lint", *rig]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    at = next(index for index, line in enumerate(lines) if " W001: " in line)
+    assert lines[at] == (
+        f"{rig[1]}:11: warning W001: weights of 1 vertices do not sum to 1: 1.25 at vertex 1, "
+        "an error of 0.25"
+    )
+    assert lines[at + 1] == ("    weights do not sum to 1: normalise them (--normalize shows how)")
+    assert lines[-1].endswith("in 2 files")
+
+
+@pytest.mark.parametrize(
+    ("fail_on", "code"), [("error", 0), ("warning", 1), ("note", 1), ("never", 0)]
+)
+def test_fail_on_sets_the_exit_code(rig, capsys, fail_on: str, code: int) -> None:
+    assert run(["lint", *rig, "--fail-on", fail_on]) == code
+
+
+def test_errors_fail_by_default_and_come_first(rig, tmp_path: Path, capsys) -> None:
+    missing = str(tmp_path / "none.skel")
+    assert run(["lint", *rig, missing]) == 1
+    out = capsys.readouterr().out
+    assert out.startswith(f"{missing}: error F001: cannot be read: No such file or directory\n")
+    assert " W001: " in out
+    assert run(["lint", missing, "--fail-on", "never"]) == 0
+
+
+def test_ignored_codes_do_not_count(rig, capsys) -> None:
+    arguments = ["lint", *rig, "--fail-on", "warning", "--ignore"]
+    found = json_of(["lint", *rig], capsys)["findings"]
+    heavy = sorted({f["code"] for f in found if f["severity"] != "note"})
+    assert run([*arguments, ",".join(heavy).lower()]) == 0
+    assert " W001: " not in capsys.readouterr().out
+    assert run([*arguments, "X999"]) == 2
+    assert 'no code "X999"' in capsys.readouterr().err
+
+
+def json_of(arguments: list[str], capsys) -> dict:
+    run([*arguments, "--json"])
+    return json.loads(capsys.readouterr().out)
+
+
+def test_json_holds_every_place(rig, capsys) -> None:
+    found = json_of(["lint", *rig], capsys)
+    (weights,) = [f for f in found["findings"] if f["code"] == "W001"]
+    assert (weights["file"], weights["line"], weights["actor"]) == (rig[1], 11, 0)
+    assert weights["vertices"] == [1] and weights["n_vertices"] == 1
+    assert weights["title"] == CODES["W001"].title and weights["hint"] == CODES["W001"].hint
+    assert found["counts"]["warning"] == sum(f["severity"] == "warning" for f in found["findings"])
+
+
+def test_codes_are_listed(capsys) -> None:
+    assert run(["lint", "--codes"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == list(CODES)
+    assert lines[0] == "F001  error    file cannot be read: check the name and the permissions"
+
+
+def test_without_files_the_bundled_figure_is_checked(capsys) -> None:
+    assert run(["lint", "--fail-on", "warning"]) == 0
+    assert capsys.readouterr().out.endswith("0 errors, 0 warnings, 3 notes in 2 files\n")
+
+
+def test_a_sound_rig_and_the_body(tmp_path: Path, capsys) -> None:
+    assert run(["lint", *map(str, write_rig(tmp_path)), "--body"]) == 0
+
+
+def test_the_largest_speed_is_an_option(shared: Path, capsys) -> None:
+    files = [str(shared / name) for name in ("wasp.skel", "wasp.skin", "wasp_walk.anim")]
+    assert run(["lint", *files, "--fail-on", "warning"]) == 0
+    assert run(["lint", *files, "--fail-on", "warning", "--max-speed", "0.01"]) == 1
+    assert " C003: " in capsys.readouterr().out
+
+
+def test_a_size_limit_is_a_finding(rig, capsys) -> None:
+    assert run(["lint", *rig, "--max-size", "10"]) == 1
+    assert "expected at most 10 bytes" in capsys.readouterr().out
+    assert run(["lint", *rig, "--max-size", "ten"]) == 2

@@ -1,0 +1,230 @@
+"""What frames are called on the command line: as a capture's files number them, or from 0 on."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from viewer.commands._numbers import number
+from viewer.errors import ViewerError, printable
+from viewer.rig.scene import Actor, Scene
+
+__all__ = [
+    "Numbering",
+    "Range",
+    "add_frame_arguments",
+    "apply_time",
+    "numbering_of",
+    "parse_range",
+]
+
+_SLOWEST, _FASTEST = 0.001, 100_000.0  # frames a second
+_LAST_NUMBER = 1_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """Frames ``first``, ``first + step`` … below ``stop``; None for the motion's own ends."""
+
+    first: int | None
+    stop: int | None
+    step: int = 1
+
+    def __str__(self) -> str:
+        ends = ["" if end is None else str(end) for end in (self.first, self.stop)]
+        return ":".join(ends) + (f":{self.step}" if self.step > 1 else "")
+
+
+@dataclass(frozen=True, slots=True)
+class Numbering:
+    """What the frames of motions are called.
+
+    Attributes
+    ----------
+    first : int
+        Number of the first frame.
+    count : int
+        Number of frames to the motions' end.
+    start, end : float
+        Seconds from the earliest start to the latest end.
+    rate : float
+        Frames a second by which they are counted.
+    runs_on : bool
+        Whether something moves beyond the last frame: curves of keys do, captures do not.
+    """
+
+    first: int
+    count: int
+    start: float
+    end: float
+    rate: float
+    runs_on: bool
+
+    @property
+    def last(self) -> int:
+        """Number of the last frame."""
+        return self.first + self.count - 1
+
+    def time_of(self, frame: int) -> float:
+        """Return the seconds at which a frame is shown.
+
+        Raises
+        ------
+        ViewerError
+            If there is no such frame.
+        """
+        last = _LAST_NUMBER if self.runs_on else self.last
+        if not self.first <= frame <= last:
+            wanted = f"{self.first} or more" if frame < self.first and self.runs_on else ""
+            raise ViewerError(
+                f"--frame: expected {wanted or f'{self.first} to {last}'}, found {frame}"
+            )
+        return self.start + (frame - self.first) / self.rate
+
+    def checked_time(self, time: float) -> float:
+        """Return a time at which there is something to see.
+
+        A capture's last frame counts for half a frame's duration: its exact seconds are seldom
+        what somebody types.
+
+        Raises
+        ------
+        ViewerError
+            If the time lies outside of captures.
+        """
+        if self.runs_on:
+            return time
+        half = 0.5 / self.rate
+        if not self.start - half <= time <= self.end + half:
+            raise ViewerError(
+                f"--time: expected {self.start:.6g} to {self.end:.6g} seconds, found {time:g}"
+            )
+        return min(max(time, self.start), self.end)
+
+    def span(self, asked: Range | None) -> tuple[int, int]:
+        """Return the first frame of a range and the one behind its last, counted from 0.
+
+        Raises
+        ------
+        ViewerError
+            If the range begins outside the motions, or leaves a capture.
+        """
+        if asked is None:
+            return 0, self.count
+        first = 0 if asked.first is None else asked.first - self.first
+        stop = self.count if asked.stop is None else asked.stop - self.first
+        if not 0 <= first < stop or (stop > self.count and not self.runs_on):
+            raise ViewerError(
+                f"--frames: expected a range within {self.first}:{self.last + 1} "
+                f"(frames {self.first} to {self.last}), found {asked}"
+            )
+        return first, stop
+
+
+def numbering_of(actors: Sequence[Actor], rate: float | None = None) -> Numbering:
+    """Return what the frames of some actors' motions are called.
+
+    The longest capture counts: at its own rate its frames have the numbers of its files. At
+    another rate, and where there are only clips of keys, frames count from 0.
+
+    Parameters
+    ----------
+    actors : sequence of Actor
+        With or without motions.
+    rate : float, optional
+        Frames a second; those of the longest capture, or 30, if omitted.
+    """
+    from viewer.rig.clip import Clip
+    from viewer.rig.motion import scene_rate, time_span
+    from viewer.rig.points import PointClip
+    from viewer.rig.sampled_clip import SampledClip
+
+    captures = [a.clip for a in actors if isinstance(a.clip, SampledClip | PointClip)]
+    longest = max(captures, key=lambda clip: clip.end - clip.start, default=None)
+    own = scene_rate(actors)
+    counted = rate or own
+    first = longest.timing.first_frame if longest is not None and counted == own else 0
+    start, end = time_span(actors)
+    count = math.floor((end - start) * counted + 1e-6) + 1
+    runs_on = any(isinstance(actor.clip, Clip) for actor in actors)
+    return Numbering(first, count, start, end, counted, runs_on)
+
+
+def add_frame_arguments(parser: argparse.ArgumentParser, many: str = "") -> None:
+    """Add the options that choose frames; ``many`` is how a range is given, if one can be."""
+    group = parser.add_argument_group(
+        "which frames: counted as a capture's files number them, otherwise from 0"
+    )
+    if many:
+        step = ", every STEP-th of them" if "STEP" in many else ""
+        group.add_argument(
+            "--frames",
+            metavar=many,
+            help=f"frames A to B - 1{step}; A or B may be left out (default: the whole motion)",
+        )
+    group.add_argument("--frame", type=int, metavar="N", help="pose by the motion at frame N")
+    group.add_argument(
+        "--time", type=number, metavar="S", help="pose by the motion at S seconds (default: start)"
+    )
+    group.add_argument(
+        "--fps",
+        type=_rate,
+        metavar="R",
+        help="frames a second: of captures, and by which frames of clips are counted "
+        "(default: the file's own, or 30)",
+    )
+
+
+def parse_range(text: str) -> Range:
+    """Return the range that ``A:B`` or ``A:B:STEP`` stands for; A and B may be left out.
+
+    >>> parse_range("10:20:2"), parse_range(":5")
+    (Range(first=10, stop=20, step=2), Range(first=None, stop=5, step=1))
+    """
+    found = re.fullmatch(r"(\d{0,9}):(\d{0,9})(?::(\d{1,9}))?", text.strip(), re.ASCII)
+    if found:
+        first, stop = (int(end) if end else None for end in found.group(1, 2))
+        step = int(found[3] or 1)
+        if step >= 1 and (stop is None or (first or 0) < stop):
+            return Range(first, stop, step)
+    raise ViewerError(
+        f'--frames: expected A:B or A:B:STEP with A below B, as 0:100, found "{printable(text)}"'
+    )
+
+
+def _rate(text: str) -> float:
+    value = number(text)
+    if not _SLOWEST <= value <= _FASTEST:
+        raise argparse.ArgumentTypeError(
+            f"expected {_SLOWEST:g} to {_FASTEST:,.0f} frames a second, found {text}"
+        )
+    return value
+
+
+def apply_time(scene: Scene, arguments: argparse.Namespace) -> None:
+    """Pose every actor that has a motion as it is at the frame or time asked for, in place.
+
+    Raises
+    ------
+    ViewerError
+        If nothing moves, or captures have nothing there.
+    """
+    if arguments.frame is None and arguments.time is None:
+        return
+    from viewer.rig.motion import pose_actor
+
+    option = "--time" if arguments.frame is None else "--frame"
+    if arguments.frame is not None and arguments.time is not None:
+        raise ViewerError("--frame and --time: expected one of them, found both")
+    if all(actor.clip is None for actor in scene.actors):
+        raise ViewerError(f"{option}: no file is a clip")
+    frames = numbering_of(scene.actors, arguments.fps)
+    if arguments.frame is not None:
+        scene.time = frames.time_of(arguments.frame)
+    else:
+        scene.time = frames.checked_time(arguments.time)
+    for actor in scene.actors:
+        pose_actor(actor, scene.time, arguments.fill_gaps)

@@ -1,0 +1,122 @@
+"""``--shape`` by name, and for figures whose shapes are morphs."""
+
+from __future__ import annotations
+
+import argparse
+
+import numpy as np
+
+from viewer.commands._numbers import number
+from viewer.errors import ViewerError, printable
+from viewer.rig.arrays import Floats
+from viewer.rig.figure import Figure
+from viewer.rig.morph_target import MORPH_GROUP
+from viewer.rig.pose_record import PoseRecord
+from viewer.rig.scene import Actor, Scene
+
+__all__ = ["has_only_morphs", "is_named", "morph_record", "named_record"]
+
+_LISTED = 12  # names in a message
+
+
+def is_named(text: str) -> bool:
+    """Return whether weights are given by name, as ``open=0.5,wide=1``."""
+    return "=" in text
+
+
+def has_only_morphs(figure: Figure) -> bool:
+    """Return whether a figure has shapes, all of which are morphs."""
+    groups = () if figure.blend_shapes is None else figure.blend_shapes.groups
+    return bool(groups) and all(group == MORPH_GROUP for group in groups)
+
+
+def morph_record(figure: Figure, values: Floats) -> PoseRecord:
+    """Return what sets the first morphs of a figure, (N,), and the others to 0.
+
+    Raises
+    ------
+    ViewerError
+        If it has fewer; the message names them.
+    """
+    names = () if figure.blend_shapes is None else figure.blend_shapes.names
+    if len(values) > len(names) and values[len(names) :].any():
+        raise ViewerError(
+            f"--shape: {printable(figure.name)} has {len(names)} morphs ({_listed(names)}), "
+            f"found {len(values)} numbers"
+        )
+    # Whatever is no coefficient of a body is recorded as an expression.
+    return PoseRecord(expression=values)
+
+
+def named_record(scene: Scene, text: str) -> tuple[Actor, PoseRecord]:
+    """Return the first actor that has all shapes named in a text, and what sets them.
+
+    Returns
+    -------
+    actor : Actor
+        With a pose.
+    record : PoseRecord
+        Sets the named shapes and keeps the others.
+
+    Raises
+    ------
+    ViewerError
+        If the text is wrong, or no actor has these shapes; the message lists those there are.
+    """
+    wanted = [_pair(part) for part in text.strip().removesuffix(",").split(",")]
+    shaped = [actor for actor in scene.actors if actor.pose is not None and actor.figure.n_shapes]
+    if not shaped:
+        raise ViewerError("--shape: no file has shapes or morphs")
+    for actor in shaped:
+        if all(_rows(actor.figure, name) for name, _ in wanted):
+            return actor, _record(actor, wanted)
+    names = _names(shaped[0].figure)
+    missing = next((name for name, _ in wanted if not _rows(shaped[0].figure, name)), wanted[0][0])
+    raise ViewerError(
+        f'--shape: no shape is called "{printable(missing, 60)}"; there are {len(names)}: '
+        f"{_listed(names)}"
+    )
+
+
+def _record(actor: Actor, wanted: list[tuple[str, float]]) -> PoseRecord:
+    assert actor.pose is not None and actor.figure.blend_shapes is not None  # the caller looked
+    weights = np.zeros(actor.figure.n_shapes)
+    weights[: len(actor.pose.shape_weights)] = actor.pose.shape_weights
+    for name, value in wanted:
+        rows = _rows(actor.figure, name)
+        if len(rows) > 1:
+            raise ViewerError(
+                f'--shape: {len(rows)} shapes are called "{printable(name, 60)}"; '
+                "numbers without names set all in order"
+            )
+        weights[rows] = value
+    is_shape = np.array([group == "shape" for group in actor.figure.blend_shapes.groups])
+    return PoseRecord(shape=weights[is_shape], expression=weights[~is_shape])
+
+
+def _pair(text: str) -> tuple[str, float]:
+    # Names may hold "="; numbers do not.
+    name, equals, value = text.rpartition("=")
+    try:
+        if equals and name.strip():
+            return name.strip(), number(value)
+    except (ValueError, argparse.ArgumentTypeError):
+        pass
+    raise ViewerError(f'--shape: expected NAME=NUMBER, found "{printable(text, 60)}"')
+
+
+def _names(figure: Figure) -> tuple[str, ...]:
+    return () if figure.blend_shapes is None else figure.blend_shapes.names
+
+
+def _rows(figure: Figure, name: str) -> list[int]:
+    """Return the shapes of this name; in other letters only if none has it exactly."""
+    names = _names(figure)
+    exact = [row for row, each in enumerate(names) if each == name]
+    return exact or [row for row, each in enumerate(names) if each.lower() == name.lower()]
+
+
+def _listed(names: tuple[str, ...]) -> str:
+    shown = ", ".join(printable(name, 40) for name in names[:_LISTED])
+    more = len(names) - _LISTED
+    return f"{shown} and {more} more" if more > 0 else shown
