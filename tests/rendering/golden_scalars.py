@@ -15,7 +15,7 @@ from golden_scenes import BEND, Shot, options, posed_fox
 
 import viewer
 from viewer.resources import resource
-from viewer.rig.annotations import BodyParts
+from viewer.rig.annotations import BodyParts, VertexField
 from viewer.rig.figure import Figure
 from viewer.rig.scalars import SCALARS
 from viewer.rig.scene import Actor, Scene
@@ -51,7 +51,12 @@ def _uneven_arm() -> Scene:
     factors = np.repeat(1.0 - 0.2 * along, np.diff(skin.starts))
     parts = BodyParts(("upper", "middle", "lower"), np.minimum(3.0 * along, 2.0).astype(np.int32))
     uneven = replace(skin, weights=skin.weights * factors)
-    return Scene([bent(replace(figure, skin=uneven, body_parts=parts), *BEND)])
+    fields = (
+        VertexField("along", "Along the arm", along),
+        VertexField("half", "Half", np.minimum(2.0 * along, 1.0) // 1, names=("upper", "lower")),
+    )
+    odd = replace(figure, skin=uneven, body_parts=parts, fields=fields)
+    return Scene([bent(odd, *BEND)])
 
 
 _SCENES: dict[str, tuple[Callable[[], Scene], str, tuple[float, float]]] = {
@@ -69,6 +74,8 @@ _SCENES: dict[str, tuple[Callable[[], Scene], str, tuple[float, float]]] = {
     "correctives": (_posed_body, "correctives", (20.0, 12.0)),
     "asymmetry": (_posed_body, "asymmetry", (20.0, 12.0)),
     "parts": (_uneven_arm, "parts", (35.0, 15.0)),
+    "field": (_uneven_arm, "field:along", (35.0, 15.0)),
+    "class": (_uneven_arm, "class:half", (35.0, 15.0)),
 }
 assert set(_SCENES) == set(SCALARS), "every scalar view has a picture"
 
