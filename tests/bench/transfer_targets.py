@@ -1,0 +1,285 @@
+"""Meshes whose true skin weights are known, made from the bundled figures.
+
+Each target comes with the template in the place and pose where both fit, and with the matrix that
+took it there, so that weights can be judged with or without the search for an alignment.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.spatial import cKDTree
+
+import viewer
+from viewer.rig.mesh import vertex_normals
+from viewer.rig.skin import skin_from_entries
+
+SAMPLES = Path(__file__).resolve().parents[2] / "assets" / "samples"
+TURN = np.radians(115.0)
+
+
+@dataclass(frozen=True)
+class Target:
+    """A mesh, its true weights, and the template that it was made from."""
+
+    name: str
+    figure: viewer.Figure
+    pose: viewer.Pose  # of the template
+    template: np.ndarray  # (V, 3) its posed vertices, in the target's space
+    template_triangles: np.ndarray
+    template_weights: sp.csr_array  # (V, J)
+    positions: np.ndarray  # (W, 3)
+    triangles: np.ndarray
+    weights: sp.csr_array  # (W, J)
+    placement: np.ndarray  # (4, 4) template to target
+
+
+def weights_of(skin: viewer.Skin) -> sp.csr_array:
+    """Return weights as a matrix whose rows add up to 1."""
+    matrix = sp.csr_array(
+        (skin.weights, skin.joints, skin.starts), shape=(skin.n_vertices, skin.n_joints)
+    )
+    return sp.csr_array(sp.diags_array(1.0 / matrix.sum(axis=1)) @ matrix)
+
+
+def body() -> viewer.Figure:
+    return viewer.load(SAMPLES / "body.npz").actors[0].figure
+
+
+def fox() -> viewer.Figure:
+    return viewer.load(SAMPLES / "fox.skel", SAMPLES / "fox.skin").actors[0].figure
+
+
+def targets(figure: viewer.Figure, what: str) -> list[Target]:
+    """Return all targets of a figure; the body's have clothes and lowered arms besides."""
+    rng = np.random.default_rng(20)
+    plain = _plain(what, figure, viewer.rest_pose(figure.skeleton))
+    posed = _plain(what, figure, _bent(figure, rng, 0.25))
+    made = [
+        _perturbed(plain, rng),
+        _subdivided(plain),
+        _remeshed(plain, rng),
+        _coarse_template(plain),
+        _placed(_remeshed(plain, rng)),
+        _named(_remeshed(posed, rng), "re-posed, remeshed"),
+        _otherwise_bent(plain, figure, rng),
+        _named(_shell(plain, 0.01, None), "offset by 1 %"),
+    ]
+    if what == "body":
+        down = _plain(what, figure, _arms_down(figure))
+        made.append(_named(_remeshed(down, rng), "arms on the torso"))
+        torso = ["pelvis", "spine1", "spine2", "spine3", "left_hip", "right_hip"]
+        made.append(_named(_shell(plain, 0.015, torso), "clothes, open, offset by 1.5 %"))
+    return made
+
+
+def fine(figure: viewer.Figure) -> Target:
+    """Return a target of more than 50,000 vertices, a part of which does not fit."""
+    rest = _plain("", figure, viewer.rest_pose(figure.skeleton))
+    bent = _otherwise_bent(rest, figure, np.random.default_rng(3), remesh=False)
+    return _clustered(_subdivided(_subdivided(bent)), 0.3 * _edge_length(*_surface(rest)))
+
+
+def template_figure(target: Target) -> viewer.Figure:
+    """Return the target's template as a figure, with weights that add up to 1."""
+    figure = target.figure
+    if len(target.template) == figure.mesh.n_vertices:
+        return figure
+    # A decimated template keeps some of the figure's vertices, here found by their place at rest.
+    rest = viewer.deform(figure, target.pose, viewer.Skinning(correctives=False))[0]
+    kept = cKDTree(rest).query(target.template)[1]
+    positions = figure.mesh.positions[kept]
+    entries = sp.coo_array(target.template_weights)
+    skin = skin_from_entries(
+        len(target.template), entries.row, entries.col, entries.data, figure.skin.inverse_bind
+    )
+    normals = vertex_normals(positions, target.template_triangles)
+    mesh = viewer.Mesh(positions, normals, target.template_triangles)
+    return viewer.Figure(figure.name, mesh, figure.skeleton, skin, up=figure.up)
+
+
+def _surface(target: Target) -> tuple[np.ndarray, np.ndarray]:
+    return target.positions, target.triangles
+
+
+def _plain(what, figure, pose) -> Target:
+    positions, _ = viewer.deform(figure, pose, viewer.Skinning(correctives=False))
+    weights, triangles = weights_of(figure.skin), figure.mesh.triangles
+    return Target(
+        what, figure, pose, positions, triangles, weights, positions, triangles, weights, np.eye(4)
+    )
+
+
+def _named(target: Target, name: str) -> Target:
+    return replace(target, name=name)
+
+
+def _bent(figure, rng, angle: float) -> viewer.Pose:
+    """Turn every joint but the root about random axes, by a normal angle."""
+    pose = viewer.rest_pose(figure.skeleton)
+    turns = rng.normal(scale=angle / np.sqrt(3), size=(len(pose.rotations), 3))
+    turns[0] = 0.0
+    _turn(pose, turns)
+    return pose
+
+
+def _arms_down(figure) -> viewer.Pose:
+    """Lower the arms of the body until they lie on the torso."""
+    pose = viewer.rest_pose(figure.skeleton)
+    turns = np.zeros((len(pose.rotations), 3))
+    names = list(figure.skeleton.names)
+    turns[names.index("left_shoulder"), 2] = -1.35
+    turns[names.index("right_shoulder"), 2] = 1.35
+    _turn(pose, turns)
+    return pose
+
+
+def _turn(pose: viewer.Pose, vectors: np.ndarray) -> None:
+    angles = np.linalg.norm(vectors, axis=1, keepdims=True)
+    axes = vectors / np.where(angles > 0, angles, 1.0)
+    pose.rotations[:] = np.concatenate([np.sin(angles / 2) * axes, np.cos(angles / 2)], axis=1)
+
+
+def _edges(triangles: np.ndarray) -> np.ndarray:
+    return np.unique(np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+
+
+def _edge_length(positions, triangles) -> float:
+    links = _edges(triangles)
+    return float(np.median(np.linalg.norm(np.diff(positions[links], axis=1), axis=2)))
+
+
+def _size(positions) -> float:
+    return float(np.linalg.norm(np.ptp(positions, axis=0)))
+
+
+def _perturbed(target: Target, rng) -> Target:
+    step = 0.2 * _edge_length(target.positions, target.triangles)
+    positions = target.positions + rng.normal(scale=step / 2, size=target.positions.shape)
+    return replace(target, name="perturbed", positions=positions)
+
+
+def _subdivided(target: Target) -> Target:
+    """Put a vertex in the middle of each edge, with the mean of its ends' weights."""
+    links, count = _edges(target.triangles), len(target.positions)
+    keys = links[:, 0].astype(np.int64) * count + links[:, 1]
+    a, b, c = target.triangles.T.astype(np.int64)
+
+    def middle(i, j):
+        low, high = np.minimum(i, j), np.maximum(i, j)
+        return count + np.searchsorted(keys, low * count + high)
+
+    ab, bc, ca = middle(a, b), middle(b, c), middle(c, a)
+    triangles = np.concatenate(
+        [np.stack(three, axis=1) for three in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]
+    )
+    rows = np.concatenate([np.arange(count), np.repeat(count + np.arange(len(links)), 2)])
+    columns = np.concatenate([np.arange(count), links.ravel()])
+    shares = np.concatenate([np.ones(count), np.full(2 * len(links), 0.5)])
+    means = sp.csr_array((shares, (rows, columns)), shape=(count + len(links), count))
+    return replace(
+        target,
+        name="subdivided",
+        positions=means @ target.positions,
+        triangles=triangles.astype(np.int32),
+        weights=sp.csr_array(means @ target.weights),
+    )
+
+
+def _clustered(target: Target, cell: float) -> Target:
+    """Keep one vertex of each cell of a grid: the one nearest to the mean of the cell's."""
+    cells = np.floor(target.positions / cell).astype(np.int64)
+    _, label = np.unique(cells, axis=0, return_inverse=True)
+    label = label.ravel()
+    counts = np.bincount(label)
+    means = np.stack(
+        [np.bincount(label, target.positions[:, axis]) / counts for axis in range(3)], axis=1
+    )
+    far = np.linalg.norm(target.positions - means[label], axis=1)
+    order = np.lexsort((far, label))
+    kept = order[np.unique(label[order], return_index=True)[1]]
+    triangles = label[target.triangles]
+    whole = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
+    triangles = triangles[whole]
+    once = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)[1]
+    return replace(
+        target,
+        name="decimated",
+        positions=target.positions[kept],
+        triangles=triangles[np.sort(once)].astype(np.int32),
+        weights=target.weights[kept],
+    )
+
+
+def _remeshed(target: Target, rng) -> Target:
+    """Subdivide twice, keep about as many vertices as before, elsewhere; then perturb."""
+    fine = _subdivided(_subdivided(target))
+    coarse = _clustered(fine, 1.1 * _edge_length(target.positions, target.triangles))
+    return replace(_perturbed(coarse, rng), name="remeshed")
+
+
+def _coarse_template(target: Target) -> Target:
+    """Take a decimated template for the figure itself, whose weights are its own."""
+    coarse = _clustered(target, 2.0 * _edge_length(target.positions, target.triangles))
+    return replace(
+        target,
+        name="coarse template",
+        template=coarse.positions,
+        template_triangles=coarse.triangles,
+        template_weights=coarse.weights,
+    )
+
+
+def _placed(target: Target) -> Target:
+    """Turn, enlarge to centimetres and shift target and template."""
+    cosine, sine = np.cos(TURN), np.sin(TURN)
+    matrix = np.eye(4)
+    matrix[:3, :3] = 95.0 * np.array([[cosine, 0, sine], [0, 1, 0], [-sine, 0, cosine]])
+    matrix[:3, 3] = 30.0, -12.0, 400.0
+
+    def move(points):
+        return points @ matrix[:3, :3].T + matrix[:3, 3]
+
+    return replace(
+        target,
+        name="remeshed, turned, in centimetres",
+        positions=move(target.positions),
+        template=move(target.template),
+        placement=matrix,
+    )
+
+
+def _otherwise_bent(target: Target, figure, rng, remesh: bool = True) -> Target:
+    """Bend the target a little, but not the template: an imperfect fit of the pose."""
+    bent = _plain("", figure, _bent(figure, rng, np.radians(4.0)))
+    bent = _remeshed(bent, rng) if remesh else bent
+    return replace(bent, name="bent by 4 degrees", template=target.template, pose=target.pose)
+
+
+def _shell(target: Target, offset: float, joints: list[str] | None) -> Target:
+    """Offset the surface along its normals, of some joints' parts alone if they are given."""
+    normals = vertex_normals(target.positions, target.triangles)
+    links = _edges(target.triangles)
+    both = np.concatenate([links, links[:, ::-1]])
+    count = len(normals)
+    matrix = sp.csr_array((np.ones(len(both)), (both[:, 0], both[:, 1])), shape=(count, count))
+    for _ in range(5):
+        normals = normals + matrix @ normals
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    moved = target.positions + offset * _size(target.positions) * normals
+    triangles = target.triangles
+    if joints is not None:
+        names = list(target.figure.skeleton.names)
+        part = np.isin(target.weights.toarray().argmax(axis=1), [names.index(n) for n in joints])
+        triangles = triangles[part[triangles].all(axis=1)]
+    used, flat = np.unique(triangles, return_inverse=True)
+    shell = replace(
+        target,
+        positions=moved[used],
+        triangles=flat.reshape(-1, 3).astype(np.int32),
+        weights=target.weights[used],
+    )
+    return _clustered(_subdivided(shell), 1.1 * _edge_length(shell.positions, shell.triangles))

@@ -1,0 +1,293 @@
+"""``viewer rig``: a mesh goes in, a figure that moves comes out."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+pytest.importorskip("scipy")
+
+import viewer
+from viewer.cli import run
+from viewer.commands import rig
+from viewer.commands._landmarks import read_landmarks
+from viewer.errors import FormatError
+from viewer.export import export
+from viewer.formats import Source
+from viewer.loading import bundled_body
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import Mesh, vertex_normals
+from viewer.rig.pose import rest_pose
+from viewer.rig.scene import Actor
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A fox in centimetres, turned by a quarter about y, and the fox's pose."""
+    folder = tmp_path_factory.mktemp("rig")
+    fox = viewer.load().actors[0]
+    positions = 100.0 * viewer.deform(fox.figure, fox.pose)[0][:, [2, 1, 0]] * [1, 1, -1]
+    mesh = fox.figure.mesh
+    target = Mesh(
+        positions,
+        vertex_normals(positions, mesh.triangles),
+        mesh.triangles,
+        uvs=mesh.uvs,
+        uv_triangles=mesh.uv_triangles,
+    )
+    export(Actor(Figure("scan", target)), folder / "scan.obj")
+    return folder
+
+
+def fox_vertices(pose=None):
+    fox = viewer.load().actors[0]
+    return viewer.deform(fox.figure, pose or fox.pose)[0]
+
+
+def rigged(folder, tmp_path, name, *options):
+    out = tmp_path / name
+    arguments = ["rig", str(folder / "scan.obj"), "--from", "fox", "-o", str(out), *options]
+    assert run(arguments) == 0
+    return out
+
+
+def test_npz_opens_again_and_moves_as_the_template(folder, tmp_path, capsys):
+    out = rigged(folder, tmp_path, "scan.npz")
+    said = capsys.readouterr()
+    assert said.err == ""
+    lines = said.out.splitlines()
+    assert lines[0].startswith(
+        "alignment: the target lies in place and is left there; scale 100, turned by 90.00 degrees"
+    )
+    assert lines[-1] == f"{out}: the figure with its rig, the target's pose, confidence"
+    assert any(line.startswith("posed again, the mesh is off by at most") for line in lines)
+    figure = viewer.load(out).actors[0].figure
+    pose = rest_pose(figure.skeleton)
+    pose.dofs[figure.skeleton.names.index("jaw")] = 0.2
+    template = rest_pose(viewer.load().actors[0].figure.skeleton)
+    template.dofs[:] = pose.dofs
+    size = 118.0
+    assert_allclose(
+        viewer.deform(figure, pose)[0], 100.0 * fox_vertices(template), atol=1e-5 * size
+    )
+    with np.load(out) as arrays:
+        assert arrays["confidence"].shape == (figure.mesh.n_vertices,)
+        assert arrays["confidence_names"].tolist() == ["matched", "filled", "rigid"]
+        assert_allclose(arrays["alignment"][:3, :3], 100.0 * np.array([[0, 0, 1], [0, 1, 0],
+                        [-1, 0, 0]]), atol=1e-9)  # fmt: skip
+
+
+def test_course_rig_opens_again_and_its_pose_is_the_target(folder, tmp_path, capsys):
+    out = rigged(folder, tmp_path, "scan.skel")
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "scan.json",
+        "scan.obj",
+        "scan.skel",
+        "scan.skin",
+    ]
+    parts = [out, out.with_suffix(".skin"), out.with_suffix(".json")]
+    scene = viewer.load(*parts)
+    (warning,) = scene.warnings
+    assert warning.endswith("texcoords without a texture: drawn untextured")
+    posed = viewer.deform(scene.actors[0].figure, scene.actors[0].pose)[0]
+    target = viewer.load(folder / "scan.obj").actors[0].figure.mesh.positions
+    # The fox's vertices are split along texture seams already: the .skin keeps their numbers.
+    assert_allclose(posed, target, atol=1e-9)
+    rest = viewer.load(tmp_path / "scan.obj").actors[0].figure.mesh
+    assert rest.uvs is not None and rest.n_vertices == len(target)
+    assert capsys.readouterr().out.splitlines()[-1].endswith("the target's pose")
+
+
+def test_template_is_posed_by_the_same_options_as_everywhere(folder, tmp_path, capsys):
+    # In its rest pose the template fits less well than in the pose of the target.
+    options = ["--pose", ",".join(["0"] * 114), "--method", "robust"]
+    out = tmp_path / "scan.npz"
+    target = str(folder / "scan.obj")
+    assert run(["rig", target, "--from", "fox", *options, "-o", str(out)]) == 0
+    error = capsys.readouterr().out.splitlines()[1]
+    assert error.startswith("alignment error: ")
+    assert float(error.split()[2]) > 0.05  # per cent; it is 0 in the right pose
+
+
+def test_template_may_be_posed_by_a_frame_of_a_sequence(tmp_path, capsys, monkeypatch):
+    seen = {}
+
+    def instead(figure, pose, target, settings, report, name):
+        seen.update(figure=figure, pose=pose, target=target, settings=settings)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(rig, "transfer", instead)
+    body = viewer.load(bundled_body()).actors[0].figure
+    poses = np.zeros((5, 72))
+    poses[:, 5] = np.arange(5) / 10.0
+    np.savez(tmp_path / "walk.npz", poses=poses, trans=np.zeros((5, 3)), mocap_framerate=30.0)
+    export(Actor(Figure("scan", body.mesh)), tmp_path / "scan.obj")
+    options = ["--from", "body", "--from", str(tmp_path / "walk.npz"), "--template-frame", "3"]
+    assert run(["rig", str(tmp_path / "scan.obj"), *options, "--max-angle", "45"]) == 130
+    assert_allclose(seen["pose"].dofs[5], 0.3, atol=1e-12)
+    assert seen["figure"].skeleton.n_joints == 24
+    assert_allclose(seen["settings"].weights.match.max_angle, np.radians(45.0))
+    assert capsys.readouterr().err.splitlines()[-1] == "viewer: interrupted"
+
+
+def test_options_reach_the_transfer(folder, tmp_path, monkeypatch, capsys):
+    seen = {}
+
+    def instead(figure, pose, target, settings, report, name):
+        seen.update(settings=settings, name=name)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(rig, "transfer", instead)
+    pairs = tmp_path / "pairs.txt"
+    pairs.write_text("head 1 2 3\njaw 4 5 6  # there\n\n0 0 0 7 8 9\n")
+    options = ["--method", "nearest", "--up", "z", "--facing", "x", "--scale", "axes", "--smooth"]
+    more = ["--max-influences", "4", "--joints", "copied", "--max-distance", "0.02", "--no-refine"]
+    arguments = ["rig", str(folder / "scan.obj"), "--from", "fox", *options, *more]
+    assert run([*arguments, "--landmarks", str(pairs), "-o", str(tmp_path / "x.skel")]) == 130
+    settings = seen["settings"]
+    assert (settings.method, settings.joints, settings.correctives) == ("nearest", "copied", False)
+    where = settings.alignment
+    assert (where.up, where.facing, where.scale, where.refines) == ("z", "x", "axes", False)
+    assert_allclose(where.landmarks[:, 1], [[1, 2, 3], [4, 5, 6], [7, 8, 9]])
+    weights = settings.weights
+    assert (weights.smoothing_rounds, weights.max_influences) == (10, 4)
+    assert weights.match.max_distance == 0.02 and seen["name"] == "scan"
+
+
+def test_target_with_a_rig_of_its_own_is_taken_as_posed(tmp_path, monkeypatch, capsys):
+    seen = {}
+
+    def instead(figure, pose, target, settings, report, name):
+        seen.update(target=target)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(rig, "transfer", instead)
+    from viewer.loading import bundled_files
+
+    assert run(["rig", *map(str, bundled_files())]) == 130
+    assert_allclose(seen["target"].positions, fox_vertices())
+    assert "warning: fox has a rig already, which is not used" in capsys.readouterr().err
+
+
+REFUSED = {
+    "suffix": (
+        ["-o", "{tmp}/x.glb"],
+        2,
+        'viewer: a rigged mesh cannot be written as ".glb"; there are: .skel (with .skin, .obj and '
+        "the target's pose as .json), .npz",
+    ),
+    "folder": (["-o", "{tmp}/no/x.npz"], 5, "viewer: {tmp}/no/x.npz: the folder does not exist"),
+    "angle": (["--max-angle", "200"], 2, "viewer: --max-angle: expected 0 to 180, found 200"),
+    "no rig": (
+        ["--from", "{scan}"],
+        2,
+        "viewer: --from: expected a figure with mesh, skeleton and skin, found none",
+    ),
+    "axes": (
+        ["--up", "z", "--facing", "z"],
+        2,
+        "viewer: expected a facing across the up axis z, found z",
+    ),
+}
+
+
+@pytest.mark.parametrize(("options", "code", "message"), REFUSED.values(), ids=REFUSED)
+def test_what_makes_no_sense_is_refused_in_one_line(
+    folder, tmp_path, capsys, options, code, message
+):
+    names = {"tmp": tmp_path, "scan": folder / "scan.obj"}
+    arguments = [option.format(**names) for option in options]
+    assert run(["rig", str(folder / "scan.obj"), *arguments]) == code
+    assert capsys.readouterr().err == message.format(**names) + "\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_target_is_never_replaced(folder, capsys):
+    target = folder / "scan.obj"
+    before = target.read_bytes()
+    assert run(["rig", str(target), "-o", str(folder / "scan.skel"), "--force"]) == 5
+    assert capsys.readouterr().err == (
+        f"viewer: {target}: is an input file, which is never replaced\n"
+    )
+    assert target.read_bytes() == before
+
+
+def test_existing_files_stay_without_force(folder, tmp_path, capsys):
+    (tmp_path / "x.json").write_text("mine")
+    assert run(["rig", str(folder / "scan.obj"), "-o", str(tmp_path / "x.skel")]) == 5
+    assert capsys.readouterr().err == (
+        f"viewer: {tmp_path / 'x.json'}: exists already (--force replaces it)\n"
+    )
+
+
+def test_two_meshes_are_one_too_many(folder, tmp_path, capsys):
+    other = tmp_path / "other.obj"
+    other.write_bytes((folder / "scan.obj").read_bytes())
+    assert run(["rig", str(folder / "scan.obj"), str(other)]) == 2
+    assert capsys.readouterr().err == "viewer: expected one mesh to rig, found 2\n"
+
+
+# Landmark files
+
+
+def landmarks(tmp_path, text):
+    path = tmp_path / "pairs.txt"
+    path.write_text(text)
+    actor = viewer.load().actors[0]
+    return read_landmarks(Source.open(path), actor.figure, actor.pose)
+
+
+def test_landmarks_are_points_or_joints_where_the_pose_has_them(tmp_path):
+    from viewer.rig.skinning import joint_matrices
+
+    actor = viewer.load().actors[0]
+    found = landmarks(tmp_path, "1 2 3 4 5 6\nhead 7 8 9\n-1 0 0 1e1 0 0\n")
+    assert found.shape == (3, 2, 3)
+    assert_allclose(found[0], [[1, 2, 3], [4, 5, 6]])
+    head = actor.figure.skeleton.names.index("head")
+    assert_allclose(found[1, 0], joint_matrices(actor.figure, actor.pose)[head, :3, 3])
+    assert_allclose(found[2, 1], [10, 0, 0])
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "message"),
+    [
+        (
+            "head 1 2 3\n# no\n1 2 3 4 5\n",
+            3,
+            'expected a joint of fox, found "1 2"',
+        ),
+        (
+            "head 1 2\n",
+            1,
+            'expected six numbers, or a joint and three numbers, found "head 1 2"',
+        ),
+        (
+            "head 1 2 nan\n",
+            1,
+            'expected six numbers, or a joint and three numbers, found "head 1 2 nan"',
+        ),
+        ("wing 1 2 3\n", 1, 'expected a joint of fox, found "wing"'),
+        ("head 1 2 3\n", None, "expected 3 or more pairs of points, found 1"),
+    ],
+)
+def test_landmarks_that_are_none_are_named_by_line(tmp_path, text, line, message):
+    with pytest.raises(FormatError) as problem:
+        landmarks(tmp_path, text)
+    where = tmp_path / "pairs.txt"
+    expected = f"{where}:{line}: {message}" if line else f"{where}: {message}"
+    assert str(problem.value) == expected
+
+
+def test_view_shows_the_result_over_the_hidden_target(folder, monkeypatch, capsys):
+    shown = []
+    import viewer.app.window
+
+    monkeypatch.setattr(viewer.app.window, "show", shown.append)
+    assert run(["rig", str(folder / "scan.obj"), "--from", "fox", "--view"]) == 0
+    (scene,) = shown
+    result, target = scene.actors
+    assert result.visible and not target.visible
+    posed = viewer.deform(result.figure, result.pose)[0]
+    assert_allclose(posed, target.figure.mesh.positions, atol=1e-9)

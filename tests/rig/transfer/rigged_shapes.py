@@ -1,0 +1,70 @@
+"""Small rigged figures for the tests of rig transfer."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import Mesh, vertex_normals
+from viewer.rig.skeleton import Skeleton
+from viewer.rig.skin import skin_from_entries
+
+HALF_TURN = np.pi
+
+
+def turn(axis, angle):
+    """Return a rotation about an axis of any length, by Rodrigues' formula."""
+    x, y, z = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+def mesh_of(positions, triangles) -> Mesh:
+    """Return a mesh with the normals of its surface."""
+    triangles = np.asarray(triangles, dtype=np.int32)
+    return Mesh(positions, vertex_normals(positions, triangles), triangles)
+
+
+def tube(around=16, along=21, length=2.0):
+    """Return a closed tube along y whose section differs in all directions, and grows upwards."""
+    angles = np.arange(around) * 2 * np.pi / around
+    heights = np.linspace(0.0, length, along)
+    section = np.stack([0.3 * np.cos(angles) + 0.08 * np.cos(2 * angles), 0.2 * np.sin(angles)], 1)
+    rings = [[(1 + 0.2 * y) * x, y, (1 + 0.2 * y) * z + 0.05 * y * y] for y in heights
+             for x, z in section]  # fmt: skip
+    positions = np.array([*rings, [0.0, -0.1, 0.0], [0.0, length + 0.2, 0.05 * length**2]])
+    ring = np.arange(around * along).reshape(along, around)
+    a, b = ring[:-1], np.roll(ring, -1, axis=1)[:-1]
+    c, d = np.roll(ring, -1, axis=1)[1:], ring[1:]
+    sides = np.concatenate([np.stack([a, d, c], -1), np.stack([a, c, b], -1)]).reshape(-1, 3)
+    low, high = len(positions) - 2, len(positions) - 1
+    first, last = ring[0], ring[-1]
+    caps = [*[(first[k], first[(k + 1) % around], low) for k in range(around)],
+            *[(last[(k + 1) % around], last[k], high) for k in range(around)]]  # fmt: skip
+    return positions, np.concatenate([sides, np.array(caps)]).astype(np.int32)
+
+
+def arm(root_moves=True, limit=np.inf) -> Figure:
+    """Return a tube with joints at y = 0 and y = 1, weights blended linearly from 0.8 to 1.2."""
+    positions, triangles = tube()
+    share = np.clip((positions[:, 1] - 0.8) / 0.4, 0.0, 1.0)
+    vertices = np.tile(np.arange(len(positions)), 2)
+    joints = np.repeat([0, 1], len(positions))
+    weights = np.concatenate([1 - share, share])
+    bind = np.tile(np.eye(4), (2, 1, 1))
+    bind[1, 1, 3] = -1.0
+    kept = weights > 0
+    moves = 3 if root_moves else 0
+    skeleton = Skeleton(
+        names=("base", "tip"),
+        parents=np.array([-1, 0]),
+        rest_translations=np.array([[0.0, 0, 0], [0, 1, 0]]),
+        rest_rotations=np.tile([0.0, 0, 0, 1], (2, 1)),
+        rest_scales=np.ones((2, 3)),
+        dof_joints=np.array([0] * moves + [0] * 3 + [1] * 3),
+        dof_kinds=np.array([*range(moves), 3, 4, 5, 3, 4, 5]),
+        rest_dofs=np.zeros(moves + 6),
+        dof_limits=np.tile([-limit, limit], (moves + 6, 1)),
+    )
+    skin = skin_from_entries(len(positions), vertices[kept], joints[kept], weights[kept], bind)
+    return Figure("arm", mesh_of(positions, triangles), skeleton, skin)

@@ -1,0 +1,87 @@
+"""Landmark files: pairs of points that belong together on two meshes.
+
+One pair a line: three numbers of the posed template and three of the target, or the name of a
+joint of the template and three numbers of the target; ``#`` begins a comment::
+
+    0.0 1.62 0.1      0.0 162.0 9.5
+    left_wrist        71.2 140.0 -3.0
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.errors import FormatError, printable
+from viewer.formats import Source
+from viewer.rig.arrays import Floats
+from viewer.rig.figure import Figure
+from viewer.rig.pose import Pose
+from viewer.rig.skinning import joint_matrices
+
+__all__ = ["read_landmarks"]
+
+_FARTHEST = 1e9  # any unit
+
+
+def read_landmarks(source: Source, template: Figure, pose: Pose) -> Floats:
+    """Read pairs of points.
+
+    Parameters
+    ----------
+    source : Source
+        The file.
+    template : Figure
+        Gives the joints that are named.
+    pose : Pose
+        Puts them where they are.
+
+    Returns
+    -------
+    (N, 2, 3)
+        Of each pair the template's point, then the target's.
+
+    Raises
+    ------
+    FormatError
+        With the line, if it is no pair, or no joint has the name; without, if there are fewer
+        than three pairs.
+    """
+    skeleton = template.skeleton
+    assert skeleton is not None  # the template is attached
+    joints = joint_matrices(template, pose)[:, :3, 3]
+    pairs = []
+    for number, data in enumerate(source.data.splitlines(), start=1):
+        line = data.decode("utf-8", "replace")
+        words = line.partition("#")[0].split()
+        if not words:
+            continue
+        values = _floats(words if len(words) == 6 else words[-3:])
+        if values is None or len(words) < 4:
+            raise FormatError(
+                source.path,
+                "expected six numbers, or a joint and three numbers, "
+                f'found "{printable(line.strip(), 60)}"',
+                number,
+            )
+        if len(values) == 6:
+            pairs.append([values[:3], values[3:]])
+            continue
+        name = " ".join(words[:-3])
+        if name not in skeleton.names:
+            raise FormatError(
+                source.path,
+                f'expected a joint of {printable(template.name, 60)}, found "{printable(name)}"',
+                number,
+            )
+        pairs.append([joints[skeleton.names.index(name)].tolist(), values])
+    if len(pairs) < 3:
+        raise FormatError(source.path, f"expected 3 or more pairs of points, found {len(pairs)}")
+    return np.array(pairs, dtype=np.float64)
+
+
+def _floats(words: list[str]) -> list[float] | None:
+    try:
+        values = [float(word) for word in words]
+    except ValueError:
+        return None
+    return values if all(abs(value) < _FARTHEST for value in values) else None

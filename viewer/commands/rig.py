@@ -1,0 +1,255 @@
+"""Give an unrigged mesh the rig of a figure."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from viewer.commands._frame_numbers import add_frame_arguments
+from viewer.commands._landmarks import read_landmarks
+from viewer.commands._numbers import number
+from viewer.commands._pose import add_pose_arguments, apply_pose, pose_files
+from viewer.commands._progress import Progress
+from viewer.commands._rig_output import check_files, write_rigged
+from viewer.commands._scene import print_warnings
+from viewer.errors import RigError, ViewerError, printable
+from viewer.formats import Source
+from viewer.loading import MotionSettings, bundled_body, bundled_files, load
+from viewer.models import resolve
+from viewer.rig.figure import Figure
+from viewer.rig.scene import Actor, Scene
+from viewer.rig.skinning import deform
+from viewer.rig.transfer.alignment import SCALES, AlignmentSettings
+from viewer.rig.transfer.matching import MatchSettings
+from viewer.rig.transfer.orientation_search import AXES
+from viewer.rig.transfer.pipeline import transfer
+from viewer.rig.transfer.rigged import Rigged
+from viewer.rig.transfer.settings import JOINTS, METHODS, TransferSettings
+from viewer.rig.transfer.weights import WeightSettings
+
+__all__ = ["add_arguments", "run"]
+
+_BUNDLED = ("body", "fox")
+_SMOOTHING = 10  # rounds, where --smooth gives no number
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    parser.add_argument(
+        "files", nargs="+", metavar="TARGET", help="the mesh: .obj, .ply; and its texture picture"
+    )
+    parser.add_argument(
+        "--from",
+        dest="template",
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="the rigged figure: any that opens, a model's name, body (default) or fox; several "
+        "files of one figure or with a motion by repeating this",
+    )
+    parser.add_argument(
+        "-o", "--output", metavar="FILE", help=".skel (with .skin, .obj, .json), or .npz"
+    )
+    parser.add_argument("--force", action="store_true", help="replace existing files")
+    parser.add_argument("--view", action="store_true", help="open a window on the result")
+    _add_method_arguments(parser)
+    _add_alignment_arguments(parser)
+    add_frame_arguments(parser)
+    add_pose_arguments(parser)
+    parser.add_argument(
+        "--template-pose", dest="pose", metavar="FILE|A,B,…", help="the same as --pose"
+    )
+    parser.add_argument(
+        "--template-frame", dest="frame", type=int, metavar="N", help="the same as --frame"
+    )
+    parser.set_defaults(fill_gaps=False)
+
+
+def _add_method_arguments(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("method")
+    texts = "; ".join(f"{name}: {text}" for name, text in METHODS.items())
+    group.add_argument("--method", choices=METHODS, default="robust", help=texts)
+    group.add_argument(
+        "--max-distance",
+        type=number,
+        default=0.05,
+        metavar="X",
+        help="of the target's size, up to which a vertex matches (default: 0.05)",
+    )
+    group.add_argument(
+        "--max-angle",
+        type=number,
+        default=30.0,
+        metavar="DEG",
+        help="between the surfaces, up to which a vertex matches (default: 30)",
+    )
+    group.add_argument(
+        "--smooth",
+        type=int,
+        nargs="?",
+        const=_SMOOTHING,
+        default=0,
+        metavar="N",
+        help=f"even out weights that were filled in, N rounds ({_SMOOTHING} without a number)",
+    )
+    group.add_argument(
+        "--max-influences", type=int, metavar="N", help="keep each vertex's N strongest"
+    )
+    group.add_argument(
+        "--joints",
+        choices=JOINTS,
+        default="carried",
+        help="moved as the surface around them, or with the alignment alone (default: carried)",
+    )
+    group.add_argument(
+        "--no-correctives", action="store_true", help="leave out the template's pose correctives"
+    )
+
+
+def _add_alignment_arguments(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("alignment")
+    group.add_argument("--up", choices=AXES, help="of the target (default: searched)")
+    group.add_argument("--facing", choices=AXES, help="of the target (default: searched)")
+    group.add_argument(
+        "--scale",
+        choices=SCALES,
+        default="uniform",
+        help="of the template: one, one along each axis, or none (default: uniform)",
+    )
+    group.add_argument(
+        "--landmarks",
+        metavar="FILE",
+        help="three or more pairs, a line each: a joint or three numbers of the posed template, "
+        "and three numbers of the target",
+    )
+    group.add_argument(
+        "--no-refine", action="store_true", help="take landmarks or the search as they are"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Rig the mesh, say how it went, write it, and show it if asked."""
+    output = None if arguments.output is None else Path(arguments.output)
+    if output is not None:
+        check_files(output, _inputs(arguments), arguments.force)
+    target = _target(arguments)
+    template = _template(arguments)
+    settings = _settings(arguments, template, output)
+    assert target.mesh is not None and template.pose is not None  # both looked
+    title = f"rigging {printable(target.name, 40)}"
+    with Progress(title, 100) as progress:
+        rigged = transfer(
+            template.figure,
+            template.pose,
+            target.mesh,
+            settings,
+            lambda share, what: progress.show(round(100.0 * share)),
+            name=target.name,
+        )
+    _tell(rigged)
+    if output is not None:
+        print("\n".join(write_rigged(rigged, output)))
+    if arguments.view:
+        _show(rigged, target)
+    return 0
+
+
+def _inputs(arguments: argparse.Namespace) -> list[Path]:
+    named = [*arguments.files, *arguments.template, *pose_files(arguments)]
+    named += [arguments.landmarks] if arguments.landmarks else []
+    return [Path(file) for file in (*map(resolve, named), bundled_body(), *bundled_files())]
+
+
+def _target(arguments: argparse.Namespace) -> Figure:
+    """Return the mesh that is to be rigged; one that has a rig already as it is posed."""
+    scene = load(*map(resolve, arguments.files))
+    print_warnings(scene.warnings)
+    meshes = [actor for actor in scene.actors if actor.figure.mesh is not None]
+    if len(meshes) != 1:
+        raise ViewerError(f"expected one mesh to rig, found {len(meshes)}")
+    actor = meshes[0]
+    figure = actor.figure
+    assert figure.mesh is not None  # it was chosen for it
+    if not figure.is_attached:
+        return figure
+    print_warnings([f"{printable(figure.name, 60)} has a rig already, which is not used"])
+    positions, normals = deform(figure, actor.pose)
+    return Figure(figure.name, replace(figure.mesh, positions=positions, normals=normals))
+
+
+def _template(arguments: argparse.Namespace) -> Actor:
+    """Return the figure whose rig is carried over, posed and shaped as asked."""
+    files = [file for name in arguments.template or ["body"] for file in _template_files(name)]
+    scene = load(*files, motion=MotionSettings(frame_rate=arguments.fps))
+    print_warnings([*scene.warnings, *apply_pose(scene, arguments)])
+    attached = [actor for actor in scene.actors if actor.figure.is_attached]
+    if not attached:
+        raise RigError("--from: expected a figure with mesh, skeleton and skin, found none")
+    if len(attached) > 1:
+        name = printable(attached[0].name, 60)
+        print_warnings([f"--from: {len(attached)} figures; the first, {name}, is the template"])
+    if not attached[0].is_present:
+        raise RigError("--from: expected a frame with the template in it, found a gap")
+    return attached[0]
+
+
+def _template_files(name: str) -> list[Path]:
+    if name in _BUNDLED and not Path(name).exists():
+        return [bundled_body()] if name == "body" else list(bundled_files())
+    return [resolve(name)]
+
+
+def _settings(
+    arguments: argparse.Namespace, template: Actor, output: Path | None
+) -> TransferSettings:
+    """Return what is asked for; the course rig's format has no place for correctives."""
+    landmarks = None
+    if arguments.landmarks is not None:
+        assert template.pose is not None  # it is attached
+        source = Source.open(arguments.landmarks)
+        landmarks = read_landmarks(source, template.figure, template.pose)
+    if not 0.0 <= arguments.max_angle <= 180.0:
+        raise ViewerError(f"--max-angle: expected 0 to 180, found {arguments.max_angle:g}")
+    as_rig = output is not None and output.suffix.lower() != ".npz"
+    angle = math.radians(arguments.max_angle)
+    usual = MatchSettings()
+    return TransferSettings(
+        method=arguments.method,
+        alignment=AlignmentSettings(
+            up=arguments.up,
+            facing=arguments.facing,
+            scale=arguments.scale,
+            landmarks=landmarks,
+            refines=not arguments.no_refine,
+        ),
+        weights=WeightSettings(
+            match=MatchSettings(
+                max_distance=arguments.max_distance,
+                max_angle=angle,
+                near_angle=max(angle, usual.near_angle),
+            ),
+            smoothing_rounds=arguments.smooth,
+            max_influences=arguments.max_influences,
+        ),
+        joints=arguments.joints,
+        correctives=not (arguments.no_correctives or as_rig),
+    )
+
+
+def _tell(rigged: Rigged) -> None:
+    """Print what was found, and warnings where errors go."""
+    mark = "warning: "
+    print_warnings([line.removeprefix(mark) for line in rigged.lines if line.startswith(mark)])
+    print("\n".join(line for line in rigged.lines if not line.startswith(mark)))
+
+
+def _show(rigged: Rigged, target: Figure) -> None:
+    """Open a window on the result, with the target hidden in the same place."""
+    from viewer.app.window import show
+
+    result = Actor(rigged.figure, rigged.pose.copy(), placement=np.array(rigged.placement))
+    show(Scene([result, Actor(target, visible=False)], world_up=rigged.figure.up))

@@ -1,0 +1,295 @@
+"""Rigged meshes: every part of a figure with its rig, in one ``.npz`` that any program can read.
+
+::
+
+    viewer_rig ()   name ()   up ()   unit ()
+    positions (V, 3)   triangles (T, 3)   uvs (U, 2)   uv_triangles (T, 3)            at rest
+    material_names (M,)   material_textures (M,)   triangle_materials (T,)   image_0 (H, W, 4) …
+    joint_names (J,)   parents (J,)   rest_translations (J, 3)   rest_rotations (J, 4)
+    rest_scales (J, 3)   dof_joints (D,)   dof_kinds (D,)   rest_dofs (D,)   dof_limits (D, 2)
+    boxes (J, 2, 3)   skin_starts (V + 1,)   skin_joints (N,)   skin_weights (N,)
+    inverse_bind (J, 4, 4)   correctives (9 (J - 1), V, 3)
+    layout_starts (J,)   layout_is_euler (J,)   layout_counts (3,): numbers, translation, scale
+    hand_0_side ()   hand_0_joints (H,)   hand_0_components (C, 3 H)   hand_0_mean (3 H,) …
+
+Rotations are (x, y, z, w); matrices are for column vectors. ``dof_kinds`` are 0 to 2 for
+translations, 3 to 5 for rotations about x, y, z. What ``viewer rig`` adds is for other programs,
+and not read: ``target_dofs``, ``target_translations``, ``target_rotations``, ``target_scales``,
+``target_place``, ``placement``, ``alignment``, ``confidence``, ``distances``, ``guarded``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.errors import RigError
+from viewer.formats._archive import Archive
+from viewer.formats._container import archive_of, finite
+from viewer.formats._save import save_arrays
+from viewer.formats._source import Source
+from viewer.rig.arrays import Deferred, Floats
+from viewer.rig.blendshapes import Correctives
+from viewer.rig.figure import Figure
+from viewer.rig.hands import Hand
+from viewer.rig.mesh import Material, Mesh, vertex_normals
+from viewer.rig.pose_vector import PoseLayout
+from viewer.rig.skeleton import Skeleton
+from viewer.rig.skin import Skin
+
+__all__ = ["figure_arrays", "read", "save"]
+
+_VERSION = 1
+_MOST_HANDS = 2
+
+
+def read(source: Source) -> Figure:
+    """Read a rigged mesh.
+
+    Parameters
+    ----------
+    source : Source
+        The archive.
+
+    Returns
+    -------
+    Figure
+        With mesh, skeleton and skin; correctives are read when first used.
+
+    Raises
+    ------
+    FormatError
+        If an array is missing, has a wrong shape, or the parts do not fit each other.
+    """
+    archive = archive_of(source)
+    version = int(_finite(archive, "viewer_rig", ()))
+    if version != _VERSION:
+        raise archive.error("viewer_rig", f"expected version {_VERSION}, found {version}")
+    up = archive.text("up")
+    if up not in ("y", "z"):
+        raise archive.error("up", f'expected y or z, found "{up[:20]}"')
+    try:
+        skeleton = _skeleton(archive)
+        count = skeleton.n_joints
+        return Figure(
+            name=archive.text("name") or source.path.stem,
+            mesh=_mesh(archive),
+            skeleton=skeleton,
+            skin=_skin(archive),
+            up="z" if up == "z" else "y",
+            unit=archive.text("unit"),
+            correctives=_correctives(archive, count),
+            hands=tuple(_hand(archive, index, count) for index in _hands(archive)),
+            pose_layout=_layout(archive, count),
+        )
+    except RigError as problem:
+        raise source.error(str(problem)) from None
+
+
+def _numbers(archive: Archive, key: str, shape: tuple[int | None, ...]) -> NDArray[Any]:
+    return archive.array(key, shape).values()
+
+
+def _finite(archive: Archive, key: str, shape: tuple[int | None, ...]) -> Floats:
+    return finite(archive, key, _numbers(archive, key, shape))
+
+
+def _texts(archive: Archive, key: str) -> tuple[str, ...]:
+    return tuple(map(str, archive.array(key, (None,), "SU").values().astype(str).tolist()))
+
+
+def _mesh(archive: Archive) -> Mesh:
+    positions = _finite(archive, "positions", (None, 3))
+    triangles = _numbers(archive, "triangles", (None, 3))
+    wrong = (triangles < 0) | (triangles >= len(positions))
+    if wrong.any():
+        raise archive.error(
+            "triangles",
+            f"expected vertices 0 to {len(positions) - 1}, found {triangles[wrong][0]}",
+        )
+    has_uvs, split = archive.has("uvs"), archive.has("uv_triangles")
+    materials = _materials(archive)
+    return Mesh(
+        positions=positions,
+        normals=vertex_normals(positions, triangles.astype(np.int32)),
+        triangles=triangles,
+        uvs=_finite(archive, "uvs", (None, 2)) if has_uvs else None,
+        uv_triangles=_numbers(archive, "uv_triangles", (None, 3)) if split else None,
+        materials=materials,
+        triangle_materials=_numbers(archive, "triangle_materials", (None,)) if materials else None,
+    )
+
+
+def _materials(archive: Archive) -> tuple[Material, ...]:
+    if not archive.has("material_names"):
+        return ()
+    names, textures = _texts(archive, "material_names"), _texts(archive, "material_textures")
+    if len(names) != len(textures):
+        raise archive.error("material_textures", f"expected {len(names)}, found {len(textures)}")
+    images = [
+        _numbers(archive, f"image_{index}", (None, None, 4))
+        if archive.has(f"image_{index}")
+        else None
+        for index in range(len(names))
+    ]
+    rows = zip(names, textures, images, strict=True)
+    return tuple(Material(name, texture or None, image) for name, texture, image in rows)
+
+
+def _skeleton(archive: Archive) -> Skeleton:
+    count = len(names := _texts(archive, "joint_names"))
+    n_dofs = len(_numbers(archive, "dof_joints", (None,)))
+    return Skeleton(
+        names=names,
+        parents=_numbers(archive, "parents", (count,)),
+        rest_translations=_finite(archive, "rest_translations", (count, 3)),
+        rest_rotations=_finite(archive, "rest_rotations", (count, 4)),
+        rest_scales=_finite(archive, "rest_scales", (count, 3)),
+        dof_joints=_numbers(archive, "dof_joints", (n_dofs,)),
+        dof_kinds=_numbers(archive, "dof_kinds", (n_dofs,)),
+        rest_dofs=_finite(archive, "rest_dofs", (n_dofs,)),
+        dof_limits=_numbers(archive, "dof_limits", (n_dofs, 2)).astype(np.float64),
+        boxes=_finite(archive, "boxes", (count, 2, 3)) if archive.has("boxes") else None,
+    )
+
+
+def _skin(archive: Archive) -> Skin:
+    return Skin(
+        starts=_numbers(archive, "skin_starts", (None,)),
+        joints=_numbers(archive, "skin_joints", (None,)),
+        weights=_finite(archive, "skin_weights", (None,)),
+        inverse_bind=_finite(archive, "inverse_bind", (None, 4, 4)),
+    )
+
+
+def _correctives(archive: Archive, n_joints: int) -> Correctives | None:
+    if not archive.has("correctives"):
+        return None
+    array = archive.array("correctives", (9 * (n_joints - 1), None, 3))
+    return Correctives(
+        Deferred(array.shape, np.float64, lambda: finite(archive, "correctives", array.values()))
+    )
+
+
+def _layout(archive: Archive, n_joints: int) -> PoseLayout | None:
+    if not archive.has("layout_starts"):
+        return None
+    starts = _finite(archive, "layout_starts", (n_joints,))
+    is_euler = _numbers(archive, "layout_is_euler", (n_joints,)).astype(np.bool_)
+    total, translation, scale = map(int, _finite(archive, "layout_counts", (3,)))
+    ends = (int(starts.max()) + 3, translation + 3 * (translation >= 0), scale + 1)
+    if starts.min() < 0 or max(ends) > total:
+        raise archive.error("layout_counts", f"expected at least {max(ends)}, found {total}")
+    return PoseLayout(total, starts.astype(np.int32), is_euler, translation, scale)
+
+
+def _hands(archive: Archive) -> list[int]:
+    return [index for index in range(_MOST_HANDS) if archive.has(f"hand_{index}_joints")]
+
+
+def _hand(archive: Archive, index: int, n_joints: int) -> Hand:
+    key = f"hand_{index}_joints"
+    joints = _numbers(archive, key, (None,))
+    if ((joints < 0) | (joints >= n_joints)).any():
+        raise archive.error(key, f"expected joints 0 to {n_joints - 1}, found others")
+    return Hand(
+        archive.text(f"hand_{index}_side"),
+        joints,
+        _finite(archive, f"hand_{index}_components", (None, None)),
+        _finite(archive, f"hand_{index}_mean", (None,)),
+    )
+
+
+def save(figure: Figure, path: str | Path, more: Mapping[str, NDArray[Any]] | None = None) -> None:
+    """Write a figure with its rig.
+
+    Parameters
+    ----------
+    figure : Figure
+        With mesh, skeleton and skin.
+    path : str or Path
+        Replaced in one step.
+    more : mapping of str to array, optional
+        Further arrays, for other programs.
+
+    Raises
+    ------
+    RigError
+        If a part is missing.
+    OutputError
+        If the file cannot be written.
+    """
+    save_arrays(path, {**figure_arrays(figure), **(more or {})})
+
+
+def figure_arrays(figure: Figure) -> dict[str, NDArray[Any]]:
+    """Return what the file holds of a figure, by key; correctives as float32.
+
+    Raises
+    ------
+    RigError
+        If it lacks mesh, skeleton or skin.
+    """
+    mesh, skeleton, skin = figure.mesh, figure.skeleton, figure.skin
+    if mesh is None or skeleton is None or skin is None:
+        raise RigError(f"figure {figure.name}: expected mesh, skeleton and skin to write a rig")
+    arrays: dict[str, NDArray[Any] | None] = {
+        "viewer_rig": np.array(_VERSION),
+        "name": np.array(figure.name),
+        "up": np.array(figure.up),
+        "unit": np.array(figure.unit),
+        "positions": mesh.positions,
+        "triangles": mesh.triangles,
+        "uvs": mesh.uvs,
+        "uv_triangles": mesh.uv_triangles,
+        "joint_names": np.array(skeleton.names),
+        "skin_starts": skin.starts,
+        "skin_joints": skin.joints,
+        "skin_weights": skin.weights,
+        "inverse_bind": skin.inverse_bind,
+    }
+    for key in _SKELETON:
+        arrays[key] = getattr(skeleton, key)
+    if figure.correctives is not None:
+        arrays["correctives"] = figure.correctives.values().astype(np.float32)
+    arrays |= _material_arrays(mesh) | _layout_arrays(figure.pose_layout)
+    for index, hand in enumerate(figure.hands):
+        arrays[f"hand_{index}_side"] = np.array(hand.side)
+        for key in ("joints", "components", "mean"):
+            arrays[f"hand_{index}_{key}"] = getattr(hand, key)
+    return {key: array for key, array in arrays.items() if array is not None}
+
+
+_SKELETON = (
+    *("parents", "rest_translations", "rest_rotations", "rest_scales"),
+    *("dof_joints", "dof_kinds", "rest_dofs", "dof_limits", "boxes"),
+)
+"""Keys that are called as in ``Skeleton``."""
+
+
+def _material_arrays(mesh: Mesh) -> dict[str, NDArray[Any]]:
+    if not mesh.materials:
+        return {}
+    arrays: dict[str, NDArray[Any]] = {
+        "material_names": np.array([material.name for material in mesh.materials]),
+        "material_textures": np.array([material.texture or "" for material in mesh.materials]),
+        "triangle_materials": mesh.material_indices,
+    }
+    for index, material in enumerate(mesh.materials):
+        if material.image is not None:
+            arrays[f"image_{index}"] = material.image
+    return arrays
+
+
+def _layout_arrays(layout: PoseLayout | None) -> dict[str, NDArray[Any]]:
+    if layout is None:
+        return {}
+    return {
+        "layout_starts": layout.starts,
+        "layout_is_euler": layout.is_euler,
+        "layout_counts": np.array([layout.n_numbers, layout.translation, layout.scale]),
+    }

@@ -1,0 +1,249 @@
+"""Lay a posed template onto a target mesh: where it is already, by landmarks, or by searching."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.rig.arrays import Floats, Ints, frozen
+from viewer.rig.transfer.icp import (
+    Cloud,
+    Triangles,
+    fit_axes,
+    iterate,
+    one_way_error,
+    slide,
+    trimmed_rms,
+)
+from viewer.rig.transfer.orientation_search import axis_turns, in_place, search
+from viewer.rig.transfer.similarity import Similarity, fit_similarity
+from viewer.rig.transfer.surface_samples import sample_surface
+
+__all__ = ["SCALES", "Alignment", "AlignmentSettings", "Posed", "align", "alignment_lines"]
+
+SCALES = ("uniform", "axes", "none")
+"""One scale; one along each axis of the target; or the template's size as it is."""
+
+_DENSE, _SAMPLES = 12_000, 2_000  # points that are searched, and that are asked for
+_ROUNDS, _SLIDES = 10, 25  # of points to points, and to planes
+_AXES_ROUNDS = 20
+_IN_PLACE = 0.03  # error over size up to which a mesh may lie in place already
+_SURELY = 0.003  # and up to which nothing better is looked for
+# Share of that error that a search must reach to move the mesh all the same: a part of a figure
+# fits nearly as well in many other places, the whole of it does not.
+_BETTER, _PART_BETTER = 0.8, 0.35
+_PART = 0.05  # of the size: how far the template is from a target that is only a part
+_BAD = 0.03  # RMS over size above which the alignment is doubtful
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Posed:
+    """A surface to align: the posed template, or the target.
+
+    Attributes
+    ----------
+    positions : (V, 3)
+        Its own unit.
+    triangles : (T, 3)
+        Vertex indices.
+    """
+
+    positions: Floats
+    triangles: Ints
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AlignmentSettings:
+    """What is known or wanted of an alignment.
+
+    Attributes
+    ----------
+    up, facing : str or None
+        The target's axes, of ``orientation_search.AXES``; None to find them.
+    scale : str
+        One of ``SCALES``.
+    landmarks : (N, 2, 3) or None
+        Three or more pairs of points of the posed template and the target. They take the place
+        of the search.
+    refines : bool
+        Whether closest points improve on landmarks or on what the search found.
+    matrix : (4, 4) or None
+        An alignment that is known, as dragged in the window: nothing is searched.
+    """
+
+    up: str | None = None
+    facing: str | None = None
+    scale: str = "uniform"
+    landmarks: Floats | None = None
+    refines: bool = True
+    matrix: Floats | None = None
+
+    def __post_init__(self) -> None:
+        if self.scale not in SCALES:
+            raise RigError(f'scale: expected {", ".join(SCALES)}, found "{self.scale}"')
+        for name, shape in (("landmarks", (None, 2, 3)), ("matrix", (4, 4))):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, frozen(name, getattr(self, name), shape))
+        if self.landmarks is not None and len(self.landmarks) < 3:
+            raise RigError(f"landmarks: expected 3 or more pairs, found {len(self.landmarks)}")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Alignment:
+    """Where the posed template lies in the target's frame.
+
+    Attributes
+    ----------
+    placed : Similarity
+        Template to target, in the target's unit; never a reflection.
+    error : float
+        Trimmed RMS distance (the best 90 %) of the target from the template, over the target's
+        size.
+    away : float
+        The same of the template from the target: large where the target is only a part.
+    how : str
+        ``"in place"``, ``"search"``, ``"landmarks"`` or ``"given"``.
+    """
+
+    placed: Similarity
+    error: float
+    away: float
+    how: str
+
+
+def align(
+    template: Posed,
+    target: Posed,
+    template_up: str,
+    settings: AlignmentSettings,
+    report: Callable[[float, str], None],
+) -> Alignment:
+    """Find the similarity that lays the template onto the target.
+
+    A target that lies in place already, in another unit or turned by quarter turns at most, is
+    left there: a fit of a part (a shirt, an open shell) would only move it away. Otherwise all
+    quarter turns are tried, each with a few rounds of closest points; the best is refined on the
+    surfaces.
+
+    Parameters
+    ----------
+    template, target : Posed
+        In the same pose, roughly.
+    template_up : "y" or "z"
+        The template's up axis.
+    settings : AlignmentSettings
+        What is known or wanted.
+    report : callable
+        Told the share that is done, and what is being done; may raise to cancel.
+
+    Returns
+    -------
+    Alignment
+        With its error.
+
+    Raises
+    ------
+    RigError
+        If a mesh has no area, landmarks lie on a line, or axes contradict each other.
+    """
+    report(0.0, "alignment")
+    fine = [Triangles(side.positions, side.triangles, _SAMPLES) for side in (template, target)]
+    if settings.matrix is not None:
+        return _judged(fine, similarity_of(settings.matrix), "given")
+    if settings.landmarks is not None:
+        fit = _landmark_fit(settings.landmarks, settings.scale)
+        return _judged(fine, _refined(fine, fit, settings, report), "landmarks")
+    coarse = [
+        Cloud(exact.samples, sample_surface(side.positions, side.triangles, _DENSE))
+        for exact, side in zip(fine, (template, target), strict=True)
+    ]
+    turns = axis_turns(template_up, settings.up, settings.facing)
+    stays = in_place(coarse[0], coarse[1], turns, scaled=settings.scale != "none")
+    report(0.1, "alignment")
+    if stays.error <= _SURELY:
+        return _judged(fine, stays.placed, "in place")
+    scale = 1.0 if settings.scale == "none" else None
+    best = search(coarse[0], coarse[1], turns, scale, lambda s: report(0.1 + 0.6 * s, "alignment"))
+    found = _judged(fine, _refined(fine, best.placed, settings, report), "search")
+    left = _judged(fine, stays.placed, "in place")
+    share = _PART_BETTER if found.away > _PART else _BETTER
+    is_better = found.error < share * left.error
+    return found if stays.error > _IN_PLACE or is_better else left
+
+
+def _landmark_fit(landmarks: Floats, scale: str) -> Similarity:
+    return fit_similarity(landmarks[:, 0], landmarks[:, 1], 1.0 if scale == "none" else None)
+
+
+def _refined(
+    fine: list[Triangles],
+    start: Similarity,
+    settings: AlignmentSettings,
+    report: Callable[[float, str], None],
+) -> Similarity:
+    if settings.refines:
+        scales = settings.scale != "none"
+        for first, improve, rounds in ((0.7, iterate, _ROUNDS), (0.85, slide, _SLIDES)):
+            report(first, "alignment")
+            start = improve(fine[0], fine[1], start, rounds, scales)
+    if settings.scale == "axes":
+        return fit_axes(fine[0], fine[1], start, _AXES_ROUNDS)
+    return start
+
+
+def _judged(fine: list[Triangles], placed: Similarity, how: str) -> Alignment:
+    towards, away = one_way_error(fine[0], fine[1], placed)
+    size = fine[1].size
+    return Alignment(placed, trimmed_rms(towards) / size, trimmed_rms(away) / size, how)
+
+
+def similarity_of(matrix: Floats) -> Similarity:
+    """Return a 4 x 4 matrix as the similarity it is.
+
+    Raises
+    ------
+    RigError
+        If it mirrors, shears, or scales one direction otherwise than another.
+    """
+    linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
+    determinant = float(np.linalg.det(linear))
+    if not determinant > 0.0:
+        raise RigError("alignment: expected a matrix that does not mirror or flatten")
+    scale = float(np.cbrt(determinant))
+    rotation = linear / scale
+    if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-6:
+        raise RigError("alignment: expected a rotation, one scale and a shift, found a shear")
+    return Similarity(scale, rotation, np.asarray(matrix)[:3, 3], np.ones(3))
+
+
+_HOW = {
+    "in place": "the target lies in place and is left there",
+    "search": "found by closest points",
+    "landmarks": "from the landmarks",
+    "given": "as given",
+}
+
+
+def alignment_lines(alignment: Alignment) -> list[str]:
+    """Return what a person should know: scale, turn, shift, error, and whether to doubt it."""
+    placed = alignment.placed
+    angle = np.degrees(np.arccos(np.clip((np.trace(placed.rotation) - 1.0) / 2.0, -1.0, 1.0)))
+    shift = ", ".join(f"{value:.4g}" for value in placed.shift + 0.0)
+    factors = ""
+    if (placed.factors != 1.0).any():
+        factors = f" (along x, y, z: {', '.join(f'{f:.4g}' for f in placed.factors)})"
+    lines = [
+        f"alignment: {_HOW[alignment.how]}; scale {placed.scale:.6g}{factors}, turned by "
+        f"{angle:.2f} degrees, shift ({shift})",
+        f"alignment error: {100.0 * alignment.error:.3f} % of the target's size (RMS of the best "
+        f"90 %; template to target {100.0 * alignment.away:.3f} %)",
+    ]
+    if alignment.error > _BAD:
+        lines.append(
+            f"warning: the alignment is doubtful, above {100.0 * _BAD:g} %: give --up, --facing "
+            "or landmarks, or pose the template like the target"
+        )
+    return lines

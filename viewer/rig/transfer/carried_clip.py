@@ -1,0 +1,81 @@
+"""A template's motions for the figure that took over its rig."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from viewer.errors import RigError
+from viewer.rig.clip import Channel, Clip
+from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.skeleton import Skeleton
+
+__all__ = ["carry_clip"]
+
+_FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
+
+
+def carry_clip(
+    clip: Clip | SampledClip, skeleton: Skeleton, length_scale: float, figure_scale: float = 1.0
+) -> Clip | SampledClip:
+    """Return a clip of the template for the rigged target.
+
+    Angles stay as they are; lengths are scaled with the figure, so that a path is as many steps
+    long as before. The clip plays in the template's own axes: up is where it was.
+
+    Parameters
+    ----------
+    clip : Clip or SampledClip
+        Of the template.
+    skeleton : Skeleton
+        The target's.
+    length_scale : float
+        Target units per unit of the template's figure space, 1 if nothing was scaled.
+    figure_scale : float
+        The scale that the template's pose gave the whole figure: it is part of the target's
+        lengths already.
+
+    Returns
+    -------
+    Clip or SampledClip
+        Of the same kind, name and timing. Shapes of captures are left out: the target has its
+        own.
+
+    Raises
+    ------
+    RigError
+        If the clip has another number of joints.
+    """
+    inside = length_scale * figure_scale
+    if isinstance(clip, Clip):
+        channels = tuple(_scaled(channel, skeleton, inside) for channel in clip.channels)
+        return replace(clip, channels=channels)
+    if clip.n_joints != skeleton.n_joints:
+        raise RigError(
+            f"clip {clip.name} has {clip.n_joints} joints, the figure has {skeleton.n_joints}"
+        )
+    places, scales, moves = clip.figure_translations, clip.figure_scales, clip.translations
+    return replace(
+        clip,
+        translations=None if moves is None else moves * inside,
+        figure_translations=None if places is None else places * length_scale,
+        figure_scales=None if scales is None else scales / figure_scale,
+        shape_weights=None,
+    )
+
+
+def _scaled(channel: Channel, skeleton: Skeleton, factor: float) -> Channel:
+    """Scale a curve of lengths: its values, and slopes that are given as numbers."""
+    if channel.target >= skeleton.n_dofs:
+        raise RigError(
+            f"a channel moves DOF {channel.target}, the figure has {skeleton.n_dofs} DOFs"
+        )
+    if skeleton.dof_kinds[channel.target] >= _FIRST_ROTATION:
+        return channel
+    tangents = tuple(
+        (
+            before if isinstance(before, str) else before * factor,
+            after if isinstance(after, str) else after * factor,
+        )
+        for before, after in channel.tangents
+    )
+    return replace(channel, values=channel.values * factor, tangents=tangents)

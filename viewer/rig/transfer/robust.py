@@ -1,0 +1,222 @@
+"""The recommended way: alignment, checked closest points, carried joints, unposing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from viewer.rig.arrays import Bools, Floats
+from viewer.rig.blendshapes import Correctives, corrective_weights
+from viewer.rig.figure import Figure
+from viewer.rig.kinematics import skinning_matrices, world_matrices
+from viewer.rig.mesh import Mesh, bounding_box, box_size, vertex_normals
+from viewer.rig.pose import Pose, joint_rotations
+from viewer.rig.skinning import deform, joint_matrices
+from viewer.rig.transfer.alignment import Alignment, Posed, align, alignment_lines
+from viewer.rig.transfer.carried_correctives import carry_correctives
+from viewer.rig.transfer.checks import (
+    check_lines,
+    joint_list,
+    newly_outside,
+    residual_of,
+    with_joint_name,
+)
+from viewer.rig.transfer.joint_carrying import boundary_weights, carry_joints, surface_shifts
+from viewer.rig.transfer.matching import Template
+from viewer.rig.transfer.rest_skeleton import RestSkeleton, fit_rest_skeleton
+from viewer.rig.transfer.result import WeightTransfer
+from viewer.rig.transfer.rigged import Rigged
+from viewer.rig.transfer.settings import Report, TransferSettings
+from viewer.rig.transfer.unposing import mend, unpose
+from viewer.rig.transfer.weights import transferred_weights
+
+__all__ = ["robust"]
+
+_JOINT_REACH = 0.08  # of the target's size: how far a surface may be from the template's
+
+
+def robust(
+    template: Figure, pose: Pose, target: Mesh, how: TransferSettings, report: Report, name: str
+) -> Rigged:
+    """Carry a rig over; see ``pipeline.transfer``, which checks what it is given.
+
+    Parameters
+    ----------
+    template : Figure
+        Attached, and already shaped.
+    pose : Pose
+        Without shape weights.
+    target : Mesh
+        With triangles.
+    how : TransferSettings
+        All but the method.
+    report : callable
+        For progress.
+    name : str
+        Of the new figure.
+    """
+    posed = deform(template, pose)[0]
+    alignment, weights = _meet(template, posed, target, how, report)
+    laid = alignment.placed.apply(posed)
+    report(0.8, "joints")
+    rest, carried, lines = _carried_skeleton(template, pose, alignment, laid, target, how)
+    report(0.85, "rest pose")
+    scale = alignment.placed.scale * pose.figure_scale
+    figure, guarded = _at_rest(template, rest, weights, target, scale, how, name)
+    report(0.95, "checks")
+    joints = joint_matrices(figure, rest.pose)[:, :3, 3]
+    out = newly_outside(template, pose, posed, target, joints, carried)
+    residual = residual_of(figure, rest.pose, np.eye(4), target)
+    lines = [
+        *alignment_lines(alignment),
+        *(with_joint_name(line, figure) for line in weights.lines),
+        *lines,
+        *rest.lines,
+        *_lost(template, figure, how),
+        *check_lines(figure, guarded, out, residual),
+    ]
+    return Rigged(
+        figure=figure,
+        pose=rest.pose,
+        placement=np.eye(4),
+        alignment=alignment,
+        weights=weights,
+        guarded=guarded,
+        residual=residual,
+        outside=out,
+        length_scale=alignment.placed.scale,
+        figure_scale=pose.figure_scale,
+        lines=tuple(lines),
+    )
+
+
+def _meet(
+    template: Figure, posed: Floats, target: Mesh, how: TransferSettings, report: Report
+) -> tuple[Alignment, WeightTransfer]:
+    """Lay the posed template onto the target, and carry its weights over."""
+    mesh, skin = template.mesh, template.skin
+    assert mesh is not None and skin is not None  # the caller looked
+    alignment = align(
+        Posed(posed, mesh.triangles),
+        Posed(target.positions, target.triangles),
+        template.up,
+        how.alignment,
+        _within(report, 0.0, 0.4),
+    )
+    weights = transferred_weights(
+        Template(alignment.placed.apply(posed), mesh.triangles),
+        skin,
+        target.positions,
+        target.triangles,
+        how.weights,
+        _within(report, 0.4, 0.8),
+    )
+    return alignment, weights
+
+
+def _within(report: Report, low: float, high: float) -> Report:
+    return lambda share, what: report(low + (high - low) * share, what)
+
+
+def _carried_skeleton(
+    template: Figure,
+    pose: Pose,
+    alignment: Alignment,
+    laid: Floats,
+    target: Mesh,
+    how: TransferSettings,
+) -> tuple[RestSkeleton, Bools | None, list[str]]:
+    """Place the joints in the target; return which were carried, and what a person should know."""
+    mesh, skeleton, skin = template.mesh, template.skeleton, template.skin
+    assert mesh is not None and skeleton is not None and skin is not None  # the caller looked
+    joints = alignment.placed.apply(joint_matrices(template, pose)[:, :3, 3])
+    if how.joints == "copied":
+        rest = fit_rest_skeleton(template, pose, alignment.placed, joints, None)
+        return rest, None, ["joints: those of the template, aligned"]
+    reach = _JOINT_REACH * box_size(bounding_box(target.positions[target.triangles.ravel()]))
+    normals = vertex_normals(laid, mesh.triangles)
+    ways, matched = surface_shifts(laid, normals, target.positions, target.triangles, reach)
+    regressor = template.joint_regressor
+    found = carry_joints(
+        joints,
+        skeleton.parents,
+        regressor or boundary_weights(skin, skeleton.parents),
+        ways,
+        matched,
+    )
+    rest = fit_rest_skeleton(template, pose, alignment.placed, found.positions, found.carried)
+    by = "the joint regressor" if regressor else "the boundaries of the joints' regions"
+    count = int(found.carried.sum())
+    line = f"joints: {count} of {skeleton.n_joints} carried by {by}"
+    missed = np.flatnonzero(found.measurable & ~found.carried).tolist()
+    if missed:
+        line += f"; too little of the target around {joint_list(template, missed)}"
+    without = int((~found.measurable).sum())
+    if without:
+        line += f"; {without} without such a boundary moved with their parents"
+    return rest, found.carried, [line]
+
+
+def _at_rest(
+    template: Figure,
+    rest: RestSkeleton,
+    weights: WeightTransfer,
+    target: Mesh,
+    scale: float,
+    how: TransferSettings,
+    name: str,
+) -> tuple[Figure, Bools]:
+    """Unpose the target and put the figure together."""
+    skin = weights.skin(rest.inverse_bind)
+    skeleton, pose = rest.skeleton, rest.pose
+    palette = skinning_matrices(world_matrices(skeleton, pose), skin.inverse_bind)
+    posed = target.positions - pose.figure_translation
+    found = unpose(posed, skin, palette)
+    positions = mend(found, posed, target.triangles) if how.mends else found.positions
+    correctives = _correctives(template, weights, target, scale) if how.correctives else None
+    if correctives is not None:
+        # What the pose adds to the rest mesh is taken off now, and added back when posing.
+        turned = joint_rotations(skeleton, pose)
+        positions = positions - correctives.displacement(corrective_weights(turned))
+    mesh = replace(target, positions=positions, normals=vertex_normals(positions, target.triangles))
+    figure = Figure(
+        name=name,
+        mesh=mesh,
+        skeleton=skeleton,
+        skin=skin,
+        up=template.up,
+        unit=template.unit if abs(scale - 1.0) < 1e-9 else "",
+        correctives=correctives,
+        hands=template.hands,
+        pose_layout=template.pose_layout,
+        facts=(("rig", f"carried over from {template.name}"),),
+    )
+    return figure, found.guarded
+
+
+def _correctives(
+    template: Figure, weights: WeightTransfer, target: Mesh, scale: float
+) -> Correctives | None:
+    if template.correctives is None or template.mesh is None or weights.points is None:
+        return None
+    return carry_correctives(
+        template.correctives,
+        weights.points,
+        template.mesh.triangles,
+        weights.matched,
+        target.positions,
+        target.triangles,
+        scale,
+    )
+
+
+def _lost(template: Figure, figure: Figure, how: TransferSettings) -> list[str]:
+    """Say what of the template the new figure does not have."""
+    lines = []
+    if template.blend_shapes is not None:
+        lines.append(f"not carried over: {template.n_shapes} shape directions of the template")
+    if template.correctives is not None and figure.correctives is None:
+        why = ", too large for this many vertices" if how.correctives else ""
+        lines.append(f"pose correctives of the template: left out{why}")
+    return lines

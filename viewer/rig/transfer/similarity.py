@@ -1,0 +1,110 @@
+"""Moving one set of points onto another: rotation, shift and one scale, never a reflection."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.rig.arrays import Floats, frozen
+
+__all__ = ["Similarity", "fit_similarity"]
+
+_ON_LINE = 1e-6  # second over first extent: points nearer to a line than this leave a free turn
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Similarity:
+    """A map of points, p' = F s R p + t, F = diag(factors).
+
+    Attributes
+    ----------
+    scale : float
+        The same for all axes.
+    rotation : (3, 3)
+        Proper, applied first.
+    shift : (3,)
+        In the unit of the space mapped to.
+    factors : (3,)
+        Further scales along the axes of the space mapped to; their product is 1.
+    """
+
+    scale: float
+    rotation: Floats
+    shift: Floats
+    factors: Floats
+
+    def __post_init__(self) -> None:
+        for name, shape in (("rotation", (3, 3)), ("shift", (3,)), ("factors", (3,))):
+            object.__setattr__(self, name, frozen(name, getattr(self, name), shape))
+        if not 0.0 < self.scale < np.inf:
+            raise RigError(f"alignment: expected a scale above 0, found {self.scale:g}")
+
+    @property
+    def linear(self) -> Floats:
+        """F s R: (3, 3)."""
+        return (self.scale * self.factors)[:, None] * self.rotation
+
+    @property
+    def matrix(self) -> Floats:
+        """The whole map for column vectors: (4, 4)."""
+        matrix = np.eye(4)
+        matrix[:3, :3] = self.linear
+        matrix[:3, 3] = self.shift
+        return matrix
+
+    def apply(self, points: Floats) -> Floats:
+        """Map points (..., 3)."""
+        return points @ self.linear.T + self.shift
+
+    def undo(self, points: Floats) -> Floats:
+        """Map points (..., 3) of the space mapped to back."""
+        return (points - self.shift) / (self.scale * self.factors) @ self.rotation
+
+
+def fit_similarity(points: Floats, targets: Floats, scale: float | None = None) -> Similarity:
+    """Return the similarity that brings points nearest to their partners, in least squares.
+
+    With means removed, sum_i q_i p_i^T = U D V^T, R = U S V^T with S = diag(1, 1, det(U V^T)),
+    s = tr(D S) / sum |p_i|^2, t = mean q - s R mean p (Umeyama 1991, eqs. 39 to 43).
+
+    Parameters
+    ----------
+    points, targets : (N, 3)
+        Pairs, N >= 3.
+    scale : float, optional
+        Kept as it is; found if omitted.
+
+    Returns
+    -------
+    Similarity
+        With all factors 1.
+
+    Raises
+    ------
+    RigError
+        If there are fewer than three pairs, or the points lie on a line: then any turn about it
+        fits equally well.
+
+    >>> corners = np.eye(3)
+    >>> found = fit_similarity(corners, 2.0 * corners[[1, 2, 0]])
+    >>> round(found.scale, 12), found.rotation.round(12)[:, 0].tolist()
+    (2.0, [0.0, 1.0, 0.0])
+    """
+    if len(points) < 3 or len(points) != len(targets):
+        raise RigError(
+            f"alignment: expected 3 or more pairs of points, found {len(points)} and {len(targets)}"
+        )
+    from_mean, to_mean = points.mean(axis=0), targets.mean(axis=0)
+    p, q = points - from_mean, targets - to_mean
+    for cloud in (p, q):
+        extents = np.linalg.svd(cloud, compute_uv=False)
+        if extents[1] <= _ON_LINE * extents[0]:
+            raise RigError("alignment: expected points in a plane or in space, found them in line")
+    left, values, right = np.linalg.svd(q.T @ p)
+    signs = np.array([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
+    rotation = (left * signs) @ right
+    found = float(values @ signs / np.einsum("na,na->", p, p)) if scale is None else scale
+    shift = to_mean - found * rotation @ from_mean
+    return Similarity(found, rotation, shift, np.ones(3))

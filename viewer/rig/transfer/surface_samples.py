@@ -1,0 +1,84 @@
+"""Points spread evenly over a surface: what alignments are judged by."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.rig.arrays import Floats, Ints, frozen
+from viewer.rig.mesh import triangle_areas
+from viewer.rig.vectors import unit
+
+__all__ = ["SurfaceSamples", "sample_surface", "triangle_normals"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SurfaceSamples:
+    """Points of a surface, and which way it faces there.
+
+    Attributes
+    ----------
+    positions : (N, 3)
+        The mesh's unit.
+    normals : (N, 3)
+        Unit normals of the triangles they lie on.
+    """
+
+    positions: Floats
+    normals: Floats
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "positions", frozen("positions", self.positions, (None, 3)))
+        shape = (len(self.positions), 3)
+        object.__setattr__(self, "normals", frozen("normals", self.normals, shape))
+
+
+def triangle_normals(positions: Floats, triangles: Ints) -> Floats:
+    """Return unit normals of triangles, 0 for one without area: (T, 3)."""
+    a, b, c = (positions[triangles[:, corner]] for corner in range(3))
+    return unit(np.cross(b - a, c - a))
+
+
+def sample_surface(positions: Floats, triangles: Ints, count: int) -> SurfaceSamples:
+    """Return points of a surface, equally many for equal areas; the same for the same mesh.
+
+    Places along the summed areas are evenly spaced, so every triangle gets its share, rounded
+    up or down. Within a triangle the point is a (1 - sqrt u) + b sqrt u (1 - v) + c v sqrt u
+    (Turk 1990), with u and v from the R2 sequence (multiples of the plastic number's powers).
+
+    Parameters
+    ----------
+    positions : (V, 3)
+        Any unit.
+    triangles : (T, 3)
+        Vertex indices.
+    count : int
+        N.
+
+    Returns
+    -------
+    SurfaceSamples
+        N points.
+
+    Raises
+    ------
+    RigError
+        If no triangle has an area.
+    """
+    areas = triangle_areas(positions, triangles)
+    total = np.cumsum(areas)
+    if len(areas) == 0 or not total[-1] > 0.0:
+        raise RigError("expected a mesh with an area to align, found none")
+    places = (np.arange(count) + 0.5) / count * total[-1]
+    chosen = np.minimum(np.searchsorted(total, places), len(areas) - 1)
+    plastic = 1.32471795724474602596  # the real root of x^3 = x + 1
+    u, v = (np.arange(1, count + 1) * plastic**-power % 1.0 for power in (1, 2))
+    root = np.sqrt(u)
+    weights = np.stack([1.0 - root, root * (1.0 - v), root * v], axis=1)
+    corners = positions[triangles[chosen]]
+    return SurfaceSamples(
+        np.einsum("nk,nka->na", weights, corners),
+        triangle_normals(positions, triangles[chosen]),
+    )
