@@ -12,6 +12,7 @@ import viewer
 from viewer.errors import FormatError, RigError
 from viewer.formats import Source, detect, read
 from viewer.formats.rigged import figure_arrays, save
+from viewer.rig.annotations import VertexField
 from viewer.rig.blendshapes import Correctives
 from viewer.rig.figure import Figure
 from viewer.rig.hands import Hand
@@ -50,6 +51,10 @@ def figure() -> Figure:
         correctives=Correctives(np.arange(108.0).reshape(9, 4, 3) / 8.0),
         hands=(Hand("left", np.array([1]), np.ones((2, 3)), np.zeros(3)),),
         pose_layout=PoseLayout(10, np.array([3, 6]), np.array([True, False]), 0, 9),
+        fields=(
+            VertexField("how", "How found", np.array([0, 1, 1, 0]), names=("near", "filled")),
+            VertexField("far", "How far", np.array([0.5, 0, 2, 1]), "length"),
+        ),
     )
 
 
@@ -70,7 +75,7 @@ def same(found, wanted):
 
 def test_everything_that_is_written_is_read(tmp_path):
     path, wanted = tmp_path / "scan.npz", figure()
-    save(wanted, path, {"confidence": np.zeros(4)})
+    save(wanted, path, {"alignment": np.eye(4)})
     source = Source.open(path)
     assert detect(source) == "rigged"
     found = read(source)
@@ -79,6 +84,9 @@ def test_everything_that_is_written_is_read(tmp_path):
     for part in ("skeleton", "skin", "pose_layout"):
         same(getattr(found, part), getattr(wanted, part))
     same(found.hands[0], wanted.hands[0])
+    assert len(found.fields) == 2
+    for one, other in zip(found.fields, wanted.fields, strict=True):
+        same(one, other)
     for part in ("positions", "normals", "triangles", "uvs", "uv_triangles", "triangle_materials"):
         assert_array_equal(getattr(found.mesh, part), getattr(wanted.mesh, part))
     assert [(m.name, m.texture) for m in found.mesh.materials] == [

@@ -14,7 +14,7 @@ from viewer.export import export
 from viewer.formats import all_or_none
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor, figure_pose
-from viewer.rig.transfer.rigged import CONFIDENCE, Rigged
+from viewer.rig.transfer.rigged import Rigged
 
 __all__ = ["files_of", "write_rigged"]
 
@@ -105,8 +105,4 @@ def _arrays(rigged: Rigged) -> dict[str, NDArray[Any]]:
         "target_place": np.append(pose.figure_translation, pose.figure_scale),
         "placement": rigged.placement,
         "alignment": placed,
-        "confidence": rigged.confidence,
-        "confidence_names": np.array(CONFIDENCE),
-        "distances": rigged.weights.distances,
-        "guarded": rigged.guarded,
     }

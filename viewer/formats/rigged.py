@@ -11,11 +11,13 @@
     inverse_bind (J, 4, 4)   correctives (9 (J - 1), V, 3)
     layout_starts (J,)   layout_is_euler (J,)   layout_counts (3,): numbers, translation, scale
     hand_0_side ()   hand_0_joints (H,)   hand_0_components (C, 3 H)   hand_0_mean (3 H,) …
+    field_0_name ()   field_0_title ()   field_0_unit ()   field_0_values (V,)
+    field_0_names (N,) …
 
 Rotations are (x, y, z, w); matrices are for column vectors. ``dof_kinds`` are 0 to 2 for
 translations, 3 to 5 for rotations about x, y, z. What ``viewer rig`` adds is for other programs,
 and not read: ``target_dofs``, ``target_translations``, ``target_rotations``, ``target_scales``,
-``target_place``, ``placement``, ``alignment``, ``confidence``, ``distances``, ``guarded``.
+``target_place``, ``placement``, ``alignment``.
 """
 
 from __future__ import annotations
@@ -32,6 +34,7 @@ from viewer.formats._archive import Archive
 from viewer.formats._container import archive_of, finite
 from viewer.formats._save import save_arrays
 from viewer.formats._source import Source
+from viewer.rig.annotations import VertexField
 from viewer.rig.arrays import Deferred, Floats
 from viewer.rig.blendshapes import Correctives
 from viewer.rig.figure import Figure
@@ -85,6 +88,7 @@ def read(source: Source) -> Figure:
             correctives=_correctives(archive, count),
             hands=tuple(_hand(archive, index, count) for index in _hands(archive)),
             pose_layout=_layout(archive, count),
+            fields=_fields(archive),
         )
     except RigError as problem:
         raise source.error(str(problem)) from None
@@ -204,6 +208,22 @@ def _hand(archive: Archive, index: int, n_joints: int) -> Hand:
     )
 
 
+def _fields(archive: Archive) -> tuple[VertexField, ...]:
+    fields = []
+    while archive.has(f"field_{len(fields)}_values"):
+        key = f"field_{len(fields)}"
+        fields.append(
+            VertexField(
+                name=archive.text(f"{key}_name"),
+                title=archive.text(f"{key}_title"),
+                values=_finite(archive, f"{key}_values", (None,)),
+                unit=archive.text(f"{key}_unit"),
+                names=_texts(archive, f"{key}_names") if archive.has(f"{key}_names") else (),
+            )
+        )
+    return tuple(fields)
+
+
 def save(figure: Figure, path: str | Path, more: Mapping[str, NDArray[Any]] | None = None) -> None:
     """Write a figure with its rig.
 
@@ -261,6 +281,7 @@ def figure_arrays(figure: Figure) -> dict[str, NDArray[Any]]:
         arrays[f"hand_{index}_side"] = np.array(hand.side)
         for key in ("joints", "components", "mean"):
             arrays[f"hand_{index}_{key}"] = getattr(hand, key)
+    arrays |= _field_arrays(figure)
     return {key: array for key, array in arrays.items() if array is not None}
 
 
@@ -269,6 +290,17 @@ _SKELETON = (
     *("dof_joints", "dof_kinds", "rest_dofs", "dof_limits", "boxes"),
 )
 """Keys that are called as in ``Skeleton``."""
+
+
+def _field_arrays(figure: Figure) -> dict[str, NDArray[Any]]:
+    arrays: dict[str, NDArray[Any]] = {}
+    for index, field in enumerate(figure.fields):
+        for key in ("name", "title", "unit"):
+            arrays[f"field_{index}_{key}"] = np.array(getattr(field, key))
+        arrays[f"field_{index}_values"] = field.values
+        if field.names:
+            arrays[f"field_{index}_names"] = np.array(field.names)
+    return arrays
 
 
 def _material_arrays(mesh: Mesh) -> dict[str, NDArray[Any]]:

@@ -9,7 +9,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh
 from viewer.rig.pose import Pose
 from viewer.rig.shape import shaped
-from viewer.rig.transfer.rigged import Rigged
+from viewer.rig.transfer.rigged import Rigged, with_fields
 from viewer.rig.transfer.robust import robust
 from viewer.rig.transfer.seed import nearest
 from viewer.rig.transfer.settings import METHODS, Report, TransferSettings
@@ -71,7 +71,7 @@ def transfer(
     else:
         rigged = robust(figure, plain, target, how, tell, name)
     tell(1.0, "done")
-    return rigged
+    return with_fields(rigged)
 
 
 def _silent(share: float, what: str) -> None:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from viewer.rig.annotations import VertexField
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.clip import Clip
 from viewer.rig.figure import Figure
@@ -15,7 +16,7 @@ from viewer.rig.transfer.alignment import Alignment
 from viewer.rig.transfer.carried_clip import carry_clip
 from viewer.rig.transfer.result import WeightTransfer
 
-__all__ = ["CONFIDENCE", "Rigged", "clip_for"]
+__all__ = ["CONFIDENCE", "Rigged", "clip_for", "with_fields"]
 
 CONFIDENCE = ("matched", "filled", "rigid")
 """How a vertex came to its weights: from the template's surface under it, from its neighbours,
@@ -68,6 +69,21 @@ class Rigged:
         """Index into ``CONFIDENCE`` of every vertex: (V,) int32."""
         weights = self.weights
         return np.where(weights.matched, 0, np.where(weights.filled, 1, 2)).astype(np.int32)
+
+
+def with_fields(rigged: Rigged) -> Rigged:
+    """Return the same with a figure whose fields say how sure each vertex is.
+
+    ``"confidence"`` is the way a vertex came to its weights, ``"distance"`` how far it was from
+    the template's surface as it was laid onto it, ``"guarded"`` where its rest position is a
+    guess.
+    """
+    fields = (
+        VertexField("confidence", "How weights were found", rigged.confidence, names=CONFIDENCE),
+        VertexField("distance", "Distance to the template", rigged.weights.distances, "length"),
+        VertexField("guarded", "Rest position", rigged.guarded, names=("exact", "guarded")),
+    )
+    return replace(rigged, figure=replace(rigged.figure, fields=fields))
 
 
 def clip_for(rigged: Rigged, clip: Clip | SampledClip) -> Clip | SampledClip:
