@@ -121,7 +121,7 @@ def test_parts_that_a_figure_lacks_are_left_out(tmp_path):
 def test_figure_without_a_rig_is_not_written(tmp_path, part):
     lacking = {"skin": None, part: None, "correctives": None}
     with pytest.raises(RigError) as problem:
-        save(replace(figure(), **lacking), tmp_path / "x.npz")
+        save(replace(figure(), fields=(), **lacking), tmp_path / "x.npz")
     assert str(problem.value) == "figure scan: expected mesh, skeleton and skin to write a rig"
     assert list(tmp_path.iterdir()) == []
 
