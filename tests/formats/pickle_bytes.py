@@ -156,7 +156,8 @@ def fake_class(monkeypatch: pytest.MonkeyPatch, module: str, name: str) -> type:
     parts = module.split(".")
     for count in range(1, len(parts) + 1):
         path = ".".join(parts[:count])
-        monkeypatch.setitem(sys.modules, path, sys.modules.get(path) or ModuleType(path))
+        # The real ones, where another test has imported them, warn or refuse.
+        monkeypatch.setitem(sys.modules, path, ModuleType(path))
     monkeypatch.setattr(sys.modules[module], name, made, raising=False)
     return made
 

@@ -9,14 +9,20 @@ from pathlib import Path
 from viewer.app.jobs import ThreadJob
 from viewer.app.state import AppState
 from viewer.errors import OutputError, RigError, ViewerError, printable
-from viewer.export import EXPORTERS, MotionOptions, export_take, refuse_inputs, suited_exporter
+from viewer.export import (
+    EXPORTERS,
+    MotionOptions,
+    export_take,
+    refuse_inputs,
+    suited_exporter,
+    take_for,
+)
 from viewer.export._motion_paths import motion_paths
 from viewer.formats import all_or_none
 from viewer.rig.clip import Clip
 from viewer.rig.points import PointClip
 from viewer.rig.sampled_clip import SampledClip
 from viewer.rig.scene import Actor, Scene
-from viewer.rig.take import upright_take
 
 _MANY = (".obj",)  # a file for each frame: the command line writes them
 _FRAMES = "smpl"  # the folder of frames within a capture's folder
@@ -138,7 +144,7 @@ def _parts(state: AppState, path: Path, everyone: bool) -> tuple[list[_Part], li
 def _write(scene: Scene, parts: Sequence[_Part], key: str, options: MotionOptions) -> list[str]:
     lines: list[str] = []
     for part in parts:
-        take, up = upright_take(scene, part.actor, part.rate, part.frames)
+        take, up = take_for(key, options, scene, part.actor, part.rate, part.frames)
         lines += export_take(take, part.path, key, replace(options, world_up=up))
     return lines
 
@@ -149,7 +155,9 @@ def _write_capture(
     """Write everybody into one folder."""
     from viewer.export.easymocap import export_takes
 
-    found = [upright_take(scene, part.actor, part.rate, part.frames) for part in parts]
+    found = [
+        take_for("easymocap", options, scene, part.actor, part.rate, part.frames) for part in parts
+    ]
     ups = sorted({up for _, up in found})
     if len(ups) > 1:
         raise RigError(f"expected one up axis for all people, found {' and '.join(ups)}")

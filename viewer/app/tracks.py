@@ -120,8 +120,8 @@ def bars(places: Sequence[float], narrowest: float, end: float) -> list[tuple[fl
     end : float
         The right end of all.
 
-    >>> bars([0, 9, 20, 20, 22, 30, 40, 40], 5, 40)
-    [(0, 9), (16, 21), (22, 30), (35, 40)]
+    >>> bars([0.0, 9.0, 20.0, 20.0, 22.0, 30.0, 40.0, 40.0], 5.0, 40.0)
+    [(0.0, 9.0), (16.0, 21.0), (22.0, 30.0), (35.0, 40.0)]
     """
     found: list[tuple[float, float]] = []
     for number in range(0, len(places), 2):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 from viewer.commands._frame_numbers import numbering_of, parse_range
 from viewer.commands._numbers import number
@@ -16,6 +15,7 @@ from viewer.export import (
     export_take,
     motion_exporters,
     suited_exporter,
+    take_for,
 )
 from viewer.export._motion_paths import motion_paths
 from viewer.export._options import GAPS, ROTATION_ORDERS
@@ -27,7 +27,7 @@ from viewer.rig.points import PointClip
 from viewer.rig.sampled_clip import SampledClip
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import Skinning
-from viewer.rig.take import Take, upright_take
+from viewer.rig.take import Take
 from viewer.rig.units import METRES
 
 __all__ = [
@@ -124,9 +124,10 @@ def write_motions(
     actors = moving_actors(scene)
     parts = []
     for actor, path in zip(actors, motion_paths(output, actors), strict=True):
-        sample = upright_point_take if isinstance(actor.clip, PointClip) else upright_take
         frames = _frames(arguments, actor)
-        take, up = sample(scene, actor, arguments.fps, frames, arguments.fill_gaps)
+        how = (scene, actor, arguments.fps, frames, arguments.fill_gaps)
+        is_points = isinstance(actor.clip, PointClip)
+        take, up = upright_point_take(*how) if is_points else take_for(key, options, *how)
         parts.append(_Part(actor, take, up, path))
     there = [part for part in parts if part.present.any()]
     if not there:
@@ -143,7 +144,7 @@ class _Part:
 
     actor: Actor
     take: Take | PointTake
-    up: Literal["y", "z"]
+    up: str
     path: Path
 
     @property

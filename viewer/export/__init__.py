@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 
 from viewer.errors import RigError, UnsupportedFormatError
 from viewer.export._options import MotionOptions
 from viewer.formats._save import refuse_inputs
 from viewer.rig.figure import Figure
-from viewer.rig.scene import Actor
+from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import Skinning
 from viewer.rig.smpl_family import member_of
-from viewer.rig.take import Take
+from viewer.rig.take import Take, own_take, upright_take
 
 __all__ = [
     "EXPORTERS",
@@ -26,6 +28,7 @@ __all__ = [
     "motion_exporters",
     "refuse_inputs",
     "suited_exporter",
+    "take_for",
 ]
 
 
@@ -43,12 +46,15 @@ class Exporter:
         Whether its module has ``export(actor, path, skinning)``.
     writes_motion : bool
         Whether its module has ``export_take(take, path, options)``.
+    keeps_world : bool
+        Whether it writes a motion as its own world has it, even where people hang head down.
     """
 
     title: str
     suffixes: tuple[str, ...]
     writes_pose: bool = True
     writes_motion: bool = False
+    keeps_world: bool = False
 
 
 EXPORTERS = {
@@ -63,10 +69,18 @@ EXPORTERS = {
     "gltf": Exporter("glTF: mesh, skin and motion", (".glb", ".gltf"), writes_motion=True),
     "bvh": Exporter("BVH: skeleton and motion", (".bvh",), writes_pose=False, writes_motion=True),
     "amass": Exporter(
-        "AMASS: parameters of the SMPL family", (".npz",), writes_pose=False, writes_motion=True
+        "AMASS: parameters of the SMPL family",
+        (".npz",),
+        writes_pose=False,
+        writes_motion=True,
+        keeps_world=True,
     ),
     "easymocap": Exporter(
-        "EasyMocap: a folder of frames", ("/",), writes_pose=False, writes_motion=True
+        "EasyMocap: a folder of frames",
+        ("/",),
+        writes_pose=False,
+        writes_motion=True,
+        keeps_world=True,
     ),
 }
 """Modules in this folder, each with ``export(actor, path, skinning)``."""
@@ -186,6 +200,34 @@ def export_take(take: Take, path: str | Path, key: str, options: MotionOptions) 
     return notes
 
 
+def take_for(
+    key: str,
+    options: MotionOptions,
+    scene: Scene,
+    actor: Actor,
+    rate: float | None = None,
+    frames: tuple[int, int | None] | None = None,
+    fill: bool = False,
+) -> tuple[Take, str]:
+    """Sample an actor's clip as an exporter wants it, and return what is up in it.
+
+    What comes from a capture goes back as it was, unless another up axis is asked for; other
+    formats want people who stand.
+
+    Parameters
+    ----------
+    key : str
+        Of ``EXPORTERS``.
+    options : MotionOptions
+        Whether an up axis is asked for.
+    scene, actor, rate, frames, fill
+        As for ``viewer.rig.take.upright_take``.
+    """
+    is_own = EXPORTERS[key].keeps_world and not options.up
+    sample = own_take if is_own else upright_take
+    return sample(scene, actor, rate, frames, fill)
+
+
 def files_written(path: str | Path) -> list[Path]:
     """Return all files that an export to ``path`` writes: a rig is two, and so is a ``.gltf``.
 
@@ -206,3 +248,19 @@ def require_mesh(actor: Actor, what: str) -> None:
     """Refuse a figure without a mesh in words that name the format."""
     if actor.figure.mesh is None:
         raise RigError(f"figure {actor.figure.name} has no mesh to write as {what}")
+
+
+class _CallableModule(ModuleType):
+    """Lets ``viewer.export(actor, path)`` work whoever imported this package first.
+
+    Python binds a package's name in its parent when it is imported, over the function of the
+    same name that ``viewer`` offers.
+    """
+
+    def __call__(
+        self, actor: Actor, path: str | Path, skinning: Skinning | None = None
+    ) -> list[str]:
+        return export(actor, path, skinning)
+
+
+sys.modules[__name__].__class__ = _CallableModule

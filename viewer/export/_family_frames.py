@@ -115,10 +115,12 @@ def up_axis(options: MotionOptions) -> str:
     Raises
     ------
     RigError
-        If it is neither y nor z.
+        If it is neither y nor z; that of the scene may point down.
     """
+    if options.up not in ("", "y", "z"):
+        raise RigError(f'up axis: expected y or z, found "{options.up}"')
     up = options.up or options.world_up
-    if up not in ("y", "z"):
+    if up not in ("y", "z", "-y", "-z"):
         raise RigError(f'up axis: expected y or z, found "{up}"')
     return up
 

@@ -16,7 +16,9 @@ GAPS = {
     "interpolate": "rotations on the shorter arc between the frames around",
     "split": "one file for each run of frames",
 }
-"""What formats that know no missing frames write for them."""
+"""What is written for missing frames."""
+
+_CLOSED = "hold"  # the way of formats that know no missing frames
 
 
 @dataclass(slots=True)
@@ -32,13 +34,15 @@ class MotionOptions:
     rotation_order : str
         One of ``ROTATION_ORDERS``.
     gaps : str
-        A key of ``GAPS``.
+        A key of ``GAPS``; empty for the format's default: missing frames are left out where the
+        format can do so, and held where it cannot.
     rest_frame : bool
         Put the rest pose before the first frame.
     digits : int
         Decimals of text formats.
-    world_up : "y" or "z"
-        The axis that points up in the scene the take comes from.
+    world_up : "y", "z", "-y" or "-z"
+        The axis that points up in the world of the take; the last two only for exporters that
+        keep that world.
     skinning : Skinning
         How joints move the mesh, where vertices are written.
     """
@@ -46,8 +50,13 @@ class MotionOptions:
     unit: str = ""
     up: str = ""
     rotation_order: str = "zyx"
-    gaps: str = "hold"
+    gaps: str = ""
     rest_frame: bool = False
     digits: int = 6
     world_up: str = "y"
     skinning: Skinning = field(default_factory=Skinning)
+
+    @property
+    def closing(self) -> str:
+        """How gaps are closed in formats that know no missing frames: a key of ``GAPS``."""
+        return self.gaps or _CLOSED

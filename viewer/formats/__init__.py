@@ -111,7 +111,6 @@ FORMATS = {
     ),
     "ply": Format("mesh (PLY)", (".ply",), rb"\Aply[ \t]*[\r\n]", writes=False),
     "bvh": Format("BVH motion", (".bvh",), rb"(?i:\A\s*HIERARCHY\b)", writes=False),
-    "rigged": Format("rigged mesh", (".npz",), keys=("viewer_rig",), writes=False),
     "smpl": Format(
         "SMPL family",
         (".npz", ".pkl"),
@@ -134,6 +133,7 @@ FORMATS = {
         ),
         writes=False,
     ),
+    "rigged": Format("rigged mesh", (".npz",), keys=("viewer_rig",), writes=False),
     "easymocap": Format(
         "EasyMocap recording",
         (".json",),

@@ -322,7 +322,7 @@ def _timed_rows(archive: Archive, count: int, first: str) -> Ints:
 
 def _up(archive: Archive, is_aist: bool) -> str:
     said = _text(archive, "up")
-    if said in ("y", "z"):
+    if said in ("y", "z", "-y", "-z"):
         return said
     if is_aist:
         return "y"

@@ -209,7 +209,7 @@ def _hand(archive: Archive, index: int, n_joints: int) -> Hand:
 
 
 def _fields(archive: Archive) -> tuple[VertexField, ...]:
-    fields = []
+    fields: list[VertexField] = []
     while archive.has(f"field_{len(fields)}_values"):
         key = f"field_{len(fields)}"
         fields.append(

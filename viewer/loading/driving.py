@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -161,9 +162,25 @@ def _give_body_motion(
     except RigError as problem:
         raise RigError(f"{printable(path, 300)}: {problem} (--model names the model)") from None
     cast.notes += [f"{printable(path, 300)}: {note}" for note in notes]
-    up = settings.up or motion.up or model.up
-    placement = rotation_transform(0, np.pi) if up.startswith("-") else np.eye(4)
-    cast.add(Actor(model, clip=clip, placement=placement), up[-1], placed=False)
+    actor = Actor(model, clip=clip)
+    up = settings.up or motion.up
+    if not up:
+        up = _judged_up(path, [actor], cast)
+    if up.startswith("-"):
+        actor.placement = rotation_transform(0, np.pi)
+    cast.add(actor, up[-1], placed=False)
+
+
+def _judged_up(path: Path, actors: Sequence[Actor], cast: Cast, usual: str = "") -> str:
+    """Return what is up, judged by the people, and say so unless it is what is usual."""
+    from viewer.rig.up_axis import guess_up
+
+    up = guess_up(actors)
+    if up != usual:
+        turned = ", so all is turned over" if up.startswith("-") else ""
+        text = f"taken for {up} up, judged by the people{turned}; --up sets it"
+        cast.notes.append(f"{printable(path, 300)}: {text}")
+    return up
 
 
 def _begin_capture(
@@ -175,8 +192,6 @@ def _begin_capture(
     is_bundled: bool,
 ) -> None:
     """Read a capture until somebody is seen; the rest is read later."""
-    from viewer.rig.up_axis import guess_up
-
     builder = Builder(capture, model, keeps_shape=not is_bundled)
     cast.notes += capture.warnings
     while not builder.actors and not builder.is_done:
@@ -186,7 +201,8 @@ def _begin_capture(
             raise builder.refusal(problem) from None
     if is_bundled and any(actor.figure is model for actor in builder.actors):
         cast.notes.append(_on_bundled(path, builder.has_shape))
-    up = settings.up or capture.up or guess_up(builder.actors)
+    # EasyMocap's usual calibration has z up, which needs no word.
+    up = settings.up or capture.up or _judged_up(path, builder.actors, cast, usual="z")
     builder.place(up)
     turn = builder.placement[:3, :3].T
     cast.views += [replace(view, rotation=view.rotation @ turn) for view in capture.views]

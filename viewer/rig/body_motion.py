@@ -47,7 +47,7 @@ class BodyMotion:
         Coefficients of the hands' principal components, instead of finger joints.
     flat_hands : bool
         Whether ``hands`` leave the mean hand out.
-    up : "y", "z" or ""
+    up : "y", "z", "-y", "-z" or ""
         The axis that points up in the world; empty if unknown.
     facts : tuple of (str, str)
         What the file says beside, for ``viewer info``.

@@ -18,7 +18,7 @@ from viewer.rig.sampled_clip import SampledClip
 from viewer.rig.scene import Actor, Motion, Scene
 from viewer.rig.upright import own_up
 
-__all__ = ["Take", "frame_range", "take_of", "upright_take"]
+__all__ = ["Take", "frame_range", "own_take", "take_of", "upright_take"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,6 +105,33 @@ def frame_range(
         found = f"{first} to {'the end' if asked is None else asked}"
         raise RigError(f"frames: expected a range within 0 to {count}, found {found}")
     return first, stop
+
+
+def own_take(
+    scene: Scene,
+    actor: Actor,
+    rate: float | None = None,
+    frames: tuple[int, int | None] | None = None,
+    fill: bool = False,
+) -> tuple[Take, str]:
+    """Sample an actor's clip in its own world, for formats that keep a capture's numbers.
+
+    Parameters
+    ----------
+    scene : Scene
+        Says what is up.
+    actor, rate, frames, fill
+        As for ``take_of``. Where the actor stands in the scene is left out.
+
+    Returns
+    -------
+    take : Take
+        Its frames.
+    up : "y", "z", "-y" or "-z"
+        The axis that points up in them.
+    """
+    up, hangs = own_up(scene, actor)
+    return take_of(actor, rate, frames, fill), f"-{up}" if hangs else up
 
 
 def upright_take(

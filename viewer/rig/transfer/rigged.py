@@ -78,10 +78,12 @@ def with_fields(rigged: Rigged) -> Rigged:
     the template's surface as it was laid onto it, ``"guarded"`` where its rest position is a
     guess.
     """
+    confidence = rigged.confidence.astype(np.float64)
+    guarded = rigged.guarded.astype(np.float64)
     fields = (
-        VertexField("confidence", "How weights were found", rigged.confidence, names=CONFIDENCE),
+        VertexField("confidence", "How weights were found", confidence, names=CONFIDENCE),
         VertexField("distance", "Distance to the template", rigged.weights.distances, "length"),
-        VertexField("guarded", "Rest position", rigged.guarded, names=("exact", "guarded")),
+        VertexField("guarded", "Rest position", guarded, names=("exact", "guarded")),
     )
     return replace(rigged, figure=replace(rigged.figure, fields=fields))
 
