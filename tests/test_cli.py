@@ -79,6 +79,12 @@ def test_usage_error_is_one_line(arguments, capsys, tmp_path, monkeypatch):
     assert "--help" in captured.err and not captured.out
 
 
+@pytest.mark.parametrize("words", [["--up", "-z"], ["--up=-z"], ["--up", "-y"]])
+def test_downward_axes_may_follow_a_blank(words, rig, capsys):
+    assert run(["info", *words, *map(str, rig)]) == 0
+    assert capsys.readouterr().err == ""
+
+
 def test_word_that_is_no_command_is_taken_for_a_file(capsys):
     assert run(["infoo"]) == 2
     assert "infoo" in capsys.readouterr().err

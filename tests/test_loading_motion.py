@@ -111,6 +111,41 @@ def test_without_a_model_the_bundled_body_is_used_and_said(recording):
     assert any("drawn with the bundled body" in text for text in scene.warnings)
 
 
+def test_bundled_body_has_neither_shapes_nor_expressions_of_the_files(tmp_path):
+    for name, extra, lost in (
+        (
+            "a",
+            {"shapes": [[1.0] * 10]},
+            ", without the shapes of the files, which mean nothing to it",
+        ),
+        (
+            "b",
+            {"shapes": [[1.0] * 10], "expression": [[0.0] * 10]},
+            ", without the shapes and expressions of the files, which mean nothing to it",
+        ),
+        ("c", {}, ""),
+    ):
+        folder = tmp_path / name / "smpl"
+        folder.mkdir(parents=True)
+        (folder / "000000.json").write_text(json.dumps([person(0, 0.0) | extra]))
+        text = f"{tmp_path / name}: drawn with the bundled body{lost} (--model names another)"
+        assert load(tmp_path / name).warnings == (text,)
+
+
+def test_people_without_any_shapes_are_said_once(tmp_path, smpl):
+    folder = tmp_path / "output" / "smpl"
+    folder.mkdir(parents=True)
+    people = [person(0, 0.0), person(7, 5.0)]
+    for record in people:
+        del record["shapes"]
+    for frame in range(300):  # read in several parts
+        (folder / f"{frame:06}.json").write_text(json.dumps(people))
+    text = "output: no shapes in the files: all have the model's mean shape"
+    assert load(tmp_path / "output", smpl).warnings == (text,)
+    (folder / "000299.json").write_text(json.dumps([person(0, 0.0), people[1]]))
+    assert text not in load(tmp_path / "output", smpl).warnings
+
+
 def test_frame_rate_is_that_asked_for(recording, smpl):
     scene = load(recording, smpl, motion=MotionSettings(frame_rate=50.0))
     assert scene.actors[0].clip.end == pytest.approx(3 / 50)

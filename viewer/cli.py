@@ -27,6 +27,8 @@ exit codes: 0 done, 1 lint found or diff measured too much, 2 bad input, 4 no us
 5 output could not be written
 """
 
+_DOWNWARD = ("-y", "-z")  # axes that point up the other way; no option has these letters
+
 
 class _Terminated(BaseException):
     """SIGTERM arrived; unwinds like Ctrl-C, so that no temporary file stays behind."""
@@ -101,10 +103,11 @@ class _Parser(argparse.ArgumentParser):
 
 
 def _protect_numbers(arguments: list[str]) -> list[str]:
-    """Join ``--option -1`` to ``--option=-1``: argparse takes ``-1,2`` for an option."""
+    """Join ``--option -1`` to ``--option=-1``: argparse takes ``-1,2`` and ``-z`` for options."""
     joined: list[str] = []
     for argument in arguments:
-        is_negative = len(argument) > 1 and argument[0] == "-" and argument[1] in "0123456789."
+        is_number = len(argument) > 1 and argument[0] == "-" and argument[1] in "0123456789."
+        is_negative = is_number or argument in _DOWNWARD
         if is_negative and joined and joined[-1].startswith("--") and "=" not in joined[-1]:
             joined[-1] += f"={argument}"
         else:

@@ -108,7 +108,7 @@ def test_who_is_away_is_left_out_and_the_others_keep_their_names(recording, tmp_
 def test_who_is_away_is_left_out_of_folders(recording, tmp_path, capsys):
     assert convert(*recording, "-o", tmp_path / "w", "--frames", "23:24") == 0
     text = capsys.readouterr().out
-    assert "1 frames of 1 person" in text and "SMPL 7: not there in frame 23, and not" in text
+    assert "1 frame of 1 person" in text and "SMPL 7: not there in frame 23, and not" in text
     (frame,) = (tmp_path / "w" / "smpl").iterdir()
     assert [record["id"] for record in json.loads(frame.read_text())] == [0]
 

@@ -22,6 +22,10 @@ SUFFIXES = ", ".join(
     {"/": "a folder for EasyMocap"}.get(suffix, suffix)
     for suffix in dict.fromkeys(s for kind in EXPORTERS.values() for s in kind.suffixes)
 )
+NO_MEMBER = (
+    "twist cannot be written as an EasyMocap folder: expected the joints of "
+    "SMPL, SMPL+H, SMPL-X or MANO, found others"
+)
 NO_FILE = "cannot be read: No such file or directory"
 
 
@@ -309,7 +313,7 @@ def test_actor_that_cannot_be_written_takes_the_others_back(tmp_path, capsys):
     ("out", "code", "message"),
     [
         ("x.fbx", 2, f'no exporter for ".fbx"; there are: {SUFFIXES}'),
-        ("x", 2, "no file moves anything: a motion cannot be written"),
+        ("x", 2, NO_MEMBER),
         ("missing/x.obj", 5, "{folder}/missing/x.obj: the folder does not exist"),
         ("missing/x.skel", 5, "{folder}/missing/x.skel: the folder does not exist"),
         ("twist.skel/x.obj", 5, "{folder}/twist.skel/x.obj: the folder does not exist"),

@@ -148,10 +148,11 @@ def test_refusals(walk, tmp_path, monkeypatch, capsys, arguments, message):
     assert set(tmp_path.iterdir()) == before
 
 
-def test_still_figures_have_no_motion_to_write(tmp_path, capsys):
+def test_still_figures_have_no_frames_to_write(tmp_path, capsys):
     skel, skin = write_rig(tmp_path)
-    assert convert(skel, skin, "-o", tmp_path / "w.bvh") == 2
-    assert "no file moves anything: a motion cannot be written" in capsys.readouterr().err
+    for options in (["-o", tmp_path / "w_{frame}.obj"], ["--frames", ":9", "-o", tmp_path / "w"]):
+        assert convert(skel, skin, *options) == 2
+        assert "no file moves anything: a motion cannot be written" in capsys.readouterr().err
 
 
 def test_existing_files_need_force(walk, tmp_path, capsys):

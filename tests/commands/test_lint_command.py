@@ -100,3 +100,11 @@ def test_a_size_limit_is_a_finding(rig, capsys) -> None:
     assert run(["lint", *rig, "--max-size", "10"]) == 1
     assert "expected at most 10 bytes" in capsys.readouterr().out
     assert run(["lint", *rig, "--max-size", "ten"]) == 2
+
+
+def test_people_of_one_file_are_told_apart(shared_data: Path, capsys) -> None:
+    points = shared_data / "smpl_synthetic" / "easymocap" / "keypoints3d"
+    assert run(["lint", str(points)]) == 0
+    lines = [line for line in capsys.readouterr().out.splitlines() if " C012: " in line]
+    what = "1 of 25 keypoints are never seen: right_ear"
+    assert lines == [f"{points}: note C012: body25 {person}: {what}" for person in (0, 1)]

@@ -472,9 +472,7 @@ def test_options_without_sense_are_one_line(draw, walk, tmp_path, name, options,
 def test_missing_library_is_one_line(draw, walk, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "av", None)
     said = draw(walk, "x.mp4", code=2)
-    assert said.err == (
-        'viewer: videos need PyAV, which is not installed: pip install "skinning-viewer[video]"\n'
-    )
+    assert said.err == ("viewer: videos need PyAV, which is not installed: pip install av\n")
     draw(walk, "{frame}.png", "--frames", "0:2", size="16x16")  # pictures need no such thing
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from viewer.commands._frame_numbers import numbering_of, parse_range
 from viewer.commands._numbers import number
+from viewer.commands._one_pose import asks_one_pose, pose_line, posed_actors, take_of_pose
 from viewer.errors import OutputError, RigError, UnsupportedFormatError, ViewerError, printable
 from viewer.export import (
     EXPORTERS,
@@ -34,9 +35,11 @@ __all__ = [
     "add_motion_arguments",
     "check_frame_field",
     "is_motion",
+    "left_out_lines",
     "motion_paths",
-    "moving_actors",
+    "pose_or_point_actors",
     "write_motions",
+    "written_actors",
 ]
 
 _MOST_DIGITS = 15
@@ -55,7 +58,9 @@ def add_motion_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"what to write, where a suffix leaves a choice; motions: {', '.join(kinds)}",
     )
     group.add_argument(
-        "--gaps", choices=GAPS, default="hold", help="missing frames (default: hold)"
+        "--gaps",
+        choices=GAPS,
+        help="missing frames (default: left out of EasyMocap, .obj and arrays, else hold)",
     )
     group.add_argument("--to-unit", choices=METRES, help="of the file (default: cm in BVH)")
     group.add_argument(
@@ -99,7 +104,7 @@ def motion_options(arguments: argparse.Namespace, skinning: Skinning) -> MotionO
         unit=arguments.to_unit or "",
         up=arguments.to_up or "",
         rotation_order=arguments.rotation_order,
-        gaps="interpolate" if arguments.fill_gaps else arguments.gaps,
+        gaps="interpolate" if arguments.fill_gaps else arguments.gaps or "",
         rest_frame=arguments.rest_frame,
         digits=digits,
         skinning=skinning,
@@ -111,7 +116,8 @@ def write_motions(
 ) -> list[str]:
     """Write every actor's motion; return lines that say what was written and what was lost.
 
-    People who are in none of the frames are left out, and the others keep the names of their files.
+    Where one pose is asked for, or nothing moves, a motion of one frame is written. People who are
+    in none of the frames are left out, and the others keep the names of their files.
 
     Raises
     ------
@@ -121,13 +127,15 @@ def write_motions(
     """
     options = motion_options(arguments, skinning)
     key = _exporter(arguments, output, scene)
-    actors = moving_actors(scene)
+    actors = written_actors(arguments, output, scene)
+    is_pose = asks_one_pose(arguments, output, scene)
     parts = []
     for actor, path in zip(actors, motion_paths(output, actors), strict=True):
-        frames = _frames(arguments, actor)
-        how = (scene, actor, arguments.fps, frames, arguments.fill_gaps)
-        is_points = isinstance(actor.clip, PointClip)
-        take, up = upright_point_take(*how) if is_points else take_for(key, options, *how)
+        if is_pose:
+            take: Take | PointTake
+            take, up = take_of_pose(arguments, key, options, scene, actor)
+        else:
+            take, up = _whole_take(arguments, key, options, scene, actor)
         parts.append(_Part(actor, take, up, path))
     there = [part for part in parts if part.present.any()]
     if not there:
@@ -135,7 +143,20 @@ def write_motions(
     lines = _write(there, output, key, options) + _untracked_lines(there, key)
     away = [part for part in parts if not part.present.any()]
     lines += [f"{printable(p.take.name)}: not there in {p.span}, and not written" for p in away]
-    return lines + _lost_points(scene, actors)
+    return [*lines, *[pose_line(arguments)] * is_pose, *left_out_lines(scene, actors)]
+
+
+def _whole_take(
+    arguments: argparse.Namespace, key: str, options: MotionOptions, scene: Scene, actor: Actor
+) -> tuple[Take | PointTake, str]:
+    """Return the frames of an actor that are asked for, and what is up in them."""
+    frames, fills = _frames(arguments, actor), bool(arguments.fill_gaps)
+    if not isinstance(actor.clip, PointClip):
+        return take_for(key, options, scene, actor, arguments.fps, frames, fills)
+    if options.gaps not in ("", "interpolate"):
+        raise ViewerError(f"--gaps: expected interpolate for keypoints, found {options.gaps}")
+    fills = options.gaps == "interpolate"
+    return upright_point_take(scene, actor, arguments.fps, frames, fills)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -201,13 +222,37 @@ def _untracked_lines(parts: list[_Part], key: str) -> list[str]:
     return [f"{', '.join(names)}: without a track, perhaps somebody else in each frame"]
 
 
-def _lost_points(scene: Scene, written: list[Actor]) -> list[str]:
-    """Say whose captured points are not written beside the bodies."""
-    left = [a for a in scene.actors if isinstance(a.clip, PointClip) and a not in written]
-    if not left:
-        return []
-    names = ", ".join(printable(actor.name) for actor in left)
-    return [f"keypoints beside bodies are not written ({names}): open the keypoints3d folder alone"]
+def left_out_lines(scene: Scene, written: list[Actor]) -> list[str]:
+    """Say what is not written: figures that nothing moves, and captured points beside bodies."""
+    left = [actor for actor in scene.actors if actor not in written]
+    still = [printable(a.name) for a in left if a.clip is None]
+    points = [printable(a.name) for a in left if isinstance(a.clip, PointClip)]
+    why = "nothing moves it" if any(a.clip is not None for a in written) else "it has no joints"
+    lines = [f"{name}: {why}, so it is not written" for name in still]
+    if points:
+        names = ", ".join(points)
+        folder = "open the keypoints3d folder alone"
+        lines.append(f"keypoints beside bodies are not written ({names}): {folder}")
+    return lines
+
+
+def pose_or_point_actors(scene: Scene) -> list[Actor]:
+    """Return the actors that are written as they are posed: captured points only if alone."""
+    figures = [actor for actor in scene.actors if not isinstance(actor.clip, PointClip)]
+    return figures or list(scene.actors)
+
+
+def written_actors(arguments: argparse.Namespace, output: Path, scene: Scene) -> list[Actor]:
+    """Return the actors whose motion, or pose as a motion of one frame, is written.
+
+    Raises
+    ------
+    RigError
+        If there is neither.
+    """
+    if asks_one_pose(arguments, output, scene):
+        return posed_actors(scene)
+    return moving_actors(scene)
 
 
 def moving_actors(scene: Scene) -> list[Actor]:
@@ -227,7 +272,7 @@ def moving_actors(scene: Scene) -> list[Actor]:
 
 def _exporter(arguments: argparse.Namespace, output: Path, scene: Scene) -> str:
     """Return the exporter asked for, or the first that suits the suffix and the figures."""
-    found, actors = motion_exporters(output), moving_actors(scene)
+    found, actors = motion_exporters(output), written_actors(arguments, output, scene)
     if isinstance(actors[0].clip, PointClip):
         if _OF_POINTS not in found or arguments.kind not in (None, _OF_POINTS):
             raise RigError(

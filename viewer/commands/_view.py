@@ -12,6 +12,7 @@ from viewer.errors import ViewerError, printable
 from viewer.rendering.camera import Camera, camera_from_view, fit
 from viewer.rendering.ground_pass import parse_color
 from viewer.rendering.options import BACKGROUNDS, SHOWN, DisplayOptions
+from viewer.rendering.pinhole import distortion_error
 from viewer.rendering.program import SHADING
 from viewer.rig.arrays import Floats
 from viewer.rig.camera_view import CameraView
@@ -24,9 +25,12 @@ __all__ = [
     "camera_of",
     "display_of",
     "hide_parts",
+    "lens_notes",
     "parse_size",
     "warn_of_missing",
 ]
+
+_SEEN = 0.5  # pixels of the camera's own pictures: smaller errors are not seen
 
 
 def add_camera_arguments(parser: argparse.ArgumentParser) -> None:
@@ -75,6 +79,9 @@ def add_display_arguments(parser: argparse.ArgumentParser) -> None:
         ("no-grid", "leave out the ground grid"),
         ("keypoints", "a model's keypoints as markers"),
         ("reduced", "the coarser mesh, if there is one"),
+        ("xray", "bones seen through the skin"),
+        ("joint-names", "the names of joints, as far as they do not cover each other"),
+        ("joint-axes", "the axes of joints: x red, y green, z blue"),
     ):
         group.add_argument(f"--{name}", action="store_true", help=text)
     group.add_argument(
@@ -154,9 +161,30 @@ def display_of(arguments: argparse.Namespace) -> DisplayOptions:
         skinning=skinning_of(arguments),
         keypoints=arguments.keypoints,
         reduced=arguments.reduced,
+        xray=arguments.xray,
+        joint_names=arguments.joint_names,
+        joint_axes=arguments.joint_axes,
     )
     set_scalar(arguments, options)
     return options
+
+
+def lens_notes(arguments: argparse.Namespace, scene: Scene) -> list[str]:
+    """Return what looking through a calibrated camera leaves out, if it is to be seen: one line.
+
+    Raises
+    ------
+    ViewerError
+        If there is no such camera, or its files do not say how large its pictures are.
+    """
+    if arguments.view is None:
+        return []
+    view = _find_view(scene, arguments.view)
+    error = distortion_error(view)
+    if error < _SEEN:
+        return []
+    name = printable(view.name, 40)
+    return [f"camera {name}: its lens bends pictures by up to {error:.1f} pixels, not drawn here"]
 
 
 def hide_parts(arguments: argparse.Namespace, scene: Scene, options: DisplayOptions) -> None:
@@ -191,4 +219,15 @@ def warn_of_missing(scene: Scene, options: DisplayOptions) -> list[str]:
         notes.append("--reduced: no figure has a reduced mesh")
     if options.keypoints and not any(figure.keypoints for figure in figures):
         notes.append("--keypoints: no figure has keypoints")
-    return notes
+    return notes + _joint_notes(scene, options)
+
+
+def _joint_notes(scene: Scene, options: DisplayOptions) -> list[str]:
+    """Return what of joints was asked for and is not to be seen, one line each."""
+    has_one = any(actor.figure.skeleton is not None for actor in scene.actors)
+    if has_one and options.show != "binding":
+        return []
+    why = "in binding space there are no joints" if has_one else "no figure has a skeleton"
+    names = "xray", "joint_names", "joint_axes"
+    asked = [name for name in names if getattr(options, name)]
+    return [f"--{name.replace('_', '-')}: {why}" for name in asked]

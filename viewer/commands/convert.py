@@ -10,10 +10,13 @@ from viewer.commands._motion_export import (
     add_motion_arguments,
     check_frame_field,
     is_motion,
+    left_out_lines,
     motion_paths,
-    moving_actors,
+    pose_or_point_actors,
     write_motions,
+    written_actors,
 )
+from viewer.commands._one_pose import check_frame_options
 from viewer.commands._output import check_output
 from viewer.commands._pose import (
     add_pose_arguments,
@@ -76,6 +79,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:
     """Refuse what can be refused before anything is read."""
+    check_frame_options(arguments)
     suffix = output.suffix.lower() or "/"
     kinds = [kind for kind in EXPORTERS.values() if suffix in kind.suffixes]
     if not kinds:
@@ -92,8 +96,9 @@ def _write_poses(
     arguments: argparse.Namespace, scene: Scene, output: Path, skinning: Skinning
 ) -> list[str]:
     inputs = _inputs(arguments)  # --model-path counts from now on
-    places = dict(zip(scene.actors, motion_paths(output, scene.actors), strict=True))
-    actors = [actor for actor in scene.actors if actor.is_present]
+    shown = pose_or_point_actors(scene)
+    places = dict(zip(shown, motion_paths(output, shown), strict=True))
+    actors = [actor for actor in shown if actor.is_present]
     if not actors:
         raise RigError("nobody is there at that time: there is nothing to write")
     files = [file for actor in actors for file in _written(places[actor])]
@@ -103,21 +108,22 @@ def _write_poses(
     with all_or_none(files):
         for actor in actors:
             lines += export(upright_actor(scene, actor), places[actor], skinning)
-    away = [actor for actor in scene.actors if not actor.is_present]
-    return lines + [f"{printable(a.name)}: not there at that time, and not written" for a in away]
+    away = [actor for actor in shown if not actor.is_present]
+    lines += [f"{printable(a.name)}: not there at that time, and not written" for a in away]
+    return lines + left_out_lines(scene, shown)
 
 
 def _write_motions(
     arguments: argparse.Namespace, scene: Scene, output: Path, skinning: Skinning
 ) -> list[str]:
     inputs = _inputs(arguments)
-    moving = moving_actors(scene)
+    actors = written_actors(arguments, output, scene)
     if "{frame" in output.name or (arguments.frames and output.suffix.lower() == ".obj"):
         check_frame_field(output)
     elif not output.suffix:
         _check_capture_folder(output, inputs, arguments.force)
     else:
-        for path in motion_paths(output, moving):
+        for path in motion_paths(output, actors):
             _check_folder(path)
             check_output(path, inputs, arguments.force)
     return write_motions(arguments, scene, output, skinning)

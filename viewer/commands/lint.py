@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections import Counter
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -20,15 +17,21 @@ from viewer.commands._scene import (
     size_limit,
 )
 from viewer.errors import ViewerError, printable
-from viewer.lint import CODES, SEVERITIES, Finding, LintOptions, lint_files
+from viewer.lint import (
+    CODES,
+    SEVERITIES,
+    LintOptions,
+    describe,
+    finding_text,
+    lint_files,
+    summary,
+    worst_first,
+)
 from viewer.loading import bundled_files
-from viewer.rig.scene import Scene
-from viewer.rig.skeleton import joint_labels
 
-__all__ = ["add_arguments", "describe", "run"]
+__all__ = ["add_arguments", "run"]
 
 _FOUND = 1  # exit code
-_LISTED = 100  # places of one finding in JSON; their number is always there
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -93,11 +96,12 @@ def run(arguments: argparse.Namespace) -> int:
             files, options, motion_settings(arguments), size_limit(arguments), show
         )
     findings = [finding for finding in findings if finding.code not in ignored]
-    findings.sort(key=lambda finding: -SEVERITIES.index(finding.severity))
+    findings = worst_first(findings)
     if arguments.json:
         print(json.dumps(describe(findings, scene), indent=1, allow_nan=False))
     else:
-        print("\n".join([*map(_line, findings), _summary(findings, len(files))]))
+        files_text = f"{len(files)} file{'s' * (len(files) != 1)}"
+        print("\n".join([*map(finding_text, findings), f"{summary(findings)} in {files_text}"]))
     if arguments.fail_on == "never":
         return 0
     limit = SEVERITIES.index(arguments.fail_on)
@@ -117,74 +121,3 @@ def _code_lines() -> list[str]:
     return [
         f"{name}  {code.severity:<7}  {code.title}: {code.hint}" for name, code in CODES.items()
     ]
-
-
-def _line(finding: Finding) -> str:
-    """Return one finding as compilers print theirs, so that editors jump to file and line."""
-    place = ""
-    if finding.file is not None and finding.file != Path():
-        place = printable(finding.file, 300)
-        place += f":{finding.line}" if finding.line is not None else ""
-    elif finding.name:
-        place = printable(finding.name, 100)
-    head = f"{place}: " if place else ""
-    text = printable(finding.message, 2000)
-    return f"{head}{finding.severity} {finding.code}: {text}\n    {finding.title}: {finding.hint}"
-
-
-def _summary(findings: list[Finding], n_files: int) -> str:
-    counts = Counter(finding.severity for finding in findings)
-    parts = [f"{counts[kind]} {kind}{'s' * (counts[kind] != 1)}" for kind in reversed(SEVERITIES)]
-    return f"{', '.join(parts)} in {n_files} file{'s' * (n_files != 1)}"
-
-
-def describe(findings: list[Finding], scene: Scene) -> dict[str, Any]:
-    """Return findings ready for JSON.
-
-    Parameters
-    ----------
-    findings : list of Finding
-        Of this scene, or of its files.
-    scene : Scene
-        Names the joints.
-    """
-    counts = Counter(finding.severity for finding in findings)
-    return {
-        "findings": [_describe(finding, scene) for finding in findings],
-        "counts": {kind: counts[kind] for kind in reversed(SEVERITIES)},
-    }
-
-
-def _describe(finding: Finding, scene: Scene) -> dict[str, Any]:
-    has_file = finding.file is not None and finding.file != Path()
-    facts: dict[str, Any] = {
-        "code": finding.code,
-        "severity": finding.severity,
-        "title": finding.title,
-        "message": printable(finding.message, 2000),
-        "hint": finding.hint,
-        "file": printable(finding.file, 1000) if has_file else None,
-        "line": finding.line,
-        "actor": finding.actor,
-        "name": printable(finding.name),
-    }
-    for key in ("vertices", "triangles", "joints", "frames", "times"):
-        values = getattr(finding, key)
-        facts[key] = values[:_LISTED].tolist()
-        facts[f"n_{key}"] = len(values)
-    facts["joint_names"] = _joint_names(finding, scene)
-    return facts
-
-
-def _joint_names(finding: Finding, scene: Scene) -> list[str]:
-    if finding.actor is None or len(finding.joints) == 0:
-        return []
-    figure = scene.actors[finding.actor].figure
-    if figure.points is not None:
-        names: tuple[str, ...] = figure.points.names
-    elif figure.skeleton is not None:
-        names = joint_labels(figure.skeleton)
-    else:
-        return []
-    some = finding.joints[:_LISTED].tolist()
-    return [printable(names[joint]) if joint < len(names) else f"#{joint}" for joint in some]

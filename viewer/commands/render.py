@@ -23,6 +23,7 @@ from viewer.commands._view import (
     camera_of,
     display_of,
     hide_parts,
+    lens_notes,
     parse_size,
     warn_of_missing,
 )
@@ -85,7 +86,7 @@ def run(arguments: argparse.Namespace) -> int:
         print_warnings([f"{printable(output)}: this format knows no transparency"])
     scene = open_scene(arguments)
     hide_parts(arguments, scene, options)
-    print_warnings(warn_of_missing(scene, options))
+    print_warnings(warn_of_missing(scene, options) + lens_notes(arguments, scene))
     if request is not None and (request.is_certain or any(a.clip for a in scene.actors)):
         print(draw_sequence(request, arguments, scene, options, size))
     else:
@@ -143,6 +144,11 @@ def draw_scene(
     with Offscreen(device) as offscreen:
         pixels = offscreen.render(scene, size, camera, options, box)
         print_warnings(offscreen.renderer.notes)
+        if options.joint_names:
+            left_out, n_seen = offscreen.renderer.names_left_out
+            if left_out:
+                words = "would cover others" if left_out > 1 else "would cover another"
+                print_warnings([f"{left_out} of {n_seen} names of joints left out: they {words}"])
         return pixels
 
 

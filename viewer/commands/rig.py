@@ -14,9 +14,10 @@ from viewer.commands._landmarks import read_landmarks
 from viewer.commands._numbers import number
 from viewer.commands._pose import add_pose_arguments, apply_pose, pose_files
 from viewer.commands._progress import Progress
-from viewer.commands._rig_output import check_files, write_rigged
+from viewer.commands._rig_output import check_files
 from viewer.commands._scene import print_warnings
 from viewer.errors import RigError, ViewerError, printable
+from viewer.export._rigged_files import write_rigged
 from viewer.formats import Source
 from viewer.loading import MotionSettings, bundled_body, bundled_files, load
 from viewer.models import resolve

@@ -7,15 +7,21 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.errors import RigError
+from viewer.export._options import GAPS
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.motion import Frames
 from viewer.rig.quaternion import slerp
 
-__all__ = ["filled", "gaps_text", "runs"]
+__all__ = ["filled", "gaps_text", "kept_gaps", "runs"]
 
 Indices = NDArray[np.intp]
 
 _LISTED = 6  # gaps in a note
+_FILLING = {
+    "hold": "the last pose is held",
+    "interpolate": "interpolated, held at both ends",
+}
 
 
 def runs(flags: Bools) -> list[tuple[int, int]]:
@@ -68,6 +74,39 @@ def filled(frames: Frames, interpolate: bool) -> Frames:
         figure_translations=_line(frames.figure_translations, before, after, share),
         figure_scales=_line(frames.figure_scales, before, after, share),
     )
+
+
+def kept_gaps(frames: Frames, gaps: str, first_frame: int) -> tuple[Frames, str]:
+    """Return the frames for formats that can leave some out: filled only if that is asked for.
+
+    Parameters
+    ----------
+    frames : Frames
+        With gaps or without.
+    gaps : str
+        A key of ``GAPS``, or empty. Where each frame stands alone, split frames are those there.
+    first_frame : int
+        What the first frame is called.
+
+    Returns
+    -------
+    frames : Frames
+        The same if they are not filled.
+    note : str
+        What was done, as ``"missing frames 3 to 5: the last pose is held"``; empty if nothing was.
+
+    Raises
+    ------
+    RigError
+        If it is no such way.
+    """
+    if gaps not in ("", *GAPS):
+        raise RigError(f'way to close gaps: expected one of {", ".join(GAPS)}, found "{gaps}"')
+    present = frames.present
+    if gaps not in _FILLING or present.all() or not present.any():
+        return frames, ""
+    note = f"missing {gaps_text(present, first_frame)}: {_FILLING[gaps]}"
+    return filled(frames, gaps == "interpolate"), note
 
 
 def _line(rows: Floats, before: Indices, after: Indices, share: Floats) -> Floats:

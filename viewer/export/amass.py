@@ -65,13 +65,13 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
     check_unit(options, "AMASS")
     member = member_of_figure(take.figure, "an AMASS motion", ("pelvis",))
     present = take.frames.present
-    if options.gaps not in GAPS:
-        raise RigError(f'gaps: expected one of {", ".join(GAPS)}, found "{options.gaps}"')
+    if options.closing not in GAPS:
+        raise RigError(f'gaps: expected one of {", ".join(GAPS)}, found "{options.closing}"')
     if not present.any():
         raise RigError(f"{take.name}: every frame is missing, there is nothing to write")
-    frames = filled(take.frames, options.gaps == "interpolate")
+    frames = filled(take.frames, options.closing == "interpolate")
     body, notes = family_frames(take, frames, member, options)
-    is_split = options.gaps == "split" and not present.all()
+    is_split = options.closing == "split" and not present.all()
     spans = runs(present) if is_split else [(0, len(present))]
     paths = [path]
     if len(spans) > 1:
@@ -85,8 +85,9 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
             if not is_split and not present.all():
                 arrays["present"] = present
             save_arrays(file, arrays)
+            length = "1 frame" if stop - start == 1 else f"{stop - start} frames"
             written.append(
-                f"{printable(file, 300)}: {stop - start} frames of {member.title} at "
+                f"{printable(file, 300)}: {length} of {member.title} at "
                 f"{take.frame_rate:g} a second, {up} up"
             )
     return [*written, *_remarks(body, take, present, options), *notes]
@@ -131,6 +132,6 @@ def _remarks(body: FamilyFrames, take: Take, present: Bools, options: MotionOpti
             "hold": "filled with the last pose, and marked in present",
             "interpolate": "bridged on the shorter arc, and marked in present",
             "split": "left out between the files",
-        }[options.gaps]
+        }[options.closing]
         notes.append(f"{missing} missing: {how}")
     return notes

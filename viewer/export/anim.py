@@ -66,15 +66,16 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
             f".anim moves a root and three angles of each joint, as .skel files do; "
             f"{figure.name} moves otherwise"
         )
-    if options.gaps not in GAPS:
+    if options.closing not in GAPS:
         raise RigError(
-            f'way to close gaps: expected one of {", ".join(GAPS)}, found "{options.gaps}"'
+            f'way to close gaps: expected one of {", ".join(GAPS)}, found "{options.closing}"'
         )
     if not frames.present.any():
         raise RigError(f"{take.name}: every frame is missing, there is nothing to write")
     if isinstance(take.motion, Clip) and _is_whole(take, take.motion):
         write(take.motion, path)
-        notes = [f"{_summary(path, take.motion)}, the clip's own"]
+        own = ", the clip's own" if take.motion.end > take.motion.start else ""
+        notes = [f"{_summary(path, take.motion)}{own}"]
         if frames.figure_translations.any():
             notes.append("the place of the whole figure is no part of its clip: it is left out")
         return notes + _left_out(figure, frames)
@@ -84,9 +85,9 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
 def _export_frames(take: Take, skeleton: Skeleton, path: Path, options: MotionOptions) -> list[str]:
     """Write a key per frame, in one file or one for each run of frames."""
     frames = take.frames
-    whole = filled(frames, options.gaps == "interpolate")
+    whole = filled(frames, options.closing == "interpolate")
     dofs = _dofs(take, skeleton, whole)
-    is_split = options.gaps == "split" and not frames.present.all()
+    is_split = options.closing == "split" and not frames.present.all()
     spans = runs(frames.present) if is_split else [(0, frames.n_frames)]
     clips, errors = [], []
     for start, stop in spans:
@@ -123,7 +124,9 @@ def _remarks(
     if not frames.present.all():
         done = {"hold": "the last pose is held", "interpolate": "interpolated"}
         text = gaps_text(frames.present, take.first_frame)
-        notes.append(f"missing {text}: {done.get(options.gaps, 'one file for each run of frames')}")
+        notes.append(
+            f"missing {text}: {done.get(options.closing, 'one file for each run of frames')}"
+        )
     return notes + _left_out(figure, frames)
 
 

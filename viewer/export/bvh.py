@@ -68,8 +68,8 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
     if not take.frames.present.any():
         raise RigError(f"{take.name}: every frame is missing, there is nothing to write")
     reference = int(take.frames.present.argmax())
-    is_split = options.gaps == "split" and not take.frames.present.all()
-    frames = filled(take.frames, options.gaps == "interpolate")
+    is_split = options.closing == "split" and not take.frames.present.all()
+    frames = filled(take.frames, options.closing == "interpolate")
     figure, rigged = _one_root(take.figure, frames, reference)
     space = _space(figure, options)
     with np.errstate(invalid="ignore", over="ignore"):
@@ -99,7 +99,7 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
     present = int(take.frames.present.sum())
     notes.append(
         f"read back: the largest joint position error is {writer.length(error)} ({worst}) "
-        f"over {present} frames"
+        f"over {'1 frame' if present == 1 else f'{present} frames'}"
     )
     return notes + _remarks(take, figure, body, reference, options)
 
@@ -110,7 +110,7 @@ def _check(options: MotionOptions) -> None:
         ("up axis", options.up, ("", "y", "z")),
         ("up axis of the scene", options.world_up, ("y", "z")),
         ("rotation order", options.rotation_order, ROTATION_ORDERS),
-        ("way to close gaps", options.gaps, tuple(GAPS)),
+        ("way to close gaps", options.closing, tuple(GAPS)),
     ):
         if value not in known:
             listed = ", ".join(filter(None, known))
@@ -253,9 +253,11 @@ class _Writer:
         unit = unit if self.figure.unit in METRES else "the figure's own unit"
         first = self.take.first_frame + start
         rest = "the rest pose and " * self.options.rest_frame
+        span = f"{stop - start} frames ({first} to {first + stop - start - 1})"
+        span = span if stop - start > 1 else f"1 frame ({first})"
         return (
-            f"{printable(path, 300)}: {len(self.names)} joints, {rest}{stop - start} frames "
-            f"({first} to {first + stop - start - 1}) at {self.take.frame_rate:g} a second, "
+            f"{printable(path, 300)}: {len(self.names)} joints, {rest}{span} at "
+            f"{self.take.frame_rate:g} a second, "
             f"{unit}, {self.options.up or 'y'} up, channels {self.options.rotation_order.upper()}"
         )
 
@@ -272,7 +274,9 @@ def _remarks(
     if not frames.present.all():
         done = {"hold": "the last pose is held", "interpolate": "interpolated, held at both ends"}
         text = gaps_text(frames.present, take.first_frame)
-        notes.append(f"missing {text}: {done.get(options.gaps, 'one file for each run of frames')}")
+        notes.append(
+            f"missing {text}: {done.get(options.closing, 'one file for each run of frames')}"
+        )
     if figure.unit not in METRES and options.unit:
         notes.append(f"lengths stay as they are: {take.figure.name} does not say its unit")
     moving = [joint_label(skeleton, int(joint)) for joint in np.flatnonzero(body.moves)]

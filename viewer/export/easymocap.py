@@ -17,6 +17,7 @@ import re
 import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -29,7 +30,7 @@ from viewer.export._family_frames import (
     member_of_figure,
     up_axis,
 )
-from viewer.export._gaps import gaps_text
+from viewer.export._gaps import gaps_text, kept_gaps
 from viewer.export._options import MotionOptions
 from viewer.rig.arrays import Floats
 from viewer.rig.person import person_label
@@ -65,7 +66,8 @@ def export_takes(
     path : Path
         The folder; ``smpl`` in it is replaced if it holds nothing but numbered frames.
     options : MotionOptions
-        Up axis (that of the scene if empty). Gaps stay gaps.
+        Up axis (that of the scene if empty), and gaps: they stay gaps unless it is asked to hold
+        or to interpolate.
     persons : sequence of int, optional
         What each is called; 0, 1, 2 … if omitted, below 0 for people without a track.
 
@@ -86,12 +88,16 @@ def export_takes(
     check_unit(options, "EasyMocap")
     _check(takes, persons)
     people, notes = [], []
-    for take, person in zip(takes, persons, strict=True):
+    for taken, person in zip(takes, persons, strict=True):
+        frames, filling = kept_gaps(taken.frames, options.gaps, taken.first_frame)
+        take = replace(taken, frames=frames)
         member = member_of_figure(take.figure, "an EasyMocap folder", ("pelvis", "wrist"))
-        body, losses = family_frames(take, take.frames, member, options)
+        body, losses = family_frames(take, frames, member, options)
         people.append((person, take, _Records(person, body)))
         who = f"{person_label(person)}: " if len(takes) > 1 else ""
         notes += [f"{who}{loss}" for loss in losses]
+        if filling:
+            notes.append(f"{who}{filling}")
         if not take.frames.present.all():
             missing = gaps_text(take.frames.present, take.first_frame)
             notes.append(f"{who}{missing} missing, as in the motion")
@@ -108,8 +114,9 @@ def export_takes(
             text = "[\n" + ",\n".join(rows) + "\n]\n"
             (folder / f"{frame:06}.json").write_text(text, encoding="ascii", newline="\n")
     who = "1 person" if len(takes) == 1 else f"{len(takes)} people"
+    count = "1 frame" if stop - first == 1 else f"{stop - first} frames"
     return [
-        f"{printable(path / _FOLDER, 300)}: {stop - first} frames of {who}, {up_axis(options)} up; "
+        f"{printable(path / _FOLDER, 300)}: {count} of {who}, {up_axis(options)} up; "
         f"EasyMocap keeps no frame rate: it is {takes[0].frame_rate:g} a second",
         *notes,
     ]

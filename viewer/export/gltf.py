@@ -85,13 +85,13 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
     """
     _check(take, options)
     present = take.frames.present
-    frames = filled(take.frames, options.gaps == "interpolate")
+    frames = filled(take.frames, options.closing == "interpolate")
     reference = int(present.argmax())
     shape = shape_of(take.figure, frames.shape_weights, reference)
     body = _body_of(take.figure, shape, options.skinning)
     spans = [(0, frames.n_frames)]
     paths = [path]
-    if options.gaps == "split" and not present.all():
+    if options.closing == "split" and not present.all():
         spans = runs(present)
         if len(spans) > 1:
             names = [f"{path.stem}-{number}{path.suffix}" for number in range(1, len(spans) + 1)]
@@ -118,7 +118,7 @@ def _check(take: Take, options: MotionOptions) -> None:
         ("unit", options.unit, ("", "m")),
         ("up axis", options.up, ("", "y")),
         ("up axis of the scene", options.world_up, ("y", "z")),
-        ("way to close gaps", options.gaps, tuple(GAPS)),
+        ("way to close gaps", options.closing, tuple(GAPS)),
     ):
         if value not in known:
             listed = ", ".join(filter(None, known))
@@ -277,7 +277,9 @@ def _motion_remarks(take: Take, body: _Body, frames: Frames, options: MotionOpti
     if not take.frames.present.all():
         done = {"hold": "the last pose is held", "interpolate": "interpolated, held at both ends"}
         text = gaps_text(take.frames.present, take.first_frame)
-        notes.append(f"missing {text}: {done.get(options.gaps, 'one file for each run of frames')}")
+        notes.append(
+            f"missing {text}: {done.get(options.closing, 'one file for each run of frames')}"
+        )
     assert body.figure.skeleton is not None  # shaping keeps it
     moves = np.flatnonzero(moving(body.figure.skeleton, frames) & (skeleton.parents >= 0))
     if len(moves):

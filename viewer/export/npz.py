@@ -9,7 +9,7 @@
 Of a motion, F frames: ``vertices`` (F, V, 3), ``joints`` (F, J, 3), ``world`` (F, J, 4, 4),
 ``rotations`` (F, J, 4) within the parents as (x, y, z, w), ``shape_weights`` (F, S) or (1, S),
 ``times`` (F,), ``frames`` (F,), ``present`` (F,), ``frame_rate``; where a frame is not present its
-rows are NaN.
+rows are NaN, unless it is asked to fill them: then ``present`` is true throughout.
 
 Of K captured points: ``points`` (K, 3) or (F, K, 3), NaN where they are not seen, ``confidences``
 (K,) or (F, K), ``joint_names`` (K,), ``limbs`` (L, 2), ``sides`` (K,) -1 for right, 1 for left,
@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from viewer.errors import RigError, printable
 from viewer.export import MotionOptions
+from viewer.export._gaps import kept_gaps
 from viewer.formats import save_arrays
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.motion import pose_of, world_frames
@@ -73,8 +74,11 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
 
 def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
     """Write float64 arrays of all frames; see ``viewer.export.export_take``."""
-    figure, frames = take.figure, take.frames
-    _check(take.name, frames.present, figure.unit, options)
+    figure = take.figure
+    _check(take.name, take.frames.present, figure.unit, options)
+    if options.gaps == "split":
+        raise RigError('gaps of arrays: expected hold or interpolate, found "split"')
+    frames, filling = kept_gaps(take.frames, options.gaps, take.first_frame)
     skeleton = figure.skeleton
     assert skeleton is not None  # whoever has a take has a skeleton
     world = world_frames(figure, frames)
@@ -105,7 +109,7 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
         arrays["vertices"] = vertices
     save_arrays(path, arrays)
     count = _count(frames.present, take.frame_rate)
-    return [f"{printable(path, 300)}: {count}: {', '.join(arrays)}"]
+    return [f"{printable(path, 300)}: {count}: {', '.join(arrays)}", *[filling] * bool(filling)]
 
 
 def export_points(take: PointTake, path: Path, options: MotionOptions) -> list[str]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from viewer.errors import OutputError, printable
 from viewer.export import MotionOptions, require_mesh
+from viewer.export._gaps import kept_gaps
 from viewer.formats import all_or_none, free_path, save_bytes, save_text
 from viewer.formats._image import encode_png
 from viewer.rig.arrays import Floats, Ints
@@ -56,9 +57,11 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
 def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
     """Write one numbered file a frame; see ``viewer.export.export_take``.
 
-    ``{frame}`` in the name becomes the frame's number, as in ``walk_{frame:05}.obj``.
+    ``{frame}`` in the name becomes the frame's number, as in ``walk_{frame:05}.obj``. Missing
+    frames have no file unless ``options.gaps`` asks to hold or to interpolate.
     """
-    frames = np.flatnonzero(take.frames.present)
+    poses, filling = kept_gaps(take.frames, options.gaps, take.first_frame)
+    frames = np.flatnonzero(poses.present)
     files = [
         path.with_name(path.name.format(frame=int(frame) + take.first_frame)) for frame in frames
     ]
@@ -67,14 +70,16 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
     written: list[str] = []
     with all_or_none(files):
         for frame, file in zip(frames, files, strict=True):
-            pose = pose_of(take.figure, take.frames, int(frame))
+            pose = pose_of(take.figure, poses, int(frame))
             written += export(Actor(take.figure, pose), file, options.skinning)
-    missing = take.frames.n_frames - len(files)
+    missing = poses.n_frames - len(files)
     if not files:
         return [f"{printable(path, 300)}: nobody is there in these frames, nothing was written"]
     name = printable(path, 300)
     gaps = f"; {missing} frames are missing in the motion, and have no file" if missing else ""
-    return [f"{name}: {len(files)} files, {files[0].name} to {files[-1].name}{gaps}"]
+    span = f"{len(files)} files, {files[0].name} to {files[-1].name}"
+    span = span if len(files) > 1 else f"1 file, {files[0].name}"
+    return [f"{name}: {span}{gaps}", *[filling] * bool(filling)]
 
 
 def _rows(keyword: str, rows: Floats) -> str:

@@ -242,9 +242,7 @@ def _library() -> ModuleType:
         import av.filter
         import av.video.reformatter
     except ImportError:
-        raise ViewerError(
-            'videos need PyAV, which is not installed: pip install "skinning-viewer[video]"'
-        ) from None
+        raise ViewerError("videos need PyAV, which is not installed: pip install av") from None
     return av
 
 

@@ -56,8 +56,8 @@ class Builder:
         Frames that have been taken in.
     is_cut : bool
         Whether reading was given up before the end.
-    has_shape : bool
-        Whether the files give shapes.
+    has_shape, has_expression : bool
+        Whether the files give shapes other than 0, and expressions.
     """
 
     capture: Capture
@@ -68,6 +68,8 @@ class Builder:
     n_read: int = 0
     is_cut: bool = False
     has_shape: bool = False
+    has_expression: bool = False
+    _names_shapes: bool = False  # whether anybody has shapes, if only zeros
     _parts: Iterator[CapturePart] | None = None
     _bodies: dict[int, Actor] = field(default_factory=dict)
     _points: dict[int, Actor] = field(default_factory=dict)
@@ -114,14 +116,24 @@ class Builder:
         for person, (layout, clip) in sorted(part.points.items(), key=_order):
             notes += self._add_points(person, layout, clip, new)
         self.n_read = max(self.n_read, part.stop)
+        notes += self._shape_notes()
         for actor in new:
             pose_actor(actor, 0.0)
         fresh = [note for note in dict.fromkeys(notes) if note not in self._notes]
         self._notes.update(fresh)
         return new, fresh
 
+    def _shape_notes(self) -> list[str]:
+        """Say at the end that bodies have the model's mean shape because no file has another."""
+        lacks = self._bodies and self.model.n_shapes and not self._names_shapes
+        if not (self.is_done and self.keeps_shape and lacks):
+            return []
+        return [f"{self.capture.name}: no shapes in the files: all have the model's mean shape"]
+
     def _add_body(self, person: int, motion: BodyMotion, new: list[Actor]) -> list[str]:
         self.has_shape |= motion.shape is not None and bool(motion.shape.any())
+        self.has_expression |= motion.expression is not None
+        self._names_shapes |= motion.shape is not None
         if not self.keeps_shape:
             motion = replace(motion, shape=None, expression=None)
         clip, notes = body_clip(motion, self.model)

@@ -139,9 +139,11 @@ def _is_bundled(figure: Figure) -> bool:
     return figure.blend_shapes is not None and "stature" in figure.blend_shapes.names
 
 
-def _on_bundled(path: Path, has_shape: bool) -> str:
-    shapes = ", without the shapes of the files, which mean nothing to it" if has_shape else ""
-    return f"{printable(path, 300)}: drawn with the bundled body{shapes} (--model names another)"
+def _on_bundled(path: Path, has_shape: bool, has_expression: bool) -> str:
+    given = ["shapes"] * has_shape + ["expressions"] * has_expression
+    lost = f", without the {' and '.join(given)} of the files, which mean nothing to it"
+    text = f"drawn with the bundled body{lost if given else ''} (--model names another)"
+    return f"{printable(path, 300)}: {text}"
 
 
 def _give_body_motion(
@@ -155,7 +157,9 @@ def _give_body_motion(
     if settings.frame_rate is not None:
         motion = replace(motion, timing=replace(motion.timing, frame_rate=settings.frame_rate))
     if is_bundled:
-        cast.notes.append(_on_bundled(path, motion.shape is not None))
+        cast.notes.append(
+            _on_bundled(path, motion.shape is not None, motion.expression is not None)
+        )
         motion = replace(motion, shape=None, expression=None)
     try:
         clip, notes = body_clip(motion, model)
@@ -200,7 +204,7 @@ def _begin_capture(
         except RigError as problem:
             raise builder.refusal(problem) from None
     if is_bundled and any(actor.figure is model for actor in builder.actors):
-        cast.notes.append(_on_bundled(path, builder.has_shape))
+        cast.notes.append(_on_bundled(path, builder.has_shape, builder.has_expression))
     # EasyMocap's usual calibration has z up, which needs no word.
     up = settings.up or capture.up or _judged_up(path, builder.actors, cast, usual="z")
     builder.place(up)

@@ -26,4 +26,4 @@ def scipy_part(name: str) -> ModuleType:
     try:
         return import_module(f"scipy.{name}")
     except ModuleNotFoundError:
-        raise RigError('rigging needs scipy: pip install "skinning-viewer[rig]"') from None
+        raise RigError("rigging needs scipy: pip install scipy") from None

@@ -1,0 +1,50 @@
+"""--xray, --joint-names, --joint-axes: what is drawn, what is said."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from app.tiny import write_rig
+from PIL import Image
+
+from viewer.cli import run
+
+
+@pytest.fixture
+def rig(tmp_path):
+    return [str(path) for path in write_rig(tmp_path)]
+
+
+@pytest.fixture
+def render(tmp_path, capsys):
+    """Draw a picture; return its pixels, or None, with what was said to the error stream."""
+
+    def drawn(*arguments):
+        path = tmp_path / "x.png"
+        assert run(["render", *arguments, "--size", "320x240", "-o", str(path), "--force"]) == 0
+        return np.array(Image.open(path)).astype(int), capsys.readouterr().err
+
+    return drawn
+
+
+@pytest.mark.parametrize("option", ["--xray", "--joint-names", "--joint-axes"])
+def test_option_changes_the_picture(render, rig, option):
+    plain, _ = render(*rig)
+    marked, said = render(*rig, option)
+    assert (plain != marked).any() and said == ""
+
+
+def test_names_left_out_are_told(render, tmp_path):
+    path = tmp_path / "heap.skel"
+    path.write_text("balljoint a { " + "balljoint b { } " * 4 + "}")
+    _, said = render(str(path), "--joint-names")
+    # Two names have room beside the place where all five joints are.
+    assert said.endswith("warning: 3 of 5 names of joints left out: they would cover others\n")
+
+
+def test_what_no_figure_has_is_told(render, rig):
+    _, said = render(rig[1], "--xray", "--joint-names")
+    assert "warning: --xray: no figure has a skeleton\n" in said
+    assert "warning: --joint-names: no figure has a skeleton\n" in said
+    _, said = render(*rig, "--joint-axes", "--show", "binding")
+    assert said == "warning: --joint-axes: in binding space there are no joints\n"

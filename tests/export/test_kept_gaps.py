@@ -1,0 +1,131 @@
+"""Missing frames in formats that can leave them out: they stay missing unless filling is asked."""
+
+import json
+
+import numpy as np
+import pytest
+from export.plain_readers import read_obj
+from family_models import family_figure
+from family_takes import family_motion, family_take
+from numpy.testing import assert_allclose, assert_array_equal
+from seamed import POSITIONS, seamed_actor
+
+from viewer.errors import RigError
+from viewer.export import MotionOptions, export_take
+from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.scene import Actor
+from viewer.rig.take import take_of
+from viewer.rig.timing import Timing
+
+ATOL = 1e-8  # lengths of 1 to 10: nine digits
+FILLED = {
+    "hold": "missing frames 8 to 9: the last pose is held",
+    "interpolate": "missing frames 8 to 9: interpolated, held at both ends",
+}
+
+
+def moving_roof():
+    """Frames 7 to 10 of a mesh that goes from x = 0 to x = 3; those between are missing."""
+    figure = seamed_actor(unit="m").figure
+    clip = SampledClip(
+        "go",
+        Timing(10.0, np.array([0, -1, -1, 1]), 7),
+        np.tile([0.0, 0.0, 0.0, 1.0], (2, figure.skeleton.n_joints, 1)),
+        figure_translations=np.array([[0.0, 0.0, 0.0], [3.0, 0.0, 0.0]]),
+    )
+    return take_of(Actor(figure, clip=clip))
+
+
+@pytest.mark.parametrize(
+    ("gaps", "places"),
+    [
+        ("", {7: 0.0, 10: 3.0}),
+        ("split", {7: 0.0, 10: 3.0}),
+        ("hold", {7: 0.0, 8: 0.0, 9: 0.0, 10: 3.0}),
+        ("interpolate", {7: 0.0, 8: 1.0, 9: 2.0, 10: 3.0}),
+    ],
+)
+def test_numbered_meshes(tmp_path, gaps, places):
+    name = tmp_path / "m_{frame:02}.obj"
+    notes = export_take(moving_roof(), name, "obj", MotionOptions(gaps=gaps))
+    files = {int(path.stem[2:]): read_obj(path).v for path in tmp_path.iterdir()}
+    assert files.keys() == places.keys()
+    for frame, x in places.items():
+        assert_allclose(files[frame], np.add(POSITIONS, [x, 0.0, 0.0]), atol=ATOL)
+    span = f"{name}: {len(places)} files, m_07.obj to m_10.obj"
+    if gaps in FILLED:
+        assert notes == [span, FILLED[gaps]]
+    else:
+        assert notes == [f"{span}; 2 frames are missing in the motion, and have no file"]
+
+
+@pytest.mark.parametrize(
+    ("gaps", "x"),
+    [("", [0, np.nan, np.nan, 3]), ("hold", [0, 0, 0, 3]), ("interpolate", [0, 1, 2, 3])],
+)
+def test_arrays(tmp_path, gaps, x):
+    path = tmp_path / "a.npz"
+    notes = export_take(moving_roof(), path, "npz", MotionOptions(gaps=gaps))
+    with np.load(path) as arrays:
+        assert_allclose(arrays["vertices"][:, :, 0], np.add.outer(x, POSITIONS[:, 0]), atol=1e-12)
+        assert_array_equal(arrays["present"], ~np.isnan(x))
+    assert notes[1:] == ([FILLED[gaps]] if gaps else [])
+    assert ("2 of them missing, NaN" in notes[0]) == (not gaps)
+
+
+def test_arrays_are_not_split(tmp_path):
+    message = 'gaps of arrays: expected hold or interpolate, found "split"'
+    with pytest.raises(RigError, match=f"^{message}$"):
+        export_take(moving_roof(), tmp_path / "a.npz", "npz", MotionOptions(gaps="split"))
+    assert not any(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("gaps", "rows", "note"),
+    [
+        ("", [0, None, 2], "frame 6 missing, as in the motion"),
+        ("split", [0, None, 2], "frame 6 missing, as in the motion"),
+        ("hold", [0, 0, 2], "missing frame 6: the last pose is held"),
+    ],
+)
+def test_folders(tmp_path, gaps, rows, note):
+    motion = family_motion(24, rows=np.array([0, -1, 2]), first_frame=5)
+    take = family_take(family_figure("smpl", tmp_path), motion)
+    out = tmp_path / "out"
+    notes = export_take(take, out, "easymocap", MotionOptions(gaps=gaps))
+    assert notes[1:] == [note]
+    for frame, row in enumerate(rows, 5):
+        people = json.loads((out / "smpl" / f"{frame:06}.json").read_text())
+        assert len(people) == (row is not None)
+        if row is not None:
+            assert_allclose(people[0]["Th"][0], motion.translations[row], atol=1e-6)
+
+
+def test_folders_of_interpolated_frames(tmp_path):
+    # Half-way between two unit quaternions lies their sum, at length 1.
+    motion = family_motion(24, rows=np.array([0, -1, 2]), first_frame=5)
+    take = family_take(family_figure("smpl", tmp_path), motion)
+    export_take(take, tmp_path / "out", "easymocap", MotionOptions(gaps="interpolate"))
+    (person,) = json.loads((tmp_path / "out" / "smpl" / "000006.json").read_text())
+    ends = [quaternion(motion.vectors[row, 4]) for row in (0, 2)]
+    ends[1] = ends[1] if ends[0] @ ends[1] > 0 else -ends[1]
+    middle = (ends[0] + ends[1]) / np.linalg.norm(ends[0] + ends[1])
+    found = quaternion(np.array(person["poses"][0][12:15]))
+    assert_allclose(abs(found @ middle), 1.0, atol=1e-9)
+
+
+def quaternion(vector):
+    angle = np.linalg.norm(vector)
+    return np.append(np.sin(angle / 2) * vector / angle, np.cos(angle / 2))
+
+
+@pytest.mark.parametrize("key", ["obj", "npz", "easymocap"])
+def test_unknown_ways_are_refused(tmp_path, key):
+    take = moving_roof()
+    if key == "easymocap":
+        take = family_take(family_figure("smpl", tmp_path), family_motion(24))
+    before = sorted(tmp_path.iterdir())
+    message = 'way to close gaps: expected one of hold, interpolate, split, found "jump"'
+    with pytest.raises(RigError, match=f"^{message}$"):
+        export_take(take, tmp_path / "m_{frame}", key, MotionOptions(gaps="jump"))
+    assert sorted(tmp_path.iterdir()) == before

@@ -1,0 +1,75 @@
+"""One pose in formats that hold motions: when it is asked for, and what its frame is called."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+
+from viewer.commands._frame_numbers import numbering_of
+from viewer.errors import ViewerError
+from viewer.export import EXPORTERS, MotionOptions
+from viewer.rig.clip import Clip
+from viewer.rig.pose_take import posed_take
+from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.scene import Actor, Scene
+from viewer.rig.take import Take
+
+__all__ = ["asks_one_pose", "check_frame_options", "pose_line", "posed_actors", "take_of_pose"]
+
+
+def check_frame_options(arguments: argparse.Namespace) -> None:
+    """Refuse a range of frames together with a single one.
+
+    Raises
+    ------
+    ViewerError
+        If both are given.
+    """
+    for option in ("frame", "time"):
+        if arguments.frames is not None and getattr(arguments, option) is not None:
+            raise ViewerError(f"--frames and --{option}: expected one of them, found both")
+
+
+def asks_one_pose(arguments: argparse.Namespace, output: Path, scene: Scene) -> bool:
+    """Return whether one pose of joints is to be written: at a frame or time, or nothing moves."""
+    if arguments.frames is not None or all(actor.pose is None for actor in scene.actors):
+        return False
+    is_still = not _moving(scene) and "{frame" not in output.name
+    return is_still or _at_one_time(arguments)
+
+
+def posed_actors(scene: Scene) -> list[Actor]:
+    """Return the actors whose pose is written: those that move, or all that can if none does."""
+    return _moving(scene) or [actor for actor in scene.actors if actor.pose is not None]
+
+
+def take_of_pose(
+    arguments: argparse.Namespace, key: str, options: MotionOptions, scene: Scene, actor: Actor
+) -> tuple[Take, str]:
+    """Return an actor's present pose as a take, and what is up in it, as an exporter wants it.
+
+    The frame is called as ``--frame`` counts; between two frames it is the one that is shown.
+    """
+    frames = numbering_of(scene.actors, arguments.fps)
+    time = frames.start if scene.time is None else scene.time
+    number = frames.first + math.floor((time - frames.start) * frames.rate + 1e-6)
+    keeps_world = EXPORTERS[key].keeps_world and not options.up
+    return posed_take(scene, actor, frames.rate, number, time, keeps_world)
+
+
+def pose_line(arguments: argparse.Namespace) -> str:
+    """Return the line that says why there is only one frame."""
+    if arguments.frame is not None:
+        return f"one frame: the pose at frame {arguments.frame}"
+    if arguments.time is not None:
+        return f"one frame: the pose at {arguments.time:g} s"
+    return "one frame: nothing moves, so the present pose was written"
+
+
+def _at_one_time(arguments: argparse.Namespace) -> bool:
+    return arguments.frame is not None or arguments.time is not None
+
+
+def _moving(scene: Scene) -> list[Actor]:
+    return [actor for actor in scene.actors if isinstance(actor.clip, Clip | SampledClip)]

@@ -1,0 +1,124 @@
+"""What is written of a mesh that got a rig: a course rig with mesh and pose, or one ``.npz``."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.errors import UnsupportedFormatError, printable
+from viewer.export import export
+from viewer.formats import all_or_none
+from viewer.rig.blendshapes import corrective_weights
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import vertex_normals
+from viewer.rig.pose import joint_rotations
+from viewer.rig.scene import Actor, figure_pose
+from viewer.rig.transfer.rigged import Rigged
+
+__all__ = ["RIGGED_SUFFIXES", "files_of", "without_correctives", "write_rigged"]
+
+RIGGED_SUFFIXES = (".npz", ".skel", ".skin")
+"""Those that ``files_of`` knows."""
+
+_RIG = (".skel", ".skin", ".obj", ".json")
+
+
+def files_of(output: Path) -> list[Path]:
+    """Return all files that one output stands for.
+
+    Raises
+    ------
+    UnsupportedFormatError
+        If its suffix is none of ``.skel``, ``.skin`` and ``.npz``.
+    """
+    suffix = output.suffix.lower()
+    if suffix == ".npz":
+        return [output]
+    if suffix in (".skel", ".skin"):
+        return [output.with_suffix(each) for each in _RIG]
+    raise UnsupportedFormatError(
+        f'a rigged mesh cannot be written as "{suffix}"; there are: .skel (with .skin, .obj and '
+        "the target's pose as .json), .npz"
+    )
+
+
+def write_rigged(rigged: Rigged, output: Path) -> list[str]:
+    """Write a rigged mesh, all of its files or none.
+
+    Parameters
+    ----------
+    rigged : Rigged
+        The result.
+    output : Path
+        ``.skel`` or ``.skin``: skeleton and skin at rest, the rest mesh with its texture
+        coordinates as ``.obj``, the target's pose as ``.json``; they hold no pose correctives,
+        see ``without_correctives``. ``.npz``: all of it in one file.
+
+    Returns
+    -------
+    list of str
+        What was written, and what a format cannot hold.
+
+    Raises
+    ------
+    RigError
+        If the skeleton has what ``.skel`` cannot hold.
+    UnsupportedFormatError
+        As ``files_of``.
+    OutputError
+        If a file cannot be written.
+    """
+    files = files_of(output)
+    if output.suffix.lower() == ".npz":
+        from viewer.formats.rigged import save
+
+        save(rigged.figure, output, _arrays(rigged))
+        return [f"{printable(output, 300)}: the figure with its rig, the target's pose, confidence"]
+    skel, _, obj, json = files
+    figure = without_correctives(rigged)
+    lines: list[str] = []
+    with all_or_none(files):
+        lines += export(Actor(figure, figure_pose(figure)), skel)
+        lines += export(Actor(Figure(figure.name, figure.mesh, up=figure.up)), obj)
+        lines += export(Actor(figure, rigged.pose), json)
+    lines[-1] += ", the target's pose"
+    if rigged.figure.correctives is not None:
+        lines.append(
+            "pose correctives have no place in .skel and .skin: the rest mesh is the one that "
+            "gives the target without them"
+        )
+    return lines
+
+
+def without_correctives(rigged: Rigged) -> Figure:
+    """Return the figure without pose correctives that still gives the target in its pose.
+
+    What they add in that pose goes into the rest mesh: V + B(pose).
+    """
+    figure = rigged.figure
+    correctives, mesh, skeleton = figure.correctives, figure.mesh, figure.skeleton
+    if correctives is None or mesh is None or skeleton is None:
+        return figure
+    turned = joint_rotations(skeleton, rigged.pose)
+    rest = mesh.positions + correctives.displacement(corrective_weights(turned))
+    plain = replace(mesh, positions=rest, normals=vertex_normals(rest, mesh.triangles))
+    return replace(figure, mesh=plain, correctives=None)
+
+
+def _arrays(rigged: Rigged) -> dict[str, NDArray[Any]]:
+    """Return what a program may want to know beside the figure itself."""
+    pose = rigged.pose
+    placed = rigged.alignment.placed.matrix if rigged.alignment else np.linalg.inv(rigged.placement)
+    return {
+        "target_dofs": pose.dofs,
+        "target_translations": pose.translations,
+        "target_rotations": pose.rotations,
+        "target_scales": pose.scales,
+        "target_place": np.append(pose.figure_translation, pose.figure_scale),
+        "placement": rigged.placement,
+        "alignment": placed,
+    }
