@@ -7,8 +7,14 @@ from pathlib import Path
 import pytest
 from app.tiny import write_rig
 
+import viewer
+from viewer.cli import run
+from viewer.export import export
 from viewer.lint import Finding, lint_files
 from viewer.loading import bundled_body, bundled_files
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import Mesh, vertex_normals
+from viewer.rig.scene import Actor
 
 
 def heavy(findings: list[Finding]) -> list[tuple[str, str]]:
@@ -62,4 +68,18 @@ def test_the_pig_has_two_pairs_of_joints_of_one_name(shared_data: Path) -> None:
 @pytest.mark.parametrize("name", ["SMPL_NEUTRAL.npz", "SMPL_NEUTRAL.pkl", "easymocap"])
 def test_synthetic_models_and_captures_are_sound(shared_data: Path, name: str) -> None:
     _, findings = lint_files([shared_data / "smpl_synthetic" / name])
+    assert heavy(findings) == []
+
+
+def test_a_mesh_that_was_given_a_rig_is_sound(tmp_path: Path) -> None:
+    pytest.importorskip("scipy")
+    body = viewer.load(bundled_body()).actors[0]
+    moved = 1.3 * viewer.deform(body.figure, body.pose)[0] + [0.2, 0.0, 0.1]
+    triangles = body.figure.mesh.triangles
+    mesh = Mesh(moved, vertex_normals(moved, triangles), triangles)
+    export(Actor(Figure("scan", mesh)), tmp_path / "scan.obj")
+    files = [tmp_path / "rigged.skel", tmp_path / "rigged.skin"]
+    assert run(["rig", str(tmp_path / "scan.obj"), "-o", str(files[0])]) == 0
+    scene, findings = lint_files(files)
+    assert len(scene.actors) == 1 and scene.actors[0].figure.is_attached
     assert heavy(findings) == []

@@ -8,9 +8,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from viewer.lint._aim import points_of
+from viewer.lint._aim import Places, places_of, points_of
 from viewer.lint._codes import CODES, SEVERITIES, Code
 from viewer.lint._finding import Finding, LintOptions, Subject
+from viewer.lint._report import describe, finding_text, summary, worst_first
 from viewer.rig.scene import Scene
 
 if TYPE_CHECKING:
@@ -24,11 +25,17 @@ __all__ = [
     "Code",
     "Finding",
     "LintOptions",
+    "Places",
     "Progress",
     "Subject",
+    "describe",
+    "finding_text",
     "lint_files",
     "lint_scene",
+    "places_of",
     "points_of",
+    "summary",
+    "worst_first",
 ]
 
 Progress = Callable[[int, int, str], None]

@@ -1,21 +1,48 @@
-"""Where a finding is in the scene, for a camera that shall look there."""
+"""Where a finding is in the scene: for a camera that looks there, and for marks that show it."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from viewer.lint._finding import Finding
 from viewer.rig.arrays import Floats
 from viewer.rig.points import PointClip
-from viewer.rig.scene import Scene, actor_points
-from viewer.rig.skinning import deform, joint_matrices
+from viewer.rig.scene import Actor, Scene, actor_points
+from viewer.rig.skinning import Skinning, deform, joint_matrices
 from viewer.rig.transform import apply_transform
 
-__all__ = ["points_of"]
+__all__ = ["Places", "places_of", "points_of"]
 
 
-def points_of(finding: Finding, scene: Scene) -> Floats:
-    """Return the points of a scene that a finding is about, posed as the scene is now.
+@dataclass(frozen=True, slots=True, eq=False)
+class Places:
+    """What a finding is about, as the scene is posed, in scene space.
+
+    Attributes
+    ----------
+    vertices : (N, 3)
+        The worst first.
+    triangles : (T, 3, 3)
+        Their corners, the worst triangle first.
+    joints : (J, 3)
+        Joints, or captured points that are seen.
+    facing : (3,)
+        Mean normal of what is on the surface: length 1 if all of it faces one way, 0 if it faces
+        every way or there is nothing.
+    """
+
+    vertices: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    triangles: Floats = field(default_factory=lambda: np.zeros((0, 3, 3)))
+    joints: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    facing: Floats = field(default_factory=lambda: np.zeros(3))
+
+
+def places_of(
+    finding: Finding, scene: Scene, skinning: Skinning | None = None, binding: bool = False
+) -> Places:
+    """Return the places of a scene that a finding is about, posed as the scene is now.
 
     Findings about frames are seen best with the scene at ``finding.times[0]``.
 
@@ -24,24 +51,44 @@ def points_of(finding: Finding, scene: Scene) -> Floats:
     finding : Finding
         Of this scene.
     scene : Scene
-        As it was when it was checked.
-
-    Returns
-    -------
-    (N, 3)
-        Scene space: of the vertices, of the triangles' corners, or of the joints, in this order;
-        all of the actor if it names none; none at all without an actor.
+        As it was when it was checked; poses may differ.
+    skinning : Skinning, optional
+        How the mesh is drawn.
+    binding : bool
+        Whether it is drawn in its binding space.
     """
     if finding.actor is None or finding.actor >= len(scene.actors):
-        return np.zeros((0, 3))
+        return Places()
     actor = scene.actors[finding.actor]
-    figure = actor.figure
-    vertices = finding.vertices
-    if len(vertices) == 0 and len(finding.triangles) and figure.mesh is not None:
-        vertices = figure.mesh.triangles[finding.triangles].ravel()
-    if len(vertices) and figure.mesh is not None:
-        return apply_transform(actor.placement, deform(figure, actor.pose)[0][vertices])
-    joints = finding.joints
+    joints = _joint_places(finding, actor)
+    mesh = actor.figure.mesh
+    if mesh is None or not (len(finding.vertices) or len(finding.triangles)):
+        return Places(joints=joints)
+    if binding:
+        positions, normals = mesh.positions, mesh.normals
+    else:
+        positions, normals = deform(actor.figure, actor.pose, skinning or Skinning())
+    corners = mesh.triangles[finding.triangles]
+    touched = np.concatenate([finding.vertices, corners.ravel()])
+    return Places(
+        vertices=apply_transform(actor.placement, positions[finding.vertices]),
+        triangles=apply_transform(actor.placement, positions[corners]),
+        joints=joints,
+        facing=_facing(normals[touched], actor),
+    )
+
+
+def _facing(normals: Floats, actor: Actor) -> Floats:
+    """Return the mean of unit normals, turned as the actor stands: (3,)."""
+    mean = normals.mean(axis=0)
+    turned = actor.placement[:3, :3] @ mean
+    length = float(np.linalg.norm(turned))
+    # A placement's scale must not make it longer; a broken rig may have no finite normals.
+    return turned * (np.linalg.norm(mean) / length) if 0.0 < length < np.inf else np.zeros(3)
+
+
+def _joint_places(finding: Finding, actor: Actor) -> Floats:
+    joints, figure = finding.joints, actor.figure
     if len(joints) and isinstance(actor.clip, PointClip):
         if actor.points is None:
             return np.zeros((0, 3))
@@ -50,4 +97,31 @@ def points_of(finding: Finding, scene: Scene) -> Floats:
     if len(joints) and figure.skeleton is not None and actor.pose is not None:
         world = joint_matrices(figure, actor.pose)[joints]
         return apply_transform(actor.placement, world[:, :3, 3])
-    return actor_points(actor)
+    return np.zeros((0, 3))
+
+
+def points_of(finding: Finding, scene: Scene, places: Places | None = None) -> Floats:
+    """Return the points of a scene that a finding is about, posed as the scene is now.
+
+    Parameters
+    ----------
+    finding : Finding
+        Of this scene.
+    scene : Scene
+        As it was when it was checked.
+    places : Places, optional
+        What ``places_of`` gave, if it is at hand.
+
+    Returns
+    -------
+    (N, 3)
+        Scene space: of the vertices, or of the triangles' corners, or of the joints, in this
+        order; all of the actor if it names none, or none is there now; none at all without an
+        actor.
+    """
+    if finding.actor is None or finding.actor >= len(scene.actors):
+        return np.zeros((0, 3))
+    found = places or places_of(finding, scene)
+    corners = found.triangles.reshape(-1, 3)
+    several = (part for part in (found.vertices, corners, found.joints) if len(part))
+    return next(several, actor_points(scene.actors[finding.actor]))

@@ -22,7 +22,7 @@ from viewer.rig.pose import Pose
 from viewer.rig.rotation import axis_rotations, quaternion_to_matrix
 from viewer.rig.skeleton import Skeleton, joint_label
 
-__all__ = ["Reach", "chain_above", "place_jacobian", "reach"]
+__all__ = ["Reach", "chain_above", "place_jacobian", "reach", "rotation_axes"]
 
 _FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
 _CLOSE = 1e-7  # of the chain's length: an error below is none
@@ -110,14 +110,29 @@ def place_jacobian(skeleton: Skeleton, pose: Pose, world: Floats, joint: int, ro
         parent = int(skeleton.parents[turning])
         linear = world[parent, :3, :3] if parent >= 0 else np.eye(3)
         arm = np.linalg.solve(linear, end - world[turning, :3, 3])
-        axes = _axes(skeleton, pose, int(turning))
+        axes = rotation_axes(skeleton, pose, int(turning))
         for place in np.flatnonzero(skeleton.dof_joints[rows] == turning):
             columns[:, place] = linear @ np.cross(axes[int(rows[place])], arm)
     return columns
 
 
-def _axes(skeleton: Skeleton, pose: Pose, joint: int) -> dict[int, Floats]:
-    """Return the axis of each rotation DOF of a joint, in its parent's frame."""
+def rotation_axes(skeleton: Skeleton, pose: Pose, joint: int) -> dict[int, Floats]:
+    """Return the axis about which each rotation DOF of a joint turns it right now.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Gives the DOF table.
+    pose : Pose
+        Radians; the DOFs that are applied later turn the axes of those before.
+    joint : int
+        Whose DOFs.
+
+    Returns
+    -------
+    dict of int to (3,)
+        By row of the DOF table: unit vectors in the parent's frame.
+    """
     own = np.flatnonzero((skeleton.dof_joints == joint) & (skeleton.dof_kinds >= _FIRST_ROTATION))
     after = quaternion_to_matrix(pose.rotations[joint])
     axes = {}

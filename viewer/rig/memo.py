@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Hashable
+from threading import Lock
 from typing import Generic, TypeVar
 from weakref import WeakKeyDictionary
 
@@ -13,7 +15,7 @@ _Value = TypeVar("_Value")
 
 
 class Memo(Generic[_Owner, _Value]):
-    """A few results per owner; they go when the owner does.
+    """A few results per owner; they go when the owner does. Threads may share it.
 
     Parameters
     ----------
@@ -23,6 +25,7 @@ class Memo(Generic[_Owner, _Value]):
 
     def __init__(self, kept: int = 1) -> None:
         self._kept = kept
+        self._lock = Lock()
         self._values: WeakKeyDictionary[_Owner, dict[Hashable, _Value]] = WeakKeyDictionary()
 
     def get(self, owner: _Owner, key: Hashable, make: Callable[[], _Value]) -> _Value:
@@ -38,9 +41,12 @@ class Memo(Generic[_Owner, _Value]):
             Without arguments.
         """
         known = self._values.setdefault(owner, {})
-        if key not in known:
-            value = make()
-            while len(known) >= self._kept:
+        if key in known:
+            with contextlib.suppress(KeyError):  # another thread made room meanwhile
+                return known[key]
+        value = make()
+        with self._lock:
+            while len(known) >= self._kept and key not in known:
                 del known[next(iter(known))]
             known[key] = value
-        return known[key]
+        return value

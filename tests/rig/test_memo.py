@@ -1,0 +1,82 @@
+"""Remembered results: how many, for how long, and shared by threads."""
+
+from __future__ import annotations
+
+import gc
+import threading
+import weakref
+
+from viewer.rig.memo import Memo
+
+
+class Owner:
+    """Something that can be referred to weakly."""
+
+
+def test_a_result_is_made_once() -> None:
+    memo: Memo[Owner, list[int]] = Memo()
+    owner, made = Owner(), []
+    for _ in range(3):
+        assert memo.get(owner, "a", lambda: made.append(1) or [7]) == [7]
+    assert made == [1]
+
+
+def test_the_oldest_makes_room() -> None:
+    memo: Memo[Owner, int] = Memo(kept=2)
+    owner, made = Owner(), []
+
+    def get(key: int) -> int:
+        return memo.get(owner, key, lambda: made.append(key) or key)
+
+    assert [get(key) for key in (1, 2, 3, 3, 2, 1)] == [1, 2, 3, 3, 2, 1]
+    assert made == [1, 2, 3, 1]
+
+
+def test_results_go_with_their_owner() -> None:
+    memo: Memo[Owner, Owner] = Memo()
+    owner = Owner()
+    gone = weakref.ref(memo.get(owner, "a", Owner))
+    assert gone() is not None
+    del owner
+    gc.collect()
+    assert gone() is None
+
+
+def test_threads_that_take_each_others_room_get_their_own() -> None:
+    """One result is kept, and a second thread asks for another one while the first is made."""
+    memo: Memo[Owner, str] = Memo(kept=1)
+    owner, inside, go = Owner(), threading.Event(), threading.Event()
+    found: list[str] = []
+
+    def slow() -> str:
+        inside.set()
+        go.wait(10)
+        return "slow"
+
+    thread = threading.Thread(target=lambda: found.append(memo.get(owner, "slow", slow)))
+    thread.start()
+    inside.wait(10)
+    assert memo.get(owner, "quick", lambda: "quick") == "quick"
+    go.set()
+    thread.join()
+    assert found == ["slow"]
+    assert memo.get(owner, "slow", lambda: "again") == "slow"
+
+
+def test_threads_that_change_places_all_the_time_never_fail() -> None:
+    memo: Memo[Owner, int] = Memo(kept=1)
+    owner = Owner()
+    wrong: list[int] = []
+
+    def ask(first: int) -> None:
+        for step in range(3000):
+            key = (first + step) % 3
+            if memo.get(owner, key, lambda key=key: key) != key:
+                wrong.append(key)
+
+    threads = [threading.Thread(target=ask, args=(k,)) for k in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not wrong

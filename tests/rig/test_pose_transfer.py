@@ -1,0 +1,162 @@
+"""Poses carried between figures: other DOF orders, rest rotations, up axes, joints in between."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from viewer.errors import RigError
+from viewer.rig.figure import Figure
+from viewer.rig.pose import rest_pose
+from viewer.rig.pose_transfer import joints_by_name, shares_dofs, transfer_pose
+from viewer.rig.skeleton import Skeleton
+
+HALF = np.sqrt(0.5)
+
+
+def about(axis: int, angle: float) -> np.ndarray:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array(
+        [
+            [[1, 0, 0], [0, c, -s], [0, s, c]],
+            [[c, 0, s], [0, 1, 0], [-s, 0, c]],
+            [[c, -s, 0], [s, c, 0], [0, 0, 1]],
+        ][axis]
+    )
+
+
+def figure(names, orders, name="one", up="y", rest=None, limits=None, parents=None) -> Figure:
+    """Return a chain of joints; each turns about the axes of its word, the first applied first."""
+    dofs = [(joint, "xyz".index(axis)) for joint, word in enumerate(orders) for axis in word]
+    count = len(names)
+    bounds = np.tile([-np.inf, np.inf], (len(dofs), 1)) if limits is None else np.array(limits)
+    skeleton = Skeleton(
+        names=tuple(names),
+        parents=np.arange(count) - 1 if parents is None else np.array(parents),
+        rest_translations=np.tile([0.0, 1.0, 0.0], (count, 1)),
+        rest_rotations=np.tile([0.0, 0, 0, 1], (count, 1)) if rest is None else np.array(rest),
+        rest_scales=np.ones((count, 3)),
+        dof_joints=np.array([joint for joint, _ in dofs], int),
+        dof_kinds=np.array([3 + axis for _, axis in dofs], int),
+        rest_dofs=np.clip(np.zeros(len(dofs)), *bounds.T),
+        dof_limits=bounds,
+    )
+    return Figure(name=name, skeleton=skeleton, up=up)
+
+
+def posed(fig, *dofs):
+    pose = rest_pose(fig.skeleton)
+    pose.dofs[:] = dofs
+    return pose
+
+
+def test_other_order_of_dofs_gets_the_same_rotation() -> None:
+    one, other = figure("ab", ["xyz", "xyz"]), figure("ab", ["zxy", "yzx"], "other")
+    angles = 0.3, -0.5, 0.8, 1.0, 0.2, -0.7
+    pose, notes = transfer_pose(one, posed(one, *angles), other, rest_pose(other.skeleton))
+    z, x, y = pose.dofs[:3]
+    first = about(2, 0.8) @ about(1, -0.5) @ about(0, 0.3)
+    assert_allclose(about(1, y) @ about(0, x) @ about(2, z), first, atol=1e-12)
+    y, z, x = pose.dofs[3:]
+    second = about(2, -0.7) @ about(1, 0.2) @ about(0, 1.0)
+    assert_allclose(about(0, x) @ about(2, z) @ about(1, y), second, atol=1e-12)
+    assert notes == []
+
+
+def test_labels_alone_would_give_another_pose() -> None:
+    # What is carried is the rotation: the numbers under the same labels differ.
+    one, other = figure("a", ["xyz"]), figure("a", ["zyx"], "other")
+    pose, _ = transfer_pose(one, posed(one, 0.5, 0.6, 0.7), other, rest_pose(other.skeleton))
+    z, y, x = pose.dofs
+    assert np.abs([x - 0.5, y - 0.6, z - 0.7]).max() > 0.1
+
+
+def test_joints_that_are_missing_are_named_in_one_line_and_others_stay() -> None:
+    one = figure(["a", "b", "tail", "tip"], ["xyz"] * 4, "cat")
+    other = figure(["a", "b", "hat"], ["xyz"] * 3, "man")
+    start = posed(other, *np.zeros(6), 0.1, 0.2, 0.3)
+    pose, notes = transfer_pose(one, posed(one, *[0.2] * 12), other, start)
+    assert notes == ["man has no joint called tail, tip"]
+    assert_allclose(pose.dofs, [0.2] * 6 + [0.1, 0.2, 0.3], atol=1e-12)
+    assert_allclose(start.dofs[:6], 0)
+
+
+def test_joint_in_between_is_folded_in() -> None:
+    # The other's "b" hangs on an extra joint that stays turned by 0.3: b makes up for it.
+    one = figure(["a", "b"], ["xyz", "xyz"])
+    other = figure(["a", "extra", "b"], ["xyz"] * 3, "other")
+    start = posed(other, 0, 0, 0, 0, 0, 0.3, 0, 0, 0)
+    pose, _ = transfer_pose(one, posed(one, 0, 0, 0.2, 0, 0, 0.5), other, start)
+    assert_allclose(pose.dofs[[2, 5, 8]], [0.2, 0.3, 0.2], atol=1e-12)
+
+
+def test_rest_rotations_may_differ() -> None:
+    # The other's joint rests a quarter turn about x: what turns about the world's y turns it
+    # about its own -z, as Rx(-90) y = -z.
+    one = figure("a", ["xyz"])
+    other = figure("a", ["xyz"], "other", rest=[[HALF, 0, 0, HALF]])
+    pose, _ = transfer_pose(one, posed(one, 0, 0.4, 0), other, rest_pose(other.skeleton))
+    # W = Ry(0.4) Rx(90) = Rx(90) R'  =>  R' = Rx(-90) Ry(0.4) Rx(90) = Rz(-0.4).
+    assert_allclose(pose.dofs, [0, 0, -0.4], atol=1e-12)
+
+
+def test_up_axes_may_differ() -> None:
+    # Turned about the way up: y of the one is z of the other.
+    one, other = figure("a", ["xyz"]), figure("a", ["xyz"], "other", up="z")
+    pose, _ = transfer_pose(one, posed(one, 0, 0.4, 0), other, rest_pose(other.skeleton))
+    assert_allclose(pose.dofs, [0, 0, 0.4], atol=1e-12)
+    back, _ = transfer_pose(other, posed(other, 0, 0, 0.4), one, rest_pose(one.skeleton))
+    assert_allclose(back.dofs, [0, 0.4, 0], atol=1e-12)
+
+
+def test_limits_and_missing_axes_are_kept_and_said() -> None:
+    one = figure("ab", ["xyz", "xyz"])
+    other = figure("ab", ["xyz", "x"], "stiff", limits=[[-0.1, 0.1]] * 3 + [[0, 1]])
+    pose, notes = transfer_pose(one, posed(one, 0.5, 0, 0, 0.4, 0, 0.2), other,
+                                rest_pose(other.skeleton))  # fmt: skip
+    assert_allclose(pose.dofs[:3], [0.1, 0, 0], atol=1e-9)
+    # Rz(0.2) Rx(0.4) on an axis x: tan t = (1 + cos 0.2) sin 0.4 / ((1 + cos 0.2) cos 0.4).
+    assert_allclose(pose.dofs[3], 0.4, atol=1e-9)
+    assert notes == ["turned as far as their DOFs and limits allow: a, b"]
+
+
+def test_place_size_and_shape_stay() -> None:
+    one, other = figure("a", ["xyz"]), figure("a", ["zyx"], "other")
+    source = posed(one, 0.1, 0.2, 0.3)
+    source.figure_translation[:] = 1, 2, 3
+    source.figure_scale = 5.0
+    start = rest_pose(other.skeleton)
+    start.figure_scale = 0.5
+    pose, _ = transfer_pose(one, source, other, start)
+    assert pose.figure_scale == 0.5 and not pose.figure_translation.any()
+
+
+def test_nothing_in_common_is_refused() -> None:
+    one, other = figure("ab", ["xyz", "x"], "cat"), figure("cd", ["x", "x"], "man")
+    with pytest.raises(RigError) as caught:
+        transfer_pose(one, rest_pose(one.skeleton), other, rest_pose(other.skeleton))
+    assert str(caught.value) == "no joint of cat is called as one of man"
+
+
+def test_repeated_and_empty_names_match_nothing() -> None:
+    one = figure(["a", "leg", "leg", ""], ["x"] * 4)
+    other = figure(["leg", "a", ""], ["x"] * 3)
+    assert joints_by_name(one.skeleton, other.skeleton).tolist() == [-1, 0, -1]
+
+
+def test_same_numbers_need_the_same_dofs_rest_and_up() -> None:
+    one = figure("ab", ["xyz", "xyz"])
+    assert shares_dofs(one, one) and shares_dofs(one, figure("ab", ["xyz", "xyz"], "other"))
+    assert not shares_dofs(one, figure("ab", ["xyz", "zyx"]))
+    assert not shares_dofs(one, figure("ac", ["xyz", "xyz"]))
+    assert not shares_dofs(one, figure("ab", ["xyz", "xyz"], up="z"))
+    assert not shares_dofs(one, figure("ab", ["xyz", "xyz"], parents=[-1, -1]))
+    assert not shares_dofs(one, figure("ab", ["xyz"] * 2, rest=[[0, 0, 0, 1], [HALF, 0, 0, HALF]]))
+
+
+def test_long_lists_are_cut() -> None:
+    one = figure(["a", *(f"j{k}" for k in range(20))], ["xyz"] * 21)
+    other = figure("a", ["zyx"], "man")
+    _, notes = transfer_pose(one, rest_pose(one.skeleton), other, rest_pose(other.skeleton))
+    assert notes[0].startswith("man has no joint called j0, j1, ") and notes[0].endswith("8 more")

@@ -1,0 +1,100 @@
+"""Findings in words: a line each for people and editors, everything for programs."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from viewer.errors import printable
+from viewer.lint._codes import SEVERITIES
+from viewer.lint._finding import Finding
+from viewer.rig.scene import Scene
+from viewer.rig.skeleton import joint_labels
+
+__all__ = ["describe", "finding_text", "summary", "worst_first"]
+
+_LISTED = 100  # places of one finding in JSON; their number is always there
+
+
+def worst_first(findings: Sequence[Finding]) -> list[Finding]:
+    """Return findings by severity, the worst first; those of one severity stay in their order."""
+    return sorted(findings, key=lambda finding: -SEVERITIES.index(finding.severity))
+
+
+def finding_text(finding: Finding) -> str:
+    """Return one finding as compilers print theirs, so that editors jump to file and line.
+
+    Who it is about is said where the file does not say it: of several people, and of a clip.
+    """
+    place, who = "", ""
+    if finding.file is not None and finding.file != Path():
+        place = printable(finding.file, 300)
+        place += f":{finding.line}" if finding.line is not None else ""
+        known = (finding.file.stem, finding.file.name, "")
+        who = "" if finding.name in known else f"{printable(finding.name, 100)}: "
+    elif finding.name:
+        place = printable(finding.name, 100)
+    head = f"{place}: " if place else ""
+    text = f"{finding.severity} {finding.code}: {who}{printable(finding.message, 2000)}"
+    return f"{head}{text}\n    {finding.title}: {finding.hint}"
+
+
+def summary(findings: Sequence[Finding]) -> str:
+    """Return how many there are of each severity: ``1 error, 0 warnings, 3 notes``."""
+    counts = Counter(finding.severity for finding in findings)
+    parts = [f"{counts[kind]} {kind}{'s' * (counts[kind] != 1)}" for kind in reversed(SEVERITIES)]
+    return ", ".join(parts)
+
+
+def describe(findings: Sequence[Finding], scene: Scene) -> dict[str, Any]:
+    """Return findings ready for JSON.
+
+    Parameters
+    ----------
+    findings : sequence of Finding
+        Of this scene, or of its files.
+    scene : Scene
+        Names the joints.
+    """
+    counts = Counter(finding.severity for finding in findings)
+    return {
+        "findings": [_describe(finding, scene) for finding in findings],
+        "counts": {kind: counts[kind] for kind in reversed(SEVERITIES)},
+    }
+
+
+def _describe(finding: Finding, scene: Scene) -> dict[str, Any]:
+    has_file = finding.file is not None and finding.file != Path()
+    facts: dict[str, Any] = {
+        "code": finding.code,
+        "severity": finding.severity,
+        "title": finding.title,
+        "message": printable(finding.message, 2000),
+        "hint": finding.hint,
+        "file": printable(finding.file, 1000) if has_file else None,
+        "line": finding.line,
+        "actor": finding.actor,
+        "name": printable(finding.name),
+    }
+    for key in ("vertices", "triangles", "joints", "frames", "times"):
+        values = getattr(finding, key)
+        facts[key] = values[:_LISTED].tolist()
+        facts[f"n_{key}"] = len(values)
+    facts["joint_names"] = _joint_names(finding, scene)
+    return facts
+
+
+def _joint_names(finding: Finding, scene: Scene) -> list[str]:
+    if finding.actor is None or len(finding.joints) == 0:
+        return []
+    figure = scene.actors[finding.actor].figure
+    if figure.points is not None:
+        names: tuple[str, ...] = figure.points.names
+    elif figure.skeleton is not None:
+        names = joint_labels(figure.skeleton)
+    else:
+        return []
+    some = finding.joints[:_LISTED].tolist()
+    return [printable(names[joint]) if joint < len(names) else f"#{joint}" for joint in some]
