@@ -42,7 +42,7 @@ HOMES = {
     "pyrr": {"rendering/camera.py"},
     "glfw": {"app"},
     "imgui_bundle": {"app"},
-    "PIL": {"formats/_image.py", "rendering/legend_picture.py"},
+    "PIL": {"formats/_image.py", "rendering/legend_picture.py", "rendering/lettering.py"},
     "av": {"formats/_video.py"},
 }
 

@@ -12,6 +12,9 @@ import numpy as np
 import pytest
 from PIL import Image, ImageFilter
 
+from viewer.app.lint_actions import check_rig
+from viewer.app.weights_actions import pin_vertex
+
 GOLDEN = Path(__file__).resolve().parents[1] / "golden"
 SIZE = (560, 420)
 BODY_SIZE = (760, 680)
@@ -46,6 +49,13 @@ def _dialog(hand):
     hand.state.dialog.folder = Path("/figures")
 
 
+def _lint(hand):
+    check_rig(hand.state)
+    hand.state.lint.running.job.wait()
+    hand.step(3)
+    hand.click("finding 0")
+
+
 STATES = {
     "start": _nothing,
     "skeleton": _skeleton,
@@ -53,6 +63,7 @@ STATES = {
     "keys": _keys,
     "message": _message,
     "dialog": _dialog,
+    "lint": _lint,
 }
 
 
@@ -73,6 +84,20 @@ def _skinning(hand):
     options.shading, options.scalar = "scalar", "cut"
 
 
+def _weights(hand):
+    hand.show_panel("Weights")
+    pose, options = hand.state.actor.pose, hand.state.options
+    pose.dofs[hand.dof_index("left_hip.z")] = 0.4
+    options.shading, options.scalar, options.scalar_range = "scalar", "stretch", (-50.0, 50.0)
+
+
+def _vertex(hand):
+    for number, joint in enumerate(("left_hip", "spine1", "left_shoulder")):
+        hand.state.actor.pose.dofs[hand.dof_index(f"{joint}.z")] = 0.4 - 0.3 * number
+    hand.state.options.xray = True
+    pin_vertex(hand.state, 0, int(np.diff(hand.state.actor.figure.skin.starts).argmax()))
+
+
 def _vectors(hand):
     hand.click("Rotation vectors")
     pose = hand.state.actor.pose
@@ -84,6 +109,8 @@ BODIES = {
     "shape": ("flame", _shape),
     "skinning": ("smpl", _skinning),
     "vectors": ("box", _vectors),
+    "weights": ("smpl", _weights),
+    "vertex": ("smpl", _vertex),
 }
 
 

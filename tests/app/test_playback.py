@@ -162,3 +162,27 @@ def test_nothing_that_moves_does_not_play():
     playback.playing = True
     playback.advance(1.0)
     assert playback.time == 0.0
+
+
+def test_frames_are_those_of_the_chosen_actor_so_that_each_can_be_reached():
+    one, other = actor(captured(4, 30.0, 0)), actor(captured(5, 50.0, 0))
+    other.offset = 0.005
+    scene = Scene([one, other])
+    playback = Playback()
+    playback.show(scene)
+    playback.step(1)
+    assert playback.time == pytest.approx(1 / 30)
+    playback.follow(scene.actors, other)
+    assert playback.frame_rate == 50.0
+    assert playback.time == pytest.approx(1 / 30)  # another choice moves nothing
+    playback.seek(0.0)
+    times = []
+    for _ in range(3):
+        playback.step(1)
+        times.append(playback.time)
+    assert times == pytest.approx([0.005, 0.025, 0.045])
+    assert playback.frame == 2
+    # From 0 to 0.1 s: frames 0 to 4 of that actor lie within.
+    assert playback.whole == pytest.approx((0.0, 0.1)) and playback.frame_range == (0, 4)
+    playback.follow(scene.actors, one)
+    assert playback.frame_range == (0, 3) and playback.frame == 1

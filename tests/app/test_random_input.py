@@ -20,7 +20,7 @@ from PIL import Image
 from viewer.app import menus
 
 KEYS = [
-    *"rskwntgfhzyoamcv",
+    *"rskwntgfhzyoamcvedqx",
     *("_1", "_3", "_5", "_7", "tab", "escape", "f1", "f12", "enter", "backspace", "delete"),
     *("left_arrow", "right_arrow", "up_arrow", "down_arrow", "space", "keypad5", "page_down"),
 ]

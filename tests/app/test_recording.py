@@ -120,7 +120,7 @@ def test_window_answers_while_it_records(moving, tmp_path):
     start(moving, tmp_path / "f_{frame}.png", kind="pictures", rate=60.0)
     moving.step(3)
     azimuth = moving.state.camera.azimuth
-    x, y = moving.middle[0], moving.middle[1] - 150  # beside the progress bar
+    x, y = moving.middle[0], moving.middle[1] + 80  # beside the progress bar
     moving.pull((x, y), (x + 40, y))
     assert moving.state.camera.azimuth != azimuth
     finish(moving)

@@ -17,6 +17,8 @@ NAMES = [
     "motion",
     "read",
     "captures",
+    "lint",
+    "transfer",
     "video",
 ]
 

@@ -56,31 +56,31 @@ def fox() -> viewer.Figure:
 def targets(figure: viewer.Figure, what: str) -> list[Target]:
     """Return all targets of a figure; the body's have clothes and lowered arms besides."""
     rng = np.random.default_rng(20)
-    plain = _plain(what, figure, viewer.rest_pose(figure.skeleton))
-    posed = _plain(what, figure, _bent(figure, rng, 0.25))
+    plain = posed(what, figure, viewer.rest_pose(figure.skeleton))
+    bent = posed(what, figure, bent_pose(figure, rng, 0.25))
     made = [
         _perturbed(plain, rng),
-        _subdivided(plain),
+        subdivided(plain),
         _remeshed(plain, rng),
         _coarse_template(plain),
         _placed(_remeshed(plain, rng)),
-        _named(_remeshed(posed, rng), "re-posed, remeshed"),
+        _named(_remeshed(bent, rng), "re-posed, remeshed"),
         _otherwise_bent(plain, figure, rng),
-        _named(_shell(plain, 0.01, None), "offset by 1 %"),
+        _named(shell(plain, 0.01, None), "offset by 1 %"),
     ]
     if what == "body":
-        down = _plain(what, figure, _arms_down(figure))
+        down = posed(what, figure, _arms_down(figure))
         made.append(_named(_remeshed(down, rng), "arms on the torso"))
         torso = ["pelvis", "spine1", "spine2", "spine3", "left_hip", "right_hip"]
-        made.append(_named(_shell(plain, 0.015, torso), "clothes, open, offset by 1.5 %"))
+        made.append(_named(shell(plain, 0.015, torso), "clothes, open, offset by 1.5 %"))
     return made
 
 
 def fine(figure: viewer.Figure) -> Target:
     """Return a target of more than 50,000 vertices, a part of which does not fit."""
-    rest = _plain("", figure, viewer.rest_pose(figure.skeleton))
+    rest = posed("", figure, viewer.rest_pose(figure.skeleton))
     bent = _otherwise_bent(rest, figure, np.random.default_rng(3), remesh=False)
-    return _clustered(_subdivided(_subdivided(bent)), 0.3 * _edge_length(*_surface(rest)))
+    return clustered(subdivided(subdivided(bent)), 0.3 * edge_length(*_surface(rest)))
 
 
 def template_figure(target: Target) -> viewer.Figure:
@@ -105,7 +105,8 @@ def _surface(target: Target) -> tuple[np.ndarray, np.ndarray]:
     return target.positions, target.triangles
 
 
-def _plain(what, figure, pose) -> Target:
+def posed(what, figure, pose) -> Target:
+    """Return a figure's own vertices in a pose."""
     positions, _ = viewer.deform(figure, pose, viewer.Skinning(correctives=False))
     weights, triangles = weights_of(figure.skin), figure.mesh.triangles
     return Target(
@@ -117,12 +118,12 @@ def _named(target: Target, name: str) -> Target:
     return replace(target, name=name)
 
 
-def _bent(figure, rng, angle: float) -> viewer.Pose:
+def bent_pose(figure, rng, angle: float) -> viewer.Pose:
     """Turn every joint but the root about random axes, by a normal angle."""
     pose = viewer.rest_pose(figure.skeleton)
     turns = rng.normal(scale=angle / np.sqrt(3), size=(len(pose.rotations), 3))
     turns[0] = 0.0
-    _turn(pose, turns)
+    turn_joints(pose, turns)
     return pose
 
 
@@ -133,38 +134,41 @@ def _arms_down(figure) -> viewer.Pose:
     names = list(figure.skeleton.names)
     turns[names.index("left_shoulder"), 2] = -1.35
     turns[names.index("right_shoulder"), 2] = 1.35
-    _turn(pose, turns)
+    turn_joints(pose, turns)
     return pose
 
 
-def _turn(pose: viewer.Pose, vectors: np.ndarray) -> None:
+def turn_joints(pose: viewer.Pose, vectors: np.ndarray) -> None:
+    """Give each joint a rotation by its rotation vector, in place."""
     angles = np.linalg.norm(vectors, axis=1, keepdims=True)
     axes = vectors / np.where(angles > 0, angles, 1.0)
     pose.rotations[:] = np.concatenate([np.sin(angles / 2) * axes, np.cos(angles / 2)], axis=1)
 
 
-def _edges(triangles: np.ndarray) -> np.ndarray:
+def edges(triangles: np.ndarray) -> np.ndarray:
+    """Return each edge once: (E, 2)."""
     return np.unique(np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
 
 
-def _edge_length(positions, triangles) -> float:
-    links = _edges(triangles)
+def edge_length(positions, triangles) -> float:
+    """Return the median length of the edges."""
+    links = edges(triangles)
     return float(np.median(np.linalg.norm(np.diff(positions[links], axis=1), axis=2)))
 
 
-def _size(positions) -> float:
+def size_of(positions) -> float:
     return float(np.linalg.norm(np.ptp(positions, axis=0)))
 
 
 def _perturbed(target: Target, rng) -> Target:
-    step = 0.2 * _edge_length(target.positions, target.triangles)
+    step = 0.2 * edge_length(target.positions, target.triangles)
     positions = target.positions + rng.normal(scale=step / 2, size=target.positions.shape)
     return replace(target, name="perturbed", positions=positions)
 
 
-def _subdivided(target: Target) -> Target:
+def subdivided(target: Target) -> Target:
     """Put a vertex in the middle of each edge, with the mean of its ends' weights."""
-    links, count = _edges(target.triangles), len(target.positions)
+    links, count = edges(target.triangles), len(target.positions)
     keys = links[:, 0].astype(np.int64) * count + links[:, 1]
     a, b, c = target.triangles.T.astype(np.int64)
 
@@ -189,7 +193,7 @@ def _subdivided(target: Target) -> Target:
     )
 
 
-def _clustered(target: Target, cell: float) -> Target:
+def clustered(target: Target, cell: float) -> Target:
     """Keep one vertex of each cell of a grid: the one nearest to the mean of the cell's."""
     cells = np.floor(target.positions / cell).astype(np.int64)
     _, label = np.unique(cells, axis=0, return_inverse=True)
@@ -216,14 +220,14 @@ def _clustered(target: Target, cell: float) -> Target:
 
 def _remeshed(target: Target, rng) -> Target:
     """Subdivide twice, keep about as many vertices as before, elsewhere; then perturb."""
-    fine = _subdivided(_subdivided(target))
-    coarse = _clustered(fine, 1.1 * _edge_length(target.positions, target.triangles))
+    fine = subdivided(subdivided(target))
+    coarse = clustered(fine, 1.1 * edge_length(target.positions, target.triangles))
     return replace(_perturbed(coarse, rng), name="remeshed")
 
 
 def _coarse_template(target: Target) -> Target:
     """Take a decimated template for the figure itself, whose weights are its own."""
-    coarse = _clustered(target, 2.0 * _edge_length(target.positions, target.triangles))
+    coarse = clustered(target, 2.0 * edge_length(target.positions, target.triangles))
     return replace(
         target,
         name="coarse template",
@@ -254,32 +258,32 @@ def _placed(target: Target) -> Target:
 
 def _otherwise_bent(target: Target, figure, rng, remesh: bool = True) -> Target:
     """Bend the target a little, but not the template: an imperfect fit of the pose."""
-    bent = _plain("", figure, _bent(figure, rng, np.radians(4.0)))
+    bent = posed("", figure, bent_pose(figure, rng, np.radians(4.0)))
     bent = _remeshed(bent, rng) if remesh else bent
     return replace(bent, name="bent by 4 degrees", template=target.template, pose=target.pose)
 
 
-def _shell(target: Target, offset: float, joints: list[str] | None) -> Target:
+def shell(target: Target, offset: float, joints: list[str] | None) -> Target:
     """Offset the surface along its normals, of some joints' parts alone if they are given."""
     normals = vertex_normals(target.positions, target.triangles)
-    links = _edges(target.triangles)
+    links = edges(target.triangles)
     both = np.concatenate([links, links[:, ::-1]])
     count = len(normals)
     matrix = sp.csr_array((np.ones(len(both)), (both[:, 0], both[:, 1])), shape=(count, count))
     for _ in range(5):
         normals = normals + matrix @ normals
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    moved = target.positions + offset * _size(target.positions) * normals
+    moved = target.positions + offset * size_of(target.positions) * normals
     triangles = target.triangles
     if joints is not None:
         names = list(target.figure.skeleton.names)
-        part = np.isin(target.weights.toarray().argmax(axis=1), [names.index(n) for n in joints])
-        triangles = triangles[part[triangles].all(axis=1)]
+        inside = np.isin(target.weights.toarray().argmax(axis=1), [names.index(n) for n in joints])
+        triangles = triangles[inside[triangles].all(axis=1)]
     used, flat = np.unique(triangles, return_inverse=True)
-    shell = replace(
+    part = replace(
         target,
         positions=moved[used],
         triangles=flat.reshape(-1, 3).astype(np.int32),
         weights=target.weights[used],
     )
-    return _clustered(_subdivided(shell), 1.1 * _edge_length(shell.positions, shell.triangles))
+    return clustered(subdivided(part), 1.1 * edge_length(part.positions, part.triangles))

@@ -173,6 +173,9 @@ SHOTS: dict[str, Callable[[], Shot]] = {
     "fox-binding": lambda: Shot(posed_fox(2), options(show="binding")),
     "fox-skeleton": lambda: Shot(posed_fox(), options(show="skeleton"), "left"),
     "fox-both": lambda: Shot(posed_fox(1), DisplayOptions(show="both"), selected_joint=3),
+    "fox-xray": lambda: Shot(
+        posed_fox(1), options(xray=True, joint_axes=True), selected_joint=3, ssim_limit=LINES
+    ),
     "fox-checker": lambda: Shot(posed_fox(), options(shading="checker")),
     "fox-normals": lambda: Shot(posed_fox(), options(shading="normals")),
     "fox-plain-flat": lambda: Shot(posed_fox(), options(texture=False, flat=True)),

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from viewer.app.posing_actions import cancel_drag
 from viewer.app.reasons import no_motion
+from viewer.app.rig_gizmo import drop_rig_tool
 from viewer.app.state import AppState
+from viewer.app.weights_actions import unpin
 from viewer.errors import ViewerError, printable
 from viewer.rendering.camera import VIEWS, Camera, camera_from_view, fit
 from viewer.rendering.options import SHOWN, Lights
@@ -11,7 +14,8 @@ from viewer.rendering.picking import Pick
 from viewer.rendering.pinhole import distortion_error
 from viewer.rig.follow import followed_point
 from viewer.rig.pose import rest_pose
-from viewer.rig.scene import scene_points
+from viewer.rig.scene import Actor, scene_points
+from viewer.rig.skeleton import joint_label
 
 __all__ = [
     "cancel",
@@ -110,8 +114,12 @@ def take_pick(state: AppState, found: Pick, aims: bool) -> None:
         state.choose_actor(found.actor)
         state.say_status(printable(state.actor.name, 60))
     if found.joint >= 0:
-        state.selected_joint = found.joint
+        state.selected_joint = state.weights.scrolls_to = found.joint
         skeleton = state.actor.figure.skeleton
+        if skeleton is not None:
+            label = joint_label(skeleton, found.joint)
+            if state.joint_filter.lower() not in label.lower():
+                state.joint_filter = ""
         above = found.joint
         while skeleton is not None and above >= 0:
             state.opened_joints.add(above)  # so that its row is seen
@@ -135,14 +143,25 @@ def reset_lights(state: AppState) -> None:
 
 def undo(state: AppState) -> None:
     """Take back the last change of pose or display."""
+    before = state.actor
     if not state.history.undo(state.scene, state.options):
         state.say_status("Nothing to undo")
+    _keep_choice(state, before)
 
 
 def redo(state: AppState) -> None:
     """Bring back the change that was undone last."""
+    before = state.actor
     if not state.history.redo(state.scene, state.options):
         state.say_status("Nothing to redo")
+    _keep_choice(state, before)
+
+
+def _keep_choice(state: AppState, before: Actor) -> None:
+    """Choose anew if the chosen actor is there no more."""
+    last = len(state.scene.actors) - 1
+    if state.chosen_actor > last or state.actor is not before:
+        state.choose_actor(min(state.chosen_actor, last))
 
 
 def play(state: AppState) -> None:
@@ -212,6 +231,8 @@ def stop_following(state: AppState) -> None:
 
 def cancel(state: AppState) -> None:
     """Close what lies on top: message, dialog, key list; else drop the selection."""
+    if cancel_drag(state):
+        return
     if state.error:
         state.error = ""
     elif state.dialog is not None:
@@ -232,5 +253,12 @@ def cancel(state: AppState) -> None:
         state.say_status("Reading was cancelled; what was read stays")
     elif state.keys_visible:
         state.keys_visible = False
+    elif drop_rig_tool(state):
+        state.say_status("The template is left where it is")
+    elif state.lint.chosen >= 0:
+        state.lint.chosen = -1
+    elif state.weights.pinned is not None:
+        unpin(state)
+        state.say_status("The vertex was unpinned")
     else:
         state.selected_joint = -1

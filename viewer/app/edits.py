@@ -21,8 +21,9 @@ _MOST = 500  # steps kept
 
 @dataclass(frozen=True, slots=True)
 class _Snapshot:
-    """All that can be undone: each actor's pose, clip and way to be shown; what is shown how."""
+    """All that can be undone: who is there, each actor's pose, clip and way to be shown; how."""
 
+    actors: tuple[Actor, ...]
     poses: tuple[Pose | None, ...]
     looks: tuple[_Look, ...]
     options: DisplayOptions
@@ -78,28 +79,37 @@ class History:
         self._now = _take(scene, options, self.time)
         return True
 
+    def accept(self, scene: Scene, options: DisplayOptions) -> None:
+        """Take over what only looks at the scene otherwise, without a step of its own."""
+        if self._now is not None:
+            self._now = _take(scene, options, self.time)
+
     def follow(self, scene: Scene, time: float) -> None:
         """Take over poses that the clock has set, without a step; edits keep their steps."""
         self.time = time
         if self._now is not None:
-            poses = tuple(actor.pose.copy() if actor.pose else None for actor in scene.actors)
+            actors = self._now.actors  # others may have come to the scene since
+            poses = tuple(actor.pose.copy() if actor.pose else None for actor in actors)
             self._now = replace(self._now, poses=poses, time=time)
 
     def add_actors(self, scene: Scene, options: DisplayOptions) -> None:
         """Go on with a scene to which actors were added at its end, as captures are read."""
         whole = _take(scene, options, self.time)
+        known = {id(actor) for one in (*self._undo, *self._redo) for actor in one.actors}
+        known |= {id(actor) for actor in (self._now.actors if self._now else ())}
+        rows = [row for row, actor in enumerate(whole.actors) if id(actor) not in known]
+        clips = {id(actor): actor.clip for actor in whole.actors}
 
         def extended(one: _Snapshot) -> _Snapshot:
-            count = len(one.poses)
-            clips = [look.clip for look in whole.looks]
             looks = (
-                replace(look, clip=_grown(look.clip, clip))
-                for look, clip in zip(one.looks, clips[:count], strict=True)
+                replace(look, clip=_grown(look.clip, clips.get(id(actor))))
+                for actor, look in zip(one.actors, one.looks, strict=True)
             )
             return replace(
                 one,
-                poses=(*one.poses, *whole.poses[count:]),
-                looks=(*looks, *whole.looks[count:]),
+                actors=(*one.actors, *(whole.actors[row] for row in rows)),
+                poses=(*one.poses, *(whole.poses[row] for row in rows)),
+                looks=(*looks, *(whole.looks[row] for row in rows)),
             )
 
         self._undo[:] = map(extended, self._undo)
@@ -154,7 +164,7 @@ def _grown(old: Motion | None, new: Motion | None) -> Motion | None:
 def _take(scene: Scene, options: DisplayOptions, time: float) -> _Snapshot:
     poses = tuple(actor.pose.copy() if actor.pose else None for actor in scene.actors)
     looks = tuple(map(_look, scene.actors))
-    return _Snapshot(poses, looks, copy.deepcopy(options), time)
+    return _Snapshot(tuple(scene.actors), poses, looks, copy.deepcopy(options), time)
 
 
 def _look(actor: Actor) -> _Look:
@@ -163,6 +173,7 @@ def _look(actor: Actor) -> _Look:
 
 
 def _restore(snapshot: _Snapshot, scene: Scene, options: DisplayOptions) -> None:
+    scene.actors[:] = snapshot.actors
     for actor, pose, look in zip(scene.actors, snapshot.poses, snapshot.looks, strict=True):
         actor.pose = pose.copy() if pose else None
         actor.clip, actor.offset, actor.visible = look.clip, look.offset, look.visible
@@ -175,6 +186,8 @@ def _restore(snapshot: _Snapshot, scene: Scene, options: DisplayOptions) -> None
 
 def _is_same(snapshot: _Snapshot, scene: Scene, options: DisplayOptions) -> bool:
     if snapshot.options != options:
+        return False
+    if [*map(id, snapshot.actors)] != [*map(id, scene.actors)]:
         return False
     # Clips are compared by identity: they are never changed, only replaced.
     if any(_look(actor) != look for actor, look in zip(scene.actors, snapshot.looks, strict=True)):

@@ -12,18 +12,24 @@ import moderngl
 import numpy as np
 from imgui_bundle import imgui
 
-from viewer.app.actions import follow_actor, take_pick
+from viewer.app.actions import follow_actor
+from viewer.app.explanation_lines import draw_pinned
 from viewer.app.file_dialog import PICTURES, FileDialog, draw_file_dialog, folder_of
+from viewer.app.gizmo import is_held
+from viewer.app.gizmo_drawing import draw_gizmo
 from viewer.app.interface import draw_interface
 from viewer.app.jobs import FrameJob
 from viewer.app.keys import handle_keys
+from viewer.app.lint_marks import show_finding
 from viewer.app.loader import Loader
 from viewer.app.mouse import handle_mouse
 from viewer.app.overlays import draw_hints
 from viewer.app.recent import remember
 from viewer.app.record_dialog import draw_record_dialog
+from viewer.app.rig_gizmo import draw_rig_tools, show_rig
 from viewer.app.state import AppState
 from viewer.app.stream import Stream
+from viewer.app.view_picks import answer_picks
 from viewer.errors import RenderError, ViewerError, printable
 from viewer.formats import FORMATS, free_path, save_image
 from viewer.loading import Contents, add_to_actor, bundled_body, bundled_files
@@ -102,9 +108,11 @@ class Frame:
         self._take_streamed()
         self._work()
         self._pose()
-        state.history.observe(state.scene, state.options, imgui.is_any_item_active())
+        self.renderer.marks, self.renderer.ghost = show_finding(state), show_rig(state)
+        state.history.observe(state.scene, state.options, is_held(state))
         self._draw_scene(scale)
-        self._pick(scale)
+        if self.target is not None:
+            answer_picks(state, self.renderer, self.target.size, scale, self._drawn)
         imgui.render()
         framebuffer.use()
         self.context.viewport = (0, 0, *size)
@@ -125,9 +133,8 @@ class Frame:
             self._clips = clips
             if not (self._is_first or state.history.has_restored):
                 # Undoing goes back to the time and poses from before the clock follows.
-                busy = imgui.is_any_item_active()
-                state.history.observe(state.scene, state.options, busy)
-            state.playback.follow(state.scene.actors)
+                state.history.observe(state.scene, state.options, is_held(state))
+            state.playback.follow(state.scene.actors, state.actor)
         if state.history.has_restored:
             # Undoing has brought back poses with their time: they stay as they were.
             state.playback.seek(state.history.time)
@@ -163,7 +170,7 @@ class Frame:
         if grew:
             state.scene.actors += new
             self._clips = tuple((actor.clip, actor.offset) for actor in state.scene.actors)
-            state.playback.follow(state.scene.actors)
+            state.playback.follow(state.scene.actors, state.actor)
             state.playback.pose(state.scene, again=True)
             state.history.add_actors(state.scene, state.options)
             state.history.follow(state.scene, state.playback.time)
@@ -203,26 +210,11 @@ class Frame:
             draw_list = imgui.get_background_draw_list()
             # Textures have their first row at the bottom.
             draw_list.add_image(picture, (x, y), corner, (0.0, 1.0), (1.0, 0.0))
+            draw_pinned(state)
+            draw_gizmo(state)
+            draw_rig_tools(state)
             if state.panels_visible:
                 draw_hints(state)
-
-    def _pick(self, scale: float) -> None:
-        """Choose what was clicked in the view, or aim the camera at it."""
-        state, wanted = self.state, self.state.wants_pick
-        state.wants_pick = None
-        if wanted is None or self.target is None:
-            return
-        x, y, aims = wanted
-        try:
-            found = self.renderer.pick(
-                state.scene, state.camera, state.options, self.target.size,
-                x * scale, y * scale, state.box,
-            )  # fmt: skip
-        except ViewerError as problem:
-            state.error = str(problem)
-            return
-        if found is not None:
-            take_pick(state, found, aims)
 
     def _draw_target(self, size: tuple[int, int]) -> None:
         """Draw the scene; what the driver refuses becomes a message, and the window stays."""
@@ -248,6 +240,7 @@ class Frame:
         poses = tuple(
             (
                 id(actor),
+                id(actor.figure),
                 actor.is_drawn,
                 actor.color,
                 b"" if actor.points is None else actor.points.tobytes(),
@@ -259,7 +252,8 @@ class Frame:
         selected = (state.chosen_actor, state.selected_joint)
         place = (camera.target.tobytes(), camera.distance, camera.azimuth, camera.inclination)
         lens = (camera.fov, camera.orthographic, camera.up, id(camera.fixed))
-        return (size, place, lens, copy.deepcopy(state.options), poses, *selected)
+        marks, options = self.renderer.marks, copy.deepcopy(state.options)
+        return (size, place, lens, options, poses, *selected, marks, self.renderer.ghost)
 
     def _target(self, size: tuple[int, int]) -> Target:
         samples = self.state.options.samples

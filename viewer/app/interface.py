@@ -11,6 +11,7 @@ from viewer.app.message_window import draw_error, draw_message_window
 from viewer.app.overlays import draw_overlays
 from viewer.app.panels import PANELS, Panel, panel_module
 from viewer.app.reasons import no_panel
+from viewer.app.shown_panels import is_open, set_open
 from viewer.app.state import AppState
 
 __all__ = ["draw_interface"]
@@ -30,7 +31,7 @@ def draw_interface(state: AppState) -> list[Path]:
         dock = _draw_dock(state)
         leading = ""
         for name, panel in PANELS.items():
-            if name not in state.closed_panels and not no_panel(state, panel.needs):
+            if is_open(state, name) and not no_panel(state, panel.needs):
                 appears = _draw_panel(state, name, panel)
                 leading = panel.title if appears and panel.leads else leading
         if leading:
@@ -56,6 +57,7 @@ def _draw_dock(state: AppState) -> int:
         _build_layout(dock)
         state.wants_layout_reset = False
         state.closed_panels.clear()
+        state.opened_panels.clear()
     flags = imgui.DockNodeFlags_.passthru_central_node
     flags |= imgui.DockNodeFlags_.no_docking_over_central_node
     imgui.dock_space_over_viewport(dock, imgui.get_main_viewport(), flags)
@@ -110,5 +112,5 @@ def _draw_panel(state: AppState, name: str, panel: Panel) -> bool:
         imgui.pop_item_width()
     imgui.end()
     if not stays:
-        state.closed_panels.add(name)
+        set_open(state, name, False)
     return appears

@@ -8,7 +8,10 @@ from typing import Protocol
 
 from viewer.errors import ViewerError
 
-__all__ = ["FrameJob", "Job", "ThreadJob"]
+__all__ = ["CountedJob", "FrameJob", "Job", "Report", "ThreadJob"]
+
+Report = Callable[[int, int, str], None]
+"""Told the steps done, all steps, and what comes next; raises to end the work."""
 
 
 class Job(Protocol):
@@ -95,6 +98,67 @@ class ThreadJob:
 
     def wait(self) -> None:
         """Return when it has ended."""
+        self._thread.join()
+
+
+class _EndedError(ViewerError):
+    """Unwinds work that was cancelled."""
+
+
+class CountedJob:
+    """Work in a thread of its own that tells how far it is, and can be ended between two steps.
+
+    Parameters
+    ----------
+    title : str
+        What is being done, until the work itself says more.
+    act : callable
+        Given a ``Report``; returns lines that say what was done; raises ViewerError.
+    """
+
+    def __init__(self, title: str, act: Callable[[Report], list[str]]) -> None:
+        self.title, self.error, self.can_cancel = title, "", True
+        self.lines: list[str] = []
+        self._act = act
+        self._progress = (0, 0)
+        self._is_cancelled = False
+        self._thread = threading.Thread(target=self._run)
+        self._thread.start()
+
+    def _run(self) -> None:
+        try:
+            self.lines = self._act(self._report)
+        except _EndedError:
+            return
+        except ViewerError as problem:
+            self.error = str(problem)
+        except MemoryError:
+            self.error = f"{self.title}: not enough memory"
+
+    def _report(self, done: int, total: int, what: str) -> None:
+        if self._is_cancelled:
+            raise _EndedError(self.title)
+        self._progress, self.title = (done, total), what or self.title
+
+    @property
+    def is_done(self) -> bool:
+        """Whether it has ended, or nobody wants it any more."""
+        return self._is_cancelled or not self._thread.is_alive()
+
+    @property
+    def progress(self) -> tuple[int, int]:
+        """Steps done and steps in all; (0, 0) before the first."""
+        return self._progress
+
+    def step(self) -> None:
+        """Nothing: the thread works."""
+
+    def cancel(self) -> None:
+        """Let it end before its next step; what it makes until then is for nobody."""
+        self._is_cancelled = True
+
+    def wait(self) -> None:
+        """Return when the thread has ended."""
         self._thread.join()
 
 

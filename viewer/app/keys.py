@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 from imgui_bundle import imgui
 
-from viewer.app import actions, pose_actions
+from viewer.app import actions, pose_actions, posing_actions, rig_results
 from viewer.app.state import AppState
+from viewer.app.weights_actions import toggle_weights
 
 __all__ = ["KEYS", "Shortcut", "handle_keys"]
 
@@ -41,6 +42,10 @@ def _end(last: bool) -> Callable[[AppState], None]:
     return lambda state: actions.go_to_end(state, last)
 
 
+def _take(tool: str) -> Callable[[AppState], None]:
+    return lambda state: posing_actions.choose_tool(state, tool)
+
+
 def _want(what: str) -> Callable[[AppState], None]:
     return lambda state: state.wants.add(what)
 
@@ -67,6 +72,11 @@ KEYS = (
     Shortcut((_K.n,), "N", "vertex normals", _toggle("normals", "Vertex normals")),
     Shortcut((_K.t,), "T", "texture", _toggle("texture", "Texture")),
     Shortcut((_K.g,), "G", "ground grid", _toggle("grid", "Grid")),
+    Shortcut((_K.a,), "A", "rigged mesh or as it was (A/B)", rig_results.switch_version),
+    Shortcut((_K.b,), "B", "x-ray: bones through the skin", _toggle("xray", "X-ray")),
+    Shortcut((_K.j,), "J", "names of joints", _toggle("joint_names", "Joint names")),
+    Shortcut((_SHIFT | _K.j,), "Shift+J", "axes of joints", _toggle("joint_axes", "Joint axes")),
+    Shortcut((_K.v,), "V", "weights of the selected joint", toggle_weights),
     Shortcut((_K.f,), "F", "fit the view", actions.fit_view),
     Shortcut((_K._1, _K.keypad1), "1", "front view", _look("front")),
     Shortcut((_K._3, _K.keypad3), "3", "side view", _look("left")),
@@ -79,6 +89,10 @@ KEYS = (
     Shortcut((_CTRL | _K.o,), "Ctrl+O", "open files", _want("open dialog")),
     Shortcut((_CTRL | _K.z,), "Ctrl+Z", "undo", actions.undo),
     Shortcut((_CTRL | _SHIFT | _K.z, _CTRL | _K.y), "Ctrl+Shift+Z", "redo", actions.redo),
+    Shortcut((_K.q,), "Q", "tool Select: click chooses", _take("select")),
+    Shortcut((_K.e,), "E", "tool Rotate: turn the selected joint", _take("rotate")),
+    Shortcut((_K.d,), "D", "tool Move: drag a joint (IK)", _take("move")),
+    Shortcut((_K.x,), "X", "local, parent or world axes", posing_actions.next_orientation),
     Shortcut((_K.m,), "M", "mirror the pose left to right", pose_actions.mirror),
     Shortcut((_CTRL | _K.c,), "Ctrl+C", "copy the pose", pose_actions.copy_pose),
     Shortcut(
@@ -107,6 +121,7 @@ _ALWAYS = ("Esc", "Ctrl+Q")  # also while a message or dialog lies over everythi
 MOUSE = (
     ("Click", "choose an actor or joint"),
     ("Double click", "aim the camera there"),
+    ("Alt click", "why is this vertex here"),
     ("Left drag", "orbit"),
     ("Right drag, Shift drag", "pan"),
     ("Wheel", "zoom to the pointer"),

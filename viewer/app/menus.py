@@ -9,6 +9,7 @@ from imgui_bundle import imgui
 from viewer.app.actions import redo, reset_pose, undo
 from viewer.app.clip_actions import new_clip
 from viewer.app.file_dialog import FileDialog, folder_of
+from viewer.app.lint_actions import check_rig
 from viewer.app.motion_dialog import ask_for_motion
 from viewer.app.panels import PANELS
 from viewer.app.pose_actions import (
@@ -29,7 +30,9 @@ from viewer.app.reasons import (
     nothing_to_export,
 )
 from viewer.app.record_dialog import RecordSettings
+from viewer.app.shown_panels import is_open, set_open
 from viewer.app.state import AppState
+from viewer.app.view_menu import draw_view_menu
 from viewer.app.widgets import begin_menu, menu_item, note_item
 from viewer.errors import ViewerError, printable
 from viewer.export import EXPORTERS
@@ -50,11 +53,13 @@ def draw_menus(state: AppState) -> list[Path]:
     if begin_menu(state, "Edit"):
         _draw_edit_menu(state)
         imgui.end_menu()
+    draw_view_menu(state)
     if begin_menu(state, "Window"):
         for name, panel in PANELS.items():
             why = no_panel(state, panel.needs)
-            if menu_item(state, panel.title, "", name not in state.closed_panels, why):
-                state.closed_panels ^= {name}
+            shown = is_open(state, name)
+            if menu_item(state, panel.title, "", shown, why):
+                set_open(state, name, not shown)
         imgui.separator()
         if menu_item(state, "Messages", "Ctrl+M", state.messages_visible):
             state.messages_visible = not state.messages_visible
@@ -181,3 +186,6 @@ def _draw_edit_menu(state: AppState) -> None:
         copy_numbers(state)
     if menu_item(state, "Paste pose", "Ctrl+V", why=why):
         paste_pose(state)
+    imgui.separator()
+    if menu_item(state, "Check the rig", why=no_job_room(state)):
+        check_rig(state)

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
+from viewer.app.gizmo import choose_joint, use_handles
+from viewer.app.rig_gizmo import holds_mouse
 from viewer.app.state import AppState
+from viewer.app.weights_view import wants_vertex
 from viewer.rendering.camera import orbit, pan, zoom
 
 __all__ = ["handle_mouse"]
@@ -18,6 +21,8 @@ def handle_mouse(state: AppState) -> None:
     """Move the camera by what the mouse did in this frame outside all panels."""
     io = imgui.get_io()
     x, y, width, height = state.view_rect
+    if use_handles(state) or holds_mouse(state):
+        return
     if io.want_capture_mouse or width < 1 or height < 1:
         return
     delta = io.mouse_delta
@@ -33,7 +38,11 @@ def handle_mouse(state: AppState) -> None:
     place = (io.mouse_pos.x - x, io.mouse_pos.y - y)
     if imgui.is_mouse_double_clicked(imgui.MouseButton_.left):
         state.wants_pick = (*place, True)
-    elif imgui.is_mouse_released(imgui.MouseButton_.left) and _is_click():
+    elif (
+        imgui.is_mouse_released(imgui.MouseButton_.left)
+        and _is_click()
+        and (wants_vertex(state.weights) or not choose_joint(state))
+    ):
         state.wants_pick = (*place, False)
     if io.mouse_wheel and imgui.is_mouse_pos_valid():
         across = (io.mouse_pos.x - x - width / 2) / height

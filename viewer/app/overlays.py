@@ -12,9 +12,11 @@ from typing import NamedTuple
 from imgui_bundle import imgui
 
 from viewer.app.actions import cancel
+from viewer.app.hover_text import draw_hover_text
 from viewer.app.keys import KEYS, MOUSE
 from viewer.app.legend import draw_legend
 from viewer.app.state import AppState
+from viewer.app.toolbar import draw_toolbar
 from viewer.app.widgets import Rect, begin_overlay, button, overlay_rect
 from viewer.errors import printable
 from viewer.rendering.ground_pass import grid_step
@@ -32,8 +34,10 @@ _LONGEST_NOTE = 400  # characters
 def draw_overlays(state: AppState) -> None:
     """Draw all of them but the hints, which lie behind the panels."""
     legend = draw_legend(state)
-    progress = _draw_progress(state, legend)
-    _draw_notes(state, [rect for rect in (legend, progress) if rect is not None])
+    tools = draw_toolbar(state, legend)
+    progress = _draw_progress(state, legend, tools)
+    _draw_notes(state, [rect for rect in (legend, tools, progress) if rect is not None])
+    draw_hover_text(state)
     _draw_keys(state)
 
 
@@ -84,7 +88,7 @@ def _progress(state: AppState) -> _Progress | None:
     return None
 
 
-def _draw_progress(state: AppState, legend: Rect | None) -> Rect | None:
+def _draw_progress(state: AppState, legend: Rect | None, tools: Rect | None) -> Rect | None:
     """Draw a bar for what is going on; return where."""
     shown = _progress(state)
     if shown is None:
@@ -96,6 +100,8 @@ def _draw_progress(state: AppState, legend: Rect | None) -> Rect | None:
     top = y + _GAP
     if legend is not None and left < legend[2] + _BETWEEN:
         top = legend[3] + _BETWEEN
+    if tools is not None and left + whole > tools[0] - _BETWEEN:
+        top = max(top, tools[3] + _BETWEEN)
     imgui.set_next_window_pos((left, top), imgui.Cond_.always)
     flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.always_auto_resize
     flags |= imgui.WindowFlags_.no_docking | imgui.WindowFlags_.no_saved_settings

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from viewer.rig.clip import Clip
 from viewer.rig.crowd import pose_actors
-from viewer.rig.motion import DEFAULT_RATE, frame_rate, time_span
+from viewer.rig.motion import DEFAULT_RATE, time_span
 from viewer.rig.scene import Actor, Scene
 
 __all__ = ["FASTEST", "MODES", "Playback"]
@@ -44,9 +44,12 @@ class Playback:
     whole : (float, float)
         The range of all clips.
     frame_rate : float
-        Frames a second by which one steps and counts.
+        Frames a second by which one steps and counts: those of the chosen actor's capture, so
+        that each of its frames can be reached, else of the longest one.
+    origin : float
+        Seconds of that capture's first frame.
     first_frame : int
-        What the frame at ``whole[0]`` is called.
+        What that frame is called.
     keyed_rate : float
         The same where nothing consists of frames: keyed clips have no rate of their own.
     has_frames : bool
@@ -63,6 +66,7 @@ class Playback:
     end: float = 0.0
     whole: tuple[float, float] = (0.0, 0.0)
     frame_rate: float = DEFAULT_RATE
+    origin: float = 0.0
     keyed_rate: float = DEFAULT_RATE
     first_frame: int = 0
     has_frames: bool = False
@@ -71,41 +75,58 @@ class Playback:
     _over: float = 0.0  # seconds since the last frame of the range became due
     _turned: bool = False  # on the way back of ping-pong
     _posed: tuple[float, bool] | None = None
+    _grid: tuple[object, ...] = ()  # whose frames count
 
     def show(self, scene: Scene) -> None:
         """Take over the range of a scene's clips, and go to its start, or where it is."""
         self.playing, self.mode, self.speed = False, "loop", 1.0
         self.keyed_rate, self.has_frames = DEFAULT_RATE, False
-        self.follow(scene.actors)
+        self._grid = ()
+        self.follow(scene.actors, scene.actors[0] if scene.actors else None)
         self.start, self.end = self.whole
         self.seek(self.start if scene.time is None else scene.time)
 
-    def follow(self, actors: Sequence[Actor]) -> None:
+    def follow(self, actors: Sequence[Actor], chosen: Actor | None = None) -> None:
         """Keep up with clips that changed or grew; a range that was all of them stays all.
 
         Where the same frames come faster or slower, time and range stay on their frames.
+
+        Parameters
+        ----------
+        actors : sequence of Actor
+            All of the scene.
+        chosen : Actor, optional
+            Whose capture gives the frames, if it has one.
         """
         was_whole = (self.start, self.end) == self.whole
-        counted = self.n_frames if self.has_frames else 0
-        low, rate = self.whole[0], self.frame_rate
         moving = [actor for actor in actors if actor.clip is not None]
-        sampled = [
-            actor.clip for actor in moving if actor.clip and not isinstance(actor.clip, Clip)
-        ]
+        sampled = [actor for actor in moving if not isinstance(actor.clip, Clip)]
         self.has_motion, self.has_frames = bool(moving), bool(sampled)
         self.whole = time_span(moving)
-        longest = max(sampled, key=lambda clip: clip.end - clip.start, default=None)
-        self.frame_rate = self.keyed_rate if longest is None else frame_rate(longest)
-        self.first_frame = longest.timing.first_frame if longest is not None else 0
-        if self.has_frames and counted == self.n_frames and rate != self.frame_rate:
-            self.time, self.start, self.end = (
-                self.whole[0] + (time - low) * rate / self.frame_rate
-                for time in (self.time, self.start, self.end)
-            )
+        counted = chosen if chosen in sampled else max(sampled, key=_length, default=None)
+        self._count(counted)
         if was_whole:
             self.start, self.end = self.whole
         else:
             self.set_range(self.start, self.end)
+
+    def _count(self, actor: Actor | None) -> None:
+        """Count by the frames of an actor's capture, None for those of keyed clips."""
+        clip = None if actor is None else actor.clip
+        old_rate, old_origin, old_grid = self.frame_rate, self.origin, self._grid
+        if actor is None or clip is None or isinstance(clip, Clip):
+            self.frame_rate, self.first_frame = self.keyed_rate, 0
+            self.origin, self._grid = self.whole[0], ()
+            return
+        timing = clip.timing
+        self.frame_rate, self.first_frame = timing.frame_rate, timing.first_frame
+        self.origin = timing.start + actor.offset
+        self._grid = (id(actor), timing.n_frames, timing.first_frame)
+        if self._grid == old_grid and old_rate != self.frame_rate:
+            self.time, self.start, self.end = (
+                self.origin + (time - old_origin) * old_rate / self.frame_rate
+                for time in (self.time, self.start, self.end)
+            )
 
     def count_by(self, rate: float) -> None:
         """Say how many frames a second motions have that consist of none."""
@@ -116,17 +137,24 @@ class Playback:
     @property
     def n_frames(self) -> int:
         """Number of frames of the whole range."""
+        low, high = self.frame_range
+        return high - low + 1
+
+    @property
+    def frame_range(self) -> tuple[int, int]:
+        """The first and the last frame of the whole range, counted as ``frame`` is."""
         low, high = self.whole
-        return math.floor((high - low) * self.frame_rate + 1e-6) + 1
+        first = math.ceil((low - self.origin) * self.frame_rate - 1e-6)
+        return first, math.floor((high - self.origin) * self.frame_rate + 1e-6)
 
     @property
     def frame(self) -> int:
-        """The frame that is shown, counted from 0 at the start of the whole range."""
-        return math.floor((self.time - self.whole[0]) * self.frame_rate + 1e-6)
+        """The frame that is shown, counted from 0 at the origin."""
+        return math.floor((self.time - self.origin) * self.frame_rate + 1e-6)
 
     def frame_time(self, frame: int) -> float:
         """Return the seconds of a frame."""
-        return self.whole[0] + frame / self.frame_rate
+        return self.origin + frame / self.frame_rate
 
     def seek(self, time: float) -> None:
         """Go to a time; within the range unless playing runs on."""
@@ -137,7 +165,7 @@ class Playback:
     def step(self, frames: int) -> None:
         """Stop, and go to another frame: a whole one, however time stood before."""
         self.playing = False
-        place = (self.time - self.whole[0]) * self.frame_rate
+        place = (self.time - self.origin) * self.frame_rate
         nearest = round(place)
         if abs(place - nearest) < 1e-6:
             target = nearest + frames
@@ -228,3 +256,8 @@ class Playback:
     def accept(self) -> None:
         """Take the present poses for those of the time shown: they were edited, or undone."""
         self._posed = self.time, self.fill_gaps
+
+
+def _length(actor: Actor) -> float:
+    assert actor.clip is not None  # only what moves is compared
+    return actor.clip.end - actor.clip.start

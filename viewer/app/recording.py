@@ -113,7 +113,7 @@ def _times(state: AppState, settings: RecordSettings) -> tuple[Floats, list[int]
     count = math.floor((playback.end - playback.start) * rate + 1e-6) + 1
     times = playback.start + np.arange(count) / rate
     first = playback.first_frame if rate == playback.frame_rate else 0
-    first += math.floor((playback.start - playback.whole[0]) * rate + 1e-6)
+    first += math.floor((playback.start - playback.origin) * rate + 1e-6)
     if settings.kind == "sheet":
         chosen = np.unique(np.rint(np.linspace(0, count - 1, settings.n_cells)).astype(int))
         return times[chosen], (first + chosen).tolist(), rate

@@ -12,8 +12,12 @@ import numpy as np
 
 from viewer.app.curve_view import CurveView
 from viewer.app.edits import History
+from viewer.app.lint_view import LintView
 from viewer.app.messages import MessageLog
 from viewer.app.playback import Playback
+from viewer.app.posing import Posing
+from viewer.app.rig_view import RigView
+from viewer.app.weights_view import WeightsView
 from viewer.rendering.camera import Camera, fit
 from viewer.rendering.legend import Legend
 from viewer.rendering.options import DisplayOptions
@@ -107,6 +111,16 @@ class AppState:
         The scene's clock.
     curves : CurveView
         What the Curves panel shows.
+    weights : WeightsView
+        What the Weights panel and the tools for vertices keep.
+    lint : LintView
+        What the Lint panel shows.
+    closed_panels, opened_panels : set of str
+        Those that were closed, and of those that wait to be asked for, the ones that were.
+    posing : Posing
+        What the tools that pose by hand keep.
+    rig : RigView
+        What the Rig panel keeps.
     job : Job or None
         Work that goes on beside the frame loop.
     record : RecordSettings or None
@@ -153,6 +167,7 @@ class AppState:
     joint_filter: str = ""
     opened_joints: set[int] = field(default_factory=set)
     closed_panels: set[str] = field(default_factory=set)
+    opened_panels: set[str] = field(default_factory=set)
     view_rect: tuple[float, float, float, float] = (0.0, 0.0, 1.0, 1.0)
     item_rects: dict[str, tuple[float, float, float, float]] = field(default_factory=dict)
     wants: set[str] = field(default_factory=set)
@@ -165,6 +180,10 @@ class AppState:
     history: History = field(default_factory=History)
     playback: Playback = field(default_factory=Playback)
     curves: CurveView = field(default_factory=CurveView)
+    lint: LintView = field(default_factory=LintView)
+    weights: WeightsView = field(default_factory=WeightsView)
+    posing: Posing = field(default_factory=Posing)
+    rig: RigView = field(default_factory=RigView)
     job: Job | None = None
     record: RecordSettings | None = None
     wants_pick: tuple[float, float, bool] | None = None
@@ -191,6 +210,7 @@ class AppState:
     def choose_actor(self, index: int) -> None:
         """Let panels act on another actor."""
         self.chosen_actor = index
+        self.playback.follow(self.scene.actors, self.actor)  # one steps by its frames
         self.selected_joint = -1
         self.held_vector = None
         self.joint_filter = ""

@@ -169,9 +169,9 @@ def _draw_ruler(playback: Playback, area: tuple[float, float, float, float], hei
     scale = width / max(high - low, 1e-9)
     line, color = imgui.get_color_u32(_LINE), imgui.get_color_u32(_TEXT)
     step = nice_step(_TICK_GAP * imgui.get_font_size() / scale * playback.frame_rate)
-    first = math.ceil(playback.first_frame / step) * step
-    for number in range(first, playback.first_frame + playback.n_frames, step):
-        x = left + (number - playback.first_frame) / playback.frame_rate * scale
+    first, last = (playback.first_frame + frame for frame in playback.frame_range)
+    for number in range(math.ceil(first / step) * step, last + 1, step):
+        x = left + (playback.frame_time(number - playback.first_frame) - low) * scale
         draw_list.add_line((x, top), (x, top + total), line)
         draw_list.add_text((x + 3.0, top), color, str(number))
     dark = imgui.get_color_u32(_OUTSIDE)

@@ -16,6 +16,7 @@ import moderngl  # noqa: E402  after glfw, whose library imgui-bundle chooses
 from imgui_bundle import imgui, implot  # noqa: E402
 
 from viewer.app.frame import Frame  # noqa: E402
+from viewer.app.jobs import FrameJob  # noqa: E402
 from viewer.app.recent import (  # noqa: E402
     load_closed_panels,
     load_recent,
@@ -199,10 +200,13 @@ class _Window:
         """
         self._is_dirty = False
         state = self.state
-        if is_settling or state.playback.playing or state.job:
+        # What a thread does is looked at now and then: frames would take its time away.
+        steps = isinstance(state.job, FrameJob)
+        if is_settling or state.playback.playing or steps:
             glfw.poll_events()
         else:
             moves = bool(state.loader or state.stream) or _awaits_tooltip(self._imgui)
+            moves |= state.weights.is_waiting or state.job is not None
             glfw.wait_events_timeout(_BUSY_SECONDS if moves else _IDLE_SECONDS)
             # Messages that time out, the bar of a file being read, a text cursor that blinks.
             self._is_dirty |= moves or bool(state.notes or imgui.get_io().want_text_input)

@@ -47,6 +47,12 @@ class Kept(Generic[_Owner, _Item]):
             self._items[id(owner)] = (owner, make())
         return self._items[id(owner)][1]
 
+    def drop(self, owner: _Owner, before: Callable[[_Item], object]) -> None:
+        """Free one owner's item; ``before`` is called with it."""
+        item = self._items.pop(id(owner))[1]
+        before(item)
+        item.release()
+
     def keep_only(
         self, owners: Sequence[_Owner], before: Callable[[_Item], object] | None = None
     ) -> None:
@@ -113,7 +119,12 @@ class ActorBuffers:
     def posed_mesh(self, actor: Actor) -> PosedMesh:
         """Return an actor's posed vertices; its figure must have a mesh."""
         mesh = self.mesh(actor.figure)
-        return self.posed.get(actor, lambda: PosedMesh(self.context, self.programs, mesh))
+        make = lambda: PosedMesh(self.context, self.programs, mesh)  # noqa: E731
+        posed = self.posed.get(actor, make)
+        if posed.mesh is not mesh:  # the actor has got another figure
+            self.posed.drop(actor, self._forget)
+            posed = self.posed.get(actor, make)
+        return posed
 
     def skeleton(self, actor: Actor) -> SkeletonBuffers:
         """Return an actor's boxes; its figure must have a skeleton."""

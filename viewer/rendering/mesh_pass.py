@@ -11,9 +11,11 @@ from viewer.rendering.index_sets import IndexSet
 from viewer.rendering.mesh_buffers import MeshBuffers
 from viewer.rendering.options import Color, DisplayOptions
 from viewer.rendering.program import Programs, set_uniforms
+from viewer.rendering.see_through import surface_opacity
 from viewer.rendering.skin_pass import PosedMesh
 from viewer.rendering.view import View, set_lights, set_model
 from viewer.rig.arrays import Floats
+from viewer.rig.mesh import bounding_box, box_size
 
 __all__ = ["SKIN_COLOR", "MeshPass", "draw_runs", "set_surface"]
 
@@ -77,6 +79,18 @@ class MeshPass:
         indices = mesh.mesh.index_set(options.reduced, options.hidden_parts)
         draw_runs(self.array(mesh, program, indices), indices, options.texture)
 
+    def draw_lines(
+        self, mesh: PosedMesh, placement: Floats, view: View, options: DisplayOptions
+    ) -> None:
+        """Draw what is asked for of edges and normals, over the surface."""
+        self.context.depth_func = "<="
+        if options.wireframe:
+            self.draw_edges(mesh, placement, view, options)
+        shape = mesh.mesh.figure.mesh
+        if options.normals and shape is not None:
+            self.draw_normals(mesh, placement, view, box_size(bounding_box(shape.positions)))
+        self.context.depth_func = "<"
+
     def draw_edges(
         self, mesh: PosedMesh, placement: Floats, view: View, options: DisplayOptions
     ) -> None:
@@ -138,7 +152,7 @@ def set_surface(program: moderngl.Program, mesh: MeshBuffers, options: DisplayOp
     """Set what the shading programs must know of a figure's surface."""
     values = {
         "u_flat": options.flat,
-        "u_opacity": 1.0,
+        "u_opacity": surface_opacity(options),
         "u_has_uv": mesh.uvs is not None,
         "u_texture": _TEXTURE_UNIT,
         "u_has_colors": options.shading == "parts" and mesh.colors is not None,

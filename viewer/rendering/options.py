@@ -114,6 +114,11 @@ class DisplayOptions:
         How far back and forth in time paths go; 0 for the whole motion.
     min_confidence : float
         Captured keypoints that are less certain are left out.
+    xray : bool
+        See bones through the skin, which is translucent unless its colours stand for numbers.
+    joint_names, joint_axes : bool
+        Write the joints' names beside them, as far as they do not cover each other; draw the axes
+        of their spaces: x red, y green, z blue.
     """
 
     show: str = "skin"
@@ -139,3 +144,6 @@ class DisplayOptions:
     trail_joints: tuple[tuple[int, int], ...] = ()
     trail_seconds: float = 0.0
     min_confidence: float = 0.1
+    xray: bool = False
+    joint_names: bool = False
+    joint_axes: bool = False

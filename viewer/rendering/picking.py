@@ -11,12 +11,14 @@ from numpy.typing import NDArray
 
 from viewer.rendering.actor_buffers import ActorBuffers
 from viewer.rendering.crowd_buffers import CrowdBuffers
+from viewer.rendering.joint_marks import joint_at, marks_of
 from viewer.rendering.joint_pass import draw_boxes
 from viewer.rendering.mesh_pass import MeshPass
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.point_pass import PointPass
 from viewer.rendering.program import Programs, set_uniforms
 from viewer.rendering.shown import (
+    has_joint_marks,
     has_markers,
     has_points,
     placement_of,
@@ -117,6 +119,12 @@ class PickPass:
         pixel : (float, float)
             From the picture's left and upper edge.
         """
+        if has_joint_marks(options):
+            # Their dots lie over everything else, and bones through the skin do.
+            marked = joint_at(marks_of(scene.actors), view, size, pixel, options.xray)
+            if marked is not None:
+                whose, joint, point = marked
+                return Pick(whose, joint, -1, -1, point)
         self._begin()
         near = replace(view, projection=_window(size, pixel) @ view.projection)
         self._found, self._is_small = [], []

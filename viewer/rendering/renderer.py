@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import moderngl
@@ -16,7 +16,10 @@ from viewer.rendering.mesh_pass import MeshPass
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.program import Programs
 from viewer.rendering.scalar_views import ScalarViews
+from viewer.rendering.see_through import draw_layer
 from viewer.rendering.shown import (
+    Meshes,
+    has_joint_marks,
     has_markers,
     has_points,
     placement_of,
@@ -30,13 +33,15 @@ from viewer.rendering.skin_pass import PosedMesh
 from viewer.rendering.target import Target
 from viewer.rendering.view import View, view_of
 from viewer.rig.arrays import Floats
-from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.scene import Actor, Scene
 
 if TYPE_CHECKING:
+    from viewer.rendering.ghost_pass import Ghost, GhostPass
+    from viewer.rendering.joint_mark_pass import JointMarkPass
     from viewer.rendering.keypoint_pass import KeypointPass
     from viewer.rendering.legend import Legend
     from viewer.rendering.legend_pass import LegendPass
+    from viewer.rendering.mark_pass import MarkPass, Marks
     from viewer.rendering.picking import Pick, PickPass
     from viewer.rendering.point_pass import PointPass
     from viewer.rendering.trail_pass import TrailPass
@@ -60,6 +65,13 @@ class Renderer:
         Range and legend of the scalar view drawn last.
     buffers : ActorBuffers
         What was uploaded for figures and actors.
+    marks : Marks or None
+        What is marked, over everything but legends.
+    ghost : Ghost or None
+        A surface that is shown over the scene without being part of it.
+    names_left_out : (int, int)
+        How many joints of the last picture have no name because it would cover another one, and of
+        how many.
     """
 
     def __init__(self, context: moderngl.Context) -> None:
@@ -73,7 +85,12 @@ class Renderer:
         self.buffers = ActorBuffers(
             context, self.programs, self.joint_pass.cube, self.notes, self.mesh_pass.forget
         )
-        self._late: list[PointPass | PickPass | LegendPass] = []
+        self.marks: Marks | None = None
+        self.ghost: Ghost | None = None
+        self.names_left_out = 0, 0
+        self._late: list[
+            PointPass | PickPass | LegendPass | MarkPass | JointMarkPass | GhostPass
+        ] = []
 
     # What many scenes never need is imported and made when it is first asked for.
 
@@ -118,6 +135,33 @@ class Renderer:
         legends = LegendPass(self.context, self.programs)
         self._late.append(legends)
         return legends
+
+    @cached_property
+    def mark_pass(self) -> MarkPass:
+        """Draws marks."""
+        from viewer.rendering.mark_pass import MarkPass
+
+        marks = MarkPass(self.context, self.programs)
+        self._late.append(marks)
+        return marks
+
+    @cached_property
+    def ghost_pass(self) -> GhostPass:
+        """Draws what is shown over the scene."""
+        from viewer.rendering.ghost_pass import GhostPass
+
+        ghosts = GhostPass(self.context, self.programs, self.mesh_pass)
+        self._late.append(ghosts)
+        return ghosts
+
+    @cached_property
+    def joint_mark_pass(self) -> JointMarkPass:
+        """Draws bones through the skin, axes and names of joints."""
+        from viewer.rendering.joint_mark_pass import JointMarkPass
+
+        marks = JointMarkPass(self.context, self.programs)
+        self._late.append(marks)
+        return marks
 
     @property
     def scalar_range(self) -> tuple[float, float]:
@@ -184,6 +228,7 @@ class Renderer:
         for actor in scene.actors:
             if has_markers(actor, options):
                 self._draw_markers(actor, view, options)
+        self._draw_marks(scene, view, options, target.size, selected)
         if options.legend and options.shading == "scalar" and has_meshes:
             self._draw_legend(target.size)
 
@@ -246,14 +291,19 @@ class Renderer:
             self.scalars.update(meshes.singles, options, (whose, joint))
         self._prepare(target)
         self.ground_pass.draw_background(options.background)
+        draw_layer(self.context, options, partial(self._draw_surfaces, meshes, view, options))
         for actor, mesh in meshes.singles:
-            self._draw_mesh(actor, mesh, view, options)
-        for actors, crowd in meshes.crowds:
-            if options.cull:
-                self.context.enable(moderngl.CULL_FACE)
-            draw_crowd(self.programs, crowd, actors, view, options)
-            self.context.disable(moderngl.CULL_FACE)
+            self.mesh_pass.draw_lines(mesh, placement_of(actor, options), view, options)
         return bool(meshes)
+
+    def _draw_surfaces(self, meshes: Meshes, view: View, options: DisplayOptions) -> None:
+        if options.cull:
+            self.context.enable(moderngl.CULL_FACE)
+        for actor, mesh in meshes.singles:
+            self.mesh_pass.draw(mesh, placement_of(actor, options), view, options, actor.color)
+        for actors, crowd in meshes.crowds:
+            draw_crowd(self.programs, crowd, actors, view, options)
+        self.context.disable(moderngl.CULL_FACE)
 
     def _prepare(self, target: Target) -> None:
         context = self.context
@@ -268,22 +318,6 @@ class Renderer:
         note = f"a picture of {size[0]} x {size[1]} pixels has no room for a legend"
         if not self.legend_pass.draw(self.legend, size) and note not in self.notes:
             self.notes.append(note)
-
-    def _draw_mesh(
-        self, actor: Actor, mesh: PosedMesh, view: View, options: DisplayOptions
-    ) -> None:
-        if options.cull:
-            self.context.enable(moderngl.CULL_FACE)
-        placement = placement_of(actor, options)
-        self.mesh_pass.draw(mesh, placement, view, options, actor.color)
-        self.context.disable(moderngl.CULL_FACE)
-        self.context.depth_func = "<="
-        if options.wireframe:
-            self.mesh_pass.draw_edges(mesh, placement, view, options)
-        if options.normals and actor.figure.mesh is not None:
-            size = box_size(bounding_box(actor.figure.mesh.positions))
-            self.mesh_pass.draw_normals(mesh, placement, view, size)
-        self.context.depth_func = "<"
 
     def _draw_skeleton(
         self,
@@ -302,6 +336,24 @@ class Renderer:
         markers.update(actor.pose, options.skinning)
         # The markers' place is part of their positions.
         self.keypoint_pass.draw(markers, actor.placement, view, options)
+
+    def _draw_marks(
+        self,
+        scene: Scene,
+        view: View,
+        options: DisplayOptions,
+        size: tuple[int, int],
+        selected: tuple[int, int],
+    ) -> None:
+        """Draw what lies over everything but legends."""
+        self.names_left_out = 0, 0
+        if has_joint_marks(options):
+            self.joint_mark_pass.draw(scene.actors, view, options, size, selected)
+            self.names_left_out = self.joint_mark_pass.names_left_out
+        if self.ghost is not None:
+            self.ghost_pass.draw(self.ghost, view, options)
+        if self.marks is not None:
+            self.mark_pass.draw(self.marks, view, size)
 
     def _draw_trails(
         self, scene: Scene, view: View, options: DisplayOptions, size: tuple[int, int]

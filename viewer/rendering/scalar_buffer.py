@@ -68,10 +68,11 @@ class ScalarBuffer:
         key = (name, repr(skinning), pose is None, pose_key(pose) if depends and pose else None)
         if key == self._key:
             return
-        figure = self.mesh.figure
-        if find_view(name).about and missing_part(name, figure):
+        figure, view = self.mesh.figure, find_view(name)
+        if view.about and missing_part(name, figure):
             # Another figure of the scene may have this joint or field.
-            self.numbers = np.zeros(len(self.mesh.copies))
+            nothing = -1.0 if view.kind == "categorical" else 0.0
+            self.numbers = np.full(len(self.mesh.copies), nothing)
         else:
             self.numbers = compute(name, figure, pose, skinning)
         if self.values is None:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Meshes",
+    "has_joint_marks",
     "has_markers",
     "has_points",
     "placement_of",
@@ -150,6 +151,12 @@ def has_markers(actor: Actor, options: DisplayOptions) -> bool:
     if not options.keypoints or options.show == "binding" or actor.pose is None:
         return False
     return actor.is_drawn and actor.figure.keypoints is not None
+
+
+def has_joint_marks(options: DisplayOptions) -> bool:
+    """Return whether anything is drawn at joints beside their boxes."""
+    wanted = options.joint_names or options.joint_axes or options.xray
+    return wanted and options.show != "binding"
 
 
 def has_points(actor: Actor) -> bool:

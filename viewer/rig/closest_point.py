@@ -25,6 +25,7 @@ _NEAREST = 8  # pieces asked for at first; four times as many where the bound is
 _FLAT = 1e-20  # sin^2 of an angle below which a triangle counts as a segment
 # Bounds of radii are rounded up by this much, so that no triangle is missed by a last digit.
 _SLACK = 1.0 + 1e-9
+_FEW = 10_000  # points for which starting threads takes longer than it saves
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -124,7 +125,7 @@ class Surface:
         best = np.zeros(len(points), dtype=np.int32)
         nearest = np.full(len(points), np.inf)
         for level in self._levels:  # a first guess, which makes the bounds below short
-            pieces = level.tree.query(points, workers=-1)[1]
+            pieces = level.tree.query(points, workers=_workers(len(points)))[1]
             self._keep_nearer(points, level.triangles[pieces][:, None], best, nearest)
         for level in self._levels:
             pending = np.arange(len(points))
@@ -145,7 +146,10 @@ class Surface:
             reach = float(nearest[part].max() + level.radius) * _SLACK
             # ``range`` as k keeps the second axis where only one piece is asked for.
             distances, pieces = level.tree.query(
-                points[part], k=range(1, count + 1), distance_upper_bound=reach, workers=-1
+                points[part],
+                k=range(1, count + 1),
+                distance_upper_bound=reach,
+                workers=_workers(len(part)),
             )
             is_piece = pieces < len(level.triangles)  # beyond the reach the tree gives none
             pieces[~is_piece] = 0
@@ -260,6 +264,11 @@ def _pieces(corners: Floats) -> tuple[Floats, Ints]:
         radii = np.concatenate([radii[kept], *map(_radii, halves)])
         room -= len(is_long)
     return pieces, triangles
+
+
+def _workers(n_points: int) -> int:
+    """Return how many threads a tree should be asked with: one, or -1 for all there are."""
+    return 1 if n_points < _FEW else -1
 
 
 def _halves(pieces: Floats) -> tuple[Floats, Floats]:

@@ -228,7 +228,7 @@ def test_scipy_that_is_missing_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "scipy.spatial", None)
     with pytest.raises(RigError) as problem:
         transfer(figure, pose, figure.mesh)
-    assert str(problem.value) == 'rigging needs scipy: pip install "skinning-viewer[rig]"'
+    assert str(problem.value) == "rigging needs scipy: pip install scipy"
 
 
 def test_figure_is_complete():

@@ -24,20 +24,27 @@ class Panel:
         something that moves, or that or several actors; empty for nothing.
     leads : bool
         Whether it comes to the front of its tabs when a scene brings it.
+    on_demand : bool
+        Whether it is closed until somebody asks for it.
     """
 
     title: str
     place: str
     needs: str = ""
     leads: bool = False
+    on_demand: bool = False
 
 
 PANELS = {
     "joints": Panel("Joints", "left"),
     "shape": Panel("Shape", "left", needs="blend_shapes"),
     "hands": Panel("Hands", "left", needs="hands"),
+    "vertex": Panel("Vertex", "left", on_demand=True),
+    "lint": Panel("Lint", "left", on_demand=True),
+    "rig": Panel("Rig", "left", on_demand=True),
     "display": Panel("Display", "right 1"),
     "skinning": Panel("Skinning", "right 1"),
+    "weights": Panel("Weights", "right 1"),
     "camera": Panel("Camera", "right 2"),
     "lights": Panel("Lights", "right 2"),
     "stats": Panel("Stats", "right 3"),

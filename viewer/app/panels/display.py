@@ -7,7 +7,16 @@ from imgui_bundle import imgui
 from viewer.app.actions import show
 from viewer.app.reasons import no_mesh, no_skeleton, no_skin, no_texture
 from viewer.app.state import AppState
-from viewer.app.widgets import checkbox, choice, disabled, explain, note_item, slider
+from viewer.app.view_menu import JOINT_TOGGLES
+from viewer.app.widgets import (
+    checkbox,
+    choice,
+    disabled,
+    explain,
+    note_item,
+    same_line_if_room,
+    slider,
+)
 from viewer.errors import printable
 from viewer.rendering.ground_pass import grid_step, parse_color
 from viewer.rendering.options import SHOWN
@@ -53,9 +62,23 @@ def draw(state: AppState) -> None:
     _beside("Grid (0.5)")
     options.grid = checkbox(state, f"Grid ({grid_step(state.box):g})###Grid", options.grid)
     _draw_background(state)
+    imgui.separator()
+    _draw_joint_toggles(state)
 
 
 _CLAMP = imgui.SliderFlags_.always_clamp
+
+
+def _draw_joint_toggles(state: AppState) -> None:
+    """Draw what is seen of joints beside their boxes, in one line if there is room."""
+    options, why = state.options, no_skeleton(state)
+    for name, (text, key) in JOINT_TOGGLES.items():
+        short = text.removeprefix("Joint ").capitalize()
+        if name != "xray":
+            same_line_if_room(short)
+        label = f"{short}###{name}"
+        setattr(options, name, checkbox(state, label, getattr(options, name), why))
+        explain(f"{text} ({key})")
 
 
 def _draw_extras(state: AppState) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 from imgui_bundle import imgui
 
 from viewer.app.actions import reset_pose
+from viewer.app.clip_pause import pause_for_edit
 from viewer.app.panels._ball_joint import draw_own_numbers, draw_vector_component, is_ball
 from viewer.app.panels._captured_points import draw_captured_points
 from viewer.app.panels._figure_place import draw_figure_place
@@ -61,6 +62,7 @@ def draw(state: AppState) -> None:
         imgui.text_disabled("no joint has this in its name")
     clipper = imgui.ListClipper()
     clipper.begin(len(shown))
+    _include_wanted(state, clipper, shown)
     while clipper.step():
         for joint, dof, depth in shown[clipper.display_start : clipper.display_end]:
             if dof == OWN_NUMBERS:
@@ -72,6 +74,13 @@ def draw(state: AppState) -> None:
                 _draw_dof(state, skeleton, actor.pose, dof, depth, labels[joint])
     clipper.end()
     imgui.end_child()
+
+
+def _include_wanted(state: AppState, clipper: imgui.ListClipper, shown: Rows) -> None:
+    """Let the row of a joint that was chosen elsewhere be drawn, so that it can be scrolled to."""
+    for row, (joint, dof, _) in enumerate(shown if state.weights.scrolls_to >= 0 else ()):
+        if joint == state.weights.scrolls_to and dof == -1:
+            clipper.include_item_by_index(row)
 
 
 def _draw_actor_choice(state: AppState) -> None:
@@ -201,6 +210,9 @@ def _draw_joint(state: AppState, skeleton: Skeleton, joint: int, depth: int, lab
     imgui.set_next_item_open(joint in state.opened_joints or bool(state.joint_filter))
     imgui.tree_node_ex(f"{label}##joint{joint}", flags)
     note_item(state, f"joint {label}")
+    if joint == state.weights.scrolls_to:
+        imgui.set_scroll_here_y(0.5)
+        state.weights.scrolls_to = -1
     if imgui.is_item_toggled_open():
         state.opened_joints ^= {joint}
     elif imgui.is_item_clicked():
@@ -233,6 +245,8 @@ def _draw_dof(
         return
     imgui.begin_disabled(bool(locked))
     value = _dof_slider(state, skeleton, pose, dof)
+    if imgui.is_item_activated():
+        pause_for_edit(state)
     imgui.end_disabled()
     note_item(state, f"{label}.{name}")
     if imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):

@@ -1,13 +1,13 @@
-"""Skinning: the method, how many influences count, and what either does, as a heat map."""
+"""Skinning: the method, and how many influences count."""
 
 from __future__ import annotations
 
 from imgui_bundle import imgui
 
 from viewer.app.state import AppState
-from viewer.app.widgets import checkbox, choice, note_item, number_text, slider
+from viewer.app.widgets import checkbox, note_item, slider
 from viewer.rig.figure import Figure
-from viewer.rig.scalars import SCALARS, length_unit, split_name, strongest
+from viewer.rig.scalars import strongest
 from viewer.rig.skinning import METHODS, Skinning
 
 __all__ = ["draw"]
@@ -28,8 +28,6 @@ def draw(state: AppState) -> None:
     _draw_influences(state, figure, skinning)
     if figure.correctives is not None:
         skinning.correctives = checkbox(state, "Pose correctives", skinning.correctives)
-    imgui.separator()
-    _draw_heat_map(state, figure)
 
 
 def _draw_method(state: AppState, skinning: Skinning) -> None:
@@ -66,20 +64,3 @@ def _draw_influences(state: AppState, figure: Figure, skinning: Skinning) -> Non
     imgui.begin_disabled(skinning.max_influences > 0)
     skinning.normalize = checkbox(state, "Normalise weights", skinning.normalize)
     imgui.end_disabled()
-
-
-def _draw_heat_map(state: AppState, figure: Figure) -> None:
-    options = state.options
-    shows = options.shading == "scalar"
-    if checkbox(state, "Heat map", shows) != shows:
-        options.shading = "phong" if shows else "scalar"
-    titles = {name: view.title for name, view in SCALARS.items()}
-    imgui.set_next_item_width(-1.0)
-    key = split_name(options.scalar)[0]
-    chosen = choice(state, "##Heat map of", key, titles)
-    if chosen != key:
-        options.scalar = chosen
-    if shows and SCALARS[chosen].unit == "length":
-        factor, unit = length_unit(figure)
-        most = number_text(factor * state.stats.scalar_range[1])
-        imgui.text_wrapped(f"up to {most} {unit} in this pose")

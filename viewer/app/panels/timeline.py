@@ -77,8 +77,8 @@ def _draw_place(state: AppState) -> None:
     if changed and frame != shown:
         playback.playing = False
         playback.seek(playback.frame_time(frame - playback.first_frame))
-    last = playback.first_frame + playback.n_frames - 1
-    text = f"of {playback.first_frame} to {last}    {playback.time:.3f} s"
+    first, last = (playback.first_frame + number for number in playback.frame_range)
+    text = f"of {first} to {last}    {playback.time:.3f} s"
     same_line_if_room(text)
     imgui.text_unformatted(text)
 
@@ -123,14 +123,12 @@ def _draw_settings(state: AppState) -> None:
 def _draw_range(state: AppState) -> None:
     """Draw the frames at which playing starts and ends."""
     playback = state.playback
-    rate, whole = playback.frame_rate, playback.whole[0]
-    first = round((playback.start - whole) * rate) + playback.first_frame
-    last = round((playback.end - whole) * rate) + playback.first_frame
+    rate, origin = playback.frame_rate, playback.origin
+    first = round((playback.start - origin) * rate) + playback.first_frame
+    last = round((playback.end - origin) * rate) + playback.first_frame
+    lowest, highest = (playback.first_frame + number for number in playback.frame_range)
     imgui.set_next_item_width(9 * imgui.get_font_size())
-    changed, low, high = imgui.drag_int_range2(
-        "Range", first, last, 0.3, playback.first_frame,
-        playback.first_frame + playback.n_frames - 1,
-    )  # fmt: skip
+    changed, low, high = imgui.drag_int_range2("Range", first, last, 0.3, lowest, highest)
     note_item(state, "Range")
     text = "frames that are played; I and O set them to the present one, a right click to all"
     explain(text)

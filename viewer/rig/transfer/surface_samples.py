@@ -11,7 +11,7 @@ from viewer.rig.arrays import Floats, Ints, frozen
 from viewer.rig.mesh import triangle_areas
 from viewer.rig.vectors import unit
 
-__all__ = ["SurfaceSamples", "sample_surface", "triangle_normals"]
+__all__ = ["SurfaceSamples", "even_vertices", "sample_surface", "triangle_normals"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,12 +67,7 @@ def sample_surface(positions: Floats, triangles: Ints, count: int) -> SurfaceSam
     RigError
         If no triangle has an area.
     """
-    areas = triangle_areas(positions, triangles)
-    total = np.cumsum(areas)
-    if len(areas) == 0 or not total[-1] > 0.0:
-        raise RigError("expected a mesh with an area to align, found none")
-    places = (np.arange(count) + 0.5) / count * total[-1]
-    chosen = np.minimum(np.searchsorted(total, places), len(areas) - 1)
+    chosen = _even_triangles(positions, triangles, count)
     plastic = 1.32471795724474602596  # the real root of x^3 = x + 1
     u, v = (np.arange(1, count + 1) * plastic**-power % 1.0 for power in (1, 2))
     root = np.sqrt(u)
@@ -82,3 +77,38 @@ def sample_surface(positions: Floats, triangles: Ints, count: int) -> SurfaceSam
         np.einsum("nk,nka->na", weights, corners),
         triangle_normals(positions, triangles[chosen]),
     )
+
+
+def even_vertices(positions: Floats, triangles: Ints, count: int) -> Ints:
+    """Return some vertices of a surface, about equally many for equal areas.
+
+    Parameters
+    ----------
+    positions : (V, 3)
+        Any unit.
+    triangles : (T, 3)
+        Vertex indices.
+    count : int
+        At most so many.
+
+    Returns
+    -------
+    (N,)
+        Vertex indices in order, each once; N <= count.
+
+    Raises
+    ------
+    RigError
+        If no triangle has an area.
+    """
+    return np.unique(triangles[_even_triangles(positions, triangles, count), 0])
+
+
+def _even_triangles(positions: Floats, triangles: Ints, count: int) -> Ints:
+    """Return triangles at evenly spaced places along the summed areas: (count,)."""
+    areas = triangle_areas(positions, triangles)
+    total = np.cumsum(areas)
+    if len(areas) == 0 or not total[-1] > 0.0:
+        raise RigError("expected a mesh with an area to align, found none")
+    places = (np.arange(count) + 0.5) / count * total[-1]
+    return np.minimum(np.searchsorted(total, places), len(areas) - 1)

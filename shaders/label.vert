@@ -1,0 +1,20 @@
+#version 330
+// One rectangle of a texture per instance, pixel by pixel.
+
+in vec2 in_corner;          // per instance: left upper corner in the picture, pixels
+in vec2 in_source;          // the same in the texture, rows counted from the first
+in vec2 in_extent;          // width and height, pixels
+in vec3 in_color;           // sRGB: what white becomes
+
+uniform vec2 u_picture;     // size of the picture, pixels
+
+out vec2 v_pixel;           // of the texture
+flat out vec3 v_color;
+
+void main() {
+    vec2 corner = in_extent * vec2(gl_VertexID & 1, gl_VertexID >> 1);
+    v_pixel = in_source + corner;
+    v_color = in_color;
+    vec2 place = 2.0 * (in_corner + corner) / u_picture - 1.0;
+    gl_Position = vec4(place.x, -place.y, 0.0, 1.0);
+}

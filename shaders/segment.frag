@@ -1,0 +1,17 @@
+#version 330
+// A line with round ends, whose edges fade over a pixel; the result is multiplied by alpha.
+
+in vec4 v_color;                // sRGB and opacity
+noperspective in vec2 v_place;  // pixels along the segment and beside it
+flat in float v_length;         // pixels
+flat in float v_radius;         // pixels
+
+uniform float u_opacity;
+
+out vec4 f_color;
+
+void main() {
+    float away = length(v_place - vec2(clamp(v_place.x, 0.0, v_length), 0.0));
+    float cover = clamp(v_radius + 0.5 - away, 0.0, 1.0);
+    f_color = vec4(v_color.rgb, 1.0) * v_color.a * cover * u_opacity;
+}

@@ -1,0 +1,43 @@
+#version 330
+// One segment per instance: a strip of four vertices around it, as wide on the screen wherever. A
+// segment of length 0 is a dot.
+
+in vec3 in_start;       // scene space minus centre
+in vec3 in_end;
+in vec4 in_color;       // sRGB and opacity
+in float in_width;      // pixels
+
+uniform mat4 u_model_view;
+uniform mat4 u_projection;
+uniform vec2 u_size;    // of the picture, pixels
+
+out vec4 v_color;
+noperspective out vec2 v_place;     // pixels along the segment and beside it
+flat out float v_length;            // pixels
+flat out float v_radius;            // pixels
+
+// Where the segment from a to b, with a behind the near plane, crosses it.
+vec4 cut(vec4 a, vec4 b) {
+    float distance_a = a.z + a.w, distance_b = b.z + b.w;
+    return distance_a < 0.0 && distance_b > 0.0
+        ? mix(a, b, distance_a / (distance_a - distance_b)) : a;
+}
+
+void main() {
+    mat4 matrix = u_projection * u_model_view;
+    vec4 first = matrix * vec4(in_start, 1.0), second = matrix * vec4(in_end, 1.0);
+    vec4 start = cut(first, second), end = cut(second, first);
+    vec2 way = 0.5 * (end.xy / end.w - start.xy / start.w) * u_size;
+    v_length = length(way);
+    way = v_length > 0.0 ? way / v_length : vec2(1.0, 0.0);
+    v_radius = 0.5 * in_width;
+    bool at_end = gl_VertexID >= 2;
+    // Half a pixel more all around, for edges that fade.
+    float reach = v_radius + 0.5;
+    float along = at_end ? reach : -reach, side = gl_VertexID % 2 == 0 ? -reach : reach;
+    vec4 place = at_end ? end : start;
+    place.xy += 2.0 / u_size * (along * way + side * vec2(-way.y, way.x)) * place.w;
+    gl_Position = place;
+    v_place = vec2(along + (at_end ? v_length : 0.0), side);
+    v_color = in_color;
+}

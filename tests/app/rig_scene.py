@@ -1,0 +1,62 @@
+"""A bent arm whose mesh, turned and thirty times as large, is to be rigged from the arm itself."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+from rig.transfer.rigged_shapes import arm, mesh_of, turn
+
+from viewer.rig.clip import Channel, Clip
+from viewer.rig.figure import Figure
+from viewer.rig.pose import rest_pose
+from viewer.rig.scene import Actor, Scene
+from viewer.rig.skinning import deform
+
+SCALE, ROTATION, MOVE = 30.0, turn([0.1, 1, 0.2], 2.0), np.array([3.0, -4.0, 5.0])
+TRUE = np.eye(4)
+TRUE[:3, :3], TRUE[:3, 3] = SCALE * ROTATION, MOVE
+
+
+def bent():
+    """Return the arm and the pose of both."""
+    figure = arm()
+    pose = rest_pose(figure.skeleton)
+    pose.dofs[6:] = 0.2, -0.1, 0.7
+    return figure, pose
+
+
+def scan(figure, pose) -> Figure:
+    """Return the posed arm's mesh alone, elsewhere."""
+    positions = deform(figure, pose)[0] @ TRUE[:3, :3].T + MOVE
+    return Figure("scan", mesh_of(positions, figure.mesh.triangles))
+
+
+def swing(figure) -> Clip:
+    """Return a motion of the arm: it moves along x by 1 and its tip turns about z by 1."""
+    channels = []
+    for dof in range(figure.skeleton.n_dofs):
+        last = 1.0 if dof in (0, 8) else 0.0
+        tangents = (("linear", "linear"),) * 2
+        channels.append(Channel(dof, np.array([0.0, 1.0]), np.array([0.0, last]), tangents))
+    return Clip("swing", tuple(channels), 0.0, 1.0)
+
+
+def scene(with_template=True, with_clip=False) -> Scene:
+    """Return the mesh, and beside it the posed arm."""
+    figure, pose = bent()
+    actors = [Actor(scan(figure, pose))]
+    if with_template:
+        clip = swing(figure) if with_clip else None
+        actors.append(Actor(figure, pose.copy(), clip))
+    return Scene(actors)
+
+
+def finish(hand, seconds=120.0):
+    """Run frames until the thread's work is done and taken over."""
+    end = time.monotonic() + seconds
+    while hand.state.job is not None:
+        assert time.monotonic() < end
+        hand.step()
+        time.sleep(0.1)
+    hand.step(3)

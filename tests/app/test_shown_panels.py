@@ -1,0 +1,34 @@
+"""Which panels are open: most until they are closed, those on demand only when asked for."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from viewer.app.panels import PANELS
+from viewer.app.shown_panels import is_open, set_open
+
+
+def test_panels_on_demand_are_closed_at_first(hand):
+    state = hand.state
+    assert "lint" in PANELS and PANELS["lint"].on_demand
+    for name, panel in PANELS.items():
+        assert is_open(state, name) == (not panel.on_demand)
+
+
+def test_opening_and_closing(hand):
+    state = hand.state
+    for name in ("lint", "stats"):
+        for opened in (True, True, False, False, True):
+            set_open(state, name, opened)
+            assert is_open(state, name) == opened
+    assert state.opened_panels == {"lint"} and not state.closed_panels
+
+
+def test_cross_of_its_tab_closes_a_panel_on_demand(hand):
+    set_open(hand.state, "lint", True)
+    hand.step(4)
+    assert "Check" in hand.state.item_rects or "Recheck" in hand.state.item_rects
+    tab = imgui.internal.find_window_by_name("Lint").dc.dock_tab_item_rect
+    hand.click((tab.max.x - 12, 0.5 * (tab.min.y + tab.max.y)))
+    hand.step(3)
+    assert not hand.state.opened_panels and not hand.state.closed_panels

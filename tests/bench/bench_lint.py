@@ -1,0 +1,89 @@
+"""What checking costs: ``lint`` on the bundled body with 1,000 frames, beside reading them.
+
+Reading is opening body and motion as ``viewer view`` does; the check starts from the open scene.
+Where its time goes is printed as well.
+"""
+
+from __future__ import annotations
+
+import statistics
+import tempfile
+import time
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from measure import interleaved, report
+
+import viewer
+from viewer.lint import lint_scene
+from viewer.loading import bundled_body
+from viewer.rig.scene import Scene
+
+GOAL = 4.0
+N_FRAMES, RATE = 1000, 60.0
+N_JOINTS, N_SHAPES = 52, 16  # of SMPL-H, as AMASS has them
+
+
+def motion(path: Path) -> Path:
+    """Write a walk-like motion as AMASS does, its joints swinging at different speeds."""
+    rng = np.random.default_rng(0)
+    seconds = np.arange(N_FRAMES)[:, None] / RATE
+    swing = rng.uniform(0.0, 0.3, 3 * N_JOINTS)
+    poses = swing * np.sin(2.0 * np.pi * rng.uniform(0.2, 1.0, 3 * N_JOINTS) * seconds)
+    # z up: a body is turned onto its feet, and walks along y.
+    poses[:, :3] = np.pi / 2.0, 0.0, 0.0
+    place = np.zeros((N_FRAMES, 3))
+    place[:, 1], place[:, 2] = 0.8 * seconds[:, 0], 1.2
+    np.savez(
+        path,
+        poses=poses,
+        trans=place,
+        betas=np.zeros(N_SHAPES),
+        gender="neutral",
+        mocap_framerate=RATE,
+    )
+    return path
+
+
+def main(rounds: int = 7) -> None:
+    """Print the time of a check against that of reading, and each check's share."""
+    with tempfile.TemporaryDirectory(prefix="viewer-bench-") as folder:
+        files = [bundled_body(), motion(Path(folder) / "walk.npz")]
+        scene = viewer.load(*files)
+        found = lint_scene(scene)
+        work = {
+            "lint": lambda: lint_scene(scene),
+            "read body and motion": lambda: viewer.load(*files),
+        }
+        times = interleaved(work, rounds)
+    title = f"lint of the body with {N_FRAMES} frames: {len(found)} findings"
+    report(title, times, ("lint", "read body and motion"), GOAL)
+    print("where the time goes:")
+    for name, spent in shares(scene).items():
+        print(f"  {name:<44} {spent:9.2f} ms")
+
+
+def shares(scene: Scene, rounds: int = 5) -> dict[str, float]:
+    """Return milliseconds of each check, the median of some rounds."""
+    spent: dict[str, list[float]] = {}
+    for _ in range(rounds):
+        steps = steps_of(scene)
+        for (what, start), (_, end) in pairwise(steps):
+            spent.setdefault(what, []).append(1e3 * (end - start))
+    return {name: statistics.median(values) for name, values in spent.items()}
+
+
+def steps_of(scene: Scene) -> list[tuple[str, float]]:
+    """Return when each step of a check began, in seconds, and when the last one ended."""
+    steps: list[tuple[str, float]] = []
+
+    def note(_done: int, _total: int, what: str) -> None:
+        steps.append((what, time.perf_counter()))
+
+    lint_scene(scene, progress=note)
+    return [*steps, ("", time.perf_counter())]
+
+
+if __name__ == "__main__":
+    main()

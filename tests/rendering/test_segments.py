@@ -1,0 +1,112 @@
+"""Segments and dots on the screen: how wide, how round, in front or behind."""
+
+from __future__ import annotations
+
+import moderngl
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from viewer.rendering.camera import Camera
+from viewer.rendering.program import Programs
+from viewer.rendering.segments import HIDDEN, SegmentPass, Segments, dots, joined
+from viewer.rendering.view import view_of
+
+SIDE = 80  # pixels; x and y from -2 to 2, so a unit is 20 pixels
+BOX = np.array([[-2.0, -2.0, -2.0], [2.0, 2.0, 2.0]])
+RED = (1.0, 0.0, 0.0, 1.0)
+
+
+@pytest.fixture
+def picture(ctx):
+    """Draw segments from +z; return opacity and colour, (H, W, 4) float, first row on top."""
+    programs = Programs(ctx)
+    target = ctx.framebuffer(
+        [ctx.texture((SIDE, SIDE), 4, dtype="f4")], ctx.depth_renderbuffer((SIDE, SIDE))
+    )
+    passes = SegmentPass(ctx, programs)
+    camera = Camera(azimuth=0.0, inclination=0.0, fov=90.0, distance=2.0, orthographic=True)
+
+    def draw(segments, depth=1.0, on_top=False, target_point=(0.0, 0.0, 0.0)):
+        camera.target = np.array(target_point)
+        target.use()
+        ctx.viewport = (0, 0, SIDE, SIDE)
+        target.clear(depth=depth)
+        ctx.enable_only(moderngl.DEPTH_TEST | moderngl.BLEND)
+        ctx.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
+        ctx.depth_func = "<"
+        passes.draw(
+            segments, view_of(camera, (SIDE, SIDE), BOX + camera.target), (SIDE, SIDE), on_top
+        )
+        rows = np.frombuffer(target.read(components=4, dtype="f4"), dtype="f4")
+        return rows.reshape(SIDE, SIDE, 4)[::-1]
+
+    yield draw
+    passes.release()
+    programs.release()
+    for item in (*target.color_attachments, target.depth_attachment, target):
+        item.release()
+
+
+def line(start, end, width=4.0, color=RED):
+    return Segments(np.array([start]), np.array([end]), np.array([color]), np.array([width]))
+
+
+def test_line_is_as_wide_and_long_as_asked(picture):
+    opacity = picture(line((-1.0, 0.0, 0.0), (1.0, 0.0, 0.0)))[..., 3]
+    # From column 20 to 60, four pixels wide; round ends reach two pixels further.
+    assert_allclose(opacity[:, 40].sum(), 4.0, atol=0.02)
+    assert_allclose(opacity.sum(), 4.0 * 40.0 + np.pi * 4.0, rtol=0.01)
+    assert_allclose(opacity[:, 22:58], opacity[:, 40:41].repeat(36, axis=1), atol=1e-5)
+
+
+def test_slanted_line_covers_the_same(picture):
+    opacity = picture(line((-0.6, -0.8, 0.0), (0.6, 0.8, 0.0)))[..., 3]
+    assert_allclose(opacity.sum(), 4.0 * 40.0 + np.pi * 4.0, rtol=0.02)
+
+
+def test_segment_of_no_length_is_a_round_dot(picture):
+    opacity = picture(dots(np.zeros((1, 3)), np.array(RED), 20.0))[..., 3]
+    assert_allclose(opacity.sum(), np.pi * 100.0, rtol=0.01)
+    assert_array_equal(opacity, opacity.T)
+    assert_array_equal(opacity, opacity[::-1])
+
+
+def test_colours_are_multiplied_by_opacity(picture):
+    found = picture(dots(np.zeros((1, 3)), np.array([0.2, 0.4, 0.8, 0.5]), 20.0))[40, 40]
+    assert_allclose(found, [0.1, 0.2, 0.4, 0.5], atol=1e-6)
+
+
+def test_later_ones_lie_over_earlier_ones(picture):
+    both = joined(
+        [dots(np.zeros((1, 3)), np.array(RED), 20.0),
+         dots(np.zeros((1, 3)), np.array([0.0, 1.0, 0.0, 1.0]), 8.0)]
+    )  # fmt: skip
+    found = picture(both)
+    assert_allclose(found[40, 40], [0, 1, 0, 1], atol=1e-6)
+    assert_allclose(found[40, 47], [1, 0, 0, 1], atol=1e-6)
+
+
+def test_what_is_behind_something_is_faint_unless_on_top(picture):
+    dot = dots(np.zeros((1, 3)), np.array(RED), 20.0)
+    assert_allclose(picture(dot, depth=0.0)[40, 40, 3], HIDDEN, atol=1e-6)
+    assert_allclose(picture(dot, depth=0.0, on_top=True)[40, 40, 3], 1.0, atol=1e-6)
+
+
+def test_nothing_draws_nothing(picture):
+    assert not picture(dots(np.zeros((0, 3)), np.array(RED), 5.0)).any()
+
+
+def test_many_more_segments_than_before_are_drawn(picture):
+    picture(line((-1.0, 0.0, 0.0), (1.0, 0.0, 0.0)))
+    points = np.stack([np.linspace(-1.9, 1.9, 200), np.zeros(200), np.zeros(200)], axis=1)
+    found = picture(dots(points, np.array(RED), 4.0))
+    assert_allclose(found[40, 4:76, 3], 1.0, atol=0.02)
+
+
+def test_far_from_the_origin_nothing_shakes(picture):
+    near = picture(line((-1.0, 0.3, 0.0), (1.0, 0.3, 0.0)))
+    # float32 counts in steps of 8 there.
+    away = np.array([1e8, 0.0, 0.0])
+    far = line(away + np.array([-1.0, 0.3, 0.0]), away + np.array([1.0, 0.3, 0.0]))
+    assert_allclose(picture(far, target_point=away), near, atol=1e-3)

@@ -1,0 +1,162 @@
+"""What the Lint panel and its menu entry do: check, choose a finding, copy all of them."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+from imgui_bundle import imgui
+
+from viewer.app.actions import take_pick
+from viewer.app.jobs import CountedJob, Report
+from viewer.app.lint_view import Checked, Running
+from viewer.app.reasons import no_job_room
+from viewer.app.shown_panels import set_open
+from viewer.app.state import AppState
+from viewer.errors import printable
+from viewer.lint import describe, finding_text, lint_scene, summary, worst_first
+from viewer.rendering.picking import Pick
+from viewer.rig.pose import pose_key
+from viewer.rig.scene import Actor, Scene
+
+__all__ = [
+    "check_rig",
+    "choose_finding",
+    "copy_findings",
+    "is_stale",
+    "start_check",
+    "take_findings",
+]
+
+_TITLE = "Checking the rig"
+
+
+def check_rig(state: AppState) -> None:
+    """Show the Lint panel and check the scene."""
+    set_open(state, "lint", True)
+    imgui.set_window_focus("Lint")
+    state.lint.was_shown = True
+    start_check(state)
+
+
+def start_check(state: AppState) -> None:
+    """Check the scene as it is now, in a thread; nothing if other work goes on."""
+    if no_job_room(state):
+        return
+    source, options, running = state.scene, state.lint.options, Running()
+    copy = _copied(source)
+
+    def check(report: Report) -> list[str]:
+        findings = tuple(worst_first(lint_scene(copy, options, report)))
+        running.result = Checked(source, copy, options, findings)
+        return [f"Checked: {summary(findings)}"]
+
+    running.job = state.job = CountedJob(_TITLE, check)
+    state.lint.running = running
+
+
+def _copied(scene: Scene) -> Scene:
+    """Return a scene whose poses stay as they are while the other one is posed on."""
+    return Scene([_copied_actor(actor) for actor in scene.actors], world_up=scene.up)
+
+
+def _copied_actor(actor: Actor) -> Actor:
+    return replace(
+        actor,
+        pose=None if actor.pose is None else actor.pose.copy(),
+        placement=actor.placement.copy(),
+        points=None if actor.points is None else actor.points.copy(),
+    )
+
+
+def take_findings(state: AppState) -> None:
+    """Show the findings of a check that has ended; those of another scene are forgotten."""
+    view, running = state.lint, state.lint.running
+    if running is not None and running.job is not state.job:
+        view.running = None
+        # A check that was cancelled, or of a scene that is gone, has nothing to show.
+        if running.result is not None and running.result.source is state.scene:
+            view.checked, view.chosen = running.result, -1
+            view.is_edited, view.seen = False, _moving(state)
+    if view.checked is not None and view.checked.source is not state.scene:
+        view.checked, view.chosen = None, -1
+
+
+def is_stale(state: AppState) -> bool:
+    """Return whether the scene, or what counts as a fault, is another than when it was checked.
+
+    That time moves on, and poses with it, changes nothing. To be asked once a frame.
+    """
+    view, known = state.lint, state.lint.checked
+    if known is None:
+        return False
+    before, view.seen = view.seen, _moving(state)
+    if before[0] == view.seen[0] and before[1:] != view.seen[1:]:
+        view.is_edited = True
+    actors, old = state.scene.actors, known.scene.actors
+    return (
+        view.is_edited
+        or view.options != known.options
+        or len(actors) != len(old)
+        or any(map(_differs, actors, old))
+    )
+
+
+def _moving(state: AppState) -> tuple[object, ...]:
+    """Return the time at which the scene is posed, and the poses of what moves."""
+    poses = [actor.pose for actor in state.scene.actors if actor.clip is not None]
+    time = (state.scene.time, state.playback.fill_gaps)
+    return (time, *(pose_key(pose) for pose in poses if pose is not None))
+
+
+def _differs(actor: Actor, old: Actor) -> bool:
+    if actor.figure is not old.figure or actor.clip is not old.clip:
+        return True
+    if actor.offset != old.offset or (actor.placement != old.placement).any():
+        return True
+    if actor.clip is not None or actor.pose is None or old.pose is None:
+        return False
+    return pose_key(actor.pose) != pose_key(old.pose)
+
+
+def choose_finding(state: AppState, index: int) -> None:
+    """Look at a finding: its actor, joint and time; -1 or the same one again: at none.
+
+    Parameters
+    ----------
+    state : AppState
+        The camera goes there with the next picture.
+    index : int
+        Of ``state.lint.checked.findings``.
+    """
+    view = state.lint
+    view.chosen = -1 if index == view.chosen else index
+    finding = view.finding
+    if finding is None or finding.actor is None or finding.actor >= len(state.scene.actors):
+        return
+    view.wants_aim = True
+    actor = state.scene.actors[finding.actor]
+    joint = int(finding.joints[0]) if len(finding.joints) else -1
+    if actor.figure.skeleton is None or joint >= actor.figure.skeleton.n_joints:
+        joint = -1
+    take_pick(state, Pick(finding.actor, joint, -1, -1, actor.placement[:3, 3]), False)
+    if len(finding.times) and state.playback.has_motion:
+        state.playback.playing = False
+        state.playback.seek(float(finding.times[0]))
+    if not actor.visible:
+        state.say_status(f"{printable(actor.name, 60)} is hidden: see the panel Actors")
+
+
+def copy_findings(state: AppState, as_json: bool) -> None:
+    """Put all findings on the clipboard, as ``viewer lint`` prints them."""
+    known = state.lint.checked
+    if known is None:
+        return
+    if as_json:
+        text = json.dumps(describe(known.findings, known.scene), indent=1, allow_nan=False)
+    else:
+        text = "\n".join([*map(finding_text, known.findings), summary(known.findings)])
+    imgui.set_clipboard_text(text)
+    count = len(known.findings)
+    kind = "JSON" if as_json else "text"
+    state.say_status(f"{count} finding{'s' * (count != 1)} copied as {kind}")

@@ -1,0 +1,87 @@
+"""Words as pixels, many of them in one texture; Pillow is imported when one is drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from viewer.rig.arrays import Bytes, Ints
+
+__all__ = ["Lettering", "shelves"]
+
+_RIM = 2  # pixels around letters
+_WIDEST = 2048  # pixels; what is longer is cut off
+_MOST = 4000  # words that are remembered
+_DARK = 205  # opacity of the rim, of 255
+
+
+class Lettering:
+    """Draws words in letters of one size.
+
+    Parameters
+    ----------
+    letters : int
+        Height of the letters, pixels.
+    """
+
+    def __init__(self, letters: int) -> None:
+        from PIL import ImageFont
+
+        self.letters = letters
+        self._font = ImageFont.load_default(letters)
+        self._widths: dict[str, int] = {}
+        self._pixels: dict[str, Bytes] = {}
+
+    def sizes(self, words: Sequence[str]) -> Ints:
+        """Return width and height of words with their rims: (N, 2), pixels."""
+        if len(self._widths) > _MOST:
+            self._widths.clear()
+        for word in words:
+            if word not in self._widths:
+                self._widths[word] = int(np.ceil(self._font.getlength(word))) + 2 * _RIM
+        widths = [min(self._widths[word], _WIDEST) for word in words]
+        heights = [self._height] * len(words)
+        return np.array([widths, heights], dtype=np.int32).reshape(2, -1).T
+
+    @property
+    def _height(self) -> int:
+        return round(1.25 * self.letters) + 2 * _RIM
+
+    def pixels(self, word: str) -> Bytes:
+        """Return a word in white with a dark rim: (H, W, 2) uint8, grey times opacity, opacity."""
+        from PIL import Image, ImageDraw
+
+        if word not in self._pixels:
+            if len(self._pixels) > _MOST:
+                self._pixels.clear()
+            width, height = self.sizes([word])[0].tolist()
+            rim, inside = Image.new("L", (width, height)), Image.new("L", (width, height))
+            place = _RIM, _RIM
+            ImageDraw.Draw(rim).text(place, word, _DARK, self._font, stroke_width=_RIM)
+            ImageDraw.Draw(inside).text(place, word, 255, self._font)
+            white = np.array(inside)
+            self._pixels[word] = np.dstack([white, np.maximum(white, np.array(rim))])
+        return self._pixels[word]
+
+
+def shelves(sizes: Ints, width: int, tallest: int) -> Ints:
+    """Return where rectangles of one height lie in a picture, in rows: (M, 2), M <= N.
+
+    Parameters
+    ----------
+    sizes : (N, 2)
+        Widths, at most ``width``, and heights, pixels.
+    width, tallest : int
+        Of the picture; what does not fit into it any more is left out.
+    """
+    corners: list[tuple[int, int]] = []
+    x = y = 0
+    for across, down in sizes.tolist():
+        if x + across > width:
+            x, y = 0, y + down
+        if y + down > tallest:
+            break
+        corners.append((x, y))
+        x += across
+    return np.array(corners, dtype=np.int32).reshape(-1, 2)

@@ -1,0 +1,112 @@
+"""Where points of the scene are in the picture, computed on the processor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.rendering.view import View
+from viewer.rig.arrays import Bools, Floats
+
+__all__ = ["Projected", "picture_scale", "project", "project_segments"]
+
+_USUAL_HEIGHT = 720.0  # pixels of a picture whose marks have their usual size
+_SCALES = 0.8, 4.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Projected:
+    """Points in the picture.
+
+    Attributes
+    ----------
+    pixels : (N, 2)
+        From the picture's left and upper edge; any where the point is not seen.
+    depths : (N,)
+        Growing away from the eye, -1 to 1.
+    seen : (N,) bool
+        Whether the point is in front of the eye and within the picture.
+    """
+
+    pixels: Floats
+    depths: Floats
+    seen: Bools
+
+
+def project(view: View, size: tuple[int, int], points: Floats) -> Projected:
+    """Return where points are seen: x = c_x / c_w with c = P V [p 1].
+
+    Parameters
+    ----------
+    view : View
+        The camera's matrices.
+    size : (int, int)
+        Width and height of the picture, pixels.
+    points : (N, 3)
+        Scene space.
+    """
+    clip = _clip(view, points)
+    in_front = clip[:, 3] > 0.0
+    w = np.where(in_front, clip[:, 3], 1.0)
+    pixels, depths = _pixels(clip, w, size), clip[:, 2] / w
+    inside = ((pixels >= 0.0) & (pixels < size)).all(axis=1) & (np.abs(depths) <= 1.0)
+    return Projected(pixels, depths, in_front & inside)
+
+
+def project_segments(
+    view: View, size: tuple[int, int], starts: Floats, ends: Floats
+) -> tuple[Floats, Bools]:
+    """Return where segments are seen, cut off at the near plane: -c_w <= c_z.
+
+    Parameters
+    ----------
+    view : View
+        The camera's matrices.
+    size : (int, int)
+        Width and height of the picture, pixels.
+    starts, ends : (N, 3)
+        Scene space.
+
+    Returns
+    -------
+    pixels : (N, 2, 2)
+        Both ends, from the picture's left and upper edge; they may lie outside of it.
+    seen : (N,) bool
+        Whether any of it is in front of the near plane.
+    """
+    clips = np.stack([_clip(view, starts), _clip(view, ends)], axis=1)
+    away = clips[..., 2] + clips[..., 3]
+    seen: Bools = np.any(away > 0.0, axis=1)
+    behind = away <= 0.0
+    span = away - away[:, ::-1]
+    share = away / np.where(span == 0.0, 1.0, span)
+    # A little on this side of the plane, where w is not 0.
+    cut = clips + (share + 1e-6)[..., None] * (clips[:, ::-1] - clips)
+    clips = np.where(behind[..., None], cut, clips)
+    w = clips[..., 3]
+    return _pixels(clips, np.where(w > 0.0, w, 1.0), size), seen
+
+
+def picture_scale(size: tuple[int, int]) -> float:
+    """Return how much larger than usual marks are drawn in a picture, 1 at 720 pixels' height.
+
+    Parameters
+    ----------
+    size : (int, int)
+        Width and height of the picture, pixels.
+    """
+    return float(np.clip(min(size[1], 0.75 * size[0]) / _USUAL_HEIGHT, *_SCALES))
+
+
+def _clip(view: View, points: Floats) -> Floats:
+    """Return points in clip space: (N, 4)."""
+    matrix = view.projection @ view.matrix
+    return points @ matrix[:, :3].T + matrix[:, 3]
+
+
+def _pixels(clip: Floats, w: Floats, size: tuple[int, int]) -> Floats:
+    """Return pixels from the left and upper edge: (..., 2)."""
+    across = 0.5 * (1.0 + clip[..., 0] / w) * size[0]
+    down = 0.5 * (1.0 - clip[..., 1] / w) * size[1]
+    return np.stack([across, down], axis=-1)

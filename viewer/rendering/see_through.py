@@ -1,0 +1,49 @@
+"""Surfaces that one can look through: one translucent layer, whatever lies over whatever."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import moderngl
+
+from viewer.rendering.options import DisplayOptions
+
+__all__ = ["draw_layer", "surface_opacity"]
+
+_XRAY_OPACITY = 0.4
+
+
+def surface_opacity(options: DisplayOptions) -> float:
+    """Return how much of what is behind a surface it hides, 0 to 1.
+
+    Colours that stand for numbers must be those of the legend, so they stay opaque.
+    """
+    return _XRAY_OPACITY if options.xray and options.shading != "scalar" else 1.0
+
+
+def draw_layer(
+    context: moderngl.Context, options: DisplayOptions, draw: Callable[[], object]
+) -> None:
+    """Draw surfaces; translucent ones so that only what is nearest counts.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        The context in use.
+    options : DisplayOptions
+        Whether the surfaces are translucent.
+    draw : callable
+        Draws them; called a second time if they are.
+    """
+    if surface_opacity(options) == 1.0:
+        draw()
+        return
+    target = context.fbo
+    target.color_mask = False, False, False, False
+    target.use()  # moderngl hands masks to OpenGL only then
+    draw()
+    target.color_mask = True, True, True, True
+    target.use()
+    context.depth_func = "<="
+    draw()
+    context.depth_func = "<"

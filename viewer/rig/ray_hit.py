@@ -1,0 +1,92 @@
+"""Where a line of sight meets a surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.rig.arrays import Floats, Ints
+
+__all__ = ["RayHit", "first_hit", "surface_point"]
+
+_AT_ONCE = 1 << 18  # triangles; some 300 bytes each
+_EDGE = 1e-9  # barycentric: edges belong to both of their triangles
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RayHit:
+    """A point of a surface.
+
+    Attributes
+    ----------
+    triangle : int
+        Which one it lies on.
+    barycentric : (3,)
+        Weights of the corners, adding up to 1.
+    distance : float
+        From the ray's origin, in lengths of its direction.
+    """
+
+    triangle: int
+    barycentric: Floats
+    distance: float
+
+
+def first_hit(
+    positions: Floats, triangles: Ints, origin: Floats, direction: Floats
+) -> RayHit | None:
+    """Return where a ray first meets a surface, from either side; None if nowhere.
+
+    With edges e1, e2 from corner a, o + t d = a + u e1 + v e2 is solved by determinants
+    (Möller and Trumbore 1997, eq. 6).
+
+    Parameters
+    ----------
+    positions : (V, 3)
+        Vertices.
+    triangles : (T, 3)
+        Vertex indices.
+    origin, direction : (3,)
+        In the same space; what is behind the origin does not count.
+
+    >>> corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    >>> eye, ahead = np.array([0.25, 0.25, 2.0]), np.array([0.0, 0.0, -1.0])
+    >>> hit = first_hit(corners, np.array([[0, 1, 2]]), eye, ahead)
+    >>> hit.distance, hit.barycentric.tolist()
+    (2.0, [0.5, 0.25, 0.25])
+    """
+    best: RayHit | None = None
+    for start in range(0, len(triangles), _AT_ONCE):
+        hit = _nearest(positions, triangles[start : start + _AT_ONCE], origin, direction)
+        if hit is not None and (best is None or hit.distance < best.distance):
+            best = RayHit(hit.triangle + start, hit.barycentric, hit.distance)
+    return best
+
+
+def _nearest(
+    positions: Floats, triangles: Ints, origin: Floats, direction: Floats
+) -> RayHit | None:
+    a, b, c = (positions[triangles[:, corner]] for corner in range(3))
+    first, second, away = b - a, c - a, origin - a
+    across = np.cross(direction, second)
+    determinant = np.einsum("na,na->n", first, across)
+    turned = np.cross(away, first)
+    # Triangles seen from their edge are not hit.
+    seen = determinant != 0.0
+    inverse = np.divide(1.0, determinant, out=np.zeros(len(determinant)), where=seen)
+    u = np.einsum("na,na->n", away, across) * inverse
+    v = (turned @ direction) * inverse
+    t = np.einsum("na,na->n", second, turned) * inverse
+    inside = seen & (u >= -_EDGE) & (v >= -_EDGE) & (u + v <= 1.0 + _EDGE) & (t > 0.0)
+    t = np.where(inside, t, np.inf)
+    nearest = int(t.argmin()) if len(t) else -1
+    if nearest < 0 or not np.isfinite(t[nearest]):
+        return None
+    weights = np.clip([1.0 - u[nearest] - v[nearest], u[nearest], v[nearest]], 0.0, 1.0)
+    return RayHit(nearest, weights / weights.sum(), float(t[nearest]))
+
+
+def surface_point(positions: Floats, triangles: Ints, hit: RayHit) -> Floats:
+    """Return a hit's place on the surface as its vertices lie now: (3,)."""
+    return np.asarray(hit.barycentric @ positions[triangles[hit.triangle]])
