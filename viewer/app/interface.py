@@ -98,11 +98,26 @@ def _share(side: tuple[float, float, float]) -> float:
     return max(usual, min(largest, wanted * imgui.get_font_size() / width))
 
 
+def _dock_of_neighbour(panel: Panel) -> int:
+    """Return where another panel of the same place is docked, 0 if none is."""
+    for other in PANELS.values():
+        window = None
+        if other.place == panel.place and other is not panel:
+            window = imgui.internal.find_window_by_name(other.title)
+        if window is not None and window.dock_id:
+            return int(window.dock_id)
+    return 0
+
+
 def _draw_panel(state: AppState, name: str, panel: Panel) -> bool:
     """Draw one panel; return whether it was not there before."""
     # A panel that comes with a figure does not push itself in front of the others.
     is_quiet = panel.needs and not panel.leads
     flags = imgui.WindowFlags_.no_focus_on_appearing if is_quiet else imgui.WindowFlags_.none
+    neighbour = _dock_of_neighbour(panel)
+    if neighbour:
+        # A panel that is newer than the layout that was remembered would float over the others.
+        imgui.set_next_window_dock_id(neighbour, imgui.Cond_.first_use_ever)
     shown, stays = imgui.begin(panel.title, True, flags)
     appears = imgui.is_window_appearing()
     if shown:
