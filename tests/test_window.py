@@ -281,11 +281,11 @@ def test_screenshot_is_the_headless_picture_to_the_pixel(window, places, figure)
     camera = Camera(up=scene.up)
     fit(camera, scene_points(scene), width / height)
     assert (saved == viewer.render(scene, (width, height), camera)).all()
-    # And the window shows these pixels, but for messages and hints at the lower edge.
+    # And the window shows these pixels, but for tools at the upper edge, messages at the lower.
     shown = app.screen()
     x, y = map(int, places[1][:2])
-    rows = height - 120
-    assert (shown[y : y + rows, x : x + width] == saved[:rows, :, :3]).mean() > 0.999
+    rows = slice(120, height - 120)
+    assert (shown[y : y + height, x : x + width][rows] == saved[rows, :, :3]).mean() > 0.999
     app.key("ctrl+q")
     app.finish()
 
