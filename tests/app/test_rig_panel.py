@@ -13,13 +13,15 @@ from numpy.testing import assert_allclose
 pytest.importorskip("scipy")
 
 import viewer
-from viewer.app.rig_placing import as_similarity, move_by_hand
-from viewer.app.rig_sources import current_template, template_texts
-from viewer.app.rig_work import start_adding
+from viewer.app.rig_placing import as_similarity, move_by_hand, placing_now
+from viewer.app.rig_sources import current_template, target_mesh, template_texts
+from viewer.app.rig_steps import align_template
+from viewer.app.rig_work import start_adding, start_reading
 from viewer.export import export
 from viewer.formats.rigged import save
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import deform
+from viewer.rig.transfer.alignment import AlignmentSettings
 from viewer.rig.transform import apply_transform
 
 SIZE = (900, 1250)
@@ -27,12 +29,15 @@ SIZE = (900, 1250)
 
 @pytest.fixture
 def rigging(drive):
-    """A hand on an app with the mesh and its template, the panel open."""
+    """A hand on an app with the mesh and its template, which lies on it, the panel open."""
 
-    def opened(**settings):
+    def opened(placed=True, **settings):
         hand = drive(scene=rig_scene.scene(**settings), size=SIZE, samples=1)
         hand.menu("menu Window", "Rig")
         hand.step(2)
+        if placed:  # searching takes seconds
+            move_by_hand(hand.state, current_template(hand.state), as_similarity(TRUE))
+            hand.step(2)
         return hand
 
     return opened
@@ -64,7 +69,7 @@ def test_scene_without_a_bare_mesh_greys_all_but_adding_one(drive, texts):
 
 
 def test_alignment_is_found_and_shown_with_its_error(rigging, texts):
-    hand = rigging()
+    hand = rigging(placed=False)
     steps = hand.undo_steps
     hand.click("Align")
     finish(hand)
@@ -80,8 +85,6 @@ def test_alignment_is_found_and_shown_with_its_error(rigging, texts):
 
 def test_template_posed_after_aligning_says_so(rigging, texts):
     hand = rigging()
-    hand.click("Align")
-    finish(hand)
     hand.state.scene.actors[1].pose.dofs[8] = 0.0
     texts.clear()
     hand.step(2)
@@ -89,12 +92,12 @@ def test_template_posed_after_aligning_says_so(rigging, texts):
 
 
 def test_match_is_coloured_before_anything_is_rigged(rigging, texts):
-    hand = rigging()
+    hand = rigging(placed=False)
     assert "Colours" not in hand.state.item_rects
     hand.click("Show match")  # greyed: not aligned yet
     assert hand.state.job is None
-    hand.click("Align")
-    finish(hand)
+    move_by_hand(hand.state, current_template(hand.state), as_similarity(TRUE))
+    hand.step(2)
     hand.click("Show match")
     finish(hand)
     state = hand.state
@@ -114,8 +117,6 @@ def test_match_is_coloured_before_anything_is_rigged(rigging, texts):
 
 def test_match_counts_what_is_near_enough_and_faces_alike(rigging):
     hand = rigging()
-    hand.click("Align")
-    finish(hand)
     # The template a tenth of the target's size beside it: nothing is within 1 %.
     placing = hand.state.rig.placing.similarity
     away = placing.matrix.copy()
@@ -229,9 +230,10 @@ def test_result_moves_as_the_template_where_the_target_stands(rigging):
     # The clip's first frame is the rest pose; the target was posed otherwise.
     template = hand.state.scene.actors[1]
     template.pose.dofs[6:] = 0.2, -0.1, 0.7
-    hand.state.playback.accept()
+    hand.step(2)
     hand.click("Run")
     finish(hand)
+    assert hand.state.error == ""
     still = seen(hand, 0)
     hand.click("Move as the template")
     hand.step(2)
@@ -304,15 +306,20 @@ def test_missing_scipy_is_a_message(rigging, monkeypatch):
     assert names(hand) == ["scan", "arm"]
 
 
-def test_settings_reach_the_transfer(rigging, monkeypatch):
+def test_settings_reach_alignment_and_transfer(rigging, monkeypatch):
     asked = {}
+
+    def placed(template, own, target, settings, fits, tell):
+        asked.update(alignment=settings, fits=fits)
+        return align_template(template, own, target, AlignmentSettings(matrix=TRUE), False, tell)
 
     def instead(figure, pose, target, settings, report, name):
         asked.update(settings=settings, name=name)
         raise viewer.ViewerError("stopped here")
 
+    monkeypatch.setattr("viewer.app.rig_work.align_template", placed)
     monkeypatch.setattr("viewer.app.rig_work.transfer", instead)
-    hand = rigging()
+    hand = rigging(placed=False)
     hand.pick("Up", 3)
     hand.pick("Scale", 2)
     hand.pick("Joints##rig", 1)
@@ -320,16 +327,43 @@ def test_settings_reach_the_transfer(rigging, monkeypatch):
     hand.enter_value("Smoothing", "7")
     hand.enter_value("Max. influences", "3")
     hand.click("Pose correctives")
+    hand.click("Fit pose and proportions")
     hand.click("Run")
     finish(hand)
     settings = asked["settings"]
     assert hand.state.error == "stopped here" and asked["name"] == "scan rigged"
-    assert (settings.alignment.up, settings.alignment.scale) == ("z", "none")
-    assert settings.alignment.facing is None and settings.alignment.matrix is None
-    assert settings.joints == "copied" and not settings.correctives
+    assert (asked["alignment"].up, asked["alignment"].scale) == ("z", "none")
+    assert asked["alignment"].facing is None and not asked["fits"]
+    assert_allclose(settings.alignment.matrix, TRUE, atol=1e-9)
+    assert settings.joints == "copied" and not settings.correctives and not settings.fits
     assert settings.weights.match.max_angle == pytest.approx(np.radians(75.0))
     assert settings.weights.match.near_angle == pytest.approx(np.radians(75.0))
     assert (settings.weights.smoothing_rounds, settings.weights.max_influences) == (7, 3)
+
+
+def test_template_in_another_pose_is_turned_to_fit_and_shown_so(rigging, texts):
+    hand = rigging(placed=False)
+    actor = hand.state.scene.actors[1]
+    actor.pose.dofs[6:] = 0.2, -0.1, 0.2  # the tip of the target is turned by half a radian more
+    hand.step(2)
+    hand.click("Align")
+    finish(hand)
+    state = hand.state
+    assert state.rig.placing.fitted is not None
+    texts.clear()
+    hand.step()
+    assert any(text.startswith("pose: the template's joints turned") for text in texts)
+    ghost = hand.app.frame.renderer.ghost
+    shown = apply_transform(ghost.placement, ghost.figure.mesh.positions)
+    own = apply_transform(ghost.placement, deform(actor.figure, actor.pose)[0])
+    wanted = target_mesh(state).positions
+    gaps = [np.linalg.norm(points - wanted, axis=1).max() for points in (shown, own)]
+    assert gaps[0] < 0.2 * gaps[1]
+    assert actor.pose.dofs[8] == 0.2  # the actor stands as before
+    hand.click("Run")
+    finish(hand)
+    assert_allclose(seen(hand, 0), wanted, atol=1e-6)
+    assert state.error == ""
 
 
 def test_mesh_is_added_by_the_dialog_and_the_body_is_read_when_needed(drive, tmp_path):
@@ -365,6 +399,25 @@ def test_mesh_is_added_by_the_dialog_and_the_body_is_read_when_needed(drive, tmp
 
 def template_names(hand):
     return template_texts(hand.state).values()
+
+
+def test_template_of_a_file_stays_itself_when_it_is_fitted(drive, tmp_path):
+    hand = drive(scene=rig_scene.scene(with_template=False), size=SIZE, samples=1)
+    hand.menu("menu Window", "Rig")
+    hand.step(2)
+    assert hand.state.rig.template_key == "body"  # there is no other
+    save(rig_scene.bent()[0], tmp_path / "arm.npz")
+    start_reading(hand.state, (tmp_path / "arm.npz",))
+    finish(hand)
+    template = hand.state.rig.template
+    hand.click("Run")  # aligns, and turns the joints of the template, which is at rest
+    finish(hand)
+    assert hand.state.rig.template is template
+    assert placing_now(hand.state).fitted is not None
+    hand.click("Run")
+    finish(hand)
+    assert hand.state.rig.template is template and placing_now(hand.state) is not None
+    assert names(hand) == ["scan rigged", "scan"] and hand.state.error == ""
 
 
 def test_files_that_do_not_fit_are_messages(rigging, tmp_path):
@@ -412,7 +465,7 @@ def test_result_is_saved_and_opens_again(rigging, tmp_path):
     finish(hand)
     assert hand.says("Saved") and hand.state.error == ""
     again = viewer.load(tmp_path / "scan_rigged.npz").actors[0].figure
-    assert again.is_attached and [field.name for field in again.fields][0] == "confidence"
+    assert again.is_attached and again.fields[0].name == "confidence"
     hand.click("Save rigged…")
     hand.state.dialog.enter(tmp_path)
     hand.state.dialog.name = "arm2.skel"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from viewer.app.posing_actions import cancel_drag
 from viewer.app.reasons import no_motion
-from viewer.app.rig_gizmo import drop_rig_tool
+from viewer.app.rig_tools import drop_rig_tool
 from viewer.app.state import AppState
 from viewer.app.weights_actions import unpin
 from viewer.errors import ViewerError, printable
@@ -158,10 +158,12 @@ def redo(state: AppState) -> None:
 
 
 def _keep_choice(state: AppState, before: Actor) -> None:
-    """Choose anew if the chosen actor is there no more."""
-    last = len(state.scene.actors) - 1
-    if state.chosen_actor > last or state.actor is not before:
-        state.choose_actor(min(state.chosen_actor, last))
+    """Keep the chosen actor, wherever it is now; choose anew if it is there no more."""
+    actors, row = state.scene.actors, state.chosen_actor
+    if row < len(actors) and actors[row] is before:
+        return
+    rows = [number for number, actor in enumerate(actors) if actor is before]
+    state.choose_actor(rows[0] if rows else min(row, len(actors) - 1))
 
 
 def play(state: AppState) -> None:

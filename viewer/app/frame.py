@@ -26,7 +26,7 @@ from viewer.app.mouse import handle_mouse
 from viewer.app.overlays import draw_hints
 from viewer.app.recent import remember
 from viewer.app.record_dialog import draw_record_dialog
-from viewer.app.rig_gizmo import draw_rig_tools, show_rig
+from viewer.app.rig_tools import draw_rig_tools, show_rig
 from viewer.app.state import AppState
 from viewer.app.stream import Stream
 from viewer.app.view_picks import answer_picks

@@ -5,7 +5,7 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from viewer.app.gizmo import choose_joint, use_handles
-from viewer.app.rig_gizmo import holds_mouse
+from viewer.app.rig_tools import holds_mouse
 from viewer.app.state import AppState
 from viewer.app.weights_view import wants_vertex
 from viewer.rendering.camera import orbit, pan, zoom

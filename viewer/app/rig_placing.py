@@ -21,12 +21,12 @@ from viewer.rig.transfer.similarity import Similarity
 from viewer.rig.transform import translation_matrix
 
 __all__ = [
-    "alignment_settings",
     "as_similarity",
     "box_fit",
     "ghost_of",
     "ghost_place",
     "is_posed_since",
+    "laid_template",
     "move_by_hand",
     "placing_now",
     "posed_template",
@@ -79,6 +79,14 @@ def is_posed_since(state: AppState) -> bool:
     return placing is not None and template is not None and placing.pose != pose_key(template.pose)
 
 
+def laid_template(state: AppState) -> Template | None:
+    """Return the template in the pose in which it lies on the target; None if it is unread."""
+    placing, template = placing_now(state), current_template(state)
+    if placing is None or template is None or placing.fitted is None or is_posed_since(state):
+        return template
+    return placing.fitted
+
+
 def similarity_now(state: AppState, template: Template) -> Similarity:
     """Return where the template lies, box on box if nobody has aligned it."""
     placing = placing_now(state)
@@ -103,29 +111,23 @@ def as_similarity(matrix: Floats) -> Similarity:
 
 def move_by_hand(state: AppState, template: Template, similarity: Similarity) -> None:
     """Lay the template somewhere else; its error is not known there."""
-    meshes = (target_mesh(state), template.figure)
-    settings = AlignmentSettings(matrix=similarity.matrix)
-    state.rig.placing = Placing(similarity, None, settings, meshes, pose_key(template.pose))
-
-
-def alignment_settings(state: AppState) -> AlignmentSettings:
-    """Return how a run finds where the template lies: there, or by searching."""
-    placing, choices = placing_now(state), state.rig.choices
-    if placing is None:
-        return AlignmentSettings(
-            up=choices.up or None,
-            facing=choices.facing or None,
-            scale=choices.scale,
-            refines=choices.refines,
-        )
-    if (placing.similarity.factors == 1.0).all():
-        return AlignmentSettings(matrix=placing.similarity.matrix)
-    return placing.settings  # a matrix that scales axes is found again, not given
+    own, before = current_template(state), placing_now(state)
+    assert own is not None  # it is moved
+    fitted = template if before is not None and before.fitted is template else None
+    state.rig.placing = Placing(
+        similarity=similarity,
+        alignment=None,
+        settings=AlignmentSettings(matrix=similarity.matrix),
+        fitted=fitted,
+        lines=before.lines if before is not None and fitted is not None else (),
+        meshes=(target_mesh(state), own.figure),
+        pose=pose_key(own.pose),
+    )
 
 
 def set_aside(state: AppState) -> None:
     """Show the template to the right of the target, as the camera sees it."""
-    view, template = state.rig, current_template(state)
+    view, template = state.rig, laid_template(state)
     view.aside = np.zeros(3)
     if template is None or view.target is None:
         return
@@ -142,7 +144,7 @@ def set_aside(state: AppState) -> None:
 
 def ghost_of(state: AppState) -> Ghost | None:
     """Return the template as it is to be drawn over the scene, None if it is not."""
-    view, template = state.rig, current_template(state)
+    view, template = state.rig, laid_template(state)
     if template is None or view.target is None:
         return None
     if view.tool == "landmarks":

@@ -40,7 +40,7 @@ TOOLS = {
     "": ("None", "the mouse orbits and chooses as usual"),
     "move": ("Move", "drag the template by arrows and squares"),
     "rotate": ("Turn", "drag the template around by rings"),
-    "scale": ("Scale", "drag a handle: the template grows as a whole"),
+    "scale": ("Scale", "drag the ring out or in: the template grows as a whole"),
     "landmarks": ("Landmarks", "click a point of the template, then the same of the target"),
 }
 """Ways to lay the template onto the target by hand: name and what the mouse does."""
@@ -89,6 +89,10 @@ class Placing:
         With its errors; None until those are measured.
     settings : AlignmentSettings
         How to come there again.
+    fitted : Template or None
+        The template with its joints turned and its limbs resized; None where it fits as it is.
+    lines : tuple of str
+        What was done to it.
     meshes : tuple of object
         The target's mesh and the template's figure: for others it means nothing.
     pose : tuple of bytes
@@ -98,6 +102,8 @@ class Placing:
     similarity: Similarity
     alignment: Alignment | None
     settings: AlignmentSettings
+    fitted: Template | None
+    lines: tuple[str, ...]
     meshes: tuple[object, object]
     pose: tuple[bytes, ...]
 
@@ -172,6 +178,8 @@ class RigChoices:
         One of ``SCALES``.
     refines : bool
         Whether closest points improve on landmarks.
+    fits : bool
+        Whether the template's joints are turned and its limbs resized where that is needed.
     method, joints : str
         As in ``TransferSettings``.
     max_distance : float
@@ -190,6 +198,7 @@ class RigChoices:
     facing: str = ""
     scale: str = "uniform"
     refines: bool = True
+    fits: bool = True
     method: str = "robust"
     joints: str = "carried"
     max_distance: float = 0.05
@@ -223,6 +232,9 @@ class RigView:
         A key of ``TOOLS``.
     holds_mouse : bool
         Whether the pointer is on a handle of the gizmo, or holds one.
+    scaling : (float, float) or None
+        While the ring that scales is held: how far from the middle it was taken, and the
+        template's scale then.
     was_dragged : bool
         Whether the gizmo has moved the template since its error was measured.
     landmarks : list of Landmark
@@ -256,6 +268,7 @@ class RigView:
     ghost: str = "translucent"
     tool: str = ""
     holds_mouse: bool = False
+    scaling: tuple[float, float] | None = None
     was_dragged: bool = False
     landmarks: list[Landmark] = field(default_factory=list)
     pending: RayHit | None = None

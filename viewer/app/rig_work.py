@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +10,7 @@ import numpy as np
 
 from viewer.app.jobs import CountedJob, Report
 from viewer.app.reasons import no_job_room
-from viewer.app.rig_placing import alignment_settings, placing_now, target_place
+from viewer.app.rig_placing import laid_template, placing_now, target_place
 from viewer.app.rig_results import compare, put_results, show_match
 from viewer.app.rig_sources import (
     choose_target,
@@ -21,30 +20,22 @@ from viewer.app.rig_sources import (
     target_mesh,
     template_files,
 )
+from viewer.app.rig_steps import align_template, match_fields, match_settings, transfer_settings
 from viewer.app.rig_view import Landmark, Placing, Result, RigChoices, Running, Template
 from viewer.app.state import AppState
 from viewer.errors import RigError, printable
 from viewer.loading import load
 from viewer.rendering.camera import fit
-from viewer.rig.annotations import VertexField
 from viewer.rig.arrays import Floats
-from viewer.rig.mesh import Mesh, bounding_box, box_size
-from viewer.rig.pose import pose_key
+from viewer.rig.mesh import Mesh, bounding_box
 from viewer.rig.ray_hit import surface_point
 from viewer.rig.scene import Actor, scene_points
-from viewer.rig.skinning import deform
-from viewer.rig.transfer.alignment import AlignmentSettings, Posed, align
-from viewer.rig.transfer.matching import MatchSettings, match
-from viewer.rig.transfer.matching import Template as Surface
+from viewer.rig.transfer.alignment import AlignmentSettings
 from viewer.rig.transfer.pipeline import transfer
-from viewer.rig.transfer.settings import METHODS, TransferSettings
-from viewer.rig.transfer.similarity import Similarity
-from viewer.rig.transfer.weights import WeightSettings
-from viewer.rig.transfer.welding import weld
+from viewer.rig.transfer.settings import METHODS
 
 __all__ = [
     "landmark_settings",
-    "match_settings",
     "start_adding",
     "start_align",
     "start_match",
@@ -136,9 +127,12 @@ def start_reading(state: AppState, paths: tuple[Path, ...] = ()) -> None:
     _begin(state, "Reading the template", act)
 
 
-def _snapshot(state: AppState) -> Callable[[Report], Template]:
-    """Return what gives a thread the template as it is now, read there if it has to be."""
-    known, key = current_template(state), state.rig.template_key
+def _snapshot(state: AppState, laid: bool) -> Callable[[Report], Template]:
+    """Return what gives a thread the template as it is now, or as it lies on the target.
+
+    It is read there if it has to be.
+    """
+    known, key = laid_template(state) if laid else current_template(state), state.rig.template_key
     if known is not None:
         taken = replace(known, pose=known.pose.copy())
         return lambda report: taken
@@ -152,8 +146,10 @@ def _snapshot(state: AppState) -> Callable[[Report], Template]:
 
 def _keep(state: AppState, template: Template) -> None:
     """Remember a template that was read on the way."""
-    if template.actor is None and state.rig.template_key == template.key:
-        state.rig.template = template
+    view = state.rig
+    is_new = view.template is None or view.template.key != template.key
+    if is_new and template.actor is None and view.template_key == template.key:
+        view.template = template
 
 
 def _shares(
@@ -164,35 +160,34 @@ def _shares(
 
 
 def start_align(state: AppState, settings: AlignmentSettings | None = None) -> None:
-    """Lay the template onto the target: by searching, or as the settings say."""
+    """Lay the template onto the target: by searching, or from where it lies as the settings say."""
     choices, target = state.rig.choices, target_mesh(state)
-    how = settings or AlignmentSettings(
-        up=choices.up or None, facing=choices.facing or None, scale=choices.scale
-    )
-    take = _snapshot(state)
+    take = _snapshot(state, laid=settings is not None)
+    how = settings or _search_settings(choices)
+    own = current_template(state)
+    fits = choices.fits and how.matrix is None
 
     def act(report: Report) -> _Finish:
         template = take(report)
-        assert template.figure.mesh is not None  # it is attached
-        posed = deform(template.figure, template.pose)[0]
-        found = align(
-            Posed(posed, template.figure.mesh.triangles),
-            Posed(target.positions, target.triangles),
-            template.figure.up,
-            how,
-            _shares(report),
-        )
-        meshes = (target, template.figure)
+        found = align_template(template, own or template, target, how, fits, _shares(report))
 
         def finish(state: AppState) -> None:
             _keep(state, template)
-            state.rig.placing = Placing(found.placed, found, how, meshes, pose_key(template.pose))
+            before, state.rig.placing = state.rig.placing, found
+            if before is not None and how.matrix is not None and found.fitted is not None:
+                state.rig.placing = replace(found, lines=before.lines)  # it was only measured
             if state.rig.tool == "landmarks":
                 state.rig.tool = ""  # so that the template is seen where it lies
 
         return finish
 
     _begin(state, "Aligning", act)
+
+
+def _search_settings(choices: RigChoices) -> AlignmentSettings:
+    return AlignmentSettings(
+        up=choices.up or None, facing=choices.facing or None, scale=choices.scale
+    )
 
 
 def landmark_settings(state: AppState, mesh: Mesh, refines: bool) -> AlignmentSettings:
@@ -221,91 +216,58 @@ def landmark_settings(state: AppState, mesh: Mesh, refines: bool) -> AlignmentSe
     )
 
 
-def match_settings(choices: RigChoices) -> MatchSettings:
-    """Return when a vertex matches, as the panel says."""
-    angle, usual = math.radians(choices.max_angle), MatchSettings()
-    return MatchSettings(
-        max_distance=choices.max_distance, max_angle=angle, near_angle=max(angle, usual.near_angle)
-    )
-
-
 def start_match(state: AppState) -> None:
     """Find which vertices of the target lie on the template, and show them as colours."""
     placing, settings = placing_now(state), match_settings(state.rig.choices)
     if placing is None or state.rig.target is None:
         return
-    take, similarity = _snapshot(state), placing.similarity
+    take, similarity = _snapshot(state, laid=True), placing.similarity
     mesh, actor = target_mesh(state), state.rig.target
 
     def act(report: Report) -> _Finish:
         template = take(report)
         report(0, 0, "Looking for closest points")
-        fields, share = _match_fields(template, similarity, mesh, settings)
+        fields, share = match_fields(template, similarity, mesh, settings)
         return lambda state: show_match(state, actor, fields, share)
 
     _begin(state, "Looking for closest points", act)
 
 
-def _match_fields(
-    template: Template, similarity: Similarity, mesh: Mesh, settings: MatchSettings
-) -> tuple[tuple[VertexField, ...], float]:
-    """Return class, distance and angle of each vertex, and the share that matches."""
-    assert template.figure.mesh is not None  # it is attached
-    posed = similarity.apply(deform(template.figure, template.pose)[0])
-    welded = weld(mesh.positions, mesh.triangles)
-    size = box_size(bounding_box(mesh.positions))
-    surface = Surface(posed, template.figure.mesh.triangles)
-    found = match(surface, welded, size, settings)
-    matched, rows = found.matched[welded.vertices], welded.vertices
-    distances, angles = found.points.distances[rows], np.degrees(found.angles[rows])
-    classes = ("unmatched", "matched")
-    fields = (
-        VertexField("match", "Match with the template", matched.astype(float), names=classes),
-        VertexField("match distance", "Distance to the template", distances, "length"),
-        VertexField("match angle", "Angle to the template", angles, "degrees"),
-    )
-    return fields, float(matched.mean())
-
-
-def _transfer_settings(state: AppState, method: str) -> TransferSettings:
-    choices = state.rig.choices
-    return TransferSettings(
-        method=method,
-        alignment=alignment_settings(state),
-        weights=WeightSettings(
-            match=match_settings(choices),
-            smoothing_rounds=choices.smoothing,
-            max_influences=choices.max_influences or None,
-        ),
-        joints=choices.joints,
-        correctives=choices.correctives,
-    )
-
-
 def start_run(state: AppState, methods: tuple[str, ...]) -> None:
-    """Rig the target by one or several methods; the first one's result takes its place."""
-    target = state.rig.target
+    """Rig the target by one or several methods; the first one's result takes its place.
+
+    The template is aligned first if it was not, and taken as it is shown if it was.
+    """
+    target, choices, placing = state.rig.target, replace(state.rig.choices), placing_now(state)
     if target is None:
         return
-    take, mesh, name = _snapshot(state), target_mesh(state), target.figure.name
-    settings = [_transfer_settings(state, method) for method in methods]
-    place = target_place(target)
+    take, mesh, name = _snapshot(state, laid=True), target_mesh(state), target.figure.name
+    place, own = target_place(target), current_template(state)
 
     def act(report: Report) -> _Finish:
-        template, results = take(report), []
-        for number, how in enumerate(settings):
-            ends = number / len(settings), (number + 1) / len(settings)
-            tell = _shares(report, *ends, f"{printable(name, 40)}, {how.method}: ")
-            called = f"{name} {_CALLED[how.method]}"
-            rigged = transfer(template.figure, template.pose, mesh, how, tell, name=called)
+        template, found, start = take(report), placing, 0.0
+        laid = template
+        if found is None and "robust" in methods:
+            start, how = 0.4, _search_settings(choices)
+            tell = _shares(report, 0.0, start)
+            found = align_template(template, own or template, mesh, how, choices.fits, tell)
+            laid = found.fitted or template
+        results = []
+        for number, method in enumerate(methods):
+            low, high = (start + (1.0 - start) * (number + k) / len(methods) for k in (0, 1))
+            tell = _shares(report, low, high, f"{printable(name, 40)}, {method}: ")
+            settings = transfer_settings(choices, method, found)
+            called = f"{name} {_CALLED[method]}"
+            rigged = transfer(laid.figure, laid.pose, mesh, settings, tell, name=called)
             actor = Actor(rigged.figure, rigged.pose.copy(), placement=place @ rigged.placement)
-            results.append(Result(how.method, rigged, actor, target, template))
-        comparison = compare(*results) if len(results) == len(METHODS) else None
-
-        def finish(state: AppState) -> None:
-            _keep(state, template)
-            put_results(state, results, comparison)
-
-        return finish
+            results.append(Result(method, rigged, actor, target, template))
+        return lambda state: _put(state, results, found)
 
     _begin(state, f"Rigging {printable(name, 40)}", act)
+
+
+def _put(state: AppState, results: list[Result], placing: Placing | None) -> None:
+    """Take over what a run has made."""
+    _keep(state, results[0].template)
+    state.rig.placing = placing
+    put_results(state, results, compare(*results) if len(results) == len(METHODS) else None)

@@ -8,16 +8,17 @@ import numpy as np
 from imgui_bundle import imgui
 
 from viewer.app.reasons import no_job_room
-from viewer.app.rig_gizmo import choose_rig_tool
 from viewer.app.rig_placing import (
     box_fit,
     is_posed_since,
+    laid_template,
     move_by_hand,
     placing_now,
     posed_template,
     similarity_now,
 )
-from viewer.app.rig_sources import current_template, target_mesh
+from viewer.app.rig_sources import target_mesh
+from viewer.app.rig_tools import choose_rig_tool
 from viewer.app.rig_view import GHOSTS, TOOLS, Placing, Template
 from viewer.app.rig_work import landmark_settings, start_align
 from viewer.app.state import AppState
@@ -33,7 +34,7 @@ from viewer.app.widgets import (
 from viewer.errors import ViewerError
 from viewer.rig.arrays import Floats
 from viewer.rig.rotation import axis_rotations, matrix_to_euler
-from viewer.rig.transfer.alignment import SCALES, AlignmentSettings
+from viewer.rig.transfer.alignment import SCALES, Alignment, AlignmentSettings
 from viewer.rig.transfer.orientation_search import AXES
 from viewer.rig.transfer.similarity import Similarity
 
@@ -54,6 +55,8 @@ def draw_alignment(state: AppState) -> None:
     choices.facing = choice(state, "Facing", choices.facing, axes)
     explain("the target's axis that it looks along")
     choices.scale = choice(state, "Scale", choices.scale, {s: _SCALE_TEXTS[s] for s in SCALES})
+    choices.fits = checkbox(state, "Fit pose and proportions", choices.fits)
+    explain("turn the template's joints and resize its limbs where the target is otherwise")
     if button(state, "Align", why):
         start_align(state)
     if not why:
@@ -64,24 +67,34 @@ def draw_alignment(state: AppState) -> None:
         _refine(state)
     if not refuses:
         explain("from where it lies, by closest points")
-    _draw_error(state, placing_now(state))
+    _draw_placing(placing_now(state))
     state.rig.ghost = choice(state, "Template shown", state.rig.ghost, GHOSTS)
     _draw_tools(state)
-    template = current_template(state)
+    template = laid_template(state)
     if template is not None and state.rig.tool not in ("", "landmarks"):
         _draw_numbers(state, template)
     if template is not None and (state.rig.tool == "landmarks" or state.rig.landmarks):
         _draw_landmarks(state, template)
+    placing = placing_now(state)
+    # What comes and goes stands below the controls, which stay where they are.
+    for line in placing.lines if placing is not None else ():
+        imgui.text_wrapped(line)
+    if is_posed_since(state):
+        imgui.text_wrapped("the template was posed otherwise since: align again")
 
 
-def _draw_error(state: AppState, placing: Placing | None) -> None:
-    """Draw how far the surfaces are apart: trimmed RMS, as in the report."""
+def _draw_placing(placing: Placing | None) -> None:
+    """Draw how the template lies: how far the surfaces are apart."""
     if placing is None:
         imgui.text_disabled("not aligned yet")
         return
-    found = placing.alignment
+    _draw_error(placing.alignment)
+
+
+def _draw_error(found: Alignment | None) -> None:
+    """Draw the error: trimmed RMS, as in the report."""
     if found is None:
-        imgui.text_unformatted("error: not measured here")
+        imgui.text_disabled("error: not measured here")
         return
     how = "by hand" if found.how == "given" else found.how
     text = f"error {100.0 * found.error:.2f} % of its size ({how})"
@@ -95,13 +108,11 @@ def _draw_error(state: AppState, placing: Placing | None) -> None:
         "RMS distance of the target's best 90 % from the template; of the template from the "
         f"target: {100.0 * found.away:.2f} %"
     )
-    if is_posed_since(state):
-        imgui.text_wrapped("the template was posed otherwise since: align again")
 
 
 def _refine(state: AppState) -> None:
     """Let closest points improve on where the template lies: corners of its box are landmarks."""
-    template = current_template(state)
+    template = laid_template(state)
     if template is None:
         return
     low, high = (f(posed_template(state.rig, template).positions, axis=0) for f in (np.min, np.max))

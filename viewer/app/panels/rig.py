@@ -113,7 +113,9 @@ def _draw_template(state: AppState, template: Template) -> None:
     skeleton, mesh = template.figure.skeleton, template.figure.mesh
     assert skeleton is not None and mesh is not None  # it is attached
     pose = "in its present pose" if template.actor is not None else "in its file's pose"
+    imgui.push_text_wrap_pos(0.0)
     imgui.text_disabled(f"{skeleton.n_joints} joints, {mesh.n_vertices:,} vertices, {pose}")
+    imgui.pop_text_wrap_pos()
     if template.actor is None:
         if button(state, "Pose it…", no_target(state)):
             _add_template(state, template)

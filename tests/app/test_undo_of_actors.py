@@ -1,0 +1,87 @@
+"""Undoing brings back who was there, not only how they were posed."""
+
+from __future__ import annotations
+
+from app.captured import people
+
+from viewer.rig.scene import Actor
+
+
+def names(hand):
+    return [actor.name for actor in hand.state.scene.actors]
+
+
+def test_actors_that_came_and_went_are_undone(hand):
+    state = hand.state
+    first = state.actor
+    other = Actor(first.figure)
+    state.scene.actors.append(other)
+    state.choose_actor(1)
+    hand.step(2)
+    assert hand.undo_steps == 1
+    state.scene.actors[0] = Actor(first.figure)
+    hand.step(2)
+    assert hand.undo_steps == 2
+    hand.key("z", "ctrl")
+    assert state.scene.actors == [first, other] and state.actor is other
+    hand.key("z", "ctrl")
+    assert state.scene.actors == [first]
+    assert state.chosen_actor == 0 and state.actor is first
+    hand.key("y", "ctrl")
+    hand.step(2)
+    assert state.scene.actors == [first, other]
+    hand.assert_sane()
+
+
+def test_chosen_actor_stays_chosen_where_it_is_now(hand):
+    state = hand.state
+    first, other = state.actor, Actor(state.actor.figure)
+    state.scene.actors[:] = [other, first]
+    state.choose_actor(1)
+    hand.step(2)
+    hand.key("z", "ctrl")
+    assert state.scene.actors == [first] and state.actor is first
+    hand.key("y", "ctrl")
+    assert state.chosen_actor == 1 and state.actor is first
+
+
+def test_poses_of_actors_that_went_come_back_with_them(hand):
+    state = hand.state
+    dof = hand.dof_index("arm.x")
+    first = state.actor
+    first.pose.dofs[dof] = 0.7
+    hand.step(2)
+    state.scene.actors[0] = Actor(first.figure)
+    hand.step(2)
+    first.pose.dofs[dof] = -3.0  # nobody sees it
+    hand.key("z", "ctrl")
+    assert state.actor is first and first.pose.dofs[dof] == 0.7
+    hand.key("z", "ctrl")
+    assert first.pose.dofs[dof] == 0.2
+
+
+def test_another_look_is_no_step(hand):
+    state = hand.state
+    state.options.wireframe = True
+    hand.step(2)
+    steps = hand.undo_steps
+    state.actor.visible = False
+    state.history.accept(state.scene, state.options)
+    hand.step(2)
+    assert hand.undo_steps == steps
+    hand.key("z", "ctrl")
+    assert not state.options.wireframe and state.actor.visible
+
+
+def test_people_that_are_still_read_join_every_step(drive, rig):
+    hand = drive(scene=people(rig, [True] * 5), samples=1)
+    state = hand.state
+    state.scene.actors.append(Actor(state.actor.figure))
+    hand.step(2)
+    late = Actor(state.actor.figure)
+    state.scene.actors.append(late)
+    state.history.add_actors(state.scene, state.options)
+    hand.step(2)
+    assert hand.undo_steps == 1
+    hand.key("z", "ctrl")
+    assert late in state.scene.actors and len(names(hand)) == 2

@@ -1,0 +1,79 @@
+"""Rigged meshes as files: all of them or none, and correctives where there is no place for them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from rig.transfer.rigged_shapes import arm
+
+pytest.importorskip("scipy")
+
+import viewer
+from viewer.errors import UnsupportedFormatError
+from viewer.export._rigged_files import files_of, without_correctives, write_rigged
+from viewer.rig.blendshapes import Correctives
+from viewer.rig.figure import Figure
+from viewer.rig.pose import rest_pose
+from viewer.rig.skinning import deform
+from viewer.rig.transfer.pipeline import transfer
+
+
+@pytest.fixture(scope="module")
+def rigged():
+    """A bent arm with correctives, whose own mesh got its rig back."""
+    plain = arm()
+    offsets = np.random.default_rng(4).normal(scale=0.02, size=(9, plain.mesh.n_vertices, 3))
+    template = Figure(
+        "arm", plain.mesh, plain.skeleton, plain.skin, correctives=Correctives(offsets)
+    )
+    pose = rest_pose(template.skeleton)
+    pose.dofs[6:] = 0.2, -0.1, 0.7
+    target = viewer.Mesh(*deform(template, pose), plain.mesh.triangles)
+    return target, transfer(template, pose, target)
+
+
+def test_names_of_the_files():
+    assert files_of(Path("a/b.npz")) == [Path("a/b.npz")]
+    assert [path.name for path in files_of(Path("b.skin"))] == [
+        "b.skel", "b.skin", "b.obj", "b.json",
+    ]  # fmt: skip
+    with pytest.raises(UnsupportedFormatError) as caught:
+        files_of(Path("b.fbx"))
+    assert str(caught.value) == (
+        'a rigged mesh cannot be written as ".fbx"; there are: .skel (with .skin, .obj and '
+        "the target's pose as .json), .npz"
+    )
+
+
+def test_without_correctives_the_target_is_met_in_its_pose(rigged):
+    target, found = rigged
+    assert found.figure.correctives is not None
+    plain = without_correctives(found)
+    assert plain.correctives is None
+    assert_allclose(deform(plain, found.pose)[0], target.positions, atol=1e-9)
+    assert_allclose(deform(found.figure, found.pose)[0], target.positions, atol=1e-9)
+    assert np.abs(plain.mesh.positions - found.figure.mesh.positions).max() > 1e-3
+
+
+def test_course_rig_gives_the_target_and_says_what_is_lost(rigged, tmp_path):
+    target, found = rigged
+    lines = write_rigged(found, tmp_path / "arm.skel")
+    assert lines[-1].startswith("pose correctives have no place in .skel and .skin: ")
+    assert lines[-2].endswith(", the target's pose") and "arm.json" in lines[-2]
+    files = [tmp_path / f"arm.{suffix}" for suffix in ("skel", "skin", "json")]
+    actor = viewer.load(*files).actors[0]
+    # The text formats hold six digits after the point or more.
+    assert_allclose(deform(actor.figure, actor.pose)[0], target.positions, atol=1e-5)
+
+
+def test_npz_keeps_correctives(rigged, tmp_path):
+    _, found = rigged
+    lines = write_rigged(found, tmp_path / "arm.npz")
+    assert lines == [
+        f"{tmp_path / 'arm.npz'}: the figure with its rig, the target's pose, confidence"
+    ]
+    again = viewer.load(tmp_path / "arm.npz").actors[0].figure
+    assert again.correctives is not None and len(again.fields) == 3
