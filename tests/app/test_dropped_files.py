@@ -48,15 +48,18 @@ def test_dropped_pose_and_picture_join_the_open_figure(textured, tmp_path, names
     assert textured.dof("pelvis.y") == before[textured.dof_index("pelvis.y")]
     has_texture = bool(state.actor.figure.mesh.materials)
     assert has_texture is ("picture" in names)
-    assert textured.undo_steps == (2 if "pose" in names else 1)
+    # What is dropped together is one step, its texture too.
+    assert textured.undo_steps == 2
     textured.key("z", "ctrl")
-    if "pose" in names:
-        assert textured.dof("left_knee.x") == 0.0
-        assert not state.actor.pose.shape_weights.any()
-        textured.key("z", "ctrl")
-    assert not textured.dofs().any()
-    # The texture is no step of the history and stays.
+    assert textured.dof("left_knee.x") == 0.0
+    assert not state.actor.pose.shape_weights.any() and not state.actor.figure.mesh.materials
+    assert textured.dof("pelvis.y") == before[textured.dof_index("pelvis.y")]
+    textured.key("z", "ctrl shift")
     assert bool(state.actor.figure.mesh.materials) is has_texture
+    assert (textured.dof("left_knee.x") == 0.5) is ("pose" in names)
+    textured.key("z", "ctrl")
+    textured.key("z", "ctrl")
+    assert not textured.dofs().any()
 
 
 def test_dropped_pictures_replace_each_other(textured, tmp_path):
