@@ -22,7 +22,7 @@ from viewer.rig.transfer.weights import WeightSettings, nearest_weights, transfe
 
 CLEAR = 0.1  # difference of the two largest weights, from which a dominant joint is clear
 SHARE, SAME = 0.5, 0.97  # goals: mean L1 against the other method's; same dominant joint
-# The nearest vertex of the same topology, barely moved, is the vertex itself.
+# The nearest vertex of the same topology, barely moved, is the vertex itself: no method is better.
 UNFAIR = {"perturbed"}
 
 

@@ -107,6 +107,12 @@ def _add_method_arguments(parser: argparse.ArgumentParser) -> None:
         help="moved as the surface around them, or with the alignment alone (default: carried)",
     )
     group.add_argument(
+        "--no-fit",
+        action="store_true",
+        help="keep the template's pose and proportions as they are, even if turning its joints "
+        "and resizing its limbs would lay it onto the mesh much better",
+    )
+    group.add_argument(
         "--no-correctives", action="store_true", help="leave out the template's pose correctives"
     )
 
@@ -237,6 +243,7 @@ def _settings(
             max_influences=arguments.max_influences,
         ),
         joints=arguments.joints,
+        fits=not arguments.no_fit,
         correctives=not (arguments.no_correctives or as_rig),
     )
 

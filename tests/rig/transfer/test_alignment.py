@@ -152,7 +152,7 @@ def test_matrices_that_mirror_or_shear_are_refused():
 
 def test_lines_tell_everything_and_warn_of_a_bad_fit():
     placed = Similarity(2.0, turn([0, 1, 0], np.pi / 2), np.array([1.0, 0, -2]), np.ones(3))
-    lines = alignment_lines(Alignment(placed, 0.05, 0.1, "search"))
+    lines = alignment_lines(Alignment(placed, 0.05, 0.1, (0.05, 0.1), "search"))
     assert lines == [
         "alignment: found by closest points; scale 2, turned by 90.00 degrees, shift (1, 0, -2)",
         "alignment error: 5.000 % of the target's size (RMS of the best 90 %; template to target "

@@ -10,8 +10,8 @@ pytest.importorskip("scipy")
 from viewer.rig.transfer.icp import (
     Triangles,
     fit_axes,
+    gaps_between,
     iterate,
-    one_way_error,
     slide,
     trimmed_rms,
 )
@@ -39,7 +39,7 @@ def test_iterate_then_slide_find_the_alignment_exactly():
 def test_iterate_alone_comes_closer_with_every_round():
     template, target = sides()
     errors = [
-        trimmed_rms(one_way_error(template, target, iterate(template, target, START, n, True))[0])
+        trimmed_rms(gaps_between(template, target, iterate(template, target, START, n, True)).towards)
         for n in (0, 5, 20)
     ]
     assert errors[0] > 2 * errors[1] > 3 * errors[2]

@@ -11,10 +11,12 @@ from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints, frozen
 from viewer.rig.transfer.icp import (
     Cloud,
+    Side,
     Triangles,
+    capped_rms,
     fit_axes,
+    gaps_between,
     iterate,
-    one_way_error,
     slide,
     trimmed_rms,
 )
@@ -22,20 +24,33 @@ from viewer.rig.transfer.orientation_search import axis_turns, in_place, search
 from viewer.rig.transfer.similarity import Similarity, fit_similarity
 from viewer.rig.transfer.surface_samples import sample_surface
 
-__all__ = ["SCALES", "Alignment", "AlignmentSettings", "Posed", "align", "alignment_lines"]
+__all__ = [
+    "PART",
+    "SCALES",
+    "Alignment",
+    "AlignmentSettings",
+    "Posed",
+    "align",
+    "alignment_lines",
+    "misfit",
+    "similarity_of",
+]
 
 SCALES = ("uniform", "axes", "none")
 """One scale; one along each axis of the target; or the template's size as it is."""
 
 _DENSE, _SAMPLES = 12_000, 2_000  # points that are searched, and that are asked for
-_ROUNDS, _SLIDES = 10, 25  # of points to points, and to planes
+_ROUNDS, _SLIDES = 60, 25  # of points to points, and to planes
 _AXES_ROUNDS = 20
-_IN_PLACE = 0.03  # error over size up to which a mesh may lie in place already
-_SURELY = 0.003  # and up to which nothing better is looked for
-# Share of that error that a search must reach to move the mesh all the same: a part of a figure
+_IN_PLACE = 0.03  # misfit over size up to which a mesh may lie in place already
+_SURELY = 0.003  # mean distance over size up to which nothing better is looked for
+# Share of that misfit that a search must reach to move the mesh all the same: a part of a figure
 # fits nearly as well in many other places, the whole of it does not.
 _BETTER, _PART_BETTER = 0.8, 0.35
-_PART = 0.05  # of the size: how far the template is from a target that is only a part
+PART = 0.05
+"""Of the size: a template farther than this from the target says that the target is a part."""
+
+_CAP = 0.05  # of the size: what lies farther away, as hair or a missing hand, counts as much
 _BAD = 0.03  # RMS over size above which the alignment is doubtful
 
 
@@ -104,6 +119,10 @@ class Alignment:
         size.
     away : float
         The same of the template from the target: large where the target is only a part.
+    uneven : (float, float)
+        Root mean squares of the same distances over the size, without what the surface stands off
+        everywhere, and with all of them, each counted as 5 % at most: there ends of limbs that
+        stick out count, which the best 90 % leave out.
     how : str
         ``"in place"``, ``"search"``, ``"landmarks"`` or ``"given"``.
     """
@@ -111,7 +130,48 @@ class Alignment:
     placed: Similarity
     error: float
     away: float
+    uneven: tuple[float, ...]
     how: str
+
+    @classmethod
+    def of(cls, template: Side, target: Side, placed: Similarity, how: str) -> Alignment:
+        """Return an alignment with its errors.
+
+        Parameters
+        ----------
+        template, target : Side
+            Both meshes.
+        placed : Similarity
+            Where the template lies.
+        how : str
+            See above.
+        """
+        size = target.size
+        gaps = gaps_between(template, target, placed)
+        return cls(
+            placed,
+            error=trimmed_rms(gaps.towards) / size,
+            away=trimmed_rms(gaps.away) / size,
+            uneven=tuple(
+                capped_rms(way / size, _CAP) for way in (gaps.uneven_towards, gaps.uneven_away)
+            ),
+            how=how,
+        )
+
+
+def misfit(alignment: Alignment, is_part: bool) -> float:
+    """Return what alignments are compared by: the mean of the uneven errors both ways.
+
+    Parameters
+    ----------
+    alignment : Alignment
+        With its errors.
+    is_part : bool
+        Whether the target is only a part of what the template shows: then what the template has
+        beyond it says nothing.
+    """
+    towards, away = alignment.uneven
+    return towards if is_part else 0.5 * (towards + away)
 
 
 def align(
@@ -150,28 +210,38 @@ def align(
         If a mesh has no area, landmarks lie on a line, or axes contradict each other.
     """
     report(0.0, "alignment")
-    fine = [Triangles(side.positions, side.triangles, _SAMPLES) for side in (template, target)]
+    ours, theirs = (
+        Triangles(side.positions, side.triangles, _SAMPLES) for side in (template, target)
+    )
+    fine = (ours, theirs)
     if settings.matrix is not None:
-        return _judged(fine, similarity_of(settings.matrix), "given")
-    if settings.landmarks is not None:
-        fit = _landmark_fit(settings.landmarks, settings.scale)
-        return _judged(fine, _refined(fine, fit, settings, report), "landmarks")
+        return Alignment.of(ours, theirs, similarity_of(settings.matrix), "given")
     coarse = [
         Cloud(exact.samples, sample_surface(side.positions, side.triangles, _DENSE))
         for exact, side in zip(fine, (template, target), strict=True)
     ]
+    if settings.landmarks is not None:
+        start = _landmark_fit(settings.landmarks, settings.scale)
+        if settings.refines:
+            report(0.2, "alignment")
+            start = iterate(coarse[0], coarse[1], start, _ROUNDS, settings.scale != "none")
+        return Alignment.of(ours, theirs, _refined(fine, start, settings, report), "landmarks")
     turns = axis_turns(template_up, settings.up, settings.facing)
     stays = in_place(coarse[0], coarse[1], turns, scaled=settings.scale != "none")
     report(0.1, "alignment")
     if stays.error <= _SURELY:
-        return _judged(fine, stays.placed, "in place")
+        return Alignment.of(ours, theirs, stays.placed, "in place")
     scale = 1.0 if settings.scale == "none" else None
-    best = search(coarse[0], coarse[1], turns, scale, lambda s: report(0.1 + 0.6 * s, "alignment"))
-    found = _judged(fine, _refined(fine, best.placed, settings, report), "search")
-    left = _judged(fine, stays.placed, "in place")
-    share = _PART_BETTER if found.away > _PART else _BETTER
-    is_better = found.error < share * left.error
-    return found if stays.error > _IN_PLACE or is_better else left
+    best = search(coarse[0], coarse[1], turns, scale, lambda s: report(0.1 + 0.7 * s, "alignment"))
+    left = Alignment.of(ours, theirs, stays.placed, "in place")
+    tried = [best.placed, _refined(fine, best.placed, settings, report)]
+    searched = [Alignment.of(ours, theirs, placed, "search") for placed in tried]
+    is_part = min(each.away for each in searched) > PART
+    # Sliding looks at what faces each other alone, and may leave ends of limbs behind.
+    found = min(reversed(searched), key=lambda each: misfit(each, is_part))
+    share = _PART_BETTER if is_part else _BETTER
+    gap = misfit(left, is_part)
+    return found if gap > _IN_PLACE or misfit(found, is_part) < share * gap else left
 
 
 def _landmark_fit(landmarks: Floats, scale: str) -> Similarity:
@@ -179,25 +249,17 @@ def _landmark_fit(landmarks: Floats, scale: str) -> Similarity:
 
 
 def _refined(
-    fine: list[Triangles],
+    fine: tuple[Triangles, Triangles],
     start: Similarity,
     settings: AlignmentSettings,
     report: Callable[[float, str], None],
 ) -> Similarity:
     if settings.refines:
-        scales = settings.scale != "none"
-        for first, improve, rounds in ((0.7, iterate, _ROUNDS), (0.85, slide, _SLIDES)):
-            report(first, "alignment")
-            start = improve(fine[0], fine[1], start, rounds, scales)
+        report(0.85, "alignment")
+        start = slide(fine[0], fine[1], start, _SLIDES, settings.scale != "none")
     if settings.scale == "axes":
         return fit_axes(fine[0], fine[1], start, _AXES_ROUNDS)
     return start
-
-
-def _judged(fine: list[Triangles], placed: Similarity, how: str) -> Alignment:
-    towards, away = one_way_error(fine[0], fine[1], placed)
-    size = fine[1].size
-    return Alignment(placed, trimmed_rms(towards) / size, trimmed_rms(away) / size, how)
 
 
 def similarity_of(matrix: Floats) -> Similarity:

@@ -10,7 +10,7 @@ import numpy as np
 
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats
-from viewer.rig.transfer.icp import Cloud, iterate, one_way_error
+from viewer.rig.transfer.icp import Cloud, gaps_between, iterate
 from viewer.rig.transfer.similarity import Similarity
 from viewer.rig.transfer.surface_samples import SurfaceSamples
 
@@ -26,6 +26,7 @@ _NEAR_UNIT = 0.15  # how far a ratio of sizes may be from a unit's and be taken 
 _TRIM = 0.8  # share of distances that counts: hair, skirts and cropped parts do not
 _QUICK, _LONG = 12, 60  # rounds for every candidate, and for the best few
 _FINALISTS = 4
+_NO_BETTER = 0.7  # of an error: turning a mesh that lies in place must gain more than this
 _IN_PLACE = 300  # samples that tell whether a mesh lies in place already
 
 
@@ -118,19 +119,18 @@ def in_place(template: Cloud, target: Cloud, turns: list[Floats], scaled: bool) 
     -------
     Candidate
         Its error is one-way: a shirt that lies on the body fits, whatever it leaves bare. Of
-        several equally good ones the first, so that nothing is turned without need.
+        several about equally good ones the first, so that nothing is turned without need: most
+        figures look much the same from behind.
     """
     few = target.samples.positions[:: max(1, len(target.samples.positions) // _IN_PLACE)]
-    best: Candidate | None = None
+    found = []
     for unit, turn in product(_UNITS if scaled else (1.0,), turns):
         placed = Similarity(unit, turn, np.zeros(3), np.ones(3))
         near = placed.apply(template.find(placed.undo(few)).positions)
         error = _trimmed_mean(np.linalg.norm(near - few, axis=1)) / target.size
-        # A tie, to rounding, goes to the plainer one.
-        if best is None or error < best.error - 1e-9:
-            best = Candidate(placed, error)
-    assert best is not None  # there is always a turn
-    return best
+        found.append(Candidate(placed, error))
+    enough = min(candidate.error for candidate in found) / _NO_BETTER + 1e-9
+    return next(candidate for candidate in found if candidate.error <= enough)
 
 
 def search(
@@ -180,8 +180,9 @@ def search(
 
 def judge(template: Cloud, target: Cloud, placed: Similarity) -> Candidate:
     """Return an alignment with its two-way error."""
-    ways = one_way_error(template, target, placed)
-    return Candidate(placed, sum(_trimmed_mean(way) for way in ways) / 2.0 / target.size)
+    gaps = gaps_between(template, target, placed)
+    both = _trimmed_mean(gaps.towards) + _trimmed_mean(gaps.away)
+    return Candidate(placed, 0.5 * both / target.size)
 
 
 def _thinned(side: Cloud, count: int) -> Cloud:

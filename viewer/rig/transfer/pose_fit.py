@@ -1,4 +1,4 @@
-"""A posed template turned joint by joint until it lies on the target.
+"""A template whose joints are turned, and limbs resized, until it lies on the target.
 
 Articulated iterative closest points (Pellegrini et al. 2008): vertices of the template look for
 the target's surface, points of the target for the template's vertices, and every round moves all
@@ -27,32 +27,50 @@ from viewer.rig.rotation import (
     rotation_vector_to_matrix,
 )
 from viewer.rig.skeleton import Skeleton, clamp_dofs
-from viewer.rig.skin import Skin, influence_counts, weight_sums
 from viewer.rig.skinning.lbs import move
 from viewer.rig.transfer.icp import Side
-from viewer.rig.transfer.pose_step import Pairs, PoseStep, solve_step
+from viewer.rig.transfer.pose_step import Laid, Pairs, PoseStep, solve_step
+from viewer.rig.transfer.proportions import Limbs, limbs_of, resized
 from viewer.rig.transfer.similarity import Similarity
 from viewer.rig.transfer.surface_samples import even_vertices
 from viewer.rig.transform import apply_transform
+from viewer.rig.vectors import unit
 
-__all__ = ["fit_pose", "joint_shares"]
+__all__ = ["Fitted", "fit_pose"]
 
-_ROUNDS = 28
+_ROUNDS = 32
 _NEARING = 16  # rounds in which the reach shrinks
 _VERTICES = 1500  # of the template that look for the target
 _FAR, _NEAR = 0.25, 0.03  # of the size: how far partners may be, at first and in the end
 _SAME_WAY = 0.5  # cosine of 60 degrees between the normals of a pair
-_STILL = 1e-3  # radians: late rounds that turn no joint by more are the last ones
+_STILL = 2e-3  # radians: late rounds that turn no joint by more are the last ones
 _FEWEST = 50  # pairs that still tell how a figure stands
+_SMALLEST, _LARGEST = np.log(0.5), np.log(2.0)  # of limbs
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Laid:
-    """A template as it stands: vertices and normals (V, 3) and joints (J, 3) in the target."""
+class Fitted:
+    """A template that was made to fit.
 
-    positions: Floats
-    normals: Floats
-    joints: Floats
+    Attributes
+    ----------
+    figure : Figure
+        With its limbs resized.
+    pose : Pose
+        DOFs are within their limits; what these do not allow is in the joints' quaternions.
+    placed : Similarity
+        From the posed figure to the target.
+    turned : (J, 3)
+        Rotation vectors that the joints were turned by in all, radians.
+    grown : (2, J)
+        Logarithms of the factors along and across the limbs.
+    """
+
+    figure: Figure
+    pose: Pose
+    placed: Similarity
+    turned: Floats
+    grown: Floats
 
 
 def fit_pose(
@@ -63,8 +81,10 @@ def fit_pose(
     near: Side,
     scales: bool,
     report: Callable[[float], None],
-) -> tuple[Pose, Similarity]:
-    """Turn a template's joints until its surface lies on the target's.
+) -> Fitted:
+    """Turn a template's joints and resize its limbs until its surface lies on the target's.
+
+    Limbs of a symmetric template grow alike on both sides.
 
     Parameters
     ----------
@@ -77,74 +97,45 @@ def fit_pose(
     far, near : Side
         The target: searched quickly at first, and exactly in the end.
     scales : bool
-        Whether the template's size may change.
+        Whether the template's size may change, and its proportions.
     report : callable
         Told the share that is done; may raise to cancel.
-
-    Returns
-    -------
-    pose : Pose
-        DOFs are within their limits; what these do not allow is in the joints' quaternions.
-    placed : Similarity
-        With its own rotation, shift and scale.
     """
-    mesh, skeleton, skin = template.mesh, template.skeleton, template.skin
-    assert mesh is not None and skeleton is not None and skin is not None  # the caller looked
-    chosen = even_vertices(mesh.positions, mesh.triangles, _VERTICES)
-    shares = joint_shares(skin, skeleton.parents)
-    pose, turned = pose.copy(), np.zeros((skeleton.n_joints, 3))
+    assert template.mesh is not None and template.skeleton is not None  # the caller looked
+    limbs, skeleton = limbs_of(template), template.skeleton
+    chosen = even_vertices(template.mesh.positions, template.mesh.triangles, _VERTICES)
+    turned = np.zeros((skeleton.n_joints, 3))
+    state = Fitted(template, pose.copy(), placed, turned, np.zeros((2, skeleton.n_joints)))
     for number in range(_ROUNDS):
         report(number / _ROUNDS)
-        laid = _lay(template, pose, placed)
+        laid = _lay(state, limbs)
         late = min(number / _NEARING, 1.0)
         target = far if late < 1.0 else near
         pairs = _pairs(laid, chosen, target, target.size * _FAR * (_NEAR / _FAR) ** late)
         if len(pairs.vertices) < _FEWEST:
             break
-        step = solve_step(
-            laid.positions,
-            laid.joints,
-            shares,
-            skeleton.parents,
-            turned,
-            pairs,
-            target.size,
-            scales,
-        )
-        _turn_joints(skeleton, pose, placed, step.joint_turns)
-        placed = _moved(placed, step)
-        turned += step.joint_turns
+        parents, size = skeleton.parents, target.size
+        step = solve_step(laid, limbs, parents, pairs, size, state.turned, state.grown, scales)
+        state = _moved(template, limbs, state, step)
         if late == 1.0 and np.abs(step.joint_turns).max(initial=0.0) < _STILL:
             break
-    return pose, placed
+    return state
 
 
-def joint_shares(skin: Skin, parents: Ints) -> Floats:
-    """Return how much of each vertex hangs on a joint or below it: (V, J), from 0 to 1."""
-    owners = np.repeat(np.arange(skin.n_vertices), influence_counts(skin))
-    shares = np.zeros((skin.n_vertices, skin.n_joints))
-    np.add.at(shares, (owners, skin.joints), skin.weights)
-    sums = weight_sums(skin)
-    shares /= np.where(sums > 0.0, sums, 1.0)[:, None]
-    for joint in range(len(parents) - 1, -1, -1):
-        # Children come after their parents, so this joint's own sum is final.
-        if parents[joint] >= 0:
-            shares[:, parents[joint]] += shares[:, joint]
-    return shares
-
-
-def _lay(template: Figure, pose: Pose, placed: Similarity) -> _Laid:
-    mesh, skeleton, skin = template.mesh, template.skeleton, template.skin
+def _lay(state: Fitted, limbs: Limbs) -> Laid:
+    mesh, skeleton, skin = state.figure.mesh, state.figure.skeleton, state.figure.skin
     assert mesh is not None and skeleton is not None and skin is not None  # the caller looked
-    world = world_matrices(skeleton, pose)
-    posed = move(mesh.positions, skin, skinning_matrices(world, skin.inverse_bind))[0]
-    place = placement_matrix(pose)
-    positions = placed.apply(apply_transform(place, posed))
-    joints = placed.apply(apply_transform(place, world[:, :3, 3]))
-    return _Laid(positions, vertex_normals(positions, mesh.triangles), joints)
+    world = world_matrices(skeleton, state.pose)
+    palette = skinning_matrices(world, skin.inverse_bind)
+    place = placement_matrix(state.pose)
+    posed = move(mesh.positions, skin, palette)[0]
+    positions = state.placed.apply(apply_transform(place, posed))
+    joints = state.placed.apply(apply_transform(place, world[:, :3, 3]))
+    axes = unit(np.einsum("jab,jb->ja", palette[:, :3, :3], limbs.axes)) @ state.placed.rotation.T
+    return Laid(positions, vertex_normals(positions, mesh.triangles), joints, axes)
 
 
-def _pairs(laid: _Laid, chosen: Ints, target: Side, reach: float) -> Pairs:
+def _pairs(laid: Laid, chosen: Ints, target: Side, reach: float) -> Pairs:
     """Match both ways; what is too far away or on the border of a hole is no pair."""
     points = laid.positions[chosen]
     found = target.find(points)
@@ -164,11 +155,19 @@ def _pairs(laid: _Laid, chosen: Ints, target: Side, reach: float) -> Pairs:
     )
 
 
-def _moved(placed: Similarity, step: PoseStep) -> Similarity:
-    """Return the template's place after a round: x' = g R (x - m) + m + t."""
-    turn = rotation_vector_to_matrix(step.turn)
-    shift = step.growth * turn @ (placed.shift - step.middle) + step.middle + step.shift
-    return Similarity(step.growth * placed.scale, turn @ placed.rotation, shift, placed.factors)
+def _moved(template: Figure, limbs: Limbs, state: Fitted, step: PoseStep) -> Fitted:
+    """Return what a round leads to: the whole goes by x' = e^u R (x - m) + m + t."""
+    placed, skeleton = state.placed, state.figure.skeleton
+    assert skeleton is not None  # the caller looked
+    growths = state.grown + step.limb_growths
+    growths = np.clip(0.5 * (growths + growths[:, limbs.partners]), _SMALLEST, _LARGEST)
+    pose = state.pose.copy()
+    _turn_joints(skeleton, pose, placed, step.joint_turns)
+    figure = resized(template, limbs, *np.exp(growths))
+    turn, growth = rotation_vector_to_matrix(step.turn), float(np.exp(step.growth))
+    shift = growth * turn @ (placed.shift - step.middle) + step.middle + step.shift
+    moved = Similarity(growth * placed.scale, turn @ placed.rotation, shift, placed.factors)
+    return Fitted(figure, pose, moved, state.turned + step.joint_turns, growths)
 
 
 def _turn_joints(skeleton: Skeleton, pose: Pose, placed: Similarity, turns: Floats) -> None:
@@ -180,10 +179,10 @@ def _turn_joints(skeleton: Skeleton, pose: Pose, placed: Similarity, turns: Floa
     parents = skeleton.parents
     within = joint_rotations(skeleton, pose)
     world = within.copy()
-    for joint in np.flatnonzero(parents >= 0).tolist():
+    below = np.flatnonzero(parents >= 0).astype(np.int32)
+    for joint in below.tolist():
         # Parents come first, so the parent's axes are final.
         world[joint] = world[parents[joint]] @ within[joint]
-    below = np.flatnonzero(parents >= 0)
     axes = placed.rotation @ world[parents[below]]
     local = np.einsum("jba,jb->ja", axes, turns[below])
     _put_rotations(skeleton, pose, below, rotation_vector_to_matrix(local) @ within[below])

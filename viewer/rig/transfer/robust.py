@@ -12,8 +12,8 @@ from viewer.rig.figure import Figure
 from viewer.rig.kinematics import skinning_matrices, world_matrices
 from viewer.rig.mesh import Mesh, bounding_box, box_size, vertex_normals
 from viewer.rig.pose import Pose, joint_rotations
-from viewer.rig.skinning import deform, joint_matrices
-from viewer.rig.transfer.alignment import Alignment, Posed, align, alignment_lines
+from viewer.rig.skinning import joint_matrices
+from viewer.rig.transfer.alignment import Alignment, alignment_lines
 from viewer.rig.transfer.carried_correctives import carry_correctives
 from viewer.rig.transfer.checks import (
     check_lines,
@@ -24,6 +24,7 @@ from viewer.rig.transfer.checks import (
 )
 from viewer.rig.transfer.joint_carrying import boundary_weights, carry_joints, surface_shifts
 from viewer.rig.transfer.matching import Template
+from viewer.rig.transfer.posed_alignment import align_posed
 from viewer.rig.transfer.rest_skeleton import RestSkeleton, fit_rest_skeleton
 from viewer.rig.transfer.result import WeightTransfer
 from viewer.rig.transfer.rigged import Rigged
@@ -56,9 +57,10 @@ def robust(
     name : str
         Of the new figure.
     """
-    posed = deform(template, pose)[0]
-    alignment, weights = _meet(template, posed, target, how, report)
+    met = align_posed(template, pose, target, how.alignment, how.fits, _within(report, 0.0, 0.4))
+    alignment, template, pose, posed = met.alignment, met.figure, met.pose, met.positions
     laid = alignment.placed.apply(posed)
+    weights = _weighed(template, laid, target, how, report)
     report(0.8, "joints")
     rest, carried, lines = _carried_skeleton(template, pose, alignment, laid, target, how)
     report(0.85, "rest pose")
@@ -70,6 +72,7 @@ def robust(
     residual = residual_of(figure, rest.pose, np.eye(4), target)
     lines = [
         *alignment_lines(alignment),
+        *met.lines,
         *(with_joint_name(line, figure) for line in weights.lines),
         *lines,
         *rest.lines,
@@ -91,28 +94,20 @@ def robust(
     )
 
 
-def _meet(
-    template: Figure, posed: Floats, target: Mesh, how: TransferSettings, report: Report
-) -> tuple[Alignment, WeightTransfer]:
-    """Lay the posed template onto the target, and carry its weights over."""
+def _weighed(
+    template: Figure, laid: Floats, target: Mesh, how: TransferSettings, report: Report
+) -> WeightTransfer:
+    """Carry the weights of a template over that lies on the target."""
     mesh, skin = template.mesh, template.skin
     assert mesh is not None and skin is not None  # the caller looked
-    alignment = align(
-        Posed(posed, mesh.triangles),
-        Posed(target.positions, target.triangles),
-        template.up,
-        how.alignment,
-        _within(report, 0.0, 0.4),
-    )
-    weights = transferred_weights(
-        Template(alignment.placed.apply(posed), mesh.triangles),
+    return transferred_weights(
+        Template(laid, mesh.triangles),
         skin,
         target.positions,
         target.triangles,
         how.weights,
         _within(report, 0.4, 0.8),
     )
-    return alignment, weights
 
 
 def _within(report: Report, low: float, high: float) -> Report:

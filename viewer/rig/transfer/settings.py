@@ -38,6 +38,9 @@ class TransferSettings:
         When a vertex matches; smoothing; number of influences.
     joints : str
         One of ``JOINTS``.
+    fits : bool
+        Whether the template's joints are turned and its limbs resized, where it stands otherwise
+        than the target or has other proportions.
     correctives : bool
         Whether pose correctives of the template are carried.
     mends : bool
@@ -48,6 +51,7 @@ class TransferSettings:
     alignment: AlignmentSettings = field(default_factory=AlignmentSettings)
     weights: WeightSettings = field(default_factory=WeightSettings)
     joints: str = "carried"
+    fits: bool = True
     correctives: bool = True
     mends: bool = True
 

@@ -1,0 +1,188 @@
+"""A template laid onto a target, its joints turned and limbs resized to what the target is.
+
+People in scans stand with lowered arms and have limbs of their own, templates stretch their arms
+out: no alignment of the whole lays one onto the other. So where the alignment leaves a gap, pose
+and proportions are fitted too, and kept if that closes most of it. A figure that stands otherwise
+also looks much the same from behind: where the alignment cannot tell, both ways are fitted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from viewer.rig.arrays import Floats
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import Mesh
+from viewer.rig.pose import Pose
+from viewer.rig.rotation import rotation_vector_to_matrix
+from viewer.rig.skeleton import joint_label
+from viewer.rig.skinning import deform
+from viewer.rig.transfer.alignment import (
+    PART,
+    Alignment,
+    AlignmentSettings,
+    Posed,
+    align,
+    misfit,
+)
+from viewer.rig.transfer.icp import Cloud, Triangles, iterate
+from viewer.rig.transfer.orientation_search import axis_direction
+from viewer.rig.transfer.pose_fit import Fitted, fit_pose
+from viewer.rig.transfer.similarity import Similarity
+from viewer.rig.transfer.surface_samples import sample_surface
+
+__all__ = ["PosedAlignment", "align_posed"]
+
+_CLOSE = 0.002  # misfit over size up to which nothing is gained by turning joints
+# Share of the misfit that may be left if turned joints are to be kept: clothes can be fitted a
+# little better by bending the body, but only a figure in another pose much better.
+_KEPT, _PART_KEPT = 0.65, 0.5
+_ALIKE = 1.5  # misfits nearer than this do not tell front from back
+_CLEARLY = 0.85  # of the misfit, which standing the other way must reach after the fit
+_SAMPLES, _DENSE = 2_000, 12_000  # as for alignments
+_ROUNDS = 30  # to lay the template the other way round
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PosedAlignment:
+    """Where the template lies, and how it is made to fit.
+
+    Attributes
+    ----------
+    alignment : Alignment
+        Of the template in ``pose``.
+    figure : Figure
+        The template, its limbs resized if that was needed.
+    pose : Pose
+        The template's own, or fitted.
+    positions : (V, 3)
+        The template's vertices in that pose, in its own frame.
+    lines : tuple of str
+        What was done to pose and proportions.
+    """
+
+    alignment: Alignment
+    figure: Figure
+    pose: Pose
+    positions: Floats
+    lines: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Job:
+    """What every fit needs to know."""
+
+    template: Figure
+    pose: Pose
+    cloud: Cloud
+    exact: Triangles
+    scales: bool
+
+
+def align_posed(
+    template: Figure,
+    pose: Pose,
+    target: Mesh,
+    settings: AlignmentSettings,
+    fits: bool,
+    report: Callable[[float, str], None],
+) -> PosedAlignment:
+    """Lay a template onto a target, and turn its joints if it stands otherwise.
+
+    Parameters
+    ----------
+    template : Figure
+        With mesh, skeleton and skin, already shaped.
+    pose : Pose
+        Of the template, without shape weights.
+    target : Mesh
+        With triangles.
+    settings : AlignmentSettings
+        What is known of how they lie. Where each axis has a scale of its own nothing is fitted,
+        where the scale is known only the pose.
+    fits : bool
+        Whether pose and proportions may change.
+    report : callable
+        Told the share that is done, and what is being done; may raise to cancel.
+
+    Returns
+    -------
+    PosedAlignment
+        The template as it was given, where a fitted one is not much better.
+
+    Raises
+    ------
+    RigError
+        As ``align``.
+    """
+    assert template.mesh is not None  # the caller looked
+    posed = deform(template, pose)[0]
+    ours = Posed(posed, template.mesh.triangles)
+    theirs = Posed(target.positions, target.triangles)
+    rigid = align(ours, theirs, template.up, settings, lambda s, what: report(0.5 * s, what))
+    is_part = rigid.away > PART
+    before = misfit(rigid, is_part)
+    kept = PosedAlignment(rigid, template, pose, posed, ())
+    if not fits or settings.scale == "axes" or before <= _CLOSE:
+        return kept
+    exact = Triangles(target.positions, target.triangles, _SAMPLES)
+    dense = sample_surface(target.positions, target.triangles, _DENSE)
+    scales = settings.scale != "none" and not is_part
+    job = _Job(template, pose, Cloud(exact.samples, dense), exact, scales)
+    found = _fitted(job, rigid, lambda share: report(0.5 + 0.25 * share, "pose"))
+    may_turn = rigid.how in ("search", "in place") and settings.facing is None and not is_part
+    behind = _turned_round(job, ours, rigid, template.up) if may_turn else None
+    if behind is not None and misfit(behind, is_part) < _ALIKE * before:
+        other = _fitted(job, behind, lambda share: report(0.75 + 0.25 * share, "pose"))
+        if misfit(other.alignment, is_part) < _CLEARLY * misfit(found.alignment, is_part):
+            found = other
+    after = misfit(found.alignment, is_part)
+    if after > (_PART_KEPT if is_part else _KEPT) * before:
+        return kept
+    return replace(found, lines=(*found.lines, _gap_line(before, after)))
+
+
+def _fitted(job: _Job, start: Alignment, report: Callable[[float], None]) -> PosedAlignment:
+    template = job.template
+    assert template.mesh is not None  # the caller looked
+    found = fit_pose(template, job.pose, start.placed, job.cloud, job.exact, job.scales, report)
+    posed = deform(found.figure, found.pose)[0]
+    ours = Triangles(posed, template.mesh.triangles, _SAMPLES)
+    alignment = Alignment.of(ours, job.exact, found.placed, start.how)
+    return PosedAlignment(alignment, found.figure, found.pose, posed, _lines(found))
+
+
+def _turned_round(job: _Job, ours: Posed, rigid: Alignment, up: str) -> Alignment:
+    """Return the template facing the other way, laid onto the target as well as it goes."""
+    placed = rigid.placed
+    half = rotation_vector_to_matrix(np.pi * axis_direction(up))
+    middle = placed.apply(ours.positions.mean(axis=0))
+    rotation = placed.rotation @ half
+    shift = middle - placed.scale * rotation @ ours.positions.mean(axis=0)
+    exact = Triangles(ours.positions, ours.triangles, _SAMPLES)
+    cloud = Cloud(exact.samples, sample_surface(ours.positions, ours.triangles, _DENSE))
+    start = Similarity(placed.scale, rotation, shift, placed.factors)
+    return Alignment.of(
+        exact, job.exact, iterate(cloud, job.cloud, start, _ROUNDS, job.scales), "search"
+    )
+
+
+def _lines(found: Fitted) -> tuple[str, ...]:
+    """Say which joint was turned most, and which limb resized most."""
+    skeleton = found.figure.skeleton
+    assert skeleton is not None  # the caller looked
+    angles = np.linalg.norm(found.turned, axis=1)
+    most, longest = int(angles.argmax()), int(np.abs(found.grown[0]).argmax())
+    names = [joint_label(skeleton, joint) for joint in (most, longest)]
+    change = 100.0 * np.expm1(found.grown[0, longest])
+    return (
+        f"pose: the template's joints turned to fit, {names[0]} by {np.degrees(angles[most]):.0f} "
+        f"degrees; its limbs resized, {names[1]} by {change:+.0f} % in length",
+    )
+
+
+def _gap_line(before: float, after: float) -> str:
+    return f"that leaves a gap of {100.0 * after:.3f} % of the size, before {100.0 * before:.3f} %"

@@ -1,0 +1,142 @@
+"""A figure with longer or shorter, thicker or thinner limbs: one factor along, one across each.
+
+A joint's limb is what follows it. Its vertices are moved, where the figure is bound, by
+S_j (x - c_j) + c'_j, blended with the skin's weights; S_j = g_j I + (l_j - g_j) d_j d_j^T with
+the length l_j along the limb's axis d_j and the girth g_j across it. The joints below follow:
+c'_k = c'_j + S_j (c_k - c_j).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import vertex_normals
+from viewer.rig.mirror import joint_partners
+from viewer.rig.skin import Skin, influence_counts, weight_sums
+from viewer.rig.skinning.lbs import move
+from viewer.rig.vectors import unit
+
+__all__ = ["Limbs", "limbs_of", "resized"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Limbs:
+    """What hangs on each joint.
+
+    Attributes
+    ----------
+    weights : (V, J)
+        Of the skin, each vertex's adding up to 1.
+    shares : (V, J)
+        The same of a joint and all below it.
+    axes : (J, 3)
+        Unit vectors along the limbs, where the figure is bound; 0 for a joint that moves nothing.
+    partners : (J,)
+        The joint on the other side, or the joint itself.
+    """
+
+    weights: Floats
+    shares: Floats
+    axes: Floats
+    partners: Ints
+
+
+def limbs_of(figure: Figure) -> Limbs:
+    """Return a figure's limbs.
+
+    An axis leads from the joint to those below it, each counted by how much of the mesh it
+    carries, or to the middle of the vertices of a last joint.
+
+    Parameters
+    ----------
+    figure : Figure
+        With mesh, skeleton and skin.
+    """
+    mesh, skeleton, skin = figure.mesh, figure.skeleton, figure.skin
+    assert mesh is not None and skeleton is not None and skin is not None  # the caller looked
+    parents = skeleton.parents
+    weights = _dense(skin)
+    shares = weights.copy()
+    for joint in range(len(parents) - 1, -1, -1):
+        # Children come after their parents, so this joint's own sum is final.
+        if parents[joint] >= 0:
+            shares[:, parents[joint]] += shares[:, joint]
+    joints = _bound_joints(skin)
+    ways = np.zeros_like(joints)
+    below = np.flatnonzero(parents >= 0)
+    carried = shares.sum(axis=0)
+    steps = carried[below, None] * (joints[below] - joints[parents[below]])
+    np.add.at(ways, parents[below], steps)
+    last = np.setdiff1d(np.arange(len(parents)), parents[below])
+    ways[last] = weights[:, last].T @ mesh.positions - carried[last, None] * joints[last]
+    try:
+        partners = joint_partners(figure)
+    except RigError:
+        partners = np.arange(len(parents), dtype=np.int32)  # not symmetric: nothing to keep
+    return Limbs(weights, shares, unit(ways), partners)
+
+
+def resized(figure: Figure, limbs: Limbs, lengths: Floats, girths: Floats) -> Figure:
+    """Return a figure with other limbs: mesh, bind pose and rest skeleton.
+
+    Parameters
+    ----------
+    figure : Figure
+        With mesh, skeleton and skin.
+    limbs : Limbs
+        Its own.
+    lengths, girths : (J,)
+        Factors along and across the limbs.
+
+    Returns
+    -------
+    Figure
+        Same joints and weights; all else that belongs to vertices is kept as it is.
+    """
+    mesh, skeleton, skin = figure.mesh, figure.skeleton, figure.skin
+    assert mesh is not None and skeleton is not None and skin is not None  # the caller looked
+    scales = girths[:, None, None] * np.eye(3) + (lengths - girths)[:, None, None] * np.einsum(
+        "ja,jb->jab", limbs.axes, limbs.axes
+    )
+    joints, parents = _bound_joints(skin), skeleton.parents
+    below = np.flatnonzero(parents >= 0)
+    moved = joints.copy()
+    for joint in below.tolist():
+        # Parents come first, so the parent's place is final.
+        parent = parents[joint]
+        moved[joint] = moved[parent] + scales[parent] @ (joints[joint] - joints[parent])
+    palette = np.tile(np.eye(4), (len(parents), 1, 1))
+    palette[:, :3, :3] = scales
+    palette[:, :3, 3] = moved - np.einsum("jab,jb->ja", scales, joints)
+    positions = move(mesh.positions, skin, palette)[0]
+    bind = np.asarray(np.linalg.inv(skin.inverse_bind), dtype=np.float64)
+    bind[:, :3, 3] = moved
+    longer = (moved - joints)[below] - (moved - joints)[parents[below]]
+    rest = skeleton.rest_translations.copy()
+    rest[below] += np.linalg.solve(bind[parents[below], :3, :3], longer[..., None])[..., 0]
+    inverse_bind = np.asarray(np.linalg.inv(bind), dtype=np.float64)
+    return replace(
+        figure,
+        mesh=replace(mesh, positions=positions, normals=vertex_normals(positions, mesh.triangles)),
+        skeleton=replace(skeleton, rest_translations=rest),
+        skin=replace(skin, inverse_bind=inverse_bind),
+    )
+
+
+def _dense(skin: Skin) -> Floats:
+    owners = np.repeat(np.arange(skin.n_vertices), influence_counts(skin))
+    weights = np.zeros((skin.n_vertices, skin.n_joints))
+    np.add.at(weights, (owners, skin.joints), skin.weights)
+    sums = weight_sums(skin)
+    scaled: Floats = weights / np.where(sums > 0.0, sums, 1.0)[:, None]
+    return scaled
+
+
+def _bound_joints(skin: Skin) -> Floats:
+    joints: Floats = np.asarray(np.linalg.inv(skin.inverse_bind), dtype=np.float64)[:, :3, 3]
+    return joints
