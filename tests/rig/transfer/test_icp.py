@@ -39,7 +39,9 @@ def test_iterate_then_slide_find_the_alignment_exactly():
 def test_iterate_alone_comes_closer_with_every_round():
     template, target = sides()
     errors = [
-        trimmed_rms(gaps_between(template, target, iterate(template, target, START, n, True)).towards)
+        trimmed_rms(
+            gaps_between(template, target, iterate(template, target, START, n, True)).towards
+        )
         for n in (0, 5, 20)
     ]
     assert errors[0] > 2 * errors[1] > 3 * errors[2]
