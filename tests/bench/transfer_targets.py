@@ -76,6 +76,22 @@ def targets(figure: viewer.Figure, what: str) -> list[Target]:
     return made
 
 
+def without_pose(figure: viewer.Figure, what: str) -> list[Target]:
+    """Return re-posed targets for a template that is left at rest; they lie in no place known."""
+    rng = np.random.default_rng(21)
+    rest = viewer.rest_pose(figure.skeleton)
+    at_rest = posed(what, figure, rest)
+    made = []
+    for degrees in (4.0, 8.0, 15.0):
+        bent = posed(what, figure, bent_pose(figure, rng, np.radians(degrees)))
+        made.append(_named(_remeshed(bent, rng), f"bent by {degrees:g} degrees"))
+    if what == "body":
+        for angle, name in ((0.6, "arms half down"), (1.35, "arms on the torso")):
+            down = posed(what, figure, _arms_down(figure, angle))
+            made.append(_named(_remeshed(down, rng), name))
+    return [replace(each, pose=rest, template=at_rest.positions) for each in made]
+
+
 def fine(figure: viewer.Figure) -> Target:
     """Return a target of more than 50,000 vertices, a part of which does not fit."""
     rest = posed("", figure, viewer.rest_pose(figure.skeleton))
@@ -127,13 +143,13 @@ def bent_pose(figure, rng, angle: float) -> viewer.Pose:
     return pose
 
 
-def _arms_down(figure) -> viewer.Pose:
-    """Lower the arms of the body until they lie on the torso."""
+def _arms_down(figure, angle: float = 1.35) -> viewer.Pose:
+    """Lower the arms of the body, with the usual angle until they lie on the torso."""
     pose = viewer.rest_pose(figure.skeleton)
     turns = np.zeros((len(pose.rotations), 3))
     names = list(figure.skeleton.names)
-    turns[names.index("left_shoulder"), 2] = -1.35
-    turns[names.index("right_shoulder"), 2] = 1.35
+    turns[names.index("left_shoulder"), 2] = -angle
+    turns[names.index("right_shoulder"), 2] = angle
     turn_joints(pose, turns)
     return pose
 

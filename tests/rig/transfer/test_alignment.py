@@ -8,6 +8,7 @@ from rigged_shapes import tube, turn
 pytest.importorskip("scipy")
 
 from viewer.errors import RigError
+from viewer.rig.mesh import vertex_normals
 from viewer.rig.transfer.alignment import (
     Alignment,
     AlignmentSettings,
@@ -46,6 +47,15 @@ def test_part_in_place_is_left_alone_although_it_stands_off():
     assert found.how == "in place"
     assert (found.placed.matrix == np.eye(4)).all()
     assert found.away > 0.05 > found.error
+
+
+def test_shell_in_place_is_left_alone_although_a_larger_template_is_nearer():
+    # Evenly 2 % of the size away all round: a larger tube would be nearer nearly everywhere.
+    normals = vertex_normals(POSITIONS, TRIANGLES)
+    found = aligned(POSITIONS + 0.05 * normals)
+    assert found.how == "in place"
+    assert (found.placed.matrix == np.eye(4)).all()
+    assert found.error > 0.015 and max(found.uneven) < 0.005
 
 
 def test_turned_scaled_and_moved_target_is_found_exactly():

@@ -9,6 +9,7 @@ pytest.importorskip("scipy")
 
 from viewer.rig.transfer.icp import (
     Triangles,
+    capped_rms,
     fit_axes,
     gaps_between,
     iterate,
@@ -83,3 +84,17 @@ def test_axes_are_scaled_on_their_own():
 
 def test_trimmed_rms_leaves_out_the_worst():
     assert trimmed_rms(np.array([3.0, 4.0, *[0.0] * 7, 1000.0])) == pytest.approx(5 / 3)
+
+
+def test_gaps_of_an_even_shell_are_even():
+    plane = np.array([[0.0, 0, 0], [10, 0, 0], [0, 10, 0]])
+    one = np.array([[0, 1, 2]])
+    template, target = (
+        Triangles(plane, one, 100),
+        Triangles(plane + np.array([0, 0, 0.5]), one, 100),
+    )
+    gaps = gaps_between(template, target, START)
+    for whole, uneven in ((gaps.towards, gaps.uneven_towards), (gaps.away, gaps.uneven_away)):
+        assert_allclose(whole, 0.5, atol=1e-12)
+        assert_allclose(uneven, 0.0, atol=1e-12)
+    assert_allclose(capped_rms(np.array([3.0, 9.0]), 4.0), np.sqrt(12.5))

@@ -74,6 +74,17 @@ def test_mesh_in_another_unit_and_axis_lies_in_place():
     assert_allclose(found.placed.rotation, quarter, atol=1e-15)
 
 
+def test_mesh_that_fits_hardly_better_turned_is_not_turned():
+    positions, triangles = tube()
+    turned = positions * [-1.0, 1.0, -1.0]
+    between = 0.46 * positions + 0.54 * turned  # from behind it is a little nearer
+    template, target = cloud(positions, triangles), cloud(between, triangles)
+    found = in_place(template, target, axis_turns("y"), scaled=False)
+    assert (found.placed.rotation == np.eye(3)).all()
+    found = in_place(template, cloud(turned, triangles), axis_turns("y"), scaled=False)
+    assert (found.placed.rotation == np.diag([-1.0, 1.0, -1.0])).all()
+
+
 def test_search_finds_a_turned_scaled_and_moved_mesh():
     positions, triangles = tube()
     rotation = turn([0.2, 1, 0.1], 2.2)

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from viewer.errors import RigError
-from viewer.rig.transfer.surface_samples import sample_surface, triangle_normals
+from viewer.rig.transfer.surface_samples import even_vertices, sample_surface, triangle_normals
 
 # Two triangles in different planes, the second with three times the area of the first.
 POSITIONS = np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0], [0, 0, 1], [0, 0, 4], [0, 4, 1]])
@@ -43,4 +43,25 @@ def test_triangle_without_area_has_no_normal():
 def test_mesh_without_area_is_refused(triangles):
     with pytest.raises(RigError) as problem:
         sample_surface(POSITIONS, np.asarray(triangles), 10)
+    assert str(problem.value) == "expected a mesh with an area to align, found none"
+
+
+def test_vertices_are_chosen_by_area_and_each_once():
+    # One large and one small triangle apart: three vertices of the large one at most.
+    positions = np.concatenate([100.0 * POSITIONS[:3], POSITIONS[3:]])
+    assert even_vertices(positions, TRIANGLES, 10).tolist() == [0]
+    line = np.arange(101.0)
+    strip = np.concatenate([np.stack([line, 0 * line, 0 * line], 1),
+                            np.stack([line, 0 * line + 1, 0 * line], 1)])  # fmt: skip
+    low = np.arange(100)
+    cells = np.concatenate([np.stack([low, low + 1, low + 101], 1),
+                            np.stack([low + 1, low + 102, low + 101], 1)])  # fmt: skip
+    chosen = even_vertices(strip, cells, 50)
+    assert len(chosen) == len(set(chosen.tolist())) and 25 <= len(chosen) <= 50
+    assert np.diff(np.sort(strip[chosen, 0])).max() <= 8.0
+
+
+def test_vertices_of_a_mesh_without_area_are_refused():
+    with pytest.raises(RigError) as problem:
+        even_vertices(np.zeros((3, 3)), np.array([[0, 1, 2]]), 5)
     assert str(problem.value) == "expected a mesh with an area to align, found none"

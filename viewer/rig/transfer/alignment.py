@@ -44,6 +44,7 @@ _ROUNDS, _SLIDES = 60, 25  # of points to points, and to planes
 _AXES_ROUNDS = 20
 _IN_PLACE = 0.03  # misfit over size up to which a mesh may lie in place already
 _SURELY = 0.003  # mean distance over size up to which nothing better is looked for
+_SLIDING = 0.02  # misfit over size up to which surfaces slide along each other
 # Share of that misfit that a search must reach to move the mesh all the same: a part of a figure
 # fits nearly as well in many other places, the whole of it does not.
 _BETTER, _PART_BETTER = 0.8, 0.35
@@ -124,7 +125,8 @@ class Alignment:
         everywhere, and with all of them, each counted as 5 % at most: there ends of limbs that
         stick out count, which the best 90 % leave out.
     how : str
-        ``"in place"``, ``"search"``, ``"landmarks"`` or ``"given"``.
+        ``"in place"``, ``"search"``, ``"landmarks"``, ``"given"``, or ``"fit"`` where pose and
+        proportions were fitted beyond that, unless landmarks were given.
     """
 
     placed: Similarity
@@ -234,11 +236,16 @@ def align(
     scale = 1.0 if settings.scale == "none" else None
     best = search(coarse[0], coarse[1], turns, scale, lambda s: report(0.1 + 0.7 * s, "alignment"))
     left = Alignment.of(ours, theirs, stays.placed, "in place")
-    tried = [best.placed, _refined(fine, best.placed, settings, report)]
-    searched = [Alignment.of(ours, theirs, placed, "search") for placed in tried]
-    is_part = min(each.away for each in searched) > PART
-    # Sliding looks at what faces each other alone, and may leave ends of limbs behind.
-    found = min(reversed(searched), key=lambda each: misfit(each, is_part))
+    found = Alignment.of(ours, theirs, best.placed, "search")
+    is_part = found.away > PART
+    # Sliding perfects what nearly fits; in another pose it takes long and leads nowhere.
+    if settings.scale == "axes" or misfit(found, True) <= _SLIDING:
+        placed = _refined(fine, best.placed, settings, report)
+        slid = Alignment.of(ours, theirs, placed, "search")
+        is_part &= slid.away > PART
+        # It looks at what faces each other alone, and may leave ends of limbs behind.
+        if settings.scale == "axes" or misfit(slid, is_part) <= misfit(found, is_part):
+            found = slid
     share = _PART_BETTER if is_part else _BETTER
     gap = misfit(left, is_part)
     return found if gap > _IN_PLACE or misfit(found, is_part) < share * gap else left
@@ -286,6 +293,7 @@ _HOW = {
     "search": "found by closest points",
     "landmarks": "from the landmarks",
     "given": "as given",
+    "fit": "found by fitting pose and proportions",
 }
 
 

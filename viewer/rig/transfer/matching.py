@@ -18,6 +18,7 @@ from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.closest_point import Surface, SurfacePoints, interpolate
 from viewer.rig.mesh import vertex_normals
+from viewer.rig.transfer.same_vertices import at_vertices, same_vertices
 from viewer.rig.transfer.welding import Welded, weld
 from viewer.rig.vectors import unit
 
@@ -101,9 +102,9 @@ class Template:
     def __init__(self, positions: Floats, triangles: Ints) -> None:
         self.surface = Surface(positions, triangles)
         self.positions, self.triangles = positions, triangles
-        welded = weld(positions, triangles)
-        normals = vertex_normals(welded.positions, welded.triangles)
-        self.normals: Floats = normals[welded.vertices]
+        self.welded = weld(positions, triangles)
+        normals = vertex_normals(self.welded.positions, self.welded.triangles)
+        self.normals: Floats = normals[self.welded.vertices]
 
     def normals_at(self, points: SurfacePoints) -> Floats:
         """Return unit normals at points of the surface, (N, 3), mixed from the corners'."""
@@ -154,7 +155,7 @@ def match(template: Template, target: Welded, size: float, settings: MatchSettin
     Matches
         Vertices without a normal are judged by distance alone.
     """
-    points = template.surface.closest(target.positions)
+    points = _closest(template, target)
     normals = sheet_normals(target)
     angles = _angles(template, points, normals)
     near = points.distances <= settings.max_distance * size
@@ -169,6 +170,14 @@ def match(template: Template, target: Welded, size: float, settings: MatchSettin
     matched[rest[fits]] = True
     angles[rest[fits]] = side_angles[fits]
     return Matches(_replaced(points, rest[fits], sides, fits), matched, angles, inside_out)
+
+
+def _closest(template: Template, target: Welded) -> SurfacePoints:
+    """Return the closest points, or the vertices that are the target's own."""
+    points, welded = template.surface.closest(target.positions), template.welded
+    same = same_vertices(welded, target, points.distances)
+    corners = welded.vertices[template.triangles]
+    return at_vertices(points, target.positions, corners, welded.positions, same)
 
 
 def _angles(template: Template, points: SurfacePoints, normals: Floats) -> Floats:

@@ -40,6 +40,7 @@ _CLOSE = 0.002  # misfit over size up to which nothing is gained by turning join
 # Share of the misfit that may be left if turned joints are to be kept: clothes can be fitted a
 # little better by bending the body, but only a figure in another pose much better.
 _KEPT, _PART_KEPT = 0.65, 0.5
+_SURE = 0.004  # misfit after the fit up to which a figure faces the right way: no other is tried
 _ALIKE = 1.5  # misfits nearer than this do not tell front from back
 _CLEARLY = 0.85  # of the misfit, which standing the other way must reach after the fit
 _SAMPLES, _DENSE = 2_000, 12_000  # as for alignments
@@ -134,11 +135,12 @@ def align_posed(
     job = _Job(template, pose, Cloud(exact.samples, dense), exact, scales)
     found = _fitted(job, rigid, lambda share: report(0.5 + 0.25 * share, "pose"))
     may_turn = rigid.how in ("search", "in place") and settings.facing is None and not is_part
-    behind = _turned_round(job, ours, rigid, template.up) if may_turn else None
-    if behind is not None and misfit(behind, is_part) < _ALIKE * before:
-        other = _fitted(job, behind, lambda share: report(0.75 + 0.25 * share, "pose"))
-        if misfit(other.alignment, is_part) < _CLEARLY * misfit(found.alignment, is_part):
-            found = other
+    if may_turn and misfit(found.alignment, False) > _SURE:
+        behind = _turned_round(job, ours, rigid, template.up)
+        if misfit(behind, False) < _ALIKE * before:
+            other = _fitted(job, behind, lambda share: report(0.75 + 0.25 * share, "pose"))
+            if misfit(other.alignment, False) < _CLEARLY * misfit(found.alignment, False):
+                found = other
     after = misfit(found.alignment, is_part)
     if after > (_PART_KEPT if is_part else _KEPT) * before:
         return kept
@@ -151,7 +153,8 @@ def _fitted(job: _Job, start: Alignment, report: Callable[[float], None]) -> Pos
     found = fit_pose(template, job.pose, start.placed, job.cloud, job.exact, job.scales, report)
     posed = deform(found.figure, found.pose)[0]
     ours = Triangles(posed, template.mesh.triangles, _SAMPLES)
-    alignment = Alignment.of(ours, job.exact, found.placed, start.how)
+    how = start.how if start.how == "landmarks" else "fit"
+    alignment = Alignment.of(ours, job.exact, found.placed, how)
     return PosedAlignment(alignment, found.figure, found.pose, posed, _lines(found))
 
 

@@ -1,0 +1,111 @@
+"""Alignment with pose and proportions: people with lowered arms, of other sizes, from behind."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from rigged_shapes import arm, mesh_of
+
+pytest.importorskip("scipy")
+
+from viewer.loading import bundled_body, load
+from viewer.rig.pose import rest_pose
+from viewer.rig.skinning import deform, joint_matrices
+from viewer.rig.transfer.alignment import AlignmentSettings
+from viewer.rig.transfer.posed_alignment import align_posed
+
+
+def silent(share, what):
+    pass
+
+
+def aligned(figure, target, fits=True, report=silent, **settings):
+    pose = rest_pose(figure.skeleton)
+    return align_posed(figure, pose, target, AlignmentSettings(**settings), fits, report), pose
+
+
+@pytest.fixture(scope="module")
+def standing():
+    """The bundled body with lowered arms and longer legs, turned to face -z."""
+    figure = load(bundled_body()).actors[0].figure
+    pose = rest_pose(figure.skeleton)
+    names = figure.skeleton.names
+    for side, sign in (("left", -1.0), ("right", 1.0)):
+        pose.dofs[3 * names.index(f"{side}_shoulder") + 2] = sign * 0.8
+    pose.shape_weights = np.zeros(figure.n_shapes)
+    pose.shape_weights[figure.blend_shapes.names.index("leg length")] = 2.0
+    half_turn = np.array([-1.0, 1.0, -1.0])
+    positions = deform(figure, pose)[0] * half_turn
+    return (
+        figure,
+        mesh_of(positions, figure.mesh.triangles),
+        joint_matrices(figure, pose)[:, :3, 3] * half_turn,
+    )
+
+
+def test_person_with_lowered_arms_is_found_from_behind(standing):
+    figure, target, joints = standing
+    found, pose = aligned(figure, target)
+    assert found.alignment.how == "fit"
+    assert_allclose(found.alignment.placed.rotation @ [0, 0, 1], [0, 0, -1], atol=0.1)
+    size = np.linalg.norm(np.ptp(target.positions, axis=0))
+    laid = found.alignment.placed.apply(found.positions)
+    assert np.linalg.norm(laid - target.positions, axis=1).mean() < 0.01 * size
+    places = found.alignment.placed.apply(joint_matrices(found.figure, found.pose)[:, :3, 3])
+    assert np.linalg.norm(places - joints, axis=1).max() < 0.02 * size
+    assert found.figure.mesh is not figure.mesh and found.pose is not pose
+    assert len(found.lines) == 2
+    assert found.lines[0].startswith("pose: the template's joints turned to fit, ")
+
+
+def test_facing_that_is_given_is_kept(standing):
+    figure, target, _ = standing
+    found, _ = aligned(figure, target, facing="z")
+    assert (found.alignment.placed.rotation @ [0, 0, 1])[2] > 0.9
+
+
+def test_template_is_left_alone_where_that_is_asked(standing):
+    figure, target, _ = standing
+    found, pose = aligned(figure, target, fits=False)
+    assert found.pose is pose and found.figure is figure and found.lines == ()
+
+
+def test_template_that_fits_is_left_alone():
+    figure = arm()
+    found, pose = aligned(figure, figure.mesh)
+    assert found.pose is pose and found.figure is figure and found.lines == ()
+    assert found.alignment.how == "in place"
+
+
+def test_shell_that_stands_off_evenly_is_not_fitted():
+    figure = arm()
+    shell = mesh_of(figure.mesh.positions + 0.03 * figure.mesh.normals, figure.mesh.triangles)
+    found, pose = aligned(figure, shell)
+    assert found.pose is pose and found.figure is figure
+    assert (found.alignment.placed.matrix == np.eye(4)).all()
+
+
+def test_scales_of_axes_keep_the_pose():
+    figure = arm()
+    pose = rest_pose(figure.skeleton)
+    pose.dofs[6:] = 0.0, 0.0, 0.8
+    target = mesh_of(deform(figure, pose)[0] * [1.2, 1.0, 0.9], figure.mesh.triangles)
+    found, own = aligned(figure, target, scale="axes")
+    assert found.pose is own and found.figure is figure
+
+
+def test_progress_rises_and_cancels(standing):
+    figure, target, _ = standing
+
+    class CancelledError(RuntimeError):
+        pass
+
+    shares = []
+
+    def report(share, what):
+        shares.append(share)
+        if what == "pose" and share > 0.6:
+            raise CancelledError
+
+    with pytest.raises(CancelledError):
+        aligned(figure, target, report=report)
+    assert shares == sorted(shares) and shares[0] == 0.0
