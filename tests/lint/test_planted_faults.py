@@ -313,6 +313,7 @@ FAULTS: dict[str, tuple[Callable[[], Figure | Scene], str, str, list[int]]] = {
     "long normal": (lambda: with_normal(3, (0.8, -0.9, -0.8)), "M008", "vertices", [3]),
     "normals inwards": (against, "M009", "vertices", list(range(20))),
     "stray vertex": (lambda: moved(6, (1e8, 0, 0)), "M010", "vertices", [6]),
+    "vertex a hundred sizes away": (lambda: moved(6, (100, 0, 0)), "M010", "vertices", [6]),
     "triangle twice": (
         lambda: meshed(lambda t: np.vstack([t, t[4:5, [1, 2, 0]]])), "M011", "triangles", [36]
     ),
@@ -371,6 +372,7 @@ COMPANIONS = {
     "three on an edge": {"M005"},
     "triangle twice": {"M006"},
     "stray vertex": {"Y001", "M001"},  # triangles to it are slivers
+    "vertex a hundred sizes away": {"Y001", "M003"},  # it pulls the volume inside out
     "fast turn": {"C003"},  # the ankle goes where the knee turns it
 }
 

@@ -42,6 +42,7 @@ _WARNINGS = (
     ("C001", r"keys sorted"),
     ("C010", r"channel \d+ has no keys"),
     ("C005", r"frames? .*(?:gap|left out|missing)"),
+    ("F007", r"texcoords without a texture"),  # nothing is missing: no picture was ever named
     ("F005", r"drawn untextured|drawn without|a texture without|lies outside the folder"),
     (
         "F006",
