@@ -187,3 +187,15 @@ def test_nan_is_never_within_a_tolerance() -> None:
     found = compare(Actor(figure()), Actor(figure()), n_poses=0)
     broken = replace(found.measures[0], maximum=float("nan"))
     assert replace(found, measures=(broken,)).exceeds(1e9)
+
+
+def test_actors_are_left_in_the_worst_pose_also_if_that_is_their_own() -> None:
+    # The vertex is off by the same at rest and turned, so the first pose is the worst.
+    moved = CORNERS.copy()
+    moved[0] += [0.0, 0.0, 0.2]
+    first, second = Actor(figure()), Actor(figure(moved))
+    found = compare(first, second)
+    assert measures(found)["vertices"].step == "own pose"
+    for actor in (first, second):
+        assert actor.pose is not None
+        assert_allclose(actor.pose.dofs, [0.0])

@@ -73,6 +73,7 @@ class _Comparison:
         self.first, self.second, self.skinning, self.steps = first, second, skinning, steps
         self.mismatches, self.notes = list(steps.mismatches), list(steps.notes)
         self.tallies: list[Tally] = []
+        self.numbers: dict[str, int] = {}  # of steps, by name
         self._pair_skeletons()
         self._pair_meshes()
         self._pair_points()
@@ -139,13 +140,15 @@ class _Comparison:
         if self.has_meshes and not self.is_same and count > _MOST_SEARCHES:
             self.notes.append(f"closest points in {n_searches} of {count} frames")
         absent = 0
-        for number, step in enumerate(self.steps.run(self.first, self.second)):
+        for number in range(count):
+            step = self.steps.pose(number, self.first, self.second)
             if report is not None:
                 report(number, count)
             if self.first.is_present != self.second.is_present:
                 absent += 1
             if not (self.first.is_present and self.second.is_present):
                 continue
+            self.numbers[step] = number
             if size == 0.0:
                 size = _size(self.first)
                 self._compare_weights(step)
@@ -171,9 +174,7 @@ class _Comparison:
             return
         of_meshes = [tally for tally in told if not tally.items]
         worst = max(of_meshes or told, key=lambda tally: tally.worst).step
-        for step in self.steps.run(self.first, self.second):
-            if step == worst:
-                break
+        self.steps.pose(self.numbers[worst], self.first, self.second)
 
     def _compare_joints(self, step: str) -> None:
         if self.joints is None:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from viewer.rig.arrays import Floats, Ints
 from viewer.rig.clip import Clip
 from viewer.rig.comparison.pairs import pair_names
 from viewer.rig.motion import frame_rate, pose_actor
+from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor, figure_pose
 from viewer.rig.skeleton import Skeleton, dof_label
 
@@ -41,6 +41,8 @@ class Steps:
         What the first frame is called.
     mismatches, notes : tuple of str
         What one has and the other lacks; how steps were chosen.
+    own : (Pose or None, Pose or None)
+        Where both start without motions.
     """
 
     times: Floats
@@ -50,31 +52,30 @@ class Steps:
     first_frame: int = 0
     mismatches: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    own: tuple[Pose | None, Pose | None] = (None, None)
 
     @property
     def count(self) -> int:
         """Number of steps."""
         return len(self.times) or 1 + len(self.dofs)
 
-    def run(self, first: Actor, second: Actor) -> Iterator[str]:
-        """Pose both actors by one step after the other, and name each."""
+    def pose(self, number: int, first: Actor, second: Actor) -> str:
+        """Pose both actors as in one step, in any order, and return what it is called."""
         if len(self.times):
-            for number, time in enumerate(self.times.tolist()):
-                # Both from their own start: captures may count from any frame.
-                for actor in (first, second):
-                    assert actor.clip is not None  # or there were no times
-                    pose_actor(actor, time + actor.clip.start + actor.offset)
-                yield f"frame {self.first_frame + number}"
-            return
-        for actor in (first, second):
-            if actor.clip is not None:  # the other has none: its motion has no partner
-                actor.pose = None if actor.figure.skeleton is None else figure_pose(actor.figure)
-        yield "own pose"
-        for number, values in enumerate(self.dofs):
-            assert first.pose is not None and second.pose is not None  # or there were no DOFs
-            first.pose.dofs[self.first] = values
-            second.pose.dofs[self.second] = values
-            yield f"test pose {number + 1}"
+            # Both from their own start: captures may count from any frame.
+            for actor in (first, second):
+                assert actor.clip is not None  # or there were no times
+                time = float(self.times[number]) + actor.clip.start + actor.offset
+                pose_actor(actor, time)
+            return f"frame {self.first_frame + number}"
+        for actor, own in zip((first, second), self.own, strict=True):
+            actor.pose = None if own is None else own.copy()
+        if number == 0:
+            return "own pose"
+        assert first.pose is not None and second.pose is not None  # or there were no DOFs
+        first.pose.dofs[self.first] = self.dofs[number - 1]
+        second.pose.dofs[self.second] = self.dofs[number - 1]
+        return f"test pose {number}"
 
 
 def steps_of(first: Actor, second: Actor, n_poses: int, frames: FrameRange | None = None) -> Steps:
@@ -99,9 +100,20 @@ def steps_of(first: Actor, second: Actor, n_poses: int, frames: FrameRange | Non
     RigError
         If the range holds no frame.
     """
-    none = np.zeros(0, dtype=np.int32)
     if first.clip is not None and second.clip is not None:
         return _motion_steps(first, second, frames)
+    return replace(_still_steps(first, second, n_poses), own=(_own_pose(first), _own_pose(second)))
+
+
+def _own_pose(actor: Actor) -> Pose | None:
+    """Return where an actor starts; a motion without a partner counts for nothing."""
+    if actor.clip is None:
+        return None if actor.pose is None else actor.pose.copy()
+    return None if actor.figure.skeleton is None else figure_pose(actor.figure)
+
+
+def _still_steps(first: Actor, second: Actor, n_poses: int) -> Steps:
+    none = np.zeros(0, dtype=np.int32)
     if (first.clip is None) != (second.clip is None):
         lacking = "second" if second.clip is None else "first"
         return Steps(
