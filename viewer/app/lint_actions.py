@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 
 from imgui_bundle import imgui
 
@@ -57,16 +56,7 @@ def start_check(state: AppState) -> None:
 
 def _copied(scene: Scene) -> Scene:
     """Return a scene whose poses stay as they are while the other one is posed on."""
-    return Scene([_copied_actor(actor) for actor in scene.actors], world_up=scene.up)
-
-
-def _copied_actor(actor: Actor) -> Actor:
-    return replace(
-        actor,
-        pose=None if actor.pose is None else actor.pose.copy(),
-        placement=actor.placement.copy(),
-        points=None if actor.points is None else actor.points.copy(),
-    )
+    return Scene([actor.copy() for actor in scene.actors], world_up=scene.up)
 
 
 def take_findings(state: AppState) -> None:

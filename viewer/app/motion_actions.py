@@ -19,6 +19,7 @@ from viewer.export import (
 )
 from viewer.export._motion_paths import motion_paths
 from viewer.formats import all_or_none
+from viewer.formats._save import require_folder
 from viewer.rig.clip import Clip
 from viewer.rig.points import PointClip
 from viewer.rig.sampled_clip import SampledClip
@@ -129,7 +130,7 @@ def _parts(state: AppState, path: Path, everyone: bool) -> tuple[list[_Part], li
             lines.append(f"{printable(actor.name)}: not there in the range, and not written")
             continue
         # What goes on in the window meanwhile must not change what is written.
-        taken = replace(actor, pose=actor.pose.copy() if actor.pose else None)
+        taken = actor.copy()
         rate = state.playback.frame_rate if isinstance(actor.clip, Clip) else None
         parts.append(_Part(taken, file, frames, rate, number))
     if not parts:
@@ -168,8 +169,7 @@ def _write_capture(
 
 def _refuse(path: Path, files: Sequence[Path], inputs: Sequence[Path]) -> None:
     """Refuse what cannot be written, or was opened."""
-    if not path.parent.is_dir():
-        raise OutputError(f"{printable(path, 300)}: the folder does not exist")
+    require_folder(path)
     if path.suffix:
         refuse_inputs(files, inputs)
         return

@@ -11,9 +11,10 @@ from viewer.app.jobs import ThreadJob
 from viewer.app.rig_placing import target_place
 from viewer.app.rig_view import Comparison, Result
 from viewer.app.state import AppState
-from viewer.errors import OutputError, RigError, ViewerError, printable
+from viewer.errors import RigError, ViewerError, printable
 from viewer.export import refuse_inputs
 from viewer.export._rigged_files import files_of, write_rigged
+from viewer.formats._save import require_folder
 from viewer.rig.annotations import VertexField
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.clip import Clip
@@ -248,8 +249,7 @@ def save_rigged(state: AppState, result: Result, path: Path) -> None:
     try:
         files = files_of(path)
         refuse_inputs(files, [*state.paths, *result.template.paths])
-        if not path.parent.is_dir():
-            raise OutputError(f"{printable(path, 300)}: the folder does not exist")
+        require_folder(path)
     except ViewerError as problem:
         state.error = str(problem)
         return

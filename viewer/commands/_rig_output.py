@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from viewer.commands._output import check_output
-from viewer.errors import OutputError, printable
 from viewer.export._rigged_files import files_of
+from viewer.formats._save import require_folder
 
 __all__ = ["check_files"]
 
@@ -21,5 +21,4 @@ def check_files(output: Path, inputs: list[Path], force: bool) -> None:
     """
     for file in files_of(output):
         check_output(file, inputs, force)
-    if not output.parent.is_dir():
-        raise OutputError(f"{printable(output, 300)}: the folder does not exist")
+    require_folder(output)

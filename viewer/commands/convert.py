@@ -33,6 +33,7 @@ from viewer.commands._scene import (
 from viewer.errors import OutputError, RigError, UnsupportedFormatError, printable
 from viewer.export import EXPORTERS, export, files_written
 from viewer.formats import all_or_none
+from viewer.formats._save import require_folder
 from viewer.rig.scene import Scene
 from viewer.rig.skinning import Skinning
 from viewer.rig.upright import upright_actor
@@ -88,7 +89,7 @@ def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:
         for path in _written(output):
             check_output(path, _inputs(arguments), arguments.force)
     elif suffix != "/" and "{frame" not in output.name:
-        _check_folder(output)
+        require_folder(output)
         check_output(output, _inputs(arguments), arguments.force)
 
 
@@ -124,7 +125,7 @@ def _write_motions(
         _check_capture_folder(output, inputs, arguments.force)
     else:
         for path in motion_paths(output, actors):
-            _check_folder(path)
+            require_folder(path)
             check_output(path, inputs, arguments.force)
     return write_motions(arguments, scene, output, skinning)
 
@@ -151,10 +152,5 @@ def _inputs(arguments: argparse.Namespace) -> list[Path]:
 
 def _written(path: Path) -> list[Path]:
     """Return all that is written for one output, in a folder that exists."""
-    _check_folder(path)
+    require_folder(path)
     return files_written(path)
-
-
-def _check_folder(path: Path) -> None:
-    if not path.parent.is_dir():
-        raise OutputError(f"{printable(path, 300)}: the folder does not exist")

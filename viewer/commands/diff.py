@@ -17,6 +17,7 @@ from viewer.commands._pose import add_skinning_arguments, skinning_of
 from viewer.commands._progress import Progress
 from viewer.commands._scene import print_warnings
 from viewer.errors import OutputError, ViewerError, printable
+from viewer.formats._save import require_folder
 from viewer.loading import MotionSettings, load
 from viewer.rig.comparison import Difference, compare
 from viewer.rig.comparison.steps import FrameRange
@@ -134,8 +135,7 @@ def _checked_output(arguments: argparse.Namespace) -> Path | None:
             f"{printable(output, 300)}: pictures cannot be written as "
             f'"{output.suffix}"; there are: {", ".join(PICTURES)}'
         )
-    if not output.parent.is_dir():
-        raise OutputError(f"{printable(output, 300)}: the folder does not exist")
+    require_folder(output)
     asked = [arguments.reference, *arguments.files]
     inputs = [file for text in asked for file in _inputs(text)]
     check_output(output, [*inputs, *map(Path, arguments.common)], arguments.force)
@@ -186,24 +186,12 @@ def _compared(
                 progress.total = count
                 progress.show(done)
 
-            posed = _copy(first)
+            posed = first.copy()
             difference = compare(posed, second, skinning, n_poses, frames, report)
         found.append((posed, difference))
     differences = tuple((actor.name, difference) for actor, difference in found)
     row = Compared(name, differences, mismatches, warnings=other.warnings)
     return row, heat_of(name, found)
-
-
-def _copy(actor: Actor) -> Actor:
-    return Actor(
-        actor.figure,
-        None if actor.pose is None else actor.pose.copy(),
-        actor.clip,
-        offset=actor.offset,
-        person=actor.person,
-        points=actor.points,
-        is_present=actor.is_present,
-    )
 
 
 def _pair_actors(

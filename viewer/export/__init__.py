@@ -15,7 +15,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import Skinning
 from viewer.rig.smpl_family import member_of
-from viewer.rig.take import Take, own_take, upright_take
+from viewer.rig.take import Take, upright_take
 
 __all__ = [
     "EXPORTERS",
@@ -223,9 +223,8 @@ def take_for(
     scene, actor, rate, frames, fill
         As for ``viewer.rig.take.upright_take``.
     """
-    is_own = EXPORTERS[key].keeps_world and not options.up
-    sample = own_take if is_own else upright_take
-    return sample(scene, actor, rate, frames, fill)
+    keeps_world = EXPORTERS[key].keeps_world and not options.up
+    return upright_take(scene, actor, rate, frames, fill, keeps_world)
 
 
 def files_written(path: str | Path) -> list[Path]:

@@ -20,7 +20,7 @@ from viewer.export._bvh_angles import euler_angles
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.kinematics import forward_kinematics, world_matrices
-from viewer.rig.motion import Frames, rest_translations_of, world_frames
+from viewer.rig.motion import Frames, frames_between, rest_translations_of, world_frames
 from viewer.rig.pose import rest_pose
 from viewer.rig.rotation import quaternion_to_matrix
 
@@ -112,7 +112,7 @@ def body_of(figure: Figure, frames: Frames, reference: int, order: str, space: S
     angles, positions, places = np.empty(shape), np.empty(shape), np.empty(shape)
     for start in range(0, count, _BLOCK):
         block = slice(start, min(start + _BLOCK, count))
-        part = _block(frames, block)
+        part = frames_between(frames, block)
         places[block] = _places(figure, part, weights, scale) @ space.world.T * space.factor
         turns = _rotations(figure, part, space)
         angles[block] = euler_angles(turns, order)
@@ -132,19 +132,6 @@ def shape_at(frames: Frames, frame: int) -> Floats:
     """Return the shape weights of one frame: (1, S)."""
     weights = frames.shape_weights
     return weights if len(weights) == 1 else weights[frame : frame + 1]
-
-
-def _block(frames: Frames, rows: slice) -> Frames:
-    weights = frames.shape_weights
-    return Frames(
-        frames.times[rows],
-        frames.present[rows],
-        frames.rotations[rows],
-        frames.translations[rows],
-        weights if len(weights) == 1 else weights[rows],
-        frames.figure_translations[rows],
-        frames.figure_scales[rows],
-    )
 
 
 def _places(figure: Figure, frames: Frames, weights: Floats, scale: float) -> Floats:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from viewer.export._gltf_document import Document, text_of
 from viewer.export._gltf_nodes import Locals, Tree
@@ -13,7 +12,7 @@ from viewer.rig.arrays import Bools, Floats
 from viewer.rig.motion import Frames
 from viewer.rig.skeleton import Skeleton
 
-__all__ = ["add_animation", "frames_between", "moving", "still_locals"]
+__all__ = ["add_animation", "moving", "still_locals"]
 
 _NOISE = 1e-9  # of the skeleton's size: what moves less does not move
 
@@ -121,17 +120,3 @@ def _continuous(rotations: Floats) -> Floats:
     sides = np.cumprod(np.where(cosines < 0.0, -1.0, 1.0), axis=0)
     units[1:] *= sides[..., None]
     return units
-
-
-def frames_between(frames: Frames, rows: slice | NDArray[np.intp]) -> Frames:
-    """Return some of the frames."""
-    weights = frames.shape_weights
-    return Frames(
-        frames.times[rows],
-        frames.present[rows],
-        frames.rotations[rows],
-        frames.translations[rows],
-        weights if len(weights) == 1 else weights[rows],
-        frames.figure_translations[rows],
-        frames.figure_scales[rows],
-    )

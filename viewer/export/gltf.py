@@ -18,14 +18,14 @@ from viewer.export._gaps import filled, gaps_text, runs
 from viewer.export._gltf_document import Document, text_of
 from viewer.export._gltf_losses import losses, not_held, sampled, vertices_text
 from viewer.export._gltf_mesh import Color, add_mesh
-from viewer.export._gltf_motion import add_animation, frames_between, moving, still_locals
+from viewer.export._gltf_motion import add_animation, moving, still_locals
 from viewer.export._gltf_nodes import Locals, Tree, add_nodes, locals_of
 from viewer.export._gltf_shape import Shape, shape_of
 from viewer.export._gltf_skin import Influences, influences_of, inverse_bind_matrices
 from viewer.export._options import GAPS, MotionOptions
 from viewer.formats import all_or_none, save_bytes
 from viewer.rig.figure import Figure
-from viewer.rig.motion import Frames, pose_of
+from viewer.rig.motion import Frames, frames_between, pose_of
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor, figure_pose
 from viewer.rig.skeleton import joint_label

@@ -24,6 +24,7 @@ __all__ = [
     "as_words",
     "free_path",
     "refuse_inputs",
+    "require_folder",
     "save_arrays",
     "save_bytes",
     "save_text",
@@ -284,6 +285,18 @@ def _replace(target: Path, data: bytes, permissions: int) -> None:
 def _require_folder(target: Path) -> None:
     if not target.parent.is_dir():
         raise FileNotFoundError(None, f"the folder {printable(target.parent, 300)} does not exist")
+
+
+def require_folder(file: Path) -> None:
+    """Refuse a file whose folder is not there.
+
+    Raises
+    ------
+    OutputError
+        With the file's name.
+    """
+    if not file.parent.is_dir():
+        raise OutputError(f"{printable(file, 300)}: the folder does not exist")
 
 
 def refuse_inputs(files: Sequence[Path], inputs: Sequence[Path]) -> None:

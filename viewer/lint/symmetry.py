@@ -10,7 +10,7 @@ from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh, bounding_box, box_size
 from viewer.rig.mirror import asymmetry, joint_partners
-from viewer.rig.skin import Skin, normalized, owners
+from viewer.rig.skin import Skin, normalized, owners, row_norms
 
 __all__ = ["check"]
 
@@ -92,12 +92,11 @@ def weight_differences(skin: Skin, symmetry: Ints, partners: Ints) -> Floats:
         0 to 2.
     """
     whole = normalized(skin)
-    vertices, joints = owners(whole).astype(np.int64), whole.joints
+    vertices, joints = owners(whole), whole.joints
     # Each influence, and with a minus sign what the partner would have of it.
-    keys = np.concatenate(
-        [vertices * skin.n_joints + joints, symmetry[vertices] * skin.n_joints + partners[joints]]
+    return row_norms(
+        skin.n_vertices,
+        np.concatenate([vertices, symmetry[vertices]]),
+        np.concatenate([joints, partners[joints]]),
+        np.concatenate([whole.weights, -whole.weights]),
     )
-    weights = np.concatenate([whole.weights, -whole.weights])
-    unique, inverse = np.unique(keys, return_inverse=True)
-    rest = np.abs(np.bincount(inverse, weights, minlength=len(unique)))
-    return np.bincount(unique // skin.n_joints, rest, minlength=skin.n_vertices).astype(np.float64)

@@ -42,7 +42,7 @@ def add_to_actor(contents: Contents, actor: Actor) -> tuple[Actor, list[str]]:
         If a pose or picture does not fit; the actor is then as it was.
     """
     notes: list[str] = []
-    trial = replace(actor, pose=None if actor.pose is None else actor.pose.copy())
+    trial = actor.copy()
     for path, pixels in contents.pictures:
         trial.figure = with_texture(trial.figure, path, pixels)
     for path, record in contents.poses:

@@ -174,11 +174,7 @@ class Progress:
 
 def copied(scene: Scene) -> Scene:
     """Return a scene whose actors can be posed without changing this one's; figures are shared."""
-    actors = [
-        replace(actor, pose=None if actor.pose is None else actor.pose.copy())
-        for actor in scene.actors
-    ]
-    return replace(scene, actors=actors)
+    return replace(scene, actors=[actor.copy() for actor in scene.actors])
 
 
 def pose_scene(scene: Scene, recording: Recording, seconds: float) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints
@@ -27,6 +28,7 @@ __all__ = [
     "DEFAULT_RATE",
     "Frames",
     "frame_rate",
+    "frames_between",
     "frames_of",
     "place_pose",
     "pose_actor",
@@ -237,6 +239,20 @@ def pose_of(figure: Figure, frames: Frames, frame: int) -> Pose:
     )
     _apply(row, frame, figure.skeleton, pose)
     return pose
+
+
+def frames_between(frames: Frames, rows: slice | NDArray[np.intp]) -> Frames:
+    """Return some of the frames; one shape for all of them stays one."""
+    weights = frames.shape_weights
+    return Frames(
+        frames.times[rows],
+        frames.present[rows],
+        frames.rotations[rows],
+        frames.translations[rows],
+        weights if len(weights) == 1 else weights[rows],
+        frames.figure_translations[rows],
+        frames.figure_scales[rows],
+    )
 
 
 def world_frames(figure: Figure, frames: Frames) -> Floats:

@@ -89,7 +89,7 @@ def posed_take(
     actor, rate, number, time
         As for ``pose_take``. Where the actor stands in the scene is left out.
     keeps_world : bool
-        Leave it as its own world has it, as ``viewer.rig.take.own_take`` does.
+        Leave it as its own world has it, as ``viewer.rig.take.upright_take`` does.
 
     Returns
     -------

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
@@ -84,6 +84,15 @@ class Actor:
     def __post_init__(self) -> None:
         if self.pose is None and self.figure.skeleton is not None:
             self.pose = figure_pose(self.figure)
+
+    def copy(self) -> Actor:
+        """Return an actor that can be posed and placed by itself; figure and clip are shared."""
+        return replace(
+            self,
+            pose=None if self.pose is None else self.pose.copy(),
+            placement=self.placement.copy(),
+            points=None if self.points is None else self.points.copy(),
+        )
 
 
 def figure_pose(figure: Figure) -> Pose:

@@ -19,6 +19,7 @@ __all__ = [
     "merged",
     "normalized",
     "owners",
+    "row_norms",
     "skin_from_entries",
     "skin_from_lists",
     "skin_rows",
@@ -183,6 +184,33 @@ def skin_rows(skin: Skin, vertices: Ints) -> Skin:
     starts = np.concatenate([[0], np.cumsum(counts)])
     index = np.repeat(skin.starts[vertices] - starts[:-1], counts) + np.arange(starts[-1])
     return Skin(starts.astype(np.int32), skin.joints[index], skin.weights[index], skin.inverse_bind)
+
+
+def row_norms(n_vertices: int, vertices: Ints, joints: Ints, weights: Floats) -> Floats:
+    """Return each vertex's sum over joints of |weight|, entries of one joint added up first.
+
+    With the entries of one skin and, negative, those of another this is the L1 distance of their
+    rows, however those are ordered or split.
+
+    Parameters
+    ----------
+    n_vertices : int
+        V.
+    vertices, joints : (N,)
+        Row and column of each entry.
+    weights : (N,)
+        With their signs.
+
+    Returns
+    -------
+    (V,)
+        0 where nothing is left.
+    """
+    n_joints = int(joints.max(initial=0)) + 1
+    entries, places = np.unique(vertices.astype(np.int64) * n_joints + joints, return_inverse=True)
+    sums = np.abs(np.bincount(places, weights, minlength=len(entries)))
+    rows = np.bincount(entries // n_joints, sums, minlength=n_vertices)
+    return rows.astype(np.float64, copy=False)
 
 
 def strongest_first(skin: Skin) -> Skin:

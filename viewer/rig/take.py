@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from viewer.rig.sampled_clip import SampledClip
 from viewer.rig.scene import Actor, Motion, Scene
 from viewer.rig.upright import own_up
 
-__all__ = ["Take", "frame_range", "own_take", "take_of", "upright_take"]
+__all__ = ["Take", "frame_range", "take_of", "upright_take"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,40 +106,14 @@ def frame_range(
     return first, stop
 
 
-def own_take(
-    scene: Scene,
-    actor: Actor,
-    rate: float | None = None,
-    frames: tuple[int, int | None] | None = None,
-    fill: bool = False,
-) -> tuple[Take, str]:
-    """Sample an actor's clip in its own world, for formats that keep a capture's numbers.
-
-    Parameters
-    ----------
-    scene : Scene
-        Says what is up.
-    actor, rate, frames, fill
-        As for ``take_of``. Where the actor stands in the scene is left out.
-
-    Returns
-    -------
-    take : Take
-        Its frames.
-    up : "y", "z", "-y" or "-z"
-        The axis that points up in them.
-    """
-    up, hangs = own_up(scene, actor)
-    return take_of(actor, rate, frames, fill), f"-{up}" if hangs else up
-
-
 def upright_take(
     scene: Scene,
     actor: Actor,
     rate: float | None = None,
     frames: tuple[int, int | None] | None = None,
     fill: bool = False,
-) -> tuple[Take, Literal["y", "z"]]:
+    keeps_world: bool = False,
+) -> tuple[Take, str]:
     """Sample an actor's clip, stood up where its own world hangs head down.
 
     Parameters
@@ -149,17 +122,21 @@ def upright_take(
         Says what is up.
     actor, rate, frames, fill
         As for ``take_of``. Where the actor stands in the scene is left out.
+    keeps_world : bool
+        Leave it as its own world has it, for formats that keep a capture's numbers.
 
     Returns
     -------
     take : Take
         Its frames.
-    up : "y" or "z"
-        The axis that points up in them.
+    up : "y", "z", "-y" or "-z"
+        The axis that points up in them; the last two only in a world that is kept.
     """
     take = take_of(actor, rate, frames, fill)
     up, hangs = own_up(scene, actor)
-    return (replace(take, frames=_turned_over(take)) if hangs else take), up
+    if not hangs:
+        return take, up
+    return (take, f"-{up}") if keeps_world else (replace(take, frames=_turned_over(take)), up)
 
 
 def _turned_over(take: Take) -> Frames:

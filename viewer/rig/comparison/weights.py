@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.closest_point import SurfacePoints
 from viewer.rig.comparison.pairs import Pairs
-from viewer.rig.skin import Skin, owners
+from viewer.rig.skin import Skin, owners, row_norms, skin_rows
 
 __all__ = ["row_distances", "skin_at"]
 
@@ -29,16 +31,15 @@ def row_distances(first: Skin, second: Skin, pairs: Pairs) -> Floats:
     (V,)
         0 for equal rows, however they are ordered or split.
     """
-    n_joints = first.n_joints + second.n_joints  # joints of the second without a partner get more
-    names = np.arange(second.n_joints, dtype=np.int64) + first.n_joints
+    # Joints of the second without a partner are joints of their own.
+    names = np.arange(second.n_joints, dtype=np.int32) + first.n_joints
     names[pairs.second] = pairs.first
-    vertices = np.concatenate([owners(first), owners(second)]).astype(np.int64)
-    joints = np.concatenate([first.joints.astype(np.int64), names[second.joints]])
-    entries, places = np.unique(vertices * n_joints + joints, return_inverse=True)
-    signed = np.bincount(places, np.concatenate([first.weights, -second.weights]))
-    rows = entries // n_joints
-    sums = np.bincount(rows, np.abs(signed), minlength=first.n_vertices)
-    return sums.astype(np.float64, copy=False)
+    return row_norms(
+        first.n_vertices,
+        np.concatenate([owners(first), owners(second)]),
+        np.concatenate([first.joints, names[second.joints]]),
+        np.concatenate([first.weights, -second.weights]),
+    )
 
 
 def skin_at(skin: Skin, triangles: Ints, found: SurfacePoints) -> Skin:
@@ -58,13 +59,6 @@ def skin_at(skin: Skin, triangles: Ints, found: SurfacePoints) -> Skin:
     Skin
         Of N vertices; a joint may occur several times in one.
     """
-    corners = triangles[found.triangles].ravel()
-    counts = np.diff(skin.starts)[corners]
-    starts = np.concatenate([[0], np.cumsum(counts)])
-    index = np.repeat(skin.starts[corners] - starts[:-1], counts) + np.arange(starts[-1])
-    return Skin(
-        starts=starts[::3].astype(np.int32),
-        joints=skin.joints[index],
-        weights=skin.weights[index] * np.repeat(found.barycentric.ravel(), counts),
-        inverse_bind=skin.inverse_bind,
-    )
+    corners = skin_rows(skin, triangles[found.triangles].ravel())
+    shares = np.repeat(found.barycentric.ravel(), np.diff(corners.starts))
+    return replace(corners, starts=corners.starts[::3], weights=shares * corners.weights)
