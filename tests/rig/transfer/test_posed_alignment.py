@@ -1,5 +1,7 @@
 """Alignment with pose and proportions: people with lowered arms, of other sizes, from behind."""
 
+import re
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -91,6 +93,28 @@ def test_scales_of_axes_keep_the_pose():
     target = mesh_of(deform(figure, pose)[0] * [1.2, 1.0, 0.9], figure.mesh.triangles)
     found, own = aligned(figure, target, scale="axes")
     assert found.pose is own and found.figure is figure
+
+
+def test_stretched_target_is_told_its_scales():
+    figure = load(bundled_body()).actors[0].figure
+    target = mesh_of(figure.mesh.positions * [1.3, 1.0, 0.8], figure.mesh.triangles)
+    found, own = aligned(figure, target, fits=False)
+    (line,) = found.lines
+    told = re.fullmatch(
+        r"warning: with a scale of its own along x, y and z \((.+)\) the template fits much "
+        r"better, with a gap of 0\.\d+ % instead of 0\.\d+ %: if the target was stretched, ask "
+        r"for it \(--scale axes\)",
+        line,
+    )
+    scales = [float(value) for value in told[1].split(", ")]
+    assert_allclose(scales, [1.3, 1.0, 0.8], atol=0.003)
+    asked, _ = aligned(figure, target, fits=False, scale="axes")
+    assert asked.lines == ()
+    laid = asked.alignment.placed.apply(figure.mesh.positions)
+    size = np.linalg.norm(np.ptp(target.positions, axis=0))
+    assert np.linalg.norm(laid - target.positions, axis=1).max() < 0.003 * size
+    known, _ = aligned(figure, target, fits=False, scale="none")
+    assert known.lines == ()
 
 
 def test_progress_rises_and_cancels(standing):

@@ -28,7 +28,7 @@ from viewer.rig.transfer.alignment import (
     align,
     misfit,
 )
-from viewer.rig.transfer.icp import Cloud, Triangles, iterate
+from viewer.rig.transfer.icp import Cloud, Triangles, fit_axes, iterate
 from viewer.rig.transfer.orientation_search import axis_direction
 from viewer.rig.transfer.pose_fit import Fitted, fit_pose
 from viewer.rig.transfer.similarity import Similarity
@@ -45,6 +45,9 @@ _ALIKE = 1.5  # misfits nearer than this do not tell front from back
 _CLEARLY = 0.85  # of the misfit, which standing the other way must reach after the fit
 _SAMPLES, _DENSE = 2_000, 12_000  # as for alignments
 _ROUNDS = 30  # to lay the template the other way round
+_AXES_ROUNDS = 20
+_FOUND = ("search", "in place")  # alignments that nobody vouches for
+_STRETCHED, _STRETCH = 0.5, 1.02  # of the misfit, and of the scales: what is worth a word
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,7 +65,7 @@ class PosedAlignment:
     positions : (V, 3)
         The template's vertices in that pose, in its own frame.
     lines : tuple of str
-        What was done to pose and proportions.
+        What was done to pose and proportions, and what would fit better.
     """
 
     alignment: Alignment
@@ -124,19 +127,37 @@ def align_posed(
     ours = Posed(posed, template.mesh.triangles)
     theirs = Posed(target.positions, target.triangles)
     rigid = align(ours, theirs, template.up, settings, lambda s, what: report(0.5 * s, what))
-    is_part = rigid.away > PART
-    before = misfit(rigid, is_part)
     kept = PosedAlignment(rigid, template, pose, posed, ())
-    if not fits or settings.scale == "axes" or before <= _CLOSE:
+    is_part = rigid.away > PART
+    if settings.scale == "axes" or misfit(rigid, is_part) <= _CLOSE:
         return kept
     exact = Triangles(target.positions, target.triangles, _SAMPLES)
-    dense = sample_surface(target.positions, target.triangles, _DENSE)
-    scales = settings.scale != "none" and not is_part
-    job = _Job(template, pose, Cloud(exact.samples, dense), exact, scales)
+    if fits:
+        dense = sample_surface(target.positions, target.triangles, _DENSE)
+        scales = settings.scale != "none" and not is_part
+        job = _Job(template, pose, Cloud(exact.samples, dense), exact, scales)
+        kept = _if_better(job, ours, kept, settings.facing, report)
+    if settings.scale == "uniform" and rigid.how in _FOUND and not is_part:
+        lines = _stretch_lines(ours, exact, rigid, misfit(kept.alignment, False))
+        kept = replace(kept, lines=(*kept.lines, *lines))
+    return kept
+
+
+def _if_better(
+    job: _Job,
+    ours: Posed,
+    kept: PosedAlignment,
+    facing: str | None,
+    report: Callable[[float, str], None],
+) -> PosedAlignment:
+    """Return the template with fitted pose and proportions if these close most of the gap."""
+    rigid = kept.alignment
+    is_part = rigid.away > PART
+    before = misfit(rigid, is_part)
     found = _fitted(job, rigid, lambda share: report(0.5 + 0.25 * share, "pose"))
-    may_turn = rigid.how in ("search", "in place") and settings.facing is None and not is_part
+    may_turn = rigid.how in _FOUND and facing is None and not is_part
     if may_turn and misfit(found.alignment, False) > _SURE:
-        behind = _turned_round(job, ours, rigid, template.up)
+        behind = _turned_round(job, ours, rigid, job.template.up)
         if misfit(behind, False) < _ALIKE * before:
             other = _fitted(job, behind, lambda share: report(0.75 + 0.25 * share, "pose"))
             if misfit(other.alignment, False) < _CLEARLY * misfit(found.alignment, False):
@@ -171,6 +192,29 @@ def _turned_round(job: _Job, ours: Posed, rigid: Alignment, up: str) -> Alignmen
     return Alignment.of(
         exact, job.exact, iterate(cloud, job.cloud, start, _ROUNDS, job.scales), "search"
     )
+
+
+def _stretch_lines(ours: Posed, exact: Triangles, rigid: Alignment, best: float) -> list[str]:
+    """Say so where a scale along each axis closes most of the gap that is left.
+
+    It is never taken unasked: people differ in height and girth, and limbs that point along
+    other axes would be resized with them.
+    """
+    if best <= _CLOSE:
+        return []
+    template = Triangles(ours.positions, ours.triangles, _SAMPLES)
+    placed = fit_axes(template, exact, rigid.placed, _AXES_ROUNDS)
+    if placed.factors.max() < _STRETCH * placed.factors.min():
+        return []
+    gap = misfit(Alignment.of(template, exact, placed, rigid.how), False)
+    if gap > _STRETCHED * best:
+        return []
+    scales = ", ".join(f"{value:.4g}" for value in placed.scale * placed.factors)
+    return [
+        f"warning: with a scale of its own along x, y and z ({scales}) the template fits much "
+        f"better, with a gap of {100.0 * gap:.3f} % instead of {100.0 * best:.3f} %: if the target "
+        "was stretched, ask for it (--scale axes)"
+    ]
 
 
 def _lines(found: Fitted) -> tuple[str, ...]:
