@@ -6,7 +6,7 @@ import pytest
 from viewer.rig.figure import Figure
 from viewer.rig.scalars import length_text, length_unit
 from viewer.rig.skeleton import ball_skeleton
-from viewer.rig.units import METRES, SIZES, WORDS, is_metres
+from viewer.rig.units import METRES, SIZES, WORDS, is_metres, unit_of_scaled
 
 
 def test_factors_are_those_of_the_units():
@@ -36,3 +36,23 @@ def test_small_lengths_are_millimetres_in_every_known_unit(unit, text):
     figure = Figure("a", skeleton=skeleton, unit=unit)
     assert length_text(figure, 2.0) == text
     assert length_unit(figure) == (pytest.approx(1000 * METRES[unit]), "mm")
+
+
+@pytest.mark.parametrize(
+    ("unit", "scale", "expected"),
+    [
+        ("m", 1.0, "m"),
+        ("m", 0.6, "m"),  # a child beside a grown-up
+        ("m", 110.0, "cm"),
+        ("m", 900.0, "mm"),
+        ("cm", 0.011, "m"),
+        ("in", 1.2, "in"),
+        ("in", 2.54, "cm"),
+        ("m", 39.37, ""),  # inches are never guessed
+        ("m", 7.0, ""),
+        ("", 1.0, ""),
+        ("furlong", 1.0, ""),
+    ],
+)
+def test_unit_of_a_figure_of_the_same_kind_is_judged_by_its_size(unit, scale, expected):
+    assert unit_of_scaled(unit, scale) == expected

@@ -83,6 +83,33 @@ def test_target_is_not_altered_and_keeps_its_texture_coordinates(carried):
     assert (rigged.figure.mesh.triangles == target.triangles).all()
 
 
+def test_target_that_is_inside_out_is_turned_round_in_the_result(carried):
+    figure, pose, target, rigged = carried
+    backwards = mesh_of(target.positions, target.triangles[:, ::-1])
+    found = transfer(figure, pose, backwards)
+    assert (found.figure.mesh.triangles == target.triangles).all()
+    assert_allclose(found.figure.mesh.normals, rigged.figure.mesh.normals, atol=1e-6)
+    assert_allclose(again(found), target.positions, atol=1e-10)
+    count = target.n_triangles
+    told = f"wound inside out, and turned round in the result: {count} triangles"
+    assert told in found.lines and told not in rigged.lines
+
+
+@pytest.mark.parametrize(
+    ("scale", "unit", "told"),
+    [
+        (1.2, "m", "metres"),
+        (1000.0, "mm", "millimetres"),
+        (30.0, "", "not known, much larger or smaller than the template"),
+    ],
+)
+def test_unit_is_judged_by_size(scale, unit, told):
+    figure, pose = bent_arm()
+    rigged = transfer(replace(figure, unit="m"), pose, moved(figure, pose, scale))
+    assert rigged.figure.unit == unit
+    assert f"unit, judged by size: {told}" in rigged.lines
+
+
 def test_the_templates_clip_plays(carried):
     figure, _, _, rigged = carried
     times = np.array([0.0, 1.0])

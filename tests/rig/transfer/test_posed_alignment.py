@@ -98,7 +98,7 @@ def test_scales_of_axes_keep_the_pose():
 def test_stretched_target_is_told_its_scales():
     figure = load(bundled_body()).actors[0].figure
     target = mesh_of(figure.mesh.positions * [1.3, 1.0, 0.8], figure.mesh.triangles)
-    found, own = aligned(figure, target, fits=False)
+    found, _ = aligned(figure, target, fits=False)
     (line,) = found.lines
     told = re.fullmatch(
         r"warning: with a scale of its own along x, y and z \((.+)\) the template fits much "

@@ -30,10 +30,17 @@ def test_match_lines_say_what_is_out_of_the_ordinary():
     found = matches([True, False, False, False], [0, 2])
     assert match_lines(found, ~found.matched, "harmonic") == (
         "matched 1 of 4 vertices (25.0%), filled in 3",
-        "less than half of the target meets the template: check the alignment, or allow a "
-        "larger distance",
-        "inside out, and turned round: 2 parts",
+        "warning: less than 75% of the target meets the template: check the alignment, or allow "
+        "a larger distance",
+        "2 parts of the target face the other way than the template: matched as if turned round",
         "the weights that were filled in needed another solver: harmonic",
+    )
+
+
+def test_match_lines_speak_of_one_part_alone():
+    found = matches([True, True], [0])
+    assert match_lines(found, ~found.matched, "direct")[1:] == (
+        "1 part of the target faces the other way than the template: matched as if turned round",
     )
 
 

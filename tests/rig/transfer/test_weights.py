@@ -80,6 +80,21 @@ def test_transfer_mixes_weights_between_vertices():
     np.testing.assert_allclose(dense(result), along(positions[:, 0]), atol=1e-12)
 
 
+def test_transfer_leaves_no_residue_of_corners_that_a_point_is_not_on():
+    # Rings between the template's sides: closest points lie on edges, but for a rounding.
+    positions, triangles = tube()
+    x = positions[:, 0].copy()
+    half = np.pi / 16
+    rotation = np.array([[np.cos(half), -np.sin(half)], [np.sin(half), np.cos(half)]])
+    positions[:, 1:] = positions[:, 1:] @ rotation.T
+    positions[:, 0] += 1e-9
+    result = transfer(positions, triangles)
+    assert result.matched.all()
+    assert np.diff(result.starts).tolist() == (along(x) > 1e-6).sum(axis=1).tolist()
+    np.testing.assert_allclose(dense(result), along(x), atol=1e-8)
+    np.testing.assert_allclose(dense(result).sum(axis=1), 1.0, atol=1e-12)
+
+
 def test_transfer_fills_in_what_stands_off_the_template():
     positions, triangles = tube(rings=25)
     x = positions[:, 0]

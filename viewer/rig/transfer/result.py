@@ -21,7 +21,7 @@ __all__ = [
 ]
 
 _LISTED = 5  # islands named one by one
-_FEW = 0.5  # of the vertices: with fewer matched, most weights are guesses
+_FEW = 0.75  # of the vertices: with fewer matched, many weights are guesses
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,6 +65,8 @@ class WeightTransfer:
         Radians between the normals of both, 0 where the target has none.
     points : SurfacePoints or None
         The V points of the template that were looked at; None if only its vertices were.
+    backwards : (V,) bool
+        Vertices of parts whose triangles are wound the wrong way.
     rigid : RigidIslands
         Parts without any matched vertex.
     lines : tuple of str
@@ -79,6 +81,7 @@ class WeightTransfer:
     distances: Floats
     angles: Floats
     points: SurfacePoints | None
+    backwards: Bools
     rigid: RigidIslands
     lines: tuple[str, ...]
 
@@ -129,11 +132,16 @@ def match_lines(found: Matches, filled: Bools, method: str) -> tuple[str, ...]:
     ]
     if found.matched.mean() < _FEW:
         lines.append(
-            "less than half of the target meets the template: check the alignment, "
-            "or allow a larger distance"
+            f"warning: less than {_FEW:.0%} of the target meets the template: check the "
+            "alignment, or allow a larger distance"
         )
-    if len(found.inside_out):
-        lines.append(f"inside out, and turned round: {_counted(len(found.inside_out), 'part')}")
+    count = len(found.inside_out)
+    if count:
+        does = "faces" if count == 1 else "face"
+        lines.append(
+            f"{_counted(count, 'part')} of the target {does} the other way than the template: "
+            "matched as if turned round"
+        )
     if method != "direct":
         lines.append(f"the weights that were filled in needed another solver: {method}")
     return tuple(lines)

@@ -22,6 +22,7 @@ from viewer.rig.transfer.checks import (
     residual_of,
     with_joint_name,
 )
+from viewer.rig.transfer.inside_out import turned_round
 from viewer.rig.transfer.joint_carrying import boundary_weights, carry_joints, surface_shifts
 from viewer.rig.transfer.matching import Template
 from viewer.rig.transfer.posed_alignment import align_posed
@@ -31,6 +32,7 @@ from viewer.rig.transfer.rigged import Rigged
 from viewer.rig.transfer.settings import Report, TransferSettings
 from viewer.rig.transfer.unposing import mend, unpose
 from viewer.rig.transfer.weights import transferred_weights
+from viewer.rig.units import WORDS, unit_of_scaled
 
 __all__ = ["robust"]
 
@@ -76,6 +78,7 @@ def robust(
         *(with_joint_name(line, figure) for line in weights.lines),
         *lines,
         *rest.lines,
+        *_judged(template, figure, weights),
         *_lost(template, figure, how),
         *check_lines(figure, guarded, out, residual),
     ]
@@ -175,13 +178,14 @@ def _at_rest(
         turned = joint_rotations(skeleton, pose)
         positions = positions - correctives.displacement(corrective_weights(turned))
     mesh = replace(target, positions=positions, normals=vertex_normals(positions, target.triangles))
+    mesh = turned_round(mesh, weights.backwards)
     figure = Figure(
         name=name,
         mesh=mesh,
         skeleton=skeleton,
         skin=skin,
         up=template.up,
-        unit=template.unit if abs(scale - 1.0) < 1e-9 else "",
+        unit=unit_of_scaled(template.unit, scale),
         correctives=correctives,
         hands=template.hands,
         pose_layout=template.pose_layout,
@@ -204,6 +208,19 @@ def _correctives(
         target.triangles,
         scale,
     )
+
+
+def _judged(template: Figure, figure: Figure, weights: WeightTransfer) -> list[str]:
+    """Say what was judged of the target: which way round it is wound, and its unit."""
+    assert figure.mesh is not None  # it was just made
+    lines = []
+    turned = int(weights.backwards[figure.mesh.triangles].any(axis=1).sum())
+    if turned:
+        lines.append(f"wound inside out, and turned round in the result: {turned} triangles")
+    if template.unit in WORDS:
+        unit = WORDS.get(figure.unit, "not known, much larger or smaller than the template")
+        lines.append(f"unit, judged by size: {unit}")
+    return lines
 
 
 def _lost(template: Figure, figure: Figure, how: TransferSettings) -> list[str]:

@@ -12,7 +12,8 @@ from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.closest_point import SurfacePoints, interpolate
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.skin import Skin, skin_rows
-from viewer.rig.transfer.inpainting import Report, fill
+from viewer.rig.transfer.inpainting import NEGLIGIBLE, Report, fill
+from viewer.rig.transfer.inside_out import wound_backwards
 from viewer.rig.transfer.laplacian import laplacian
 from viewer.rig.transfer.matching import Matches, MatchSettings, Template, match
 from viewer.rig.transfer.nearest import nearest_vertices
@@ -84,7 +85,8 @@ def transferred_weights(
     Returns
     -------
     WeightTransfer
-        Rows add up to 1. No weight is dropped except solved ones below 1e-6.
+        Rows add up to 1. No weight of the template is dropped, only solved ones below 1e-6, and
+        those of corners that have less than 1e-6 of a closest point.
 
     Raises
     ------
@@ -105,7 +107,7 @@ def transferred_weights(
     if not found.matched.any():
         raise RigError(nothing_matched(found.points.distances, size))
     report(0.4, "weighing")
-    rows = interpolate(found.points, template.triangles, source)
+    rows = interpolate(_without_residue(found.points), template.triangles, source)
     has_match = np.bincount(target.islands, found.matched, target.n_islands) > 0
     rows, rigid = _with_rigid(template, source, target, rows, np.nonzero(~has_match)[0])
     filled = ~found.matched & has_match[target.islands]
@@ -122,7 +124,14 @@ def transferred_weights(
         *rigid_lines(rigid),
     )
     skin = skin_of(rows, weights.inverse_bind, settings.max_influences)
-    return _in_vertices(target.vertices, skin, found, filled, rigid, lines)
+    backwards = wound_backwards(target, found.inside_out)
+    return _in_vertices(target.vertices, skin, found, filled, backwards, rigid, lines)
+
+
+def _without_residue(points: SurfacePoints) -> SurfacePoints:
+    """Return points on edges and corners as these: rounding leaves them a little of the rest."""
+    kept = np.where(points.barycentric < NEGLIGIBLE, 0.0, points.barycentric)
+    return replace(points, barycentric=kept / kept.sum(axis=1, keepdims=True))
 
 
 def nearest_weights(
@@ -160,6 +169,7 @@ def nearest_weights(
         distances=distances,
         angles=np.zeros(len(near)),
         points=None,
+        backwards=np.zeros(len(near), dtype=bool),
         rigid=RigidIslands(empty, empty, empty, np.zeros(0)),
         lines=(f"nearest vertex within the limit for {int(near.sum())} of {len(near)} vertices",),
     )
@@ -212,6 +222,7 @@ def _in_vertices(
     skin: Skin,
     found: Matches,
     filled: Bools,
+    backwards: Bools,
     rigid: RigidIslands,
     lines: tuple[str, ...],
 ) -> WeightTransfer:
@@ -232,6 +243,7 @@ def _in_vertices(
             points.positions[welded],
             points.distances[welded],
         ),
+        backwards=backwards,
         rigid=rigid,
         lines=lines,
     )
