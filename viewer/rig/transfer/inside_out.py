@@ -63,7 +63,7 @@ def turned_round(mesh: Mesh, vertices: Bools) -> Mesh:
     vertices : (V,) bool
         Of whole parts.
     """
-    rows = vertices[mesh.triangles].any(axis=1)
+    rows = np.logical_or.reduce(vertices[mesh.triangles], axis=1)
     if not rows.any():
         return mesh
     triangles = _reversed(mesh.triangles, rows)
