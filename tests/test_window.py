@@ -167,15 +167,15 @@ class Window:
     def screen(self):
         return np.array(ImageGrab.grab(xdisplay=self.display).convert("RGB"))
 
-    def wait_until_quiet(self):
-        """Return the screen as soon as it shows the figure and has stopped changing."""
+    def wait_until_quiet(self, still=0.25):
+        """Return the screen as soon as it shows the figure and has not changed for a while."""
         last = [self.screen(), time.monotonic()]
 
         def is_quiet():
             now = self.screen()
             if (now != last[0]).any() or now.max() == 0:
                 last[:] = now, time.monotonic()
-            return now if time.monotonic() - last[1] > 0.25 else None
+            return now if time.monotonic() - last[1] > still else None
 
         return _wait_for(is_quiet, "a picture that stands still")
 
@@ -308,15 +308,16 @@ def test_layout_is_remembered_between_runs(window, places):
     app = window()
     before = app.wait_until_quiet()
     app.drag((x - 1, y + height / 2), (x + 120, y + height / 2))
-    wider = app.wait_until_changed(before)
+    app.wait_until_changed(before)
+    wider = app.wait_until_quiet(still=1.0)
     app.tell("windowfocus", "--sync", app.id)
     app.key("ctrl+q")
     app.finish()
     assert (app.folder / "state" / "viewer" / "layout.ini").stat().st_size > 100
-    again = window().wait_until_quiet()
     strip = np.s_[200:700, int(x) + 20 : int(x) + 100]  # was view, is panel now
     assert (wider[strip] != before[strip]).mean() > 0.5
-    assert (again[strip] == wider[strip]).mean() > 0.98
+    again = window()
+    _wait_for(lambda: (again.screen()[strip] == wider[strip]).mean() > 0.98, "the same layout")
 
 
 def test_idle_window_burns_no_processor(window):
