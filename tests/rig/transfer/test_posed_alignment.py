@@ -12,8 +12,13 @@ pytest.importorskip("scipy")
 from viewer.loading import bundled_body, load
 from viewer.rig.pose import rest_pose
 from viewer.rig.skinning import deform, joint_matrices
+from viewer.rig.transfer import posed_alignment
 from viewer.rig.transfer.alignment import AlignmentSettings
+from viewer.rig.transfer.pose_fit import Fitted
 from viewer.rig.transfer.posed_alignment import align_posed
+from viewer.rig.transfer.similarity import Similarity
+
+LANDMARKS = np.array([[[0, 0, 0]] * 2, [[1, 0, 0]] * 2, [[0, 0, 1]] * 2], dtype=float)
 
 
 def silent(share, what):
@@ -115,6 +120,46 @@ def test_stretched_target_is_told_its_scales():
     assert np.linalg.norm(laid - target.positions, axis=1).max() < 0.003 * size
     known, _ = aligned(figure, target, fits=False, scale="none")
     assert known.lines == ()
+
+
+def bent(angle):
+    figure = arm()
+    pose = rest_pose(figure.skeleton)
+    pose.dofs[8] = angle
+    return figure, pose, mesh_of(deform(figure, pose)[0], figure.mesh.triangles)
+
+
+def fit_of(figure, pose, angle):
+    """Return what a fit comes to that turned the tip by an angle, and then stopped."""
+    turned = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, angle]])
+    placed = Similarity(1.0, np.eye(3), np.zeros(3), np.ones(3))
+    return Fitted(figure, pose, placed, turned, np.zeros((2, 2)))
+
+
+@pytest.mark.parametrize(
+    ("target", "reached", "lines"),
+    [
+        (1.5, 1.38, ("warning: pose: not fitted, as that would leave a gap of G % of the size, "
+                     "before G %, with tip turned by 79 degrees: is the template of the same kind "
+                     "as the target?",)),
+        (0.9, 0.7, ("pose: the template's joints turned to fit, tip by 40 degrees; its limbs "
+                    "resized, base by +0 % in length",
+                    "warning: that leaves a gap of G % of the size, before G %: is the template of "
+                    "the same kind as the target?")),
+        (1.5, 1.5, ("pose: the template's joints turned to fit, tip by 86 degrees; its limbs "
+                    "resized, base by +0 % in length",
+                    "that leaves a gap of G % of the size, before G %")),
+        (1.5, 0.1, ("pose: not fitted, as that would leave a gap of G % of the size, "
+                    "before G %",)),
+    ],
+)  # fmt: skip
+def test_fit_that_leaves_a_gap_is_doubted_or_left(monkeypatch, target, reached, lines):
+    figure, _, mesh = bent(target)
+    half = bent(reached)[1]
+    monkeypatch.setattr(posed_alignment, "fit_pose", lambda *_: fit_of(figure, half, reached))
+    found, own = aligned(figure, mesh, landmarks=LANDMARKS, refines=False)
+    assert tuple(re.sub(r"\d+\.\d+", "G", line) for line in found.lines) == lines
+    assert (found.pose is own) == ("not fitted" in lines[0])
 
 
 def test_progress_rises_and_cancels(standing):

@@ -40,6 +40,9 @@ _CLOSE = 0.002  # misfit over size up to which nothing is gained by turning join
 # Share of the misfit that may be left if turned joints are to be kept: clothes can be fitted a
 # little better by bending the body, but only a figure in another pose much better.
 _KEPT, _PART_KEPT = 0.65, 0.5
+# A fit that leaves more than this and turned a joint by more is of another kind of figure, as of a
+# fox onto a pig: it bends the spine until the legs meet something.
+_POOR, _BENT = 0.01, np.radians(45.0)
 _SURE = 0.004  # misfit after the fit up to which a figure faces the right way: no other is tried
 _ALIKE = 1.5  # misfits nearer than this do not tell front from back
 _CLEARLY = 0.85  # of the misfit, which standing the other way must reach after the fit
@@ -66,6 +69,8 @@ class PosedAlignment:
         The template's vertices in that pose, in its own frame.
     lines : tuple of str
         What was done to pose and proportions, and what would fit better.
+    most_turned : (float, str)
+        The largest turn of a joint in radians, and its name; (0, "") if none was turned.
     """
 
     alignment: Alignment
@@ -73,6 +78,7 @@ class PosedAlignment:
     pose: Pose
     positions: Floats
     lines: tuple[str, ...]
+    most_turned: tuple[float, str] = (0.0, "")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -163,9 +169,18 @@ def _if_better(
             if misfit(other.alignment, False) < _CLEARLY * misfit(found.alignment, False):
                 found = other
     after = misfit(found.alignment, is_part)
+    bent, name = found.most_turned
+    gaps = f"a gap of {100.0 * after:.3f} % of the size, before {100.0 * before:.3f} %"
     if after > (_PART_KEPT if is_part else _KEPT) * before:
-        return kept
-    return replace(found, lines=(*found.lines, _gap_line(before, after)))
+        return replace(kept, lines=(f"pose: not fitted, as that would leave {gaps}",))
+    if after <= _POOR:
+        return replace(found, lines=(*found.lines, f"that leaves {gaps}"))
+    doubt = "is the template of the same kind as the target?"
+    if bent > _BENT:
+        turn = f"{name} turned by {np.degrees(bent):.0f} degrees"
+        line = f"warning: pose: not fitted, as that would leave {gaps}, with {turn}: {doubt}"
+        return replace(kept, lines=(line,))
+    return replace(found, lines=(*found.lines, f"warning: that leaves {gaps}: {doubt}"))
 
 
 def _fitted(job: _Job, start: Alignment, report: Callable[[float], None]) -> PosedAlignment:
@@ -176,7 +191,9 @@ def _fitted(job: _Job, start: Alignment, report: Callable[[float], None]) -> Pos
     ours = Triangles(posed, template.mesh.triangles, _SAMPLES)
     how = start.how if start.how == "landmarks" else "fit"
     alignment = Alignment.of(ours, job.exact, found.placed, how)
-    return PosedAlignment(alignment, found.figure, found.pose, posed, _lines(found))
+    return PosedAlignment(
+        alignment, found.figure, found.pose, posed, _lines(found), _most_turned(found)
+    )
 
 
 def _turned_round(job: _Job, ours: Posed, rigid: Alignment, up: str) -> Alignment:
@@ -221,15 +238,19 @@ def _lines(found: Fitted) -> tuple[str, ...]:
     """Say which joint was turned most, and which limb resized most."""
     skeleton = found.figure.skeleton
     assert skeleton is not None  # the caller looked
-    angles = np.linalg.norm(found.turned, axis=1)
-    most, longest = int(angles.argmax()), int(np.abs(found.grown[0]).argmax())
-    names = [joint_label(skeleton, joint) for joint in (most, longest)]
+    angle, name = _most_turned(found)
+    longest = int(np.abs(found.grown[0]).argmax())
     change = 100.0 * np.expm1(found.grown[0, longest])
     return (
-        f"pose: the template's joints turned to fit, {names[0]} by {np.degrees(angles[most]):.0f} "
-        f"degrees; its limbs resized, {names[1]} by {change:+.0f} % in length",
+        f"pose: the template's joints turned to fit, {name} by {np.degrees(angle):.0f} degrees; "
+        f"its limbs resized, {joint_label(skeleton, longest)} by {change:+.0f} % in length",
     )
 
 
-def _gap_line(before: float, after: float) -> str:
-    return f"that leaves a gap of {100.0 * after:.3f} % of the size, before {100.0 * before:.3f} %"
+def _most_turned(found: Fitted) -> tuple[float, str]:
+    """Return the largest turn of a joint in radians, and the joint's name."""
+    skeleton = found.figure.skeleton
+    assert skeleton is not None  # the caller looked
+    angles = np.linalg.norm(found.turned, axis=1)
+    most = int(angles.argmax())
+    return float(angles[most]), joint_label(skeleton, most)
