@@ -36,7 +36,7 @@ __all__ = [
 
 _FAR = 3.0  # medians: pairs farther apart than this are not used
 _SAME_WAY = 0.5  # cosine of 60 degrees between the normals of a pair
-_SETTLED = 1e-5  # relative change of the error at which rounds end
+_SETTLED = 1e-5  # relative change of the error, or of scales, at which rounds end
 _EXACT = 1e-12  # error over size at which there is nothing left to improve
 _ON_EDGE = 1e-9  # barycentric coordinate of a point on an edge
 _HOLD = 3e-3  # weight of distances between points beside those to planes, before squaring
@@ -290,7 +290,10 @@ def fit_axes(template: Side, target: Side, start: Similarity, rounds: int) -> Si
         if (scales <= 0.0).any():
             break
         scale = float(np.cbrt(np.prod(scales)))
+        settled = np.abs(scales / (placed.scale * placed.factors) - 1.0).max() < _SETTLED
         placed = Similarity(scale, start.rotation, solved[3:], scales / scale)
+        if settled:
+            break
     return placed
 
 

@@ -50,7 +50,9 @@ _SAMPLES, _DENSE = 2_000, 12_000  # as for alignments
 _ROUNDS = 30  # to lay the template the other way round
 _AXES_ROUNDS = 20
 _FOUND = ("search", "in place")  # alignments that nobody vouches for
-_STRETCHED, _STRETCH = 0.5, 1.02  # of the misfit, and of the scales: what is worth a word
+# Scales of their own are worth a word where a gap above the first is left, they leave at most the
+# second of it, and differ by more than the third.
+_STRETCH_GAP, _STRETCH_LEFT, _STRETCH = 0.001, 0.5, 1.02
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -135,10 +137,11 @@ def align_posed(
     rigid = align(ours, theirs, template.up, settings, lambda s, what: report(0.5 * s, what))
     kept = PosedAlignment(rigid, template, pose, posed, ())
     is_part = rigid.away > PART
-    if settings.scale == "axes" or misfit(rigid, is_part) <= _CLOSE:
+    gap = misfit(rigid, is_part)
+    if settings.scale == "axes" or gap <= min(_CLOSE, _STRETCH_GAP):
         return kept
     exact = Triangles(target.positions, target.triangles, _SAMPLES)
-    if fits:
+    if fits and gap > _CLOSE:
         dense = sample_surface(target.positions, target.triangles, _DENSE)
         scales = settings.scale != "none" and not is_part
         job = _Job(template, pose, Cloud(exact.samples, dense), exact, scales)
@@ -217,14 +220,14 @@ def _stretch_lines(ours: Posed, exact: Triangles, rigid: Alignment, best: float)
     It is never taken unasked: people differ in height and girth, and limbs that point along
     other axes would be resized with them.
     """
-    if best <= _CLOSE:
+    if best <= _STRETCH_GAP:
         return []
     template = Triangles(ours.positions, ours.triangles, _SAMPLES)
     placed = fit_axes(template, exact, rigid.placed, _AXES_ROUNDS)
     if placed.factors.max() < _STRETCH * placed.factors.min():
         return []
     gap = misfit(Alignment.of(template, exact, placed, rigid.how), False)
-    if gap > _STRETCHED * best:
+    if gap > _STRETCH_LEFT * best:
         return []
     scales = ", ".join(f"{value:.4g}" for value in placed.scale * placed.factors)
     return [
