@@ -9,12 +9,23 @@ in float in_width;      // pixels
 
 uniform mat4 u_model_view;
 uniform mat4 u_projection;
-uniform vec2 u_size;    // of the picture, pixels
+uniform vec2 u_size;        // of the picture, pixels
+uniform float u_border;     // pixels around it
+uniform float u_lift;       // share of the way to the eye by which it lies before its place
+uniform float u_height;     // the same for parallel projections: scene units
+uniform bool u_orthographic;
 
 out vec4 v_color;
 noperspective out vec2 v_place;     // pixels along the segment and beside it
 flat out float v_length;            // pixels
 flat out float v_radius;            // pixels
+
+// What lies on a surface is drawn a little before it, at the same place of the picture.
+vec4 lifted(vec3 place) {
+    vec3 seen = (u_model_view * vec4(place, 1.0)).xyz;
+    seen = u_orthographic ? seen + vec3(0.0, 0.0, u_height) : seen * (1.0 - u_lift);
+    return u_projection * vec4(seen, 1.0);
+}
 
 // Where the segment from a to b, with a behind the near plane, crosses it.
 vec4 cut(vec4 a, vec4 b) {
@@ -24,8 +35,7 @@ vec4 cut(vec4 a, vec4 b) {
 }
 
 void main() {
-    mat4 matrix = u_projection * u_model_view;
-    vec4 first = matrix * vec4(in_start, 1.0), second = matrix * vec4(in_end, 1.0);
+    vec4 first = lifted(in_start), second = lifted(in_end);
     vec4 start = cut(first, second), end = cut(second, first);
     vec2 way = 0.5 * (end.xy / end.w - start.xy / start.w) * u_size;
     v_length = length(way);
@@ -33,7 +43,7 @@ void main() {
     v_radius = 0.5 * in_width;
     bool at_end = gl_VertexID >= 2;
     // Half a pixel more all around, for edges that fade.
-    float reach = v_radius + 0.5;
+    float reach = v_radius + u_border + 0.5;
     float along = at_end ? reach : -reach, side = gl_VertexID % 2 == 0 ? -reach : reach;
     vec4 place = at_end ? end : start;
     place.xy += 2.0 / u_size * (along * way + side * vec2(-way.y, way.x)) * place.w;

@@ -69,6 +69,31 @@ def test_drag_is_one_step_and_undone_at_once(arm):
     assert_array_equal(arm.dofs(), after)
 
 
+def test_click_on_a_ring_chooses_the_joint_whose_dot_lies_there(arm):
+    camera = arm.state.camera
+    camera.orthographic = True
+    arm.step(2)
+    for _ in range(3):  # until the elbow is as far from the shoulder as the outer ring
+        apart = np.subtract(joint_seen(arm, 1), joint_seen(arm, 0))
+        camera.distance *= np.linalg.norm(apart) / VIEW_RADIUS
+        arm.step(2)
+    before, steps = arm.dofs(), arm.undo_steps
+    place = joint_seen(arm, 1)
+    arm.move(place)
+    arm.press()
+    assert arm.state.posing.drag is not None  # the ring is held
+    arm.let_go()
+    arm.step(2)
+    assert arm.state.selected_joint == 1
+    assert_array_equal(arm.dofs(), before)
+    assert arm.undo_steps == steps
+    # A drag from there turns the joint that has the ring.
+    arm.state.selected_joint = 0
+    arm.step(2)
+    drag_along(arm, around(joint_seen(arm, 0), VIEW_RADIUS, 0.0, 0.8))
+    assert arm.state.selected_joint == 0 and (arm.dofs() != before).any()
+
+
 @pytest.mark.parametrize("way", ["escape", "right button"])
 def test_cancelled_drag_restores_the_pose_and_leaves_no_step(arm, way):
     before, steps = arm.dofs(), arm.undo_steps

@@ -169,6 +169,23 @@ def test_f12_saves_what_is_shown_and_never_replaces(hand, tmp_path, monkeypatch)
     assert hand.undo_steps == 1  # only the wireframe
 
 
+def test_f12_says_that_the_legend_is_not_in_the_picture(hand, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = "The legend is not in it: Legend in pictures (panel Weights) does that"
+    hand.key("f12")
+    assert not hand.says(text)
+    hand.state.options.shading, hand.state.options.scalar = "scalar", "influences"
+    hand.step(3)
+    without = hand.scene_picture()
+    hand.key("f12")
+    assert hand.says(text)
+    hand.state.notes.clear()
+    hand.state.options.legend = True
+    hand.step(3)
+    hand.key("f12")
+    assert not hand.says(text) and (hand.scene_picture() != without).any()
+
+
 def test_f12_without_a_current_folder_shows_a_message(hand, tmp_path, monkeypatch):
     folder = tmp_path / "gone"
     folder.mkdir()
@@ -234,14 +251,6 @@ def test_ctrl_letters_are_not_plain_letters(hand):
     for key in ("s", "w", "r", "h", "g"):
         hand.key(key, "ctrl")
     assert hand.undo_steps == 0 and not hand.state.keys_visible
-
-
-def test_keys_overlay_lists_every_key_within_the_view(drive, rig):
-    hand = drive(*rig, size=(900, 700))
-    hand.key("h")
-    hand.step(2)
-    window = imgui.internal.find_window_by_name("##keys")
-    assert window.pos.y >= 0 and window.pos.y + window.size.y <= 700
 
 
 def test_menu_entries_act(hand):

@@ -6,10 +6,14 @@ import json
 
 import numpy as np
 import pytest
+from app.posing_rigs import arm_figure
 from imgui_bundle import imgui
 from numpy.testing import assert_allclose, assert_array_equal
 
-from viewer.rig.pose import pose_key
+from viewer.formats.pose import pose_text
+from viewer.rig.pose import joint_rotations, pose_key, rest_pose
+from viewer.rig.pose_record import record_of
+from viewer.rig.scene import Actor, Scene
 
 
 @pytest.fixture
@@ -170,6 +174,50 @@ def test_pose_menu_of_the_panel_copies_pastes_and_mirrors(box):
     box.click("Pose…")
     box.click("Mirror")
     assert box.dof("joint_2.x") == pytest.approx(np.pi / 4) and _key(box) != before
+
+
+# Other actors and windows
+
+ANGLES = (0.4, -0.3, 0.7, 0.2, 0.9, -0.5, 0.1, 0.6, -0.2)
+
+
+def _arm_text(orders, dofs, **settings):
+    """Return what a window with an arm copies, with its pose and its joints' rotations."""
+    figure = arm_figure(orders=orders, **settings)
+    pose = rest_pose(figure.skeleton)
+    pose.dofs[:] = dofs
+    return pose_text(record_of(figure, pose)), pose, joint_rotations(figure.skeleton, pose)
+
+
+def _arm(drive, *orders, **settings):
+    return drive(scene=Scene([Actor(arm_figure(orders=orders, **settings))]))
+
+
+def test_another_window_takes_rotations_where_its_dofs_are_others(drive):
+    text, _, wanted = _arm_text(("xyz", "xyz", "xyz"), ANGLES, name="first")
+    hand = _arm(drive, "zyx", "yxz", "xzy", name="second")
+    _paste(hand, text)
+    actor = hand.state.actor
+    found = joint_rotations(actor.figure.skeleton, actor.pose)
+    assert_allclose(found, wanted, atol=1e-12)
+    assert np.abs(hand.dofs() - ANGLES).max() > 0.1
+    assert hand.says("3 of 3 joints of first taken over") and hand.says("Pose pasted")
+
+
+def test_another_window_with_the_same_dofs_takes_every_digit(drive):
+    orders = "xyz", "z", "xyz"
+    text, pose, _ = _arm_text(orders, (1.0, 2.0, -1 / 3, *ANGLES[:7]), root="xyz")
+    hand = _arm(drive, *orders, root="xyz", name="other")
+    _paste(hand, text)
+    assert _key(hand) == pose_key(pose) and not hand.says("taken over")
+
+
+def test_moves_that_another_actor_does_not_take_are_said(drive):
+    first = _arm_text(("xyz", "z", "xyz"), (0.5, 0.25, *[0] * 6), root="y", name="first")
+    hand = _arm(drive, "zyx", "z", "xyz", root="y", name="second")
+    _paste(hand, first[0])
+    assert hand.dof("shoulder.ty") == 0.0 and hand.dof("shoulder.x") == pytest.approx(0.25)
+    assert hand.says("left as they were: where joints are moved to")
 
 
 # Dialogs

@@ -4,10 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from PIL import Image
 
 from viewer.app.record_dialog import RecordSettings
+from viewer.app.recorded_marks import RecordedMarks
+from viewer.app.weights_actions import pin_vertex, unpin
+from viewer.rendering.joint_marks import HIGHLIGHT
+from viewer.rendering.recorder import copied
 from viewer.rig.clip import Channel, Clip
+from viewer.rig.crowd import pose_actors
 
 
 @pytest.fixture
@@ -67,6 +73,62 @@ def test_numbered_pictures_show_what_the_window_shows(moving, tmp_path):
             differences[number, other] = np.abs(found - shown[:height, :width, :3]).mean()
     assert (differences.argmin(axis=1) == range(5)).all()
     assert np.diag(differences).max() < 2.0 < differences[0, 1]
+
+
+def test_what_explains_the_view_is_in_every_frame(moving, tmp_path):
+    state = moving.state
+    pin_vertex(state, 0, 4)
+    state.selected_joint = 1
+    state.options.joint_names = state.options.xray = True
+    moving.step(4)
+    start(moving, tmp_path / "a_{frame}.png", kind="pictures", rate=2.0)
+    finish(moving)
+    unpin(state)
+    state.options.joint_names = state.options.xray = False
+    moving.step(2)
+    start(moving, tmp_path / "b_{frame}.png", kind="pictures", rate=2.0)
+    finish(moving)
+    middles = []
+    for number in range(3):
+        with (
+            Image.open(tmp_path / f"a_{number}.png") as marked,
+            Image.open(tmp_path / f"b_{number}.png") as plain,
+        ):
+            pictures = [np.array(one.convert("RGB")).astype(int) for one in (marked, plain)]
+        changed = np.abs(pictures[0] - pictures[1]).max(axis=-1) > 8
+        # The selected joint's dot, 1.5 times as large as the others.
+        yellow = np.abs(pictures[0] - 255 * np.array(HIGHLIGHT[:3])).max(axis=-1) < 6
+        assert yellow.sum() > 20 and changed[yellow].any()
+        # The white dot of the vertex moves with the figure.
+        white = changed & (pictures[0].min(axis=-1) > 250)
+        middles.append(np.nonzero(white)[1].max())
+    assert middles[0] < middles[1] < middles[2]
+
+
+def test_annotations_are_those_of_the_frames_pose(moving):
+    pin_vertex(moving.state, 0, 4)
+    moving.step(4)
+    marks = RecordedMarks(moving.state)
+    unpin(moving.state)
+    scene = copied(moving.state.scene)
+    places = []
+    for seconds in (0.0, 1.0):
+        pose_actors(scene.actors, seconds, False)
+        (found,) = marks.at(scene, (960, 720))
+        places.append(found.segments.starts[-1])
+    assert_allclose(places[1] - places[0], [0.5, 0.0, 0.0], atol=1e-12)
+    scene.actors[0].visible = False
+    assert marks.at(scene, (960, 720)) == []
+
+
+def test_dialog_offers_the_legend_where_there_is_one(moving):
+    moving.state.record = RecordSettings()
+    moving.step(2)
+    assert "Legend in pictures" not in moving.state.item_rects
+    moving.state.options.shading = "scalar"
+    moving.step(2)
+    moving.click("Legend in pictures")
+    assert moving.state.options.legend
 
 
 def test_scene_is_left_as_it_was(moving, tmp_path):

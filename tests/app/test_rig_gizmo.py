@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+
 import numpy as np
 import pytest
 from app import rig_scene
@@ -14,11 +16,13 @@ from viewer.app.rig_gizmo import RADIUS
 from viewer.app.rig_placing import (
     as_similarity,
     ghost_place,
+    laid_template,
     move_by_hand,
     posed_template,
     similarity_now,
 )
 from viewer.app.rig_sources import current_template, target_mesh
+from viewer.app.rig_steps import align_template
 from viewer.app.view_frame import view_frame
 from viewer.rig.mesh import bounding_box
 from viewer.rig.transform import apply_transform, translation_matrix
@@ -103,6 +107,74 @@ def test_ring_turns_the_template_about_its_middle(hand):
     assert_allclose(after.rotation, quarter @ before.rotation, atol=0.02)
     assert_allclose(middle(hand)[0], center, atol=1e-3)
     assert after.scale == pytest.approx(before.scale, rel=1e-5)
+
+
+def test_drag_is_one_step_of_undoing_with_its_error(hand):
+    hand.click("rig tool move")
+    before, steps = similarity(hand), hand.undo_steps
+    pull_along_x(hand, 2.5)
+    finish(hand)
+    first, error = similarity(hand), hand.state.rig.placing.alignment.error
+    pull_along_x(hand, -1.0)
+    finish(hand)
+    assert hand.undo_steps == steps + 2
+    hand.key("z", "ctrl")
+    hand.step(2)
+    assert_allclose(similarity(hand).matrix, first.matrix)
+    assert hand.state.rig.placing.alignment.error == error  # measured before, and known again
+    hand.key("z", "ctrl")
+    hand.step(2)
+    assert hand.state.rig.placing is None
+    assert_allclose(similarity(hand).matrix, before.matrix)
+    hand.key("y", "ctrl")
+    hand.step(2)
+    assert_allclose(similarity(hand).matrix, first.matrix)
+    assert hand.state.job is None and hand.undo_steps == steps + 1
+
+
+def test_moved_template_keeps_its_fitted_pose_and_not_the_gap_it_left(hand):
+    hand.state.scene.actors[1].pose.dofs[6:] = 0.2, -0.1, 0.2  # the target's tip is bent more
+    hand.step(2)
+    hand.click("Align")
+    finish(hand)
+    pose, gap = hand.state.rig.placing.lines
+    assert pose.startswith("pose: ") and gap.startswith("that leaves a gap of ")
+    laid = laid_template(hand.state)
+    away = translation_matrix(np.array([2.5, 0.0, 0.0])) @ similarity_now(hand.state, laid).matrix
+    move_by_hand(hand.state, laid, as_similarity(away))
+    assert hand.state.rig.placing.lines == (pose,)
+    assert hand.state.rig.placing.fitted is laid
+
+
+def test_drag_undone_while_its_error_is_measured_stays_undone(hand, monkeypatch):
+    gate = threading.Event()
+
+    def late(*given):
+        gate.wait(60)
+        return align_template(*given)
+
+    monkeypatch.setattr("viewer.app.rig_work.align_template", late)
+    hand.click("rig tool move")
+    pull_along_x(hand, 2.5)
+    hand.step(2)
+    assert hand.state.job is not None
+    hand.key("z", "ctrl")
+    hand.step(2)
+    gate.set()
+    finish(hand)
+    assert hand.state.rig.placing is None
+    hand.key("y", "ctrl")
+    hand.step(2)
+    assert hand.state.rig.placing.alignment.error > 0.01
+
+
+def pull_along_x(hand, way):
+    """Drag the arrow along x by a length of the scene."""
+    _, place = middle(hand)
+    unit = unit_way(hand, np.array([1.0, 0.0, 0.0]))
+    start = place + 45.0 * unit / np.linalg.norm(unit)
+    hand.pull(tuple(start), tuple(start + way * unit))
+    hand.step(2)
 
 
 def hovers(hand, place):

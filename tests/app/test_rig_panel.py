@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import threading
+import time
+
 import numpy as np
 import pytest
 from app import rig_scene
@@ -76,11 +79,14 @@ def test_alignment_is_found_and_shown_with_its_error(rigging, texts):
     assert_allclose(hand.state.rig.placing.similarity.matrix, TRUE, atol=1e-6)
     texts.clear()
     hand.step()
-    assert "error 0.00 % of its size (search)" in texts
+    assert "error 0.00 % (by closest points)" in texts
     ghost = hand.app.frame.renderer.ghost
     assert ghost.style == "translucent"
     assert_allclose(ghost.placement, TRUE, atol=1e-6)
-    assert hand.undo_steps == steps  # nothing in the scene has changed
+    assert hand.undo_steps == steps + 1
+    hand.key("z", "ctrl")
+    hand.step(2)
+    assert hand.state.rig.placing is None and hand.app.frame.renderer.ghost is None
 
 
 def test_template_posed_after_aligning_says_so(rigging, texts):
@@ -151,6 +157,30 @@ def test_run_puts_the_rigged_mesh_in_the_targets_place_in_one_step(rigging):
     hand.step(2)
     assert visible(hand) == ["scan rigged", "arm"]
     hand.assert_sane()
+
+
+def test_report_says_how_the_alignment_was_found(rigging, texts):
+    hand = rigging(placed=False)
+    hand.state.scene.actors[1].pose.dofs[6:] = 0.2, -0.1, 0.2
+    hand.step(2)
+    hand.click("Align")
+    finish(hand)
+    hand.click("Run")
+    finish(hand)
+    rigged = hand.state.rig.results["robust"].rigged
+    assert rigged.lines[0].startswith("alignment: found by fitting pose and proportions; scale ")
+    assert rigged.lines[1].startswith("alignment error: ")
+    assert rigged.lines[2:4] == hand.state.rig.placing.lines
+    assert rigged.lines[2].startswith("pose: ") and rigged.lines[4].startswith("matched ")
+
+
+def test_stats_count_the_rigged_mesh(rigging, texts):
+    hand = rigging()
+    hand.click("Run")
+    finish(hand)
+    texts.clear()
+    hand.step()
+    assert "scan rigged, arm, scan" in texts and "4" in texts  # joints: two of each rig
 
 
 def test_a_goes_between_the_mesh_and_its_rig_without_steps(rigging):
@@ -322,11 +352,14 @@ def test_settings_reach_alignment_and_transfer(rigging, monkeypatch):
     hand = rigging(placed=False)
     hand.pick("Up", 3)
     hand.pick("Scale", 2)
+    hand.click("rig advanced")
+    hand.step(2)
     hand.pick("Joints##rig", 1)
     hand.enter_value("Max. angle", "75")
     hand.enter_value("Smoothing", "7")
     hand.enter_value("Max. influences", "3")
     hand.click("Pose correctives")
+    hand.click("Refine alignment")
     hand.click("Fit pose and proportions")
     hand.click("Run")
     finish(hand)
@@ -334,11 +367,47 @@ def test_settings_reach_alignment_and_transfer(rigging, monkeypatch):
     assert hand.state.error == "stopped here" and asked["name"] == "scan rigged"
     assert (asked["alignment"].up, asked["alignment"].scale) == ("z", "none")
     assert asked["alignment"].facing is None and not asked["fits"]
+    assert not asked["alignment"].refines
     assert_allclose(settings.alignment.matrix, TRUE, atol=1e-9)
     assert settings.joints == "copied" and not settings.correctives and not settings.fits
     assert settings.weights.match.max_angle == pytest.approx(np.radians(75.0))
     assert settings.weights.match.near_angle == pytest.approx(np.radians(75.0))
     assert (settings.weights.smoothing_rounds, settings.weights.max_influences) == (7, 3)
+
+
+def test_advanced_settings_are_folded_away_and_counted(rigging, texts, monkeypatch):
+    titles, draw = [], imgui.tree_node
+    monkeypatch.setattr(imgui, "tree_node", lambda text: titles.append(text) or draw(text))
+    hand = rigging(placed=False)
+    assert titles[-1] == "Advanced###rig advanced" and "Smoothing" not in hand.state.item_rects
+    hand.state.rig.choices.smoothing, hand.state.rig.choices.joints = 3, "copied"
+    hand.step(2)
+    assert titles[-1] == "Advanced (2 changed)###rig advanced"
+    hand.click("rig advanced")
+    hand.step(2)
+    assert "Smoothing" in hand.state.item_rects
+
+
+def test_work_says_in_words_what_it_does_and_its_share(rigging, texts, monkeypatch):
+    gate = threading.Event()
+
+    def placed(template, own, target, settings, fits, tell):
+        tell(0.4, "pose")
+        gate.wait(60)
+        return align_template(template, own, target, AlignmentSettings(matrix=TRUE), False, tell)
+
+    monkeypatch.setattr("viewer.app.rig_work.align_template", placed)
+    said, draw = [], imgui.progress_bar
+    monkeypatch.setattr(imgui, "progress_bar", lambda *given: said.append(given[2]) or draw(*given))
+    hand = rigging(placed=False)
+    hand.click("Align")
+    while hand.state.job.progress != (40, 100):
+        time.sleep(0.01)
+    texts.clear()
+    hand.step(2)
+    gate.set()
+    assert "Fitting pose and proportions" in texts and said[-1] == "40 %"
+    finish(hand)
 
 
 def test_template_in_another_pose_is_turned_to_fit_and_shown_so(rigging, texts):

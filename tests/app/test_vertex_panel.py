@@ -7,8 +7,11 @@ import pytest
 from imgui_bundle import imgui
 from numpy.testing import assert_allclose
 
+from viewer.app.explanation_lines import influence_colors, vertex_annotation
 from viewer.app.panels.vertex import matrix_text
 from viewer.app.weights_actions import pin_vertex
+from viewer.rendering.projection import project
+from viewer.rendering.view import view_of
 from viewer.rig.explanation import explain
 from viewer.rig.explanation_text import explanation_text
 from viewer.rig.skinning import Skinning, deform, joint_matrices
@@ -138,6 +141,74 @@ def test_lines_lead_to_the_rigid_images(pinned):
     pinned.state.options.show = "binding"
     assert pinned.state.weights.pinned is not None
     pinned.step(2)
+
+
+def beside(hand, picture, weight_place):
+    """Return the pixels around a share of the way from the vertex to its first rigid image."""
+    size = picture.shape[1], picture.shape[0]
+    explanation = hand.state.weights.explanation
+    start, end = explanation.position, explanation.images[0]
+    point = start + weight_place * (end - start)
+    view = view_of(hand.state.camera, size, hand.state.box)
+    x, y = np.rint(project(view, size, point[None]).pixels[0]).astype(int)
+    return picture[y - 2 : y + 3, x - 2 : x + 3, :3].astype(int)
+
+
+def test_screenshot_has_the_lines_while_they_are_shown(pinned):
+    shown = pinned.scene_picture()
+    explanation = pinned.state.weights.explanation
+    skeleton = pinned.state.actor.figure.skeleton
+    color = 255 * influence_colors(explanation, skeleton)[0]
+    # In the middle of the line the colour of its joint, at its end a white dot.
+    apart = np.abs(beside(pinned, shown, 0.5) - color).max(axis=-1)
+    assert apart.min() < 90
+    assert beside(pinned, shown, 0.0).min(axis=-1).max() > 240
+    pinned.click("Lines")
+    pinned.step(2)
+    without = pinned.scene_picture()
+    assert (beside(pinned, without, 0.5) != beside(pinned, shown, 0.5)).any()
+    assert beside(pinned, without, 0.0).min(axis=-1).max() > 240
+    pinned.click("Unpin")
+    pinned.step(2)
+    assert (pinned.scene_picture() != without).any()
+
+
+def test_annotation_is_made_anew_only_when_something_changed(pinned):
+    before = pinned.state.weights.annotations
+    pinned.step(3)
+    assert pinned.state.weights.annotations is before
+    pinned.state.actor.pose.dofs[pinned.dof_index("arm.z")] = 0.5
+    pinned.step(2)
+    after = pinned.state.weights.annotations
+    assert after is not before
+    pinned.state.actor.visible = False
+    pinned.step(2)
+    assert pinned.app.frame.renderer.annotations == ()
+
+
+def test_every_influence_has_a_line_a_dot_and_a_word(pinned):
+    explanation, actor = pinned.state.weights.explanation, pinned.state.actor
+    actor.placement[:3, 3] = 10.0, 0.0, 0.0
+    found = vertex_annotation(explanation, actor, True, (960, 720))  # scale 1
+    assert found.manner.on_top
+    # Weakest first: a dark line, a line, a dark dot, a dot; at last the vertex, dark and white.
+    shift = np.array([10.0, 0, 0])
+    starts, ends = found.segments.starts - shift, found.segments.ends - shift
+    weak, strong = explanation.images[1], explanation.images[0]
+    vertex = explanation.position
+    assert_allclose(
+        starts, [vertex, vertex, weak, weak, vertex, vertex, strong, strong, vertex, vertex]
+    )
+    assert_allclose(ends, [weak] * 4 + [strong] * 4 + [vertex] * 2)
+    # Half of the vertex follows each: widths of 1 + 4 / 2 pixels.
+    assert_allclose(explanation.weights, 0.5)
+    assert_allclose(found.segments.widths, [5, 3, 11, 8, 5, 3, 11, 8, 12, 8])
+    assert_allclose(found.segments.colors[[1, 5], 3], 0.35 + 0.65 * 0.5)
+    assert found.labels.words == tuple(f"{name}  0.500" for name in explanation.names)
+    assert_allclose(found.labels.points - shift, explanation.images)
+    assert found.labels.ranks.tolist() == [0, 1]
+    alone = vertex_annotation(explanation, actor, False, (960, 720))
+    assert alone.labels is None and len(alone.segments.widths) == 2
 
 
 @pytest.mark.parametrize("way", ["Esc", "Unpin", "menu", "panel"])

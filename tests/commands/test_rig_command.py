@@ -58,7 +58,8 @@ def test_npz_opens_again_and_moves_as_the_template(folder, tmp_path, capsys):
     assert said.err == ""
     lines = said.out.splitlines()
     assert lines[0].startswith(
-        "alignment: the target lies in place and is left there; scale 100, turned by 90.00 degrees"
+        "alignment: the template is scaled and turned about the origin that both share; "
+        "scale 100, turned by 90.00 degrees, shift (0, 0, 0)"
     )
     assert lines[-1] == f"{out}: the figure with its rig, the target's pose, confidence"
     assert any(line.startswith("posed again, the mesh is off by at most") for line in lines)
@@ -131,6 +132,17 @@ def test_template_may_be_posed_by_a_frame_of_a_sequence(tmp_path, capsys, monkey
     assert capsys.readouterr().err.splitlines()[-1] == "viewer: interrupted"
 
 
+@pytest.mark.parametrize("option", ["--template-frame", "--frame"])
+def test_frame_that_is_not_there_is_refused_by_the_name_it_was_given(tmp_path, capsys, option):
+    poses = {"poses": np.zeros((5, 72)), "trans": np.zeros((5, 3)), "mocap_framerate": 30.0}
+    np.savez(tmp_path / "walk.npz", **poses)
+    body = viewer.load(bundled_body()).actors[0].figure
+    export(Actor(Figure("scan", body.mesh)), tmp_path / "scan.obj")
+    options = ["--from", "body", "--from", str(tmp_path / "walk.npz"), option, "9"]
+    assert run(["rig", str(tmp_path / "scan.obj"), *options]) == 2
+    assert capsys.readouterr().err == f"viewer: {option}: expected 0 to 4, found 9\n"
+
+
 def test_options_reach_the_transfer(folder, tmp_path, monkeypatch, capsys):
     seen = {}
 
@@ -183,6 +195,23 @@ REFUSED = {
         ["--from", "{scan}"],
         2,
         "viewer: --from: expected a figure with mesh, skeleton and skin, found none",
+    ),
+    "frame of no motion": (
+        ["--from", "fox", "--template-frame", "3"],
+        2,
+        "viewer: --template-frame: expected a template with a motion, found none; give the "
+        "motion's file by another --from, as --from body --from walk.npz",
+    ),
+    "time of no motion": (
+        ["--from", "fox", "--time", "3"],
+        2,
+        "viewer: --time: expected a template with a motion, found none; give the motion's file "
+        "by another --from, as --from body --from walk.npz",
+    ),
+    "two frames": (
+        ["--frame", "2", "--template-frame", "3"],
+        2,
+        "viewer: --frame and --template-frame: expected one of them, found both",
     ),
     "axes": (
         ["--up", "z", "--facing", "z"],

@@ -107,6 +107,18 @@ def test_fixed_range_is_that_of_the_bar_and_the_note_says_what_there_is():
     assert found.note == "from 0 to 100"
 
 
+def test_typical_range_tells_the_extremes_too():
+    numbers = np.array([-10.0, 0, 30, 0, 0, 480])
+    figure, shown_options = strip(), DisplayOptions(scalar="stretch")
+    for ends, note in (
+        ((-40.0, 40.0), "99 %: up to ±40; from -10 to +480"),
+        ((-480.0, 480.0), "from -10 to +480"),
+    ):
+        look = look_of("stretch", figure, ends, shown_options)
+        found = legend_of("stretch", [Shown(figure, numbers, look)])
+        assert found.note == note
+
+
 def test_nothing_to_see_is_said():
     found = legend("methods", [0] * 6)
     assert found.ticks == () and found.note == "0 everywhere"

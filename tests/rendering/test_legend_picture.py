@@ -58,25 +58,53 @@ def test_swatches_are_below_each_other_in_their_order():
     assert (steps > 0).all() and np.ptp(steps) <= 1
 
 
+def joints(count, size, name="joint {}"):
+    """Return the legend of so many joints, and where their swatches begin: columns, None if not."""
+    entries = tuple(
+        Entry((200, index % 256, 40 + index // 256), name.format(index)) for index in range(count)
+    )
+    pixels = legend_pixels(Legend("Dominant joint", entries=entries), size)
+    found = [(pixels[..., :3] == entry.color).all(axis=2).any(axis=0) for entry in entries]
+    return pixels, [int(np.flatnonzero(one)[0]) if one.any() else None for one in found]
+
+
+@pytest.mark.parametrize("size", [(400, 300), (1280, 720), (1920, 1080)])
+@pytest.mark.parametrize("count", [24, 37])
+def test_every_joint_of_a_body_or_creature_has_its_swatch(size, count):
+    pixels, lefts = joints(count, size)
+    assert None not in lefts and lefts == sorted(lefts)
+    assert pixels.shape[0] <= 0.9 * size[1] and pixels.shape[1] <= 0.45 * size[0]
+
+
+def test_many_joints_stand_in_even_columns_beside_each_other():
+    _, lefts = joints(40, (1280, 720))
+    columns = [lefts.count(left) for left in sorted(set(lefts))]
+    assert columns == [20, 20]
+
+
+def test_letters_shrink_before_columns_reach_the_figure():
+    name = "a joint with a long name {}"
+    few, many = (joints(count, (1280, 720), name) for count in (2, 60))
+    swatches = [len(rows_with(pixels, (200, 0, 40))) for pixels, _ in (few, many)]
+    assert 0.6 * swatches[0] <= swatches[1] < swatches[0]
+    assert None not in many[1] and many[0].shape[1] <= 0.45 * 1280
+
+
 def test_what_is_too_much_is_counted():
-    def heights(count):
-        entries = tuple(Entry((200, index, 40), f"joint {index}") for index in range(count))
-        pixels = legend_pixels(Legend("Dominant joint", entries=entries), (1280, 720))
-        return pixels, [bool(len(rows_with(pixels, entry.color))) for entry in entries]
-
-    _, all_seen = heights(14)
-    assert all(all_seen)
-    pixels, seen = heights(40)
-    assert seen == [True] * 13 + [False] * 27
-    assert pixels.shape == heights(200)[0].shape or pixels.shape[0] == heights(200)[0].shape[0]
+    pixels, lefts = joints(2000, (1280, 720))
+    shown = lefts.index(None)
+    assert shown > 100 and all(left is None for left in lefts[shown:])
+    assert pixels.shape[0] <= 0.9 * 720 and pixels.shape[1] <= 0.45 * 1280
+    # The line that counts the rest is the last of the last column, and has no swatch.
+    per_column = lefts.count(lefts[0])
+    assert (shown + 1) % per_column == 0
 
 
-def test_low_picture_has_fewer_swatches():
-    entries = tuple(Entry((200, index, 40), f"joint {index}") for index in range(14))
-    pixels = legend_pixels(Legend("Dominant joint", entries=entries), (640, 150))
-    assert pixels.shape[0] <= 0.9 * 150
-    seen = [bool(len(rows_with(pixels, entry.color))) for entry in entries]
-    assert 2 < sum(seen) < 14 and seen == sorted(seen, reverse=True)
+def test_low_and_narrow_picture_has_fewer_swatches():
+    pixels, lefts = joints(37, (300, 120))
+    assert pixels.shape[0] <= 0.9 * 120
+    seen = [left is not None for left in lefts]
+    assert 2 < sum(seen) < 37 and seen == sorted(seen, reverse=True)
 
 
 @pytest.mark.parametrize(("size", "fits"), [((640, 360), True), ((60, 360), False),

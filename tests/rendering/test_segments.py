@@ -9,7 +9,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from viewer.rendering.camera import Camera
 from viewer.rendering.program import Programs
-from viewer.rendering.segments import HIDDEN, SegmentPass, Segments, dots, joined
+from viewer.rendering.projection import project
+from viewer.rendering.segments import HIDDEN, Manner, SegmentPass, Segments, dots, joined
 from viewer.rendering.view import view_of
 
 SIDE = 80  # pixels; x and y from -2 to 2, so a unit is 20 pixels
@@ -27,7 +28,7 @@ def picture(ctx):
     passes = SegmentPass(ctx, programs)
     camera = Camera(azimuth=0.0, inclination=0.0, fov=90.0, distance=2.0, orthographic=True)
 
-    def draw(segments, depth=1.0, on_top=False, target_point=(0.0, 0.0, 0.0)):
+    def draw(segments, depth=1.0, target_point=(0.0, 0.0, 0.0), **manner):
         camera.target = np.array(target_point)
         target.use()
         ctx.viewport = (0, 0, SIDE, SIDE)
@@ -35,9 +36,8 @@ def picture(ctx):
         ctx.enable_only(moderngl.DEPTH_TEST | moderngl.BLEND)
         ctx.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
         ctx.depth_func = "<"
-        passes.draw(
-            segments, view_of(camera, (SIDE, SIDE), BOX + camera.target), (SIDE, SIDE), on_top
-        )
+        view = view_of(camera, (SIDE, SIDE), BOX + camera.target)
+        passes.draw(segments, view, (SIDE, SIDE), Manner(**manner))
         rows = np.frombuffer(target.read(components=4, dtype="f4"), dtype="f4")
         return rows.reshape(SIDE, SIDE, 4)[::-1]
 
@@ -91,6 +91,33 @@ def test_what_is_behind_something_is_faint_unless_on_top(picture):
     dot = dots(np.zeros((1, 3)), np.array(RED), 20.0)
     assert_allclose(picture(dot, depth=0.0)[40, 40, 3], HIDDEN, atol=1e-6)
     assert_allclose(picture(dot, depth=0.0, on_top=True)[40, 40, 3], 1.0, atol=1e-6)
+
+
+def test_border_is_mixed_in_around(picture):
+    blue = (0.0, 0.0, 1.0)
+    found = picture(dots(np.zeros((1, 3)), np.array(RED), 20.0), border=4.0, border_color=blue)
+    assert_allclose(found[40, 40], RED, atol=1e-6)
+    assert_allclose(found[40, 51], (0, 0, 1, 1), atol=1e-6)  # 11.5 pixels from the middle
+    # Discs of radius 14 in all and of radius 10 in red.
+    assert_allclose(found[..., 3].sum(), np.pi * 14.0**2, rtol=0.01)
+    assert_allclose(found[..., 0].sum(), np.pi * 10.0**2, rtol=0.01)
+
+
+def test_hidden_opacity_is_as_asked(picture):
+    dot = dots(np.zeros((1, 3)), np.array(RED), 20.0)
+    assert_allclose(picture(dot, depth=0.0, hidden=0.75)[40, 40, 3], 0.75, atol=1e-6)
+
+
+def test_lifted_ones_are_seen_on_a_surface_at_their_place(picture):
+    # The eye is 2 away: a lift of a quarter moves a dot at z = 0 to z = 0.5, and no other way.
+    dot, other = (dots(np.array([[0.5, 0.5, z]]), np.array(RED), 20.0) for z in (0.0, 0.4))
+    near = picture(dot)
+    camera = Camera(azimuth=0.0, inclination=0.0, fov=90.0, distance=2.0, orthographic=True)
+    at = project(view_of(camera, (SIDE, SIDE), BOX), (SIDE, SIDE), np.array([[0.0, 0.0, 0.25]]))
+    between = 0.5 + 0.5 * float(at.depths[0])
+    assert_allclose(picture(dot, depth=between)[30, 50, 3], HIDDEN, atol=1e-6)
+    assert_allclose(picture(dot, depth=between, lift=0.25), near, atol=1e-6)
+    assert_allclose(picture(other, depth=between)[30, 50, 3], 1.0, atol=1e-6)
 
 
 def test_nothing_draws_nothing(picture):

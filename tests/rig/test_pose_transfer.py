@@ -8,8 +8,9 @@ from numpy.testing import assert_allclose
 
 from viewer.errors import RigError
 from viewer.rig.figure import Figure
-from viewer.rig.pose import rest_pose
-from viewer.rig.pose_transfer import joints_by_name, shares_dofs, transfer_pose
+from viewer.rig.pose import joint_rotations, pose_key, rest_pose
+from viewer.rig.pose_record import apply_record, record_of
+from viewer.rig.pose_transfer import dof_layout, joint_turns, joints_by_name, turn_joints
 from viewer.rig.skeleton import Skeleton
 
 HALF = np.sqrt(0.5)
@@ -45,6 +46,14 @@ def figure(names, orders, name="one", up="y", rest=None, limits=None, parents=No
     return Figure(name=name, skeleton=skeleton, up=up)
 
 
+def transfer_pose(one, pose, other, start):
+    return turn_joints(joint_turns(one, pose), other, start)
+
+
+def shares_dofs(one, other):
+    return dof_layout(one) == dof_layout(other)
+
+
 def posed(fig, *dofs):
     pose = rest_pose(fig.skeleton)
     pose.dofs[:] = dofs
@@ -61,7 +70,7 @@ def test_other_order_of_dofs_gets_the_same_rotation() -> None:
     y, z, x = pose.dofs[3:]
     second = about(2, -0.7) @ about(1, 0.2) @ about(0, 1.0)
     assert_allclose(about(0, x) @ about(2, z) @ about(1, y), second, atol=1e-12)
-    assert notes == []
+    assert notes == ["2 of 2 joints of one taken over"]
 
 
 def test_labels_alone_would_give_another_pose() -> None:
@@ -77,7 +86,7 @@ def test_joints_that_are_missing_are_named_in_one_line_and_others_stay() -> None
     other = figure(["a", "b", "hat"], ["xyz"] * 3, "man")
     start = posed(other, *np.zeros(6), 0.1, 0.2, 0.3)
     pose, notes = transfer_pose(one, posed(one, *[0.2] * 12), other, start)
-    assert notes == ["man has no joint called tail, tip"]
+    assert notes == ["2 of 4 joints of cat taken over", "man has no joint called tail, tip"]
     assert_allclose(pose.dofs, [0.2] * 6 + [0.1, 0.2, 0.3], atol=1e-12)
     assert_allclose(start.dofs[:6], 0)
 
@@ -118,7 +127,7 @@ def test_limits_and_missing_axes_are_kept_and_said() -> None:
     assert_allclose(pose.dofs[:3], [0.1, 0, 0], atol=1e-9)
     # Rz(0.2) Rx(0.4) on an axis x: tan t = (1 + cos 0.2) sin 0.4 / ((1 + cos 0.2) cos 0.4).
     assert_allclose(pose.dofs[3], 0.4, atol=1e-9)
-    assert notes == ["turned as far as their DOFs and limits allow: a, b"]
+    assert notes[1:] == ["turned as far as their DOFs and limits allow: a, b"]
 
 
 def test_place_size_and_shape_stay() -> None:
@@ -142,7 +151,7 @@ def test_nothing_in_common_is_refused() -> None:
 def test_repeated_and_empty_names_match_nothing() -> None:
     one = figure(["a", "leg", "leg", ""], ["x"] * 4)
     other = figure(["leg", "a", ""], ["x"] * 3)
-    assert joints_by_name(one.skeleton, other.skeleton).tolist() == [-1, 0, -1]
+    assert joints_by_name(one.skeleton.names, other.skeleton.names).tolist() == [-1, 0, -1]
 
 
 def test_same_numbers_need_the_same_dofs_rest_and_up() -> None:
@@ -159,4 +168,64 @@ def test_long_lists_are_cut() -> None:
     one = figure(["a", *(f"j{k}" for k in range(20))], ["xyz"] * 21)
     other = figure("a", ["zyx"], "man")
     _, notes = transfer_pose(one, rest_pose(one.skeleton), other, rest_pose(other.skeleton))
-    assert notes[0].startswith("man has no joint called j0, j1, ") and notes[0].endswith("8 more")
+    assert notes[1].startswith("man has no joint called j0, j1, ") and notes[1].endswith("8 more")
+
+
+def test_turns_are_those_of_the_figures_axes() -> None:
+    # The second joint turns about x within a parent turned about z: in all Rz(0.5) Rx(0.3).
+    one = figure("ab", ["z", "x"])
+    turns = joint_turns(one, posed(one, 0.5, 0.3))
+    assert_allclose(turns.turns[0], [0, 0, np.sin(0.25), np.cos(0.25)], atol=1e-12)
+    c, s, cx, sx = np.cos(0.25), np.sin(0.25), np.cos(0.15), np.sin(0.15)
+    assert_allclose(turns.turns[1], [c * sx, s * sx, s * cx, c * cx], atol=1e-12)
+    assert (turns.figure, turns.names, turns.up) == ("one", ("a", "b"), "y")
+
+
+def test_record_of_the_same_dofs_brings_back_what_lies_beneath_them() -> None:
+    # A motion turned the hinge "b" about y too, and moved it.
+    one = figure("ab", ["xyz", "x"], rest=[[0, 0, 0, 1], [HALF, 0, 0, HALF]])
+    pose = posed(one, 0.1, 0.2, 0.3, 0.4)
+    pose.rotations[1] = 0.0, np.sin(0.35), 0.0, np.cos(0.35)
+    pose.translations[1] = 0.5, 0.25, -1.0
+    found = posed(one, 0, 0, 0, -1.0)
+    found.rotations[0] = 0.0, 1.0, 0.0, 0.0
+    assert apply_record(record_of(one, pose), one, found) == []
+    assert_allclose(found.rotations, pose.rotations, atol=1e-12)
+    assert found.dofs.tolist() == pose.dofs.tolist()
+    assert found.translations.tolist() == pose.translations.tolist()
+
+
+def test_record_for_other_dofs_turns_joints_and_leaves_place_and_size() -> None:
+    one, other = figure("ab", ["xyz", "xyz"], "cat"), figure("ab", ["zxy", "yzx"], "man")
+    pose = posed(one, 0.3, -0.5, 0.8, 1.0, 0.2, -0.7)
+    pose.figure_translation[:] = 1, 0, 0
+    pose.figure_scale = 2.0
+    found = rest_pose(other.skeleton)
+    assert apply_record(record_of(one, pose), other, found) == [
+        "2 of 2 joints of cat taken over",
+        "left as they were: the figure's place, its size",
+    ]
+    wanted = joint_rotations(one.skeleton, pose)
+    assert_allclose(joint_rotations(other.skeleton, found), wanted, atol=1e-12)
+    assert found.figure_scale == 1.0 and not found.figure_translation.any()
+
+
+def test_refused_record_leaves_the_pose() -> None:
+    one, other = figure("a", ["xyz"], "cat"), figure("b", ["x"], "man")
+    found = rest_pose(other.skeleton)
+    before = pose_key(found)
+    with pytest.raises(RigError) as caught:
+        apply_record(record_of(one, rest_pose(one.skeleton)), other, found)
+    assert str(caught.value) == "no joint of cat is called as one of man"
+    assert pose_key(found) == before
+
+
+def test_hand_written_part_of_a_record_leaves_the_rest_beneath() -> None:
+    from dataclasses import replace
+
+    one = figure("ab", ["xyz", "x"])
+    found = rest_pose(one.skeleton)
+    found.rotations[1] = 0.0, 1.0, 0.0, 0.0
+    part = replace(record_of(one, posed(one, 0, 0, 0, 0.4)), dofs={"b.x": 0.25})
+    assert apply_record(part, one, found) == []
+    assert found.dofs.tolist() == [0, 0, 0, 0.25] and found.rotations[1].tolist() == [0, 1, 0, 0]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +15,9 @@ from viewer.rig.pose import Pose, pose_key
 from viewer.rig.sampled_clip import SampledClip
 from viewer.rig.scene import Actor, Motion, Scene
 
+if TYPE_CHECKING:
+    from viewer.app.rig_view import Placing, RigView
+
 __all__ = ["History"]
 
 _MOST = 500  # steps kept
@@ -21,13 +25,17 @@ _MOST = 500  # steps kept
 
 @dataclass(frozen=True, slots=True)
 class _Snapshot:
-    """All that can be undone: who is there, each actor's pose, clip and way to be shown; how."""
+    """All that can be undone: who is there, each actor's pose, clip and way to be shown; how.
+
+    And where the template of a rig was laid, None where that is not known.
+    """
 
     actors: tuple[Actor, ...]
     poses: tuple[Pose | None, ...]
     looks: tuple[_Look, ...]
     options: DisplayOptions
     time: float
+    placing: Placing | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,34 +63,51 @@ class History:
         Seconds that are shown; undoing goes back to the time of the change.
     has_restored : bool
         Whether poses were brought back that the clock has not been told of.
+    rig : RigView or None
+        Says where the template of a rig lies, which is undone with the scene.
     """
 
     time: float = 0.0
     has_restored: bool = False
+    rig: RigView | None = None
     _now: _Snapshot | None = None
     _undo: list[_Snapshot] = field(default_factory=list)
     _redo: list[_Snapshot] = field(default_factory=list)
 
     def start(self, scene: Scene, options: DisplayOptions) -> None:
         """Forget everything; the scene as it is becomes the first state."""
-        self._now = _take(scene, options, self.time)
+        self.rig = None  # it was about another scene
+        self._now = self._take(scene, options)
         self._undo.clear()
         self._redo.clear()
 
     def observe(self, scene: Scene, options: DisplayOptions, busy: bool) -> bool:
         """Keep a step if something changed and no widget is held; return whether it did."""
-        if busy or self._now is None or _is_same(self._now, scene, options):
+        if busy or self._now is None:
+            return False
+        if _is_same(self._now, scene, options) and not self._is_laid_elsewhere():
             return False
         self._undo.append(self._now)
         del self._undo[:-_MOST]
         self._redo.clear()
-        self._now = _take(scene, options, self.time)
+        self._now = self._take(scene, options)
         return True
 
     def accept(self, scene: Scene, options: DisplayOptions) -> None:
         """Take over what only looks at the scene otherwise, without a step of its own."""
         if self._now is not None:
-            self._now = _take(scene, options, self.time)
+            self._now = self._take(scene, options)
+
+    def measured(self, placing: Placing, known: Placing) -> None:
+        """Put a placing whose error is known in the place of the same one without, in all steps."""
+
+        def exchanged(one: _Snapshot) -> _Snapshot:
+            return replace(one, placing=known) if one.placing is placing else one
+
+        self._undo[:] = map(exchanged, self._undo)
+        self._redo[:] = map(exchanged, self._redo)
+        if self._now is not None:
+            self._now = exchanged(self._now)
 
     def follow(self, scene: Scene, time: float) -> None:
         """Take over poses that the clock has set, without a step; edits keep their steps."""
@@ -94,7 +119,7 @@ class History:
 
     def add_actors(self, scene: Scene, options: DisplayOptions) -> None:
         """Go on with a scene to which actors were added at its end, as captures are read."""
-        whole = _take(scene, options, self.time)
+        whole = self._take(scene, options)
         known = {id(actor) for one in (*self._undo, *self._redo) for actor in one.actors}
         known |= {id(actor) for actor in (self._now.actors if self._now else ())}
         rows = [row for row, actor in enumerate(whole.actors) if id(actor) not in known]
@@ -148,8 +173,23 @@ class History:
         destination.append(self._now)
         self._now = source.pop()
         _restore(self._now, scene, options)
+        if self.rig is not None:
+            self.rig.placing = self._now.placing
         self.time, self.has_restored = self._now.time, True
         return True
+
+    def _take(self, scene: Scene, options: DisplayOptions) -> _Snapshot:
+        poses = tuple(actor.pose.copy() if actor.pose else None for actor in scene.actors)
+        looks, kept = tuple(map(_look, scene.actors)), copy.deepcopy(options)
+        return _Snapshot(tuple(scene.actors), poses, looks, kept, self.time, self._placing())
+
+    def _placing(self) -> Placing | None:
+        return None if self.rig is None else self.rig.placing
+
+    def _is_laid_elsewhere(self) -> bool:
+        """Return whether a template was laid; forgetting it with another choice is no edit."""
+        placing = self._placing()
+        return placing is not None and (self._now is None or placing is not self._now.placing)
 
 
 def _grown(old: Motion | None, new: Motion | None) -> Motion | None:
@@ -159,12 +199,6 @@ def _grown(old: Motion | None, new: Motion | None) -> Motion | None:
     if isinstance(old, PointClip) and isinstance(new, PointClip):
         return with_rate(new, old.timing.frame_rate)
     return old
-
-
-def _take(scene: Scene, options: DisplayOptions, time: float) -> _Snapshot:
-    poses = tuple(actor.pose.copy() if actor.pose else None for actor in scene.actors)
-    looks = tuple(map(_look, scene.actors))
-    return _Snapshot(tuple(scene.actors), poses, looks, copy.deepcopy(options), time)
 
 
 def _look(actor: Actor) -> _Look:

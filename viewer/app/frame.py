@@ -13,7 +13,7 @@ import numpy as np
 from imgui_bundle import imgui
 
 from viewer.app.actions import follow_actor
-from viewer.app.explanation_lines import draw_pinned
+from viewer.app.explanation_lines import draw_hovered, pinned_annotations
 from viewer.app.file_dialog import PICTURES, FileDialog, draw_file_dialog, folder_of
 from viewer.app.gizmo import is_held
 from viewer.app.gizmo_drawing import draw_gizmo
@@ -200,6 +200,7 @@ class Frame:
         size = (round(width * scale), round(height * scale))
         if min(size) < 1:
             return
+        self.renderer.annotations = pinned_annotations(state, size)
         key = self._scene_key(size)
         if key != self._drawn:
             self._drawn = key  # also if it fails: not again before something has changed
@@ -210,7 +211,7 @@ class Frame:
             draw_list = imgui.get_background_draw_list()
             # Textures have their first row at the bottom.
             draw_list.add_image(picture, (x, y), corner, (0.0, 1.0), (1.0, 0.0))
-            draw_pinned(state)
+            draw_hovered(state)
             draw_gizmo(state)
             draw_rig_tools(state)
             if state.panels_visible:
@@ -228,6 +229,7 @@ class Frame:
             target.resolve()
             state.stats.samples = target.samples
             state.stats.scalar_range = self.renderer.scalar_range
+            state.stats.scalar_ends = self.renderer.scalars.ends
             state.stats.legend = self.renderer.legend
         except ViewerError as problem:
             state.error = str(problem)
@@ -253,7 +255,8 @@ class Frame:
         place = (camera.target.tobytes(), camera.distance, camera.azimuth, camera.inclination)
         lens = (camera.fov, camera.orthographic, camera.up, id(camera.fixed))
         marks, options = self.renderer.marks, copy.deepcopy(state.options)
-        return (size, place, lens, options, poses, *selected, marks, self.renderer.ghost)
+        drawn_over = marks, self.renderer.ghost, self.renderer.annotations
+        return (size, place, lens, options, poses, *selected, *drawn_over)
 
     def _target(self, size: tuple[int, int]) -> Target:
         samples = self.state.options.samples
@@ -348,7 +351,8 @@ class Frame:
             from viewer.app.recording import recording_steps
 
             path, settings = state.wants_recording, replace(state.record)
-            steps = recording_steps(state, self.context, settings, path)
+            ghost = self.renderer.ghost
+            steps = recording_steps(state, self.context, settings, path, ghost)
             state.job = FrameJob(f"Recording {printable(path.name, 60)}", steps)
             state.playback.playing, state.record = False, None
         state.wants_recording = None
@@ -360,6 +364,10 @@ class Frame:
             path = free_path(Path.cwd(), self.state.scene.actors[0].figure.name, ".png")
             save_image(path, self.scene_picture())
             self.state.say(f"Saved {printable(path, 200)}")
+            if "##legend" in self.state.item_rects:  # over the picture, not in it
+                self.state.say(
+                    "The legend is not in it: Legend in pictures (panel Weights) does that"
+                )
         except ViewerError as problem:
             self.state.error = str(problem)
         except OSError as problem:

@@ -40,7 +40,9 @@ _LEFT, _RIGHT = imgui.MouseButton_.left, imgui.MouseButton_.right
 def is_held(state: AppState) -> bool:
     """Return whether an edit is going on: a widget or a handle is held."""
     drag = state.posing.drag
-    return imgui.is_any_item_active() or (drag is not None and not drag.is_over)
+    is_dragged = drag is not None and not drag.is_over
+    moves_template = state.rig.holds_mouse and imgui.is_mouse_down(_LEFT)
+    return imgui.is_any_item_active() or is_dragged or moves_template
 
 
 def use_handles(state: AppState) -> bool:
@@ -81,6 +83,8 @@ def _go_on(state: AppState, drag: Drag, place: Place) -> bool:
         drag.actor.pose = drag.outcome.pose
     if not imgui.is_mouse_down(_LEFT):
         state.posing.drag = None
+        if not drag.has_moved:
+            choose_joint(state)  # its dot lies under a ring or an arrow
     return True
 
 

@@ -81,10 +81,10 @@ def draw_gizmo(state: AppState) -> None:
     pen, posed = _Pen(view_frame(state)), selected(state)
     pen.list.push_clip_rect((x, y), (x + width, y + height), True)
     hot = None if _drag(state) else _hovered(state, pen.frame)
-    _draw_joints(state, pen, hot)
+    _draw_joints(state, pen)
     if posed is not None:
-        _draw_arcs(state, pen, posed)
         if state.posing.tool == "rotate":
+            _draw_arcs(state, pen, posed)
             _draw_rings(state, pen, posed, hot)
         else:
             _draw_chain(state, pen, posed)
@@ -107,7 +107,7 @@ def _hovered(state: AppState, frame: ViewFrame) -> Handle | None:
     return handle_at(state, frame, (io.mouse_pos.x, io.mouse_pos.y))
 
 
-def _draw_joints(state: AppState, pen: _Pen, hot: Handle | None) -> None:
+def _draw_joints(state: AppState, pen: _Pen) -> None:
     """Draw a dot for each joint, and the name of the one under the pointer."""
     places, io = joint_places(state), imgui.get_io()
     seen = np.flatnonzero(np.isfinite(places).all(axis=1))
@@ -116,9 +116,10 @@ def _draw_joints(state: AppState, pen: _Pen, hot: Handle | None) -> None:
         for x, y in places[seen].tolist():
             pen.list.add_circle_filled((x, y), 3.5, rim)
             pen.list.add_circle_filled((x, y), 2.5, ink)
-    is_free = hot is None and _drag(state) is None and not io.want_capture_mouse
+    is_free = _drag(state) is None and not io.want_capture_mouse
     under = joint_at(state, (io.mouse_pos.x, io.mouse_pos.y)) if is_free else -1
     skeleton = state.actor.figure.skeleton
+    # A click chooses it also where it lies under a handle, which a drag takes.
     if under >= 0 and skeleton is not None:
         x, y = places[under].tolist()
         pen.list.add_circle((x, y), 7.0, imgui.get_color_u32((*_HOT, 1.0)), 0, 2.0)

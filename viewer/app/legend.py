@@ -7,13 +7,15 @@ from imgui_bundle import imgui
 from viewer.app.state import AppState
 from viewer.app.widgets import Rect, begin_overlay, overlay_rect
 from viewer.errors import printable
-from viewer.rendering.legend import Legend
+from viewer.rendering.legend import Entry, Legend
+from viewer.rendering.legend_columns import legend_columns
 
 __all__ = ["draw_legend"]
 
 _GAP = 10.0  # points from the edges of the view
 _BAR = (200.0, 12.0)  # points
-_MOST_ENTRIES = 16
+_TALL, _WIDE = 0.8, 0.4  # of the view, for names
+_MANY, _SMALLER = 12, 0.8  # with more names than this, they are written that much smaller
 _LONGEST = 40  # letters of a name
 _LINE = (0.05, 0.05, 0.06, 1.0)
 
@@ -37,7 +39,10 @@ def draw_legend(state: AppState) -> Rect | None:
         imgui.text_unformatted(printable(legend.heading, 2 * _LONGEST))
         if len(legend.colors):
             _draw_bar(legend, min(_BAR[0], width - 60.0))
-        _draw_entries(legend, height)
+        smaller = _SMALLER if len(legend.entries) > _MANY else 1.0
+        imgui.push_font(None, smaller * imgui.get_style().font_size_base)
+        _draw_entries(legend, width, height)
+        imgui.pop_font()
         if legend.note:
             imgui.text_disabled(legend.note)
     rect = overlay_rect(state, "##legend")
@@ -72,20 +77,35 @@ def _draw_bar(legend: Legend, width: float) -> None:
         imgui.text_unformatted(tick.text)
 
 
-def _draw_entries(legend: Legend, height: float) -> None:
-    """Draw a swatch and a name for as many things as there is room for."""
-    line = imgui.get_text_line_height_with_spacing()
-    most = min(_MOST_ENTRIES, max(int(0.8 * height / line) - 3, 1))
-    entries = legend.entries
-    kept = entries if len(entries) <= most else entries[: most - 1]
-    side = imgui.get_text_line_height()
-    for entry in kept:
-        place, draw_list = imgui.get_cursor_screen_pos(), imgui.get_window_draw_list()
-        r, g, b = (channel / 255.0 for channel in entry.color)
-        color = imgui.get_color_u32((r, g, b, 1.0))
-        draw_list.add_rect_filled(place, (place.x + side, place.y + side), color)
-        imgui.dummy((side, side))
-        imgui.same_line()
-        imgui.text_unformatted(printable(entry.text, _LONGEST))
-    if len(kept) < len(entries):
-        imgui.text_disabled(f"and {len(entries) - len(kept)} more")
+def _draw_entries(legend: Legend, width: float, height: float) -> None:
+    """Draw a swatch and a name for as many things as there is room for, in columns."""
+    if not legend.entries:
+        return
+    side, line = imgui.get_text_line_height(), imgui.get_text_line_height_with_spacing()
+    gap = imgui.get_style().item_spacing.x
+    texts = [printable(entry.text, _LONGEST) for entry in legend.entries]
+    widths = [imgui.calc_text_size(text).x + side + 2.0 * gap for text in texts]
+    rows = max(int(_TALL * height / line) - 3, 1)
+    columns = legend_columns(widths, rows, _WIDE * width)
+    first, left, top = 0, imgui.get_cursor_pos_x(), imgui.get_cursor_pos_y()
+    for number, count in enumerate(columns.counts):
+        imgui.set_cursor_pos((left, top))
+        for row in range(first, first + count):
+            imgui.set_cursor_pos_x(left)
+            _draw_entry(legend.entries[row], texts[row], side)
+        if number == len(columns.counts) - 1 and columns.left_out:
+            imgui.set_cursor_pos_x(left)
+            imgui.text_disabled(f"and {columns.left_out} more")
+        first, left = first + count, left + columns.widths[number]
+    imgui.set_cursor_pos((imgui.get_style().window_padding.x, top + columns.rows * line))
+    imgui.dummy((0.0, 0.0))  # ImGui wants an item where the cursor was set
+
+
+def _draw_entry(entry: Entry, text: str, side: float) -> None:
+    place, draw_list = imgui.get_cursor_screen_pos(), imgui.get_window_draw_list()
+    r, g, b = (channel / 255.0 for channel in entry.color)
+    color = imgui.get_color_u32((r, g, b, 1.0))
+    draw_list.add_rect_filled(place, (place.x + side, place.y + side), color)
+    imgui.dummy((side, side))
+    imgui.same_line()
+    imgui.text_unformatted(text)

@@ -11,7 +11,7 @@ from viewer.app.state import AppState
 from viewer.errors import ViewerError
 from viewer.lint import Places, places_of, points_of
 from viewer.rendering.camera import Camera, camera_axes, fit
-from viewer.rendering.mark_pass import Marks
+from viewer.rendering.marks import Marks
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.pose import pose_key

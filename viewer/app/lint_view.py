@@ -9,7 +9,7 @@ from viewer.lint import SEVERITIES, Finding, LintOptions
 
 if TYPE_CHECKING:
     from viewer.app.jobs import CountedJob
-    from viewer.rendering.mark_pass import Marks
+    from viewer.rendering.marks import Marks
     from viewer.rig.scene import Scene
 
 __all__ = ["Checked", "LintView", "Running"]

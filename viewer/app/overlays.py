@@ -13,7 +13,7 @@ from imgui_bundle import imgui
 
 from viewer.app.actions import cancel
 from viewer.app.hover_text import draw_hover_text
-from viewer.app.keys import KEYS, MOUSE
+from viewer.app.keys_list import draw_keys
 from viewer.app.legend import draw_legend
 from viewer.app.state import AppState
 from viewer.app.toolbar import draw_toolbar
@@ -38,7 +38,7 @@ def draw_overlays(state: AppState) -> None:
     progress = _draw_progress(state, legend, tools)
     _draw_notes(state, [rect for rect in (legend, tools, progress) if rect is not None])
     draw_hover_text(state)
-    _draw_keys(state)
+    draw_keys(state)
 
 
 def draw_hints(state: AppState) -> None:
@@ -83,7 +83,9 @@ def _progress(state: AppState) -> _Progress | None:
         done, total = job.progress
         label = "Cancel" if job.can_cancel else ""
         if total:
-            return _Progress(job.title, done / total, f"{done:,} of {total:,}", label)
+            # Work that counts nothing tells its share in hundredths.
+            text = f"{done} %" if total == 100 else f"{done:,} of {total:,}"
+            return _Progress(job.title, done / total, text, label)
         return _Progress(job.title, -imgui.get_time(), "", label)
     return None
 
@@ -163,27 +165,3 @@ def _newest(heights: Sequence[float], line: float, room: float) -> int:
             break
         count += 1
     return count
-
-
-def _draw_keys(state: AppState) -> None:
-    if not state.keys_visible:
-        return
-    lines = [*((key.label, key.text) for key in KEYS), *MOUSE]
-    viewport = imgui.get_main_viewport()
-    fits = (len(lines) + 3) * imgui.get_text_line_height_with_spacing() <= viewport.size.y
-    style = imgui.get_style()
-    # In a low window the lines move together and get smaller rather than go out of it.
-    room = (viewport.size.y - 3 * style.window_padding.y) / len(lines)
-    share = 1.0 if fits else max(min(room / imgui.get_text_line_height(), 1.0), 0.5)
-    gap = (style.item_spacing.x, style.item_spacing.y if fits else 0.0)
-    imgui.push_style_var(imgui.StyleVar_.item_spacing, gap)
-    imgui.push_font(None, share * style.font_size_base)
-    center = viewport.get_center()
-    if begin_overlay("##keys", center.x, center.y, (0.5, 0.5)):
-        for label, text in lines:
-            imgui.text_colored((1.0, 0.78, 0.45, 1.0), label)
-            imgui.same_line(11 * imgui.get_font_size())
-            imgui.text_unformatted(text)
-    imgui.end()
-    imgui.pop_font()
-    imgui.pop_style_var()

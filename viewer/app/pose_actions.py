@@ -10,15 +10,12 @@ import numpy as np
 from imgui_bundle import imgui
 
 from viewer.app.clip_pause import pause_for_edit
-from viewer.app.posing import CopiedPose
 from viewer.app.state import AppState
 from viewer.errors import ViewerError, printable
 from viewer.export import export, files_written, refuse_inputs
 from viewer.formats import Source, write
 from viewer.rig.mirror import mirror_pose
-from viewer.rig.pose import Pose
 from viewer.rig.pose_record import PoseRecord, apply_record, record_of
-from viewer.rig.pose_transfer import shares_dofs, transfer_pose
 from viewer.rig.pose_vector import write_vector
 from viewer.rig.scene import figure_pose
 from viewer.rig.upright import upright_actor
@@ -47,11 +44,9 @@ def copy_pose(state: AppState) -> None:
     """Put the chosen actor's pose on the clipboard as JSON."""
     from viewer.formats.pose import pose_text
 
-    record, actor = _record(state), state.actor
-    if record is not None and actor.pose is not None:
-        text = pose_text(record, printable(actor.figure.name))
-        imgui.set_clipboard_text(text)
-        state.posing.copied = CopiedPose(text, actor.figure, actor.pose.copy())
+    record = _record(state)
+    if record is not None:
+        imgui.set_clipboard_text(pose_text(record))
         state.say_status("Pose copied as JSON")
 
 
@@ -68,7 +63,8 @@ def copy_numbers(state: AppState) -> None:
 def paste_pose(state: AppState) -> None:
     """Pose the chosen actor by what is on the clipboard: JSON, or the model's own numbers.
 
-    A pose that was copied here from a figure with other DOFs is carried over joint by joint.
+    A pose that was copied from a figure with other DOFs is carried over joint by joint: JSON says
+    how they are turned.
     """
     from viewer.formats import pose
 
@@ -76,10 +72,6 @@ def paste_pose(state: AppState) -> None:
     if actor.pose is None:
         return
     text = imgui.get_clipboard_text() or ""
-    copied = state.posing.copied
-    if copied is not None and copied.text == text and not shares_dofs(copied.figure, actor.figure):
-        _paste_foreign(state, copied, actor.pose)
-        return
     try:
         # Numbers may come with commas, from a list in a program.
         words = text if "{" in text else re.sub(r"[\[\],;]", " ", text)
@@ -91,22 +83,6 @@ def paste_pose(state: AppState) -> None:
         state.error = str(problem)
         return
     state.say(*source.warnings, *notes)
-    _say_pasted(state)
-
-
-def _paste_foreign(state: AppState, copied: CopiedPose, present: Pose) -> None:
-    """Turn the chosen actor's joints as another figure's were."""
-    actor = state.actor
-    try:
-        actor.pose, notes = transfer_pose(copied.figure, copied.pose, actor.figure, present)
-    except ViewerError as problem:
-        state.error = str(problem)
-        return
-    state.say(*notes)
-    _say_pasted(state)
-
-
-def _say_pasted(state: AppState) -> None:
     state.say_status("Pose pasted")
     pause_for_edit(state)
 

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
 from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure
 from viewer.rig.pose import Pose
 
 if TYPE_CHECKING:
     from viewer.app.view_frame import ViewFrame
     from viewer.rig.scene import Actor
 
-__all__ = ["ORIENTATIONS", "TOOLS", "CopiedPose", "Drag", "Handle", "Outcome", "Posing"]
+__all__ = ["ORIENTATIONS", "TOOLS", "Drag", "Handle", "Outcome", "Posing"]
 
 TOOLS = {
     "select": ("Select", "Q", "click chooses, drag orbits"),
@@ -109,23 +108,6 @@ class Drag:
     is_over: bool = False
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class CopiedPose:
-    """A pose on the clipboard, with the figure that it belongs to.
-
-    Attributes
-    ----------
-    text : str
-        What the clipboard held: anything else there is not this pose.
-    figure, pose : Figure, Pose
-        As they were.
-    """
-
-    text: str
-    figure: Figure
-    pose: Pose
-
-
 @dataclass(slots=True)
 class Posing:
     """The tools' state.
@@ -140,15 +122,12 @@ class Posing:
         How many joints above a dragged one may turn; 0 until it is chosen: two, without the root.
     drag : Drag or None
         The handle that is held.
-    copied : CopiedPose or None
-        The pose that was copied last.
     """
 
     tool: str = "select"
     orientation: str = "local"
     chain_length: int = 0
     drag: Drag | None = None
-    copied: CopiedPose | None = field(default=None)
 
     @property
     def is_on(self) -> bool:

@@ -136,6 +136,8 @@ def _draw_settings(state: AppState, settings: RecordSettings) -> None:
             settings.seconds = seconds
     if settings.kind != ".mp4":
         settings.transparent = checkbox(state, "Transparent background", settings.transparent)
+    if state.options.shading == "scalar":
+        state.options.legend = checkbox(state, "Legend in pictures", state.options.legend)
     imgui.text_disabled(_span_text(state, settings))
 
 

@@ -13,10 +13,12 @@ import moderngl
 import numpy as np
 
 from viewer.app.record_dialog import RecordSettings
+from viewer.app.recorded_marks import RecordedMarks
 from viewer.app.state import AppState
 from viewer.errors import OutputError, printable
 from viewer.export import refuse_inputs
 from viewer.formats._video_kinds import MOST_GIF_RATE
+from viewer.rendering.ghost_pass import Ghost
 from viewer.rendering.recorder import Follow, Recording, Sink, record
 from viewer.rendering.renderer import Renderer
 from viewer.rig.arrays import Floats
@@ -27,7 +29,11 @@ _FULL = 360.0  # degrees
 
 
 def recording_steps(
-    state: AppState, context: moderngl.Context, settings: RecordSettings, path: Path
+    state: AppState,
+    context: moderngl.Context,
+    settings: RecordSettings,
+    path: Path,
+    ghost: Ghost | None = None,
 ) -> Generator[tuple[int, int], None, list[str]]:
     """Record the range that is played, from the view as it is now.
 
@@ -42,6 +48,8 @@ def recording_steps(
         What is asked for.
     path : Path
         Where the result goes; ``{frame}`` in the name of numbered pictures is their number.
+    ghost : Ghost, optional
+        A surface that is shown over the scene.
 
     Yields
     ------
@@ -68,25 +76,9 @@ def recording_steps(
             raise OutputError(f"{printable(taken[0], 300)}: exists already; choose another name")
     refuse_inputs(files, state.paths)
     sink, size = _sink(settings, files, size, rate, numbers)
-    options = copy.deepcopy(state.options)
-    if settings.transparent and settings.kind != ".mp4":
-        options.background = "transparent"
-    follow = None
-    if state.followed is not None and state.followed_from is not None:
-        follow = Follow(*state.followed, state.followed_from)
-    recording = Recording(
-        replace(state.scene, actors=[replace(actor) for actor in state.scene.actors]),
-        times,
-        state.camera.copy(),
-        size,
-        options,
-        box=state.box.copy(),
-        moves=state.playback.has_motion,
-        fill=state.playback.fill_gaps,
-        turn=_FULL if settings.turntable else 0.0,
-        follow=follow,
-    )
+    recording = _recording(state, settings, times, size)
     renderer = Renderer(context)
+    renderer.ghost = ghost
     try:
         # Closed before its renderer goes, also if this generator is.
         with contextlib.closing(record(recording, renderer, sink)) as steps:
@@ -97,6 +89,32 @@ def recording_steps(
     name = printable(files[0], 200) + (f" to {printable(files[-1].name)}" if files[1:] else "")
     notes = [*getattr(sink, "notes", []), *renderer.notes]
     return [f"Saved {name}: {len(times)} frames, {size[0]} x {size[1]}", *notes]
+
+
+def _recording(
+    state: AppState, settings: RecordSettings, times: Floats, size: tuple[int, int]
+) -> Recording:
+    """Return what is recorded: all that the view shows, but tools and panels."""
+    options = copy.deepcopy(state.options)
+    if settings.transparent and settings.kind != ".mp4":
+        options.background = "transparent"
+    follow = None
+    if state.followed is not None and state.followed_from is not None:
+        follow = Follow(*state.followed, state.followed_from)
+    return Recording(
+        replace(state.scene, actors=[replace(actor) for actor in state.scene.actors]),
+        times,
+        state.camera.copy(),
+        size,
+        options,
+        box=state.box.copy(),
+        moves=state.playback.has_motion,
+        fill=state.playback.fill_gaps,
+        turn=_FULL if settings.turntable else 0.0,
+        follow=follow,
+        selected=(state.chosen_actor, state.selected_joint),
+        annotations=RecordedMarks(state).at,
+    )
 
 
 def _times(state: AppState, settings: RecordSettings) -> tuple[Floats, list[int], float]:

@@ -77,7 +77,8 @@ def _manipulated(state: AppState, before: Floats) -> Floats | None:
     changed = _G.manipulate(seen, projection, _OPERATIONS[view.tool], _G.MODE.world, now)
     hovers = _G.get_hovered_handle_type() != _G.MOVETYPE.mt_none
     view.holds_mouse = _G.is_using() or (hovers and not imgui.get_io().want_capture_mouse)
-    if not changed:
+    # It reports a change once more when it was let go of: that would be another step of undoing.
+    if not changed or not imgui.is_mouse_down(imgui.MouseButton_.left):
         return None
     after = np.array(now.values, dtype=np.float64).reshape(4, 4).T
     after[:3, :3] *= size

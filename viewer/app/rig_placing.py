@@ -119,10 +119,15 @@ def move_by_hand(state: AppState, template: Template, similarity: Similarity) ->
         alignment=None,
         settings=AlignmentSettings(matrix=similarity.matrix),
         fitted=fitted,
-        lines=before.lines if before is not None and fitted is not None else (),
+        lines=_still_true(before.lines) if before is not None and fitted is not None else (),
         meshes=(target_mesh(state), own.figure),
         pose=pose_key(own.pose),
     )
+
+
+def _still_true(lines: tuple[str, ...]) -> tuple[str, ...]:
+    """Return what was done to the template, without the gap that it left where it lay."""
+    return tuple(line for line in lines if line.startswith("pose:"))
 
 
 def set_aside(state: AppState) -> None:

@@ -51,6 +51,7 @@ def refresh(state: AppState) -> None:
     view = state.rig
     if view.scene is not state.scene:
         state.rig = view = RigView(scene=state.scene, choices=view.choices)
+    state.history.rig = view
     found = targets(state)
     if view.target not in found:
         choose_target(state, found[0] if found else None)

@@ -14,16 +14,17 @@ from viewer.rig.mesh import Mesh, bounding_box, box_size
 from viewer.rig.pose import pose_key
 from viewer.rig.shape import shaped
 from viewer.rig.skinning import deform
-from viewer.rig.transfer.alignment import AlignmentSettings
+from viewer.rig.transfer.alignment import AlignmentSettings, alignment_lines
 from viewer.rig.transfer.matching import MatchSettings, match
 from viewer.rig.transfer.matching import Template as Surface
 from viewer.rig.transfer.posed_alignment import align_posed
+from viewer.rig.transfer.rigged import Rigged
 from viewer.rig.transfer.settings import TransferSettings
 from viewer.rig.transfer.similarity import Similarity
 from viewer.rig.transfer.weights import WeightSettings
 from viewer.rig.transfer.welding import weld
 
-__all__ = ["align_template", "match_fields", "match_settings", "transfer_settings"]
+__all__ = ["align_template", "match_fields", "match_settings", "retold", "transfer_settings"]
 
 _Tell = Callable[[float, str], None]
 
@@ -73,6 +74,27 @@ def align_template(
         meshes=(target, own.figure),
         pose=pose_key(own.pose),
     )
+
+
+def retold(rigged: Rigged, placing: Placing | None) -> Rigged:
+    """Let a report say how its alignment was found: the transfer only knows where it was given.
+
+    Parameters
+    ----------
+    rigged : Rigged
+        What the transfer made.
+    placing : Placing or None
+        Where it was told that the template lies; None if it was told nothing.
+    """
+    known = placing.alignment if placing is not None else None
+    if placing is None or known is None or rigged.alignment is None:
+        return rigged
+    if rigged.alignment.how != "given":
+        return rigged  # it was found anew
+    told = replace(rigged.alignment, how=known.how)
+    rest = rigged.lines[len(alignment_lines(rigged.alignment)) :]
+    lines = (*alignment_lines(told), *placing.lines, *rest)
+    return replace(rigged, alignment=told, lines=lines)
 
 
 def match_fields(

@@ -20,7 +20,13 @@ from viewer.app.rig_sources import (
     target_mesh,
     template_files,
 )
-from viewer.app.rig_steps import align_template, match_fields, match_settings, transfer_settings
+from viewer.app.rig_steps import (
+    align_template,
+    match_fields,
+    match_settings,
+    retold,
+    transfer_settings,
+)
 from viewer.app.rig_view import Landmark, Placing, Result, RigChoices, Running, Template
 from viewer.app.state import AppState
 from viewer.errors import RigError, printable
@@ -45,6 +51,15 @@ __all__ = [
 ]
 
 _Finish = Callable[[AppState], None]
+_STEPS = {
+    "alignment": "laying the template onto the mesh",
+    "pose": "fitting pose and proportions",
+    "joints": "placing the joints",
+    "rest pose": "undoing the pose",
+    "checks": "checking the result",
+    "weighing": "carrying weights over",
+}
+"""What the transfer calls its steps, in words for somebody who waits."""
 _CALLED = {"robust": "rigged", "nearest": "rigged (nearest)"}  # what is added to the mesh's name
 
 
@@ -109,8 +124,20 @@ def _show_added(state: AppState, actor: Actor) -> None:
     fit(state.camera, points, state.aspect)
 
 
-def start_reading(state: AppState, paths: tuple[Path, ...] = ()) -> None:
-    """Read the chosen template, or one from other files, which is then chosen."""
+def start_reading(
+    state: AppState, paths: tuple[Path, ...] = (), then: _Finish | None = None
+) -> None:
+    """Read the chosen template, or one from other files, which is then chosen.
+
+    Parameters
+    ----------
+    state : AppState
+        With a template that is to be read, if there are no paths.
+    paths : tuple of Path
+        Its files.
+    then : callable, optional
+        Goes on with it.
+    """
     key = "file" if paths else state.rig.template_key
 
     def act(report: Report) -> _Finish:
@@ -121,6 +148,8 @@ def start_reading(state: AppState, paths: tuple[Path, ...] = ()) -> None:
             state.rig.template = template
             state.rig.template_key = ""  # another file has the same key
             choose_template(state, key)
+            if then is not None:
+                then(state)
 
         return finish
 
@@ -156,7 +185,12 @@ def _shares(
     report: Report, low: float = 0.0, high: float = 1.0, title: str = ""
 ) -> Callable[[float, str], None]:
     """Return what tells a job of shares of the work, which is itself a part of all."""
-    return lambda share, what: report(round(100 * (low + (high - low) * share)), 100, title + what)
+
+    def tell(share: float, what: str) -> None:
+        text = title + _STEPS.get(what, what)
+        report(round(100 * (low + (high - low) * share)), 100, text[:1].upper() + text[1:])
+
+    return tell
 
 
 def start_align(state: AppState, settings: AlignmentSettings | None = None) -> None:
@@ -166,6 +200,7 @@ def start_align(state: AppState, settings: AlignmentSettings | None = None) -> N
     how = settings or _search_settings(choices)
     own = current_template(state)
     fits = choices.fits and how.matrix is None
+    asked = state.rig.placing
 
     def act(report: Report) -> _Finish:
         template = take(report)
@@ -173,9 +208,10 @@ def start_align(state: AppState, settings: AlignmentSettings | None = None) -> N
 
         def finish(state: AppState) -> None:
             _keep(state, template)
-            before, state.rig.placing = state.rig.placing, found
-            if before is not None and how.matrix is not None and found.fitted is not None:
-                state.rig.placing = replace(found, lines=before.lines)  # it was only measured
+            if asked is not None and how.matrix is not None:
+                _take_measured(state, asked, found)
+                return
+            state.rig.placing = found
             if state.rig.tool == "landmarks":
                 state.rig.tool = ""  # so that the template is seen where it lies
 
@@ -184,9 +220,20 @@ def start_align(state: AppState, settings: AlignmentSettings | None = None) -> N
     _begin(state, "Aligning", act)
 
 
+def _take_measured(state: AppState, asked: Placing, found: Placing) -> None:
+    """Take over the error of a template that was laid by hand, and may lie elsewhere by now."""
+    known = replace(found, lines=asked.lines) if found.fitted is not None else found
+    if state.rig.placing is asked:
+        state.rig.placing = known
+    state.history.measured(asked, known)
+
+
 def _search_settings(choices: RigChoices) -> AlignmentSettings:
     return AlignmentSettings(
-        up=choices.up or None, facing=choices.facing or None, scale=choices.scale
+        up=choices.up or None,
+        facing=choices.facing or None,
+        scale=choices.scale,
+        refines=choices.refines,
     )
 
 
@@ -259,6 +306,7 @@ def start_run(state: AppState, methods: tuple[str, ...]) -> None:
             settings = transfer_settings(choices, method, found)
             called = f"{name} {_CALLED[method]}"
             rigged = transfer(laid.figure, laid.pose, mesh, settings, tell, name=called)
+            rigged = retold(rigged, found)
             actor = Actor(rigged.figure, rigged.pose.copy(), placement=place @ rigged.placement)
             results.append(Result(method, rigged, actor, target, template))
         return lambda state: _put(state, results, found)

@@ -112,7 +112,9 @@ def pin_vertex(state: AppState, actor: int, vertex: int) -> None:
 def unpin(state: AppState) -> None:
     """Explain no vertex any more; the panel that did so goes."""
     set_open(state, "vertex", False)
-    state.weights.pinned = state.weights.explanation = state.weights.explanation_key = None
+    view = state.weights
+    view.pinned = view.explanation = view.explanation_key = None
+    view.annotations, view.annotation_key = (), None
 
 
 def explained(state: AppState) -> Explanation | None:

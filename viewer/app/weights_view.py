@@ -12,6 +12,7 @@ from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 
 if TYPE_CHECKING:
+    from viewer.rendering.annotation import Annotation
     from viewer.rig.explanation import Explanation
 
 __all__ = ["Hover", "Pinned", "WeightsView", "wants_vertex"]
@@ -88,6 +89,10 @@ class WeightsView:
         Of it, as it was computed last.
     explanation_key : object
         What that depends on.
+    annotations : tuple of Annotation
+        What is drawn of it; at most one.
+    annotation_key : object
+        What that depends on.
     scrolls_to : int
         The joint that the tree is to bring into view, -1 for none.
     """
@@ -101,6 +106,8 @@ class WeightsView:
     draws_lines: bool = True
     explanation: Explanation | None = None
     explanation_key: object = None
+    annotations: tuple[Annotation, ...] = ()
+    annotation_key: object = None
     scrolls_to: int = -1
 
 

@@ -68,8 +68,15 @@ class Numbering:
         """Number of the last frame."""
         return self.first + self.count - 1
 
-    def time_of(self, frame: int) -> float:
+    def time_of(self, frame: int, option: str = "--frame") -> float:
         """Return the seconds at which a frame is shown.
+
+        Parameters
+        ----------
+        frame : int
+            Its number.
+        option : str
+            That it was given with.
 
         Raises
         ------
@@ -80,7 +87,7 @@ class Numbering:
         if not self.first <= frame <= last:
             wanted = f"{self.first} or more" if frame < self.first and self.runs_on else ""
             raise ViewerError(
-                f"--frame: expected {wanted or f'{self.first} to {last}'}, found {frame}"
+                f"{option}: expected {wanted or f'{self.first} to {last}'}, found {frame}"
             )
         return self.start + (frame - self.first) / self.rate
 
@@ -176,6 +183,8 @@ def add_frame_arguments(parser: argparse.ArgumentParser, many: str = "") -> None
         help="frames a second: of captures, and by which frames of clips are counted "
         "(default: the file's own, or 30)",
     )
+    # Commands that have another name for it say so in messages.
+    parser.set_defaults(frame_option="--frame")
 
 
 def parse_range(text: str) -> Range:
@@ -216,14 +225,14 @@ def apply_time(scene: Scene, arguments: argparse.Namespace) -> None:
         return
     from viewer.rig.motion import pose_actor
 
-    option = "--time" if arguments.frame is None else "--frame"
+    option = "--time" if arguments.frame is None else arguments.frame_option
     if arguments.frame is not None and arguments.time is not None:
-        raise ViewerError("--frame and --time: expected one of them, found both")
+        raise ViewerError(f"{option} and --time: expected one of them, found both")
     if all(actor.clip is None for actor in scene.actors):
         raise ViewerError(f"{option}: no file is a clip")
     frames = numbering_of(scene.actors, arguments.fps)
     if arguments.frame is not None:
-        scene.time = frames.time_of(arguments.frame)
+        scene.time = frames.time_of(arguments.frame, option)
     else:
         scene.time = frames.checked_time(arguments.time)
     for actor in scene.actors:

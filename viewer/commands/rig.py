@@ -64,9 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--template-pose", dest="pose", metavar="FILE|A,B,…", help="the same as --pose"
     )
-    parser.add_argument(
-        "--template-frame", dest="frame", type=int, metavar="N", help="the same as --frame"
-    )
+    parser.add_argument("--template-frame", type=int, metavar="N", help="the same as --frame")
     parser.set_defaults(fill_gaps=False)
 
 
@@ -192,6 +190,7 @@ def _template(arguments: argparse.Namespace) -> Actor:
     """Return the figure whose rig is carried over, posed and shaped as asked."""
     files = [file for name in arguments.template or ["body"] for file in _template_files(name)]
     scene = load(*files, motion=MotionSettings(frame_rate=arguments.fps))
+    _check_frame(scene, arguments)
     print_warnings([*scene.warnings, *apply_pose(scene, arguments)])
     attached = [actor for actor in scene.actors if actor.figure.is_attached]
     if not attached:
@@ -202,6 +201,28 @@ def _template(arguments: argparse.Namespace) -> Actor:
     if not attached[0].is_present:
         raise RigError("--from: expected a frame with the template in it, found a gap")
     return attached[0]
+
+
+def _check_frame(scene: Scene, arguments: argparse.Namespace) -> None:
+    """Take over --template-frame, and refuse a frame or time of a template that has no motion.
+
+    Raises
+    ------
+    ViewerError
+        If there is nothing to take the frame from, or two frames are given.
+    """
+    if arguments.template_frame is not None:
+        if arguments.frame is not None:
+            raise ViewerError("--frame and --template-frame: expected one of them, found both")
+        arguments.frame, arguments.frame_option = arguments.template_frame, "--template-frame"
+    if arguments.frame is None and arguments.time is None:
+        return
+    if all(actor.clip is None for actor in scene.actors):
+        option = "--time" if arguments.frame is None else arguments.frame_option
+        raise ViewerError(
+            f"{option}: expected a template with a motion, found none; give the motion's file by "
+            "another --from, as --from body --from walk.npz"
+        )
 
 
 def _template_files(name: str) -> list[Path]:

@@ -4,9 +4,13 @@
 
     .json  {"viewer_pose": 1, "figure": name, "dofs": {"left_knee.x": radians, …},
             "shape": […], "expression": […], "translation": [x, y, z], "scale": s,
-            "own_numbers": […]}
-    .npz   dof_names, dofs, shape, expression, translation, scale, own_numbers
+            "own_numbers": […], "joint_names": […], "joint_turns": [[x, y, z, w], …],
+            "joint_shifts": [[x, y, z], …], "up": "y", "dof_layout": word}
+    .npz   the same arrays, dof_names and dofs apart
     .txt   the model's own numbers, separated by blanks: 190 for PIG, 72 for SMPL …
+
+The turns of the joints, quaternions in the figure's axes, are for figures with other DOFs, which
+``dof_layout`` tells; those with the same take ``dofs``.
 
 Both kinds of named values may instead hold one frame of what smplx takes: ``global_orient``,
 ``body_pose``, ``left_hand_pose``, ``right_hand_pose``, ``jaw_pose``, ``leye_pose``, ``reye_pose``,
@@ -29,6 +33,7 @@ from viewer.errors import UnsupportedFormatError, printable
 from viewer.formats._archive import describe
 from viewer.formats._container import archive_of
 from viewer.formats._numbers import LARGEST
+from viewer.formats._pose_turns import KEYS, named_turns, read_turns
 from viewer.formats._save import save_arrays, save_text
 from viewer.formats._source import Source
 from viewer.formats._table import read_numbers
@@ -120,7 +125,8 @@ def _archive_values(source: Source) -> dict[str, Any]:
     """Return what a pose needs; the other keys, which may be large, stay unread."""
     archive = archive_of(source)
     values: dict[str, Any] = dict.fromkeys(archive.keys)
-    for key in set(_KNOWN).intersection(archive.keys):
+    wanted = (*_KNOWN, *KEYS) if KEYS[0] in archive.keys else _KNOWN
+    for key in set(wanted).intersection(archive.keys):
         value = archive.get(key)
         values[key] = value.values() if isinstance(value, Deferred) else value
     names, dofs = values.pop("dof_names", None), values.get("dofs")
@@ -155,6 +161,7 @@ def _from_values(source: Source, values: Mapping[str, Any]) -> PoseRecord:
         scale=None if scale is None else _single(source, "scale", scale),
         flat_hands=_flag(source, values, "flat_hand_mean"),
         hand_coefficients=_flag(source, values, "use_pca"),
+        turns=read_turns(source, values),
     )
     is_empty = not record.dofs and not record.parts and record.vector is None
     if is_empty and all(value is None for value in (*found.values(), scale)):
@@ -162,7 +169,8 @@ def _from_values(source: Source, values: Mapping[str, Any]) -> PoseRecord:
         raise source.error(f"expected a pose (dofs, poses, body_pose, betas …), found keys {keys}")
     if record.translation is not None and len(record.translation) != 3:
         raise source.error(f"translation: expected 3 numbers, found {len(record.translation)}")
-    odd = [printable(key, 40) for key in values if key not in (*_KNOWN, *_NOT_NEEDED)]
+    used = (*_KNOWN, *_NOT_NEEDED) if record.turns is None else (*_KNOWN, *_NOT_NEEDED, *KEYS)
+    odd = [printable(key, 40) for key in values if key not in used]
     if odd:
         source.warn(f"keys that mean nothing in a pose: {', '.join(odd[:12])}")
     return record
@@ -233,9 +241,9 @@ def _dofs(source: Source, given: Any) -> dict[str, float]:
     return dofs
 
 
-def pose_text(record: PoseRecord, figure: str = "") -> str:
+def pose_text(record: PoseRecord) -> str:
     """Return a pose as JSON, one DOF a line."""
-    values = {"viewer_pose": _VERSION, "figure": figure, **_named(record)}
+    values = {"viewer_pose": _VERSION, **_named(record)}
     return json.dumps(values, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
 
@@ -257,7 +265,7 @@ def _named(record: PoseRecord) -> dict[str, Any]:
     ):
         if single is not None:
             named[name] = single
-    return named
+    return named if record.turns is None else named | named_turns(record.turns)
 
 
 def write(content: Figure | Clip | PoseRecord, path: str | Path) -> None:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from viewer.rendering.palettes import NOTHING
-from viewer.rendering.scalar_look import ScalarLook
+from viewer.rendering.scalar_look import TYPICAL, ScalarLook
 from viewer.rig.arrays import Bytes, Floats
 from viewer.rig.figure import Figure
 from viewer.rig.memo import Memo
@@ -20,6 +20,7 @@ __all__ = ["Entry", "Legend", "Shown", "Tick", "legend_of", "round_ticks"]
 
 _MOST_TICKS = 6
 _MOST_COUNTS = 10  # blocks of a bar that each have a number
+_SAME = 1e-9  # share by which numbers differ that are the same
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,6 +153,8 @@ def _bar(name: str, title: str, shown: Sequence[Shown]) -> Legend:
     ends = factor * look.ends[0], factor * look.ends[1]
     is_flat = low == high == 0.0
     span = f"from {_text(low, is_signed)} to {_text(high, is_signed)}"
+    if look.is_typical and max(-low, high) > (1.0 + _SAME) * ends[1]:
+        span = f"{100 * TYPICAL:.0f} %: up to ±{_text(ends[1])}; {span}"
     return Legend(
         title,
         unit,
@@ -206,7 +209,7 @@ def _vertex_areas(figure: Figure) -> Floats:
     return _areas.get(figure, (), make)
 
 
-def _text(number: float, signed: bool) -> str:
+def _text(number: float, signed: bool = False) -> str:
     """Return a number with three digits."""
     text = f"{number:.3g}" if abs(number) < 999.5 else f"{number:,.0f}"
     return f"+{text}" if signed and number > 0.0 else text

@@ -97,7 +97,7 @@ class DisplayOptions:
         selected joint is shown.
     scalar_range : (float, float) or None
         What the ends of its colour map stand for, in the unit of the legend; None for all that
-        there is.
+        there is, or nearly all of it in views with a robust range.
     isolines : bool or None
         Lines at every tenth of the range; None for those views where they are usual.
     legend : bool

@@ -26,6 +26,7 @@ from typing import Protocol
 
 import numpy as np
 
+from viewer.rendering.annotation import Annotation
 from viewer.rendering.camera import Camera
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.renderer import Renderer
@@ -129,6 +130,10 @@ class Recording:
         would follow the last: 360 makes a seamless loop.
     follow : Follow or None
         Whom the camera goes with.
+    selected : (int, int)
+        An actor's index and its joint that is highlighted, as ``Renderer.draw`` takes them.
+    annotations : callable or None
+        Gives what is drawn over a frame, from the posed scene and the picture's size.
     """
 
     scene: Scene
@@ -141,6 +146,8 @@ class Recording:
     fill: bool = False
     turn: float = 0.0
     follow: Follow | None = None
+    selected: tuple[int, int] = (0, -1)
+    annotations: Callable[[Scene, tuple[int, int]], Sequence[Annotation]] | None = None
 
     @property
     def n_frames(self) -> int:
@@ -312,8 +319,10 @@ class _Drawer:
                 yield self._buffer.read()
 
     def _draw(self, camera: Camera) -> None:
-        options = self._recording.options
-        self._renderer.draw(self._scene, camera, options, self._target, self._box)
+        recording, scene, target = self._recording, self._scene, self._target
+        if recording.annotations is not None:
+            self._renderer.annotations = recording.annotations(scene, recording.size)
+        self._renderer.draw(scene, camera, recording.options, target, self._box, recording.selected)
         self._waiter.begin()
 
     def release(self) -> None:

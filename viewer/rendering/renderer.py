@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
@@ -36,12 +37,13 @@ from viewer.rig.arrays import Floats
 from viewer.rig.scene import Actor, Scene
 
 if TYPE_CHECKING:
+    from viewer.rendering.annotation import Annotation
+    from viewer.rendering.annotation_pass import AnnotationPass
     from viewer.rendering.ghost_pass import Ghost, GhostPass
-    from viewer.rendering.joint_mark_pass import JointMarkPass
     from viewer.rendering.keypoint_pass import KeypointPass
     from viewer.rendering.legend import Legend
     from viewer.rendering.legend_pass import LegendPass
-    from viewer.rendering.mark_pass import MarkPass, Marks
+    from viewer.rendering.marks import Marks
     from viewer.rendering.picking import Pick, PickPass
     from viewer.rendering.point_pass import PointPass
     from viewer.rendering.trail_pass import TrailPass
@@ -66,7 +68,9 @@ class Renderer:
     buffers : ActorBuffers
         What was uploaded for figures and actors.
     marks : Marks or None
-        What is marked, over everything but legends.
+        What is marked, over everything but annotations and legends.
+    annotations : sequence of Annotation
+        What is explained, over everything but legends.
     ghost : Ghost or None
         A surface that is shown over the scene without being part of it.
     names_left_out : (int, int)
@@ -86,11 +90,10 @@ class Renderer:
             context, self.programs, self.joint_pass.cube, self.notes, self.mesh_pass.forget
         )
         self.marks: Marks | None = None
+        self.annotations: Sequence[Annotation] = ()
         self.ghost: Ghost | None = None
         self.names_left_out = 0, 0
-        self._late: list[
-            PointPass | PickPass | LegendPass | MarkPass | JointMarkPass | GhostPass
-        ] = []
+        self._late: list[PointPass | PickPass | LegendPass | AnnotationPass | GhostPass] = []
 
     # What many scenes never need is imported and made when it is first asked for.
 
@@ -137,13 +140,13 @@ class Renderer:
         return legends
 
     @cached_property
-    def mark_pass(self) -> MarkPass:
-        """Draws marks."""
-        from viewer.rendering.mark_pass import MarkPass
+    def annotation_pass(self) -> AnnotationPass:
+        """Draws marks, what is seen of joints beside their boxes, and annotations."""
+        from viewer.rendering.annotation_pass import AnnotationPass
 
-        marks = MarkPass(self.context, self.programs)
-        self._late.append(marks)
-        return marks
+        annotations = AnnotationPass(self.context, self.programs)
+        self._late.append(annotations)
+        return annotations
 
     @cached_property
     def ghost_pass(self) -> GhostPass:
@@ -153,15 +156,6 @@ class Renderer:
         ghosts = GhostPass(self.context, self.programs, self.mesh_pass)
         self._late.append(ghosts)
         return ghosts
-
-    @cached_property
-    def joint_mark_pass(self) -> JointMarkPass:
-        """Draws bones through the skin, axes and names of joints."""
-        from viewer.rendering.joint_mark_pass import JointMarkPass
-
-        marks = JointMarkPass(self.context, self.programs)
-        self._late.append(marks)
-        return marks
 
     @property
     def scalar_range(self) -> tuple[float, float]:
@@ -348,12 +342,19 @@ class Renderer:
         """Draw what lies over everything but legends."""
         self.names_left_out = 0, 0
         if has_joint_marks(options):
-            self.joint_mark_pass.draw(scene.actors, view, options, size, selected)
-            self.names_left_out = self.joint_mark_pass.names_left_out
+            from viewer.rendering.joint_annotation import joint_annotation
+
+            joints = joint_annotation(scene.actors, options, size, selected)
+            if joints is not None:
+                self.names_left_out = self.annotation_pass.draw(joints, view, size)
         if self.ghost is not None:
             self.ghost_pass.draw(self.ghost, view, options)
         if self.marks is not None:
-            self.mark_pass.draw(self.marks, view, size)
+            from viewer.rendering.marks import mark_annotation
+
+            self.annotation_pass.draw(mark_annotation(self.marks), view, size)
+        for annotation in self.annotations:
+            self.annotation_pass.draw(annotation, view, size)
 
     def _draw_trails(
         self, scene: Scene, view: View, options: DisplayOptions, size: tuple[int, int]

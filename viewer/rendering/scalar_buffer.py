@@ -6,7 +6,7 @@ import moderngl
 import numpy as np
 
 from viewer.rendering.mesh_buffers import MeshBuffers
-from viewer.rendering.scalar_look import ScalarLook
+from viewer.rendering.scalar_look import ScalarLook, typical_span
 from viewer.rendering.upload import float32, ramp_texture
 from viewer.rig.arrays import Floats
 from viewer.rig.pose import Pose, pose_key
@@ -34,6 +34,8 @@ class ScalarBuffer:
         The same for the figure's own vertices.
     range : (float, float)
         Lowest and highest value, in the unit that ``SCALARS`` names.
+    span : (float, float)
+        The same, or between which nearly all lie if the view's range is robust.
     name : str
         Of the view.
     version : int
@@ -46,7 +48,7 @@ class ScalarBuffer:
         self.context, self.mesh = context, mesh
         self.values: moderngl.Buffer | None = None
         self.numbers: Floats = np.zeros(0)
-        self.range = 0.0, 1.0
+        self.range = self.span = 0.0, 1.0
         self.name, self.version = "", 0
         self.look: ScalarLook | None = None
         self._colors: moderngl.Texture | None = None
@@ -79,6 +81,7 @@ class ScalarBuffer:
             self.values = self.context.buffer(reserve=4 * self.mesh.n_vertices, dynamic=True)
         self.values.write(float32(self.numbers[self.mesh.sources]))
         self.range = float(np.min(self.numbers)), float(np.max(self.numbers))
+        self.span = typical_span(self.numbers) if view.robust else self.range
         self.name, self._key = name, key
         self.version += 1
 

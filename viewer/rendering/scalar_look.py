@@ -10,11 +10,14 @@ import numpy as np
 from viewer.rendering.colormap import colormap, diverging_map, to_linear
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.palettes import NOTHING, count_palette, joint_palette, part_palette
-from viewer.rig.arrays import Bytes
+from viewer.rig.arrays import Bytes, Floats
 from viewer.rig.figure import Figure
 from viewer.rig.scalars import categories, find_view, shown_unit, split_name
 
-__all__ = ["ScalarLook", "is_whole", "look_of", "shown_ends"]
+__all__ = ["TYPICAL", "ScalarLook", "is_whole", "look_of", "shown_ends", "typical_span"]
+
+TYPICAL = 0.99
+"""Share of the numbers other than 0 that a robust range holds at least."""
 
 _NOTHING_LINEAR = tuple(float(channel) for channel in to_linear(np.array(NOTHING) / 255.0))
 
@@ -35,6 +38,8 @@ class ScalarLook:
         Whether 0 has a colour of its own, that of nothing.
     isolines : bool
         Whether there are lines at every tenth of the range.
+    is_typical : bool
+        Whether the ends leave out what is rare: larger numbers may look like the ends.
     """
 
     colors: Bytes
@@ -42,6 +47,7 @@ class ScalarLook:
     is_whole: bool = False
     dark_zero: bool = False
     isolines: bool = False
+    is_typical: bool = False
 
     @property
     def uniforms(self) -> dict[str, object]:
@@ -60,6 +66,27 @@ def is_whole(name: str) -> bool:
     return find_view(name).kind in ("discrete", "categorical")
 
 
+def typical_span(numbers: Floats) -> tuple[float, float]:
+    """Return between which numbers nearly all lie that are not 0.
+
+    Parameters
+    ----------
+    numbers : (V,)
+        Of a view.
+
+    Returns
+    -------
+    (float, float)
+        Lowest and highest of the numbers whose amounts are not above that of the 99th of a
+        hundred; the lowest and highest of all if there are fewer than a hundred.
+    """
+    amounts = np.abs(numbers[numbers != 0.0])
+    if not len(amounts):
+        return 0.0, 0.0
+    most = float(np.quantile(amounts, TYPICAL, method="higher"))
+    return max(float(numbers.min()), -most), min(float(numbers.max()), most)
+
+
 def shown_ends(
     name: str,
     figure: Figure,
@@ -75,7 +102,7 @@ def shown_ends(
     figure : Figure
         Gives the unit of a range that was asked for.
     ranges : sequence of (float, float)
-        Lowest and highest number of each figure.
+        Lowest and highest number of each figure, or those of its typical span.
     options : DisplayOptions
         The range that was asked for, if there is one.
 
@@ -116,7 +143,10 @@ def look_of(
     colors = diverging_map() if view.kind == "diverging" else colormap()
     isolines = view.isolines if options.isolines is None else options.isolines
     # No weight at all is another thing than a small one.
-    return ScalarLook(colors, ends, dark_zero=view.takes_joint, isolines=isolines)
+    is_typical = view.robust and options.scalar_range is None
+    return ScalarLook(
+        colors, ends, dark_zero=view.takes_joint, isolines=isolines, is_typical=is_typical
+    )
 
 
 def _category_colors(name: str, figure: Figure) -> Bytes:

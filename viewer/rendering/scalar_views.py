@@ -21,12 +21,14 @@ class ScalarViews:
     ----------
     range : (float, float)
         Lowest and highest number of the view drawn last, over all figures.
+    ends : (float, float)
+        What the ends of its colours stand for.
     legend : Legend or None
         Of that view.
     """
 
     def __init__(self) -> None:
-        self.range = 0.0, 0.0
+        self.range = self.ends = 0.0, 0.0
         self.legend: Legend | None = None
         self._key: tuple[object, ...] = ()
 
@@ -72,7 +74,8 @@ class ScalarViews:
         first = next((one for one in figures if not missing_part(name, one)), figures[0])
         ranges = [mesh.scalars.range for _, mesh in meshes]
         self.range = min(low for low, _ in ranges), max(high for _, high in ranges)
-        ends = shown_ends(name, first, ranges, options)
+        spans = [mesh.scalars.span for _, mesh in meshes]
+        self.ends = ends = shown_ends(name, first, spans, options)
         shown = []
         for actor, mesh in meshes:
             look = look_of(name, actor.figure, ends, options)

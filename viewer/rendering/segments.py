@@ -8,15 +8,16 @@ from dataclasses import dataclass
 import moderngl
 import numpy as np
 
+from viewer.rendering.options import Color
 from viewer.rendering.program import Programs, set_uniforms
 from viewer.rendering.upload import checked, float32
 from viewer.rendering.view import View, set_model
 from viewer.rig.arrays import Floats
 
-__all__ = ["HIDDEN", "SegmentPass", "Segments", "dots", "joined"]
+__all__ = ["HIDDEN", "Manner", "SegmentPass", "Segments", "dots", "joined"]
 
 HIDDEN = 0.4
-"""Opacity of what lies behind a surface."""
+"""Usual opacity of what lies behind a surface."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,6 +38,32 @@ class Segments:
     ends: Floats
     colors: Floats
     widths: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Manner:
+    """How segments are drawn.
+
+    Attributes
+    ----------
+    on_top : bool
+        Whether nothing that was drawn before hides them.
+    hidden : float
+        Opacity of what is hidden, 0 to 1.
+    lift : float
+        Share of the way to the eye by which segments lie before their places, so that those on a
+        surface are seen.
+    border : float
+        Width of the border around each, pixels.
+    border_color : (r, g, b)
+        sRGB, 0 to 1.
+    """
+
+    on_top: bool = False
+    hidden: float = HIDDEN
+    lift: float = 0.0
+    border: float = 0.0
+    border_color: Color = (0.0, 0.0, 0.0)
 
 
 def dots(points: Floats, colors: Floats, diameter: float) -> Segments:
@@ -82,10 +109,8 @@ class SegmentPass:
         self._buffer: moderngl.Buffer | None = None
         self._array: moderngl.VertexArray | None = None
 
-    def draw(
-        self, segments: Segments, view: View, size: tuple[int, int], on_top: bool = False
-    ) -> None:
-        """Draw segments over what is bound; what lies behind something is drawn faintly.
+    def draw(self, segments: Segments, view: View, size: tuple[int, int], manner: Manner) -> None:
+        """Draw segments over what is bound.
 
         Parameters
         ----------
@@ -95,8 +120,8 @@ class SegmentPass:
             The camera's matrices.
         size : (int, int)
             Width and height of the picture, pixels.
-        on_top : bool
-            Whether nothing that was drawn before hides them.
+        manner : Manner
+            How they are drawn.
         """
         count = len(segments.widths)
         if not count:
@@ -107,11 +132,18 @@ class SegmentPass:
         rows = np.hstack([*places, segments.colors, segments.widths[:, None]])
         array = self._filled(float32(rows).tobytes())
         set_model(self._program, view, np.eye(4), center)
-        set_uniforms(self._program, {"u_size": size})
+        values = {
+            "u_size": size,
+            "u_lift": manner.lift,
+            "u_height": manner.lift * view.camera.distance,
+            "u_border": manner.border,
+            "u_border_color": manner.border_color,
+        }
+        set_uniforms(self._program, values)
         target = self.context.fbo
         target.depth_mask = False  # segments over one another all count
         target.use()  # moderngl hands masks to OpenGL only then
-        steps = (("1", 1.0),) if on_top else ((">", HIDDEN), ("<=", 1.0))
+        steps = (("1", 1.0),) if manner.on_top else ((">", manner.hidden), ("<=", 1.0))
         for order, opacity in steps:
             self.context.depth_func = order
             set_uniforms(self._program, {"u_opacity": opacity})

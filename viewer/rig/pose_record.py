@@ -12,9 +12,16 @@ from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.hands import Hand, hand_vectors
 from viewer.rig.pose import Pose
+from viewer.rig.pose_transfer import (
+    JointTurns,
+    dof_layout,
+    joint_turns,
+    restore_rest,
+    turn_joints,
+)
 from viewer.rig.pose_vector import read_vector, set_joint_rotations, write_vector
 from viewer.rig.rotation import rotation_vector_to_matrix
-from viewer.rig.skeleton import Skeleton, clamp_dofs, dof_label, find_dof
+from viewer.rig.skeleton import DOF_KINDS, Skeleton, clamp_dofs, dof_label, find_dof
 from viewer.rig.smpl_family import members_by_numbers
 
 __all__ = ["PARTS", "PoseRecord", "apply_record", "record_of", "unused_coefficients"]
@@ -59,6 +66,9 @@ class PoseRecord:
         Whether hand poses leave the mean hand out. None: only coefficients add it.
     hand_coefficients : bool or None
         Whether hand poses are coefficients; None: all but 45 numbers are.
+    turns : JointTurns or None
+        What a figure with other DOFs takes in place of the numbers: its joints of the same names
+        turn as much, and its place, size and shape stay.
     """
 
     dofs: Mapping[str, float] = field(default_factory=dict)
@@ -70,6 +80,7 @@ class PoseRecord:
     scale: float | None = None
     flat_hands: bool | None = None
     hand_coefficients: bool | None = None
+    turns: JointTurns | None = None
 
 
 def record_of(figure: Figure, pose: Pose) -> PoseRecord:
@@ -95,6 +106,7 @@ def record_of(figure: Figure, pose: Pose) -> PoseRecord:
         expression=weights[~is_shape] if (~is_shape).any() else None,
         translation=pose.figure_translation.copy(),
         scale=pose.figure_scale,
+        turns=joint_turns(figure, pose),
     )
 
 
@@ -121,14 +133,19 @@ def apply_record(record: PoseRecord, figure: Figure, pose: Pose, cut: bool = Fal
     Raises
     ------
     RigError
-        If the record is for another figure; the pose is then as it was.
+        If the record is for another figure and does not say how the joints are turned, or if that
+        figure has no joint with such a name; the pose is then as it was.
     """
     skeleton = figure.skeleton
     if skeleton is None:
         raise RigError(f"figure {figure.name} has no skeleton to pose")
+    if record.turns is not None and record.turns.layout != dof_layout(figure):
+        work, notes = turn_joints(record.turns, figure, pose)
+        _take_over(work, pose)
+        return notes + _left_as_they_were(record)
     work, notes = pose.copy(), []
     if record.dofs:
-        notes += _apply_dofs(record.dofs, figure, work)
+        notes += _apply_dofs(record, figure, work)
     elif record.vector is not None:
         notes += _apply_vector(record.vector, figure, work)
     for name, values in record.parts.items():
@@ -140,9 +157,30 @@ def apply_record(record: PoseRecord, figure: Figure, pose: Pose, cut: bool = Fal
     if record.scale is not None:
         work.figure_scale = float(record.scale)
     notes += _keep_drawable(pose, work)
+    _take_over(work, pose)
+    return notes
+
+
+def _take_over(work: Pose, pose: Pose) -> None:
     for name in Pose.__slots__:
         setattr(pose, name, getattr(work, name))
-    return notes
+
+
+def _left_as_they_were(record: PoseRecord) -> list[str]:
+    """Return a line on what a record says that a figure with other DOFs does not take over."""
+    moves = DOF_KINDS[:3]
+    moved = [label for label, value in record.dofs.items() if value and label.endswith(moves)]
+    shifts = record.turns is not None and record.turns.shifts.any()
+    place = record.translation is not None and np.any(record.translation)
+    shapes = (values is not None and np.any(values) for values in (record.shape, record.expression))
+    left = {
+        "where joints are moved to": bool(moved) or shifts,
+        "the figure's place": place,
+        "its size": record.scale not in (None, 1.0),
+        "its shape": any(shapes),
+    }
+    words = [word for word, says in left.items() if says]
+    return [f"left as they were: {', '.join(words)}"] if words else []
 
 
 def _keep_drawable(before: Pose, pose: Pose) -> list[str]:
@@ -164,11 +202,13 @@ def _keep_drawable(before: Pose, pose: Pose) -> list[str]:
     return notes
 
 
-def _apply_dofs(dofs: Mapping[str, float], figure: Figure, pose: Pose) -> list[str]:
+def _apply_dofs(record: PoseRecord, figure: Figure, pose: Pose) -> list[str]:
     skeleton = figure.skeleton
     assert skeleton is not None
-    for label, value in dofs.items():
+    for label, value in record.dofs.items():
         pose.dofs[find_dof(skeleton, label)] = value
+    if record.turns is not None and len(record.dofs) == skeleton.n_dofs:
+        restore_rest(skeleton, pose, record.turns)
     notes = _beyond_limits(skeleton, pose.dofs)
     pose.dofs[:] = clamp_dofs(skeleton, pose.dofs)
     return notes

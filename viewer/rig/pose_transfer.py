@@ -6,12 +6,16 @@ world rotations W of the pose and W0 of the skeleton with every DOF at 0,
 
     W_target = C W_source W0_source^T C^T W0_target
 
-where C turns the source's up axis into the target's.
+where C turns the source's up axis into the target's. The turns W_source W0_source^T are all that
+has to be known of the source: they go with a pose into files and onto the clipboard.
 """
 
 from __future__ import annotations
 
+import hashlib
 from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,102 +23,181 @@ from viewer.errors import RigError, printable
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.joint_turning import nearest_dofs
-from viewer.rig.pose import Pose, joint_rotations, rest_pose
+from viewer.rig.pose import Pose, dof_rotations, joint_rotations, rest_pose
+from viewer.rig.rotation import matrix_to_quaternion, quaternion_to_matrix
 from viewer.rig.skeleton import Skeleton
 
-__all__ = ["joints_by_name", "shares_dofs", "transfer_pose"]
+__all__ = [
+    "JointTurns",
+    "dof_layout",
+    "joint_turns",
+    "joints_by_name",
+    "restore_rest",
+    "turn_joints",
+]
 
 _LISTED = 12  # names in a note
 _INEXACT = 1e-4  # radians: a turn that is missed by less is met
-_SAME_REST = 1e-6
+_REST_DIGITS = 5  # of rest rotations that count as the same
+_ROUNDING = 1e-9  # of a rotation matrix: what differs less is the same
 
 
-def shares_dofs(source: Figure, target: Figure) -> bool:
-    """Return whether a pose's numbers mean the same to both figures.
+@dataclass(frozen=True, slots=True, eq=False)
+class JointTurns:
+    """How the joints of a posed figure are turned, whatever its DOFs are.
+
+    Attributes
+    ----------
+    figure : str
+        What the figure is called.
+    names : tuple of J str
+        Of its joints.
+    turns : (J, 4)
+        Away from the rest pose, in the figure's axes: quaternions (x, y, z, w).
+    shifts : (J, 3)
+        Translations beside the DOFs, within the parent joint, lengths.
+    up : str
+        The figure's up axis, ``"y"`` or ``"z"``.
+    layout : str
+        As ``dof_layout`` gives it: where it is the same, the DOFs' values say more.
+    """
+
+    figure: str
+    names: tuple[str, ...]
+    turns: Floats
+    shifts: Floats
+    up: str
+    layout: str
+
+
+def joint_turns(figure: Figure, pose: Pose) -> JointTurns:
+    """Return how a figure's joints are turned.
 
     Parameters
     ----------
-    source, target : Figure
-        With skeletons or without.
+    figure : Figure
+        With a skeleton.
+    pose : Pose
+        Of that figure.
     """
-    one, other = source.skeleton, target.skeleton
-    if one is None or other is None:
-        return False
-    if one is other:
-        return source.n_shapes == target.n_shapes
-    return (
-        one.names == other.names
-        and np.array_equal(one.parents, other.parents)
-        and np.array_equal(one.dof_joints, other.dof_joints)
-        and np.array_equal(one.dof_kinds, other.dof_kinds)
-        and np.allclose(one.rest_rotations, other.rest_rotations, rtol=0.0, atol=_SAME_REST)
-        and (source.n_shapes, source.up) == (target.n_shapes, target.up)
+    skeleton = figure.skeleton
+    assert skeleton is not None  # whoever has a pose has a skeleton
+    turns = _turned(skeleton, pose) @ np.swapaxes(_turned(skeleton, _unturned(skeleton)), 1, 2)
+    return JointTurns(
+        figure.name,
+        skeleton.names,
+        matrix_to_quaternion(turns),
+        pose.translations.copy(),
+        figure.up,
+        dof_layout(figure),
     )
 
 
-def joints_by_name(source: Skeleton, target: Skeleton) -> Ints:
+def dof_layout(figure: Figure) -> str:
+    """Return a word that two figures share if a pose's numbers mean the same to both.
+
+    Parameters
+    ----------
+    figure : Figure
+        With a skeleton.
+    """
+    skeleton = figure.skeleton
+    assert skeleton is not None  # whoever has a pose has a skeleton
+    rest = quaternion_to_matrix(skeleton.rest_rotations).round(_REST_DIGITS) + 0.0  # no -0
+    parts = (
+        repr((skeleton.names, figure.up, figure.n_shapes)).encode("utf-8", "surrogatepass"),
+        *(
+            array.astype(np.int32).tobytes()
+            for array in (skeleton.parents, skeleton.dof_joints, skeleton.dof_kinds)
+        ),
+        rest.tobytes(),
+    )
+    return hashlib.sha256(b"|".join(parts)).hexdigest()[:16]
+
+
+def restore_rest(skeleton: Skeleton, pose: Pose, source: JointTurns) -> None:
+    """Give a pose with the source's DOFs the source's rotations and shifts beneath them, in place.
+
+    They are beside the rest pose where a motion turns a joint about more axes than its DOFs have.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Of a figure with the source's layout.
+    pose : Pose
+        With the source's values in ``dofs``, not yet clamped.
+    source : JointTurns
+        All else that is known of its pose.
+    """
+    world = quaternion_to_matrix(source.turns) @ _turned(skeleton, _unturned(skeleton))
+    parents = skeleton.parents
+    above = np.where((parents >= 0)[:, None, None], world[parents], np.eye(3))
+    turned = dof_rotations(skeleton, pose.dofs)
+    beneath = np.swapaxes(above, 1, 2) @ world @ np.swapaxes(turned, 1, 2)
+    rest = quaternion_to_matrix(skeleton.rest_rotations)
+    differs = np.abs(beneath - rest).max(axis=(1, 2)) > _ROUNDING
+    pose.rotations[:] = skeleton.rest_rotations
+    pose.rotations[differs] = matrix_to_quaternion(beneath[differs])
+    pose.translations[:] = source.shifts
+
+
+def joints_by_name(source: Sequence[str], target: Sequence[str]) -> Ints:
     """Return each target joint's partner: the source joint with its name.
 
     Parameters
     ----------
-    source, target : Skeleton
-        Names that are empty, or that repeat in either, match nothing.
+    source, target : sequence of str
+        Names of joints; those that are empty, or that repeat in either, match nothing.
 
     Returns
     -------
     (J,) int32
         Joints of the source for the J joints of the target; -1 for none.
     """
-    counts, others = Counter(source.names), Counter(target.names)
-    place = {name: joint for joint, name in enumerate(source.names)}
+    counts, others = Counter(source), Counter(target)
+    place = {name: joint for joint, name in enumerate(source)}
     return np.array(
-        [
-            place[name] if name and counts[name] == others[name] == 1 else -1
-            for name in target.names
-        ],
+        [place[name] if name and counts[name] == others[name] == 1 else -1 for name in target],
         dtype=np.int32,
     )
 
 
-def transfer_pose(
-    source: Figure, pose: Pose, target: Figure, start: Pose
-) -> tuple[Pose, list[str]]:
+def turn_joints(source: JointTurns, target: Figure, start: Pose) -> tuple[Pose, list[str]]:
     """Return a figure's pose with the joints turned as another figure's are.
 
     Parameters
     ----------
-    source : Figure
-        With a skeleton.
-    pose : Pose
-        Of the source; left as it is.
+    source : JointTurns
+        Of the other figure's pose.
     target : Figure
         With a skeleton.
     start : Pose
         Of the target; left as it is. What has no partner stays as it is there, as do place,
-        size and shape.
+        size and shape, and where joints are moved to.
 
     Returns
     -------
     pose : Pose
         Of the target, within its limits.
     notes : list of str
-        The joints that the target lacks, and those that cannot turn that way, one line each.
+        How many joints were taken over, which the target lacks, and which cannot turn that way,
+        one line each.
 
     Raises
     ------
     RigError
         If no joint of one is called as one of the other.
     """
-    one, other = source.skeleton, target.skeleton
-    if one is None or other is None:
-        raise RigError(f"figure {(target if other is None else source).name} has no skeleton")
-    partners = joints_by_name(one, other)
+    other = target.skeleton
+    if other is None:
+        raise RigError(f"figure {target.name} has no skeleton to pose")
+    partners = joints_by_name(source.names, other.names)
     found = np.flatnonzero(partners >= 0)
     if not len(found):
-        raise RigError(f"no joint of {source.name} is called as one of {target.name}")
+        whose = printable(source.figure) or "the pose"
+        raise RigError(f"no joint of {whose} is called as one of {target.name}")
     turn = _up_turn(source.up, target.up)
-    deltas = _turned(one, pose) @ np.swapaxes(_turned(one, _unturned(one)), 1, 2)
-    deltas = turn @ deltas[partners[found]] @ turn.T
+    deltas = turn @ quaternion_to_matrix(source.turns[partners[found]]) @ turn.T
     rest = _turned(other, _unturned(other))
     wanted = dict(zip(found.tolist(), deltas @ rest[found], strict=True))
     moved, missed = _turn_joints(other, start, wanted)
@@ -141,16 +224,17 @@ def _turn_joints(
     return pose, missed
 
 
-def _notes(source: Figure, target: Figure, partners: Ints, missed: list[int]) -> list[str]:
-    one, other = source.skeleton, target.skeleton
-    assert one is not None and other is not None  # the caller looked
-    used = set(partners.tolist())
-    lacking = [name or f"#{joint}" for joint, name in enumerate(one.names) if joint not in used]
-    notes = []
+def _notes(source: JointTurns, target: Figure, partners: Ints, missed: list[int]) -> list[str]:
+    skeleton = target.skeleton
+    assert skeleton is not None  # the caller looked
+    used = set(partners[partners >= 0].tolist())
+    whose = printable(source.figure) or "the pose"
+    notes = [f"{len(used)} of {len(source.names)} joints of {whose} taken over"]
+    lacking = [name or f"#{joint}" for joint, name in enumerate(source.names) if joint not in used]
     if lacking:
         notes.append(f"{target.name} has no joint called {_listed(lacking)}")
     if missed:
-        names = _listed([other.names[joint] for joint in missed])
+        names = _listed([skeleton.names[joint] for joint in missed])
         notes.append(f"turned as far as their DOFs and limits allow: {names}")
     return notes
 

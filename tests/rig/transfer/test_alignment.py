@@ -160,6 +160,24 @@ def test_matrices_that_mirror_or_shear_are_refused():
     )
 
 
+@pytest.mark.parametrize(
+    ("scale", "angle", "words"),
+    [
+        (1.0, 0.0, "the target lies on the template as it is; scale 1, turned by 0.00 degrees"),
+        (
+            1000.0,
+            np.pi / 2,
+            "the template is scaled and turned about the origin that both share; scale 1000, "
+            "turned by 90.00 degrees",
+        ),
+    ],
+)
+def test_lines_of_a_shared_origin_say_whether_anything_was_done(scale, angle, words):
+    placed = Similarity(scale, turn([1, 0, 0], angle), np.zeros(3), np.ones(3))
+    lines = alignment_lines(Alignment(placed, 0.0, 0.0, (0.0, 0.0), "in place"))
+    assert lines[0] == f"alignment: {words}, shift (0, 0, 0)"
+
+
 def test_lines_tell_everything_and_warn_of_a_bad_fit():
     placed = Similarity(2.0, turn([0, 1, 0], np.pi / 2), np.array([1.0, 0, -2]), np.ones(3))
     lines = alignment_lines(Alignment(placed, 0.05, 0.1, (0.05, 0.1), "search"))

@@ -43,6 +43,14 @@ __all__ = ["draw_alignment"]
 _FEWEST = 3  # landmarks
 _DOUBTFUL = 0.03  # error over size, as in the report
 _WARNING = (1.0, 0.77, 0.30, 1.0)
+_HOW = {
+    "in place": "about the origin of both",
+    "search": "by closest points",
+    "fit": "pose and limbs fitted",
+    "landmarks": "by landmarks",
+    "given": "by hand",
+}
+"""How a template came to where it lies, as ``Alignment.how`` says it."""
 _SCALE_TEXTS = {"uniform": "one scale", "axes": "one along each axis", "none": "as it is"}
 
 
@@ -96,8 +104,7 @@ def _draw_error(found: Alignment | None) -> None:
     if found is None:
         imgui.text_disabled("error: not measured here")
         return
-    how = "by hand" if found.how == "given" else found.how
-    text = f"error {100.0 * found.error:.2f} % of its size ({how})"
+    text = f"error {100.0 * found.error:.2f} % ({_HOW[found.how]})"
     if found.error > _DOUBTFUL:
         imgui.push_style_color(imgui.Col_.text, _WARNING)
         imgui.text_wrapped(f"{text}: doubtful")
@@ -105,8 +112,8 @@ def _draw_error(found: Alignment | None) -> None:
     else:
         imgui.text_wrapped(text)
     explain(
-        "RMS distance of the target's best 90 % from the template; of the template from the "
-        f"target: {100.0 * found.away:.2f} %"
+        "of the target's size: RMS distance of its best 90 % from the template; of the template "
+        f"from the target: {100.0 * found.away:.2f} %"
     )
 
 
@@ -163,8 +170,8 @@ def _inputs(
     """Draw the fields; return what was typed, None for each that was not."""
     flags = imgui.InputTextFlags_.enter_returns_true
     typed: list[Floats | None] = []
-    for label, values in (("Shift", shift), ("Turn (degrees)", angles)):
-        changed, new = imgui.input_float3(label, values.tolist(), "%.4g", flags)
+    for label, values, digits in (("Shift", shift, "%.4g"), ("Turn (degrees)", angles, "%.2f")):
+        changed, new = imgui.input_float3(label, values.tolist(), digits, flags)
         note_item(state, label)
         fits = changed and bool(np.isfinite(new).all())
         typed.append(np.array(new, dtype=np.float64) if fits else None)

@@ -91,11 +91,28 @@ def _draw_table(state: AppState) -> None:
     found = [one for name, one in view.results.items() if name in known]
     if not imgui.begin_table("methods", 1 + len(found), imgui.TableFlags_.sizing_stretch_same):
         return
-    _row("", [one.method for one in found])
-    _row("matched", [f"{100.0 * one.rigged.weights.matched.mean():.1f} %" for one in found])
-    _row("residual", [f"{one.rigged.residual:.1e}" for one in found])
-    _row("guarded", [f"{int(one.rigged.guarded.sum()):,}" for one in found])
-    _row("joints outside", [f"{len(one.rigged.outside):,}" for one in found])
+    rigged = [one.rigged for one in found]
+    _row("", "", [one.method for one in found])
+    _row(
+        "matched",
+        "vertices whose weights are those of the template's surface under them",
+        [f"{100.0 * one.weights.matched.mean():.1f} %" for one in rigged],
+    )
+    _row(
+        "residual",
+        "how far the mesh is from the target when it is posed again, at most, of its size",
+        [f"{one.residual:.1e}" for one in rigged],
+    )
+    _row(
+        "guarded",
+        "vertices bent too far to be undone exactly: their rest position is a guess",
+        [f"{int(one.guarded.sum()):,}" for one in rigged],
+    )
+    _row(
+        "joints outside",
+        "joints that lie outside the mesh, and inside the template",
+        [f"{len(one.outside):,}" for one in rigged],
+    )
     imgui.end_table()
     if view.comparison is not None and len(found) > 1:
         text = (
@@ -105,11 +122,12 @@ def _draw_table(state: AppState) -> None:
         imgui.text_wrapped(text)
 
 
-def _row(title: str, cells: list[str]) -> None:
+def _row(title: str, meaning: str, cells: list[str]) -> None:
     imgui.table_next_row()
     for text in (title, *cells):
         imgui.table_next_column()
         imgui.text_unformatted(text)
+        explain(meaning)
 
 
 def _draw_lines(state: AppState, result: Result) -> None:

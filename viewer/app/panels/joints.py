@@ -47,7 +47,9 @@ def draw(state: AppState) -> None:
         draw_captured_points(state, actor, actor.figure.points)
         return
     if actor.figure.skeleton is None or actor.pose is None:
-        imgui.text_wrapped("This figure has no skeleton: open its .skel with it.")
+        imgui.text_wrapped(
+            "This figure has no skeleton: open its .skel with it, or give it one: Window > Rig."
+        )
         return
     _draw_head(state)
     skeleton = actor.figure.skeleton

@@ -22,7 +22,7 @@ from viewer.app.rig_sources import (
     targets,
     template_texts,
 )
-from viewer.app.rig_view import Template
+from viewer.app.rig_view import RigChoices, Template
 from viewer.app.rig_work import start_adding, start_match, start_reading, start_run
 from viewer.app.state import AppState
 from viewer.app.widgets import (
@@ -46,6 +46,7 @@ __all__ = ["draw"]
 _MESHES = (".obj", ".ply")
 _MOST_ROUNDS, _MOST_INFLUENCES = 50, 16
 _NEAREST_WHY = "the method nearest has no such choice"
+_ADVANCED = ("refines", "joints", "smoothing", "max_influences", "correctives")
 _GAP = 1.2  # of the template's width, between it and the target
 
 
@@ -103,23 +104,30 @@ def _draw_sources(state: AppState) -> None:
     if not why:
         explain("any figure that opens: a body model, .npz, or .skel and .skin together")
     template = current_template(state)
+    # A template that was not read yet has the same controls: nothing moves away from the pointer.
+    if template is None or template.actor is None:
+        same_line_if_room("Pose it…")
+        refuses = no_target(state) or why
+        if button(state, "Pose it…", refuses):
+            if template is None:
+                start_reading(state, then=_add_template)
+            else:
+                _add_template(state)
+        if not refuses:
+            explain("puts the template beside the target, to be posed like it")
+    imgui.push_text_wrap_pos(0.0)
+    imgui.text_disabled(_template_text(template))
+    imgui.pop_text_wrap_pos()
+
+
+def _template_text(template: Template | None) -> str:
+    """Say what the template is."""
     if template is None:
-        imgui.text_disabled("read when it is needed")
-        return
-    _draw_template(state, template)
-
-
-def _draw_template(state: AppState, template: Template) -> None:
+        return "read when it is needed"
     skeleton, mesh = template.figure.skeleton, template.figure.mesh
     assert skeleton is not None and mesh is not None  # it is attached
     pose = "in its present pose" if template.actor is not None else "in its file's pose"
-    imgui.push_text_wrap_pos(0.0)
-    imgui.text_disabled(f"{skeleton.n_joints} joints, {mesh.n_vertices:,} vertices, {pose}")
-    imgui.pop_text_wrap_pos()
-    if template.actor is None:
-        if button(state, "Pose it…", no_target(state)):
-            _add_template(state, template)
-        explain("puts the template beside the target, to be posed like it")
+    return f"{skeleton.n_joints} joints, {mesh.n_vertices:,} vertices, {pose}"
 
 
 def _ask(state: AppState, done: object, title: str, suffixes: tuple[str, ...]) -> None:
@@ -136,8 +144,10 @@ def _read_template(state: AppState, paths: list[Path]) -> None:
     start_reading(state, tuple(paths))
 
 
-def _add_template(state: AppState, template: Template) -> None:
+def _add_template(state: AppState) -> None:
     """Put the template into the scene, to the right of what is there."""
+    template = current_template(state)
+    assert template is not None  # it was read
     actor = Actor(template.figure, template.pose.copy(), template.clip)
     span = bounding_box(actor_points(actor))[:, 0]
     edge = max(
@@ -185,8 +195,37 @@ def _draw_run(state: AppState) -> None:
     choices = state.rig.choices
     choices.method = choice(state, "Method", choices.method, {name: name for name in METHODS})
     explain(METHODS[choices.method])
+    _draw_advanced(state, choices)
+    why = no_job_room(state)
+    if button(state, "Run", why):
+        start_run(state, (choices.method,))
+    if not why:
+        explain("what is not aligned yet is aligned first")
+    same_line_if_room("Compare methods")
+    if button(state, "Compare methods", why):
+        start_run(state, tuple(METHODS))
+    if not why:
+        explain("runs both; A goes through the mesh as it was and both results")
+
+
+def _draw_advanced(state: AppState, choices: RigChoices) -> None:
+    """Draw what is seldom asked for, folded away; what was changed there is counted."""
+    usual = RigChoices()
+    changed = sum(getattr(choices, name) != getattr(usual, name) for name in _ADVANCED)
+    text = f"Advanced ({changed} changed)" if changed else "Advanced"
+    opened = imgui.tree_node(f"{text}###rig advanced")
+    note_item(state, "rig advanced")
+    if not opened:
+        return
+    _draw_advanced_choices(state, choices)
+    imgui.tree_pop()
+
+
+def _draw_advanced_choices(state: AppState, choices: RigChoices) -> None:
     why = _NEAREST_WHY if choices.method == "nearest" else ""
     with disabled(why):
+        choices.refines = checkbox(state, "Refine alignment", choices.refines)
+        explain("closest points improve on what the search or the landmarks found", why)
         choices.joints = choice(state, "Joints##rig", choices.joints, {n: n for n in JOINTS})
         explain("carried: moved as the surface around them; copied: with the alignment alone", why)
         changed, rounds = imgui.slider_int("Smoothing", choices.smoothing, 0, _MOST_ROUNDS)
@@ -202,13 +241,3 @@ def _draw_run(state: AppState) -> None:
         choices.max_influences = max(most, 0) if changed else choices.max_influences
         choices.correctives = checkbox(state, "Pose correctives", choices.correctives)
         explain("carry those of the template, if it has some", why)
-    why = no_job_room(state)
-    if button(state, "Run", why):
-        start_run(state, (choices.method,))
-    if not why:
-        explain("what is not aligned yet is aligned first")
-    same_line_if_room("Compare methods")
-    if button(state, "Compare methods", why):
-        start_run(state, tuple(METHODS))
-    if not why:
-        explain("runs both; A goes through the mesh as it was and both results")

@@ -6,6 +6,7 @@ from imgui_bundle import imgui
 
 from viewer.app.state import AppState
 from viewer.errors import printable
+from viewer.rig.figure import Figure
 from viewer.rig.memo import Memo
 from viewer.rig.scene import Scene
 from viewer.rig.skin import influence_counts
@@ -17,8 +18,9 @@ _known: Memo[Scene, tuple[tuple[str, str], ...]] = Memo()
 
 def draw(state: AppState) -> None:
     """Draw the panel."""
+    figures = tuple(actor.figure for actor in state.scene.actors)
     for name, value in (
-        *_known.get(state.scene, None, lambda: _counts(state.scene)),
+        *_known.get(state.scene, figures, lambda: _counts(figures)),
         ("Frame", f"{state.stats.frame_ms:.1f} ms" if state.stats.frame_ms else "not measured"),
         ("Renderer", state.stats.renderer),
         ("OpenGL", state.stats.version),
@@ -29,8 +31,7 @@ def draw(state: AppState) -> None:
         imgui.text_wrapped(value)
 
 
-def _counts(scene: Scene) -> tuple[tuple[str, str], ...]:
-    figures = [actor.figure for actor in scene.actors]
+def _counts(figures: tuple[Figure, ...]) -> tuple[tuple[str, str], ...]:
     skeletons = [figure.skeleton for figure in figures if figure.skeleton is not None]
     meshes = [figure.mesh for figure in figures if figure.mesh is not None]
     skins = [figure.skin for figure in figures if figure.skin is not None]

@@ -20,6 +20,7 @@ from viewer.app.widgets import (
     same_line_if_room,
 )
 from viewer.errors import printable
+from viewer.rendering.scalar_look import TYPICAL
 from viewer.rig.figure import Figure
 from viewer.rig.scalars import SCALARS, length_unit, shown_unit, split_name
 
@@ -114,10 +115,16 @@ def _draw_range(state: AppState, key: str) -> None:
         if imgui.radio_button("Automatic", options.scalar_range is None):
             options.scalar_range = None
         note_item(state, "Automatic")
-        explain("the colours reach over all numbers that there are", why)
+        explain(
+            f"the colours reach over {TYPICAL:.0%} of the numbers that are not 0; larger ones look "
+            "like the ends"
+            if SCALARS[key].robust
+            else "the colours reach over all numbers that there are",
+            why,
+        )
         same_line_if_room("Fixed")
         if imgui.radio_button("Fixed", options.scalar_range is not None):
-            options.scalar_range = options.scalar_range or _present_range(state, key)
+            options.scalar_range = options.scalar_range or _present_range(state)
         note_item(state, "Fixed")
         explain("the colours stay, whatever the pose; smaller and larger numbers look like the "
                 "ends", why)  # fmt: skip
@@ -143,10 +150,10 @@ def _end_field(
     return typed if changed and math.isfinite(typed) and above < typed < below else value
 
 
-def _present_range(state: AppState, key: str) -> tuple[float, float]:
+def _present_range(state: AppState) -> tuple[float, float]:
     """Return the automatic range of this moment, in the unit of the legend."""
     factor, _ = shown_unit(state.options.scalar, state.actor.figure)
-    low, high = SCALARS[key].shown(*state.stats.scalar_range)
+    low, high = state.stats.scalar_ends
     return float(f"{factor * low:.3g}"), float(f"{factor * high:.3g}")
 
 

@@ -69,6 +69,9 @@ class Scalar:
         Whether lines of equal number are drawn unless asked otherwise.
     least : float
         The automatic range ends there at least.
+    robust : bool
+        Whether the automatic range leaves the largest hundredth of what is not 0 out: one bad
+        triangle would take all colour from the rest.
     """
 
     title: str
@@ -80,6 +83,7 @@ class Scalar:
     about: str = ""
     isolines: bool = False
     least: float = 0.0
+    robust: bool = False
 
     @property
     def takes_joint(self) -> bool:
@@ -109,9 +113,9 @@ SCALARS = {
     ),
     "sums": Scalar("|sum of weights - 1|", "weights", "weights", unit="", moves=False),
     "entropy": Scalar("Entropy of weights", "weights", "weights", unit="bits", moves=False),
-    "stretch": Scalar("Edge stretch, largest", "strain", "a skin", "diverging", "%"),
-    "stretch-mean": Scalar("Edge stretch, mean", "strain", "a skin", "diverging", "%"),
-    "area": Scalar("Area change", "strain", "a skin", "diverging", "%"),
+    "stretch": Scalar("Edge stretch, largest", "strain", "a skin", "diverging", "%", robust=True),
+    "stretch-mean": Scalar("Edge stretch, mean", "strain", "a skin", "diverging", "%", robust=True),
+    "area": Scalar("Area change", "strain", "a skin", "diverging", "%", robust=True),
     "methods": Scalar("Distance LBS to DQS", "distances", "a skin"),
     "cut": Scalar("Distance to few influences", "distances", "a skin"),
     "normalized": Scalar("Effect of normalising weights", "distances", "a skin"),

@@ -289,7 +289,7 @@ def similarity_of(matrix: Floats) -> Similarity:
 
 
 _HOW = {
-    "in place": "the target lies in place and is left there",
+    "in place": "the template is scaled and turned about the origin that both share",
     "search": "found by closest points",
     "landmarks": "from the landmarks",
     "given": "as given",
@@ -301,12 +301,15 @@ def alignment_lines(alignment: Alignment) -> list[str]:
     """Return what a person should know: scale, turn, shift, error, and whether to doubt it."""
     placed = alignment.placed
     angle = np.degrees(np.arccos(np.clip((np.trace(placed.rotation) - 1.0) / 2.0, -1.0, 1.0)))
+    how = _HOW[alignment.how]
+    if alignment.how == "in place" and placed.scale == 1.0 and angle == 0.0:
+        how = "the target lies on the template as it is"
     shift = ", ".join(f"{value:.4g}" for value in placed.shift + 0.0)
     factors = ""
     if (placed.factors != 1.0).any():
         factors = f" (along x, y, z: {', '.join(f'{f:.4g}' for f in placed.factors)})"
     lines = [
-        f"alignment: {_HOW[alignment.how]}; scale {placed.scale:.6g}{factors}, turned by "
+        f"alignment: {how}; scale {placed.scale:.6g}{factors}, turned by "
         f"{angle:.2f} degrees, shift ({shift})",
         f"alignment error: {100.0 * alignment.error:.3f} % of the target's size (RMS of the best "
         f"90 %; template to target {100.0 * alignment.away:.3f} %)",

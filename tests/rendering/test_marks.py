@@ -10,7 +10,7 @@ from drawn_figures import square
 from front_view import PIXELS, drawn, front_view, pixel
 
 from viewer.rendering.camera import Camera
-from viewer.rendering.mark_pass import MARK_COLOR, Marks
+from viewer.rendering.marks import MARK_COLOR, Marks, mark_annotation
 from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.figure import Figure
@@ -102,14 +102,15 @@ def test_a_line_that_passes_the_eye_is_cut_there(offscreen):
     assert not mask[:, : PIXELS // 2 - 5].any()
 
 
-def test_the_same_marks_are_uploaded_once(offscreen):
-    marks = points((0.0, 0.0, 0.0))
-    marked(offscreen, marks)
-    first = offscreen.renderer.mark_pass._array
-    marked(offscreen, marks)
-    assert offscreen.renderer.mark_pass._array is first
-    marked(offscreen, points((1.0, 0.0, 0.0)))
-    assert offscreen.renderer.mark_pass._array is not first
+def test_points_lie_over_lines(offscreen):
+    line = np.array([[[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]])
+    both = Marks(np.zeros((1, 3)), np.array([6.0]), line)
+    found = mark_annotation(both).segments
+    assert found.starts.tolist() == [[-1, 0, 0], [0, 0, 0]]
+    assert found.ends.tolist() == [[1, 0, 0], [0, 0, 0]]
+    assert found.widths.tolist() == [2, 12]
+    # The line's dark border would be seen 3 pixels from the middle if it lay over the point.
+    assert pixel(marked(offscreen, both), 0.0, 3 / 20) == [*COLOR, 255]
 
 
 def test_marks_far_from_the_origin_do_not_shake(offscreen):

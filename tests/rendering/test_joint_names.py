@@ -7,9 +7,10 @@ import pytest
 from drawn_figures import skeleton
 from numpy.testing import assert_allclose
 
+from viewer.rendering.annotation import letters_for, place_labels
 from viewer.rendering.camera import Camera
 from viewer.rendering.joint_marks import HIGHLIGHT, marks_of
-from viewer.rendering.joint_names import letters_for, place_names
+from viewer.rendering.joint_names import name_labels
 from viewer.rendering.lettering import Lettering
 from viewer.rendering.view import view_of
 from viewer.rig.figure import Figure
@@ -29,13 +30,8 @@ def placed(lettering, offsets, selected=(0, -1)):
     joints = skeleton([-1] * len(offsets), offsets)
     marks = marks_of([Actor(Figure("figure", skeleton=joints))])
     camera = Camera(azimuth=0.0, inclination=0.0, fov=90.0, distance=2.0, orthographic=True)
-    return place_names(marks, view_of(camera, SIZE, BOX), SIZE, selected, lettering)
-
-
-def test_letters_grow_with_the_picture():
-    # 13 pixels at 720; 800 wide counts as 600 high.
-    assert letters_for((1280, 720)) == 13 and letters_for((2560, 1440)) == 26
-    assert letters_for(SIZE) == 11
+    view = view_of(camera, SIZE, BOX)
+    return place_labels(name_labels(marks, selected), view, SIZE, lettering)
 
 
 def test_joints_apart_have_all_their_names(lettering):
@@ -69,5 +65,6 @@ def test_joints_beside_the_picture_do_not_count(lettering):
 
 def test_nobody_has_no_names(lettering):
     camera = Camera()
-    names = place_names([], view_of(camera, SIZE, BOX), SIZE, (0, -1), lettering)
+    view = view_of(camera, SIZE, BOX)
+    names = place_labels(name_labels([], (0, -1)), view, SIZE, lettering)
     assert names.words == () and names.n_left_out == 0

@@ -1,0 +1,89 @@
+"""The list of keys over the window: in columns where it is low, scrolled where it is small."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from imgui_bundle import imgui
+
+from viewer.app.keys import KEYS, MOUSE
+from viewer.app.state import AppState
+from viewer.app.widgets import overlay_rect
+
+__all__ = ["draw_keys"]
+
+_COLOR = (1.0, 0.78, 0.45, 1.0)  # of keys
+_OPACITY = 0.97  # of the list: what lies behind must not be read with it
+_GAP, _BETWEEN = 1.5, 3.0  # heights of letters: from a key to its words, from column to column
+
+
+class _Columns(NamedTuple):
+    """How many columns the list has, how many lines each, and whether all can be seen."""
+
+    number: int
+    rows: int
+    fits: bool
+
+
+def draw_keys(state: AppState) -> None:
+    """Draw the list if it is wanted; the wheel moves what a small window has no room for."""
+    if not state.keys_visible:
+        return
+    lines = [*((key.label, key.text) for key in KEYS), *MOUSE]
+    style, viewport = imgui.get_style(), imgui.get_main_viewport()
+    letter = imgui.get_font_size()
+    first = max(imgui.calc_text_size(label).x for label, _ in lines) + _GAP * letter
+    column = first + max(imgui.calc_text_size(text).x for _, text in lines) + _BETWEEN * letter
+    room = (
+        viewport.size.x - 4.0 * style.window_padding.x,
+        viewport.size.y - 4.0 * style.window_padding.y,
+    )
+    columns = _columns(len(lines), room, (column, imgui.get_text_line_height_with_spacing()))
+    center = viewport.get_center()
+    imgui.set_next_window_pos(center, imgui.Cond_.always, (0.5, 0.5))
+    edges = 2.0 * style.window_padding.x, 2.0 * style.window_padding.y
+    imgui.set_next_window_size_constraints((0.0, 0.0), (room[0] + edges[0], room[1] + edges[1]))
+    imgui.set_next_window_bg_alpha(_OPACITY)
+    if imgui.begin("##keys", None, _flags(columns.fits))[0]:
+        _draw_lines(lines, columns, first, column)
+    overlay_rect(state, "##keys")
+    imgui.end()
+
+
+def _flags(fits: bool) -> int:
+    """Return the flags of a window that takes input only if it has to be scrolled."""
+    flags = imgui.WindowFlags_.no_title_bar | imgui.WindowFlags_.no_resize
+    flags |= imgui.WindowFlags_.no_move | imgui.WindowFlags_.always_auto_resize
+    flags |= imgui.WindowFlags_.no_docking | imgui.WindowFlags_.no_saved_settings
+    flags |= imgui.WindowFlags_.no_focus_on_appearing | imgui.WindowFlags_.no_nav
+    if fits:
+        return flags | imgui.WindowFlags_.no_inputs | imgui.WindowFlags_.no_scrollbar
+    return flags | imgui.WindowFlags_.horizontal_scrollbar
+
+
+def _columns(count: int, room: tuple[float, float], line: tuple[float, float]) -> _Columns:
+    """Return as few columns as there is height for, and no more than there is width for.
+
+    >>> _columns(50, (1000, 600), (400, 20)), _columns(50, (1000, 400), (400, 20))
+    (_Columns(number=2, rows=25, fits=True), _Columns(number=2, rows=25, fits=False))
+    """
+    wanted = -(-count // max(int(room[1] / line[1]), 1))
+    number = max(min(wanted, int(room[0] / line[0])), 1)
+    rows = -(-count // number)
+    return _Columns(number, rows, number == wanted and number * line[0] <= room[0])
+
+
+def _draw_lines(
+    lines: Sequence[tuple[str, str]], columns: _Columns, first: float, column: float
+) -> None:
+    """Write the lines column by column; a key and its words are one line."""
+    left, top = imgui.get_cursor_pos()
+    step = imgui.get_text_line_height_with_spacing()
+    for index, (label, text) in enumerate(lines):
+        at, row = divmod(index, columns.rows)
+        place = left + at * column, top + row * step
+        imgui.set_cursor_pos(place)
+        imgui.text_colored(_COLOR, label)
+        imgui.set_cursor_pos((place[0] + first, place[1]))
+        imgui.text_unformatted(text)

@@ -1,0 +1,77 @@
+"""How the things of a legend are split into columns, for pictures and for the window alike."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+__all__ = ["LegendColumns", "legend_columns"]
+
+
+@dataclass(frozen=True, slots=True)
+class LegendColumns:
+    """Which things stand in which column, from the top down.
+
+    Attributes
+    ----------
+    counts : tuple of int
+        Things in each column from left to right; the first ones fill the first column.
+    widths : tuple of float
+        Of each column.
+    left_out : int
+        Things without room: a line "and N more" stands below the last column's things.
+    """
+
+    counts: tuple[int, ...]
+    widths: tuple[float, ...]
+    left_out: int = 0
+
+    @property
+    def rows(self) -> int:
+        """Lines of the longest column, the one that counts what is left out among them."""
+        last = self.counts[-1] + (self.left_out > 0) if self.counts else 0
+        return max((*self.counts, last), default=0)
+
+
+def legend_columns(widths: Sequence[float], rows: int, width: float) -> LegendColumns:
+    """Split things into as few columns as their lines allow; what has no room is counted.
+
+    Parameters
+    ----------
+    widths : sequence of float
+        Of each thing's swatch and name, with the gap to the next column, in any unit.
+    rows : int
+        Lines that a column may have, 1 or more.
+    width : float
+        That all columns together may have, in the same unit. The first one is there even if it is
+        wider.
+
+    Returns
+    -------
+    LegendColumns
+        Columns of about the same length if all have room, else full ones.
+
+    >>> legend_columns([10.0] * 5, 4, 30.0).counts
+    (3, 2)
+    >>> legend_columns([10.0] * 5, 2, 20.0)
+    LegendColumns(counts=(2, 1), widths=(10.0, 10.0), left_out=2)
+    """
+    if not widths:
+        return LegendColumns((), ())
+    n_columns = -(-len(widths) // rows)
+    evenly = _split(widths, -(-len(widths) // n_columns))
+    if n_columns == 1 or sum(evenly.widths) <= width:
+        return evenly
+    full = _split(widths, rows)
+    if sum(full.widths) <= width:
+        return full
+    kept = 1
+    while sum(full.widths[: kept + 1]) <= width:
+        kept += 1
+    counts = (*full.counts[: kept - 1], full.counts[kept - 1] - 1)
+    return LegendColumns(counts, full.widths[:kept], len(widths) - sum(counts))
+
+
+def _split(widths: Sequence[float], rows: int) -> LegendColumns:
+    parts = [widths[first : first + rows] for first in range(0, len(widths), rows)]
+    return LegendColumns(tuple(map(len, parts)), tuple(max(part) for part in parts))
