@@ -26,7 +26,7 @@ def test_a_finding_is_a_line_with_its_place_and_a_hint(rig, capsys) -> None:
     lines = capsys.readouterr().out.splitlines()
     at = next(index for index, line in enumerate(lines) if " W001: " in line)
     assert lines[at] == (
-        f"{rig[1]}:11: warning W001: weights of 1 vertices do not sum to 1: 1.25 at vertex 1, "
+        f"{rig[1]}:13: warning W001: weights of 1 vertices do not sum to 1: 1.25 at vertex 1, "
         "an error of 0.25"
     )
     assert lines[at + 1] == ("    weights do not sum to 1: normalise them (--normalize shows how)")
@@ -67,7 +67,7 @@ def json_of(arguments: list[str], capsys) -> dict:
 def test_json_holds_every_place(rig, capsys) -> None:
     found = json_of(["lint", *rig], capsys)
     (weights,) = [f for f in found["findings"] if f["code"] == "W001"]
-    assert (weights["file"], weights["line"], weights["actor"]) == (rig[1], 11, 0)
+    assert (weights["file"], weights["line"], weights["actor"]) == (rig[1], 13, 0)
     assert weights["vertices"] == [1] and weights["n_vertices"] == 1
     assert weights["title"] == CODES["W001"].title and weights["hint"] == CODES["W001"].hint
     assert found["counts"]["warning"] == sum(f["severity"] == "warning" for f in found["findings"])

@@ -183,6 +183,21 @@ def test_target_with_a_rig_of_its_own_is_taken_as_posed(tmp_path, monkeypatch, c
 
 
 REFUSED = {
+    "a distance below 0": (
+        ["--max-distance=-1"],
+        2,
+        "viewer: --max-distance: expected 0 or more, found -1",
+    ),
+    "no influences": (
+        ["--max-influences", "0"],
+        2,
+        "viewer: --max-influences: expected 1 or more, found 0",
+    ),
+    "rounds below 0": (
+        ["--smooth=-3"],
+        2,
+        "viewer: --smooth: expected 0 or more rounds, found -3",
+    ),
     "suffix": (
         ["-o", "{tmp}/x.glb"],
         2,

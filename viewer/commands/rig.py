@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from viewer.commands._carried_clips import add_clip_argument, read_clips, write_clips
 from viewer.commands._frame_numbers import add_frame_arguments
 from viewer.commands._landmarks import read_landmarks
 from viewer.commands._numbers import number
@@ -56,15 +57,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "-o", "--output", metavar="FILE", help=".skel (with .skin, .obj, .json), or .npz"
     )
     parser.add_argument("--force", action="store_true", help="replace existing files")
+    add_clip_argument(parser)
     parser.add_argument("--view", action="store_true", help="open a window on the result")
     _add_method_arguments(parser)
     _add_alignment_arguments(parser)
     add_frame_arguments(parser)
     add_pose_arguments(parser)
     parser.add_argument(
-        "--template-pose", dest="pose", metavar="FILE|A,B,…", help="the same as --pose"
+        "--template-pose",
+        dest="pose",
+        metavar="FILE|A,B,…",
+        help="the template's pose, roughly that of the target: the same as --pose, of the template",
     )
-    parser.add_argument("--template-frame", type=int, metavar="N", help="the same as --frame")
+    parser.add_argument(
+        "--template-frame",
+        type=int,
+        metavar="N",
+        help="a frame of the template's motion, as --frame counts them",
+    )
     parser.set_defaults(fill_gaps=False)
 
 
@@ -144,6 +154,7 @@ def run(arguments: argparse.Namespace) -> int:
     target = _target(arguments)
     template = _template(arguments)
     settings = _settings(arguments, template, output)
+    clips = read_clips(arguments, _files(arguments), template.figure, _inputs(arguments))
     assert target.mesh is not None and template.pose is not None  # both looked
     title = f"rigging {printable(target.name, 40)}"
     with Progress(title, 100) as progress:
@@ -157,7 +168,7 @@ def run(arguments: argparse.Namespace) -> int:
         )
     _tell(rigged)
     if output is not None:
-        print("\n".join(write_rigged(rigged, output)))
+        print("\n".join([*write_rigged(rigged, output), *write_clips(rigged, clips)]))
     if arguments.view:
         _show(rigged, target)
     return 0
@@ -165,6 +176,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _inputs(arguments: argparse.Namespace) -> list[Path]:
     named = [*arguments.files, *arguments.template, *pose_files(arguments)]
+    named += arguments.clips
     named += [arguments.landmarks] if arguments.landmarks else []
     return [Path(file) for file in (*map(resolve, named), bundled_body(), *bundled_files())]
 
@@ -188,8 +200,7 @@ def _target(arguments: argparse.Namespace) -> Figure:
 
 def _template(arguments: argparse.Namespace) -> Actor:
     """Return the figure whose rig is carried over, posed and shaped as asked."""
-    files = [file for name in arguments.template or ["body"] for file in _template_files(name)]
-    scene = load(*files, motion=MotionSettings(frame_rate=arguments.fps))
+    scene = load(*_files(arguments), motion=MotionSettings(frame_rate=arguments.fps))
     _check_frame(scene, arguments)
     print_warnings([*scene.warnings, *apply_pose(scene, arguments)])
     attached = [actor for actor in scene.actors if actor.figure.is_attached]
@@ -225,10 +236,25 @@ def _check_frame(scene: Scene, arguments: argparse.Namespace) -> None:
         )
 
 
+def _files(arguments: argparse.Namespace) -> list[Path]:
+    return [file for name in arguments.template or ["body"] for file in _template_files(name)]
+
+
 def _template_files(name: str) -> list[Path]:
     if name in _BUNDLED and not Path(name).exists():
         return [bundled_body()] if name == "body" else list(bundled_files())
     return [resolve(name)]
+
+
+def _check_numbers(arguments: argparse.Namespace) -> None:
+    if not 0.0 <= arguments.max_angle <= 180.0:
+        raise ViewerError(f"--max-angle: expected 0 to 180, found {arguments.max_angle:g}")
+    if not arguments.max_distance >= 0.0:
+        raise ViewerError(f"--max-distance: expected 0 or more, found {arguments.max_distance:g}")
+    if arguments.smooth < 0:
+        raise ViewerError(f"--smooth: expected 0 or more rounds, found {arguments.smooth}")
+    if arguments.max_influences is not None and arguments.max_influences < 1:
+        raise ViewerError(f"--max-influences: expected 1 or more, found {arguments.max_influences}")
 
 
 def _settings(
@@ -240,8 +266,7 @@ def _settings(
         assert template.pose is not None  # it is attached
         source = Source.open(arguments.landmarks)
         landmarks = read_landmarks(source, template.figure, template.pose)
-    if not 0.0 <= arguments.max_angle <= 180.0:
-        raise ViewerError(f"--max-angle: expected 0 to 180, found {arguments.max_angle:g}")
+    _check_numbers(arguments)
     as_rig = output is not None and output.suffix.lower() != ".npz"
     angle = math.radians(arguments.max_angle)
     usual = MatchSettings()
