@@ -122,6 +122,18 @@ def test_what_only_one_has_is_a_mismatch_that_no_tolerance_covers() -> None:
     assert found.exceeds(1e9)
 
 
+def test_joints_in_another_order_are_told() -> None:
+    one = Figure("a", skeleton=skeleton([-1, 0, 0, 0], names=("a", "b", "c", "d")))
+    other = Figure("b", skeleton=skeleton([-1, 0, 0], names=("a", "d", "b")))
+    found = compare(Actor(one), Actor(other))
+    assert found.notes == (
+        "joints come in another order, which .skin and .anim files go by: where the first has b, "
+        "the second has d",
+    )
+    less = Figure("c", skeleton=skeleton([-1, 0, 0], names=("a", "c", "d")))
+    assert compare(Actor(one), Actor(less)).notes == ()
+
+
 def test_joint_with_another_parent_is_a_mismatch() -> None:
     one = Figure("a", skeleton=skeleton([-1, 0, 1], names=("a", "b", "c")))
     other = Figure("b", skeleton=skeleton([-1, 0, 0], names=("a", "b", "c")))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -47,7 +47,8 @@ def pair_joints(first: Skeleton, second: Skeleton) -> Pairs:
     Returns
     -------
     Pairs
-        With a mismatch for joints without a partner, and for partners with other parents.
+        With a mismatch for joints without a partner, and for partners with other parents; a note
+        if both have them in another order, which skins and clips go by.
     """
     pairs = pair_names(joint_labels(first), joint_labels(second), "joints")
     parents = [
@@ -56,10 +57,28 @@ def pair_joints(first: Skeleton, second: Skeleton) -> Pairs:
         for above in (skeleton.parents[found],)
     ]
     other = np.flatnonzero(parents[0] != parents[1])
+    texts = [f"other parents: {_listed([pairs.names[place] for place in other])}"] * bool(
+        len(other)
+    )
+    return replace(
+        pairs,
+        mismatches=(*pairs.mismatches, *texts),
+        notes=(*pairs.notes, *_order_notes(pairs, second)),
+    )
+
+
+def _order_notes(pairs: Pairs, second: Skeleton) -> list[str]:
+    order = np.argsort(pairs.second)
+    other = np.flatnonzero(order != np.arange(len(order)))
     if not len(other):
-        return pairs
-    text = f"other parents: {_listed([pairs.names[place] for place in other])}"
-    return Pairs(pairs.first, pairs.second, pairs.names, (*pairs.mismatches, text), pairs.notes)
+        return []
+    place = int(other[0])
+    labels = joint_labels(second)
+    here, there = pairs.names[place], labels[int(pairs.second[order[place]])]
+    return [
+        f"joints come in another order, which .skin and .anim files go by: where the first has "
+        f"{here}, the second has {there}"
+    ]
 
 
 def _places(found: Ints, count: int) -> Ints:
