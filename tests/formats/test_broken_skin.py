@@ -143,10 +143,10 @@ from viewer.formats import Source, skin
          "a.skin:25: bindings (line 19): expected 2 matrices, found 1 matrices, "
          "then the end of the file"),
         (GOOD.replace("0 0 1\n  8", "0 1 0\n  8"),
-         "a.skin:19: bindings: expected matrices that can be inverted, found matrix 1 "
+         "a.skin:26: bindings: expected matrices that can be inverted, found matrix 1 "
          "with determinant 0"),
         (GOOD.replace("0 0 1\n  8", "0 0 1e-300\n  8"),
-         "a.skin:19: bindings: expected matrices that can be inverted, found matrix 1 "
+         "a.skin:26: bindings: expected matrices that can be inverted, found matrix 1 "
          "with determinant 1e-300"),
         (BARE + "material a", 'a.skin:14: material: expected "{", found the end of the file'),
         (BARE + "material\ntriangles 1", 'a.skin:15: material: expected "{", found "triangles"'),

@@ -53,7 +53,7 @@ def test_quirks_load_without_a_word(text: str) -> None:
 def test_unsorted_keys_are_sorted_with_a_warning() -> None:
     clip, warnings = parse(GOOD.replace("0 1 flat smooth 2", "3 1 flat smooth 2"))
     np.testing.assert_array_equal(clip.channels[0].times, [2, 3])
-    assert warnings == ["walk.anim: channel 0: key 1 is before key 0; keys sorted"]
+    assert warnings == ["walk.anim:1: channel 0: key 1 is before key 0; keys sorted"]
 
 
 def test_channel_without_keys_warns() -> None:

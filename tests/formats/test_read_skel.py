@@ -162,7 +162,7 @@ def test_minimum_above_maximum_is_ignored_with_a_warning():
     assert skeleton.dof_limits[6:].tolist() == [[-INF, INF]] * 3
     assert skeleton.rest_dofs[6:].tolist() == [9, 9, 9]
     assert warnings == [
-        "a.skel:2: ignored 2 limits whose minimum is above the maximum, "
+        "a.skel:4: ignored 2 limits whose minimum is above the maximum, "
         "first rotxlimit 5 4 of joint b"
     ]
 

@@ -84,7 +84,7 @@ def test_any_number_of_influences_is_kept():
     assert figure.skin.starts.tolist() == [0, 1, 3, 5003]
     assert figure.skin.weights[3:].tolist() == [0.001] * 5000
     assert warnings == [
-        "a.skin:11: the weights of 1 vertices do not add up to 1 and are used as stored, "
+        "a.skin:14: the weights of 1 vertices do not add up to 1 and are used as stored, "
         "worst vertex 2 with 5"
     ]
 
@@ -122,7 +122,7 @@ def test_zero_normals_are_computed():
     figure, warnings = read(text)
     assert figure.mesh.normals.tolist() == [[0, 0, 1], [0, 0, 1], [0, 1, 0]]
     assert warnings == [
-        "a.skin:6: 2 normals of length 0, first of vertex 0: computed from the triangles"
+        "a.skin:7: 2 normals of length 0, first of vertex 0: computed from the triangles"
     ]
 
 
@@ -183,21 +183,21 @@ def test_vertices_without_influence_are_a_warning():
     figure, warnings = read(GOOD.replace("1 0 1.0", "0").replace("1 1 1\n", "1 1 0\n"))
     assert figure.skin.starts.tolist() == [0, 0, 2, 3]
     assert warnings == [
-        "a.skin:11: 2 vertices without influence stay where they were bound, first vertex 0"
+        "a.skin:12: 2 vertices without influence stay where they were bound, first vertex 0"
     ]
 
 
 def test_negative_weights_are_a_warning():
     figure, warnings = read(GOOD.replace("0.25 1 0.75", "-0.25 1 1.25"))
     assert figure.skin.weights.tolist() == [1, -0.25, 1.25, 1]
-    assert warnings == ["a.skin:11: 1 negative weights are used as stored, first -0.25 of vertex 1"]
+    assert warnings == ["a.skin:13: 1 negative weights are used as stored, first -0.25 of vertex 1"]
 
 
 def test_weights_that_do_not_add_up_are_a_warning():
     figure, warnings = read(GOOD.replace("0 1.0", "0 0.98").replace("0.75", "0.5"))
     assert figure.skin.weights.tolist() == [0.98, 0.25, 0.5, 1]
     assert warnings == [
-        "a.skin:11: the weights of 2 vertices do not add up to 1 and are used as stored, "
+        "a.skin:13: the weights of 2 vertices do not add up to 1 and are used as stored, "
         "worst vertex 1 with 0.75"
     ]
 
@@ -209,7 +209,7 @@ def test_weights_that_add_up_within_a_hundredth_are_no_warning():
 def test_nearly_singular_binding_is_a_warning():
     _, warnings = read(GOOD.replace("0 0 1\n  5", "0 0 1e-8\n  5"))
     assert warnings == [
-        "a.skin:19: matrix 0 of bindings can hardly be inverted (condition number 1e+08)"
+        "a.skin:20: matrix 0 of bindings can hardly be inverted (condition number 1e+08)"
     ]
 
 
@@ -217,4 +217,4 @@ def test_far_vertex_is_a_warning():
     figure, warnings = read(GOOD.replace("  0 2 0\n", "  0 1e30 0\n"))
     assert figure.mesh.positions[2].tolist() == [0, 1e30, 0]
     # Half of three vertices are no cloud: the median distance is 2.
-    assert warnings == ["a.skin:1: vertex 2 is 1e+30 units away from the others"]
+    assert warnings == ["a.skin:4: vertex 2 is 1e+30 units away from the others"]

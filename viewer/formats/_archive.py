@@ -14,9 +14,10 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from viewer.errors import FormatError, printable
+from viewer.formats._faults import Part
 from viewer.formats._source import MAX_SIZE, Source
 from viewer.rig.arrays import Deferred
 
@@ -172,6 +173,7 @@ class Archive:
         self, path: Path, kind: str, keys: tuple[str, ...], load: Callable[[str], Value]
     ) -> None:
         self.path, self.kind, self.keys = path, kind, keys
+        self.source: Source | None = None  # takes faults, if it is known
         self._load = load
         self._values: dict[str, Value] = {}
 
@@ -263,6 +265,19 @@ class Archive:
         if isinstance(value, str):
             return value
         raise self.error(key, f"expected a text, found {describe(value)}")
+
+    @property
+    def is_tolerant(self) -> bool:
+        """Whether faults are noted rather than raised."""
+        return self.source is not None and self.source.faults is not None
+
+    def refuse(
+        self, error: FormatError, count: int = 1, part: Part = "", places: ArrayLike = ()
+    ) -> None:
+        """Raise an error, or note it, as ``Source.refuse`` does."""
+        if self.source is None:
+            raise error
+        self.source.refuse(error, count, part, places)
 
     def error(self, key: str, message: str) -> FormatError:
         """Return an error that names the file and the key."""

@@ -166,22 +166,31 @@ class _Parser:
         while len(values) < 3:
             value = None if self.word is None else to_number(self.word.group())
             if value is None:
-                is_word = self.word is not None and self._keyword() not in (b"{", b"}", *_ITEMS)
-                if is_word:
-                    raise self._error(
-                        f"OFFSET of {_called(joint)}: expected a number, found {self._shown()}"
-                    )
-                raise self.source.error(
-                    f"OFFSET of {_called(joint)}: expected 3 numbers, found {len(values)}",
-                    keyword.start(),
-                )
+                self._refuse_offset(joint, self._offset_error(joint, keyword, len(values)))
+                return
             values.append(value)
             self._advance()
         if self.word is not None and to_number(self.word.group()) is not None:
-            raise self._error(
-                f"OFFSET of {_called(joint)}: expected 3 numbers, found more: {self._shown()}"
-            )
+            more = f"expected 3 numbers, found more: {self._shown()}"
+            self._refuse_offset(joint, self._error(f"OFFSET of {_called(joint)}: {more}"))
         joint.offset = values
+
+    def _offset_error(self, joint: BvhJoint, keyword: Word, found: int) -> FormatError:
+        if self.word is not None and self._keyword() not in (b"{", b"}", *_ITEMS):
+            return self._error(
+                f"OFFSET of {_called(joint)}: expected a number, found {self._shown()}"
+            )
+        return self.source.error(
+            f"OFFSET of {_called(joint)}: expected 3 numbers, found {found}", keyword.start()
+        )
+
+    def _refuse_offset(self, joint: BvhJoint, error: FormatError) -> None:
+        """Refuse an OFFSET; where faults are noted it is 0 0 0, and reading goes on behind it."""
+        place = sum(not other.is_end for other in self.found) - 1
+        self.source.refuse(error, 1, "joints", () if joint.is_end else [place])
+        joint.offset = [0.0, 0.0, 0.0]
+        while self.word is not None and self._keyword() not in (b"{", b"}", *_ITEMS):
+            self._advance()
 
     def _channels(self, joint: BvhJoint) -> None:
         assert self.word is not None  # the caller looked at it

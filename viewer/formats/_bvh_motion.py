@@ -10,6 +10,7 @@ import numpy as np
 from viewer.errors import FormatError
 from viewer.formats._numbers import parse_numbers, to_number
 from viewer.formats._source import Source, shown
+from viewer.formats._tolerant import held_rows, read_words, refuse_words
 from viewer.rig.arrays import Floats
 
 __all__ = ["Motion", "read_motion"]
@@ -101,8 +102,52 @@ def _found(word: bytes) -> str:
     return shown(word) if word else "the end of the file"
 
 
+def _mended(source: Source, start: int, width: int, declared: int | None) -> Floats | None:
+    """Return the frames, noting all faults in them; None if there are none, or too many to tell.
+
+    A frame that cannot be used is as the one before.
+    """
+    words = read_words(source.data, start, len(source.data))
+    bad = words.bad
+    begins, sizes = words.rows()
+    by_line = (sizes == width).sum() * 2 > len(sizes)
+    if by_line and declared is not None:
+        begins, sizes = begins[:declared], sizes[:declared]
+    if not by_line:
+        end = len(words.values) if declared is None else declared * width
+        if len(words.values) < end or end % width:
+            return None
+        begins, sizes = np.arange(0, end, width), np.full(end // width, width)
+    last = int(begins[-1] + sizes[-1]) if len(begins) else 0
+    bad = bad[bad < last]
+    fits = sizes == width
+    if fits.all() and len(bad) == 0:
+        return None
+    frames = np.searchsorted(begins, bad, side="right") - 1
+    names = dict(zip(bad.tolist(), frames.tolist(), strict=True))
+    refuse_words(source, words, bad, lambda word: f"frame {names[word]}", "frames", frames)
+    wrong = np.flatnonzero(~fits)
+    if len(wrong):
+        first = int(wrong[0])
+        place = int(words.offsets[begins[first]]), int(sizes[first])
+        error = _wrong_row(source, first, width, place)
+        source.refuse(error, len(wrong), "frames", wrong)
+    rows = np.full((len(begins), width), np.nan)
+    rows[fits] = words.values[begins[fits, None] + np.arange(width)]
+    if declared is not None and len(rows) != declared:
+        _say_difference(source, width, declared, len(rows), 0)
+    return held_rows(rows, np.isnan(rows).any(axis=1))
+
+
 def _rows(source: Source, start: int, width: int, declared: int | None) -> Floats:
     """Return all whole frames: (N, C)."""
+    source.remember(
+        "frames", lambda row: source.number_offset(start, len(source.data), row * width)
+    )
+    if source.faults is not None:
+        mended = _mended(source, start, width, declared)
+        if mended is not None:
+            return mended
     values, bad = parse_numbers(source.data, start, len(source.data))
     if bad >= 0:
         offset = source.word_offset(start, bad)
@@ -133,17 +178,16 @@ def _check_lines(source: Source, start: int, width: int, declared: int | None) -
     if len(odd) == len(lines):
         # No row fits: a frame per line only if the file has as many lines as frames.
         if len(lines) == declared:
-            raise _wrong_row(source, 0, width, lines)
+            raise _wrong_row(source, 0, width, lines[0])
         return
     row = odd[0][1]
     if row < len(lines) - 1 or lines[row][1] > width:
-        raise _wrong_row(source, row, width, lines)
+        raise _wrong_row(source, row, width, lines[row])
 
 
-def _wrong_row(source: Source, row: int, width: int, lines: list[tuple[int, int]]) -> FormatError:
+def _wrong_row(source: Source, row: int, width: int, line: tuple[int, int]) -> FormatError:
     return source.error(
-        f"frame {row}: expected {width} numbers as CHANNELS says, found {lines[row][1]}",
-        lines[row][0],
+        f"frame {row}: expected {width} numbers as CHANNELS says, found {line[1]}", line[0]
     )
 
 

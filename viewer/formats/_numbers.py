@@ -19,12 +19,24 @@ from numpy.typing import NDArray
 
 from viewer.rig.arrays import Floats
 
-__all__ = ["LARGEST", "is_number", "parse_numbers", "to_number"]
+__all__ = [
+    "LARGEST",
+    "is_infinite",
+    "is_number",
+    "parse_numbers",
+    "parse_words",
+    "to_number",
+    "word_begins",
+]
 
 LARGEST = float(np.finfo(np.float32).max)
 """Numbers beyond this become infinite on the GPU, so no file may hold them."""
 
 _NUMBER = re.compile(rb"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?[fF]?")
+# As Python, C and the C of Microsoft write what is no finite number.
+_NOT_FINITE = re.compile(
+    rb"[+-]?(?:nan(?:\(\w*\))?|inf(?:inity)?|1\.?#(?:q?nan|snan|ind|inf)\w*)", re.IGNORECASE
+)
 _SPACE = re.compile(rb"[ \t\n\r\v\f]")
 _CHUNK = 1 << 17  # bytes; temporaries stay inside the processor's cache
 _PAD = 16  # bytes before a chunk, so that the first words can be read as 16 characters
@@ -64,6 +76,17 @@ def to_number(word: bytes) -> float | None:
     return value if abs(value) <= LARGEST else None
 
 
+def is_infinite(word: bytes) -> bool:
+    """Return whether a word was a number once: NaN, infinity, or more than a float32 can hold.
+
+    >>> is_infinite(b"-nan"), is_infinite(b"1e999"), is_infinite(b"-1.#IND"), is_infinite(b"up")
+    (True, True, True, False)
+    """
+    if _NOT_FINITE.fullmatch(word):
+        return True
+    return _NUMBER.fullmatch(word) is not None and to_number(word) is None
+
+
 def parse_numbers(data: bytes, start: int, end: int) -> tuple[Floats, int]:
     """Parse white-space-separated numbers.
 
@@ -93,6 +116,41 @@ def parse_numbers(data: bytes, start: int, end: int) -> tuple[Floats, int]:
     return (np.concatenate(parts) if parts else np.zeros(0)), -1
 
 
+def parse_words(data: bytes, start: int, end: int) -> Floats:
+    """Parse white-space-separated words, whatever they are.
+
+    Parameters
+    ----------
+    data : bytes
+        The file.
+    start, end : int
+        The part of it to parse.
+
+    Returns
+    -------
+    (N,)
+        NaN for every word that is no number.
+
+    >>> parse_words(b"1 up 1e3", 0, 8).tolist()
+    [1.0, nan, 1000.0]
+    """
+    bounds = _chunk_bounds(data, start, end)
+    return np.concatenate(
+        [np.zeros(0), *(_parse_chunk(data[first:last], whole=True)[0] for first, last in bounds)]
+    )
+
+
+def word_begins(letters: NDArray[np.uint8]) -> NDArray[np.int64]:
+    """Return where words begin that white space parts.
+
+    >>> word_begins(np.frombuffer(b" 1 23", np.uint8)).tolist()
+    [1, 3]
+    """
+    # The subtraction wraps around, so that one comparison finds 9 to 13.
+    inked = ~((letters == 32) | (letters - np.uint8(9) < 5))
+    return np.flatnonzero(inked & ~np.concatenate([[False], inked[:-1]]))
+
+
 def _chunk_bounds(data: bytes, start: int, end: int) -> Iterator[tuple[int, int]]:
     while start < end:
         stop = min(start + _CHUNK, end)
@@ -103,13 +161,14 @@ def _chunk_bounds(data: bytes, start: int, end: int) -> Iterator[tuple[int, int]
         start = stop
 
 
-def _parse_chunk(chunk: bytes) -> tuple[Floats, int]:
+def _parse_chunk(chunk: bytes, whole: bool = False) -> tuple[Floats, int]:
+    """Return the numbers up to the first word that is none, or else all, with NaN for such."""
     padded = b" " * _PAD + chunk + b" "
     letters = np.frombuffer(padded, dtype=np.uint8)
     # Control characters, 0-8 and 14-31, would count as white space below, but they belong to a
     # word. The subtraction wraps around, so one comparison finds the second range.
     if letters.min() < 9 or (letters - np.uint8(14) < 18).any():
-        return _parse_slowly(chunk)
+        return _parse_slowly(chunk, whole)
     space = letters <= ord(" ")
     edges = np.flatnonzero(space[1:] != space[:-1]) + 1
     starts, ends = edges[0::2], edges[1::2]
@@ -118,20 +177,20 @@ def _parse_chunk(chunk: bytes) -> tuple[Floats, int]:
     values, odd = _parse_words(padded, letters, starts, ends)
     for index in np.flatnonzero(odd):
         value = to_number(padded[starts[index] : ends[index]])
-        if value is None:
+        if value is None and not whole:
             return values[:index], int(index)
-        values[index] = value
+        values[index] = np.nan if value is None else value
     return values, -1
 
 
-def _parse_slowly(chunk: bytes) -> tuple[Floats, int]:
+def _parse_slowly(chunk: bytes, whole: bool) -> tuple[Floats, int]:
     values: list[float] = []
     for word in chunk.split():
         value = to_number(word)
-        if value is None:
+        if value is None and not whole:
             return np.array(values), len(values)
-        values.append(value)
-    return np.array(values), -1
+        values.append(np.nan if value is None else value)
+    return np.array(values, dtype=np.float64), -1
 
 
 def _parse_words(

@@ -8,20 +8,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from viewer.errors import FormatError
-from viewer.formats._numbers import parse_numbers
-from viewer.formats._obj_lines import Lines, Places, Rows, rows_of, word_begins
+from viewer.formats._numbers import parse_numbers, word_begins
+from viewer.formats._obj_lines import Lines, Places, Rows, rows_of
 from viewer.formats._source import Source, shown
 from viewer.rig.arrays import Bools, Floats
 
-__all__ = ["CORNER_KINDS", "FaceRows", "read_faces"]
+__all__ = ["CORNER", "CORNER_KINDS", "FEWEST", "FaceRows", "fits_corner", "read_faces"]
 
 CORNER_KINDS = {"v": "vertex", "vt": "texture coordinate", "vn": "normal"}
 """What the three numbers of a corner refer to."""
 
 _SLASH = ord("/")
 _ZERO = re.compile(rb"[ \t\n\r\v\f/][+-]?0+(?:\.0*)?(?![0-9.])")  # an index that nothing has
-_CORNER = "expected a corner v, v/vt, v//vn or v/vt/vn"
-_FEWEST = 3  # corners of a face
+CORNER = "expected a corner v, v/vt, v//vn or v/vt/vn"
+FEWEST = 3  # corners of a face
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,11 +37,14 @@ class FaceRows:
         exist is known only when the whole file is read.
     offsets : (F,)
         Where each face is in the file.
+    faults : tuple of (FormatError, int, (n,))
+        Broken corners that are gone on from: the first, how many, and the faces they are of.
     """
 
     counts: Places
     corners: Places
     offsets: Places
+    faults: tuple[tuple[FormatError, int, Places], ...] = ()
 
 
 def read_faces(source: Source, lines: Lines, before: dict[str, int]) -> FaceRows:
@@ -69,10 +72,10 @@ def read_faces(source: Source, lines: Lines, before: dict[str, int]) -> FaceRows
         raise source.error("f: expected an index from 1, found 0", rows.offset(zero.end() - 1))
     begins = word_begins(rows.letters)
     counts = np.diff(np.searchsorted(begins, rows.starts))
-    small = np.flatnonzero(counts < _FEWEST)
+    small = np.flatnonzero(counts < FEWEST)
     if len(small):
         raise source.error(
-            f"f: expected {_FEWEST} or more corners, found {counts[small[0]]}",
+            f"f: expected {FEWEST} or more corners, found {counts[small[0]]}",
             int(rows.origins[small[0]]) - 1,
         )
     written = _corner_numbers(source, rows, begins)
@@ -110,7 +113,43 @@ def _corner_numbers(source: Source, rows: Rows, begins: Places) -> Places:
         if bad >= 0:
             raise _corner_error(source, rows, int(begins[bad]))
         return _spread(source, rows, values, begins, np.ones(len(begins), np.int64), None)
-    number_begins = word_begins(np.where(rows.letters == _SLASH, np.uint8(32), rows.letters))
+    fits, n_numbers, has_gap = fits_corner(rows, begins)
+    wrong = np.flatnonzero(~fits)
+    first = int(wrong[0]) if len(wrong) else len(begins)
+    if bad >= 0:
+        number_begins = _number_begins(rows)
+        owner = np.searchsorted(begins, number_begins[bad], side="right")
+        first = min(first, int(owner) - 1)
+    if first < len(begins):
+        raise _corner_error(source, rows, int(begins[first]))
+    return _spread(source, rows, values, begins, n_numbers, has_gap if has_gap.any() else None)
+
+
+def _number_begins(rows: Rows) -> Places:
+    return word_begins(np.where(rows.letters == _SLASH, np.uint8(32), rows.letters))
+
+
+def fits_corner(rows: Rows, begins: Places) -> tuple[Bools, Places, Bools]:
+    """Look at the slashes of corners.
+
+    Parameters
+    ----------
+    rows : Rows
+        Of faces.
+    begins : (C,)
+        Where each corner begins in their body.
+
+    Returns
+    -------
+    fits : (C,) bool
+        Which are v, v/vt, v//vn or v/vt/vn, whatever stands for a number.
+    n_numbers : (C,)
+        How many numbers each has.
+    has_gap : (C,) bool
+        Which are v//vn.
+    """
+    number_begins = _number_begins(rows)
+    slashes = np.flatnonzero(rows.letters == _SLASH)
     after = np.append(begins[1:], len(rows.letters))
     n_slashes = np.searchsorted(slashes, after) - np.searchsorted(slashes, begins)
     n_numbers = np.searchsorted(number_begins, after) - np.searchsorted(number_begins, begins)
@@ -121,14 +160,7 @@ def _corner_numbers(source: Source, rows: Rows, begins: Places) -> Places:
     fits &= (
         (n_slashes <= 2) & (rows.letters[begins] != _SLASH) & (rows.letters[after - 1] != _SLASH)
     )
-    wrong = np.flatnonzero(~fits)
-    first = int(wrong[0]) if len(wrong) else len(begins)
-    if bad >= 0:
-        owner = np.searchsorted(begins, number_begins[bad], side="right")
-        first = min(first, int(owner) - 1)
-    if first < len(begins):
-        raise _corner_error(source, rows, int(begins[first]))
-    return _spread(source, rows, values, begins, n_numbers, has_gap if len(doubles) else None)
+    return fits, n_numbers, has_gap
 
 
 def _spread(
@@ -158,4 +190,4 @@ def _corner_error(source: Source, rows: Rows, place: int) -> FormatError:
     offset = rows.offset(place)
     word = source.next_word(offset)
     assert word is not None  # it was found there
-    return source.error(f"f: {_CORNER}, found {shown(word.group())}", offset)
+    return source.error(f"f: {CORNER}, found {shown(word.group())}", offset)

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.formats._numbers import parse_numbers
+from viewer.formats._numbers import parse_numbers, word_begins
 from viewer.formats._source import Source, shown
 from viewer.rig.arrays import Bools, Floats
 
-__all__ = ["KEYWORDS", "Lines", "Places", "Rows", "number_rows", "pieces", "rows_of", "word_begins"]
+__all__ = ["KEYWORDS", "Lines", "Places", "Rows", "number_rows", "pieces", "rows_of"]
 
 Places = NDArray[np.int64]
 Letters = NDArray[np.uint8]
@@ -148,12 +148,6 @@ def rows_of(lines: Lines, keyword: str) -> Rows:
     letters = lines.letters[np.cumsum(steps[:-1], dtype=np.int8).view(np.bool_)]
     places = np.concatenate([[0], np.cumsum(ends - starts)])
     return Rows(letters.tobytes(), letters, places, starts + lines.base)
-
-
-def word_begins(letters: Letters) -> Places:
-    """Return where words begin that white space parts."""
-    inked = ~_is_blank(letters)
-    return np.flatnonzero(inked & ~np.concatenate([[False], inked[:-1]]))
 
 
 def number_rows(

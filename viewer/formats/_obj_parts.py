@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from viewer.formats._obj_faces import CORNER_KINDS, FaceRows, read_faces
-from viewer.formats._obj_lines import KEYWORDS, Lines, Places, number_rows, pieces
+from viewer.formats._obj_lines import KEYWORDS, Lines, Places, Rows, number_rows, pieces
+from viewer.formats._obj_mending import mended_faces, mended_rows, settled_corners
 from viewer.formats._source import Source, shown
 from viewer.rig.arrays import Floats
 
@@ -34,6 +35,8 @@ class ObjParts:
         Corners of each face.
     corners : (C, 3)
         Vertex, texture coordinate and normal of each; -1 where it has none.
+    offsets : (F,)
+        Where each face is in the file.
     runs : dict of bytes to list of (int, str)
         For ``usemtl``, ``g`` and ``o`` the names, and before which face each stands.
     libraries : list of (bytes, int)
@@ -45,6 +48,7 @@ class ObjParts:
     uvs: Floats
     counts: Places
     corners: Places
+    offsets: Places
     runs: dict[bytes, list[tuple[int, str]]]
     libraries: list[tuple[bytes, int]]
 
@@ -55,6 +59,7 @@ class _Gathered:
 
     tables: dict[str, list[Floats]] = field(default_factory=lambda: {k: [] for k in KEYWORDS})
     faces: list[FaceRows] = field(default_factory=list)
+    vertices: list[Places] = field(default_factory=list)
     before: dict[str, int] = field(default_factory=lambda: dict.fromkeys(KEYWORDS, 0))
     runs: dict[bytes, list[tuple[int, str]]] = field(
         default_factory=lambda: {word: [] for word in _RUNS}
@@ -90,14 +95,24 @@ def read_parts(source: Source) -> ObjParts:
     for keyword, name in _SHAPES.items():
         if gathered.odd[keyword]:
             source.warn(f"{gathered.odd[keyword]} {name} are not drawn")
-    _check_indices(source, gathered)
-    corners = [rows.corners for rows in gathered.faces]
+    if source.faults is None:
+        _check_indices(source, gathered)
+        every = [rows.corners for rows in gathered.faces]
+        corners = np.concatenate([np.zeros((0, 3), np.int64), *every])
+    else:
+        vertices = np.concatenate([np.zeros(0, np.int64), *gathered.vertices])
+        source.remember("positions", lambda vertex: int(vertices[vertex]))
+        corners = settled_corners(
+            source, gathered.faces, gathered.before, lambda keyword: _limits(gathered, keyword)
+        )
+    offsets = [rows.offsets for rows in gathered.faces]
     return ObjParts(
         positions=_stacked(gathered.tables["v"], 3),
         normals=_stacked(gathered.tables["vn"], 3),
         uvs=_stacked(gathered.tables["vt"], 2),
         counts=np.concatenate([np.zeros(0, np.int64), *(rows.counts for rows in gathered.faces)]),
-        corners=np.concatenate([np.zeros((0, 3), np.int64), *corners]),
+        corners=corners,
+        offsets=np.concatenate([np.zeros(0, np.int64), *offsets]),
         runs=gathered.runs,
         libraries=gathered.libraries,
     )
@@ -112,22 +127,34 @@ def _read_piece(source: Source, lines: Lines, gathered: _Gathered) -> None:
         if len(lines.of[keyword]):
             gathered.tables[keyword].append(read(source, lines, gathered))
     if len(lines.of["f"]):
-        gathered.faces.append(read_faces(source, lines, gathered.before))
+        read_some = read_faces if source.faults is None else mended_faces
+        gathered.faces.append(read_some(source, lines, gathered.before))
     _read_others(source, lines, gathered)
     for keyword, found in lines.of.items():
         gathered.before[keyword] += len(found)
 
 
+def _rows(
+    source: Source, lines: Lines, gathered: _Gathered, keyword: str, width: int
+) -> tuple[Floats, Places, Floats, Rows]:
+    if source.faults is None:
+        return number_rows(source, lines, keyword, width)
+    return mended_rows(source, lines, keyword, width, gathered.before[keyword])
+
+
 def _positions(source: Source, lines: Lines, gathered: _Gathered) -> Floats:
-    table, counts, values, rows = number_rows(source, lines, "v", 3)
+    table, counts, values, rows = _rows(source, lines, gathered, "v", 3)
+    if source.faults is not None:
+        gathered.vertices.append(rows.origins - 1)
     if len(values) == table.size:
         return table
     wrong = np.flatnonzero((counts == 5) | (counts > 7))
     if len(wrong):
-        raise source.error(
+        error = source.error(
             f"v: expected 3 numbers, or 4, 6 or 7 with w or a colour, found {counts[wrong[0]]}",
             int(rows.origins[wrong[0]]) - 1,
         )
+        source.refuse(error, len(wrong))
     colored = np.flatnonzero(counts >= 6)
     if len(colored):
         gathered.leave_out("the colour", len(colored), int(rows.origins[colored[0]]) - 1)
@@ -140,7 +167,7 @@ def _positions(source: Source, lines: Lines, gathered: _Gathered) -> Floats:
 
 
 def _uvs(source: Source, lines: Lines, gathered: _Gathered) -> Floats:
-    table, counts, values, _ = number_rows(source, lines, "vt", 1)
+    table, counts, values, _ = _rows(source, lines, gathered, "vt", 1)
     uvs = np.zeros((len(counts), 2))
     uvs[:, :1] = table
     firsts = np.cumsum(counts) - counts
@@ -150,7 +177,7 @@ def _uvs(source: Source, lines: Lines, gathered: _Gathered) -> Floats:
 
 
 def _normals(source: Source, lines: Lines, gathered: _Gathered) -> Floats:
-    return number_rows(source, lines, "vn", 3)[0]
+    return _rows(source, lines, gathered, "vn", 3)[0]
 
 
 def _read_others(source: Source, lines: Lines, gathered: _Gathered) -> None:
@@ -181,8 +208,13 @@ def _check_indices(source: Source, gathered: _Gathered) -> None:
                 continue
             corner = int((corners >= end).argmax())
             face = int(np.searchsorted(np.cumsum(rows.counts), corner, side="right"))
-            limits = f"1 to {end}" if end else "only where the file has one"
+            limits = _limits(gathered, keyword)
             raise source.error(
                 f"f: expected a {kind} {limits}, found {corners[corner] + 1}",
                 int(rows.offsets[face]),
             )
+
+
+def _limits(gathered: _Gathered, keyword: str) -> str:
+    end = gathered.before[keyword]
+    return f"1 to {end}" if end else "only where the file has one"

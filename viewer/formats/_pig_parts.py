@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from viewer.errors import FormatError, printable
 from viewer.formats._archive import Archive
 from viewer.formats._container import archive_of, finite
+from viewer.formats._faults import Part as FaultPart
 from viewer.formats._source import Source
-from viewer.formats._table import read_table, row_error
+from viewer.formats._table import read_broken_table, read_table, row_error
 from viewer.rig.arrays import Floats
 
 __all__ = ["CORE", "OPTIONAL", "Part", "PigFiles", "open_parts"]
@@ -40,6 +41,12 @@ OPTIONAL = {
 
 _SPARSE = ("skinning_weights", "J_regressor")
 _WIDTHS = {**CORE, **OPTIONAL}
+_PARTS: dict[str, FaultPart] = {
+    "vertices": "positions",
+    "t_pose_joints": "joints",
+    "parents": "joints",
+    "faces_vert": "triangles",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,11 +61,23 @@ class Part:
         Numbers; of a sparse matrix (joint, vertex, weight) rows.
     error : callable
         (message, row or None) to an error that names the file, and the line if there is one.
+    source : Source
+        Takes faults.
+    offsets : (N,) or None
+        Where each row is in a text that was read to its end in spite of faults.
     """
 
     name: str
     values: NDArray[Any]
     error: Callable[[str, int | None], FormatError]
+    source: Source
+    offsets: NDArray[np.int64] | None = None
+
+    def remember(self, kind: str, row_of: Callable[[int], int]) -> None:
+        """Let the source remember in which row a thing of a kind is, see ``Source.remember``."""
+        offsets = self.offsets
+        if offsets is not None:
+            self.source.remember(kind, lambda index: int(offsets[row_of(index)]))
 
 
 @dataclass(slots=True)
@@ -89,7 +108,9 @@ def _from_folder(source: Source) -> PigFiles:
     files = PigFiles()
     for name, columns in _WIDTHS.items():
         if f"{name}.txt" in present:
-            files.parts[name] = _text_part(source.inside(f"{name}.txt"), name, columns)
+            part = _text_part(source.inside(f"{name}.txt"), name, columns)
+            if len(part.values):
+                files.parts[name] = part
     if "body_part_defs.txt" in present:
         text = source.inside("body_part_defs.txt").data.decode("utf-8", "replace")
         files.part_names = tuple(
@@ -104,7 +125,16 @@ def _text_part(source: Source, name: str, columns: int) -> Part:
     def error(message: str, row: int | None) -> FormatError:
         return source.error(message) if row is None else row_error(source, row, columns, message)
 
-    return Part(f"{name}.txt", read_table(source, columns), error)
+    if source.faults is None:
+        return Part(f"{name}.txt", read_table(source, columns), error, source)
+    rows, offsets = read_broken_table(source, columns, _PARTS.get(name, ""))
+
+    def error_at(message: str, row: int | None) -> FormatError:
+        return source.error(message, None if row is None else int(offsets[row]))
+
+    if name not in CORE and np.isnan(rows).any():
+        rows, offsets = rows[:0], offsets[:0]  # nobody needs a part of it
+    return Part(f"{name}.txt", rows, error_at, source, offsets)
 
 
 def _from_archive(source: Source) -> PigFiles:
@@ -133,14 +163,15 @@ def _archive_part(source: Source, name: str, columns: int) -> Part:
 
     if name in _SPARSE and not _is_entries(archive, name):
         joints, vertices, weights = _entries(archive, name)
-        return Part(name, np.stack([joints, vertices, weights], axis=1), error)
+        return Part(name, np.stack([joints, vertices, weights], axis=1), error, source)
     shape = (None,) if columns == 1 else (None, columns)
     if columns == 1 and len(getattr(archive.get(name), "shape", ())) == 2:
         shape = (None, 1)
-    values = finite(archive, name, archive.array(name, shape).values()).reshape(-1, columns)
+    numbers = archive.array(name, shape).values()
+    values = finite(archive, name, numbers, _PARTS.get(name, "")).reshape(-1, columns)
     if len(values) == 0:
         raise archive.error(name, "expected at least one row, found none")
-    return Part(name, values, error)
+    return Part(name, values, error, source)
 
 
 def _entries(archive: Archive, name: str) -> tuple[NDArray[Any], NDArray[Any], Floats]:
@@ -149,7 +180,8 @@ def _entries(archive: Archive, name: str) -> tuple[NDArray[Any], NDArray[Any], F
     is_turned = getattr(archive.get(name), "shape", ()) == (n_vertices, n_joints) != (n_joints,) * 2
     sides = (n_vertices, n_joints) if is_turned else (n_joints, n_vertices)
     rows, columns, numbers = archive.sparse(name, sides).entries()
-    weights = finite(archive, name, numbers)
+    part: FaultPart = "weights" if name == "skinning_weights" else ""
+    weights = finite(archive, name, numbers, part, rows if is_turned else columns)
     return (columns, rows, weights) if is_turned else (rows, columns, weights)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.formats._numbers import parse_numbers
+from viewer.formats._numbers import parse_numbers, parse_words
 from viewer.formats._ply_header import Element, Header
 from viewer.formats._source import Source, shown
 
@@ -30,11 +30,18 @@ class Table:
         Its properties that are no lists.
     lists : dict of str to ((N,), (M,))
         Its lists: how many values each row has, and the values of all rows.
+    offsets : (N,) or None
+        Where each row is in a text.
     """
 
     element: Element
     columns: dict[str, Numbers] = field(default_factory=dict)
     lists: dict[str, tuple[Places, Numbers]] = field(default_factory=dict)
+    offsets: Places | None = None
+
+    def offset(self, row: int) -> int | None:
+        """Return where in the file a row is; None in one of bytes, which has no lines."""
+        return None if self.offsets is None else int(self.offsets[row])
 
 
 def read_tables(source: Source, header: Header) -> dict[str, Table]:
@@ -51,6 +58,7 @@ def read_tables(source: Source, header: Header) -> dict[str, Table]:
     for element in header.elements:
         table = Table(element)
         cursor = body.begin(element)
+        table.offsets = body.offsets(cursor)
         for prop in element.properties:
             if prop.count_kind:
                 counts, values, cursor = body.take_lists(table, cursor, prop.count_kind, prop.kind)
@@ -83,7 +91,9 @@ class _Text:
             offset = self.start + int(self.begins[bad])
             word = source.next_word(offset)
             assert word is not None  # it was found there
-            raise source.error(f"expected a number, found {shown(word.group())}", offset)
+            if source.faults is None:
+                raise source.error(f"expected a number, found {shown(word.group())}", offset)
+            self.values = parse_words(self.data, self.start, len(self.data))
         ends = np.flatnonzero((letters == 10) | (letters == 13))
         lines = np.searchsorted(ends, self.begins)
         # The first word of every line with words, and how many it has.
@@ -106,6 +116,10 @@ class _Text:
         self.line = last
         return self.firsts[rows]
 
+    def offsets(self, cursor: Places) -> Places | None:
+        """Return where in the file words are."""
+        return self.begins[cursor] + self.start
+
     def take(self, cursor: Places, kind: str) -> tuple[Numbers, Places]:
         """Return the next number of each row."""
         self._need(cursor + 1)
@@ -116,7 +130,7 @@ class _Text:
     ) -> tuple[Places, Numbers, Places]:
         """Return the next list of each row."""
         counts, cursor = self.take(cursor, count_kind)
-        whole = counts.astype(np.int64)
+        whole = np.clip(np.nan_to_num(counts), -(2.0**40), 2.0**40).astype(np.int64)
         wrong = np.flatnonzero((whole != counts) | (whole < 0))
         if len(wrong):
             raise self.source.error(
@@ -137,6 +151,11 @@ class _Text:
         left = len(self.firsts) - self.line
         if left:
             self.source.warn(f"ignored {left} lines after the last element")
+            words = np.flatnonzero(np.isnan(self.values[self.firsts[self.line] :]))
+            if len(words):  # only where faults are noted: others were refused at the start
+                offset = self._offset(int(self.firsts[self.line] + words[0]))
+                message = "expected numbers, found words after the last element"
+                self.source.refuse(self.source.error(message, offset), len(words))
 
     def _need(self, cursor: Places) -> None:
         short = np.flatnonzero(cursor > self.rows_left)
@@ -174,6 +193,10 @@ class _Binary:
             return self.position + np.arange(element.count, dtype=np.int64) * sum(sizes)
         starts = self._even(element)
         return self._walked(element) if starts is None else starts
+
+    def offsets(self, cursor: Places) -> Places | None:
+        """Return nothing: bytes have no lines."""
+        return None
 
     def _even(self, element: Element) -> Places | None:
         """Return where rows begin if the lists of all are as long as those of the first."""

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from viewer.rig.arrays import Bools, Floats
 
-__all__ = ["triangulate"]
+__all__ = ["first_known", "triangles_of", "triangulate"]
 
 Picks = NDArray[np.int64]
 
@@ -142,3 +142,44 @@ def _has_inside(corners: list[Floats], points: Floats) -> Bools:
 
 def _cross(a: Floats, b: Floats) -> Floats:
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
+def triangles_of(counts: Picks, faces: Picks) -> Picks:
+    """Return the triangles that some polygons become, two fewer than corners each.
+
+    Parameters
+    ----------
+    counts : (F,)
+        Corners of each polygon, as for ``triangulate``; of fewer than 3 nothing becomes.
+    faces : (N,)
+        Some of them, in any order.
+
+    Returns
+    -------
+    (T,)
+        Rising.
+    """
+    sizes = np.maximum(counts - 2, 0)
+    faces = np.unique(faces)
+    each = sizes[faces]
+    starts = (np.cumsum(sizes) - sizes)[faces]
+    return np.repeat(starts - (np.cumsum(each) - each), each) + np.arange(each.sum())
+
+
+def first_known(corners: Picks, counts: Picks, owners: Picks) -> Picks:
+    """Return corners, those below 0 replaced by the first known one of their polygon, or by 0.
+
+    Parameters
+    ----------
+    corners : (C,)
+        Vertices of all polygons.
+    counts : (F,)
+        Corners of each polygon.
+    owners : (C,)
+        The polygon of each corner.
+    """
+    known = np.flatnonzero(corners >= 0)
+    first = np.zeros(len(counts), dtype=np.int64)
+    # Written backwards, so that the first one stays.
+    first[owners[known[::-1]]] = corners[known[::-1]]
+    return np.where(corners < 0, first[owners], corners)

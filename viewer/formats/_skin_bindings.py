@@ -6,11 +6,14 @@ import re
 
 import numpy as np
 
-from viewer.formats._skin_blocks import block_numbers, find_block, opened
+from viewer.formats._skin_blocks import Block, block_numbers, find_block, opened
 from viewer.formats._source import Source, shown
+from viewer.formats._tolerant import read_words, refuse_words
 from viewer.rig.arrays import Floats
 
 __all__ = ["read_bindings"]
+
+_NEUTRAL: Floats = np.eye(4, 3).ravel()  # as the file has it, row by row
 
 Word = re.Match[bytes]
 
@@ -21,39 +24,59 @@ def read_bindings(source: Source, count: int, header: Word, position: int) -> tu
     if word is not None and word.group() == b"{":
         position = word.end()
     matrices: list[Floats] = []
+    offsets: list[int] = []
     while (word := source.next_word(position)) is not None and word.group() == b"matrix":
         rows, position = _read_matrix(source, len(matrices), word)
         matrices.append(rows)
+        offsets.append(word.start())
+    source.remember("bindings", offsets.__getitem__)
     if len(matrices) != count:
         found = f"{len(matrices)} matrices, then " + (
             "the end of the file" if word is None else shown(word.group())
         )
         where = len(source.data.rstrip()) if word is None else word.start()
-        raise source.error(
+        error = source.error(
             f"bindings (line {source.line(header.start())}): expected {count} matrices, "
             f"found {found}",
             where,
         )
+        if word is None or word.group() != b"}":
+            error.code = "F002"  # the text is broken, whatever was bound
+            raise error
+        source.refuse(error)
     if word is None:
         source.warn('the last "}" is missing: bindings ends with the file')
     elif word.group() != b"}":
         raise source.error(f'bindings: expected "}}", found {shown(word.group())}', word.start())
-    bindings = np.tile(np.eye(4), (count, 1, 1))
+    bindings = np.tile(np.eye(4), (len(matrices), 1, 1))
     if matrices:
         bindings[:, :3, :] = np.array(matrices).reshape(-1, 4, 3).transpose(0, 2, 1)
     return bindings, len(source.data) if word is None else word.end()
 
 
+def _mended(source: Source, block: Block, index: int) -> Floats:
+    """Return the numbers of a matrix, a neutral one if some are none."""
+    words = read_words(source.data, block.start, block.end)
+    bad = words.bad
+    if len(bad) == 0 or any(b"{" in words.word(place) for place in bad.tolist()):
+        return block_numbers(source, block)
+    places = np.full(len(bad), index)
+    refuse_words(source, words, bad, lambda _: block.name, "bindings", places)
+    return _NEUTRAL
+
+
 def _read_matrix(source: Source, index: int, word: Word) -> tuple[Floats, int]:
     block = find_block(source, f"matrix {index} of bindings", word, word.end())
-    values = block_numbers(source, block)
+    values = (
+        block_numbers(source, block) if source.faults is None else _mended(source, block, index)
+    )
     if not block.closed:
         raise source.error(
             f'expected "}}" to close {opened(source, block)}, found the end of the file',
             len(source.data.rstrip()),
         )
     if len(values) != 12:
-        raise source.error(
-            f"matrix {index} of bindings: expected 12 numbers, found {len(values)}", word.start()
-        )
+        message = f"matrix {index} of bindings: expected 12 numbers, found {len(values)}"
+        source.refuse(source.error(message, word.start()), 1, "bindings", [index])
+        return _NEUTRAL, block.end + 1
     return values, block.end + 1

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.errors import FormatError
 from viewer.formats._numbers import parse_numbers
 from viewer.formats._source import Source, shown
 from viewer.rig.arrays import Floats, Ints
@@ -19,6 +20,7 @@ __all__ = [
     "find_block",
     "opened",
     "to_whole",
+    "unclosed",
     "whole_numbers",
     "word_at",
 ]
@@ -65,10 +67,15 @@ def block_numbers(source: Source, block: Block) -> Floats:
         return values
     offset, word = word_at(source, block, bad)
     if word in KEYWORDS or word == b"{":
-        raise source.error(
-            f'expected "}}" to close {opened(source, block)}, found {shown(word)}', offset
-        )
+        raise unclosed(source, block, offset, word)
     raise source.error(f"{block.name}: expected a number, found {shown(word)}", offset)
+
+
+def unclosed(source: Source, block: Block, offset: int, word: bytes) -> FormatError:
+    """Return the error that a word begins something else before a block ends."""
+    return source.error(
+        f'expected "}}" to close {opened(source, block)}, found {shown(word)}', offset
+    )
 
 
 def opened(source: Source, block: Block) -> str:

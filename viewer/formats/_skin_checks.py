@@ -4,19 +4,91 @@ from __future__ import annotations
 
 import numpy as np
 
+from viewer.errors import FormatError
 from viewer.formats._numbers import LARGEST
-from viewer.formats._skin_sections import Sections
+from viewer.formats._skin_mending import LOST
+from viewer.formats._skin_sections import Sections, check_declared
 from viewer.formats._source import Source
-from viewer.rig.arrays import Floats
+from viewer.formats._tolerant import mended_corners
+from viewer.rig.arrays import Floats, Ints
 from viewer.rig.mesh import Mesh, bounding_box
-from viewer.rig.skin import Skin, has_influence, influence_counts, weight_sums
+from viewer.rig.skin import Skin, has_influence, weight_sums
+from viewer.rig.transform import translation_matrix
 
-__all__ = ["check_joints", "check_mesh", "check_triangles", "check_weights", "invert_bindings"]
+__all__ = [
+    "check_mesh",
+    "check_weights",
+    "checked_influences",
+    "checked_triangles",
+    "even_counts",
+    "invert_bindings",
+    "unbound_skin",
+]
 
 WEIGHT_TOLERANCE = 0.01  # the format's own: a sum further from 1 is worth a warning
 _SINGULAR = 1e-12  # determinant relative to the product of the column lengths
 _NEARLY_SINGULAR = 1e6  # condition number
 _FAR = 1e6  # a vertex this many times the median distance away is no part of the figure
+
+
+def even_counts(source: Source, sections: Sections) -> None:
+    """Refuse sections of more or fewer vertices than there are positions.
+
+    Where all faults are wanted and the others agree, the positions are those at fault.
+    """
+    tables = sections.tables
+    counts = {name: len(table) for name, table in tables.items()}
+    if sections.starts is not None:
+        counts["skinweights"] = len(sections.starts) - 1
+    n_positions = counts["positions"]
+    others = {name: count for name, count in counts.items() if name != "positions"}
+    if source.faults is not None and len(others) > 1 and len(set(others.values())) == 1:
+        name, wanted = next(iter(others.items()))
+        if wanted != n_positions:
+            error = _count_error(source, sections, "positions", wanted, name, n_positions)
+            source.refuse(error, 1, "positions", np.arange(wanted))
+            missing = max(wanted - n_positions, 0)
+            padded = np.pad(tables["positions"], ((0, missing), (0, 0)), constant_values=np.nan)
+            tables["positions"] = padded[:wanted]
+            return
+    for name, count in counts.items():
+        if count == n_positions:
+            check_declared(source, sections, name)
+            continue
+        error = _count_error(source, sections, name, n_positions, "positions", count)
+        if name == "skinweights":
+            source.refuse(error, 1, "weights", np.arange(count, n_positions))
+            _fit_weights(sections, n_positions)
+        else:
+            source.refuse(error)
+            del tables[name]
+
+
+def _count_error(
+    source: Source, sections: Sections, name: str, wanted: int, other: str, found: int
+) -> FormatError:
+    return source.error(
+        f"{name}: expected {wanted} entries as in {other}, found {found}", sections.offsets[name]
+    )
+
+
+def _fit_weights(sections: Sections, count: int) -> None:
+    """Leave out the influences of further vertices, or give missing vertices none."""
+    assert sections.starts is not None  # the caller looked
+    starts = sections.starts[: count + 1]
+    sections.starts = np.pad(starts, (0, count + 1 - len(starts)), mode="edge")
+    sections.joints = sections.joints[: starts[-1]]
+    sections.weights = sections.weights[: starts[-1]]
+
+
+def unbound_skin(sections: Sections) -> Skin:
+    """Return a skin of a file without bindings, its joints bound where they are at rest."""
+    assert sections.starts is not None  # the caller looked
+    fits = sections.joints >= 0
+    joints = np.where(fits, sections.joints, 0).astype(np.int32)
+    count = int(joints.max(initial=0)) + 1
+    weights = np.where(fits, sections.weights, 0.0)
+    return Skin(sections.starts, joints, weights, np.tile(np.eye(4), (count, 1, 1)))
 
 
 def check_mesh(source: Source, sections: Sections, mesh: Mesh) -> None:
@@ -37,21 +109,31 @@ def check_mesh(source: Source, sections: Sections, mesh: Mesh) -> None:
         distance = np.abs(mesh.positions - center).max(axis=1)
         source.warn(
             f"vertex {distance.argmax()} is {distance.max():.2g} units away from the others",
-            sections.offsets["positions"],
+            source.offset_of("positions", int(distance.argmax())),
         )
 
 
-def check_triangles(source: Source, sections: Sections, n_vertices: int) -> None:
-    """Refuse indices of vertices that do not exist."""
+def checked_triangles(source: Source, sections: Sections, n_vertices: int) -> Ints:
+    """Return all triangles, (T, 3); refuse indices of vertices that do not exist."""
+    first, tables = 0, []
     for run in sections.triangles:
-        corners = run.triangles.ravel()
-        if len(corners) and (corners.min() < 0 or corners.max() >= n_vertices):
-            place = int(((corners < 0) | (corners >= n_vertices)).argmax())
-            raise source.error(
-                f"triangle {place // 3}: expected a vertex index below {n_vertices}, "
-                f"found {corners[place]}",
-                source.word_offset(run.block.start, place),
-            )
+        rows = run.triangles
+        if len(rows) and (rows.min() < 0 or rows.max() >= n_vertices):
+            fits = (rows >= 0) & (rows < n_vertices)
+            wrong = ~fits & (rows != LOST)
+            if wrong.any():
+                row, corner = np.argwhere(wrong)[0].tolist()
+                error = source.error(
+                    f"triangle {row + first}: expected a vertex index below {n_vertices}, "
+                    f"found {rows[row, corner]}",
+                    run.offset(source, row, corner),
+                )
+                triangles = np.flatnonzero(wrong.any(axis=1)) + first
+                source.refuse(error, int(wrong.sum()), "triangles", triangles)
+            rows = mended_corners(rows, fits)
+        tables.append(rows)
+        first += len(rows)
+    return tables[0] if len(tables) == 1 else np.concatenate(tables)
 
 
 def invert_bindings(source: Source, sections: Sections) -> Floats:
@@ -61,60 +143,72 @@ def invert_bindings(source: Source, sections: Sections) -> Floats:
     lengths = np.linalg.norm(linear, axis=1).prod(axis=1)
     determinants = np.linalg.det(linear)
     flat = np.abs(determinants) <= _SINGULAR * lengths
+    bindings = sections.bindings
     with np.errstate(over="ignore", invalid="ignore"):
-        inverse = np.linalg.inv(np.where(flat[:, None, None], np.eye(4), sections.bindings))
+        inverse = np.linalg.inv(np.where(flat[:, None, None], np.eye(4), bindings))
         flat |= ~(np.abs(inverse) <= LARGEST).all(axis=(1, 2))
     if flat.any():
         index = int(flat.argmax())
-        raise source.error(
+        error = source.error(
             f"bindings: expected matrices that can be inverted, found matrix {index} "
             f"with determinant {determinants[index]:.3g}",
-            sections.offsets["bindings"],
+            source.offset_of("bindings", index),
         )
+        source.refuse(error, int(flat.sum()), "bindings", np.flatnonzero(flat))
+        # A joint that is where it was bound, unturned.
+        inverse[flat] = translation_matrix(-bindings[flat, :3, 3])
+        linear = np.where(flat[:, None, None], np.eye(3), linear)
     if len(linear):
         conditions = np.linalg.cond(linear)
         if conditions.max() > _NEARLY_SINGULAR:
             source.warn(
                 f"matrix {conditions.argmax()} of bindings can hardly be inverted "
                 f"(condition number {conditions.max():.2g})",
-                sections.offsets["bindings"],
+                source.offset_of("bindings", int(conditions.argmax())),
             )
     return inverse.astype(np.float64, copy=False)
 
 
-def check_joints(source: Source, sections: Sections, n_joints: int) -> None:
-    """Refuse indices of joints that are not bound."""
-    wrong = np.flatnonzero((sections.joints < 0) | (sections.joints >= n_joints))
-    if len(wrong):
-        assert sections.starts is not None  # the caller looked
-        influence = int(wrong[0])
-        vertex = int(np.searchsorted(sections.starts, influence, side="right")) - 1
+def checked_influences(source: Source, sections: Sections, n_joints: int) -> tuple[Ints, Floats]:
+    """Return joints and weights of all influences; refuse indices of joints that are not bound."""
+    joints, weights = sections.joints, sections.weights
+    fits = (joints >= 0) & (joints < n_joints)
+    if fits.all():
+        return joints, weights
+    assert sections.starts is not None  # the caller looked
+    wrong = np.flatnonzero(~fits)
+    vertices = np.searchsorted(sections.starts, wrong, side="right") - 1
+    vertex, influence = int(vertices[0]), int(wrong[0])
+    offset = source.offset_of("weights", vertex)
+    if source.faults is None:
         # Words before it: a count for each vertex up to this one, and two for each influence.
-        place = vertex + 1 + 2 * influence
-        raise source.error(
-            f"skinweights of vertex {vertex}: expected a joint index below {n_joints}, "
-            f"found {sections.joints[influence]}",
-            source.word_offset(sections.blocks["skinweights"].start, place),
-        )
+        block = sections.blocks["skinweights"]
+        offset = source.number_offset(block.start, block.end, vertex + 1 + 2 * influence)
+    error = source.error(
+        f"skinweights of vertex {vertex}: expected a joint index below {n_joints}, "
+        f"found {joints[influence]}",
+        offset,
+    )
+    source.refuse(error, len(wrong), "weights", vertices)
+    return np.where(fits, joints, 0).astype(np.int32), np.where(fits, weights, 0.0)
 
 
-def check_weights(source: Source, sections: Sections, skin: Skin) -> None:
+def check_weights(source: Source, skin: Skin) -> None:
     """Warn, once each, of weights that are negative, missing, or do not add up to 1."""
-    offset = sections.offsets["skinweights"]
     moved = has_influence(skin)
     if not moved.all():
         source.warn(
             f"{(~moved).sum()} vertices without influence stay where they were bound, "
             f"first vertex {(~moved).argmax()}",
-            offset,
+            source.offset_of("weights", int((~moved).argmax())),
         )
     negative = skin.weights < 0
     if negative.any():
-        owners = np.repeat(np.arange(skin.n_vertices), influence_counts(skin))
+        vertex = int(np.searchsorted(skin.starts, negative.argmax(), side="right")) - 1
         source.warn(
             f"{negative.sum()} negative weights are used as stored, first "
-            f"{skin.weights[negative][0]:g} of vertex {owners[negative.argmax()]}",
-            offset,
+            f"{skin.weights[negative][0]:g} of vertex {vertex}",
+            source.offset_of("weights", vertex),
         )
     errors = np.where(moved, np.abs(weight_sums(skin) - 1.0), 0.0)
     off = errors > WEIGHT_TOLERANCE
@@ -123,5 +217,5 @@ def check_weights(source: Source, sections: Sections, skin: Skin) -> None:
         source.warn(
             f"the weights of {off.sum()} vertices do not add up to 1 and are used as stored, "
             f"worst vertex {worst} with {weight_sums(skin)[worst]:.6g}",
-            offset,
+            source.offset_of("weights", worst),
         )

@@ -6,29 +6,54 @@ import re
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from viewer.formats._numbers import to_number
 from viewer.formats._skin_bindings import read_bindings
 from viewer.formats._skin_blocks import KEYWORDS, Block, block_rows, find_block, whole_numbers
 from viewer.formats._skin_material import read_material
+from viewer.formats._skin_mending import mended_rows, mended_weights, whole_corners
 from viewer.formats._skin_weights import read_weights
 from viewer.formats._source import Source, shown
 from viewer.rig.arrays import Bytes, Floats, Ints
 from viewer.rig.mesh import Material
 
-__all__ = ["Sections", "TriangleRun", "read_sections"]
+__all__ = ["Sections", "TriangleRun", "check_declared", "read_sections"]
 
 _WIDTHS = {"positions": 3, "normals": 3, "texcoords": 2}
 Word = re.Match[bytes]
 
 
+Places = NDArray[np.int64]
+
+
 @dataclass(frozen=True, slots=True)
 class TriangleRun:
-    """One triangles section: (M, 3) vertex indices and the material before it, -1 for none."""
+    """One triangles section.
+
+    Attributes
+    ----------
+    triangles : (M, 3)
+        Vertex indices.
+    material : int
+        That before it, -1 for none.
+    block : Block
+        Where it is.
+    offsets : (M,) or None
+        Where each triangle is, if the words before it do not tell.
+    """
 
     triangles: Ints
     material: int
     block: Block
+    offsets: Places | None = None
+
+    def offset(self, source: Source, triangle: int, corner: int = 0) -> int:
+        """Return where in the file a corner is, or its triangle."""
+        if self.offsets is not None:
+            return int(self.offsets[triangle])
+        place = 3 * triangle + corner
+        return source.number_offset(self.block.start, self.block.end, place)
 
 
 @dataclass(slots=True)
@@ -44,7 +69,15 @@ class Sections:
     triangles: list[TriangleRun] = field(default_factory=list)
     bindings: Floats | None = None
     offsets: dict[str, int] = field(default_factory=dict)
+    counts: dict[str, int] = field(default_factory=dict)  # as declared
     blocks: dict[str, Block] = field(default_factory=dict)
+
+    def triangle_offset(self, source: Source, triangle: int) -> int:
+        """Return where in the file a triangle is, counted through all sections."""
+        ends = np.cumsum([len(run.triangles) for run in self.triangles])
+        run = int(np.searchsorted(ends, triangle, side="right"))
+        first = int(ends[run]) - len(self.triangles[run].triangles)
+        return self.triangles[run].offset(source, triangle - first)
 
 
 def read_sections(source: Source) -> Sections:
@@ -83,6 +116,7 @@ def _read_section(source: Source, sections: Sections, word: Word) -> int:
     name = word.group().decode()
     if name in sections.offsets and name not in ("triangles", "material"):
         source.warn(f"{name} occurs again: the last one counts", word.start())
+        check_declared(source, sections, name)
     sections.offsets[name] = word.start()
     if name == "material":
         material, position = read_material(source, word, KEYWORDS, sections.pictures)
@@ -93,18 +127,67 @@ def _read_section(source: Source, sections: Sections, word: Word) -> int:
         sections.bindings, position = read_bindings(source, count, word, position)
         return position
     block = find_block(source, name, word, position)
-    sections.blocks[name] = block
+    sections.blocks[name], sections.counts[name] = block, count
     if name == "skinweights":
-        sections.starts, sections.joints, sections.weights = read_weights(source, block, count)
+        _read_weights(source, sections, block, count)
     elif name == "triangles":
-        rows = block_rows(source, block, count, 3)
-        triangles = whole_numbers(source, block, rows.ravel(), "a vertex index").reshape(-1, 3)
-        sections.triangles.append(TriangleRun(triangles, len(sections.materials) - 1, block))
+        sections.triangles.append(_read_triangles(source, sections, block, count))
     else:
-        sections.tables[name] = block_rows(source, block, count, _WIDTHS[name])
+        sections.tables[name] = _read_table(source, block, count)
     if not block.closed:
         source.warn(f'the last "}}" is missing: {name} ends with the file')
     return block.end + block.closed
+
+
+def _read_table(source: Source, block: Block, count: int) -> Floats:
+    """Parse a table, NaN where it has faults that the source takes, and remember its rows."""
+    width = _WIDTHS[block.name]
+    if source.faults is None:
+        source.remember(
+            block.name, lambda row: source.number_offset(block.start, block.end, width * row)
+        )
+        return block_rows(source, block, count, width)
+    rows, offsets = mended_rows(source, block, count, width)
+    source.remember(block.name, lambda row: int(offsets[row]))
+    return rows
+
+
+def _read_triangles(source: Source, sections: Sections, block: Block, count: int) -> TriangleRun:
+    material = len(sections.materials) - 1
+    if source.faults is None:
+        rows = block_rows(source, block, count, 3)
+        corners = whole_numbers(source, block, rows.ravel(), "a vertex index")
+        return TriangleRun(corners.reshape(-1, 3), material, block)
+    first = sum(len(run.triangles) for run in sections.triangles)
+    rows, offsets = mended_rows(source, block, count, 3, first)
+    return TriangleRun(whole_corners(source, rows, offsets, first), material, block, offsets)
+
+
+def _read_weights(source: Source, sections: Sections, block: Block, count: int) -> None:
+    if source.faults is None:
+        starts, joints, weights = read_weights(source, block, count)
+        source.remember(
+            "weights",
+            # Words before it: a count for each vertex, and two for each influence.
+            lambda row: source.number_offset(block.start, block.end, row + 2 * int(starts[row])),
+        )
+    else:
+        starts, joints, weights, offsets = mended_weights(source, block, count)
+        source.remember("weights", lambda row: int(offsets[row]))
+    sections.starts, sections.joints, sections.weights = starts, joints, weights
+
+
+def check_declared(source: Source, sections: Sections, name: str) -> None:
+    """Refuse a table or weights that has more or fewer vertices than its count says."""
+    if name not in sections.counts or name == "triangles":
+        return
+    found = len(sections.tables.get(name, ()))
+    if name == "skinweights" and sections.starts is not None:
+        found = len(sections.starts) - 1
+    declared = sections.counts[name]
+    if declared != found:
+        message = f"{name}: expected {declared} entries as its count says, found {found}"
+        source.refuse(source.error(message, sections.offsets[name]))
 
 
 def _count(source: Source, name: str, word: Word) -> tuple[int, int]:

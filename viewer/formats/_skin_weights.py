@@ -12,7 +12,7 @@ from viewer.formats._skin_blocks import Block, block_numbers, opened, to_whole, 
 from viewer.formats._source import Source, shown
 from viewer.rig.arrays import Floats, Ints
 
-__all__ = ["read_weights"]
+__all__ = ["find_heads", "read_weights"]
 
 _LEAP = 16  # vertices that one step of the Python loop passes over
 _SMALL = 1 << 29  # numbers for which three times their count is an int32
@@ -36,7 +36,7 @@ def read_weights(source: Source, block: Block, count: int) -> tuple[Ints, Ints, 
         With vertex and line.
     """
     values = block_numbers(source, block)
-    heads = _find_heads(values, count)
+    heads = find_heads(values, count)
     if heads is None:
         raise _explain(source, block, values, count)
     is_pair = np.ones(len(values), dtype=bool)
@@ -54,8 +54,8 @@ def read_weights(source: Source, block: Block, count: int) -> tuple[Ints, Ints, 
     return starts, joints, weights
 
 
-def _find_heads(values: Floats, count: int) -> NDArray[np.integer] | None:
-    """Return the places of the vertices' counts, or None if they do not fill the block.
+def find_heads(values: Floats, count: int) -> NDArray[np.integer] | None:
+    """Return the places of the vertices' counts, (V,), or None if they do not fill the block.
 
     Each count tells where the next one is, so they can only be followed one by one. Squaring
     the map "place to next place" four times makes each step of that loop pass 16 vertices.

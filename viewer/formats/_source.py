@@ -4,11 +4,17 @@ from __future__ import annotations
 
 import re
 import stat
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from viewer.errors import FormatError, printable
+from viewer.formats._faults import Fault, Part
+from viewer.formats._numbers import word_begins
+from viewer.rig.arrays import Ints
 
 if TYPE_CHECKING:
     from viewer.formats._archive import Archive
@@ -109,6 +115,8 @@ class Source:
         Largest size of a file, in bytes, also of those inside a folder or archive.
     warnings : list of str
         One line each, none twice.
+    faults : list of Fault or None
+        None where the first fault ends the reading; a list takes in all that can be gone on from.
     """
 
     def __init__(
@@ -118,10 +126,12 @@ class Source:
         self.is_folder = False
         self.max_size = max_size
         self.warnings: list[str] = []
+        self.faults: list[Fault] | None = None
         self.archive: Archive | None = None  # opened once, by whoever asks first
         self._data = None if data is None else _without_marks(data)
         self._warned: set[str] = set()
         self._counted = (0, 1)  # an offset whose line is known, and that line
+        self._offsets: dict[str, tuple[Source, Callable[[int], int]]] = {}
 
     @classmethod
     def open(cls, path: str | Path, max_size: int = MAX_SIZE) -> Source:
@@ -146,14 +156,16 @@ class Source:
 
     def inside(self, name: str) -> Source:
         """Return a file of this folder; its warnings are this source's own."""
-        source = Source(self.path / name, max_size=self.max_size)
-        source.warnings, source._warned = self.warnings, self._warned
-        return source
+        return self._related(self.path / name)
 
     def beside(self, name: str) -> Source:
         """Return a file next to this one; its warnings are this source's own."""
-        source = Source(self.path.parent / name, max_size=self.max_size)
+        return self._related(self.path.parent / name)
+
+    def _related(self, path: Path) -> Source:
+        source = Source(path, max_size=self.max_size)
         source.warnings, source._warned = self.warnings, self._warned
+        source.faults, source._offsets = self.faults, self._offsets
         return source
 
     def words(self, start: int = 0, end: int | None = None) -> Iterator[re.Match[bytes]]:
@@ -163,6 +175,11 @@ class Source:
     def next_word(self, start: int) -> re.Match[bytes] | None:
         """Return the first word at or after an offset, or None at the end of the file."""
         return _WORD.search(self.data, start)
+
+    def number_offset(self, start: int, end: int, index: int) -> int:
+        """Return the offset of the index-th word of a part without braces; for errors only."""
+        letters = np.frombuffer(self.data, dtype=np.uint8, count=end - start, offset=start)
+        return start + int(word_begins(letters)[index])
 
     def word_offset(self, start: int, index: int) -> int:
         """Return the offset of the index-th word after ``start``; slow, for errors only."""
@@ -200,6 +217,48 @@ class Source:
             message, offset = "further warnings are left out", None
         self.warnings.append(str(self.error(message, offset)))
 
+    def refuse(
+        self, error: FormatError, count: int = 1, part: Part = "", places: ArrayLike = ()
+    ) -> None:
+        """Raise an error; where all faults are wanted, note it, so that the reader goes on.
+
+        Parameters
+        ----------
+        error : FormatError
+            The first of its kind.
+        count : int
+            How many there are.
+        part, places : str, (N,)
+            What the reader replaces by something neutral, see ``Fault``.
+        """
+        if self.faults is None:
+            raise error
+        self.faults.append(Fault(error, count, part, _indices(places)))
+
+    def remember(self, kind: str, offset_of: Callable[[int], int]) -> None:
+        """Keep how to find the offset of the index-th thing of a kind, for whoever asks.
+
+        Parameters
+        ----------
+        kind : str
+            ``"positions"``, ``"normals"``, ``"weights"``, ``"triangles"``, ``"bindings"``,
+            ``"joints"``, ``"channels"`` or ``"frames"``.
+        offset_of : callable
+            Called only when somebody asks; may be slow.
+        """
+        self._offsets[kind] = self, offset_of
+
+    def offset_of(self, kind: str, index: int) -> int:
+        """Return the offset of a thing that the reader remembers; slow, for errors only."""
+        return self._offsets[kind][1](index)
+
+    def place(self, kind: str, index: int) -> tuple[Path, int] | None:
+        """Return the file and line of a thing; None if the reader does not remember such."""
+        if kind not in self._offsets:
+            return None
+        source, offset_of = self._offsets[kind]
+        return source.path, source.line(offset_of(index))
+
     def head(self, size: int) -> bytes:
         """Return up to ``size`` bytes from the first word on."""
         first = self.next_word(0)
@@ -220,6 +279,11 @@ class Source:
         if not self.data[1:_LOOK:2].strip(b"\0") or not self.data[:_LOOK:2].strip(b"\0"):
             return "UTF-16 text"
         return "binary data" if head.count(0) * 3 > len(head) else None
+
+
+def _indices(places: ArrayLike) -> Ints:
+    """Return indices once each, rising: (N,) int32."""
+    return np.unique(np.asarray(places, dtype=np.int32))
 
 
 def _without_marks(data: bytes) -> bytes:

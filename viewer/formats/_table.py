@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from viewer.errors import FormatError
+from viewer.formats._faults import Part
 from viewer.formats._numbers import parse_numbers
 from viewer.formats._source import Source, shown
+from viewer.formats._tolerant import read_words, refuse_words
 from viewer.rig.arrays import Floats
 
-__all__ = ["read_numbers", "read_table", "row_error"]
+__all__ = ["read_broken_table", "read_numbers", "read_table", "row_error"]
+
+Places = NDArray[np.int64]
 
 
 def read_table(source: Source, columns: int) -> Floats:
@@ -74,6 +79,45 @@ def _check_rows(source: Source, columns: int, count: int) -> None:
     raise source.error(
         f"expected {columns} numbers in a row, found {counts[wrong]}", int(begins[first[wrong]])
     )
+
+
+def read_broken_table(source: Source, columns: int, part: Part) -> tuple[Floats, Places]:
+    """Read a table, noting all faults; see ``read_table``.
+
+    Parameters
+    ----------
+    source : Source
+        Takes the faults.
+    columns : int
+        Numbers in every row.
+    part : str
+        What of a figure the rows are, see ``Fault``.
+
+    Returns
+    -------
+    rows : (N, columns)
+        NaN in rows that cannot be used.
+    offsets : (N,)
+        Where each is in the file.
+    """
+    words = read_words(source.data, 0, len(source.data))
+    begins, sizes = words.rows()
+    fits = sizes == columns
+    if not fits.any():
+        read_table(source, columns)  # refuses it
+    owners = np.repeat(np.arange(len(begins)), sizes)
+    bad = words.bad
+    refuse_words(source, words, bad, lambda word: f"row {owners[word]}", part, owners[bad])
+    wrong = np.flatnonzero(~fits)
+    if len(wrong):
+        error = source.error(
+            f"expected {columns} numbers in a row, found {sizes[wrong[0]]}",
+            int(words.offsets[begins[wrong[0]]]),
+        )
+        source.refuse(error, len(wrong), part, wrong)
+    rows = np.full((len(begins), columns), np.nan)
+    rows[fits] = words.values[begins[fits, None] + np.arange(columns)]
+    return rows, words.offsets[begins]
 
 
 def row_error(source: Source, row: int, columns: int, message: str) -> FormatError:

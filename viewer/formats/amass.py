@@ -23,6 +23,7 @@ from viewer.errors import FormatError, printable
 from viewer.formats._archive import Archive
 from viewer.formats._container import archive_of, finite
 from viewer.formats._source import Source
+from viewer.formats._tolerant import held_rows
 from viewer.rig.arrays import Deferred, Floats, Ints
 from viewer.rig.body_motion import BodyMotion
 from viewer.rig.smpl_family import FAMILY, members_by_numbers
@@ -155,7 +156,9 @@ def _rows(archive: Archive, key: str, count: int | None = None, first: str = "")
         raise archive.error(key, f"expected {count} frames as in {first}, found {shape[0]}")
     if not shape[0]:
         raise archive.error(key, "expected frames, found none")
-    return finite(archive, key, array.values()).reshape(shape[0], math.prod(shape[1:]))
+    values = array.values().reshape(shape[0], math.prod(shape[1:]))
+    rows = finite(archive, key, values, "frames" if shape[0] > 1 else "")
+    return held_rows(rows, ~np.isfinite(values).all(axis=1)) if archive.is_tolerant else rows
 
 
 def _whole_poses(archive: Archive, key: str) -> tuple[tuple[str, ...], Floats]:

@@ -14,6 +14,7 @@ joint 0, 1, 2 and so on, which is the order of the skeleton's DOF table.
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 
@@ -33,6 +34,7 @@ _RULES: dict[bytes, Tangent] = {rule.encode(): rule for rule in TANGENT_RULES}
 _WORDS_PER_KEY = 4
 
 Word = re.Match[bytes]
+_Key = tuple[float, float, Tangent, Tangent, int]  # the last is where it begins
 
 
 def read(source: Source) -> Clip:
@@ -65,6 +67,7 @@ class _Parser:
         self.word: Word | None = None
         self.what = "animation"
         self.began = 0  # where that begins
+        self.starts: list[int] = []  # of all channels
 
     def clip(self) -> Clip:
         """Return the whole file as a clip."""
@@ -87,6 +90,7 @@ class _Parser:
             else:
                 raise self._error(f"expected a channel, found {shown(text)}")
         self._finish(count, len(channels))
+        self.source.remember("channels", self.starts.__getitem__)
         return Clip(self.source.path.stem, tuple(channels), *(span or self._key_span(channels)))
 
     def _range(self) -> tuple[float, float]:
@@ -108,7 +112,7 @@ class _Parser:
             self.source.warn('the last "}" is missing')
         if count != found:
             wanted = "numchannels" if count is None else f"{count} channels as numchannels says"
-            raise self._error(f"expected {wanted}, found {found}")
+            self.source.refuse(self._error(f"expected {wanted}, found {found}"))
         self._advance()
         if self.word is not None:
             self.source.warn(
@@ -119,13 +123,14 @@ class _Parser:
     def _channel(self, index: int) -> Channel:
         self.what = f"channel {index}"
         self.began = self.word.start() if self.word else 0
+        self.starts.append(self.began)
         self._advance()
         # Some files number their channels; the order counts, not the number.
         while self.word is not None and self.word.group() not in (b"{", b"}", b"extrapolate"):
             self._advance()
         self._expect(b"{")
         extrapolation: tuple[Extrapolation, Extrapolation] = ("constant", "constant")
-        rows: list[tuple[float, float, Tangent, Tangent]] | None = None
+        rows: list[_Key] | None = None
         while self.word is not None and self.word.group() != b"}":
             text = self.word.group()
             if text == b"extrapolate":
@@ -144,7 +149,7 @@ class _Parser:
     def _make_channel(
         self,
         index: int,
-        rows: list[tuple[float, float, Tangent, Tangent]],
+        rows: list[_Key],
         extrapolation: tuple[Extrapolation, Extrapolation],
     ) -> Channel:
         times = [row[0] for row in rows]
@@ -152,7 +157,9 @@ class _Parser:
             self.source.warn(f"channel {index} has no keys: its value is 0")
         if times != sorted(times):
             late = next(i for i in range(1, len(times)) if times[i] < times[i - 1])
-            self.source.warn(f"channel {index}: key {late} is before key {late - 1}; keys sorted")
+            self.source.warn(
+                f"channel {index}: key {late} is before key {late - 1}; keys sorted", rows[late][4]
+            )
             rows = sorted(rows, key=lambda row: row[0])
         return Channel(
             target=index,
@@ -162,17 +169,23 @@ class _Parser:
             extrapolation=extrapolation,
         )
 
-    def _keys(self) -> list[tuple[float, float, Tangent, Tangent]]:
+    def _keys(self) -> list[_Key]:
         count = self._count("keys")
         self._expect(b"{")
-        rows: list[tuple[float, float, Tangent, Tangent]] = []
+        rows: list[_Key] = []
+        lost = 0
         while self.word is not None and self.word.group() != b"}":
-            self.what = f"{self.what.split(',')[0]}, key {len(rows)}"
-            time, value = self._number("time"), self._number("value")
-            rows.append((time, value, self._tangent(), self._tangent()))
+            self.what = f"{self.what.split(',')[0]}, key {len(rows) + lost}"
+            start = self.word.start()
+            time, value = self._number("time", of_key=True), self._number("value", of_key=True)
+            row = time, value, self._tangent(), self._tangent(), start
+            if math.isnan(time + value):
+                lost += 1  # it was noted; the curve is drawn through the other keys
+            else:
+                rows.append(row)
         self.what = self.what.split(",")[0]
-        if len(rows) != count:
-            raise self._error(f"expected {count} keys, found {len(rows)}")
+        if len(rows) + lost != count:
+            self.source.refuse(self._error(f"expected {count} keys, found {len(rows) + lost}"))
         self._expect(b"}")
         return rows
 
@@ -198,10 +211,15 @@ class _Parser:
             raise self._error(f'expected "{text.decode()}", found {self._found()}{hint}')
         self._advance()
 
-    def _number(self, item: str) -> float:
+    def _number(self, item: str, of_key: bool = False) -> float:
+        """Read a number; NaN for a key's that is none, where faults are noted."""
         value = None if self.word is None else to_number(self.word.group())
         if value is None:
-            raise self._error(f"{item}: expected a number, found {self._found()}")
+            error = self._error(f"{item}: expected a number, found {self._found()}")
+            if not of_key or self.word is None or self.word.group() in (b"{", b"}"):
+                raise error
+            self.source.refuse(error)
+            value = math.nan
         self._advance()
         return value
 
@@ -229,9 +247,13 @@ class _Parser:
         text = self.word.group() if self.word else b""
         tangent = _RULES.get(text, to_number(text))
         if tangent is None:
-            raise self._error(
+            error = self._error(
                 f"tangent: expected {', '.join(TANGENT_RULES)} or a number, found {self._found()}"
             )
+            if self.word is None or text in (b"{", b"}"):
+                raise error
+            self.source.refuse(error)
+            tangent = "smooth"
         self._advance()
         return tangent
 

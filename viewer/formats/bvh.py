@@ -65,6 +65,8 @@ def read(source: Source) -> SkeletonMotion:
     """
     hierarchy = read_hierarchy(source)
     table = _table(source, hierarchy.joints)
+    starts = [joint.start for joint in hierarchy.joints if not joint.is_end]
+    source.remember("joints", starts.__getitem__)
     motion = read_motion(source, hierarchy.motion, table.n_channels)
     _refuse_empty_joints(source, table, motion)
     skeleton = _skeleton(table)

@@ -24,7 +24,8 @@ from viewer.formats._obj_parts import ObjParts, read_parts
 from viewer.formats._polygons import triangulate
 from viewer.formats._source import Source
 from viewer.formats._surface import filled_normals, polygon_text, stated_unit, stated_up
-from viewer.rig.arrays import Floats, Ints
+from viewer.formats._tolerant import mended_positions
+from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Material, Mesh
 
@@ -56,14 +57,17 @@ def read(source: Source) -> Figure:
     if len(parts.positions) == 0:
         looks = source.looks_like()
         raise source.error(f"expected a mesh, found no `v` line{f' ({looks})' * bool(looks)}")
-    picks, owners = triangulate(parts.positions, parts.corners[:, 0], parts.counts)
+    rough = mended_positions(parts.positions, np.zeros((0, 3), np.int32))
+    picks, owners = triangulate(rough, parts.corners[:, 0], parts.counts)
     triangles = parts.corners[picks, 0].astype(np.int32)
+    positions = mended_positions(parts.positions, triangles)
+    source.remember("triangles", lambda triangle: int(parts.offsets[owners[triangle]]))
     normals = _normals(source, parts)
     uvs, uv_triangles = _uvs(source, parts, picks)
     materials, of_face = _materials(source, parts)
     mesh = Mesh(
-        positions=parts.positions,
-        normals=filled_normals(source, normals, parts.positions, triangles),
+        positions=positions,
+        normals=filled_normals(source, normals, positions, triangles),
         triangles=triangles,
         uvs=uvs,
         uv_triangles=uv_triangles,
@@ -99,7 +103,7 @@ def _facts(parts: ObjParts, mesh: Mesh, has_normals: bool) -> tuple[tuple[str, s
 
 def _uvs(source: Source, parts: ObjParts, picks: Places) -> tuple[Floats | None, Ints | None]:
     """Return the table of texture coordinates, and which ones the triangles' corners have."""
-    uvs = parts.uvs
+    uvs = parts.uvs if source.faults is None else np.nan_to_num(parts.uvs)
     if len(uvs) == 0:
         return None, None
     corners = parts.corners[picks, 1]
@@ -119,10 +123,13 @@ def _normals(source: Source, parts: ObjParts) -> Floats | None:
     listed, n_vertices = parts.normals, len(parts.positions)
     if len(listed) == 0:
         return None
-    used = parts.corners[:, 2] >= 0
+    used: Bools = parts.corners[:, 2] >= 0
     if not used.any():
         source.warn(f"{len(listed)} normals that no face uses: left out")
         return None
+    if source.faults is not None:
+        # What is no number was noted, and is computed from the triangles.
+        used &= ~np.isnan(listed.sum(axis=1)[parts.corners[:, 2]])
     vertices, indices = parts.corners[used, 0], parts.corners[used, 2]
     result = np.full((n_vertices, 3), np.nan)
     result[vertices] = listed[indices]

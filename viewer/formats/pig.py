@@ -18,12 +18,15 @@ and x, all others are rotation vectors. Scale and translation come last, about t
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
+from viewer.errors import FormatError
 from viewer.formats._pig_names import JOINTS, KEYPOINTS
 from viewer.formats._pig_parts import Part, PigFiles, open_parts
 from viewer.formats._source import Source
+from viewer.formats._tolerant import mended_corners, mended_positions
 from viewer.rig.annotations import BodyParts, Keypoints, ReducedMesh
-from viewer.rig.arrays import Floats, Ints
+from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.blendshapes import JointRegressor, regress_joints
 from viewer.rig.figure import Figure
 from viewer.rig.hierarchy import cycle_members
@@ -34,6 +37,8 @@ from viewer.rig.skin import Skin, has_influence, skin_from_entries, weight_sums
 from viewer.rig.transform import translation_matrix
 
 __all__ = ["read"]
+
+Indices = NDArray[np.int64]
 
 _ODD_SUM = 0.01  # the authors' rounding stays well below
 
@@ -58,7 +63,7 @@ def read(source: Source) -> Figure:
     """
     files = open_parts(source)
     parts = files.parts
-    positions = parts["vertices"].values
+    positions = _mended_mesh(parts)
     n_vertices, n_joints = len(positions), len(parts["t_pose_joints"].values)
     if len(parts["parents"].values) != n_joints:
         raise parts["parents"].error(
@@ -67,7 +72,13 @@ def read(source: Source) -> Figure:
             None,
         )
     parents = _parents(parts["parents"])
-    joints = parts["t_pose_joints"].values
+    joints = np.nan_to_num(parts["t_pose_joints"].values)
+    for kind, name in (
+        ("positions", "vertices"),
+        ("triangles", "faces_vert"),
+        ("joints", "t_pose_joints"),
+    ):
+        parts[name].remember(kind, lambda index: index)
     names = JOINTS if n_joints == len(JOINTS) else tuple(f"joint_{j}" for j in range(n_joints))
     mesh = _mesh(source, parts, positions)
     skin = _skin(source, parts, joints, n_vertices)
@@ -96,6 +107,15 @@ def _layout(n_joints: int) -> PoseLayout:
     return PoseLayout(4 + 3 * n_joints, starts, is_euler, translation=0, scale=3 + 3 * n_joints)
 
 
+def _mended_mesh(parts: dict[str, Part]) -> Floats:
+    """Return the vertices; those whose row cannot be used lie between their neighbours."""
+    positions, faces = parts["vertices"].values, parts["faces_vert"].values
+    if not np.isnan(positions).any():
+        return positions
+    fits = ((faces >= 0) & (faces < len(positions))).all(axis=1)
+    return mended_positions(positions, faces[fits].astype(np.int32))
+
+
 def _indices(part: Part, column: int, end: int, what: str, rows_of: Part | None = None) -> Ints:
     """Return a column of whole numbers from 0 to ``end - 1``, the rows of another part."""
     return _columns(part, slice(column, column + 1), end, what, rows_of)[:, 0]
@@ -107,28 +127,48 @@ def _corners(part: Part, what: str, rows_of: Part) -> Ints:
 
 def _columns(part: Part, columns: slice, end: int, what: str, rows_of: Part | None) -> Ints:
     values = part.values[:, columns]
-    wrong = np.argwhere((values < 0) | (values >= end) | (values != np.floor(values)))
+    known = ~np.isnan(values)
+    fits = (values >= 0) & (values < end) & (values == np.floor(values))
+    wrong = np.argwhere(known & ~fits)
     if len(wrong):
         row, column = wrong[0].tolist()
         proof = f": {rows_of.name} has {end} rows" if rows_of else ""
         found = f"found {values[row, column]:.16g}{proof}"
-        raise part.error(f"expected a {what} from 0 to {end - 1}, {found}", row)
-    return values.astype(np.int32)
+        error = part.error(f"expected a {what} from 0 to {end - 1}, {found}", row)
+        is_mesh = part.name.startswith("faces_vert")
+        part.source.refuse(error, len(wrong), "triangles" if is_mesh else "", wrong[:, 0])
+    if fits.all():
+        return values.astype(np.int32)
+    if values.shape[1] == 3:
+        return mended_corners(np.where(fits, values, 0).astype(np.int64), fits)
+    return np.where(fits, values, -1).astype(np.int32)
 
 
 def _parents(part: Part) -> Ints:
     parents = part.values[:, 0]
+    result = parents.copy()
     for joint, parent in enumerate(parents.tolist()):
-        if parent == -1.0 and joint > 0:
-            raise part.error(f"joint {joint}: expected one root, found another", joint)
-        if joint == 0 and parent != -1.0:
-            raise part.error(f"joint 0: expected -1, the root, found {parent:g}", 0)
-        if joint > 0 and not (0 <= parent < joint and parent == int(parent)):
-            wanted = "expected a parent before it"
-            problem = part.error(f"joint {joint}: {wanted}, found {parent:g}", joint)
-            problem.code = "S002" if cycle_members(parents)[joint] else ""
-            raise problem
-    return parents.astype(np.int32)
+        problem = _parent_error(part, parents, joint, parent)
+        if problem is not None:
+            part.source.refuse(problem, 1, "joints", [joint])
+        if problem is not None or np.isnan(parent):
+            result[joint] = 0.0 if joint else -1.0
+    return result.astype(np.int32)
+
+
+def _parent_error(part: Part, parents: Floats, joint: int, parent: float) -> FormatError | None:
+    if np.isnan(parent):
+        return None  # it was noted
+    if parent == -1.0 and joint > 0:
+        return part.error(f"joint {joint}: expected one root, found another", joint)
+    if joint == 0 and parent != -1.0:
+        return part.error(f"joint 0: expected -1, the root, found {parent:g}", 0)
+    if joint > 0 and not (0 <= parent < joint and parent == int(parent)):
+        wanted = "expected a parent before it"
+        problem = part.error(f"joint {joint}: {wanted}, found {parent:g}", joint)
+        problem.code = "S002" if cycle_members(parents)[joint] else ""
+        return problem
+    return None
 
 
 def _mesh(source: Source, parts: dict[str, Part], positions: Floats) -> Mesh:
@@ -155,18 +195,39 @@ def _skin(source: Source, parts: dict[str, Part], joints: Floats, n_vertices: in
     columns = _indices(part, 0, len(joints), "joint", parts["t_pose_joints"])
     vertices = _indices(part, 1, n_vertices, "vertex", parts["vertices"])
     weights = part.values[:, 2]
+    usable = (columns >= 0) & (vertices >= 0) & ~np.isnan(weights)
+    if not usable.all():
+        _note_lost(part, vertices, usable)
+        columns, vertices, weights = columns[usable], vertices[usable], weights[usable]
+    rows = np.flatnonzero(usable)
+    part.remember("weights", lambda vertex: _row_of(rows, vertices, vertex))
     keys = columns.astype(np.int64) * n_vertices + vertices
     order = np.argsort(keys, kind="stable")
     twice = np.flatnonzero(np.diff(keys[order]) == 0)
     if len(twice):
         row = int(order[twice + 1].min())
-        raise part.error(
+        error = part.error(
             f"expected each pair once, found joint {columns[row]} and vertex {vertices[row]} again",
-            row,
+            int(rows[row]),
         )
+        part.source.refuse(error, len(twice))
     skin = skin_from_entries(n_vertices, vertices, columns, weights, translation_matrix(-joints))
-    _check_weights(source, part, skin)
+    if source.faults is None:  # whoever wants all faults looks at the weights in full
+        _check_weights(source, part, skin)
     return skin
+
+
+def _row_of(rows: Indices, vertices: Ints, vertex: int) -> int:
+    """Return the first row with a weight of a vertex; of one that has none, the first of all."""
+    found = np.flatnonzero(vertices == vertex)
+    return int(rows[found[0]]) if len(found) else 0
+
+
+def _note_lost(part: Part, vertices: Ints, usable: Bools) -> None:
+    """Note whose weights are not all there; what is wrong with their rows was said already."""
+    lost = np.flatnonzero(~usable & (vertices >= 0))
+    error = part.error("rows that cannot be used", None)
+    part.source.refuse(error, 0, "weights", vertices[lost])
 
 
 def _check_weights(source: Source, part: Part, skin: Skin) -> None:
@@ -194,7 +255,9 @@ def _regressor(parts: dict[str, Part], n_joints: int, n_vertices: int) -> JointR
     part = parts["J_regressor"]
     joints = _indices(part, 0, n_joints, "joint", parts["t_pose_joints"])
     vertices = _indices(part, 1, n_vertices, "vertex", parts["vertices"])
-    return JointRegressor(n_joints, joints, vertices, part.values[:, 2].astype(np.float64))
+    usable = (joints >= 0) & (vertices >= 0)
+    weights = part.values[usable, 2].astype(np.float64)
+    return JointRegressor(n_joints, joints[usable], vertices[usable], weights)
 
 
 def _column(parts: dict[str, Part], name: str, rows: int, end: int, what: str) -> Ints | None:

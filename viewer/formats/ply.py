@@ -20,9 +20,10 @@ from viewer.errors import printable
 from viewer.formats._numbers import LARGEST
 from viewer.formats._ply_header import Header, read_header
 from viewer.formats._ply_rows import Table, read_tables
-from viewer.formats._polygons import triangulate
+from viewer.formats._polygons import first_known, triangles_of, triangulate
 from viewer.formats._source import Source
 from viewer.formats._surface import filled_normals, polygon_text, stated_unit, stated_up, texture
+from viewer.formats._tolerant import mended_positions
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Material, Mesh
@@ -59,8 +60,11 @@ def read(source: Source) -> Figure:
     tables = read_tables(source, header)
     vertices, positions = _vertices(source, tables)
     counts, corners, uv_corners = _faces(source, tables, len(positions))
-    picks, owners = triangulate(positions, corners, counts)
+    rough = mended_positions(positions, np.zeros((0, 3), np.int32))
+    picks, owners = triangulate(rough, corners, counts)
     triangles = corners[picks].astype(np.int32)
+    positions = mended_positions(positions, triangles)
+    _remember(source, tables, owners)
     normals = _columns(source, vertices, ("nx", "ny", "nz"))
     uvs, uv_triangles = _uvs(source, vertices, uv_corners, picks)
     materials = _materials(source, header, uvs is not None)
@@ -91,6 +95,15 @@ def read(source: Source) -> Figure:
     )
 
 
+def _remember(source: Source, tables: dict[str, Table], owners: Indices) -> None:
+    """Remember where vertices and triangles are, in a text."""
+    vertices, faces = tables["vertex"].offsets, tables["face"].offsets if "face" in tables else None
+    if vertices is not None:
+        source.remember("positions", lambda vertex: int(vertices[vertex]))
+    if faces is not None:
+        source.remember("triangles", lambda triangle: int(faces[owners[triangle]]))
+
+
 def _vertices(source: Source, tables: dict[str, Table]) -> tuple[Table, Floats]:
     """Return the element of the vertices, and where they are."""
     if "vertex" not in tables:
@@ -116,9 +129,11 @@ def _columns(source: Source, table: Table, names: tuple[str, ...]) -> Floats | N
     if len(odd):
         row = values[odd[0]]
         worst = row[~(np.abs(row) <= LARGEST)][0]
-        raise source.error(
-            f"{table.element.name} {odd[0]}: expected finite {' '.join(names)}, found {worst:g}"
-        )
+        message = f"{table.element.name} {odd[0]}: expected finite {' '.join(names)}"
+        error = source.error(f"{message}, found {worst:g}", table.offset(int(odd[0])))
+        count = int((~(np.abs(values) <= LARGEST)).sum())
+        source.refuse(error, count, "positions" if names == ("x", "y", "z") else "", odd)
+        values[odd] = np.nan
     return values
 
 
@@ -138,14 +153,20 @@ def _faces(
     if name is None:
         raise source.error("face: expected a list vertex_indices, found none", faces.element.offset)
     counts, values = faces.lists[name]
-    corners = values.astype(np.int64)
+    corners = np.clip(np.nan_to_num(values, nan=-1.0), -1.0, n_vertices).astype(np.int64)
     first = np.cumsum(counts) - counts
     wrong = np.flatnonzero((corners != values) | (corners < 0) | (corners >= n_vertices))
     if len(wrong):
         face = int(np.searchsorted(first, wrong[0], side="right")) - 1
-        raise source.error(
-            f"face {face}: expected a vertex from 0 to {n_vertices - 1}, found {values[wrong[0]]:g}"
+        error = source.error(
+            f"face {face}: expected a vertex from 0 to {n_vertices - 1}, "
+            f"found {values[wrong[0]]:g}",
+            faces.offset(face),
         )
+        owners = np.repeat(np.arange(len(counts)), counts)
+        source.refuse(error, len(wrong), "triangles", triangles_of(counts, owners[wrong]))
+        corners[wrong] = -1
+        corners = first_known(corners, counts, owners)
     small = counts < 3
     uvs = _wedges(source, faces, counts)
     if small.any():
@@ -174,7 +195,11 @@ def _wedges(source: Source, faces: Table, counts: Indices) -> Floats | None:
     odd = np.flatnonzero(~(np.abs(uvs) <= LARGEST).all(axis=1))
     if len(odd):
         face = int(np.searchsorted(np.cumsum(counts), odd[0], side="right"))
-        raise source.error(f"face {face}: expected finite texcoord, found {uvs[odd[0]].max():g}")
+        source.refuse(
+            source.error(f"face {face}: expected finite texcoord, found {uvs[odd[0]].max():g}"),
+            len(odd),
+        )
+        uvs = np.where(np.abs(uvs) <= LARGEST, uvs, 0.0)
     return uvs
 
 
@@ -191,7 +216,7 @@ def _uvs(
     for names in _UVS:
         uvs_of_vertices = _columns(source, vertices, names)
         if uvs_of_vertices is not None:
-            return uvs_of_vertices, None
+            return np.nan_to_num(uvs_of_vertices), None
     return None, None
 
 
@@ -210,6 +235,17 @@ def _materials(source: Source, header: Header, has_uvs: bool) -> tuple[Material,
     return (Material(name, name, texture(source, name, offset)),)
 
 
+def _note_words(source: Source, table: Table, names: list[str]) -> None:
+    """Refuse what is no number in properties that are not used: only a text may hold such."""
+    for name in names:
+        column = table.columns.get(name)
+        if column is None or table.offsets is None or not np.isnan(column).any():
+            continue
+        row, count = int(np.isnan(column).argmax()), int(np.isnan(column).sum())
+        message = f"{table.element.name} {row}: expected a number for {printable(name, 40)}"
+        source.refuse(source.error(f"{message}, found a word", table.offset(row)), count)
+
+
 def _report(source: Source, tables: dict[str, Table], uses_wedges: bool) -> None:
     """Warn, once, of everything that the file holds and the mesh does not."""
     used = {
@@ -222,6 +258,7 @@ def _report(source: Source, tables: dict[str, Table], uses_wedges: bool) -> None
             left.append(f"element {name}")
             continue
         others = [prop.name for prop in table.element.properties if prop.name not in used[name]]
+        _note_words(source, table, others)
         left += [f"{name} {other}" for other in others]
     if left:
         names = ", ".join(printable(name, 40) for name in left[:_SHOWN])

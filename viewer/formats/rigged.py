@@ -31,14 +31,17 @@ from numpy.typing import NDArray
 
 from viewer.errors import RigError
 from viewer.formats._archive import Archive
-from viewer.formats._container import archive_of, finite
+from viewer.formats._container import archive_of, corners_of, finite
+from viewer.formats._faults import Part
 from viewer.formats._save import save_arrays
 from viewer.formats._source import Source
+from viewer.formats._tolerant import mended_positions
 from viewer.rig.annotations import VertexField
 from viewer.rig.arrays import Deferred, Floats
 from viewer.rig.blendshapes import Correctives
 from viewer.rig.figure import Figure
 from viewer.rig.hands import Hand
+from viewer.rig.hierarchy import cycle_members
 from viewer.rig.mesh import Material, Mesh, vertex_normals
 from viewer.rig.pose_vector import PoseLayout
 from viewer.rig.skeleton import Skeleton
@@ -98,8 +101,8 @@ def _numbers(archive: Archive, key: str, shape: tuple[int | None, ...]) -> NDArr
     return archive.array(key, shape).values()
 
 
-def _finite(archive: Archive, key: str, shape: tuple[int | None, ...]) -> Floats:
-    return finite(archive, key, _numbers(archive, key, shape))
+def _finite(archive: Archive, key: str, shape: tuple[int | None, ...], part: Part = "") -> Floats:
+    return finite(archive, key, _numbers(archive, key, shape), part)
 
 
 def _texts(archive: Archive, key: str) -> tuple[str, ...]:
@@ -107,19 +110,15 @@ def _texts(archive: Archive, key: str) -> tuple[str, ...]:
 
 
 def _mesh(archive: Archive) -> Mesh:
-    positions = _finite(archive, "positions", (None, 3))
-    triangles = _numbers(archive, "triangles", (None, 3))
-    wrong = (triangles < 0) | (triangles >= len(positions))
-    if wrong.any():
-        raise archive.error(
-            "triangles",
-            f"expected vertices 0 to {len(positions) - 1}, found {triangles[wrong][0]}",
-        )
+    positions = _finite(archive, "positions", (None, 3), "positions")
+    listed = _numbers(archive, "triangles", (None, 3))
+    triangles = corners_of(archive, "triangles", listed, len(positions))
+    positions = mended_positions(positions, triangles)
     has_uvs, split = archive.has("uvs"), archive.has("uv_triangles")
     materials = _materials(archive)
     return Mesh(
         positions=positions,
-        normals=vertex_normals(positions, triangles.astype(np.int32)),
+        normals=vertex_normals(positions, triangles),
         triangles=triangles,
         uvs=_finite(archive, "uvs", (None, 2)) if has_uvs else None,
         uv_triangles=_numbers(archive, "uv_triangles", (None, 3)) if split else None,
@@ -149,25 +148,75 @@ def _skeleton(archive: Archive) -> Skeleton:
     n_dofs = len(_numbers(archive, "dof_joints", (None,)))
     return Skeleton(
         names=names,
-        parents=_numbers(archive, "parents", (count,)),
-        rest_translations=_finite(archive, "rest_translations", (count, 3)),
-        rest_rotations=_finite(archive, "rest_rotations", (count, 4)),
-        rest_scales=_finite(archive, "rest_scales", (count, 3)),
+        parents=_parents(archive, count),
+        rest_translations=_finite(archive, "rest_translations", (count, 3), "joints"),
+        rest_rotations=_finite(archive, "rest_rotations", (count, 4), "joints"),
+        rest_scales=_finite(archive, "rest_scales", (count, 3), "joints"),
         dof_joints=_numbers(archive, "dof_joints", (n_dofs,)),
         dof_kinds=_numbers(archive, "dof_kinds", (n_dofs,)),
         rest_dofs=_finite(archive, "rest_dofs", (n_dofs,)),
-        dof_limits=_numbers(archive, "dof_limits", (n_dofs, 2)).astype(np.float64),
+        dof_limits=_limits(archive, n_dofs),
         boxes=_finite(archive, "boxes", (count, 2, 3)) if archive.has("boxes") else None,
     )
 
 
-def _skin(archive: Archive) -> Skin:
-    return Skin(
-        starts=_numbers(archive, "skin_starts", (None,)),
-        joints=_numbers(archive, "skin_joints", (None,)),
-        weights=_finite(archive, "skin_weights", (None,)),
-        inverse_bind=_finite(archive, "inverse_bind", (None, 4, 4)),
+def _parents(archive: Archive, count: int) -> NDArray[Any]:
+    """Return the parents; where faults are noted, those that come too late are made roots."""
+    parents = _numbers(archive, "parents", (count,))
+    late = np.flatnonzero((parents >= np.arange(count)) | (parents < -1))
+    if not archive.is_tolerant or len(late) == 0:
+        return parents  # the skeleton refuses them
+    cycles = cycle_members(parents)
+    for code, joints in (("S002", late[cycles[late]]), ("S001", late[~cycles[late]])):
+        if len(joints):
+            error = archive.error(
+                "parents",
+                f"joint {joints[0]}: expected a parent before it, found {parents[joints[0]]}",
+            )
+            error.code = code
+            archive.refuse(error, len(joints), "joints", joints)
+    mended = parents.copy()
+    mended[late] = -1
+    return mended
+
+
+def _limits(archive: Archive, n_dofs: int) -> Floats:
+    """Return the limits; where faults are noted, none in place of those that contradict."""
+    limits = _numbers(archive, "dof_limits", (n_dofs, 2)).astype(np.float64)
+    wrong = ~(limits[:, 0] <= limits[:, 1])
+    if not archive.is_tolerant or not wrong.any():
+        return limits  # the skeleton refuses them
+    dof = int(wrong.argmax())
+    low, high = limits[dof]
+    error = archive.error(
+        "dof_limits",
+        f"DOF {dof}: expected a minimum not above the maximum, found {low:g} and {high:g}",
     )
+    archive.refuse(error, int(wrong.sum()))
+    return np.where(wrong[:, None], [-np.inf, np.inf], limits)
+
+
+def _skin(archive: Archive) -> Skin:
+    starts = _numbers(archive, "skin_starts", (None,))
+    joints = _numbers(archive, "skin_joints", (None,))
+    listed = _numbers(archive, "skin_weights", (None,))
+    # Whether the starts rise is for the skin to say.
+    owners = np.searchsorted(np.sort(starts), np.arange(len(listed)), side="right") - 1
+    weights = finite(archive, "skin_weights", listed, "weights", np.maximum(owners, 0))
+    inverse_bind = _finite(archive, "inverse_bind", (None, 4, 4), "bindings")
+    if archive.is_tolerant and len(joints) == len(weights):
+        wrong = (joints < 0) | (joints >= len(inverse_bind))
+        if wrong.any():
+            found = f"found {joints[wrong][0]} of vertex {owners[wrong][0]}"
+            error = archive.error(
+                "skin_joints", f"expected a joint from 0 to {len(inverse_bind) - 1}, {found}"
+            )
+            archive.refuse(error, int(wrong.sum()), "weights", owners[wrong])
+            joints, weights = np.where(wrong, 0, joints), np.where(wrong, 0.0, weights)
+        # Of a matrix that is not finite nothing can be used: a 0 would make it another one.
+        lost = ~np.isfinite(_numbers(archive, "inverse_bind", (None, 4, 4))).all(axis=(1, 2))
+        inverse_bind = np.where(lost[:, None, None], np.eye(4), inverse_bind)
+    return Skin(starts=starts, joints=joints, weights=weights, inverse_bind=inverse_bind)
 
 
 def _correctives(archive: Archive, n_joints: int) -> Correctives | None:

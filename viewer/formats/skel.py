@@ -17,28 +17,22 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 
-from viewer.errors import FormatError, UnsupportedFormatError, printable
-from viewer.formats._numbers import LARGEST, is_number, to_number
-from viewer.formats._save import as_words, save_text
+from viewer.errors import FormatError
+from viewer.formats._numbers import is_number, to_number
+from viewer.formats._skel_writing import KEYWORDS, UNLIMITED, write
 from viewer.formats._source import Source, shown
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
-from viewer.rig.skeleton import DOF_KINDS, Skeleton, dof_label, joint_label
+from viewer.rig.skeleton import DOF_KINDS, Skeleton, dof_label
 
 __all__ = ["read", "write"]
 
-UNLIMITED = 100_000.0
-"""The course's word for "no limit", written out by some files."""
-
-_DEEPEST = 32  # tabs that a line begins with
 _VECTORS = {b"offset": 3, b"boxmin": 3, b"boxmax": 3, b"pose": 3}
 _LIMITS = {b"rotxlimit": 0, b"rotylimit": 1, b"rotzlimit": 2}
 _JOINT = b"balljoint"
-_KEYWORDS = {*_VECTORS, *_LIMITS, _JOINT}
 
 Word = re.Match[bytes]
 
@@ -55,6 +49,7 @@ class _Joint:
     boxmax: list[float] = field(default_factory=lambda: [0.1, 0.1, 0.1])
     pose: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
     limits: list[list[float]] = field(default_factory=lambda: [[-np.inf, np.inf] for _ in "xyz"])
+    limit_starts: list[int] = field(default_factory=lambda: [0, 0, 0])
 
 
 def read(source: Source) -> Figure:
@@ -79,6 +74,7 @@ def read(source: Source) -> Figure:
     if not joints:
         looks = source.looks_like()
         raise source.error(f"expected a skeleton, found no balljoint{f' ({looks})' * bool(looks)}")
+    source.remember("joints", lambda joint: joints[joint].start)
     skeleton, dofs = _skeleton(source, joints)
     return Figure(name=source.path.stem, skeleton=skeleton, facts=_facts(skeleton, dofs))
 
@@ -118,9 +114,11 @@ class _Parser:
             elif text == b"}":
                 self._close()
             elif self.open and text in _VECTORS:
-                setattr(self.found[self.open[-1]], text.decode(), self._numbers(3))
+                values = self._numbers(3)
+                if values:
+                    setattr(self.found[self.open[-1]], text.decode(), values)
             elif self.open and text in _LIMITS:
-                self.found[self.open[-1]].limits[_LIMITS[text]] = self._numbers(2)
+                self._limit(_LIMITS[text])
             else:
                 self._skip_unknown()
         self._finish()
@@ -134,7 +132,7 @@ class _Parser:
         start = self.word.start()
         name: list[str] = []
         self._advance()
-        while self.word is not None and self.word.group() not in (b"{", b"}", *_KEYWORDS):
+        while self.word is not None and self.word.group() not in (b"{", b"}", *KEYWORDS):
             name.append(self.word.group().decode("utf-8", "surrogateescape"))
             self._advance()
         joint = _Joint(" ".join(name), self.open[-1] if self.open else -1, start)
@@ -153,8 +151,19 @@ class _Parser:
             self.extra_braces += 1
         self._advance()
 
+    def _limit(self, axis: int) -> None:
+        assert self.word is not None  # the caller looked at it
+        start = self.word.start()
+        values = self._numbers(2)
+        if values:
+            joint = self.found[self.open[-1]]
+            joint.limits[axis], joint.limit_starts[axis] = values, start
+
     def _numbers(self, count: int) -> list[float]:
-        """Read the numbers of an item; the current word is its keyword."""
+        """Read the numbers of an item; the current word is its keyword.
+
+        None at all where a fault was noted: the item is as if it were not there.
+        """
         assert self.word is not None  # the caller looked at it
         keyword = self.word
         values: list[float] = []
@@ -162,19 +171,29 @@ class _Parser:
         while len(values) < count:
             value = None if self.word is None else to_number(self.word.group())
             if value is None:
-                raise self._numbers_error(keyword, count, len(values))
+                self._refuse(self._numbers_error(keyword, count, len(values)), keyword)
+                return []
             values.append(value)
             self._advance()
         if self.word is not None and is_number(self.word.group()):
-            raise self.source.error(
+            error = self.source.error(
                 f"{self._item(keyword)}: expected {count} numbers, found more: "
                 f"{shown(self.word.group())}",
                 self.word.start(),
             )
+            self._refuse(error, keyword)
+            return []
         return values
 
+    def _refuse(self, error: FormatError, keyword: Word) -> None:
+        """Refuse an item; where faults are noted, go on behind it."""
+        moves = keyword.group() == b"offset"
+        self.source.refuse(error, 1, "joints" if moves else "", [self.open[-1]] if moves else ())
+        while self.word is not None and self.word.group() not in (b"{", b"}", *KEYWORDS):
+            self._advance()
+
     def _numbers_error(self, keyword: Word, count: int, found: int) -> FormatError:
-        if self.word is not None and self.word.group() not in (b"{", b"}", *_KEYWORDS):
+        if self.word is not None and self.word.group() not in (b"{", b"}", *KEYWORDS):
             return self.source.error(
                 f"{self._item(keyword)}: expected a number, found {shown(self.word.group())}",
                 self.word.start(),
@@ -210,7 +229,7 @@ class _Parser:
 
     def _finds_block(self) -> bool:
         """Move to the "{" of ``word name? {`` if the rest of one follows."""
-        if self.word is None or self.word.group() in (b"}", *_KEYWORDS):
+        if self.word is None or self.word.group() in (b"}", *KEYWORDS):
             return False
         if self.word.group() == b"{":
             return True
@@ -276,117 +295,6 @@ def _check_limits(source: Source, joints: list[_Joint], limits: Floats) -> None:
         source.warn(
             f"ignored {len(wrong)} limits whose minimum is above the maximum, first "
             f"rot{axis}limit {low:g} {high:g} of joint {_called(joint)}",
-            joint.start,
+            joint.limit_starts[wrong[0] % 3],
         )
         limits[wrong] = -np.inf, np.inf
-
-
-def write(figure: Figure, path: str | Path) -> None:
-    """Write a figure's skeleton.
-
-    Parameters
-    ----------
-    figure : Figure
-        With a skeleton in depth-first order, of rotation DOFs and unrotated rest joints.
-    path : str or Path
-        Replaced only when the whole text has been written.
-
-    Raises
-    ------
-    UnsupportedFormatError
-        If the format cannot hold the skeleton.
-    OutputError
-        If the file cannot be written.
-    """
-    if figure.skeleton is None:
-        raise UnsupportedFormatError(f"figure {figure.name} has no skeleton to write as .skel")
-    _check_dofs(figure.skeleton)
-    _check_numbers(figure.skeleton)
-    _check_names(figure.skeleton)
-    save_text(path, "".join(_lines(figure.skeleton)))
-
-
-def _check_dofs(skeleton: Skeleton) -> None:
-    unturned = np.allclose(skeleton.rest_rotations[:, :3], 0.0, atol=1e-12)
-    unscaled = np.allclose(skeleton.rest_scales, 1.0, atol=1e-12)
-    if not (unturned and unscaled):
-        raise UnsupportedFormatError(".skel cannot hold joints with a rest rotation or scale")
-    rotations = np.arange(6, 3 * skeleton.n_joints + 3)
-    table = np.concatenate([np.arange(6), np.tile([3, 4, 5], skeleton.n_joints - 1)])
-    owners = np.concatenate([np.zeros(6, int), 1 + (rotations - 6) // 3])
-    if not (
-        np.array_equal(skeleton.dof_kinds, table) and np.array_equal(skeleton.dof_joints, owners)
-    ):
-        raise UnsupportedFormatError(".skel holds the DOFs x, y, z of each joint, no others")
-    if skeleton.rest_dofs[:3].any() or np.isfinite(skeleton.dof_limits[:3]).any():
-        raise UnsupportedFormatError(
-            ".skel cannot hold a translation of the root in its pose, nor limits of one"
-        )
-
-
-def _check_numbers(skeleton: Skeleton) -> None:
-    limits = skeleton.dof_limits
-    finite = np.isfinite(limits)
-    if (finite & np.stack([limits[:, 0] <= -UNLIMITED, limits[:, 1] >= UNLIMITED], 1)).any():
-        raise UnsupportedFormatError(f".skel takes limits beyond +-{UNLIMITED:.0f} for none")
-    arrays = [skeleton.rest_translations, skeleton.boxes, skeleton.rest_dofs, limits[finite]]
-    if any(np.abs(array).max(initial=0.0) > LARGEST for array in arrays if array is not None):
-        raise UnsupportedFormatError(f".skel cannot hold numbers beyond {LARGEST:.3g}")
-
-
-def _check_names(skeleton: Skeleton) -> None:
-    ancestors: list[int] = []
-    for joint, parent in enumerate(skeleton.parents):
-        while ancestors and ancestors[-1] != parent:
-            ancestors.pop()
-        if parent >= 0 and not ancestors:
-            raise UnsupportedFormatError(
-                f".skel lists joints depth-first; joint {joint_label(skeleton, joint)} "
-                "comes too late"
-            )
-        ancestors.append(joint)
-    for name in skeleton.names:
-        words = as_words(name)
-        if words is None or _KEYWORDS & set(words):
-            raise UnsupportedFormatError(f'.skel cannot hold the joint name "{printable(name)}"')
-
-
-def _lines(skeleton: Skeleton) -> list[str]:
-    lines: list[str] = []
-    open_joints: list[int] = []
-
-    def close_until(parent: int) -> None:
-        while open_joints and open_joints[-1] != parent:
-            open_joints.pop()
-            lines.append(_indent(open_joints) + "}\n")
-
-    for joint, parent in enumerate(skeleton.parents):
-        close_until(parent)
-        indent = _indent(open_joints)
-        lines.append(" ".join(filter(None, [f"{indent}balljoint", skeleton.names[joint], "{\n"])))
-        lines.extend(f"{indent}\t{item}\n" for item in _items(skeleton, joint))
-        open_joints.append(joint)
-    close_until(-1)
-    return lines
-
-
-def _indent(open_joints: list[int]) -> str:
-    # A chain of n joints indented in full would take n^2 bytes.
-    return "\t" * min(len(open_joints), _DEEPEST)
-
-
-def _items(skeleton: Skeleton, joint: int) -> list[str]:
-    items = [f"offset {_numbers(skeleton.rest_translations[joint])}"]
-    if skeleton.boxes is not None:
-        low, high = skeleton.boxes[joint]
-        items += [f"boxmin {_numbers(low)}", f"boxmax {_numbers(high)}"]
-    rows = slice(3 + 3 * joint, 6 + 3 * joint)
-    for axis, limits in zip("xyz", skeleton.dof_limits[rows], strict=True):
-        if np.isfinite(limits).any():
-            written = np.nan_to_num(limits, posinf=UNLIMITED, neginf=-UNLIMITED)
-            items.append(f"rot{axis}limit {_numbers(written)}")
-    return [*items, f"pose {_numbers(skeleton.rest_dofs[rows])}"]
-
-
-def _numbers(values: Floats) -> str:
-    return " ".join(map(repr, values.tolist()))

@@ -29,14 +29,17 @@ from viewer.formats._numbers import LARGEST
 from viewer.formats._save import as_words, save_text
 from viewer.formats._skin_blocks import KEYWORDS
 from viewer.formats._skin_checks import (
-    check_joints,
     check_mesh,
-    check_triangles,
     check_weights,
+    checked_influences,
+    checked_triangles,
+    even_counts,
     invert_bindings,
+    unbound_skin,
 )
 from viewer.formats._skin_sections import Sections, read_sections
 from viewer.formats._source import Source
+from viewer.formats._tolerant import mended_positions
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Material, Mesh, vertex_normals
@@ -72,71 +75,64 @@ def read(source: Source) -> Figure:
 
 
 def _mesh(source: Source, sections: Sections) -> Mesh:
-    positions = _required(source, sections, "positions")
-    _require_equal_counts(source, sections)
+    _require_positions(source, sections)
+    even_counts(source, sections)
     if not sections.triangles:
         raise source.error("expected triangles, found no `triangles` section")
-    check_triangles(source, sections, len(positions))
-    runs = [run.triangles for run in sections.triangles]
-    triangles = runs[0] if len(runs) == 1 else np.concatenate(runs)
+    triangles = checked_triangles(source, sections, len(sections.tables["positions"]))
     if len(triangles) == 0:
         raise source.error(
             "expected at least one triangle, found none", sections.offsets["triangles"]
         )
+    source.remember("triangles", lambda triangle: sections.triangle_offset(source, triangle))
     materials = np.repeat(
         [run.material for run in sections.triangles],
         [len(run.triangles) for run in sections.triangles],
     )
+    positions = mended_positions(sections.tables["positions"], triangles)
+    uvs = sections.tables.get("texcoords")
     return Mesh(
         positions=positions,
         normals=_normals(source, sections, positions, triangles),
         triangles=triangles,
-        uvs=sections.tables.get("texcoords"),
+        uvs=uvs if uvs is None or source.faults is None else np.nan_to_num(uvs),
         materials=tuple(sections.materials),
         triangle_materials=materials.astype(np.int32),
     )
 
 
-def _required(source: Source, sections: Sections, name: str) -> Floats:
-    table = sections.tables.get(name)
+def _require_positions(source: Source, sections: Sections) -> None:
+    table = sections.tables.get("positions")
     if table is None:
         looks = source.looks_like()
         raise source.error(
-            f"expected a skin, found no `{name}` section{f' ({looks})' * bool(looks)}"
+            f"expected a skin, found no `positions` section{f' ({looks})' * bool(looks)}"
         )
     if len(table) == 0:
-        raise source.error(f"expected at least one vertex, found {name} 0", sections.offsets[name])
-    return table
-
-
-def _require_equal_counts(source: Source, sections: Sections) -> None:
-    wanted = len(sections.tables["positions"])
-    counts = {name: len(table) for name, table in sections.tables.items()}
-    if sections.starts is not None:
-        counts["skinweights"] = len(sections.starts) - 1
-    for name, count in counts.items():
-        if count != wanted:
-            raise source.error(
-                f"{name}: expected {wanted} entries as in positions, found {count}",
-                sections.offsets[name],
-            )
+        raise source.error(
+            "expected at least one vertex, found positions 0", sections.offsets["positions"]
+        )
 
 
 def _normals(source: Source, sections: Sections, positions: Floats, triangles: Ints) -> Floats:
     normals = sections.tables.get("normals")
     if normals is None:
-        source.warn("no `normals` section: computed them from the triangles")
+        if "normals" not in sections.offsets:
+            source.warn("no `normals` section: computed them from the triangles")
         return vertex_normals(positions, triangles)
     # Column by column: numpy reduces rows of three slowly.
     x, y, z = np.abs(normals.T)
-    zero: Bools = np.maximum(np.maximum(x, y), z) < _SHORTEST
+    longest = np.maximum(np.maximum(x, y), z)
+    zero: Bools = longest < _SHORTEST
     if zero.any():
         source.warn(
             f"{zero.sum()} normals of length 0, first of vertex {zero.argmax()}: "
             "computed from the triangles",
-            sections.offsets["normals"],
+            source.offset_of("normals", int(zero.argmax())),
         )
-        normals = np.where(zero[:, None], vertex_normals(positions, triangles), normals)
+    missing: Bools = zero | np.isnan(longest)
+    if missing.any():
+        normals = np.where(missing[:, None], vertex_normals(positions, triangles), normals)
     return normals
 
 
@@ -147,16 +143,19 @@ def _skin(source: Source, sections: Sections) -> Skin | None:
     if sections.starts is None or sections.bindings is None:
         missing = "skinweights" if sections.starts is None else "bindings"
         present = "bindings" if sections.starts is None else "skinweights"
-        raise source.error(f"expected a `{missing}` section beside `{present}`, found none")
+        skin = None if sections.starts is None else unbound_skin(sections)
+        source.refuse(
+            source.error(f"expected a `{missing}` section beside `{present}`, found none"),
+            1,
+            "bindings",
+            np.arange(0 if skin is None else skin.n_joints),
+        )
+        return skin
     inverse_bind = invert_bindings(source, sections)
-    check_joints(source, sections, len(inverse_bind))
-    skin = Skin(
-        starts=sections.starts,
-        joints=sections.joints,
-        weights=sections.weights,
-        inverse_bind=inverse_bind,
-    )
-    check_weights(source, sections, skin)
+    joints, weights = checked_influences(source, sections, len(inverse_bind))
+    skin = Skin(starts=sections.starts, joints=joints, weights=weights, inverse_bind=inverse_bind)
+    if source.faults is None:  # whoever wants all faults looks at the weights in full
+        check_weights(source, skin)
     return skin
 
 

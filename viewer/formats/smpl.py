@@ -16,9 +16,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.errors import printable
+from viewer.errors import FormatError, printable
 from viewer.formats._archive import Archive, Opaque, Sparse, describe
-from viewer.formats._container import archive_of, are_indices, finite
+from viewer.formats._container import archive_of, corners_of, finite
+from viewer.formats._numbers import LARGEST
 from viewer.formats._smpl_parts import (
     IGNORED,
     model_hands,
@@ -28,6 +29,7 @@ from viewer.formats._smpl_parts import (
     model_uvs,
 )
 from viewer.formats._source import Source
+from viewer.formats._tolerant import mended_positions
 from viewer.rig.arrays import Deferred, Floats, Ints
 from viewer.rig.blendshapes import BlendShapes, Correctives, JointRegressor, regress_joints
 from viewer.rig.figure import Figure
@@ -44,6 +46,7 @@ __all__ = ["KEYS", "read"]
 KEYS = ("v_template", "f", "weights", "J_regressor", "kintree_table")
 """Without these a file is no such model."""
 
+_ODD_SUM = 0.05  # of a joint's regressor from 1: it would not be where it should
 _ROUNDED = 1e-3  # how far weights may be from a sum of 1 and are scaled to it
 _ROOTS = (-1.0, 4294967295.0, 4294967296.0)  # -1, as uint32, and that through float32
 
@@ -105,10 +108,12 @@ def _layout(n_joints: int) -> PoseLayout:
 
 
 def _mesh(source: Source, archive: Archive, used: list[str]) -> Mesh:
-    positions = finite(archive, "v_template", archive.array("v_template", ("V", 3)).values())
+    template = archive.array("v_template", ("V", 3)).values()
+    positions = finite(archive, "v_template", template, "positions")
     if len(positions) == 0:
         raise archive.error("v_template", "expected at least one vertex, found none")
-    triangles = _indices(archive, "f", (None, 3), len(positions), "vertex")
+    triangles = corners_of(archive, "f", archive.array("f", (None, 3)).values(), len(positions))
+    positions = mended_positions(positions, triangles)
     used += ["v_template", "f"]
     uvs, uv_triangles = model_uvs(source, archive, len(triangles), used)
     return Mesh(
@@ -118,16 +123,6 @@ def _mesh(source: Source, archive: Archive, used: list[str]) -> Mesh:
         uvs=uvs,
         uv_triangles=uv_triangles,
     )
-
-
-def _indices(
-    archive: Archive, key: str, shape: tuple[int | None, ...], end: int, what: str
-) -> Ints:
-    values = archive.array(key, shape).values()
-    if not are_indices(values, end):
-        wrong = values[~((values >= 0) & (values < end) & (values == np.floor(values)))]
-        raise archive.error(key, f"expected a {what} from 0 to {end - 1}, found {wrong[0]:g}")
-    return values.astype(np.int32)
 
 
 def _parents(archive: Archive, used: list[str]) -> Ints:
@@ -143,18 +138,27 @@ def _parents(archive: Archive, used: list[str]) -> Ints:
     parents = rows[0].copy()
     if np.isin(parents[0], (*_ROOTS, 0.0)):
         parents[0] = -1.0
+    result = parents.copy()
     for joint, parent in enumerate(parents):
-        if joint and np.isin(parent, _ROOTS):
-            raise archive.error("kintree_table", f"expected one root, found joints 0 and {joint}")
-        if not (parent == -1 if joint == 0 else 0 <= parent < joint and parent % 1 == 0):
-            wanted = "a parent before it" if joint else "the root, whose parent is -1"
-            problem = archive.error(
-                "kintree_table", f"joint {joint}: expected {wanted}, found {parent:g}"
-            )
-            problem.code = "S002" if cycle_members(parents)[joint] else ""
-            raise problem
+        problem = _parent_error(archive, parents, joint, parent)
+        if problem is not None:
+            archive.refuse(problem, 1, "joints", [joint])
+            result[joint] = 0.0 if joint else -1.0
     used.append("kintree_table")
-    return parents.astype(np.int32)
+    return result.astype(np.int32)
+
+
+def _parent_error(
+    archive: Archive, parents: Floats, joint: int, parent: float
+) -> FormatError | None:
+    if joint and np.isin(parent, _ROOTS):
+        return archive.error("kintree_table", f"expected one root, found joints 0 and {joint}")
+    if parent == -1 if joint == 0 else 0 <= parent < joint and parent % 1 == 0:
+        return None
+    wanted = "a parent before it" if joint else "the root, whose parent is -1"
+    problem = archive.error("kintree_table", f"joint {joint}: expected {wanted}, found {parent:g}")
+    problem.code = "S002" if cycle_members(parents)[joint] else ""
+    return problem
 
 
 def _matrix(archive: Archive, key: str, shape: tuple[int, int]) -> Sparse:
@@ -172,14 +176,17 @@ def _matrix(archive: Archive, key: str, shape: tuple[int, int]) -> Sparse:
 def _regressor(archive: Archive, n_joints: int, n_vertices: int, used: list[str]) -> JointRegressor:
     matrix = _matrix(archive, "J_regressor", (n_joints, n_vertices))
     joints, vertices, numbers = matrix.entries()
-    weights = finite(archive, "J_regressor", numbers)
+    weights = finite(archive, "J_regressor", numbers, "joints", joints)
     sums = np.bincount(joints, weights, minlength=n_joints)
     worst = int(np.abs(sums - 1.0).argmax())
-    if abs(sums[worst] - 1.0) > 0.05:
-        raise archive.error(
+    if abs(sums[worst] - 1.0) > _ODD_SUM:
+        error = archive.error(
             "J_regressor",
             f"joint {worst}: expected weights with the sum 1, found {sums[worst]:.4g}",
         )
+        error.code = "F002"  # these weights are not the skin's
+        wrong = np.flatnonzero(np.abs(sums - 1.0) > _ODD_SUM)
+        archive.refuse(error, len(wrong), "joints", wrong)
     used.append("J_regressor")
     return JointRegressor(n_joints, joints.astype(np.int32), vertices.astype(np.int32), weights)
 
@@ -189,25 +196,35 @@ def _skin(
 ) -> Skin:
     matrix = _matrix(archive, "weights", (n_vertices, len(joints)))
     vertices, columns, numbers = matrix.entries()
-    weights = finite(archive, "weights", numbers)
+    weights = finite(archive, "weights", numbers, "weights", vertices)
     if (weights < 0.0).any():
         vertex = int(vertices[weights.argmin()])
-        raise archive.error(
-            "weights", f"vertex {vertex}: expected no negative weight, found {weights.min():.4g}"
+        archive.refuse(
+            archive.error(
+                "weights",
+                f"vertex {vertex}: expected no negative weight, found {weights.min():.4g}",
+            ),
+            int((weights < 0.0).sum()),
         )
     sums = np.bincount(vertices, weights, minlength=n_vertices)
-    worst = int(np.abs(sums - 1.0).argmax())
-    if abs(sums[worst] - 1.0) > _ROUNDED:
-        raise archive.error(
+    known = np.ones(n_vertices, dtype=np.bool_)
+    known[vertices[~(np.abs(numbers) <= LARGEST)]] = False
+    errors = np.where(known, np.abs(sums - 1.0), 0.0)
+    worst = int(errors.argmax())
+    if errors[worst] > _ROUNDED:
+        error = archive.error(
             "weights", f"vertex {worst}: expected weights with the sum 1, found {sums[worst]:.4g}"
         )
+        archive.refuse(error, int((errors > _ROUNDED).sum()))
     used.append("weights")
     kept = weights != 0.0
+    # What was rounded is put right, and nothing else.
+    factors = np.where(np.abs(sums - 1.0) <= _ROUNDED, sums, 1.0)
     return skin_from_entries(
         n_vertices,
         vertices[kept].astype(np.int32),
         columns[kept].astype(np.int32),
-        (weights / sums[vertices])[kept],
+        (weights / factors[vertices])[kept],
         translation_matrix(-joints),
     )
 

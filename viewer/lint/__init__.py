@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from viewer.lint._aim import Places, places_of, points_of
 from viewer.lint._codes import CODES, SEVERITIES, Code
 from viewer.lint._finding import Finding, LintOptions, Subject
 from viewer.lint._report import describe, finding_text, summary, worst_first
+from viewer.rig.arrays import Ints
 from viewer.rig.scene import Scene
 
 if TYPE_CHECKING:
@@ -72,7 +75,10 @@ CHECKS = {
 
 
 def lint_scene(
-    scene: Scene, options: LintOptions | None = None, progress: Progress | None = None
+    scene: Scene,
+    options: LintOptions | None = None,
+    progress: Progress | None = None,
+    spoiled: Sequence[Mapping[str, Ints]] = (),
 ) -> list[Finding]:
     """Check everything in an open scene.
 
@@ -85,6 +91,8 @@ def lint_scene(
     progress : callable, optional
         Called before every step with the steps done, their number, and what is looked at; what it
         raises ends the checks.
+    spoiled : sequence of mappings, optional
+        For each actor, what is not to be judged; see ``Subject``.
 
     Returns
     -------
@@ -95,7 +103,8 @@ def lint_scene(
     known: set[int] = set()
     steps: list[tuple[Subject, str]] = []
     for index, actor in enumerate(scene.actors):
-        subject = Subject(actor, index, scene.up, chosen)
+        lost = spoiled[index] if index < len(spoiled) else {}
+        subject = Subject(actor, index, scene.up, chosen, lost)
         is_new = id(actor.figure) not in known
         known.add(id(actor.figure))
         steps += [(subject, name) for name, kind in CHECKS.items() if is_new or kind.of_motion]
@@ -103,7 +112,9 @@ def lint_scene(
     for number, (subject, name) in enumerate(steps):
         if progress is not None:
             progress(number, len(steps), f"{subject.actor.name}: {CHECKS[name].title}")
-        findings += import_module(f"{__name__}.{name}").check(subject)
+        # Products of numbers near the largest overflow; what has such is far away, and found.
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            findings += import_module(f"{__name__}.{name}").check(subject)
         if name == next(reversed(CHECKS)):
             subject.tracks.clear()  # a long motion takes much memory, and is not needed again
     return findings
@@ -117,6 +128,9 @@ def lint_files(
     progress: Progress | None = None,
 ) -> tuple[Scene, list[Finding]]:
     """Open files together and check everything; what cannot be opened is a finding too.
+
+    Faults that the viewer refuses a file for are noted, all of them, and the rest of the file is
+    looked at as far as they leave it.
 
     Parameters
     ----------
@@ -139,8 +153,9 @@ def lint_files(
         First what readers say, then what the checks find, each with its file where it is known.
     """
     from viewer.formats import MAX_SIZE
-    from viewer.lint._opening import open_files, with_files
+    from viewer.lint._opening import open_files, spoiled_parts, with_files
 
     size = MAX_SIZE if max_size is None else max_size
     opened = open_files(paths, settings, size, progress)
-    return opened.scene, with_files(opened, lint_scene(opened.scene, options, progress))
+    findings = lint_scene(opened.scene, options, progress, spoiled_parts(opened))
+    return opened.scene, with_files(opened, findings)

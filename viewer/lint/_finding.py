@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -10,9 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.lint._codes import CODES
-from viewer.rig.arrays import Floats, Ints
+from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.scalars import length_text
 from viewer.rig.scene import Actor
+from viewer.rig.shape import rest_joints
+from viewer.rig.units import METRES
 
 if TYPE_CHECKING:
     from viewer.lint._tracks import Track
@@ -75,6 +79,9 @@ class Finding:
         As the file numbers them, the worst first.
     times : (N,)
         Seconds of the scene's clock at which these frames are shown.
+    at : (str, int) or None
+        The thing that the message names first, as readers remember where it is in a file:
+        ``("weights", 5)`` is the line of vertex 5's weights.
     """
 
     code: str
@@ -90,6 +97,7 @@ class Finding:
     joints: Ints = field(default_factory=lambda: _NONE)
     frames: Ints = field(default_factory=lambda: _NONE)
     times: Floats = field(default_factory=lambda: _NO_TIMES)
+    at: tuple[str, int] | None = None
 
     def __post_init__(self) -> None:
         if not self.severity:
@@ -120,6 +128,10 @@ class Subject:
         The scene's.
     options : LintOptions
         What counts as a fault.
+    spoiled : mapping of str to (N,)
+        What is not the file's own any more, because the file's own cannot be used: vertices by
+        ``"positions"`` and ``"weights"``, ``"triangles"``, joints by ``"bindings"`` and
+        ``"joints"``, rows by ``"frames"``.
     tracks : list of Track
         Empty, or that of the actor's clip.
     """
@@ -128,18 +140,51 @@ class Subject:
     index: int = 0
     up: Literal["y", "z"] = "y"
     options: LintOptions = field(default_factory=LintOptions)
+    spoiled: Mapping[str, Ints] = field(default_factory=dict)
     # What several checks need is made once: ``track_of`` keeps it here.
     tracks: list[Track] = field(default_factory=list)
 
+    def sound(self, part: str, count: int) -> Bools:
+        """Return what may be judged.
+
+        Parameters
+        ----------
+        part : str
+            A key of ``spoiled``.
+        count : int
+            How many there are.
+
+        Returns
+        -------
+        (count,)
+            False for what is not the file's own.
+        """
+        result = np.ones(count, dtype=np.bool_)
+        lost = self.spoiled.get(part, _NONE)
+        result[lost[lost < count]] = False
+        return result
+
     def length(self, length: float) -> str:
-        """Return a length in words: millimetres if the unit is known."""
-        return length_text(self.actor.figure, length)
+        """Return a length in words: in millimetres if the unit is known, else beside the size."""
+        figure = self.actor.figure
+        if figure.unit in METRES:
+            return length_text(figure, length)
+        return f"{length:.3g} units" + self._share(length)
 
     def speed(self, speed: float) -> str:
         """Return a speed in words: metres a second if the unit is known."""
-        if self.actor.figure.unit == "m":
-            return f"{speed:.3g} m/s"
-        return f"{self.length(speed)} a second"
+        unit = self.actor.figure.unit
+        if unit in METRES:
+            return f"{speed * METRES[unit]:.3g} m/s"
+        return f"{speed:.3g} units a second" + self._share(speed)
+
+    def _share(self, length: float) -> str:
+        figure = self.actor.figure
+        if figure.mesh is not None:
+            size = box_size(bounding_box(figure.mesh.positions))
+        else:
+            size = 0.0 if figure.skeleton is None else box_size(bounding_box(rest_joints(figure)))
+        return f" ({100.0 * length / size:.3g} % of its size)" if size > 0.0 else ""
 
     def found(
         self,
@@ -153,6 +198,7 @@ class Subject:
         joints: Indices = _NONE,
         frames: Indices = _NONE,
         times: Floats = _NO_TIMES,
+        at: tuple[str, int] | None = None,
     ) -> Finding:
         """Return a finding about this actor."""
         return Finding(
@@ -167,6 +213,7 @@ class Subject:
             joints=np.asarray(joints, dtype=np.int32),
             frames=np.asarray(frames, dtype=np.int32),
             times=times,
+            at=at,
         )
 
 

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
-from viewer.errors import FormatError, ViewerError, printable
-from viewer.lint._finding import Finding
+import numpy as np
 
-__all__ = ["CHECKED", "of_error", "of_warning"]
+from viewer.errors import FormatError, ViewerError, printable
+from viewer.formats import Fault
+from viewer.lint._finding import Finding, listed
+
+__all__ = ["CHECKED", "of_error", "of_faults", "of_refusal", "of_warning"]
 
 # The first pattern that is found counts.
 _ERRORS = (
     ("F001", r"cannot be read:|no such file|expected a file, found|\(--max-size\)"),
     ("W003", r"weights\b.*(?:finite numbers|found \"[+-]?(?:nan|inf))"),
     ("F003", r"expected finite|found \"[+-]?(?:nan|inf(?:inity)?)\""),
+    ("F003", r"found \"[+-]?(?:1\.#|[\d.]+e\+?\d\d)"),
     ("W002", r"expected no negative weight"),
     ("W001", r"vertex \d+: expected weights with the sum 1"),
     ("W010", r"expected a joint index below|expected a joint from 0 to"),
@@ -28,7 +34,8 @@ _ERRORS = (
     ("C009", r"channels, .* needs|has \d+ joints, figure"),
     (
         "F004",
-        r"open it (?:together )?with|does not fit|has no texture coordinates|needs a skeleton",
+        r"open it (?:together )?with|does not fit|has no texture coordinates|needs a skeleton"
+        r"|to follow the \d+ joints",
     ),
 )
 _WARNINGS = (
@@ -53,6 +60,16 @@ _WARNINGS = (
 CHECKED = frozenset(("W001", "W002", "W004", "B003", "M010", "C005"))
 """Codes of warnings that checks of the scene find again, with all places."""
 
+# Fields of a finding, and what messages call them, by what a reader put something neutral for.
+_PLACES = {
+    "positions": ("vertices", "vertices"),
+    "weights": ("vertices", "vertices"),
+    "triangles": ("triangles", "triangles"),
+    "bindings": ("joints", "joints"),
+    "joints": ("joints", "joints"),
+    "frames": ("frames", "frames"),
+}
+_NAMED = re.compile(r'"[^"]*"|[-+]?\d[-+.\w]*|\b(?:nan|inf)\b')  # what differs between alike faults
 _PLACE = re.compile(r"(?P<path>.+?)(?::(?P<line>\d+))?: (?P<text>.*)", re.DOTALL)
 
 
@@ -72,6 +89,46 @@ def of_error(problem: ViewerError, path: Path | None = None) -> Finding:
         path, line, code = problem.path, problem.line, problem.code
     text = _without_place(text, path)
     return Finding(code or _code(text, _ERRORS, "F002"), text, "error", file=path, line=line)
+
+
+def of_refusal(problem: ViewerError, path: Path) -> Finding:
+    """Return what ended the reading of a file as a finding, which says that it was the end."""
+    finding = of_error(problem, path)
+    if finding.code == "F001":
+        return finding  # of a file that cannot be read nobody expects more
+    return replace(finding, message=f"{finding.message}; nothing else in this file was checked")
+
+
+def of_faults(faults: Sequence[Fault]) -> list[Finding]:
+    """Return faults that a reader went on from as findings, those of one kind as one."""
+    kinds: dict[tuple[str, ...], list[Fault]] = {}
+    for fault in faults:
+        if fault.count == 0:
+            continue
+        finding = of_error(fault.error)
+        kind = _NAMED.sub("#", finding.message)
+        kinds.setdefault((finding.code, fault.part, str(finding.file), kind), []).append(fault)
+    return [_of_kind(alike) for alike in kinds.values()]
+
+
+def _of_kind(faults: list[Fault]) -> Finding:
+    """Return faults that say the same of different places as one finding."""
+    finding = of_error(faults[0].error)
+    count = sum(fault.count for fault in faults)
+    places = np.unique(np.concatenate([fault.places for fault in faults]))
+    field, noun = _PLACES.get(faults[0].part, ("", ""))
+    text = finding.message
+    if count > 1:
+        text += f", the first of {count}"
+        if len(places) > 1 and field:
+            text += f" ({noun} {listed(list(map(str, places.tolist())))})"
+    if field == "vertices":
+        return replace(finding, message=text, vertices=places)
+    if field == "triangles":
+        return replace(finding, message=text, triangles=places)
+    if field == "joints":
+        return replace(finding, message=text, joints=places)
+    return replace(finding, message=text, frames=places if field else finding.frames)
 
 
 def of_warning(warning: str, path: Path) -> Finding:

@@ -6,15 +6,19 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
+
 from viewer.errors import FormatError, ViewerError, printable
-from viewer.formats import MAX_SIZE
+from viewer.formats import MAX_SIZE, Fault, Source
+from viewer.lint._codes import SEVERITIES
 from viewer.lint._finding import Finding
-from viewer.lint._messages import CHECKED, of_error, of_warning
-from viewer.loading import Contents, MotionSettings, begin, read_files
+from viewer.lint._messages import CHECKED, of_error, of_faults, of_refusal, of_warning
+from viewer.loading import Contents, MotionSettings, begin, read_source
+from viewer.rig.arrays import Ints
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor, Scene
 
-__all__ = ["Opened", "open_files", "with_files"]
+__all__ = ["Opened", "open_files", "spoiled_parts", "with_files"]
 
 Progress = Callable[[int, int, str], None]
 
@@ -30,6 +34,9 @@ _LISTS = (
 )
 
 
+_INSTEAD = {"normals": "positions"}
+
+
 @dataclass(slots=True)
 class Opened:
     """What could be opened.
@@ -42,11 +49,14 @@ class Opened:
         Everything that was read.
     findings : list of Finding
         Files that cannot be read or put together, and what their readers noticed.
+    sources : dict of Path to Source
+        Every file that was read: its faults, and where things are in it.
     """
 
     scene: Scene = field(default_factory=lambda: Scene([]))
     contents: Contents = field(default_factory=Contents)
     findings: list[Finding] = field(default_factory=list)
+    sources: dict[Path, Source] = field(default_factory=dict)
 
 
 def open_files(
@@ -69,33 +79,75 @@ def open_files(
         Called before each file; what it raises ends it.
     """
     opened = Opened()
-    for number, path in enumerate(paths):
+    known = {_resolved(Path(path)): Path(path) for path in reversed(paths)}
+    queue = list(reversed(known.values()))
+    for number, path in enumerate(queue):  # grows while it is read: a .rig names files
         if progress is not None:
-            progress(number, len(paths), f"reading {printable(path, 60)}")
-        try:
-            contents = read_files([path], max_size, settings)
-        except ViewerError as problem:
-            opened.findings.append(of_error(problem, Path(path)))
-            continue
-        opened.findings += [of_warning(text, Path(path)) for text in contents.warnings]
-        _add(opened.contents, contents)
+            progress(number, len(queue), f"reading {printable(path, 60)}")
+        named = _read(opened, path, settings or MotionSettings(), max_size)
+        for other in named:
+            if _resolved(other) not in known:
+                known[_resolved(other)] = other
+                queue.append(other)
     _assemble(opened, settings)
     return opened
 
 
-def _add(everything: Contents, more: Contents) -> None:
-    """Add what one file holds; a file that a ``.rig`` names and that was read before, once."""
+def _resolved(path: Path) -> Path:
+    """Return what tells files apart; reading says what is wrong with a path that leads nowhere."""
+    try:
+        return path.resolve()
+    except (OSError, RuntimeError, ValueError):  # a loop of links, or a NUL in the name
+        return path
+
+
+def _read(opened: Opened, path: Path, settings: MotionSettings, max_size: int) -> tuple[Path, ...]:
+    """Read one file, noting all faults that can be gone on from; return files that it names."""
+    contents, faults = Contents(), list[Fault]()
+    named: tuple[Path, ...] = ()
+    refusals: list[Finding] = []
+    remarks: list[str] = []
+    try:
+        opened.sources[path] = source = Source.open(path, max_size)
+        source.faults, remarks = faults, source.warnings
+        named = read_source(source, contents, settings)
+        contents.figures = [(path, _loaded(figure, refusals)) for path, figure in contents.figures]
+    except ViewerError as problem:
+        refusals.append(of_refusal(problem, path))
+    opened.findings += [*of_faults(faults), *refusals]
+    opened.findings += [of_warning(text, path) for text in remarks]
     for name in _LISTS:
-        items = getattr(everything, name)
-        known = {path.resolve() for path, _ in items}
-        items += [item for item in getattr(more, name) if item[0].resolve() not in known]
+        getattr(opened.contents, name).extend(getattr(contents, name))
+    return named
+
+
+def _loaded(figure: Figure, refusals: list[Finding]) -> Figure:
+    """Read what is left in the file until it is used, so that its faults are known now.
+
+    What cannot be read is said, and left out of the figure.
+    """
+    try:
+        if figure.blend_shapes is not None:
+            figure.blend_shapes.direction_values()
+    except FormatError as problem:
+        refusals.append(of_error(problem))
+        figure = replace(figure, blend_shapes=None)
+    try:
+        if figure.correctives is not None:
+            figure.correctives.values()
+    except FormatError as problem:
+        refusals.append(of_error(problem))
+        figure = replace(figure, correctives=None)
+    return figure
 
 
 def _assemble(opened: Opened, settings: MotionSettings | None) -> None:
     """Make a scene; what does not fit is taken out, said, and looked at alone."""
-    contents = Contents()
-    _add(contents, opened.contents)
+    contents = replace(opened.contents)
     alone: list[Figure] = []
+    for path, figure in opened.contents.figures:
+        if _is_unbound(figure, opened.sources[path]):
+            alone += _take_out(contents, path)
     while any(getattr(contents, name) for name in _LISTS):
         try:
             opened.scene, builders = begin(contents, settings)
@@ -117,6 +169,13 @@ def _assemble(opened: Opened, settings: MotionSettings | None) -> None:
         of_warning(text, _owner(text, opened.contents)) for text in opened.scene.warnings
     ]
     opened.scene.actors += [Actor(figure) for figure in alone]
+
+
+def _is_unbound(figure: Figure, source: Source) -> bool:
+    """Return whether no bind matrix is the file's own: nobody knows how many joints there were."""
+    lost = {place for fault in source.faults or () if fault.part == "bindings"
+            for place in fault.places.tolist()}  # fmt: skip
+    return figure.skin is not None and len(lost) == figure.skin.n_joints and figure.skeleton is None
 
 
 def _culprit(problem: ViewerError, contents: Contents) -> Path | None:
@@ -162,34 +221,80 @@ def with_files(opened: Opened, findings: list[Finding]) -> list[Finding]:
         twin = next((index for index, other in enumerate(placed) if _is_same(remark, other)), None)
         if twin is None:
             remarks.append(remark)
-        elif placed[twin].line is None:
-            # The reader knows the line, the check all places.
-            placed[twin] = replace(placed[twin], line=remark.line)
-    return remarks + placed
+            continue
+        # The reader knows whether the file is refused for it, the check all places.
+        severity = max(remark.severity, placed[twin].severity, key=SEVERITIES.index)
+        line = remark.line if placed[twin].at is None else None
+        placed[twin] = replace(placed[twin], severity=severity, line=line)
+    return remarks + [_with_line(finding, opened) for finding in placed]
 
 
 def _is_same(remark: Finding, other: Finding) -> bool:
-    is_checked = remark.code in CHECKED and remark.severity != "error"
     # Bare islands are said in another way than bare vertices.
     same = other.code == remark.code or (remark.code == "W004" and other.code == "W005")
+    is_checked = remark.code in CHECKED
     return is_checked and same and (other.file is None or other.file == remark.file)
+
+
+def _with_line(finding: Finding, opened: Opened) -> Finding:
+    """Return a finding with the line of what it names, if the reader remembers where that is."""
+    source = None if finding.file is None else opened.sources.get(finding.file)
+    if source is None or finding.at is None:
+        return finding
+    kind, index = finding.at
+    # Normals that the file lacks are computed: then the vertex is what can be mended.
+    place = source.place(kind, index) or source.place(_INSTEAD.get(kind, ""), index)
+    return finding if place is None else replace(finding, file=place[0], line=place[1])
 
 
 def _placed(finding: Finding, opened: Opened) -> Finding:
     """Return a finding with the file that holds the part of the actor it is about."""
     if finding.actor is None:
         return finding
-    actor = opened.scene.actors[finding.actor]
-    contents = opened.contents
-    if finding.part == "clip":
+    paths = _files_of(opened.scene.actors[finding.actor], finding.part, opened.contents)
+    return replace(finding, file=paths[0]) if paths else finding
+
+
+def _files_of(actor: Actor, part: str, contents: Contents) -> list[Path]:
+    """Return the files that a part of an actor may be from, the likeliest first."""
+    mesh, skeleton = actor.figure.mesh, actor.figure.skeleton
+    if part == "clip":
         # Motions become clips of their own, but for keys, which stay as they were read.
         paths = [path for path, clip in contents.clips if clip is actor.clip]
         moving = [*contents.body_motions, *contents.skeleton_motions, *contents.captures]
-        paths += [moving[0][0]] if len(moving) == 1 and not paths else []
-    elif finding.part == "skeleton":
-        skeleton = actor.figure.skeleton
-        paths = [path for path, figure in contents.figures if figure.skeleton is skeleton]
-    else:
-        mesh = actor.figure.mesh
-        paths = [path for path, figure in contents.figures if figure.mesh is mesh]
-    return replace(finding, file=paths[0]) if paths else finding
+        return paths + ([moving[0][0]] if len(moving) == 1 and not paths else [])
+    if part == "skeleton" and skeleton is not None:
+        moved = [(path, motion.figure) for path, motion in contents.skeleton_motions]
+        own = [path for path, figure in contents.figures if figure.skeleton is skeleton]
+        return own or [
+            path
+            for path, figure in moved
+            if figure.skeleton is not None and figure.skeleton.names == skeleton.names
+        ]
+    return [
+        path
+        for path, figure in contents.figures
+        # A picture makes another mesh of the same positions.
+        if mesh is not None and figure.mesh is not None and figure.mesh.positions is mesh.positions
+    ]
+
+
+_SPOILED = {"mesh": ("positions", "weights", "triangles", "bindings"),
+            "skeleton": ("joints",), "clip": ("frames",)}  # fmt: skip
+"""Which parts of a fault are of which part of an actor."""
+
+
+def spoiled_parts(opened: Opened) -> list[dict[str, Ints]]:
+    """Return for each actor what its readers put something neutral for, see ``Subject``."""
+    return [_spoiled(actor, opened) for actor in opened.scene.actors]
+
+
+def _spoiled(actor: Actor, opened: Opened) -> dict[str, Ints]:
+    lost: dict[str, Ints] = {}
+    for part, keys in _SPOILED.items():
+        for path in _files_of(actor, part, opened.contents):
+            for fault in opened.sources[path].faults or ():
+                if fault.part in keys:
+                    known = lost.get(fault.part, fault.places)
+                    lost[fault.part] = np.union1d(known, fault.places)
+    return lost

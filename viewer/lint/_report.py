@@ -32,7 +32,8 @@ def finding_text(finding: Finding) -> str:
     if finding.file is not None and finding.file != Path():
         place = printable(finding.file, 300)
         place += f":{finding.line}" if finding.line is not None else ""
-        known = (finding.file.stem, finding.file.name, "")
+        # A folder's figure is called like the folder, its findings name the file inside.
+        known = (finding.file.stem, finding.file.name, finding.file.parent.name, "")
         who = "" if finding.name in known else f"{printable(finding.name, 100)}: "
     elif finding.name:
         place = printable(finding.name, 100)

@@ -8,6 +8,7 @@ import numpy as np
 
 from viewer.lint._finding import Subject
 from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.clip import Clip
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.motion import Frames, frames_of, world_frames
 from viewer.rig.points import PointClip
@@ -31,7 +32,7 @@ class Track:
     numbers : (F,) int32
         What the file calls each frame.
     present : (F,) bool
-        Where False, the other rows mean nothing.
+        Where False, the other rows mean nothing: nobody is there, or the file cannot say where.
     positions : (F, J, 3)
         Joints in the scene.
     rotations : (F, J, 4)
@@ -84,12 +85,20 @@ def _track(subject: Subject) -> Track | None:
     return Track(
         times=times + actor.offset,
         numbers=first + np.arange(count, dtype=np.int32),
-        present=frames.present,
+        present=frames.present & _known(subject, clip, count),
         positions=placed,
         rotations=frames.rotations,
         size=scale * box_size(bounding_box(rest_joints(figure))),
         scale=scale,
     )
+
+
+def _known(subject: Subject, clip: Clip | SampledClip, count: int) -> Bools:
+    """Return which frames are the file's own: (F,)."""
+    if not isinstance(clip, SampledClip):
+        return np.ones(count, dtype=np.bool_)
+    rows = clip.timing.rows
+    return subject.sound("frames", clip.n_rows)[rows] | (rows < 0)
 
 
 def _slice(frames: Frames, part: slice) -> Frames:

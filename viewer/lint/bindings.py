@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.lint._finding import Finding, Subject, listed
-from viewer.rig.arrays import Floats
+from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.mesh import bounding_box, box_size
@@ -26,7 +26,8 @@ def check(subject: Subject) -> list[Finding]:
     skin = subject.actor.figure.skin
     if skin is None or skin.n_joints == 0:
         return []
-    linear = skin.inverse_bind[:, :3, :3]
+    known = subject.sound("bindings", skin.n_joints)
+    linear = np.where(known[:, None, None], skin.inverse_bind[:, :3, :3], np.eye(3))
     lengths = np.linalg.norm(linear, axis=1).prod(axis=1)
     determinants = np.linalg.det(linear)
     flat = np.abs(determinants) <= _SINGULAR * lengths
@@ -41,9 +42,10 @@ def check(subject: Subject) -> list[Finding]:
     )  # fmt: skip
     mirrors = (determinants < 0.0) & ~flat
     findings += _about(subject, "B005", mirrors, determinants, "matrices mirror", "determinant")
-    off = np.abs(skin.inverse_bind[:, 3] - [0.0, 0.0, 0.0, 1.0]).max(axis=1)
+    off = np.abs(skin.inverse_bind[:, 3] - [0.0, 0.0, 0.0, 1.0]).max(axis=1) * known
     findings += _about(subject, "B006", off > _AFFINE, off, "matrices are not affine", "error")
-    return findings if flat.any() else findings + _elsewhere(subject, subject.actor.figure)
+    usable = known & ~flat & (off <= _AFFINE)
+    return findings + _elsewhere(subject, subject.actor.figure, usable)
 
 
 def _about(
@@ -63,11 +65,12 @@ def _about(
             f"{len(joints)} of {len(values)} bind {what}: {listed(names)} "
             f"({measure} {values[joints[0]]:.3g})",
             joints=joints,
+            at=("bindings", int(joints[0])),
         )
     ]
 
 
-def _elsewhere(subject: Subject, figure: Figure) -> list[Finding]:
+def _elsewhere(subject: Subject, figure: Figure, usable: Bools) -> list[Finding]:
     """Compare where joints were bound with where the skeleton has them.
 
     Figures are bound with all DOFs at 0 or in their files' own pose; the nearer one counts.
@@ -75,10 +78,16 @@ def _elsewhere(subject: Subject, figure: Figure) -> list[Finding]:
     skin, mesh, skeleton = figure.skin, figure.mesh, figure.skeleton
     if skin is None or mesh is None or skeleton is None:
         return []
-    bound = np.linalg.inv(skin.inverse_bind)[:, :3, 3]
+    # Where one joint is not known, nobody knows where those below it are.
+    known = subject.sound("joints", skeleton.n_joints)
+    for joint, parent in enumerate(skeleton.parents.tolist()):
+        known[joint] &= parent < 0 or bool(known[parent])
+    known &= usable
+    matrices = np.where(usable[:, None, None], skin.inverse_bind, np.eye(4))
+    bound = np.linalg.inv(matrices)[:, :3, 3]
     own = world_matrices(skeleton, rest_pose(skeleton))[:, :3, 3]
     both = [np.linalg.norm(bound - joints, axis=1) for joints in (rest_joints(figure), own)]
-    distances = min(both, key=np.max)
+    distances = min((known * part for part in both), key=np.max)
     size = box_size(bounding_box(mesh.positions))
     away = np.flatnonzero(distances > _ELSEWHERE * size)
     if len(away) == 0:
@@ -91,5 +100,6 @@ def _elsewhere(subject: Subject, figure: Figure) -> list[Finding]:
             f"{len(away)} joints were bound away from where they rest, {label} by "
             f"{subject.length(distances[away[0]])}: at rest the mesh is not as it was bound",
             joints=away,
+            at=("bindings", int(away[0])),
         )
     ]

@@ -78,6 +78,7 @@ def _keys(subject: Subject, clip: Clip) -> list[Finding]:
             f"{times[channel][0]:g} s",
             part="clip",
             times=np.unique(np.concatenate(times)) + subject.actor.offset,
+            at=("channels", channel),
         )
     ]
 
@@ -104,6 +105,7 @@ def _outside(subject: Subject, clip: Clip, skeleton: Skeleton) -> list[Finding]:
             part="clip",
             joints=np.unique(skeleton.dof_joints[targets[outside]]),
             times=times[order] + subject.actor.offset,
+            at=("channels", int(targets[worst])),
         )
     ]
 
@@ -153,5 +155,6 @@ def _too_fast(
             joints=np.concatenate([[joint], joints[joints != joint]]),
             frames=track.numbers[frames],
             times=track.times[frames],
+            at=("frames", int(frames[0])),
         )
     ]

@@ -48,7 +48,7 @@ def check(subject: Subject) -> list[Finding]:
 
 def _moving(subject: Subject, figure: Figure) -> Track | None:
     clip = subject.actor.clip
-    if clip is None or clip.end <= clip.start:
+    if clip is None or clip.end <= clip.start or len(subject.spoiled.get("joints", ())):
         return None
     track = track_of(subject)
     return track if track is not None and track.size > 0.0 and len(track.times) > 2 else None
@@ -103,6 +103,7 @@ def _sunk(
             joints=[feet[worst]],
             frames=track.numbers[frames],
             times=track.times[frames],
+            at=("frames", int(frames[0])),
         )
     ]
 
@@ -127,8 +128,7 @@ def _slipped(
     speeds = moved / (width * step)
     slides = (speeds > _SLIDES * track.size) & (speeds < _SWINGS * track.size)
     slides &= _held(stands, width)
-    # How far the foot slides in all: each window counts for one frame's share.
-    paths = np.where(slides, moved / width, 0.0).sum(axis=0)
+    paths = np.array([_path(along[:, foot], slides[:, foot], width) for foot in range(len(feet))])
     if not (paths > _FAR * track.size).any():
         return []
     worst = int(paths.argmax())
@@ -145,8 +145,23 @@ def _slipped(
             joints=[feet[worst]],
             frames=np.concatenate([[track.numbers[fastest + width]], track.numbers[frames]]),
             times=np.concatenate([[track.times[fastest + width]], track.times[frames]]),
+            at=("frames", fastest + width),
         )
     ]
+
+
+def _path(along: Floats, slides: Bools, width: int) -> float:
+    """Return how far a foot gets in all windows in which it slides, in steps of a window.
+
+    Single frames are noisy: their steps would add up to more.
+    """
+    edges = np.diff(slides.astype(np.int8), prepend=0, append=0)
+    total = 0.0
+    for first, last in zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0), strict=True):
+        end = last - 1 + width  # the frame that ends the run's last window
+        knots = np.append(np.arange(first, end, width), end)
+        total += float(np.linalg.norm(np.diff(along[knots], axis=0), axis=1).sum())
+    return total
 
 
 def _held(stands: Bools, width: int) -> Bools:

@@ -31,18 +31,20 @@ def check(subject: Subject) -> list[Finding]:
     if mesh is None:
         return []
     findings = [*_normals(subject, mesh), *_vertices(subject, mesh)]
-    if mesh.n_triangles == 0:
+    whole = subject.sound("triangles", mesh.n_triangles)
+    if not whole.any():
         return findings
-    flat = _heights(mesh) <= _FLAT * _typical(mesh)[1]
-    sound = np.flatnonzero(~flat)
+    known = subject.sound("positions", mesh.n_vertices)[mesh.triangles].all(axis=1) & whole
+    flat = (_heights(mesh) <= _FLAT * _typical(mesh)[1]) & known
+    sound = np.flatnonzero(~flat & whole)
     # What has no area has no neighbours and no sides either.
     corners = welded(mesh.positions, mesh.triangles)[sound]
     return [
         *findings,
         *_flat(subject, flat),
-        *_doubled(subject, mesh),
-        *_crowded_edges(subject, mesh),
-        *_sides(subject, mesh, sound, corners),
+        *_doubled(subject, mesh, np.flatnonzero(whole)),
+        *_crowded_edges(subject, mesh, np.flatnonzero(whole)),
+        *_sides(subject, mesh, sound, corners, known),
     ]
 
 
@@ -71,17 +73,18 @@ def _flat(subject: Subject, flat: Bools) -> list[Finding]:
             f"{len(triangles)} of {len(flat)} triangles have no area, first triangle "
             f"{triangles[0]}",
             triangles=triangles,
+            at=("triangles", int(triangles[0])),
         )
     ]
 
 
-def _doubled(subject: Subject, mesh: Mesh) -> list[Finding]:
-    rows = np.sort(mesh.triangles, axis=1).astype(np.int64)
+def _doubled(subject: Subject, mesh: Mesh, whole: Indices) -> list[Finding]:
+    rows = np.sort(mesh.triangles[whole], axis=1).astype(np.int64)
     keys = (rows[:, 0] * mesh.n_vertices + rows[:, 1]) * mesh.n_vertices + rows[:, 2]
     if mesh.n_vertices > 2_000_000:  # the product of three would not fit
         keys = np.unique(rows, axis=0, return_inverse=True)[1].ravel()
     order = np.argsort(keys, kind="stable")
-    copies = np.sort(order[1:][np.diff(keys[order]) == 0])
+    copies = whole[np.sort(order[1:][np.diff(keys[order]) == 0])]
     if len(copies) == 0:
         return []
     return [
@@ -89,18 +92,19 @@ def _doubled(subject: Subject, mesh: Mesh) -> list[Finding]:
             "M011",
             f"{len(copies)} triangles have the corners of another one, first triangle {copies[0]}",
             triangles=copies,
+            at=("triangles", int(copies[0])),
         )
     ]
 
 
-def _crowded_edges(subject: Subject, mesh: Mesh) -> list[Finding]:
+def _crowded_edges(subject: Subject, mesh: Mesh, whole: Indices) -> list[Finding]:
     """Report edges of more than two triangles, of vertices as listed: parts may touch."""
-    edges = edges_of(mesh.triangles.astype(np.int64))
+    edges = edges_of(mesh.triangles[whole].astype(np.int64))
     places = np.flatnonzero(edges.counts > 2)
     if len(places) == 0:
         return []
-    triangles = np.unique(places // 3)
-    vertices = np.unique(mesh.triangles.ravel()[places])
+    triangles = whole[np.unique(places // 3)]
+    vertices = np.unique(mesh.triangles[whole].ravel()[places])
     return [
         subject.found(
             "M006",
@@ -108,11 +112,14 @@ def _crowded_edges(subject: Subject, mesh: Mesh) -> list[Finding]:
             f"most {int(edges.counts.max())}, first at vertex {vertices[0]}",
             triangles=triangles,
             vertices=vertices,
+            at=("positions", int(vertices[0])),
         )
     ]
 
 
-def _sides(subject: Subject, mesh: Mesh, sound: Indices, corners: Indices) -> list[Finding]:
+def _sides(
+    subject: Subject, mesh: Mesh, sound: Indices, corners: Indices, known: Bools
+) -> list[Finding]:
     """Report flipped triangles, components inside out or of one side, and open borders."""
     edges = edges_of(corners)
     component, flipped, one_sided = orientations(len(corners), edges)
@@ -125,6 +132,7 @@ def _sides(subject: Subject, mesh: Mesh, sound: Indices, corners: Indices) -> li
                 f"{len(triangles)} of {mesh.n_triangles} triangles are wound against their "
                 f"neighbours, first triangle {triangles[0]}",
                 triangles=triangles,
+                at=("triangles", int(triangles[0])),
             )
         )
     if one_sided.any():
@@ -135,22 +143,37 @@ def _sides(subject: Subject, mesh: Mesh, sound: Indices, corners: Indices) -> li
                 f"a surface of {len(triangles)} triangles has no two sides, with triangle "
                 f"{triangles[0]}",
                 triangles=triangles,
+                at=("triangles", int(triangles[0])),
             )
         )
-    border = edges.counts == 1
-    findings += _inside_out(subject, mesh, sound, component, flipped, border.reshape(-1, 3))
-    if border.any():
-        vertices = np.unique(mesh.triangles[sound].ravel()[border])
-        findings.append(
-            subject.found(
-                "M005",
-                f"{int(border.sum())} edges belong to one triangle only, first at vertex "
-                f"{vertices[0]}",
-                vertices=vertices,
-                triangles=sound[np.unique(np.flatnonzero(border) // 3)],
-            )
+    unsure = _beside_lost(subject, mesh)[mesh.triangles[sound]]
+    border = (edges.counts == 1) & ~(unsure | np.roll(unsure, -1, axis=1)).ravel()
+    # Flipped ones are reported already; what the file does not say has no volume.
+    signs = np.where(flipped, -1.0, 1.0) * known[sound]
+    findings += _inside_out(subject, mesh, sound, component, signs, border.reshape(-1, 3))
+    return findings + _borders(subject, mesh, sound, border)
+
+
+def _borders(subject: Subject, mesh: Mesh, sound: Indices, border: Bools) -> list[Finding]:
+    if not border.any():
+        return []
+    vertices = np.unique(mesh.triangles[sound].ravel()[border])
+    return [
+        subject.found(
+            "M005",
+            f"{int(border.sum())} edges belong to one triangle only, first at vertex {vertices[0]}",
+            vertices=vertices,
+            triangles=sound[np.unique(np.flatnonzero(border) // 3)],
+            at=("positions", int(vertices[0])),
         )
-    return findings
+    ]
+
+
+def _beside_lost(subject: Subject, mesh: Mesh) -> Bools:
+    """Return vertices whose triangles are not all there, or whose copies nobody can find: (V,)."""
+    lost = ~subject.sound("positions", mesh.n_vertices)
+    lost[mesh.triangles[~subject.sound("triangles", mesh.n_triangles)]] = True
+    return lost
 
 
 def _inside_out(
@@ -158,7 +181,7 @@ def _inside_out(
     mesh: Mesh,
     sound: Indices,
     component: Indices,
-    flipped: Bools,
+    signs: Floats,
     border: Bools,
 ) -> list[Finding]:
     """Report closed components whose volume is negative, sum a . (b x c) / 6."""
@@ -169,8 +192,7 @@ def _inside_out(
     sums = [np.bincount(component, centers[:, axis], minlength=count) for axis in range(3)]
     middle = np.stack(sums, axis=1) / np.maximum(members, 1)[:, None]
     a, b, c = (mesh.positions[mesh.triangles[sound, k]] - middle[component] for k in range(3))
-    volumes = np.einsum("ta,ta->t", a, np.cross(b, c))
-    volumes[flipped] *= -1.0  # they are reported already
+    volumes = signs * np.einsum("ta,ta->t", a, np.cross(b, c))
     total = np.bincount(component, volumes, minlength=count)
     is_closed = open_edges**2 <= _CLOSED * members
     wrong = np.flatnonzero((total < 0.0) & is_closed & (members >= 4))
@@ -183,6 +205,7 @@ def _inside_out(
             f"{len(wrong)} closed parts with {len(triangles)} triangles are inside out, "
             f"first triangle {triangles[0]}",
             triangles=triangles,
+            at=("triangles", int(triangles[0])),
         )
     ]
 
@@ -197,6 +220,7 @@ def _normals(subject: Subject, mesh: Mesh) -> list[Finding]:
                 "M007",
                 f"{len(zero)} normals have length 0, first of vertex {zero[0]}",
                 vertices=zero,
+                at=("normals", int(zero[0])),
             )
         )
     odd = np.flatnonzero((np.abs(lengths - 1.0) > _UNIT) & (lengths >= _ZERO))
@@ -208,22 +232,29 @@ def _normals(subject: Subject, mesh: Mesh) -> list[Finding]:
                 f"{len(odd)} normals are not of length 1, that of vertex {odd[0]} is "
                 f"{lengths[odd[0]]:.4g} long",
                 vertices=odd,
+                at=("normals", int(odd[0])),
             )
         )
+    return findings + _against(subject, mesh)
+
+
+def _against(subject: Subject, mesh: Mesh) -> list[Finding]:
+    """Report normals that mostly point to the other side than their triangles."""
     used = np.unique(mesh.triangles)
     facing = np.einsum(
         "va,va->v", mesh.normals[used], vertex_normals(mesh.positions, mesh.triangles)[used]
     )
     against = used[facing < 0.0]
-    if len(against) > _AGAINST * max(len(used), 1):
-        findings.append(
-            subject.found(
-                "M009",
-                f"{len(against)} of {len(used)} normals point against their triangles",
-                vertices=against,
-            )
+    if len(against) <= _AGAINST * max(len(used), 1):
+        return []
+    return [
+        subject.found(
+            "M009",
+            f"{len(against)} of {len(used)} normals point against their triangles",
+            vertices=against,
+            at=("normals", int(against[0])),
         )
-    return findings
+    ]
 
 
 def _vertices(subject: Subject, mesh: Mesh) -> list[Finding]:
@@ -238,6 +269,7 @@ def _vertices(subject: Subject, mesh: Mesh) -> list[Finding]:
                 f"{len(unused)} of {mesh.n_vertices} vertices belong to no triangle, first vertex "
                 f"{unused[0]}",
                 vertices=unused,
+                at=("positions", int(unused[0])),
             )
         )
     center, typical = _typical(mesh)
@@ -251,6 +283,7 @@ def _vertices(subject: Subject, mesh: Mesh) -> list[Finding]:
                 f"{len(far)} vertices are far from the others, vertex {far[0]} by "
                 f"{distances[far[0]] / typical:.2g} times what is usual",
                 vertices=far,
+                at=("positions", int(far[0])),
             )
         )
     return findings

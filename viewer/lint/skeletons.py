@@ -46,6 +46,7 @@ def _names(subject: Subject, skeleton: Skeleton) -> list[Finding]:
                 f"{len(repeated)} joints share their names with others: {shown}",
                 part="skeleton",
                 joints=repeated,
+                at=("joints", repeated[0]),
             )
         )
     nameless = [joint for joint, name in enumerate(skeleton.names) if not name.strip()]
@@ -56,6 +57,7 @@ def _names(subject: Subject, skeleton: Skeleton) -> list[Finding]:
                 f"{len(nameless)} joints have no name, first joint {nameless[0]}",
                 part="skeleton",
                 joints=nameless,
+                at=("joints", nameless[0]),
             )
         )
     roots = np.flatnonzero(skeleton.parents < 0)
@@ -67,6 +69,7 @@ def _names(subject: Subject, skeleton: Skeleton) -> list[Finding]:
                 f"{len(roots)} joints have no parent: {listed([labels[j] for j in roots])}",
                 part="skeleton",
                 joints=roots,
+                at=("joints", int(roots[1])),
             )
         )
     return findings
@@ -75,8 +78,9 @@ def _names(subject: Subject, skeleton: Skeleton) -> list[Finding]:
 def _rest(subject: Subject, skeleton: Skeleton) -> list[Finding]:
     labels = joint_labels(skeleton)
     findings = []
+    known = subject.sound("joints", skeleton.n_joints)
     lengths = np.linalg.norm(skeleton.rest_rotations, axis=1)
-    odd = np.flatnonzero(np.abs(lengths - 1.0) > _UNIT)
+    odd = np.flatnonzero((np.abs(lengths - 1.0) > _UNIT) & known)
     if len(odd):
         findings.append(
             subject.found(
@@ -85,9 +89,10 @@ def _rest(subject: Subject, skeleton: Skeleton) -> list[Finding]:
                 f"{lengths[odd[0]]:.4g}",
                 part="skeleton",
                 joints=odd,
+                at=("joints", int(odd[0])),
             )
         )
-    flat = np.flatnonzero((skeleton.rest_scales <= 0.0).any(axis=1))
+    flat = np.flatnonzero((skeleton.rest_scales <= 0.0).any(axis=1) & known)
     if len(flat):
         scale = " ".join(f"{value:g}" for value in skeleton.rest_scales[flat[0]])
         findings.append(
@@ -96,6 +101,7 @@ def _rest(subject: Subject, skeleton: Skeleton) -> list[Finding]:
                 f"{len(flat)} rest scales are 0 or less, {labels[flat[0]]} has {scale}",
                 part="skeleton",
                 joints=flat,
+                at=("joints", int(flat[0])),
             )
         )
     return findings
@@ -109,11 +115,12 @@ def _named(skeleton: Skeleton, text: str) -> list[int]:
 
 
 def _limits(subject: Subject, skeleton: Skeleton, pose: Pose | None) -> list[Finding]:
-    findings = [
-        subject.found("S004", text, part="skeleton", joints=_named(skeleton, text))
-        for heading, text in subject.actor.figure.facts
-        if heading == OUTSIDE
-    ]
+    findings = []
+    for heading, text in subject.actor.figure.facts:
+        if heading == OUTSIDE:
+            joints = _named(skeleton, text)
+            at = ("joints", joints[0]) if joints else None
+            findings.append(subject.found("S004", text, part="skeleton", joints=joints, at=at))
     low, high = skeleton.dof_limits.T
     if pose is not None:
         beyond = np.maximum(low - pose.dofs, pose.dofs - high)
@@ -129,6 +136,7 @@ def _limits(subject: Subject, skeleton: Skeleton, pose: Pose | None) -> list[Fin
                     f"its limits are {low[worst]:.4g} and {high[worst]:.4g}",
                     part="skeleton",
                     joints=np.unique(skeleton.dof_joints[outside]),
+                    at=("joints", int(skeleton.dof_joints[worst])),
                 )
             )
     locked = np.flatnonzero(skeleton.locked)
@@ -141,6 +149,7 @@ def _limits(subject: Subject, skeleton: Skeleton, pose: Pose | None) -> list[Fin
                 f"{len(locked)} of {skeleton.n_dofs} DOFs are locked: {', '.join(labels)}{more}",
                 part="skeleton",
                 joints=np.unique(skeleton.dof_joints[locked]),
+                at=("joints", int(skeleton.dof_joints[locked[0]])),
             )
         )
     return findings

@@ -6,7 +6,7 @@ import numpy as np
 
 from viewer.errors import RigError
 from viewer.lint._finding import Finding, Subject
-from viewer.rig.arrays import Floats, Ints
+from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh, bounding_box, box_size
 from viewer.rig.mirror import asymmetry, joint_partners
@@ -32,11 +32,20 @@ def check(subject: Subject) -> list[Finding]:
         partners = joint_partners(figure)
     except RigError:
         return findings  # joints that mirror onto none say nothing of weights
-    return findings + _weights(subject, figure.skin, figure.symmetry, partners)
+    known = _known(subject, figure, "weights")
+    return findings + _weights(subject, figure.skin, figure.symmetry, partners, known)
+
+
+def _known(subject: Subject, figure: Figure, part: str) -> Bools:
+    """Return which vertices can be compared: they and their partners are the file's own. (V,)."""
+    assert figure.symmetry is not None  # the caller looked
+    sound = subject.sound(part, len(figure.symmetry))
+    known: Bools = sound & sound[figure.symmetry]
+    return known
 
 
 def _positions(subject: Subject, figure: Figure, mesh: Mesh) -> list[Finding]:
-    distances = asymmetry(figure)
+    distances = np.where(_known(subject, figure, "positions"), asymmetry(figure), 0.0)
     size = box_size(bounding_box(mesh.positions))
     off = np.flatnonzero(distances > _MOVED * size)
     if len(off) == 0:
@@ -50,12 +59,15 @@ def _positions(subject: Subject, figure: Figure, mesh: Mesh) -> list[Finding]:
             f"{subject.length(distances[worst])} at vertex {worst}",
             severity="warning" if distances[worst] > _ASKEW * size else "note",
             vertices=off,
+            at=("positions", worst),
         )
     ]
 
 
-def _weights(subject: Subject, skin: Skin, symmetry: Ints, partners: Ints) -> list[Finding]:
-    differences = weight_differences(skin, symmetry, partners)
+def _weights(
+    subject: Subject, skin: Skin, symmetry: Ints, partners: Ints, known: Bools
+) -> list[Finding]:
+    differences = np.where(known, weight_differences(skin, symmetry, partners), 0.0)
     off = np.flatnonzero(differences > _SHIFTED)
     if len(off) == 0:
         return []
@@ -68,6 +80,7 @@ def _weights(subject: Subject, skin: Skin, symmetry: Ints, partners: Ints) -> li
             f"{differences[worst]:.3g} in sum at vertex {worst}",
             severity="warning" if differences[worst] > _UNEQUAL else "note",
             vertices=off,
+            at=("weights", worst),
         )
     ]
 

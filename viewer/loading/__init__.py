@@ -8,7 +8,7 @@ from viewer.formats import MAX_SIZE
 from viewer.loading.additions import add_to_actor
 from viewer.loading.assembly import assemble, begin
 from viewer.loading.bundled import bundled_body, bundled_files
-from viewer.loading.contents import Contents, read_files
+from viewer.loading.contents import Contents, read_files, read_source
 from viewer.loading.settings import MotionSettings
 from viewer.rig.scene import Scene
 
@@ -22,6 +22,7 @@ __all__ = [
     "bundled_files",
     "load",
     "read_files",
+    "read_source",
 ]
 
 

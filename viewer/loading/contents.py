@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from viewer.rig.pose_record import PoseRecord
     from viewer.rig.skeleton_motion import SkeletonMotion
 
-__all__ = ["Contents", "read_files"]
+__all__ = ["Contents", "read_files", "read_source"]
 
 
 _PEEK = 16  # bytes that tell a picture
@@ -75,16 +75,35 @@ def read_files(
     sources = [Source.open(path, max_size) for path in paths]
     known = {source.path.resolve() for source in sources}
     for source in sources:  # grows while it is read: a .rig names files
-        if _is_picture(source):
-            contents.pictures.append((source.path, read_picture(source)))
-        else:
-            named = _sort(source, contents, settings or MotionSettings())
-            for path in named:
-                if path.resolve() not in known:  # a .rig may name another, or itself
-                    known.add(path.resolve())
-                    sources.append(Source.open(path, max_size))
+        for path in read_source(source, contents, settings or MotionSettings()):
+            if path.resolve() not in known:  # a .rig may name another, or itself
+                known.add(path.resolve())
+                sources.append(Source.open(path, max_size))
     contents.warnings = tuple(text for source in sources for text in source.warnings)
     return contents
+
+
+def read_source(source: Source, contents: Contents, settings: MotionSettings) -> tuple[Path, ...]:
+    """Read one file and add what it holds, but not its warnings; see the formats for errors.
+
+    Parameters
+    ----------
+    source : Source
+        The file.
+    contents : Contents
+        Is added to.
+    settings : MotionSettings
+        How motions are taken.
+
+    Returns
+    -------
+    tuple of Path
+        Files that it names, to be read as well.
+    """
+    if _is_picture(source):
+        contents.pictures.append((source.path, read_picture(source)))
+        return ()
+    return _sort(source, contents, settings)
 
 
 _LISTS = {

@@ -1,0 +1,297 @@
+"""Readers that go on: every fault is noted, and what is neutral stands in place of what is lost."""
+
+from __future__ import annotations
+
+import random
+from typing import Any
+
+import numpy as np
+import pytest
+from bvh_text import GOOD as BVH
+from skel_text import GOOD as SKEL
+from skin_text import BINDINGS
+from skin_text import GOOD as SKIN
+from synthetic_smpl import model
+from test_mutations import FILES, mutate
+
+from viewer.errors import ViewerError
+from viewer.formats import Source, anim, bvh, obj, ply, read, skel, skin, smpl
+
+OBJ = """v 0 0 0
+v 1 0 0
+v 1 1 0
+v 0 1 0
+vn 0 0 1
+f 1//1 2//1 3//1 4//1
+f 1 2 3
+"""
+PLY = """ply
+format ascii 1.0
+element vertex 4
+property float x
+property float y
+property float z
+element face 2
+property list uchar int vertex_indices
+end_header
+0 0 0
+1 0 0
+1 1 0
+0 1 0
+3 0 1 2
+3 0 2 3
+"""
+ANIM = """animation {
+range 0 1
+numchannels 1
+channel { extrapolate constant constant keys 3 {
+0 0 flat flat
+0.5 1 flat flat
+1 2 flat flat } }
+}
+"""
+
+
+def gone_on(module: Any, text: str, name: str) -> tuple[Any, list[tuple[str, int, str, list[int]]]]:
+    """Return what is read in spite of faults, and each fault: words, count, part, places."""
+    source = Source(name, text.encode())
+    source.faults = []
+    content = module.read(source)
+    faults = [(str(f.error), f.count, f.part, f.places.tolist()) for f in source.faults]
+    return content, faults
+
+
+# (module, name, text, old, new, message, part, places)
+ONE: list[tuple[Any, str, str, str, str, str, str, list[int]]] = [
+    (skin, "a.skin", SKIN, "2 0 0", "2 nan 0",
+     'a.skin:3: positions of vertex 1: expected a number, found "nan"', "positions", [1]),
+    (skin, "a.skin", SKIN, "2 0 0", "2 0,5 0",
+     'a.skin:3: positions of vertex 1: expected a number, found "0,5"', "positions", [1]),
+    (skin, "a.skin", SKIN, "2 0 0", "2 0",
+     "a.skin:3: positions of vertex 1: expected 3 numbers, found 2", "positions", [1]),
+    (skin, "a.skin", SKIN, "positions 3", "positions 4",
+     "a.skin:1: positions: expected 4 entries as its count says, found 3", "", []),
+    (skin, "a.skin", SKIN, "  2 0 0\n", "",
+     "a.skin:1: positions: expected 3 entries as in normals, found 2", "positions", [0, 1, 2]),
+    (skin, "a.skin", SKIN, "normals 3 {\n  0 0 1\n", "normals 2 {\n",
+     "a.skin:6: normals: expected 3 entries as in positions, found 2", "", []),
+    (skin, "a.skin", SKIN, "1 0 1.0", "1 0 nan",
+     'a.skin:12: skinweights of vertex 0: expected a number, found "nan"', "weights", [0]),
+    (skin, "a.skin", SKIN, "1 1 1\n}", "1 2 1\n}",
+     "a.skin:14: skinweights of vertex 2: expected a joint index below 2, found 2", "weights", [2]),
+    (skin, "a.skin", SKIN, "1 1 1\n}", "1 0.5 1\n}",
+     'a.skin:14: skinweights of vertex 2: expected a joint index, found "0.5"', "weights", [2]),
+    (skin, "a.skin", SKIN, "1 1 1\n}", "2 1 1\n}",
+     "a.skin:14: skinweights of vertex 2: expected a count and as many pairs of joint and weight, "
+     'found "2" and 2 numbers', "weights", [2]),
+    (skin, "a.skin", SKIN, "  1 1 1\n}", "}",
+     "a.skin:11: skinweights: expected 3 entries as in positions, found 2", "weights", [2]),
+    (skin, "a.skin", SKIN, "0 1 2\n}", "0 1 7\n}",
+     "a.skin:17: triangle 0: expected a vertex index below 3, found 7", "triangles", [0]),
+    (skin, "a.skin", SKIN, "0 1 2\n}", "0 1 1.5\n}",
+     "a.skin:17: triangle 0: expected a vertex index, found 1.5", "triangles", [0]),
+    (skin, "a.skin", SKIN, "0 1 2\n}", "0 inf 2\n}",
+     'a.skin:17: triangle 0: expected a number, found "inf"', "triangles", [0]),
+    (skin, "a.skin", SKIN, "0 1 0\n  0 0 1\n  5", "0 0 0\n  0 0 1\n  5",
+     "a.skin:20: bindings: expected matrices that can be inverted, found matrix 0 with "
+     "determinant 0", "bindings", [0]),
+    (skin, "a.skin", SKIN, "0 1 0\n  0 0 1\n  8", "0 -1.#IND 0\n  0 0 1\n  8",
+     'a.skin:28: matrix 1 of bindings: expected a number, found "-1.#IND"', "bindings", [1]),
+    (skin, "a.skin", SKIN, "8 9 10", "8 9",
+     "a.skin:26: matrix 1 of bindings: expected 12 numbers, found 11", "bindings", [1]),
+    (skin, "a.skin", SKIN, BINDINGS, "",
+     "a.skin: expected a `bindings` section beside `skinweights`, found none", "bindings", [0, 1]),
+    (skin, "a.skin", SKIN, "bindings 2", "bindings 3",
+     'a.skin:32: bindings (line 19): expected 3 matrices, found 2 matrices, then "}"', "", []),
+    (obj, "a.obj", OBJ, "v 1 0 0", "v 1 nan 0",
+     'a.obj:2: v of vertex 1: expected a number, found "nan"', "positions", [1]),
+    (obj, "a.obj", OBJ, "v 1 0 0", "v 1 0",
+     "a.obj:2: v of vertex 1: expected 3 numbers, found 2", "positions", [1]),
+    (obj, "a.obj", OBJ, "vn 0 0 1", "vn 0 inf 1",
+     'a.obj:5: vn 0: expected a number, found "inf"', "", [0]),
+    (obj, "a.obj", OBJ, "2//1 3", "9//1 3",
+     "a.obj:6: f: expected a vertex 1 to 4, found 9", "triangles", [0, 1]),
+    (obj, "a.obj", OBJ, "f 1 2 3", "f 1 2 0", "a.obj:7: f: expected an index from 1, found 0",
+     "triangles", [2]),
+    (obj, "a.obj", OBJ, "f 1 2 3", "f 1 2 -5", "a.obj:7: f: expected a vertex -1 to -4, found -5",
+     "triangles", [2]),
+    (obj, "a.obj", OBJ, "f 1 2 3", "f 1 x 3",
+     'a.obj:7: f: expected a corner v, v/vt, v//vn or v/vt/vn, found "x"', "triangles", [2]),
+    (obj, "a.obj", OBJ, "f 1 2 3", "f 1 2", "a.obj:7: f: expected 3 or more corners, found 2",
+     "", []),
+    (ply, "a.ply", PLY, "1 0 0", "1 nan 0",
+     "a.ply:11: vertex 1: expected finite x y z, found nan", "positions", [1]),
+    (ply, "a.ply", PLY, "3 0 2 3", "3 0 2 9",
+     "a.ply:15: face 1: expected a vertex from 0 to 3, found 9", "triangles", [1]),
+    (skel, "a.skel", SKEL, "offset 0 1 0", "offset 0 nan 0",
+     'a.skel:10: offset of joint arm: expected a number, found "nan"', "joints", [1]),
+    (skel, "a.skel", SKEL, "offset 0 1 0", "offset 0 1",
+     "a.skel:10: offset of joint arm: expected 3 numbers, found 2", "joints", [1]),
+    (skel, "a.skel", SKEL, "pose 0.5", "pose up",
+     'a.skel:8: pose of joint root: expected a number, found "up"', "", []),
+    (bvh, "a.bvh", BVH, "0.1 0.0 0.0", "0.1 nan 0.0",
+     'a.bvh:8: OFFSET of joint LeftUpLeg: expected a number, found "nan"', "joints", [1]),
+    (anim, "a.anim", ANIM, "0.5 1", "0.5 nan",
+     'a.anim:6: channel 0, key 1: value: expected a number, found "nan"', "", []),
+    (anim, "a.anim", ANIM, "keys 3", "keys 4",
+     "a.anim:7: channel 0: expected 4 keys, found 3", "", []),
+    (anim, "a.anim", ANIM, "channels 1", "channels 2",
+     "a.anim:8: animation: expected 2 channels as numchannels says, found 1", "", []),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("case", ONE, ids=lambda case: f"{case[1]}, {case[4]!r}"[:40])
+def test_one_fault_is_noted_with_its_place(case: tuple[Any, ...]) -> None:
+    module, name, text, old, new, message, part, places = case
+    assert old in text
+    broken = text.replace(old, new, 1)
+    assert gone_on(module, broken, name)[1] == [(message, 1, part, places)]
+    with pytest.raises(ViewerError):  # without the list, the reader still refuses
+        module.read(Source(name, broken.encode()))
+
+
+@pytest.mark.parametrize(
+    ("module", "name", "text"),
+    [(skin, "a.skin", SKIN), (obj, "a.obj", OBJ), (ply, "a.ply", PLY), (skel, "a.skel", SKEL),
+     (bvh, "a.bvh", BVH), (anim, "a.anim", ANIM)],
+)  # fmt: skip
+def test_good_files_have_no_faults(module: Any, name: str, text: str) -> None:
+    assert gone_on(module, text, name)[1] == []
+
+
+def test_a_lost_vertex_lies_between_its_neighbours() -> None:
+    figure, _ = gone_on(skin, SKIN.replace("2 0 0", "2 nan 0", 1), "a.skin")
+    # The middle of (0, 0, 0) and (0, 2, 0).
+    assert figure.mesh.positions.tolist() == [[0, 0, 0], [0, 1, 0], [0, 2, 0]]
+    assert figure.mesh.n_triangles == 1 and figure.skin.weights.tolist() == [1, 0.25, 0.75, 1]
+
+
+def test_a_lost_weight_is_0_and_the_others_stay() -> None:
+    figure, _ = gone_on(skin, SKIN.replace("2 0 0.25 1", "2 0 nan 1", 1), "a.skin")
+    assert figure.skin.weights.tolist() == [1, 0, 0.75, 1]
+    assert figure.skin.joints.tolist() == [0, 0, 1, 1]
+
+
+def test_a_line_of_weights_that_cannot_be_told_costs_no_other() -> None:
+    figure, _ = gone_on(skin, SKIN.replace("2 0 0.25 1", "3 0 0.25 1", 1), "a.skin")
+    assert figure.skin.starts.tolist() == [0, 1, 1, 2]
+    assert figure.skin.weights.tolist() == [1, 1]
+
+
+def test_a_lost_corner_is_another_of_its_triangle() -> None:
+    figure, _ = gone_on(skin, SKIN.replace("0 1 2\n}", "0 1 7\n}", 1), "a.skin")
+    assert figure.mesh.triangles.tolist() == [[0, 1, 0]]
+    figure, _ = gone_on(obj, OBJ.replace("f 1 2 3", "f x 2 3"), "a.obj")
+    assert figure.mesh.triangles[2].tolist() == [1, 1, 2]
+
+
+def test_a_singular_matrix_leaves_its_joint_where_it_was_bound() -> None:
+    broken = SKIN.replace("0 1 0\n  0 0 1\n  5", "0 0 0\n  0 0 1\n  5")
+    figure, _ = gone_on(skin, broken, "a.skin")
+    assert figure.skin.inverse_bind[0, :3, 3].tolist() == [-5, -6, -7]
+    assert figure.skin.inverse_bind[0, :3, :3].tolist() == np.eye(3).tolist()
+
+
+def test_normals_that_are_lost_are_computed() -> None:
+    figure, _ = gone_on(obj, OBJ.replace("vn 0 0 1", "vn 0 inf 1"), "a.obj")
+    assert figure.mesh.normals.tolist() == [[0, 0, 1]] * 4
+
+
+def test_several_faults_of_one_block_are_one_for_each_kind() -> None:
+    text = SKIN.replace("0 0 0\n  2 0 0", "nan inf 0\n  up 0 0")
+    assert [fault[0::2] for fault in gone_on(skin, text, "a.skin")[1]] == [
+        ('a.skin:2: positions of vertex 0: expected a number, found "nan"', "positions"),
+        ('a.skin:3: positions of vertex 1: expected a number, found "up"', "positions"),
+    ]
+    assert [fault[1] for fault in gone_on(skin, text, "a.skin")[1]] == [2, 1]
+
+
+def frames(*rows: str) -> str:
+    head = BVH[: BVH.index("MOTION")]
+    text = "\n".join(rows)
+    return f"{head}MOTION\nFrames: {len(rows)}\nFrame Time: 0.1\n{text}\n"
+
+
+def test_a_frame_that_is_lost_is_as_the_one_before() -> None:
+    good = [f"{k} 1 0" + " 0" * 12 for k in range(5)]
+    bad = [good[0], good[1].replace("1", "nan", 1), good[2], good[3] + " 7", good[4]]
+    motion, faults = gone_on(bvh, frames(*bad), "a.bvh")
+    assert [(fault[2], fault[3]) for fault in faults] == [("frames", [1]), ("frames", [3])]
+    assert faults[1][0].endswith("frame 3: expected 15 numbers as CHANNELS says, found 16")
+    assert motion.clip.translations[:, 0, 0].tolist() == [0, 0, 2, 2, 4]
+
+
+def test_a_key_that_is_lost_is_left_out() -> None:
+    clip, _ = gone_on(anim, ANIM.replace("0.5 1", "0.5 nan"), "a.anim")
+    assert clip.channels[0].times.tolist() == [0, 1]
+
+
+def test_faults_of_a_body_model_are_noted_by_vertex_and_joint(tmp_path: Any) -> None:
+    arrays = model("smpl")
+    arrays = {key: np.array(values) for key, values in arrays.items()}
+    arrays["v_template"][3, 0] = np.nan
+    arrays["weights"][4, 2] = np.inf
+    arrays["weights"][5] *= 0.5
+    arrays["kintree_table"][0, 5] = 9
+    arrays["f"][1, 0] = 99
+    np.savez(tmp_path / "m.npz", **arrays)
+    source = Source.open(tmp_path / "m.npz")
+    source.faults = []
+    figure = smpl.read(source)
+    found = {(f.part, tuple(f.places.tolist())) for f in source.faults}
+    assert found == {("positions", (3,)), ("weights", (4,)), ("", ()), ("joints", (5,)),
+                     ("triangles", (1,))}  # fmt: skip
+    assert figure.skeleton.parents[5] == 0
+    texts = {str(f.error).split(": ", 1)[1] for f in source.faults}
+    assert "v_template: expected finite numbers, found nan at vertex 3" in texts
+    assert "weights: expected finite numbers, found inf at vertex 4" in texts
+    assert "weights: vertex 5: expected weights with the sum 1, found 0.5" in texts
+    # The others are scaled to a sum of exactly 1, the faulty ones are as in the file.
+    sums = np.bincount(
+        np.repeat(np.arange(figure.skin.n_vertices), np.diff(figure.skin.starts)),
+        figure.skin.weights,
+    )
+    assert sums[5] == pytest.approx(0.5) and np.delete(sums, [4, 5]) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_reader_goes_on_from_faults_alone(seed: int) -> None:
+    """What the strict reader refuses has a fault; what it takes has none."""
+    rng = random.Random(seed)
+    texts = {**FILES, "dir/b.skin": SKIN.encode(), "dir/a.obj": OBJ.encode(),
+             "dir/a.ply": PLY.encode(), "dir/a.bvh": BVH.encode()}  # fmt: skip
+    for _ in range(250):
+        name = rng.choice(list(texts))
+        data = mutate(texts[name], rng)
+        source = Source(name, data)
+        source.faults = []
+        is_refused = had_end = False
+        try:
+            read(Source(name, data))
+        except ViewerError:
+            is_refused = True
+        try:
+            read(source)
+        except ViewerError:
+            had_end = True
+        assert is_refused == bool(source.faults or had_end), data
+
+
+@pytest.mark.parametrize("word", ["nan", "-inf", "Infinity", "1e39", "1.#QNAN", "-nan(ind)"])
+def test_what_was_a_number_once_has_a_code_of_its_own(word: str) -> None:
+    source = Source("a.skin", SKIN.replace("2 0 0", f"2 {word} 0", 1).encode())
+    source.faults = []
+    skin.read(source)
+    assert [fault.error.code for fault in source.faults] == ["F003"]
+
+
+def test_places_of_a_skin_are_lines() -> None:
+    source = Source("a.skin", SKIN.encode())
+    skin.read(source)
+    found = {kind: source.place(kind, 1) for kind in ("positions", "normals", "weights")}
+    assert {kind: place[1] for kind, place in found.items() if place} == {
+        "positions": 3, "normals": 8, "weights": 13
+    }  # fmt: skip
+    assert source.place("triangles", 0) == (source.path, 17)
+    assert source.place("bindings", 1) == (source.path, 26)
+    assert source.place("joints", 0) is None

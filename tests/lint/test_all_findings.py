@@ -1,0 +1,196 @@
+"""One fault hides no other: files with many faults, each found once and in its line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from formats import bvh_text, skel_text, skin_text, synthetic_smpl
+from lint.sound import column
+
+from viewer.formats import write
+from viewer.lint import Finding, lint_files
+from viewer.rig.figure import Figure
+
+
+def saved(folder: Path, figure: Figure) -> list[str]:
+    """Write the sound column and return the lines of its ``.skin``; its ``.skel`` lies beside."""
+    write(figure, folder / "a.skel")
+    write(figure, folder / "a.skin")
+    return (folder / "a.skin").read_text().splitlines()
+
+
+def section(lines: list[str], name: str) -> int:
+    """Return the index of the line behind a section's header."""
+    return next(k for k, line in enumerate(lines) if line.startswith(f"{name} ")) + 1
+
+
+def linted(folder: Path, lines: list[str]) -> list[Finding]:
+    (folder / "a.skin").write_text("\n".join(lines) + "\n")
+    return lint_files([folder / "a.skel", folder / "a.skin"])[1]
+
+
+def heavy(findings: list[Finding]) -> list[tuple[str, int | None]]:
+    """Return code and line of errors and warnings."""
+    return [(f.code, f.line) for f in findings if f.severity != "note"]
+
+
+def test_the_column_is_sound_as_files(tmp_path: Path) -> None:
+    assert heavy(linted(tmp_path, saved(tmp_path, column()))) == []
+
+
+def test_ten_faults_of_one_skin_are_ten_findings(tmp_path: Path) -> None:
+    lines = saved(tmp_path, column())
+    positions, weights = section(lines, "positions"), section(lines, "skinweights")
+    triangles, bindings = section(lines, "triangles"), section(lines, "bindings")
+    lines[positions + 2] = "nan 0 -1"
+    lines[positions + 18] = "1 4 nan"
+    lines[weights + 1] = "1 0 0.5"
+    lines[weights + 4] = "2 0 -0.25 1 1.25"
+    lines[weights + 5] = "0"
+    lines[weights + 6] = "1 0 nan"
+    lines[weights + 7] = "1 9 1.0"
+    lines[triangles + 5] = "1 2 77"
+    lines[triangles + 8] = " ".join(reversed(lines[triangles + 8].split()))
+    lines[triangles + 9] = "0 1 1.5"
+    assert lines[bindings].strip() == "matrix {"
+    lines[bindings + 2] = "0 0 0"
+    assert heavy(linted(tmp_path, lines)) == [
+        ("F003", positions + 3),
+        ("W003", weights + 7),
+        ("F002", triangles + 10),
+        ("F002", triangles + 6),
+        ("B002", bindings + 1),
+        ("W010", weights + 8),
+        ("W001", weights + 2),
+        ("W002", weights + 5),
+        ("W004", weights + 6),
+        ("M002", triangles + 9),
+    ]
+
+
+def test_findings_of_one_kind_say_how_many_and_where(tmp_path: Path) -> None:
+    lines = saved(tmp_path, column())
+    positions = section(lines, "positions")
+    for vertex in (3, 8, 9):
+        lines[positions + vertex] = "inf 1 nan"
+    found = next(f for f in linted(tmp_path, lines) if f.code == "F003")
+    assert found.message == (
+        'positions of vertex 3: expected a number, found "inf", the first of 6 (vertices 3, 8, 9)'
+    )
+    assert found.vertices.tolist() == [3, 8, 9] and found.line == positions + 4
+
+
+@pytest.mark.parametrize("vertex", range(20))
+def test_a_lost_position_brings_nothing_else(tmp_path: Path, vertex: int) -> None:
+    lines = saved(tmp_path, column())
+    lines[section(lines, "positions") + vertex] = "nan nan nan"
+    assert [f.code for f in linted(tmp_path, lines) if f.severity != "note"] == ["F003"]
+    assert "M005" not in {f.code for f in linted(tmp_path, lines)}
+
+
+@pytest.mark.parametrize("triangle", [0, 7, 33, 35])
+def test_a_lost_triangle_leaves_no_border(tmp_path: Path, triangle: int) -> None:
+    lines = saved(tmp_path, column())
+    place = section(lines, "triangles") + triangle
+    lines[place] = " ".join([*lines[place].split()[:2], "1000"])
+    assert [f.code for f in linted(tmp_path, lines)] == ["F002"]
+
+
+def test_a_lost_weight_brings_nothing_else(tmp_path: Path) -> None:
+    lines = saved(tmp_path, column())
+    lines[section(lines, "skinweights") + 9] = "2 0 nan 1 0.5"
+    assert [f.code for f in linted(tmp_path, lines)] == ["W003"]
+
+
+def test_a_singular_matrix_does_not_stop_the_others(tmp_path: Path) -> None:
+    lines = saved(tmp_path, column())
+    bindings = section(lines, "bindings")
+    lines[bindings + 1 : bindings + 4] = ["0 0 0"] * 3
+    lines[bindings + 7] = "-1 0 0"  # the second one mirrors
+    assert heavy(linted(tmp_path, lines)) == [("B002", bindings + 1), ("B005", bindings + 7)]
+
+
+def test_a_skin_without_bindings_is_looked_at_alone(tmp_path: Path) -> None:
+    lines = saved(tmp_path, column())
+    weights = section(lines, "skinweights")
+    lines[weights] = "1 0 0.5"
+    del lines[section(lines, "bindings") - 1 :]
+    assert heavy(linted(tmp_path, lines)) == [("B001", None), ("W001", weights + 1)]
+
+
+def test_what_is_no_text_of_this_kind_says_that_nothing_else_was_checked(tmp_path: Path) -> None:
+    lines = saved(tmp_path, column())
+    lines[section(lines, "positions") + 3] = "normals 4 {"
+    (found,) = [f for f in linted(tmp_path, lines) if f.severity == "error"]
+    assert (found.code, found.line) == ("F002", 5)
+    assert found.message == (
+        'expected "}" to close positions (line 1), found "normals"; '
+        "nothing else in this file was checked"
+    )
+
+
+def test_a_lost_offset_of_a_joint_is_no_other_bind_pose(tmp_path: Path) -> None:
+    texts = {"a.skel": skel_text.GOOD.replace("offset 0 1 0", "offset 0 nan 0"),
+             "a.skin": skin_text.GOOD}  # fmt: skip
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text)
+    found = lint_files([tmp_path / name for name in texts])[1]
+    assert [(f.code, f.line, f.joints.tolist()) for f in found if f.severity == "error"] == [
+        ("F003", 10, [1])
+    ]
+    (bound,) = [f for f in found if f.code == "B004"]  # the root is bound elsewhere, at 5 6 7
+    assert bound.joints.tolist() == [0] and bound.line == 20
+
+
+def test_all_faults_of_a_rig_file_are_found(tmp_path: Path) -> None:
+    """The files that a .rig names are looked at one by one: a broken one hides no other."""
+    (tmp_path / "a.rig").write_text("rig a { skeleton a.skel skin a.skin }")
+    (tmp_path / "a.skel").write_text(skel_text.GOOD.replace("{", "[", 1))
+    (tmp_path / "a.skin").write_text(skin_text.GOOD.replace("2 0 0.25", "2 0 0.5", 1))
+    found = lint_files([tmp_path / "a.rig"])[1]
+    files = [(f.code, f.file.name if f.file else "", f.line) for f in found]
+    assert ("F002", "a.skel", 2) in files and ("W001", "a.skin", 13) in files
+
+
+def test_faults_of_a_body_are_found_together_with_those_read_late(tmp_path: Path) -> None:
+    arrays = {key: np.array(values) for key, values in synthetic_smpl.model("smpl").items()}
+    arrays["v_template"][3] = np.nan
+    arrays["weights"][4, 0] = np.nan
+    arrays["weights"][5] *= 0.5
+    arrays["shapedirs"][0, 0, 0] = np.inf
+    arrays["posedirs"][0, 0, 0] = np.nan
+    np.savez(tmp_path / "m.npz", **arrays)
+    found = lint_files([tmp_path / "m.npz"])[1]
+    assert [(f.code, f.severity) for f in found if f.severity != "note"] == [
+        ("F003", "error"), ("W003", "error"), ("F003", "error"), ("F003", "error"),
+        ("W001", "error"),
+    ]  # fmt: skip
+    assert found[0].vertices.tolist() == [3] and found[1].vertices.tolist() == [4]
+    assert [f.message.split(":")[0] for f in found[2:4]] == ["shapedirs", "posedirs"]
+
+
+def test_lost_frames_are_no_jumps(tmp_path: Path) -> None:
+    head = bvh_text.GOOD[: bvh_text.GOOD.index("MOTION")]
+    rows = [f"{k} 100 0" + " 0" * 12 for k in range(30)]
+    rows[10] = rows[10].replace("100", "nan")
+    rows[20] = "90000" + rows[20][2:]
+    text = "\n".join([f"{head}MOTION", "Frames: 30", "Frame Time: 0.1", *rows])
+    (tmp_path / "a.bvh").write_text(text + "\n")
+    found = lint_files([tmp_path / "a.bvh"])[1]
+    first = text[: text.index(rows[0])].count("\n") + 1
+    lost, jump = (next(f for f in found if f.code == code) for code in ("F003", "C003"))
+    assert (lost.line, lost.frames.tolist()) == (first + 10, [10])
+    assert jump.line in (first + 20, first + 21) and sorted(jump.frames.tolist()) == [20, 21]
+
+
+def test_without_a_unit_lengths_are_in_the_figures_own(tmp_path: Path) -> None:
+    lines = saved(tmp_path, column())
+    skel = (tmp_path / "a.skel").read_text()
+    assert "offset 0.0 2.0 0.0" in skel
+    (tmp_path / "a.skel").write_text(skel.replace("offset 0.0 2.0 0.0", "offset 0.0 3.0 0.0"))
+    (bound,) = [f for f in linted(tmp_path, lines) if f.code == "B004"]
+    # One unit of a column of 2 x 4 x 2: its diagonal is the root of 24.
+    assert "knee by 1 units (20.4 % of its size)" in bound.message
+    assert bound.line == section(lines, "bindings") + 7

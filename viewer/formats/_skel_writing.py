@@ -1,0 +1,137 @@
+"""Figures as ``.skel`` text; see ``skel.py`` for its grammar."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from viewer.errors import UnsupportedFormatError, printable
+from viewer.formats._numbers import LARGEST
+from viewer.formats._save import as_words, save_text
+from viewer.rig.arrays import Floats
+from viewer.rig.figure import Figure
+from viewer.rig.skeleton import Skeleton, joint_label
+
+__all__ = ["KEYWORDS", "UNLIMITED", "write"]
+
+UNLIMITED = 100_000.0
+"""The course's word for "no limit", written out by some files."""
+
+KEYWORDS = frozenset(
+    (b"offset", b"boxmin", b"boxmax", b"pose", b"rotxlimit", b"rotylimit", b"rotzlimit")
+) | {b"balljoint"}
+"""Words that begin an item of a joint, and so are no part of a name."""
+
+_DEEPEST = 32  # tabs that a line begins with
+
+
+def write(figure: Figure, path: str | Path) -> None:
+    """Write a figure's skeleton.
+
+    Parameters
+    ----------
+    figure : Figure
+        With a skeleton in depth-first order, of rotation DOFs and unrotated rest joints.
+    path : str or Path
+        Replaced only when the whole text has been written.
+
+    Raises
+    ------
+    UnsupportedFormatError
+        If the format cannot hold the skeleton.
+    OutputError
+        If the file cannot be written.
+    """
+    if figure.skeleton is None:
+        raise UnsupportedFormatError(f"figure {figure.name} has no skeleton to write as .skel")
+    _check_dofs(figure.skeleton)
+    _check_numbers(figure.skeleton)
+    _check_names(figure.skeleton)
+    save_text(path, "".join(_lines(figure.skeleton)))
+
+
+def _check_dofs(skeleton: Skeleton) -> None:
+    unturned = np.allclose(skeleton.rest_rotations[:, :3], 0.0, atol=1e-12)
+    unscaled = np.allclose(skeleton.rest_scales, 1.0, atol=1e-12)
+    if not (unturned and unscaled):
+        raise UnsupportedFormatError(".skel cannot hold joints with a rest rotation or scale")
+    rotations = np.arange(6, 3 * skeleton.n_joints + 3)
+    table = np.concatenate([np.arange(6), np.tile([3, 4, 5], skeleton.n_joints - 1)])
+    owners = np.concatenate([np.zeros(6, int), 1 + (rotations - 6) // 3])
+    if not (
+        np.array_equal(skeleton.dof_kinds, table) and np.array_equal(skeleton.dof_joints, owners)
+    ):
+        raise UnsupportedFormatError(".skel holds the DOFs x, y, z of each joint, no others")
+    if skeleton.rest_dofs[:3].any() or np.isfinite(skeleton.dof_limits[:3]).any():
+        raise UnsupportedFormatError(
+            ".skel cannot hold a translation of the root in its pose, nor limits of one"
+        )
+
+
+def _check_numbers(skeleton: Skeleton) -> None:
+    limits = skeleton.dof_limits
+    finite = np.isfinite(limits)
+    if (finite & np.stack([limits[:, 0] <= -UNLIMITED, limits[:, 1] >= UNLIMITED], 1)).any():
+        raise UnsupportedFormatError(f".skel takes limits beyond +-{UNLIMITED:.0f} for none")
+    arrays = [skeleton.rest_translations, skeleton.boxes, skeleton.rest_dofs, limits[finite]]
+    if any(np.abs(array).max(initial=0.0) > LARGEST for array in arrays if array is not None):
+        raise UnsupportedFormatError(f".skel cannot hold numbers beyond {LARGEST:.3g}")
+
+
+def _check_names(skeleton: Skeleton) -> None:
+    ancestors: list[int] = []
+    for joint, parent in enumerate(skeleton.parents):
+        while ancestors and ancestors[-1] != parent:
+            ancestors.pop()
+        if parent >= 0 and not ancestors:
+            raise UnsupportedFormatError(
+                f".skel lists joints depth-first; joint {joint_label(skeleton, joint)} "
+                "comes too late"
+            )
+        ancestors.append(joint)
+    for name in skeleton.names:
+        words = as_words(name)
+        if words is None or KEYWORDS & set(words):
+            raise UnsupportedFormatError(f'.skel cannot hold the joint name "{printable(name)}"')
+
+
+def _lines(skeleton: Skeleton) -> list[str]:
+    lines: list[str] = []
+    open_joints: list[int] = []
+
+    def close_until(parent: int) -> None:
+        while open_joints and open_joints[-1] != parent:
+            open_joints.pop()
+            lines.append(_indent(open_joints) + "}\n")
+
+    for joint, parent in enumerate(skeleton.parents):
+        close_until(parent)
+        indent = _indent(open_joints)
+        lines.append(" ".join(filter(None, [f"{indent}balljoint", skeleton.names[joint], "{\n"])))
+        lines.extend(f"{indent}\t{item}\n" for item in _items(skeleton, joint))
+        open_joints.append(joint)
+    close_until(-1)
+    return lines
+
+
+def _indent(open_joints: list[int]) -> str:
+    # A chain of n joints indented in full would take n^2 bytes.
+    return "\t" * min(len(open_joints), _DEEPEST)
+
+
+def _items(skeleton: Skeleton, joint: int) -> list[str]:
+    items = [f"offset {_numbers(skeleton.rest_translations[joint])}"]
+    if skeleton.boxes is not None:
+        low, high = skeleton.boxes[joint]
+        items += [f"boxmin {_numbers(low)}", f"boxmax {_numbers(high)}"]
+    rows = slice(3 + 3 * joint, 6 + 3 * joint)
+    for axis, limits in zip("xyz", skeleton.dof_limits[rows], strict=True):
+        if np.isfinite(limits).any():
+            written = np.nan_to_num(limits, posinf=UNLIMITED, neginf=-UNLIMITED)
+            items.append(f"rot{axis}limit {_numbers(written)}")
+    return [*items, f"pose {_numbers(skeleton.rest_dofs[rows])}"]
+
+
+def _numbers(values: Floats) -> str:
+    return " ".join(map(repr, values.tolist()))
