@@ -110,7 +110,8 @@ def test_match_is_coloured_before_anything_is_rigged(rigging, texts):
     assert (state.options.shading, state.options.scalar) == ("scalar", "class:match")
     assert state.rig.match_share == 1.0 and state.error == ""
     fields = {field.name: field for field in state.scene.actors[0].figure.fields}
-    assert fields["match"].values.tolist() == [1.0] * state.scene.actors[0].figure.mesh.n_vertices
+    assert fields["match"].names == ("matched", "unmatched")
+    assert fields["match"].values.tolist() == [0.0] * state.scene.actors[0].figure.mesh.n_vertices
     assert fields["match distance"].values.max() < 1e-9
     texts.clear()
     hand.step()

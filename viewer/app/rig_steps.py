@@ -128,9 +128,10 @@ def match_fields(
     found = match(surface, welded, size, settings)
     matched, rows = found.matched[welded.vertices], welded.vertices
     distances, angles = found.points.distances[rows], np.degrees(found.angles[rows])
-    classes = ("unmatched", "matched")
+    # In the order of CONFIDENCE, so that both maps have one colour for what is matched.
+    classes = ("matched", "unmatched")
     fields = (
-        VertexField("match", "Match with the template", matched.astype(float), names=classes),
+        VertexField("match", "Match with the template", (~matched).astype(float), names=classes),
         VertexField("match distance", "Distance to the template", distances, "length"),
         VertexField("match angle", "Angle to the template", angles, "degrees"),
     )
