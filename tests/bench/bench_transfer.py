@@ -2,8 +2,9 @@
 
 Parts, all or those named: ``aligned``, the weights alone, template and target lying on each other;
 ``whole``, the whole way, which looks for the alignment itself, against the seed's whole way;
-``unposed``, the same with the template at rest however the target stands; ``scans``, meshes as
-scanners leave them; ``time``, where the time goes.
+``unposed``, the same with the template at rest however the target stands; ``stretched``, targets with
+another scale along each axis, which is what the program then advises to ask for, and asked for;
+``scans``, meshes as scanners leave them; ``time``, where the time goes.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import transfer_targets as made
 import viewer
 from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.skin import Skin, skin_from_entries
+from viewer.rig.transfer.alignment import AlignmentSettings
 from viewer.rig.transfer.matching import Template
 from viewer.rig.transfer.pipeline import TransferSettings, transfer
 from viewer.rig.transfer.weights import WeightSettings, nearest_weights, transferred_weights
@@ -32,7 +34,7 @@ SHARE, SAME = 0.5, 0.97  # goals: mean L1 against the other method's; same domin
 
 def main() -> None:
     figures = {"body": made.body(), "fox": made.fox()}
-    known = ("aligned", "whole", "unposed", "scans", "time")
+    known = ("aligned", "whole", "unposed", "stretched", "scans", "time")
     wanted = [name for name in sys.argv[1:] if name in known] or list(known)
     for part, how in (("aligned", _weights), ("whole", _whole)):
         for what, figure in figures.items() if part in wanted else ():
@@ -40,6 +42,11 @@ def main() -> None:
     if "unposed" in wanted:
         for what, figure in figures.items():
             _compare(what, "whole, the pose not given", made.without_pose(figure, what), _whole)
+    if "stretched" in wanted:
+        for what, figure in figures.items():
+            made_of = made.stretched(figure, what)
+            _compare(what, "whole, stretched, one scale as usual", made_of, _whole)
+            _compare(what, "whole, stretched, --scale axes", made_of, _whole_by_axes)
     if "scans" in wanted:
         _scans(figures)
     if "time" in wanted:
@@ -102,11 +109,16 @@ def _weights(target: made.Target, method: str):
     )
 
 
-def _whole(target: made.Target, method: str):
+def _whole_by_axes(target: made.Target, method: str):
+    return _whole(target, method, "axes")
+
+
+def _whole(target: made.Target, method: str, scale: str = "uniform"):
     normals = vertex_normals(target.positions, target.triangles)
     mesh = Mesh(target.positions, normals, target.triangles)
     figure = made.template_figure(target)
-    return transfer(figure, target.pose, mesh, TransferSettings(method=method)).weights
+    settings = TransferSettings(method=method, alignment=AlignmentSettings(scale=scale))
+    return transfer(figure, target.pose, mesh, settings).weights
 
 
 def _skin(target: made.Target) -> Skin:

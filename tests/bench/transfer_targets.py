@@ -92,6 +92,18 @@ def without_pose(figure: viewer.Figure, what: str) -> list[Target]:
     return [replace(each, pose=rest, template=at_rest.positions) for each in made]
 
 
+def stretched(figure: viewer.Figure, what: str) -> list[Target]:
+    """Return targets that have another scale along each axis, which no pose or limb explains."""
+    rng = np.random.default_rng(22)
+    plain = posed(what, figure, viewer.rest_pose(figure.skeleton))
+    made = []
+    for factors in ((1.05, 1.0, 1.1), (1.2, 1.0, 0.9), (1.3, 1.0, 0.8)):
+        target = _remeshed(plain, rng)
+        name = "stretched by " + ", ".join(f"{factor:g}" for factor in factors)
+        made.append(replace(target, name=name, positions=target.positions * factors))
+    return made
+
+
 def fine(figure: viewer.Figure) -> Target:
     """Return a target of more than 50,000 vertices, a part of which does not fit."""
     rest = posed("", figure, viewer.rest_pose(figure.skeleton))

@@ -10,7 +10,6 @@ pytest.importorskip("scipy")
 from viewer.rig.transfer.icp import (
     Triangles,
     capped_rms,
-    fit_axes,
     gaps_between,
     iterate,
     slide,
@@ -71,15 +70,6 @@ def test_border_edges_are_no_partners():
     # The last lies over the diagonal, which both triangles share.
     assert found.usable.tolist() == [True, False, True]
     assert_allclose(found.positions[1], [0.5, 0.0, 0.0])
-
-
-def test_axes_are_scaled_on_their_own():
-    positions, triangles = tube()
-    template = Triangles(positions, triangles, 800)
-    target = Triangles(positions * [1.2, 1.0, 0.9], triangles, 800)
-    found = fit_axes(template, target, START, 20)
-    assert_allclose(found.scale * found.factors, [1.2, 1.0, 0.9], atol=1e-6)
-    assert_allclose(np.prod(found.factors), 1.0, atol=1e-12)
 
 
 def test_trimmed_rms_leaves_out_the_worst():

@@ -113,6 +113,13 @@ def test_stretched_target_is_told_its_scales():
     )
     scales = [float(value) for value in told[1].split(", ")]
     assert_allclose(scales, [1.3, 1.0, 0.8], atol=0.003)
+    taken, own = aligned(figure, target)
+    assert taken.alignment.how == "fit" and taken.pose is own
+    assert_allclose(taken.alignment.placed.matrix, np.diag([1.3, 1.0, 0.8, 1.0]), atol=0.003)
+    assert [re.sub(r"[\d.]+", "N", line) for line in taken.lines] == [
+        "proportions: the template stretched by N, N, N along x, y and z, pose kept",
+        "that leaves a gap of N % of the size, before N %",
+    ]
     asked, _ = aligned(figure, target, fits=False, scale="axes")
     assert asked.lines == ()
     laid = asked.alignment.placed.apply(figure.mesh.positions)

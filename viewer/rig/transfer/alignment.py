@@ -9,12 +9,12 @@ import numpy as np
 
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints, frozen
+from viewer.rig.transfer.axes_fit import fit_axes
 from viewer.rig.transfer.icp import (
     Cloud,
     Side,
     Triangles,
     capped_rms,
-    fit_axes,
     gaps_between,
     iterate,
     slide,
@@ -265,7 +265,7 @@ def _refined(
         report(0.85, "alignment")
         start = slide(fine[0], fine[1], start, _SLIDES, settings.scale != "none")
     if settings.scale == "axes":
-        return fit_axes(fine[0], fine[1], start, _AXES_ROUNDS)
+        return fit_axes(fine[0], fine[1], start, _AXES_ROUNDS, settings.refines)
     return start
 
 

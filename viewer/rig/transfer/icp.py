@@ -22,26 +22,30 @@ from viewer.rig.transfer.surface_samples import SurfaceSamples, sample_surface, 
 from viewer.rig.vectors import unit
 
 __all__ = [
+    "FEWEST",
+    "HOLD",
+    "SETTLED",
     "Cloud",
     "Gaps",
+    "Pairs",
     "Side",
     "Triangles",
     "capped_rms",
-    "fit_axes",
     "gaps_between",
     "iterate",
+    "pairs_between",
     "slide",
     "trimmed_rms",
 ]
 
 _FAR = 3.0  # medians: pairs farther apart than this are not used
 _SAME_WAY = 0.5  # cosine of 60 degrees between the normals of a pair
-_SETTLED = 1e-5  # relative change of the error, or of scales, at which rounds end
+SETTLED = 1e-5  # relative change of the error, or of scales, at which rounds end
 _EXACT = 1e-12  # error over size at which there is nothing left to improve
 _ON_EDGE = 1e-9  # barycentric coordinate of a point on an edge
-_HOLD = 3e-3  # weight of distances between points beside those to planes, before squaring
+HOLD = 3e-3  # weight of distances between points beside those to planes, before squaring
 _PATIENCE = 3  # rounds without an improvement, as other pairs give another error
-_FEWEST = 8  # pairs that still tell seven numbers
+FEWEST = 8  # pairs that still tell seven numbers
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -139,7 +143,7 @@ def _border_edges(positions: Floats, triangles: Ints) -> Bools:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Pairs:
+class Pairs:
     """Points of the template, where they should come to lie, and the normals there: (N, 3)."""
 
     points: Floats
@@ -177,8 +181,8 @@ def iterate(
     """
     placed, before = start, np.inf
     for _ in range(rounds):
-        pairs = _pairs(template, target, placed)
-        if len(pairs.points) < _FEWEST:
+        pairs = pairs_between(template, target, placed)
+        if len(pairs.points) < FEWEST:
             break
         # Factors belong to the target's axes: without them the rest is a similarity.
         fit = fit_similarity(
@@ -187,7 +191,7 @@ def iterate(
         placed = replace(fit, shift=fit.shift * start.factors, factors=start.factors)
         steps = placed.apply(pairs.points) - pairs.targets
         error = float(np.sqrt(np.einsum("na,na->", steps, steps) / len(steps)))
-        if error <= _EXACT * target.size or abs(before - error) < _SETTLED * error:
+        if error <= _EXACT * target.size or abs(before - error) < SETTLED * error:
             break
         before = error
     return placed
@@ -219,13 +223,13 @@ def slide(
     """
     placed, best, lowest, idle = start, start, np.inf, 0
     for _ in range(rounds):
-        pairs = _pairs(template, target, placed)
-        if len(pairs.points) < _FEWEST:
+        pairs = pairs_between(template, target, placed)
+        if len(pairs.points) < FEWEST:
             break
         moved = placed.apply(pairs.points)
         gaps = np.einsum("na,na->n", pairs.normals, moved - pairs.targets)
         error = float(np.sqrt(np.mean(gaps**2)))
-        idle = 0 if error < lowest * (1.0 - _SETTLED) else idle + 1
+        idle = 0 if error < lowest * (1.0 - SETTLED) else idle + 1
         if error < lowest:
             best, lowest = placed, error
         if idle == _PATIENCE or error <= _EXACT * target.size:
@@ -234,7 +238,7 @@ def slide(
     return best
 
 
-def _step(placed: Similarity, moved: Floats, pairs: _Pairs, scales: bool) -> Similarity:
+def _step(placed: Similarity, moved: Floats, pairs: Pairs, scales: bool) -> Similarity:
     """Solve one linearised round of ``slide``."""
     center = moved.mean(axis=0)
     arms = moved - center
@@ -248,9 +252,9 @@ def _step(placed: Similarity, moved: Floats, pairs: _Pairs, scales: bool) -> Sim
     shifts = np.broadcast_to(np.eye(3), turns.shape)
     whole = np.concatenate([turns, shifts, arms[:, :, None]], axis=2)[:, :, : 7 if scales else 6]
     along = np.einsum("na,nak->nk", pairs.normals, whole)
-    rows = np.concatenate([along, _HOLD * whole.reshape(-1, whole.shape[2])])
+    rows = np.concatenate([along, HOLD * whole.reshape(-1, whole.shape[2])])
     values = np.einsum("na,na->n", pairs.normals, gaps)
-    solved = np.linalg.lstsq(rows, np.concatenate([values, _HOLD * gaps.ravel()]))[0]
+    solved = np.linalg.lstsq(rows, np.concatenate([values, HOLD * gaps.ravel()]))[0]
     turn = rotation_vector_to_matrix(solved[:3])
     grow = 1.0 + (float(solved[6]) if scales else 0.0)
     grow = min(max(grow, 0.5), 2.0)  # a linear step knows nothing of what lies beyond
@@ -258,46 +262,7 @@ def _step(placed: Similarity, moved: Floats, pairs: _Pairs, scales: bool) -> Sim
     return Similarity(grow * placed.scale, turn @ placed.rotation, shift, placed.factors)
 
 
-def fit_axes(template: Side, target: Side, start: Similarity, rounds: int) -> Similarity:
-    """Find another scale along each axis of the target, rotation kept.
-
-    Each round solves for factors f and a shift t that minimise sum (n . (f R p + t - q))^2 +
-    1e-5 |f R p + t - q|^2, in which both are linear.
-
-    Parameters
-    ----------
-    template, target, start, rounds
-        As for ``slide``.
-
-    Returns
-    -------
-    Similarity
-        With factors; the best so far where a fit would mirror, or too few pairs are left.
-    """
-    placed = start
-    for _ in range(rounds):
-        pairs = _pairs(template, target, placed)
-        if len(pairs.points) < _FEWEST:
-            break
-        turned = (pairs.points @ start.rotation.T)[:, :, None] * np.eye(3)
-        whole = np.concatenate([turned, np.broadcast_to(np.eye(3), turned.shape)], axis=2)
-        rows = np.concatenate(
-            [np.einsum("na,nak->nk", pairs.normals, whole), _HOLD * whole.reshape(-1, 6)]
-        )
-        values = np.einsum("na,na->n", pairs.normals, pairs.targets)
-        solved = np.linalg.lstsq(rows, np.concatenate([values, _HOLD * pairs.targets.ravel()]))[0]
-        scales = solved[:3]
-        if (scales <= 0.0).any():
-            break
-        scale = float(np.cbrt(np.prod(scales)))
-        settled = np.abs(scales / (placed.scale * placed.factors) - 1.0).max() < _SETTLED
-        placed = Similarity(scale, start.rotation, solved[3:], scales / scale)
-        if settled:
-            break
-    return placed
-
-
-def _pairs(template: Side, target: Side, placed: Similarity) -> _Pairs:
+def pairs_between(template: Side, target: Side, placed: Similarity) -> Pairs:
     """Match samples of both sides with the other, and leave out what does not go together."""
     ours, theirs = template.samples, target.samples
     found = template.find(placed.undo(theirs.positions))
@@ -306,7 +271,7 @@ def _pairs(template: Side, target: Side, placed: Similarity) -> _Pairs:
     reached = target.find(placed.apply(ours.positions))
     away = _kept(placed, ours.positions, ours.normals, reached.positions, reached.normals)
     away &= reached.usable
-    return _Pairs(
+    return Pairs(
         np.concatenate([found.positions[towards], ours.positions[away]]),
         np.concatenate([theirs.positions[towards], reached.positions[away]]),
         np.concatenate([_turned(placed, found.normals[towards]), reached.normals[away]]),

@@ -28,7 +28,8 @@ from viewer.rig.transfer.alignment import (
     align,
     misfit,
 )
-from viewer.rig.transfer.icp import Cloud, Triangles, fit_axes, iterate
+from viewer.rig.transfer.axes_fit import fit_axes
+from viewer.rig.transfer.icp import Cloud, Triangles, iterate
 from viewer.rig.transfer.orientation_search import axis_direction
 from viewer.rig.transfer.pose_fit import Fitted, fit_pose
 from viewer.rig.transfer.similarity import Similarity
@@ -50,8 +51,8 @@ _SAMPLES, _DENSE = 2_000, 12_000  # as for alignments
 _ROUNDS = 30  # to lay the template the other way round
 _AXES_ROUNDS = 20
 _FOUND = ("search", "in place")  # alignments that nobody vouches for
-# Scales of their own are worth a word where a gap above the first is left, they leave at most the
-# second of it, and differ by more than the third.
+# Scales of their own are looked at where a gap above the first is left, and taken if they leave at
+# most the second of it and differ by more than the third.
 _STRETCH_GAP, _STRETCH_LEFT, _STRETCH = 0.001, 0.5, 1.02
 
 
@@ -141,15 +142,20 @@ def align_posed(
     if settings.scale == "axes" or gap <= min(_CLOSE, _STRETCH_GAP):
         return kept
     exact = Triangles(target.positions, target.triangles, _SAMPLES)
+    stretched = None
+    if settings.scale == "uniform" and rigid.how in _FOUND and not is_part:
+        report(0.5, "proportions")
+        stretched = _stretched(ours, exact, kept)
+        if fits and stretched is not None and misfit(stretched.alignment, False) <= _STRETCH_GAP:
+            return stretched
     if fits and gap > _CLOSE:
         dense = sample_surface(target.positions, target.triangles, _DENSE)
         scales = settings.scale != "none" and not is_part
         job = _Job(template, pose, Cloud(exact.samples, dense), exact, scales)
         kept = _if_better(job, ours, kept, settings.facing, report)
-    if settings.scale == "uniform" and rigid.how in _FOUND and not is_part:
-        lines = _stretch_lines(ours, exact, rigid, misfit(kept.alignment, False))
-        kept = replace(kept, lines=(*kept.lines, *lines))
-    return kept
+    if stretched is None or not _is_closer(stretched, kept):
+        return kept
+    return stretched if fits else replace(kept, lines=(_advice(stretched, kept),))
 
 
 def _if_better(
@@ -173,7 +179,7 @@ def _if_better(
                 found = other
     after = misfit(found.alignment, is_part)
     bent, name = found.most_turned
-    gaps = f"a gap of {100.0 * after:.3f} % of the size, before {100.0 * before:.3f} %"
+    gaps = _gaps(after, before)
     if after > (_PART_KEPT if is_part else _KEPT) * before:
         return replace(kept, lines=(f"pose: not fitted, as that would leave {gaps}",))
     if after <= _POOR:
@@ -214,27 +220,48 @@ def _turned_round(job: _Job, ours: Posed, rigid: Alignment, up: str) -> Alignmen
     )
 
 
-def _stretch_lines(ours: Posed, exact: Triangles, rigid: Alignment, best: float) -> list[str]:
-    """Say so where a scale along each axis closes most of the gap that is left.
-
-    It is never taken unasked: people differ in height and girth, and limbs that point along
-    other axes would be resized with them.
-    """
-    if best <= _STRETCH_GAP:
-        return []
+def _stretched(ours: Posed, exact: Triangles, kept: PosedAlignment) -> PosedAlignment | None:
+    """Return the template with a scale along each axis, if that closes most of the gap."""
+    rigid = kept.alignment
     template = Triangles(ours.positions, ours.triangles, _SAMPLES)
-    placed = fit_axes(template, exact, rigid.placed, _AXES_ROUNDS)
+    placed = fit_axes(template, exact, rigid.placed, _AXES_ROUNDS, turns=True)
     if placed.factors.max() < _STRETCH * placed.factors.min():
-        return []
-    gap = misfit(Alignment.of(template, exact, placed, rigid.how), False)
-    if gap > _STRETCH_LEFT * best:
-        return []
-    scales = ", ".join(f"{value:.4g}" for value in placed.scale * placed.factors)
-    return [
-        f"warning: with a scale of its own along x, y and z ({scales}) the template fits much "
-        f"better, with a gap of {100.0 * gap:.3f} % instead of {100.0 * best:.3f} %: if the target "
-        "was stretched, ask for it (--scale axes)"
-    ]
+        return None
+    alignment = Alignment.of(template, exact, placed, "fit")
+    after, before = misfit(alignment, False), misfit(rigid, False)
+    found = replace(
+        kept,
+        alignment=alignment,
+        lines=(
+            f"proportions: the template stretched by {_scales(placed)} along x, y and z, pose kept",
+            f"that leaves {_gaps(after, before)}",
+        ),
+    )
+    return found if _is_closer(found, kept) else None
+
+
+def _is_closer(stretched: PosedAlignment, other: PosedAlignment) -> bool:
+    """Tell whether a stretched template leaves much less of a gap than another."""
+    gap = misfit(stretched.alignment, False)
+    return gap <= _STRETCH_LEFT * misfit(other.alignment, False)
+
+
+def _advice(stretched: PosedAlignment, kept: PosedAlignment) -> str:
+    gaps = [100.0 * misfit(one.alignment, False) for one in (stretched, kept)]
+    return (
+        "warning: with a scale of its own along x, y and z "
+        f"({_scales(stretched.alignment.placed)}) the template fits much better, with a gap of "
+        f"{gaps[0]:.3f} % instead of {gaps[1]:.3f} %: if the target was stretched, ask for it "
+        "(--scale axes)"
+    )
+
+
+def _scales(placed: Similarity) -> str:
+    return ", ".join(f"{value:.4g}" for value in placed.scale * placed.factors)
+
+
+def _gaps(after: float, before: float) -> str:
+    return f"a gap of {100.0 * after:.3f} % of the size, before {100.0 * before:.3f} %"
 
 
 def _lines(found: Fitted) -> tuple[str, ...]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.errors import counted
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.closest_point import SurfacePoints
 from viewer.rig.skin import Skin
@@ -139,7 +140,7 @@ def match_lines(found: Matches, filled: Bools, method: str) -> tuple[str, ...]:
     if count:
         does = "faces" if count == 1 else "face"
         lines.append(
-            f"{_counted(count, 'part')} of the target {does} the other way than the template: "
+            f"{counted(count, 'part')} of the target {does} the other way than the template: "
             "matched as if turned round"
         )
     if method != "direct":
@@ -151,17 +152,12 @@ def rigid_lines(rigid: RigidIslands) -> tuple[str, ...]:
     """Return one sentence for each of the largest rigid islands, and how many more there are."""
     order = np.argsort(-rigid.counts, kind="stable")
     lines = [
-        f"a part of {_counted(int(rigid.counts[island]), 'vertex')} at vertex "
+        f"a part of {counted(int(rigid.counts[island]), 'vertex')} at vertex "
         f"{rigid.vertices[island]} meets the template nowhere: it moves rigidly, mostly with "
         f"joint {rigid.joints[island]}"
         for island in order[:_LISTED]
     ]
     more = len(order) - _LISTED
     if more > 0:
-        lines.append(f"and so do {_counted(more, 'smaller part')}")
+        lines.append(f"and so do {counted(more, 'smaller part')}")
     return tuple(lines)
-
-
-def _counted(count: int, what: str) -> str:
-    plural = "vertices" if what == "vertex" else f"{what}s"
-    return f"{count} {what if count == 1 else plural}"
