@@ -2,9 +2,9 @@
 
 Parts, all or those named: ``aligned``, the weights alone, template and target lying on each other;
 ``whole``, the whole way, which looks for the alignment itself, against the seed's whole way;
-``unposed``, the same with the template at rest however the target stands; ``stretched``, targets with
-another scale along each axis, which is what the program then advises to ask for, and asked for;
-``scans``, meshes as scanners leave them; ``time``, where the time goes.
+``unposed``, the same with the template at rest however the target stands; ``stretched``, targets
+with another scale along each axis, as they are and with ``--scale axes``; ``scans``, meshes as
+scanners leave them; ``time``, where the time goes.
 """
 
 from __future__ import annotations

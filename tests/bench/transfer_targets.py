@@ -101,7 +101,10 @@ def stretched(figure: viewer.Figure, what: str) -> list[Target]:
         target = _remeshed(plain, rng)
         name = "stretched by " + ", ".join(f"{factor:g}" for factor in factors)
         made.append(replace(target, name=name, positions=target.positions * factors))
-    return made
+    cosine, sine = np.cos(TURN), np.sin(TURN)
+    turn = np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
+    turned = made[1].positions @ turn.T
+    return [*made, replace(made[1], name=f"{made[1].name}, turned", positions=turned)]
 
 
 def fine(figure: viewer.Figure) -> Target:

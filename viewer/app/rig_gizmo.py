@@ -53,11 +53,12 @@ def use_gizmo(state: AppState, template: Template) -> None:
     assert view.target is not None  # the caller looked
     place = target_place(view.target)
     middle = bounding_box(posed_template(view, template).positions).mean(axis=0)
-    before = place @ similarity_now(state, template).matrix @ translation_matrix(middle)
+    now = similarity_now(state, template)
+    before = place @ now.matrix @ translation_matrix(middle)
     after = _scaled(state, before) if view.tool == "scale" else _manipulated(state, before)
     if after is not None:
         moved = np.linalg.inv(place) @ after @ translation_matrix(-middle)
-        move_by_hand(state, template, as_similarity(moved))
+        move_by_hand(state, template, as_similarity(moved, now))
         view.was_dragged = True
 
 

@@ -95,18 +95,21 @@ def similarity_now(state: AppState, template: Template) -> Similarity:
     return box_fit(posed_template(state.rig, template), target_mesh(state))
 
 
-def as_similarity(matrix: Floats) -> Similarity:
+def as_similarity(matrix: Floats, like: Similarity | None = None) -> Similarity:
     """Return the similarity next to a matrix, whose scale is the mean of its three.
 
     Parameters
     ----------
     matrix : (4, 4)
         Not mirrored, nearly one; digits that are missing to a rotation are made up for.
+    like : Similarity or None
+        What was moved: as it is stretched, so is the result.
     """
-    linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
+    factors, own = (np.ones(3), np.ones(3)) if like is None else (like.factors, like.own_factors)
+    linear = np.asarray(matrix, dtype=np.float64)[:3, :3] / factors[:, None] / own
     scale = float(np.cbrt(max(np.linalg.det(linear), 1e-30)))
     rotation = np.asarray(nearest_rotations(linear / scale)[0], dtype=np.float64)
-    return Similarity(scale, rotation, np.asarray(matrix, dtype=np.float64)[:3, 3], np.ones(3))
+    return Similarity(scale, rotation, np.asarray(matrix, dtype=np.float64)[:3, 3], factors, own)
 
 
 def move_by_hand(state: AppState, template: Template, similarity: Similarity) -> None:
@@ -127,7 +130,7 @@ def move_by_hand(state: AppState, template: Template, similarity: Similarity) ->
 
 def _still_true(lines: tuple[str, ...]) -> tuple[str, ...]:
     """Return what was done to the template, without the gap that it left where it lay."""
-    return tuple(line for line in lines if line.startswith("pose:"))
+    return tuple(line for line in lines if line.startswith(("pose:", "proportions:")))
 
 
 def set_aside(state: AppState) -> None:

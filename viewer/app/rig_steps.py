@@ -162,11 +162,7 @@ def transfer_settings(
     """
     alignment = AlignmentSettings()
     if placing is not None:
-        # A matrix that scales each axis on its own cannot be given: it is found again.
-        is_plain = bool((placing.similarity.factors == 1.0).all())
-        alignment = placing.settings
-        if is_plain:
-            alignment = AlignmentSettings(matrix=placing.similarity.matrix)
+        alignment = AlignmentSettings(matrix=placing.similarity.matrix)
     return TransferSettings(
         method=method,
         alignment=alignment,

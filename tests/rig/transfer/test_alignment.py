@@ -156,8 +156,25 @@ def test_matrices_that_mirror_or_shear_are_refused():
     with pytest.raises(RigError) as problem:
         similarity_of(shear)
     assert str(problem.value) == (
-        "alignment: expected a rotation, one scale and a shift, found a shear"
+        "alignment: expected a rotation, a shift, and one scale or one along each axis, found a "
+        "shear"
     )
+
+
+def test_matrices_that_stretch_along_either_spaces_axes_are_taken():
+    rotation = turn([1, 2, 3], 0.7)
+    stretch, matrix = np.diag([1.2, 1.0, 0.7]), np.eye(4)
+    matrix[:3, 3] = 4.0, 5.0, 6.0
+    for linear, stretched, plain in (
+        (stretch @ rotation, "factors", "own_factors"),
+        (rotation @ stretch, "own_factors", "factors"),
+    ):
+        matrix[:3, :3] = 3.0 * linear
+        found = similarity_of(matrix)
+        assert_allclose(found.matrix, matrix, atol=1e-12)
+        assert_allclose(found.rotation, rotation, atol=1e-12)
+        assert_allclose(found.scale * getattr(found, stretched), [3.6, 3.0, 2.1])
+        assert (getattr(found, plain) == 1.0).all() and not found.is_plain
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from rigged_shapes import arm, mesh_of
+from rigged_shapes import arm, mesh_of, turn
 
 pytest.importorskip("scipy")
 
@@ -100,31 +100,41 @@ def test_scales_of_axes_keep_the_pose():
     assert found.pose is own and found.figure is figure
 
 
-def test_stretched_target_is_told_its_scales():
+@pytest.mark.parametrize("own", [False, True])
+def test_stretched_target_gets_a_scale_along_each_axis(own):
     figure = load(bundled_body()).actors[0].figure
     target = mesh_of(figure.mesh.positions * [1.3, 1.0, 0.8], figure.mesh.triangles)
-    found, _ = aligned(figure, target, fits=False)
-    (line,) = found.lines
-    told = re.fullmatch(
-        r"warning: with a scale of its own along x, y and z \((.+)\) the template fits much "
-        r"better, with a gap of 0\.\d+ % instead of 0\.\d+ %: if the target was stretched, ask "
-        r"for it \(--scale axes\)",
-        line,
-    )
-    scales = [float(value) for value in told[1].split(", ")]
-    assert_allclose(scales, [1.3, 1.0, 0.8], atol=0.003)
-    taken, own = aligned(figure, target)
-    assert taken.alignment.how == "fit" and taken.pose is own
-    assert_allclose(taken.alignment.placed.matrix, np.diag([1.3, 1.0, 0.8, 1.0]), atol=0.003)
-    assert [re.sub(r"[\d.]+", "N", line) for line in taken.lines] == [
-        "proportions: the template stretched by N, N, N along x, y and z, pose kept",
+    whose, cure = "the target's", "ask for it (--scale axes)"
+    rotation = np.eye(3)
+    if own:
+        whose, cure = "its own", "fit proportions"
+        rotation = turn([0, 1, 0], 0.5)
+        target = mesh_of(target.positions @ rotation.T, target.triangles)
+    found, pose = aligned(figure, target)
+    assert found.alignment.how == "fit" and found.pose is pose
+    wanted = rotation @ np.diag([1.3, 1.0, 0.8])
+    assert_allclose(found.alignment.placed.linear, wanted, atol=0.005)
+    assert [re.sub(r"[\d.]+", "N", line) for line in found.lines] == [
+        f"proportions: the template stretched by N, N, N along {whose} x, y and z, pose kept",
         "that leaves a gap of N % of the size, before N %",
     ]
+    unfitted, _ = aligned(figure, target, fits=False)
+    (line,) = unfitted.lines
+    told = re.fullmatch(
+        rf"warning: stretched by (.+) along {whose} x, y and z, the template fits much better, "
+        rf"with a gap of 0\.\d+ % instead of \d\.\d+ %: if the target was stretched, (.+)",
+        line,
+    )
+    assert_allclose([float(each) for each in told[1].split(", ")], [1.3, 1.0, 0.8], atol=0.005)
+    assert told[2] == cure
+
+
+def test_scales_that_are_known_are_not_looked_for():
+    figure = load(bundled_body()).actors[0].figure
+    target = mesh_of(figure.mesh.positions * [1.3, 1.0, 0.8], figure.mesh.triangles)
     asked, _ = aligned(figure, target, fits=False, scale="axes")
     assert asked.lines == ()
-    laid = asked.alignment.placed.apply(figure.mesh.positions)
-    size = np.linalg.norm(np.ptp(target.positions, axis=0))
-    assert np.linalg.norm(laid - target.positions, axis=1).max() < 0.003 * size
+    assert_allclose(asked.alignment.placed.linear, np.diag([1.3, 1.0, 0.8]), atol=0.003)
     known, _ = aligned(figure, target, fits=False, scale="none")
     assert known.lines == ()
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from imgui_bundle import imgui
@@ -155,11 +156,11 @@ def _draw_numbers(state: AppState, template: Template) -> None:
     if angle is not None:
         x, y, z = (axis_rotations(axis, np.radians(angle[axis])) for axis in range(3))
         rotation = z @ y @ x
-    moved = Similarity(
-        scale if scale is not None else now.scale,
-        rotation,
-        now.shift if shift is None else shift,
-        np.ones(3),
+    moved = replace(
+        now,
+        scale=now.scale if scale is None else scale,
+        rotation=rotation,
+        shift=now.shift if shift is None else shift,
     )
     _move(state, template, moved)
 

@@ -270,22 +270,38 @@ def _refined(
 
 
 def similarity_of(matrix: Floats) -> Similarity:
-    """Return a 4 x 4 matrix as the similarity it is.
+    """Return a 4 x 4 matrix as the similarity it is, stretched along one space's axes at most.
 
     Raises
     ------
     RigError
-        If it mirrors, shears, or scales one direction otherwise than another.
+        If it mirrors, shears, or scales along other directions than the axes of the template or
+        of the target.
     """
     linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
     determinant = float(np.linalg.det(linear))
     if not determinant > 0.0:
         raise RigError("alignment: expected a matrix that does not mirror or flatten")
-    scale = float(np.cbrt(determinant))
+    scale, shift = float(np.cbrt(determinant)), np.asarray(matrix)[:3, 3]
     rotation = linear / scale
-    if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-6:
-        raise RigError("alignment: expected a rotation, one scale and a shift, found a shear")
-    return Similarity(scale, rotation, np.asarray(matrix)[:3, 3], np.ones(3))
+    if _is_rotation(rotation):
+        return Similarity(scale, rotation, shift, np.ones(3))
+    for axis in (1, 0):
+        # F R has rows of lengths F, and R H columns of lengths H.
+        factors = np.linalg.norm(rotation, axis=axis)
+        factors = factors / np.cbrt(np.prod(factors))
+        plain = rotation / (factors[:, None] if axis else factors)
+        if _is_rotation(plain):
+            both = (factors, np.ones(3)) if axis else (np.ones(3), factors)
+            return Similarity(scale, plain, shift, *both)
+    raise RigError(
+        "alignment: expected a rotation, a shift, and one scale or one along each axis, found a "
+        "shear"
+    )
+
+
+def _is_rotation(linear: Floats) -> bool:
+    return bool(np.abs(linear @ linear.T - np.eye(3)).max() <= 1e-6)
 
 
 _HOW = {
@@ -306,8 +322,9 @@ def alignment_lines(alignment: Alignment) -> list[str]:
         how = "the target lies on the template as it is"
     shift = ", ".join(f"{value:.4g}" for value in placed.shift + 0.0)
     factors = ""
-    if (placed.factors != 1.0).any():
-        factors = f" (along x, y, z: {', '.join(f'{f:.4g}' for f in placed.factors)})"
+    for values, whose in ((placed.factors, ""), (placed.own_factors, "the template's ")):
+        if (values != 1.0).any():
+            factors = f" (along {whose}x, y, z: {', '.join(f'{f:.4g}' for f in values)})"
     lines = [
         f"alignment: {how}; scale {placed.scale:.6g}{factors}, turned by "
         f"{angle:.2f} degrees, shift ({shift})",

@@ -287,8 +287,8 @@ def _kept(
 
 
 def _turned(placed: Similarity, normals: Floats) -> Floats:
-    # Normals turn by the inverse transpose, and factors are of the target's axes.
-    return unit((normals @ placed.rotation.T) / placed.factors)
+    # Normals turn by the inverse transpose.
+    return unit(((normals / placed.own_factors) @ placed.rotation.T) / placed.factors)
 
 
 def trimmed_rms(distances: Floats, share: float = 0.9) -> float:

@@ -224,16 +224,27 @@ def _stretched(ours: Posed, exact: Triangles, kept: PosedAlignment) -> PosedAlig
     """Return the template with a scale along each axis, if that closes most of the gap."""
     rigid = kept.alignment
     template = Triangles(ours.positions, ours.triangles, _SAMPLES)
-    placed = fit_axes(template, exact, rigid.placed, _AXES_ROUNDS, turns=True)
-    if placed.factors.max() < _STRETCH * placed.factors.min():
+    trials = [
+        fit_axes(template, exact, rigid.placed, _AXES_ROUNDS, turns=True, own=own)
+        for own in (False, True)
+    ]
+    alignments = [
+        Alignment.of(template, exact, placed, "fit")
+        for placed in trials
+        if _stretch(placed) >= _STRETCH
+    ]
+    if not alignments:
         return None
-    alignment = Alignment.of(template, exact, placed, "fit")
+    # Where both are the same axes, those that --scale axes speaks of.
+    alignment, *other = alignments
+    if other and misfit(other[0], False) < _CLEARLY * misfit(alignment, False):
+        alignment = other[0]
     after, before = misfit(alignment, False), misfit(rigid, False)
     found = replace(
         kept,
         alignment=alignment,
         lines=(
-            f"proportions: the template stretched by {_scales(placed)} along x, y and z, pose kept",
+            f"proportions: the template stretched by {_scales(alignment.placed)}, pose kept",
             f"that leaves {_gaps(after, before)}",
         ),
     )
@@ -248,16 +259,25 @@ def _is_closer(stretched: PosedAlignment, other: PosedAlignment) -> bool:
 
 def _advice(stretched: PosedAlignment, kept: PosedAlignment) -> str:
     gaps = [100.0 * misfit(one.alignment, False) for one in (stretched, kept)]
+    placed = stretched.alignment.placed
+    cure = "fit proportions" if (placed.factors == 1.0).all() else "ask for it (--scale axes)"
     return (
-        "warning: with a scale of its own along x, y and z "
-        f"({_scales(stretched.alignment.placed)}) the template fits much better, with a gap of "
-        f"{gaps[0]:.3f} % instead of {gaps[1]:.3f} %: if the target was stretched, ask for it "
-        "(--scale axes)"
+        f"warning: stretched by {_scales(placed)}, the template fits much better, with a gap of "
+        f"{gaps[0]:.3f} % instead of {gaps[1]:.3f} %: if the target was stretched, {cure}"
     )
 
 
+def _stretch(placed: Similarity) -> float:
+    factors = placed.factors * placed.own_factors
+    return float(factors.max() / factors.min())
+
+
 def _scales(placed: Similarity) -> str:
-    return ", ".join(f"{value:.4g}" for value in placed.scale * placed.factors)
+    is_own = bool((placed.factors == 1.0).all())
+    scales = placed.scale * (placed.own_factors if is_own else placed.factors)
+    texts = ", ".join(f"{value:.4g}" for value in scales)
+    whose = "its own" if is_own else "the target's"
+    return f"{texts} along {whose} x, y and z"
 
 
 def _gaps(after: float, before: float) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -16,7 +16,7 @@ _ON_LINE = 1e-6  # second over first extent: points nearer to a line than this l
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Similarity:
-    """A map of points, p' = F s R p + t, F = diag(factors).
+    """A map of points, p' = F s R H p + t, F = diag(factors), H = diag(own_factors).
 
     Attributes
     ----------
@@ -28,23 +28,36 @@ class Similarity:
         In the unit of the space mapped to.
     factors : (3,)
         Further scales along the axes of the space mapped to; their product is 1.
+    own_factors : (3,)
+        The same along the axes of the points' own space.
     """
 
     scale: float
     rotation: Floats
     shift: Floats
     factors: Floats
+    own_factors: Floats = field(default_factory=lambda: np.ones(3))
 
     def __post_init__(self) -> None:
-        for name, shape in (("rotation", (3, 3)), ("shift", (3,)), ("factors", (3,))):
+        for name, shape in (
+            ("rotation", (3, 3)),
+            ("shift", (3,)),
+            ("factors", (3,)),
+            ("own_factors", (3,)),
+        ):
             object.__setattr__(self, name, frozen(name, getattr(self, name), shape))
         if not 0.0 < self.scale < np.inf:
             raise RigError(f"alignment: expected a scale above 0, found {self.scale:g}")
 
     @property
     def linear(self) -> Floats:
-        """F s R: (3, 3)."""
-        return (self.scale * self.factors)[:, None] * self.rotation
+        """F s R H: (3, 3)."""
+        return (self.scale * self.factors)[:, None] * self.rotation * self.own_factors
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether there is one scale for all directions."""
+        return bool((self.factors == 1.0).all() and (self.own_factors == 1.0).all())
 
     @property
     def matrix(self) -> Floats:
@@ -60,7 +73,8 @@ class Similarity:
 
     def undo(self, points: Floats) -> Floats:
         """Map points (..., 3) of the space mapped to back."""
-        return (points - self.shift) / (self.scale * self.factors) @ self.rotation
+        turned = (points - self.shift) / (self.scale * self.factors) @ self.rotation
+        return turned / self.own_factors
 
 
 def fit_similarity(points: Floats, targets: Floats, scale: float | None = None) -> Similarity:
