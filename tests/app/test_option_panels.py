@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from viewer.rendering.camera import VIEWS
 from viewer.rendering.options import SHOWN, Lights
 from viewer.rendering.program import SHADING
+from viewer.rig.scene import Actor
 
 
 @pytest.fixture
@@ -181,3 +184,24 @@ def test_light_colour_is_picked(tall):
     assert tall.state.options.lights.key.color != before
     assert tall.state.options.lights.rim == Lights().rim
     assert all(0 <= value <= 1 for value in tall.state.options.lights.key.color)
+
+
+def test_stats_follow_actors_that_come_go_and_change(tall, texts):
+    def vertices():
+        texts.clear()
+        tall.step()
+        return texts[texts.index("Vertices") + 1]
+
+    assert vertices() == "12"
+    tall.state.scene.actors.append(Actor(tall.state.actor.figure))
+    tall.step(2)
+    assert vertices() == "24"
+    tall.key("z", "ctrl")
+    assert vertices() == "12"
+    tall.key("y", "ctrl")
+    assert vertices() == "24"
+    # Another figure in the place of one.
+    bare = replace(tall.state.actor.figure, mesh=None, skin=None)
+    tall.state.scene.actors[1] = Actor(bare)
+    tall.step(2)
+    assert vertices() == "12"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -134,6 +135,28 @@ def test_match_counts_what_is_near_enough_and_faces_alike(rigging):
     hand.click("Show match")
     finish(hand)
     assert hand.state.rig.match_share < 0.35
+
+
+def test_stretch_is_kept_when_the_template_is_moved_and_run(rigging):
+    hand = rigging()
+    stretch = np.array([1.25, 1.0, 0.8])
+    stretched = replace(placing_now(hand.state).similarity, own_factors=stretch)
+    move_by_hand(hand.state, current_template(hand.state), stretched)
+    hand.click("rig tool scale")
+    hand.step(2)
+    hand.enter_value("Scale by", f"{stretched.scale * 1.01}")
+    now = placing_now(hand.state).similarity
+    assert now.scale == pytest.approx(1.01 * stretched.scale)
+    assert_allclose(now.own_factors, stretch)
+    moved = now.matrix.copy()
+    moved[:3, :3] = rig_scene.ROTATION @ moved[:3, :3]
+    again = as_similarity(moved, now)
+    assert_allclose(again.matrix, moved, atol=1e-9 * np.abs(moved).max())
+    finish(hand)
+    hand.click("Run")
+    finish(hand)
+    placed = hand.state.rig.results["robust"].rigged.alignment.placed
+    assert_allclose(placed.own_factors, stretch, atol=1e-9)
 
 
 def test_run_puts_the_rigged_mesh_in_the_targets_place_in_one_step(rigging):

@@ -158,6 +158,25 @@ def test_edit_pauses_the_clip_and_says_why(moved):
     assert moved.state.playback.time == stopped
 
 
+@pytest.mark.parametrize("shake", [0, 2])
+def test_click_on_a_handle_does_not_pause(moved, shake):
+    moved.state.playback.playing = True
+    moved.step(3)
+    x, y = around(joint_seen(moved, 0), 1.2 * RADIUS, 0.3, 1.1)[0]
+    moved.move((x, y))
+    moved.press()
+    assert moved.state.posing.drag is not None
+    time = moved.state.playback.time
+    moved.move((x + shake, y))
+    moved.step(3)
+    # Time waits as long as the handle is held.
+    assert moved.state.playback.playing and moved.state.playback.time == time
+    moved.let_go()
+    moved.step(3)
+    assert moved.state.playback.playing and moved.state.playback.time > time
+    assert not moved.says("Paused") and moved.undo_steps == 0
+
+
 def test_key_button_keeps_the_pose_in_the_clip_and_is_undone(moved):
     moved.state.playback.seek(1.0)
     moved.step(2)

@@ -7,7 +7,7 @@ import pytest
 from app.captured import people, walk
 
 from viewer.app.srgb import decode_srgb, encode_srgb
-from viewer.app.tracks import bars, present_spans
+from viewer.app.tracks import bars, present_spans, ruler_text_place
 
 
 @pytest.mark.parametrize(
@@ -28,6 +28,25 @@ def test_bars_are_never_too_narrow(places, drawn):
 def test_lone_frame_is_a_span_of_no_length():
     present = [False, True, False, False, True, True]
     assert present_spans(walk(present, 1), 0.01) == [(0.1, 0.1), (0.4, 0.5)]
+
+
+@pytest.mark.parametrize(
+    ("x", "begin"),
+    [(0.0, 3.0), (77.0, 80.0), (77.5, 54.5), (100.0, 77.0)],
+)
+def test_number_of_the_ruler_stays_within_it(x, begin):
+    assert ruler_text_place(x, 20.0, 100.0) == begin
+
+
+def test_last_number_of_the_ruler_is_not_cut_off(drive, rig):
+    scene = people(rig, np.ones(121, dtype=bool))
+    hand = drive(scene=scene, size=(1280, 800), samples=1)
+    _, y0, x1, _ = hand.state.item_rects["Scrubber"]
+    picture = hand.screen()[round(y0) : round(y0) + 14].astype(int).sum(axis=2)
+    # Letters are the brightest there: those of the last number are left of the end.
+    letters = np.flatnonzero((picture > 380).any(axis=0))
+    last = letters[letters > x1 - 45]
+    assert len(last) > 10 and last.max() < x1 - 1
 
 
 def test_srgb_and_back():

@@ -206,7 +206,7 @@ def test_every_influence_has_a_line_a_dot_and_a_word(pinned):
     assert_allclose(found.segments.colors[[1, 5], 3], 0.35 + 0.65 * 0.5)
     assert found.labels.words == tuple(f"{name}  0.500" for name in explanation.names)
     assert_allclose(found.labels.points - shift, explanation.images)
-    assert found.labels.ranks.tolist() == [0, 1]
+    assert found.labels.ranks.tolist() == [1, 2]  # the name of the selected joint comes first
     alone = vertex_annotation(explanation, actor, False, (960, 720))
     assert alone.labels is None and len(alone.segments.widths) == 2
 
@@ -261,3 +261,24 @@ def test_vertex_without_influence_says_so(drive, rig, texts):
 
 def test_pinning_is_no_undo_step(pinned):
     assert pinned.undo_steps == 0
+
+
+@pytest.mark.parametrize(("width", "digits"), [(720, 3), (960, 3), (1100, 4), (1280, 4)])
+def test_panel_needs_no_sideways_scrolling(drive, rig, texts, width, digits):
+    hand = drive(*rig, size=(width, 640), samples=1)
+    pin_vertex(hand.state, 0, 4)
+    hand.step(6)
+    windows = imgui.get_current_context().windows
+    inner = next(one for one in windows if one.name.startswith("Vertex/numbers"))
+    assert inner.scroll_max.x == 0.0 and inner.content_size.x > 100.0
+    listed = said(hand, texts)
+    assert listed[listed.index("sum w") + 1] == f"{1.0:.{digits}f}"
+
+
+def test_weight_has_a_line_of_its_own_where_the_name_is_long(drive, rig, texts):
+    hand = drive(*rig, size=(1280, 800), samples=1)
+    names = ("root", "a_name_that_is_as_long_as_some_are")
+    object.__setattr__(hand.state.actor.figure.skeleton, "names", names)
+    pin_vertex(hand.state, 0, 4)
+    hand.step(4)
+    assert said(hand, texts).count("w = 0.5000") == 1

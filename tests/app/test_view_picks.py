@@ -39,13 +39,14 @@ def near(hand, triangle, corner):
     return seen_at(hand, 0.8 * places[corner] + 0.2 * places.mean(axis=0))
 
 
-def facing(hand):
-    """Return the side of the column that faces the camera most."""
+def facing(hand, row=0):
+    """Return the side of the column that faces the camera most, with a corner from a row on."""
     actor = hand.state.actor
     corners = actor.figure.mesh.triangles[4:]  # those before are above and below
     places, normals = deform(actor.figure, actor.pose, hand.state.options.skinning)
     to_eye = np.linalg.inv(hand.state.camera.view_matrix())[:3, 3] - places[corners].mean(axis=1)
-    return 4 + int((normals[corners].sum(axis=1) * to_eye).sum(axis=1).argmax())
+    faces = (normals[corners].sum(axis=1) * to_eye).sum(axis=1)
+    return 4 + int(np.where((corners >= row).any(axis=1), faces, -np.inf).argmax())
 
 
 def rest(hand, place, frames=20):
@@ -174,6 +175,80 @@ def test_alt_click_pins_and_plain_click_does_not(column):
     column.click(place, held="alt")
     vertex = column.state.actor.figure.mesh.triangles[triangle, 1]
     assert column.state.weights.pinned.vertex == vertex
+
+
+@pytest.mark.parametrize(("row", "name"), [(8, "arm"), (0, "root")])
+def test_click_on_the_skin_selects_the_joint_that_moves_it_most(column, row, name):
+    mesh = column.state.actor.figure.mesh
+    triangle = facing(column, row)
+    corner = int(np.flatnonzero(mesh.triangles[triangle] // 4 == row // 4)[0])
+    vertex = int(mesh.triangles[triangle, corner])
+    click(column, near(column, triangle, corner))
+    skeleton = column.state.actor.figure.skeleton
+    assert skeleton.names[column.state.selected_joint] == name
+    assert column.says(f"{name} 1.00: the largest weight at vertex {vertex}")
+    assert column.state.weights.pinned is None and column.undo_steps == 0
+
+
+def test_click_on_the_skin_reaches_the_tree(drive, rig):
+    hand = drive(*rig, size=(1280, 800), samples=1)
+    hand.step(3)
+    hand.state.joint_filter, hand.state.opened_joints = "roo", set()
+    triangle = facing(hand, 8)
+    corner = int(hand.state.actor.figure.mesh.triangles[triangle].argmax())
+    click(hand, near(hand, triangle, corner))
+    hand.step(3)
+    assert hand.state.selected_joint == 1 and hand.state.joint_filter == ""
+    assert hand.state.opened_joints == {0, 1} and "joint arm" in hand.state.item_rects
+
+
+def test_drag_over_the_skin_selects_nothing(column):
+    x, y = near(column, facing(column), 1)
+    azimuth = column.state.camera.azimuth
+    column.pull((x, y), (x + 40, y))
+    column.step(2)
+    assert column.state.selected_joint == -1 and column.state.camera.azimuth != azimuth
+
+
+@pytest.mark.parametrize("tool", ["select", "rotate", "move"])
+def test_click_on_the_background_lets_go_of_the_joint(column, tool):
+    column.state.posing.tool, column.state.selected_joint = tool, 1
+    column.step(2)
+    x, y, width, _ = column.state.view_rect
+    column.double_click((x + width - 30, y + 300))
+    click(column, (x + width - 30, y + 300))
+    assert column.state.selected_joint == -1
+
+
+def test_click_on_a_figure_without_weights_keeps_the_joint(column):
+    actor = column.state.actor
+    bare = replace(actor.figure, skin=None)
+    column.state.scene.actors[0] = replace(actor, figure=bare)
+    column.state.selected_joint = 1
+    column.key("f")
+    column.step(2)
+    click(column, seen_at(column, bare.mesh.positions.mean(axis=0)))
+    assert column.state.selected_joint == 1
+
+
+def test_hover_tells_what_a_click_would_choose(column):
+    triangle = facing(column, 8)
+    corner = int(column.state.actor.figure.mesh.triangles[triangle].argmax())
+    place = near(column, triangle, corner)
+    rest(column, place)
+    assert column.state.weights.hover.lines[-1] == "click: arm 1.00"
+    column.state.weights.picks_vertices = True
+    rest(column, (place[0] + 1, place[1]))
+    assert not any(line.startswith("click") for line in column.state.weights.hover.lines)
+
+
+def test_hover_over_a_dot_tells_its_joint(column):
+    column.key("b")  # x-ray: dots and bones lie over the skin
+    actor = column.state.actor
+    place = joint_matrices(actor.figure, actor.pose)[0][:3, 3]
+    rest(column, seen_at(column, place + np.array([0.0, 1e-3, 0.0])))
+    lines = column.state.weights.hover.lines
+    assert lines and lines[-1] == "click: root"
 
 
 def test_box_lets_plain_clicks_pin(column):

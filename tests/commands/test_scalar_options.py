@@ -39,7 +39,7 @@ def test_line_says_what_the_numbers_are(render, body):
         ("dominant", "Dominant joint: 24 of 24"),
         ("sums", "|sum of weights - 1|: 0 to 0"),
         ("stretch", "Edge stretch, largest: 0 to 0 %"),
-        ("cut", "Distance to few influences: 0 to 0 mm"),
+        ("cut", "Distance to 4 influences: 0 to 0 mm"),
     ):
         assert render(body, "--scalar", name, "--no-grid")[1] == f", {text}\n"
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from viewer.rendering.annotation import Labels, letters_for, place_labels
+from viewer.rendering.annotation import Labels, leader_lines, letters_for, place_labels
 from viewer.rendering.camera import Camera
 from viewer.rendering.lettering import Lettering
 from viewer.rendering.view import view_of
@@ -27,7 +27,7 @@ def placed(lettering, points, ranks, words=None):
     colors = np.arange(3.0 * count).reshape(count, 3) / 100
     words = words or tuple("abcdefgh"[:count])
     labels = Labels(words, np.array(points, dtype=float), np.array(ranks), colors)
-    return place_labels(labels, view_of(camera, SIZE, BOX), SIZE, lettering)
+    return place_labels([labels], view_of(camera, SIZE, BOX), SIZE, lettering)
 
 
 def test_letters_grow_with_the_picture():
@@ -38,19 +38,49 @@ def test_letters_grow_with_the_picture():
 
 def test_low_ranks_come_first_and_then_the_nearer(lettering):
     same_place = [[0, 0, 0.0], [0, 0, 1.0], [0, 0, -1.0], [0, 0, 0.5]]
-    # There is room to the right and to the left of the place.
-    assert placed(lettering, same_place, [1, 1, 0, 1]).words == ("c", "b")
-    assert placed(lettering, same_place, [1, 1, 1, 1]).words == ("b", "d")
-    assert placed(lettering, same_place, [0, 1, 2, 3]).words == ("a", "b")
+    assert placed(lettering, same_place, [1, 1, 0, 1]).words == ("c", "b", "d", "a")
+    assert placed(lettering, same_place, [1, 1, 1, 1]).words == ("b", "d", "a", "c")
+    assert placed(lettering, same_place, [0, 1, 2, 3]).words == ("a", "b", "c", "d")
 
 
 def test_colours_go_with_their_words(lettering):
-    found = placed(lettering, [[0, 0, 0.0], [0, 0, 1.0], [0, 0, -1.0]], [2, 1, 0])
-    assert found.words == ("c", "b")
-    assert_allclose(found.colors, [[0.06, 0.07, 0.08], [0.03, 0.04, 0.05]])
-    assert (found.n_seen, found.n_left_out) == (3, 1)
+    found = placed(lettering, [[0, 0, 0.0], [0, 0, 1.0], [9, 0, -1.0]], [2, 1, 0])
+    assert found.words == ("b", "a")
+    assert_allclose(found.colors, [[0.03, 0.04, 0.05], [0.0, 0.01, 0.02]])
+    assert (found.n_seen, found.n_left_out) == ((2,), (0,))
 
 
 def test_no_words_are_none(lettering):
     found = placed(lettering, np.zeros((0, 3)), np.zeros(0, int), ())
-    assert found.words == () and found.corners.shape == (0, 2) and found.n_left_out == 0
+    assert found.words == () and found.corners.shape == (0, 2) and found.n_left_out == (0,)
+
+
+def test_words_of_several_are_placed_together(lettering):
+    camera = Camera(azimuth=0.0, inclination=0.0, fov=90.0, distance=2.0, orthographic=True)
+    view, place, white = view_of(camera, SIZE, BOX), np.zeros((1, 3)), np.ones((1, 3))
+    many = Labels(("a",) * 6, np.repeat(place, 6, axis=0), np.full(6, 7), np.ones((6, 3)))
+    one = Labels(("b",), place, np.array([3]), white)
+    found = place_labels([many, one], view, SIZE, lettering)
+    assert found.words[0] == "b" and found.owners.tolist() == [1] + [0] * (len(found.words) - 1)
+    assert found.n_seen == (6, 1) and found.n_left_out == (7 - len(found.words), 0)
+    sizes = lettering.sizes(found.words)
+    cover = np.zeros(SIZE[::-1], dtype=int)
+    for (left, top), (width, height) in zip(found.corners, sizes, strict=True):
+        cover[top : top + height, left : left + width] += 1
+    assert cover.max() == 1
+
+
+def test_lines_lead_from_beside_the_point_to_its_word(lettering):
+    found = placed(lettering, np.zeros((3, 3)), [0, 1, 2])
+    assert found.has_line.tolist() == [False, False, True]
+    camera = Camera(azimuth=0.0, inclination=0.0, fov=90.0, distance=2.0, orthographic=True)
+    view = view_of(camera, SIZE, BOX)
+    lines = leader_lines(found, view, SIZE)
+    # A dark one beneath one in the word's own colour, in the plane of the point: z = 0.
+    assert len(lines.widths) == 2 and lines.widths[0] > lines.widths[1]
+    assert_allclose(lines.colors[1], [0.06, 0.07, 0.08, 1.0])
+    # 180 pixels a unit, the middle at (400, 360). The word is three gaps of 7 * 600 / 720 above.
+    assert_allclose(lines.starts[1], [0.0, 5.0 * 600 / 720 / 180, 0.0], atol=1e-12)
+    end = [0.0, (360.0 - found.ends[2, 1]) / 180.0, 0.0]
+    assert_allclose(lines.ends[1], end, atol=1e-12)
+    assert 360.0 - found.ends[2, 1] == pytest.approx(17.5, abs=0.51)

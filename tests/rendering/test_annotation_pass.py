@@ -62,9 +62,10 @@ def test_words_are_drawn_beside_their_point(offscreen):
     named = drawn(picture(offscreen, dot((0, 0, 0), RED, words=["ab", "cd", "ef"])))
     more = named & ~alone
     half = PIXELS // 2
-    # One word fits on each side; none lies above or below the place.
-    assert more[:, :half].any() and more[:, half:].any()
-    assert not more[: half - 12].any() and not more[half + 12 :].any()
+    # One word on each side, and above them the third with a line that leads there.
+    assert more[half - 6 : half + 6, :half].any() and more[half - 6 : half + 6, half:].any()
+    assert more[: half - 14].any() and not more[half + 12 :].any()
+    assert more[half - 12 : half - 8, half - 1 : half + 1].all()
 
 
 def test_words_of_two_annotations_are_both_kept(offscreen):

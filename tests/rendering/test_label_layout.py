@@ -1,4 +1,4 @@
-"""Labels beside their points: right, else left, else not at all; never over each other."""
+"""Labels beside their own points, where room is; never over each other, nor nearer to others."""
 
 from __future__ import annotations
 
@@ -31,20 +31,57 @@ def test_label_stays_within_the_picture_vertically():
     assert placed([(20.0, 59.0)], [(30, 10)]) == {0: (24, 50)}
 
 
-def test_second_label_takes_the_other_side_and_the_third_none():
-    same = [(50.0, 30.0)] * 3
-    assert placed(same, [(30, 10)] * 3) == {0: (54, 25), 1: (16, 25)}
+def test_labels_of_one_point_lie_right_left_and_with_lines_above_and_below():
+    same, sizes = np.full((5, 2), [50.0, 30.0]), np.full((5, 2), [30, 10])
+    layout = lay_out(same, np.arange(5), sizes, PICTURE, 4.0)
+    # Three gaps away above and below; the places askew lie behind the first two.
+    assert layout.corners.tolist() == [[54, 25], [16, 25], [35, 8], [35, 42]]
+    assert layout.has_line.tolist() == [False, False, True, True]
+    assert layout.ends.tolist() == [[54.0, 30.0], [46.0, 30.0], [50.0, 18.0], [50.0, 42.0]]
 
 
 def test_first_in_order_comes_first():
     same = [(50.0, 30.0)] * 3
-    assert placed(same, [(30, 10)] * 3, order=[2, 0, 1]) == {2: (54, 25), 0: (16, 25)}
+    assert placed(same, [(30, 10)] * 3, order=[2, 0, 1]) == {2: (54, 25), 0: (16, 25), 1: (35, 8)}
 
 
 def test_half_a_gap_stays_free_beside_a_label():
-    # The first ends at column 24; the other would begin at 25 + 4 - 4.
-    found = placed([(0.0, 30.0), (21.0, 30.0), (22.0, 30.0)], [(20, 10)] * 3)
-    assert found == {0: (4, 25), 2: (26, 25)}
+    # The first ends at column 64. There is no room right of the second point.
+    assert placed([(40.0, 30.0), (90.0, 30.0)], [(20, 10)] * 2) == {0: (44, 25), 1: (66, 25)}
+    # One column less: up and to the left, 4 sqrt(1/2) both ways.
+    assert placed([(40.0, 30.0), (89.0, 30.0)], [(20, 10)] * 2) == {0: (44, 25), 1: (66, 17)}
+
+
+def test_label_does_not_lie_on_another_point():
+    assert placed([(50.0, 30.0), (60.0, 30.0)], [(30, 10)] * 2) == {0: (16, 25), 1: (64, 25)}
+
+
+def test_free_place_is_better_than_one_near_another_point():
+    # The right place ends 7 before the other point: less than three gaps of 4.
+    assert placed([(50.0, 30.0), (91.0, 30.0)], [(30, 10)] * 2)[0] == (16, 25)
+    assert placed([(50.0, 30.0), (97.0, 30.0)], [(30, 10)] * 2)[0] == (54, 25)
+    # Left of the point is no room, and above it is more than to its right.
+    assert placed([(20.0, 30.0), (61.0, 30.0)], [(30, 10)] * 2)[0] == (5, 16)
+
+
+def test_point_between_others_gets_a_line_to_its_label():
+    row = np.array([(38.0, 30.0), (50.0, 30.0), (62.0, 30.0)])
+    layout = lay_out(row, np.array([1, 0, 2]), np.full((3, 2), [30, 10]), PICTURE, 4.0)
+    # All places 4 away are nearer than 6 to one of the others.
+    assert layout.chosen[0] == 1 and layout.has_line[0]
+    left, top = layout.corners[0]
+    for x, y in row[[0, 2]]:
+        away = max(left - x, x - left - 30, 0.0), max(top - y, y - top - 10, 0.0)
+        assert np.hypot(*away) >= 6.0
+
+
+def test_search_ends_after_many_without_room():
+    # 220 labels at one place have room for four; the one aside comes too late.
+    anchors = np.array([(20.0, 30.0)] * 220 + [(80.0, 5.0)])
+    layout = lay_out(anchors, np.arange(221), np.full((221, 2), [10, 8]), PICTURE, 4.0)
+    assert 220 not in layout.chosen
+    layout = lay_out(anchors, np.arange(220, -1, -1), np.full((221, 2), [10, 8]), PICTURE, 4.0)
+    assert 220 in layout.chosen
 
 
 def test_label_wider_than_the_picture_is_left_out():
@@ -58,13 +95,20 @@ def test_label_wider_than_the_picture_is_left_out():
         max_size=30,
     )
 )
-def test_no_two_labels_overlap(rows):
+def test_no_two_labels_overlap_and_none_seems_that_of_another_point(rows):
     anchors = np.array([row[:2] for row in rows]).reshape(-1, 2)
     sizes = np.array([row[2:] for row in rows], dtype=np.int32).reshape(-1, 2)
     layout = lay_out(anchors, np.arange(len(rows)), sizes, PICTURE, 3.0)
     cover = np.zeros(PICTURE[::-1], dtype=int)
-    for index, (left, top) in zip(layout.chosen, layout.corners, strict=True):
+    for index, (left, top), leads in zip(
+        layout.chosen, layout.corners, layout.has_line, strict=True
+    ):
         width, height = sizes[index]
         assert left >= 0 and left + width <= 100 and top >= 0 and top + height <= 60
         cover[top : top + height, left : left + width] += 1
+        nearest = np.clip(anchors, (left, top), (left + width, top + height))
+        away = np.linalg.norm(nearest - anchors, axis=1)
+        others = np.abs(anchors - anchors[index]).max(axis=1) >= 1.0
+        own = 3.0 if leads else away[index]
+        assert (away[others] >= 1.5 * own - 1e-9).all()
     assert cover.max(initial=0) <= 1

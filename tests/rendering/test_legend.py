@@ -12,11 +12,12 @@ from viewer.rendering.legend import Entry, Shown, legend_of, round_ticks
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.palettes import NOTHING
 from viewer.rendering.scalar_look import look_of, shown_ends
-from viewer.rig.annotations import BodyParts
+from viewer.rig.annotations import BodyParts, VertexField
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh
-from viewer.rig.scalars import SCALARS
+from viewer.rig.scalars import SCALARS, menu_title, missing_part
 from viewer.rig.skin import skin_from_lists
+from viewer.rig.skinning import Skinning
 
 
 def strip(influences=None, **parts) -> Figure:
@@ -36,7 +37,8 @@ def legend(name, *numbers, figure=None, **options):
     values = [np.array(each, dtype=float) for each in numbers]
     ends = shown_ends(name, figure, [(v.min(), v.max()) for v in values], shown_options)
     look = look_of(name, figure, ends, shown_options)
-    return legend_of(name, [Shown(figure, each, look) for each in values])
+    having = [] if missing_part(name, figure) else [Shown(figure, each, look) for each in values]
+    return legend_of(name, having, shown_options.skinning, [figure])
 
 
 @pytest.mark.parametrize(
@@ -75,7 +77,7 @@ def test_every_range_has_two_to_six_ticks(power, share):
 
 def test_lengths_are_in_millimetres():
     found = legend("cut", [0, 0.001, 0.0123, 0, 0, 0])
-    assert found.heading == "Distance to few influences, mm"
+    assert found.heading == "Distance to 4 influences, mm"
     assert [tick.text for tick in found.ticks] == ["0", "5", "10"]
     assert found.note == "from 0 to 12.3"
     assert found.colors.shape == (256, 4)
@@ -115,7 +117,7 @@ def test_typical_range_tells_the_extremes_too():
         ((-480.0, 480.0), "from -10 to +480"),
     ):
         look = look_of("stretch", figure, ends, shown_options)
-        found = legend_of("stretch", [Shown(figure, numbers, look)])
+        found = legend_of("stretch", [Shown(figure, numbers, look)], Skinning(), [figure])
         assert found.note == note
 
 
@@ -173,11 +175,27 @@ def test_figure_without_what_is_needed_is_told(name):
     bare = replace(strip(), skin=None)
     nothing = [-1.0 if SCALARS[name].kind == "categorical" else 0.0] * 6
     found = legend(name, nothing, figure=bare)
-    assert found.title == SCALARS[name].title
+    assert found.title == menu_title(name, Skinning())
     assert found.note == f"no figure has {SCALARS[name].needs}"
     assert found.ticks == found.entries == () and len(found.colors) == 0
 
 
 def test_unknown_joint_and_no_joint_are_told():
-    assert legend("weight", [0] * 6).note == "no figure has a selected joint"
+    assert legend("weight", [0] * 6).note == "no joint is selected"
     assert legend("weight:toe", [0] * 6).note == 'no figure has a joint "toe"'
+
+
+@pytest.mark.parametrize(("kept", "title"), [
+    (0, "Distance to 4 influences"), (8, "Distance to 8 influences"), (1, "Distance to 1 influence")
+])  # fmt: skip
+def test_number_of_influences_is_named(kept, title):
+    found = legend("cut", [0, 0.1, 0, 0, 0, 0], skinning=Skinning(max_influences=kept))
+    assert found.heading == f"{title}, mm"
+    assert legend("cut", [0] * 6, figure=replace(strip(), skin=None)).title.endswith("4 influences")
+
+
+def test_title_is_kept_while_the_figure_that_has_the_field_is_hidden():
+    having = strip(fields=(VertexField("near", "How near", np.zeros(6)),))
+    found = legend_of("field:near", [], Skinning(), [strip(), having])
+    assert (found.title, found.note) == ("How near", "not known of what is shown")
+    assert legend_of("field:near", [], Skinning(), [strip()]).title == "Field"

@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from viewer.rendering.camera import Camera
-from viewer.rendering.projection import picture_scale, project, project_segments
+from viewer.rendering.projection import picture_scale, project, project_segments, unproject
 from viewer.rendering.view import view_of
 
 BOX = np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
@@ -39,6 +39,15 @@ def test_what_is_behind_or_beside_is_not_seen(view):
 
 def test_no_points_are_no_points(view):
     assert project(view, SIZE, np.zeros((0, 3))).pixels.shape == (0, 2)
+
+
+@pytest.mark.parametrize("orthographic", [False, True])
+def test_pixels_lead_back_to_points_as_deep_as_others(orthographic):
+    camera = Camera(azimuth=0.0, inclination=0.0, fov=90.0, distance=4.0, orthographic=orthographic)
+    view, points = view_of(camera, SIZE, BOX), np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 2.0]])
+    found = unproject(view, SIZE, points, np.array([[112.5, 25.0], [100.0, 75.0]]))
+    # 12.5 pixels a unit at the target; at z = 2 half as much is seen, but not in parallel.
+    assert_allclose(found, [[1, 2, 0], [0, -2 if orthographic else -1, 2]], atol=1e-12)
 
 
 def test_segment_in_front_has_both_its_ends(view):

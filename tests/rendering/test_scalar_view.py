@@ -343,7 +343,7 @@ def test_selected_joint_is_shown_by_a_view_without_a_joint(offscreen):
         found = target.read()
         assert offscreen.renderer.legend.title == "Weight of j1"
         offscreen.renderer.draw(scene, camera, options, target, scene_box(scene), (0, -1))
-        assert offscreen.renderer.legend.note == "no figure has a selected joint"
+        assert offscreen.renderer.legend.note == "no joint is selected"
     np.testing.assert_array_equal(found, wanted)
 
 
@@ -365,3 +365,26 @@ def test_same_colour_is_the_same_number_on_all_figures(offscreen):
     ends = [offscreen.renderer.posed_mesh(actor).scalars.look.ends for actor in both.actors]
     assert ends == [(0.0, 1.0), (0.0, 1.0)]
     assert offscreen.renderer.scalar_range == (0.0, 1.0)
+
+
+def test_figure_without_what_is_shown_is_drawn_as_usual(offscreen):
+    having = rising().actors[0]
+    lacking = alone(grid_figure()).actors[0]
+    having.placement[0, 3], lacking.placement[0, 3] = -2.0, 2.0
+    colors = {"shading": "scalar", "skinning": Skinning(correctives=False)}
+    together = front_view(offscreen, Scene([having, lacking]), scalar="correctives", **colors)
+    legend = offscreen.renderer.legend
+    assert legend.title == "Effect of pose correctives" and len(legend.colors)
+    apart = [front_view(offscreen, Scene([having]), scalar="correctives", **colors),
+             front_view(offscreen, Scene([lacking]))]  # fmt: skip
+    half = together.shape[1] // 2
+    np.testing.assert_array_equal(together[:, :half], apart[0][:, :half])
+    np.testing.assert_array_equal(together[:, half:], apart[1][:, half:])
+    # The one that has it hidden: the other stays as it is, and the legend keeps its title.
+    having.visible = False
+    alone_now = front_view(offscreen, Scene([having, lacking]), scalar="correctives", **colors)
+    np.testing.assert_array_equal(alone_now[:, half:], apart[1][:, half:])
+    legend = offscreen.renderer.legend
+    assert legend.title == "Effect of pose correctives"
+    assert legend.note == "not known of what is shown"
+    assert offscreen.renderer.scalar_range == (0.0, 0.0)

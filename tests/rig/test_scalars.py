@@ -21,6 +21,7 @@ from viewer.rig.scalars import (
     find_view,
     joint_of,
     length_unit,
+    menu_title,
     missing_part,
     shown_unit,
     split_name,
@@ -241,7 +242,7 @@ def test_joints_without_a_skeleton_have_indices():
     figure = Figure("skin", mesh([[0.0, 0, 0]]), None, skin)
     assert compute("weight:#1", figure, None, Skinning()).tolist() == [0.25]
     assert categories("dominant", figure) == ("#0", "#1")
-    assert view_title("weight:1", figure) == "Weight of #1"
+    assert view_title("weight:1", figure, Skinning()) == "Weight of #1"
     with pytest.raises(RigError) as caught:
         joint_of(figure, "knee")
     assert str(caught.value) == 'no joint "knee"; without a skeleton there are #0 to #1'
@@ -252,8 +253,9 @@ def test_what_a_figure_lacks_for_the_weight_of_a_joint():
     assert missing_part("weight:knee", figure) == ""
     assert missing_part("weight", figure) == "a selected joint"
     assert missing_part("weight:toe", figure) == 'a joint "toe"'
-    assert view_title("weight:KNEE", figure) == "Weight of knee"
-    assert view_title("weight:toe", figure) == view_title("weight", figure) == "Weight of a joint"
+    assert view_title("weight:KNEE", figure, Skinning()) == "Weight of knee"
+    for name in ("weight:toe", "weight"):
+        assert view_title(name, figure, Skinning()) == "Weight of a joint"
 
 
 def test_units_of_views():
@@ -293,10 +295,19 @@ def test_fields_are_shown_by_name_or_the_first_of_their_kind():
     figure = replace(sliding([[(0, 1.0)]] * 3), fields=(FAR, KINDS_OF_MATCH), unit="m")
     for name in ("field", "field:far", "field:FAR"):
         assert compute(name, figure, None, Skinning()).tolist() == [0.5, 2.0, 0.0]
-        assert view_title(name, figure) == "How far" and shown_unit(name, figure) == (1000.0, "mm")
+        assert view_title(name, figure, Skinning()) == "How far"
+        assert shown_unit(name, figure) == (1000.0, "mm")
     assert compute("class:match", figure, None, Skinning()).tolist() == [0.0, 1.0, 1.0]
     assert categories("class", figure) == ("near", "filled")
     assert missing_part("field:near", figure) == 'a field "near"'
     assert missing_part("class", replace(figure, fields=(FAR,))) == "classes"
     with pytest.raises(RigError, match=r'^no field is called "match"; there are: far$'):
         compute("field:match", figure, None, Skinning())
+
+
+def test_titles_tell_how_many_influences_are_kept():
+    figure = sliding([[(0, 1.0)]] * 3)
+    assert view_title("cut", figure, Skinning()) == "Distance to 4 influences"
+    assert menu_title("cut", Skinning(max_influences=1)) == "Distance to 1 influence"
+    assert menu_title("cut", Skinning(max_influences=8)) == "Distance to 8 influences"
+    assert menu_title("entropy", Skinning(max_influences=8)) == "Entropy of weights"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from viewer.app.posing_actions import cancel_drag
 from viewer.app.reasons import no_motion
 from viewer.app.rig_tools import drop_rig_tool
+from viewer.app.selection import select_joint
 from viewer.app.state import AppState
 from viewer.app.weights_actions import unpin
 from viewer.errors import ViewerError, printable
@@ -15,7 +16,6 @@ from viewer.rendering.pinhole import distortion_error
 from viewer.rig.follow import followed_point
 from viewer.rig.pose import rest_pose
 from viewer.rig.scene import Actor, scene_points
-from viewer.rig.skeleton import joint_label
 
 __all__ = [
     "cancel",
@@ -114,16 +114,7 @@ def take_pick(state: AppState, found: Pick, aims: bool) -> None:
         state.choose_actor(found.actor)
         state.say_status(printable(state.actor.name, 60))
     if found.joint >= 0:
-        state.selected_joint = state.weights.scrolls_to = found.joint
-        skeleton = state.actor.figure.skeleton
-        if skeleton is not None:
-            label = joint_label(skeleton, found.joint)
-            if state.joint_filter.lower() not in label.lower():
-                state.joint_filter = ""
-        above = found.joint
-        while skeleton is not None and above >= 0:
-            state.opened_joints.add(above)  # so that its row is seen
-            above = int(skeleton.parents[above])
+        select_joint(state, found.joint)
     if aims:
         state.camera.fixed = None
         state.camera.target = found.point.copy()

@@ -106,7 +106,8 @@ def vertex_annotation(
         for name, weight in zip(explanation.names, explanation.weights.tolist(), strict=True)
     )
     white = np.broadcast_to(LABEL_COLOR, (len(words), 3))
-    labels = Labels(words, images, np.arange(len(words), dtype=np.int32), white)
+    # After the name of the selected joint, before those of all others.
+    labels = Labels(words, images, np.arange(1, len(words) + 1, dtype=np.int32), white)
     return Annotation(joined([lines, *parts]), Manner(on_top=True), labels)
 
 

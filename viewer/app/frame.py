@@ -121,8 +121,14 @@ class Frame:
         state.stats.frame_ms = 1e3 * (time.perf_counter() - started)
 
     def _play(self) -> None:
-        """Let the clock run on, by the time since the last frame was begun."""
-        self.state.playback.advance(imgui.get_io().delta_time)
+        """Let the clock run on, by the time since the last frame was begun.
+
+        It waits while a handle is held that has not been dragged yet: a click must not pause, and
+        the pose in which a drag began must stay.
+        """
+        drag = self.state.posing.drag
+        if drag is None or drag.has_moved:
+            self.state.playback.advance(imgui.get_io().delta_time)
 
     def _pose(self) -> None:
         """Pose the actors for the time that is shown, if it or their clips changed."""

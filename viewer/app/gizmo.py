@@ -15,6 +15,7 @@ from viewer.app.posed_joint import PosedJoint, posed_joint
 from viewer.app.posing import Drag, Handle, Outcome
 from viewer.app.posing_actions import cancel_drag, no_tool, selected
 from viewer.app.rotate_tool import TurnHandle, grab_ring, rings
+from viewer.app.selection import select_joint
 from viewer.app.state import AppState
 from viewer.app.view_frame import Place, ViewFrame, view_frame
 from viewer.rig.arrays import Floats
@@ -34,6 +35,7 @@ __all__ = [
 DOT_REACH = 9.0
 """Window coordinates around a joint in which it is chosen."""
 
+_STILL = 2.0  # window coordinates by which a hand that clicks may shake
 _LEFT, _RIGHT = imgui.MouseButton_.left, imgui.MouseButton_.right
 
 
@@ -60,7 +62,6 @@ def use_handles(state: AppState) -> bool:
     handle = _grabbed(state, place)
     if handle is None:
         return False
-    pause_for_edit(state)
     state.posing.drag = Drag(state.actor, handle, Outcome(_pose(state), ""))
     return True
 
@@ -75,7 +76,9 @@ def _go_on(state: AppState, drag: Drag, place: Place) -> bool:
         state.posing.drag = drag if imgui.is_mouse_down(_LEFT) else None
         return True
     frame, snaps = view_frame(state), imgui.get_io().key_ctrl
-    drag.has_moved |= place != drag.handle.place
+    if not drag.has_moved and _apart(place, drag.handle.place) > _STILL:
+        drag.has_moved = True
+        pause_for_edit(state)
     asked = (place, snaps, frame.matrix.tobytes())
     if drag.has_moved and imgui.is_mouse_pos_valid() and asked != drag.asked:
         drag.asked = asked
@@ -86,6 +89,10 @@ def _go_on(state: AppState, drag: Drag, place: Place) -> bool:
         if not drag.has_moved:
             choose_joint(state)  # its dot lies under a ring or an arrow
     return True
+
+
+def _apart(one: Place, other: Place) -> float:
+    return float(np.hypot(one[0] - other[0], one[1] - other[1]))
 
 
 def _pose(state: AppState) -> Pose:
@@ -102,7 +109,7 @@ def _grabbed(state: AppState, place: Place) -> Handle | None:
     joint = joint_at(state, place)
     if joint < 0:
         return None
-    _select(state, joint)
+    select_joint(state, joint)
     posed = posed_joint(state.actor, joint)
     return None if posed is None else _middle(state, posed, place)
 
@@ -132,7 +139,7 @@ def handle_at(state: AppState, frame: ViewFrame, place: Place) -> Handle | None:
     if arrow is not None:
         return ShiftHandle(posed, pose, place, arrow)
     center = frame.place(posed.center)
-    if center is None or np.hypot(center[0] - place[0], center[1] - place[1]) > DOT_REACH:
+    if center is None or _apart(center, place) > DOT_REACH:
         return None
     return _middle(state, posed, place)
 
@@ -172,14 +179,5 @@ def choose_joint(state: AppState) -> bool:
     mouse = imgui.get_io().mouse_pos
     joint = joint_at(state, (mouse.x, mouse.y))
     if joint >= 0:
-        _select(state, joint)
+        select_joint(state, joint)
     return joint >= 0
-
-
-def _select(state: AppState, joint: int) -> None:
-    """Select a joint and open the rows above its own in the tree."""
-    state.selected_joint = state.weights.scrolls_to = joint
-    skeleton = state.actor.figure.skeleton
-    while skeleton is not None and joint >= 0:
-        state.opened_joints.add(joint)
-        joint = int(skeleton.parents[joint])

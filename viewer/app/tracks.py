@@ -16,10 +16,11 @@ from viewer.errors import printable
 from viewer.rig.clip import Clip
 from viewer.rig.scene import Actor, Motion
 
-__all__ = ["bars", "draw_tracks", "nice_step", "present_spans"]
+__all__ = ["bars", "draw_tracks", "nice_step", "present_spans", "ruler_text_place"]
 
 _NAME_WIDTH = 9.0  # letters' heights
 _TICK_GAP = 5.0  # the same: smallest distance of two numbers on the ruler
+_TICK_ASIDE = 3.0  # points between a line of the ruler and its number
 _TIME = (1.0, 0.62, 0.25, 1.0)
 _PLAIN = (0.44, 0.62, 0.80)  # of actors without a colour of their own, sRGB
 _QUIET = 0.6  # opacity of the tracks of actors that are not chosen
@@ -168,17 +169,39 @@ def _draw_ruler(playback: Playback, area: tuple[float, float, float, float], hei
     low, high = playback.whole
     scale = width / max(high - low, 1e-9)
     line, color = imgui.get_color_u32(_LINE), imgui.get_color_u32(_TEXT)
-    step = nice_step(_TICK_GAP * imgui.get_font_size() / scale * playback.frame_rate)
     first, last = (playback.first_frame + frame for frame in playback.frame_range)
+    # Room for two numbers: the last one may stand left of its line.
+    room = 2.0 * imgui.calc_text_size(str(last)).x + 3.0 * _TICK_ASIDE
+    room = max(_TICK_GAP * imgui.get_font_size(), room)
+    step = nice_step(room / scale * playback.frame_rate)
     for number in range(math.ceil(first / step) * step, last + 1, step):
         x = left + (playback.frame_time(number - playback.first_frame) - low) * scale
         draw_list.add_line((x, top), (x, top + total), line)
-        draw_list.add_text((x + 3.0, top), color, str(number))
+        place = ruler_text_place(x, imgui.calc_text_size(str(number)).x, left + width)
+        draw_list.add_text((place, top), color, str(number))
     dark = imgui.get_color_u32(_OUTSIDE)
     for start, end in ((low, playback.start), (playback.end, high)):
         if end > start:
             x0, x1 = left + (start - low) * scale, left + (end - low) * scale
             draw_list.add_rect_filled((x0, top), (x1, top + total), dark)
+
+
+def ruler_text_place(x: float, length: float, end: float) -> float:
+    """Return where a number of the ruler begins: right of its line, left of it at the end.
+
+    Parameters
+    ----------
+    x : float
+        Of the line, points.
+    length : float
+        Of the number as it is written, points.
+    end : float
+        Where the ruler ends, points.
+
+    >>> ruler_text_place(50.0, 20.0, 100.0), ruler_text_place(90.0, 20.0, 100.0)
+    (53.0, 67.0)
+    """
+    return x - _TICK_ASIDE - length if x + _TICK_ASIDE + length > end else x + _TICK_ASIDE
 
 
 def _draw_time(playback: Playback, area: tuple[float, float, float, float]) -> None:

@@ -3,28 +3,34 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from imgui_bundle import imgui
 
 from viewer.app.actions import take_pick
+from viewer.app.gizmo import joint_at
 from viewer.app.panels import PANELS
+from viewer.app.posing_actions import no_tool
+from viewer.app.selection import select_joint
 from viewer.app.state import AppState
 from viewer.app.weights_actions import pin_vertex
 from viewer.app.weights_view import Hover, wants_vertex
-from viewer.errors import ViewerError
+from viewer.errors import ViewerError, printable
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.picking import Pick
 from viewer.rendering.renderer import Renderer
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.scene import Actor
 from viewer.rig.single_vertices import deform_vertices
+from viewer.rig.skeleton import joint_label
 from viewer.rig.skinning import Skinning
 from viewer.rig.transform import apply_transform
 from viewer.rig.vertex_facts import facts_text, nearest_corner, vertex_facts
 
 __all__ = ["answer_picks", "tells_vertices", "vertex_at"]
 
+_LONGEST = 40  # letters of a name
 _REST = 0.2  # seconds for which the mouse must lie still
 
 
@@ -63,7 +69,10 @@ def _take_click(
     pixel: tuple[float, float],
     aims: bool,
 ) -> None:
-    """Pin the vertex at a pixel if vertices are wanted; else choose, or aim the camera there."""
+    """Pin the vertex at a pixel if vertices are wanted; else choose, or aim the camera there.
+
+    On a skin the joint is chosen that moves it most there, on the background none.
+    """
     if not aims and wants_vertex(state.weights):
         found = vertex_at(state, renderer, size, pixel)
         if found is not None:
@@ -71,8 +80,36 @@ def _take_click(
             imgui.set_window_focus(PANELS["vertex"].title)  # other tabs may lie over it
         return
     pick = _pick(state, renderer, size, pixel, state.options)
-    if pick is not None:
-        take_pick(state, pick, aims)
+    if pick is None:
+        if not aims:
+            state.selected_joint = -1
+        return
+    take_pick(state, pick, aims)
+    mover = None if aims else _mover(state, pick)
+    if mover is not None:
+        select_joint(state, mover.joint)
+        state.say_status(f"{mover.text}: the largest weight at vertex {mover.vertex}")
+
+
+class _Mover(NamedTuple):
+    """The joint that moves a vertex most."""
+
+    joint: int
+    vertex: int
+    text: str
+
+
+def _mover(state: AppState, pick: Pick) -> _Mover | None:
+    """Return the joint with the largest weight where a skin was hit; None for anything else."""
+    if pick.joint >= 0 or pick.triangle < 0:
+        return None
+    actor, vertex, triangle = _vertex_of(state, pick)
+    figure = state.scene.actors[actor].figure
+    facts = vertex_facts(figure, None, state.options.skinning, vertex, triangle)
+    if not len(facts.joints):
+        return None
+    name = printable(facts.names[0], _LONGEST)
+    return _Mover(int(facts.joints[0]), vertex, f"{name} {facts.weights[0]:.2f}")
 
 
 def _pick(
@@ -113,8 +150,12 @@ def vertex_at(
         options, show=show, keypoints=False, xray=False, joint_names=False, joint_axes=False
     )
     found = _pick(state, renderer, size, pixel, seen)
-    if found is None or found.triangle < 0:
-        return None
+    return None if found is None or found.triangle < 0 else _vertex_of(state, found)
+
+
+def _vertex_of(state: AppState, found: Pick) -> tuple[int, int, int]:
+    """Return actor, vertex and triangle of a surface that was hit; -1 for a reduced triangle."""
+    options = state.options
     actor = state.scene.actors[found.actor]
     figure = actor.figure
     assert figure.mesh is not None  # it has a triangle
@@ -166,9 +207,29 @@ def _look_under_mouse(
         return
     hover.is_known = True
     pixel = (place[0] - x) * scale, (place[1] - y) * scale
-    found = vertex_at(state, renderer, size, pixel)
+    pick = _pick(state, renderer, size, pixel, state.options)
+    on_skin = pick is not None and pick.joint < 0 and pick.triangle >= 0
+    if pick is not None and on_skin:
+        found: tuple[int, int, int] | None = _vertex_of(state, pick)
+    else:  # something lies over the surface
+        found = vertex_at(state, renderer, size, pixel)
     if found is not None:
         _describe(state, hover, *found)
+        hover.lines = (*hover.lines, *_click_text(state, pick))
+
+
+def _click_text(state: AppState, pick: Pick | None) -> tuple[str, ...]:
+    """Return a line on what a click would choose here, if it would choose a joint."""
+    mouse = imgui.get_io().mouse_pos
+    if wants_vertex(state.weights) or pick is None:
+        return ()
+    over = joint_at(state, (mouse.x, mouse.y)) if state.posing.is_on and not no_tool(state) else -1
+    whose = state.actor if over >= 0 else state.scene.actors[pick.actor]
+    joint, skeleton = over if over >= 0 else pick.joint, whose.figure.skeleton
+    if joint >= 0 and skeleton is not None:
+        return (f"click: {printable(joint_label(skeleton, joint), _LONGEST)}",)
+    mover = _mover(state, pick)
+    return () if mover is None else (f"click: {mover.text}",)
 
 
 def _describe(state: AppState, hover: Hover, index: int, vertex: int, triangle: int) -> None:

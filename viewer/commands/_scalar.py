@@ -17,6 +17,7 @@ from viewer.rig.scalars import (
     find_view,
     joint_of,
     length_text,
+    menu_title,
     missing_part,
     shown_unit,
     split_name,
@@ -144,8 +145,8 @@ def scalar_text(scene: Scene, options: DisplayOptions) -> str:
     ]
     if not having:
         text = length_text(scene.actors[0].figure, 0.0) if view.unit == "length" else "0"
-        return f", {view.title}: 0 to {text}"
-    title = view_title(name, having[0].figure)
+        return f", {menu_title(split_name(name)[0], options.skinning)}: 0 to {text}"
+    title = view_title(name, having[0].figure, options.skinning)
     values = [compute(name, actor.figure, actor.pose, options.skinning) for actor in having]
     if view.kind == "categorical":
         return f", {title}: {_n_different(name, scene, values)}"

@@ -14,6 +14,7 @@ from viewer.rig.skeleton import joint_labels
 __all__ = ["name_labels"]
 
 _LONGEST = 40  # letters of a name
+_LATE = 1000  # rank of joints that nobody chose: other words come before their names
 
 
 def name_labels(marks: Sequence[JointMarks], selected: tuple[int, int]) -> Labels:
@@ -34,4 +35,4 @@ def name_labels(marks: Sequence[JointMarks], selected: tuple[int, int]) -> Label
     )
     points = np.concatenate([one.points for one in marks])
     colors = np.where(is_chosen[:, None], HIGHLIGHT[:3], LABEL_COLOR)
-    return Labels(tuple(words), points, (~is_chosen).astype(np.int32), colors)
+    return Labels(tuple(words), points, np.where(is_chosen, 0, _LATE).astype(np.int32), colors)

@@ -14,7 +14,16 @@ from viewer.rig.arrays import Bytes, Floats
 from viewer.rig.figure import Figure
 from viewer.rig.memo import Memo
 from viewer.rig.mesh import triangle_areas
-from viewer.rig.scalars import categories, find_view, missing_part, shown_unit, view_title
+from viewer.rig.scalars import (
+    categories,
+    find_view,
+    menu_title,
+    missing_part,
+    shown_unit,
+    split_name,
+    view_title,
+)
+from viewer.rig.skinning import Skinning
 
 __all__ = ["Entry", "Legend", "Shown", "Tick", "legend_of", "round_ticks"]
 
@@ -92,28 +101,42 @@ class Shown:
     look: ScalarLook
 
 
-def legend_of(name: str, shown: Sequence[Shown]) -> Legend:
+def legend_of(
+    name: str, having: Sequence[Shown], skinning: Skinning, figures: Sequence[Figure]
+) -> Legend:
     """Return the legend of a view.
 
     Parameters
     ----------
     name : str
         Of the view.
-    shown : sequence of Shown
-        All figures that are drawn, at least one. The first that has what the view shows gives
-        title and unit.
+    having : sequence of Shown
+        The figures that are drawn and have what the view shows; the first one gives title and unit.
+    skinning : Skinning
+        How they are drawn.
+    figures : sequence of Figure
+        All of the scene, also those that are not drawn; at least one.
     """
-    missing = [missing_part(name, one.figure) for one in shown]
-    if all(missing):
-        return Legend(find_view(name).title, note=f"no figure has {missing[0]}")
-    having = [one for one, lacks in zip(shown, missing, strict=True) if not lacks]
-    title = view_title(name, having[0].figure)
+    if not having:
+        return _empty(name, skinning, figures)
+    title = view_title(name, having[0].figure, skinning)
     kind = find_view(name).kind
     if kind == "categorical":
         return Legend(title, entries=_entries(name, having))
     if kind == "discrete":
         return _counts(title, having)
     return _bar(name, title, having)
+
+
+def _empty(name: str, skinning: Skinning, figures: Sequence[Figure]) -> Legend:
+    """Return the legend of a view that no figure which is drawn has: why there is nothing."""
+    missing = [missing_part(name, figure) for figure in figures]
+    hidden = [figure for figure, lacks in zip(figures, missing, strict=True) if not lacks]
+    if hidden:
+        return Legend(view_title(name, hidden[0], skinning), note="not known of what is shown")
+    if missing[0] == "a selected joint":
+        return Legend(find_view(name).title, note="no joint is selected")
+    return Legend(menu_title(split_name(name)[0], skinning), note=f"no figure has {missing[0]}")
 
 
 def round_ticks(low: float, high: float, signed: bool = False) -> tuple[Tick, ...]:

@@ -25,6 +25,7 @@ SKIN_COLOR = (0.62, 0.60, 0.57)
 _EDGE_COLOR = (0.05, 0.07, 0.10, 0.55)  # sRGB and alpha
 _NORMAL_COLOR = (0.10, 0.75, 0.85, 1.0)
 _NORMAL_LENGTH = 0.02  # of the figure's size
+_USUAL = DisplayOptions().shading
 _TEXTURE_UNIT, _COLORMAP_UNIT = 5, 6  # those before are the skinning shader's
 
 
@@ -66,15 +67,15 @@ class MeshPass:
         color : (r, g, b), optional
             Of what has no texture, linear; ``SKIN_COLOR`` if omitted.
         """
-        is_scalar = options.shading == "scalar"
-        corners = "corners" if is_scalar else ""
-        program = self.programs.drawing("mesh", options.shading, geometry=corners)
+        look = mesh.scalars.look if options.shading == "scalar" else None
+        corners = "corners" if look is not None else ""
+        program = self.programs.drawing("mesh", _shading(mesh, options), geometry=corners)
         set_model(program, view, placement, mesh.center)
         set_lights(program, view, options.lights)
         set_surface(program, mesh.mesh, options)
         set_uniforms(program, {"u_color": SKIN_COLOR if color is None else color})
-        if is_scalar and mesh.scalars.look is not None:
-            set_uniforms(program, {"u_colormap": _COLORMAP_UNIT, **mesh.scalars.look.uniforms})
+        if look is not None:
+            set_uniforms(program, {"u_colormap": _COLORMAP_UNIT, **look.uniforms})
             mesh.scalars.use(_COLORMAP_UNIT)
         indices = mesh.mesh.index_set(options.reduced, options.hidden_parts)
         draw_runs(self.array(mesh, program, indices), indices, options.texture)
@@ -146,6 +147,13 @@ class MeshPass:
         for _, array in self._arrays.values():
             array.release()
         self._arrays.clear()
+
+
+def _shading(mesh: PosedMesh, options: DisplayOptions) -> str:
+    """Return how a mesh is shaded: as usual if it lacks the numbers that others show."""
+    if options.shading == "scalar" and mesh.scalars.look is None:
+        return _USUAL
+    return options.shading
 
 
 def set_surface(program: moderngl.Program, mesh: MeshBuffers, options: DisplayOptions) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from viewer.rendering.view import View
 from viewer.rig.arrays import Bools, Floats
 
-__all__ = ["Projected", "picture_scale", "project", "project_segments"]
+__all__ = ["Projected", "picture_scale", "project", "project_segments", "unproject"]
 
 _USUAL_HEIGHT = 720.0  # pixels of a picture whose marks have their usual size
 _SCALES = 0.8, 4.0
@@ -86,6 +86,32 @@ def project_segments(
     clips = np.where(behind[..., None], cut, clips)
     w = clips[..., 3]
     return _pixels(clips, np.where(w > 0.0, w, 1.0), size), seen
+
+
+def unproject(view: View, size: tuple[int, int], points: Floats, pixels: Floats) -> Floats:
+    """Return what is seen at some pixels, as deep in the picture as some points are.
+
+    Parameters
+    ----------
+    view : View
+        The camera's matrices.
+    size : (int, int)
+        Width and height of the picture, pixels.
+    points : (N, 3)
+        Scene space, in front of the eye.
+    pixels : (N, 2)
+        From the picture's left and upper edge.
+
+    Returns
+    -------
+    (N, 3)
+        Scene space: (P V)^-1 c with the points' own c_z and c_w.
+    """
+    clip = _clip(view, points)
+    clip[:, 0] = (2.0 * pixels[:, 0] / size[0] - 1.0) * clip[:, 3]
+    clip[:, 1] = (1.0 - 2.0 * pixels[:, 1] / size[1]) * clip[:, 3]
+    found = clip @ np.linalg.inv(view.projection @ view.matrix).T
+    return np.asarray(found[:, :3] / found[:, 3:])
 
 
 def picture_scale(size: tuple[int, int]) -> float:

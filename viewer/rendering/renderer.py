@@ -74,7 +74,7 @@ class Renderer:
     ghost : Ghost or None
         A surface that is shown over the scene without being part of it.
     names_left_out : (int, int)
-        How many joints of the last picture have no name because it would cover another one, and of
+        How many joints of the last picture have no name for want of room beside them, and of
         how many.
     """
 
@@ -282,7 +282,8 @@ class Renderer:
         if options.shading == "scalar" and meshes.singles:
             index, joint = selected
             whose = scene.actors[index] if 0 <= index < len(scene.actors) else None
-            self.scalars.update(meshes.singles, options, (whose, joint))
+            figures = [actor.figure for actor in scene.actors if actor.figure.mesh is not None]
+            self.scalars.update(meshes.singles, options, (whose, joint), figures)
         self._prepare(target)
         self.ground_pass.draw_background(options.background)
         draw_layer(self.context, options, partial(self._draw_surfaces, meshes, view, options))
@@ -339,22 +340,31 @@ class Renderer:
         size: tuple[int, int],
         selected: tuple[int, int],
     ) -> None:
-        """Draw what lies over everything but legends."""
-        self.names_left_out = 0, 0
+        """Draw what lies over everything but legends; all words last."""
+        self.names_left_out, drawn = (0, 0), []
         if has_joint_marks(options):
             from viewer.rendering.joint_annotation import joint_annotation
 
             joints = joint_annotation(scene.actors, options, size, selected)
             if joints is not None:
-                self.names_left_out = self.annotation_pass.draw(joints, view, size)
+                self.annotation_pass.draw(joints, view, size)
+                drawn.append(joints)
         if self.ghost is not None:
             self.ghost_pass.draw(self.ghost, view, options)
-        if self.marks is not None:
-            from viewer.rendering.marks import mark_annotation
-
-            self.annotation_pass.draw(mark_annotation(self.marks), view, size)
-        for annotation in self.annotations:
+        over = [*self._marked(), *self.annotations]
+        for annotation in over:
             self.annotation_pass.draw(annotation, view, size)
+        if drawn or over:
+            left_out = self.annotation_pass.write([*drawn, *over], view, size)
+            self.names_left_out = left_out[0] if drawn else (0, 0)
+
+    def _marked(self) -> list[Annotation]:
+        """Return what is marked as an annotation."""
+        if self.marks is None:
+            return []
+        from viewer.rendering.marks import mark_annotation
+
+        return [mark_annotation(self.marks)]
 
     def _draw_trails(
         self, scene: Scene, view: View, options: DisplayOptions, size: tuple[int, int]

@@ -41,7 +41,9 @@ class ScalarBuffer:
     version : int
         How often something was computed.
     look : ScalarLook or None
-        How they are coloured, once ``show`` was called.
+        How they are coloured; None for a figure that lacks what the view shows.
+    is_shown : bool
+        Whether ``show`` was called.
     """
 
     def __init__(self, context: moderngl.Context, mesh: MeshBuffers) -> None:
@@ -51,6 +53,7 @@ class ScalarBuffer:
         self.range = self.span = 0.0, 1.0
         self.name, self.version = "", 0
         self.look: ScalarLook | None = None
+        self.is_shown = False
         self._colors: moderngl.Texture | None = None
         self._key: tuple[object, ...] | None = None
 
@@ -85,9 +88,10 @@ class ScalarBuffer:
         self.name, self._key = name, key
         self.version += 1
 
-    def show(self, look: ScalarLook) -> None:
-        """Take over how the numbers are coloured."""
-        if self._colors is None or not self._has(look):
+    def show(self, look: ScalarLook | None) -> None:
+        """Take over how the numbers are coloured, None for not at all."""
+        self.is_shown = True
+        if look is not None and (self._colors is None or not self._has(look)):
             if self._colors is not None:
                 self._colors.release()
             self._colors = ramp_texture(self.context, look.colors)
@@ -95,7 +99,7 @@ class ScalarBuffer:
 
     def use(self, unit: int) -> None:
         """Bind the colours to a texture unit."""
-        assert self._colors is not None  # show was called
+        assert self._colors is not None  # there is a look
         self._colors.use(unit)
 
     def _has(self, look: ScalarLook) -> bool:

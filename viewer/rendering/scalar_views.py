@@ -8,6 +8,7 @@ from viewer.rendering.legend import Legend, Shown, legend_of
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.scalar_look import look_of, shown_ends
 from viewer.rendering.skin_pass import PosedMesh
+from viewer.rig.figure import Figure
 from viewer.rig.scalars import find_view, joint_text, missing_part
 from viewer.rig.scene import Actor
 
@@ -37,8 +38,11 @@ class ScalarViews:
         meshes: Sequence[tuple[Actor, PosedMesh]],
         options: DisplayOptions,
         selected: tuple[Actor | None, int],
+        figures: Sequence[Figure],
     ) -> None:
         """Compute what changed; the same colour means the same number on all figures.
+
+        Figures that lack what the view shows get no colours: they are drawn as usual.
 
         Parameters
         ----------
@@ -48,6 +52,8 @@ class ScalarViews:
             The view, its range and lines.
         selected : (Actor or None, int)
             The actor and its joint that a view without a joint of its own is about; -1 for none.
+        figures : sequence of Figure
+            All of the scene, also those that are not drawn.
         """
         name = name_for(options.scalar, *selected)
         for actor, mesh in meshes:
@@ -61,27 +67,35 @@ class ScalarViews:
             options.scalar_range,
             options.isolines,
             *((id(mesh), mesh.scalars.version) for _, mesh in meshes),
+            *map(id, figures),
         )
         # A new mesh may have the id and version of one that is gone.
-        if key != self._key or any(mesh.scalars.look is None for _, mesh in meshes):
-            self._show(name, meshes, options)
+        if key != self._key or not all(mesh.scalars.is_shown for _, mesh in meshes):
+            self._show(name, meshes, options, figures)
             self._key = key
 
     def _show(
-        self, name: str, meshes: Sequence[tuple[Actor, PosedMesh]], options: DisplayOptions
+        self,
+        name: str,
+        meshes: Sequence[tuple[Actor, PosedMesh]],
+        options: DisplayOptions,
+        figures: Sequence[Figure],
     ) -> None:
-        figures = [actor.figure for actor, _ in meshes]
-        first = next((one for one in figures if not missing_part(name, one)), figures[0])
-        ranges = [mesh.scalars.range for _, mesh in meshes]
+        having = [one for one in meshes if not missing_part(name, one[0].figure)]
+        ranges = [mesh.scalars.range for _, mesh in having] or [(0.0, 0.0)]
         self.range = min(low for low, _ in ranges), max(high for _, high in ranges)
-        spans = [mesh.scalars.span for _, mesh in meshes]
+        spans = [mesh.scalars.span for _, mesh in having] or [(0.0, 0.0)]
+        first = (having or meshes)[0][0].figure
         self.ends = ends = shown_ends(name, first, spans, options)
         shown = []
         for actor, mesh in meshes:
+            if missing_part(name, actor.figure):
+                mesh.scalars.show(None)
+                continue
             look = look_of(name, actor.figure, ends, options)
             mesh.scalars.show(look)
             shown.append(Shown(actor.figure, mesh.scalars.numbers, look))
-        self.legend = legend_of(name, shown)
+        self.legend = legend_of(name, shown, options.skinning, figures)
 
 
 def name_for(name: str, actor: Actor | None, joint: int) -> str:

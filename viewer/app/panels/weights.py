@@ -22,7 +22,7 @@ from viewer.app.widgets import (
 from viewer.errors import printable
 from viewer.rendering.scalar_look import TYPICAL
 from viewer.rig.figure import Figure
-from viewer.rig.scalars import SCALARS, length_unit, shown_unit, split_name
+from viewer.rig.scalars import SCALARS, length_unit, menu_title, shown_unit, split_name
 
 __all__ = ["draw"]
 
@@ -56,15 +56,16 @@ def _draw_views(state: AppState) -> None:
     key = split_name(state.options.scalar)[0]
     imgui.set_next_item_width(-1.0)
     whole = imgui.ComboFlags_.height_largest
-    opened = imgui.begin_combo("##Heat map of", SCALARS[key].title, whole)
+    skinning = state.options.skinning
+    opened = imgui.begin_combo("##Heat map of", menu_title(key, skinning), whole)
     if not opened:
         note_item(state, "##Heat map of")
         return
-    for name, view in SCALARS.items():
+    for name in SCALARS:
         why = no_view(state, name)
         with disabled(why):
             # Choosing what is shown already keeps the joint that the command line named.
-            if imgui.selectable(view.title, name == key)[0]:
+            if imgui.selectable(menu_title(name, skinning), name == key)[0]:
                 show_scalar(state, state.options.scalar if name == key else name)
             note_item(state, f"view {name}")
             explain("", why)
@@ -75,7 +76,7 @@ def _draw_joint(state: AppState) -> None:
     """Say whose weights are shown: the selected joint's, or those of one that was named."""
     joint, named = shown_joint(state), split_name(state.options.scalar)[1]
     if not joint:
-        imgui.text_wrapped("Select a joint in the tree or in the view.")
+        imgui.text_wrapped("Click the skin in the view, or a joint in the tree.")
         return
     imgui.text_wrapped(f"of {printable(joint, _LONGEST)}")
     if named and button(state, "Of the selected joint"):

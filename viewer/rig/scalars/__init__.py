@@ -17,7 +17,7 @@ from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.pose import Pose
-from viewer.rig.scalars._asked import Asked
+from viewer.rig.scalars._asked import Asked, influences_kept
 from viewer.rig.scalars._fields import field_of
 from viewer.rig.scalars._joints import joint_of, joint_text
 from viewer.rig.scalars._lengths import length_text, length_unit
@@ -34,6 +34,7 @@ __all__ = [
     "joint_text",
     "length_text",
     "length_unit",
+    "menu_title",
     "missing_part",
     "shown_unit",
     "split_name",
@@ -216,8 +217,33 @@ def categories(name: str, figure: Figure) -> tuple[str, ...]:
     return tuple(f"#{joint}" for joint in range(count))
 
 
-def view_title(name: str, figure: Figure) -> str:
+def menu_title(key: str, skinning: Skinning) -> str:
+    """Return what a view is called, with the number if it is about one: ``"... 4 influences"``.
+
+    Parameters
+    ----------
+    key : str
+        Of ``SCALARS``.
+    skinning : Skinning
+        How many influences count.
+    """
+    if key != "cut":
+        return SCALARS[key].title
+    count = influences_kept(skinning)
+    return f"Distance to {count} influence{'s' if count > 1 else ''}"
+
+
+def view_title(name: str, figure: Figure, skinning: Skinning) -> str:
     """Return what a view of a figure is called: ``"Weight of left_knee"``.
+
+    Parameters
+    ----------
+    name : str
+        Of the view.
+    figure : Figure
+        Gives names of joints and fields.
+    skinning : Skinning
+        How the mesh is drawn.
 
     Raises
     ------
@@ -225,12 +251,13 @@ def view_title(name: str, figure: Figure) -> str:
         If the view is unknown.
     """
     view, (key, about) = find_view(name), split_name(name)
+    title = menu_title(key, skinning)
     if missing_part(name, figure):
-        return view.title
+        return title
     field = field_of(figure, about, key == "class") if view.about == "field" else None
     if field is not None:
         return field.title
-    return f"Weight of {joint_text(figure, joint_of(figure, about))}" if about else view.title
+    return f"Weight of {joint_text(figure, joint_of(figure, about))}" if about else title
 
 
 def shown_unit(name: str, figure: Figure) -> tuple[float, str]:

@@ -9,7 +9,9 @@ from viewer.rig.pose import Pose
 from viewer.rig.skin import Skin
 from viewer.rig.skinning import Skinning, skin_used
 
-__all__ = ["Asked"]
+__all__ = ["Asked", "influences_kept"]
+
+_FOUR = 4  # influences of most engines, if no other number is chosen
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,3 +43,8 @@ class Asked:
         """The influences that count: all as stored, or cut and scaled as asked."""
         assert self.figure.skin is not None  # the view needs weights
         return skin_used(self.figure.skin, self.skinning)
+
+
+def influences_kept(skinning: Skinning) -> int:
+    """Return to how many influences a figure is compared: as many as are chosen, else four."""
+    return skinning.max_influences or _FOUR

@@ -8,17 +8,15 @@ import numpy as np
 
 from viewer.rig.arrays import Floats
 from viewer.rig.mirror import mirror_axis
-from viewer.rig.scalars._asked import Asked
+from viewer.rig.scalars._asked import Asked, influences_kept
 from viewer.rig.skinning import Skinning, deform
 
 __all__ = ["asymmetry", "correctives", "cut", "methods", "normalized"]
 
-_FOUR = 4  # influences of most engines, if no other number is chosen
-
 
 def cut(asked: Asked) -> Floats:
     """Return the distance between all influences and the strongest few: (V,), figure units."""
-    count = asked.skinning.max_influences or _FOUR
+    count = influences_kept(asked.skinning)
     # Against normalised weights: what scaling alone does is a view of its own.
     whole = replace(asked.skinning, max_influences=0, normalize=True)
     return _distance(asked, whole, replace(asked.skinning, max_influences=count))
