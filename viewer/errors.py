@@ -21,6 +21,7 @@ __all__ = [
     "RigError",
     "UnsupportedFormatError",
     "ViewerError",
+    "counted",
     "printable",
 ]
 
@@ -41,6 +42,35 @@ def printable(text: object, limit: int = 200) -> str:
         for letter in str(text)
     )
     return shown if len(shown) <= limit else shown[: limit - 1] + "…"
+
+
+_PLURALS = {"vertex": "vertices", "matrix": "matrices"}
+
+
+def counted(count: int, noun: str, one: str = "", many: str = "", of: int | None = None) -> str:
+    """Return how many there are of something, and what they do, as messages begin.
+
+    Parameters
+    ----------
+    count : int
+        How many.
+    noun : str
+        Of one, its last word the one that changes: ``"negative weight"``.
+    one, many : str
+        What one does, and what others do: ``"is"``, ``"are"``; nothing if left out.
+    of : int, optional
+        How many there are in all.
+
+    >>> counted(1, "vertex", "has", "have"), counted(3, "vertex", "has", "have")
+    ('1 vertex has', '3 vertices have')
+    >>> counted(1, "frame", "is", "are", of=20)
+    '1 of 20 frames is'
+    """
+    head, space, last = noun.rpartition(" ")
+    plural = f"{head}{space}{_PLURALS.get(last, f'{last}s')}"
+    share = "" if of is None else f"of {of} "
+    text = f"{count} {share}{noun if (count if of is None else of) == 1 else plural}"
+    return f"{text} {one if count == 1 else many}" if one else text
 
 
 class ViewerError(Exception):

@@ -333,7 +333,7 @@ def test_all_are_copied_as_text_and_json(lint, monkeypatch):
     hand.click("Copy text")
     lines = copied[-1].splitlines()
     assert lines[0] == (
-        "column: warning W001: weights of 1 vertices do not sum to 1: 0.9 at vertex 5, "
+        "column: warning W001: weights of 1 vertex do not sum to 1: 0.9 at vertex 5, "
         "an error of 0.1"
     )
     assert lines[1] == f"    {CODES['W001'].title}: {CODES['W001'].hint}"
@@ -368,8 +368,9 @@ def test_marks_go_with_the_figure_they_are_on(lint, texts):
 
 def test_posing_while_it_checks_changes_nothing_of_it(drive, monkeypatch):
     hand = drive(scene=scene_of(column()), size=SIZE, samples=1)
-    started, seen = hold_checks(monkeypatch)
+    started, seen, is_held = hold_checks(monkeypatch)
     check_rig(hand.state)
+    assert is_held.wait(30)
     hand.step(2)
     assert hand.state.job is not None and hand.state.job.progress == (3, 8)
     hand.state.actor.pose.dofs[4] = 3.5
@@ -381,27 +382,29 @@ def test_posing_while_it_checks_changes_nothing_of_it(drive, monkeypatch):
 
 
 def hold_checks(monkeypatch):
-    """Let checks wait after their third step for an event; return it and what came after."""
+    """Let checks wait after their third step for an event; return it, what came after, and when."""
     import threading
 
-    go, seen = threading.Event(), []
+    go, seen, is_held = threading.Event(), [], threading.Event()
 
     def held(scene, options, report):
         report(3, 8, "column: mesh")
+        is_held.set()
         go.wait(30)
         report(4, 8, "column: symmetry")
         seen.append(scene)
         return lint_scene(scene, options)
 
-    monkeypatch.setattr("viewer.app.lint_actions.lint_scene", held)
-    return go, seen
+    monkeypatch.setattr("viewer.lint.lint_scene", held)
+    return go, seen, is_held
 
 
 @pytest.mark.parametrize("how", ["Cancel check", "escape"])
 def test_check_is_cancelled_between_steps(drive, monkeypatch, how):
     hand = drive(scene=scene_of(LIGHT), size=SIZE, samples=1)
-    go, seen = hold_checks(monkeypatch)
+    go, seen, is_held = hold_checks(monkeypatch)
     check_rig(hand.state)
+    assert is_held.wait(30)
     hand.step(3)
     running = hand.state.lint.running
     if how == "escape":
@@ -419,9 +422,10 @@ def test_check_is_cancelled_between_steps(drive, monkeypatch, how):
 
 def test_check_waits_for_other_work(lint, monkeypatch):
     hand = lint(LIGHT)
-    go, _ = hold_checks(monkeypatch)
+    go, _, is_held = hold_checks(monkeypatch)
     first = hand.state.lint.checked
     start_check(hand.state)
+    assert is_held.wait(30)
     hand.step(2)
     job = hand.state.job
     hand.click("Recheck")  # greyed out

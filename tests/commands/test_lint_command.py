@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from app.tiny import write_rig
 from formats import skel_text, skin_text
@@ -26,7 +27,7 @@ def test_a_finding_is_a_line_with_its_place_and_a_hint(rig, capsys) -> None:
     lines = capsys.readouterr().out.splitlines()
     at = next(index for index, line in enumerate(lines) if " W001: " in line)
     assert lines[at] == (
-        f"{rig[1]}:13: warning W001: weights of 1 vertices do not sum to 1: 1.25 at vertex 1, "
+        f"{rig[1]}:13: warning W001: weights of 1 vertex do not sum to 1: 1.25 at vertex 1, "
         "an error of 0.25"
     )
     assert lines[at + 1] == ("    weights do not sum to 1: normalise them (--normalize shows how)")
@@ -106,5 +107,43 @@ def test_people_of_one_file_are_told_apart(shared_data: Path, capsys) -> None:
     points = shared_data / "smpl_synthetic" / "easymocap" / "keypoints3d"
     assert run(["lint", str(points)]) == 0
     lines = [line for line in capsys.readouterr().out.splitlines() if " C012: " in line]
-    what = "1 of 25 keypoints are never seen: right_ear"
+    what = "1 of 25 keypoints is never seen: right_ear"
     assert lines == [f"{points}: note C012: body25 {person}: {what}" for person in (0, 1)]
+
+
+def test_the_ground_is_an_option(tmp_path: Path, capsys) -> None:
+    """A body 2 m above it is not below a ground, at rest on it, or below one at 2.5 m."""
+    motion = tmp_path / "still.npz"
+    rest = np.tile([0.0, 2.0, 0.0], (20, 1))
+    np.savez(motion, poses=np.zeros((20, 72)), trans=rest, mocap_framerate=30.0, betas=np.zeros(10))
+    files = ["lint", str(motion), "--up", "y"]
+    assert run(files) == 0 and " C008: " not in capsys.readouterr().out
+    assert run([*files, "--ground", "2.5"]) == 0
+    assert " C008: body: 20 of 20 frames: left_foot is " in capsys.readouterr().out
+    assert run([*files, "--ground", "none"]) == 0 and " C008: " not in capsys.readouterr().out
+    assert run([*files, "--ground", "low"]) == 2
+    assert "--ground" in capsys.readouterr().err
+
+
+def test_frames_of_keys_are_counted_by_fps(rig, tmp_path: Path, capsys) -> None:
+    still = "channel { extrapolate constant constant keys 1 { 0 0 flat flat } }\n"
+    jump = "0 0 linear linear 1 0 linear linear 1.01 90 linear linear 2 90 linear linear"
+    first = f"channel {{ extrapolate constant constant keys 4 {{ {jump} }} }}\n"
+    (tmp_path / "a.anim").write_text(
+        f"animation {{ range 0 2 numchannels 9\n{first}{still * 8}}}\n"
+    )
+    files = ["lint", rig[0], str(tmp_path / "a.anim")]
+    assert run(files) == 0
+    assert "1 of 61 frames: root moves" in capsys.readouterr().out
+    assert run([*files, "--fps", "24"]) == 0
+    out = capsys.readouterr().out
+    assert "1 of 49 frames: root moves" in out and "to frame 24 at 1.014 s" in out
+
+
+def test_cures_fit_what_has_no_line(tmp_path: Path, capsys) -> None:
+    (tmp_path / "empty.skel").write_text("")
+    (tmp_path / "bad.skel").write_text("balljoint a { offset 1 }")
+    run(["lint", str(tmp_path / "empty.skel"), str(tmp_path / "bad.skel")])
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[1] == "    file breaks its format: export it again, or open another file"
+    assert lines[3] == "    file breaks its format: mend the line, or export the file again"

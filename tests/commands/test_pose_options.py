@@ -190,7 +190,7 @@ def test_pose_numbers_beyond_limits_are_clamped_and_told(folder, capsys):
     (folder / "hinge.skel").write_text("balljoint hinge { rotxlimit -1 0.5 }")
     actor, notes = described(capsys, "hinge.skel", "--pose", "0,0,0,2,0,0")
     assert actor["skeleton"]["dof_table"][3]["value"] == 0.5
-    assert notes == ["warning: 1 DOFs of the pose were beyond their limits and clamped"]
+    assert notes == ["warning: 1 DOF of the pose was beyond its limits and clamped"]
 
 
 def test_the_figure_is_placed(folder, capsys):

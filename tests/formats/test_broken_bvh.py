@@ -64,7 +64,8 @@ def refusal(text: str) -> str:
         ),
         (
             GOOD.replace("OFFSET 0.0 0.2 0.0", "OFFSET 0.0 1e999 0.0"),
-            'a.bvh:26: OFFSET of End Site of joint Head: expected a number, found "1e999"',
+            "a.bvh:26: OFFSET of End Site of joint Head: expected a number below 3.4e+38, "
+            'found "1e999"',
         ),
         (
             GOOD.replace("CHANNELS 6", "CHANNELS 5"),
@@ -171,7 +172,7 @@ def test_malformed_files_are_refused_with_their_line(text: str, message: str) ->
         (
             GOOD.replace("Frames: 2", "Frames: 1"),
             2,
-            ["34: expected 1 frames as Frames says, found 2; the whole ones are used"],
+            ["34: expected 1 frame as Frames says, found 2; the whole ones are used"],
         ),
         (
             GOOD.replace("Frames: 2", "Frames: 99999999999"),

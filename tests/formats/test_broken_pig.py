@@ -37,8 +37,14 @@ def folder(tmp_path):
         ({"vertices": "0 0 0\n1 up 0"}, 'pig/vertices.txt:2: expected a number, found "up"'),
         ({"vertices": "0 0 0\n1 nan 0"}, 'pig/vertices.txt:2: expected a number, found "nan"'),
         ({"vertices": "0 0 0\n1 -inf 0"}, 'pig/vertices.txt:2: expected a number, found "-inf"'),
-        ({"vertices": "0 0 0\n1 1e999 0"}, 'pig/vertices.txt:2: expected a number, found "1e999"'),
-        ({"vertices": "0 0 0\n1 1e39 0"}, 'pig/vertices.txt:2: expected a number, found "1e39"'),
+        (
+            {"vertices": "0 0 0\n1 1e999 0"},
+            'pig/vertices.txt:2: expected a number below 3.4e+38, found "1e999"',
+        ),
+        (
+            {"vertices": "0 0 0\n1 1e39 0"},
+            'pig/vertices.txt:2: expected a number below 3.4e+38, found "1e39"',
+        ),
         ({"vertices": "0 0 0\n1,0,0"}, 'pig/vertices.txt:2: expected a number, found "1,0,0"'),
         ({"vertices": "0 0 0\n1_0 0 0"}, 'pig/vertices.txt:2: expected a number, found "1_0"'),
         ({"vertices": "x y z\n0 0 0"}, 'pig/vertices.txt:1: expected a number, found "x"'),
@@ -192,7 +198,7 @@ def test_weight_sums_far_from_1_are_counted_with_the_worst(folder):
 def test_negative_weights_are_counted_and_kept(folder):
     rows = WEIGHTS.replace("0 2 0.75", "0 2 1.25").replace("1 2 0.25", "1 2 -0.25")
     figure, warnings = read(write(folder, skinning_weights=rows))
-    assert warnings == [f"{folder}: skinning_weights.txt: 1 negative weights, kept as they are"]
+    assert warnings == [f"{folder}: skinning_weights.txt: 1 negative weight, kept as it is"]
     assert figure.skin.weights.min() == -0.25
 
 

@@ -35,11 +35,11 @@ from viewer.formats import Source, skel
         ),
         (
             "balljoint a {\r\rpose 1e999 0 0 }",
-            'a.skel:3: pose of joint a: expected a number, found "1e999"',
+            'a.skel:3: pose of joint a: expected a number below 3.4e+38, found "1e999"',
         ),
         (
             "balljoint a { rotxlimit 0 3.5e38 }",
-            'a.skel:1: rotxlimit of joint a: expected a number, found "3.5e38"',
+            'a.skel:1: rotxlimit of joint a: expected a number below 3.4e+38, found "3.5e38"',
         ),
         (
             "balljoint a { rotylimit 0 1,5 }",

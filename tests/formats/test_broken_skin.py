@@ -55,7 +55,7 @@ from viewer.formats import Source, skin
         (GOOD.replace("2 0 0", "2 nan 0", 1),
          'a.skin:3: positions: expected a number, found "nan"'),
         (GOOD.replace("2 0 0", "2 3.5e38 0", 1),
-         'a.skin:3: positions: expected a number, found "3.5e38"'),
+         'a.skin:3: positions: expected a number below 3.4e+38, found "3.5e38"'),
         (GOOD.replace("2 0 0", "2 1_0 0", 1),
          'a.skin:3: positions: expected a number, found "1_0"'),
         (GOOD.replace("2 0 0", "2 0,5 0", 1),
@@ -125,7 +125,7 @@ from viewer.formats import Source, skin
         (GOOD.replace("bindings 2", "bindings 3"),
          'a.skin:32: bindings (line 19): expected 3 matrices, found 2 matrices, then "}"'),
         (GOOD.replace("bindings 2", "bindings 1"),
-         'a.skin:32: bindings (line 19): expected 1 matrices, found 2 matrices, then "}"'),
+         'a.skin:32: bindings (line 19): expected 1 matrix, found 2 matrices, then "}"'),
         (GOOD.replace("matrix", "matrices", 1),
          'a.skin:20: bindings (line 19): expected 2 matrices, found 0 matrices, then "matrices"'),
         (GOOD.replace("  8 9 10\n", ""),
@@ -140,7 +140,7 @@ from viewer.formats import Source, skin
          'a.skin:29: expected "}" to close matrix 1 of bindings (line 26), '
          "found the end of the file"),
         (GOOD[: GOOD.index("matrix {\n  1 0 0\n  0 1 0\n  0 0 1\n  8")],
-         "a.skin:25: bindings (line 19): expected 2 matrices, found 1 matrices, "
+         "a.skin:25: bindings (line 19): expected 2 matrices, found 1 matrix, "
          "then the end of the file"),
         (GOOD.replace("0 0 1\n  8", "0 1 0\n  8"),
          "a.skin:26: bindings: expected matrices that can be inverted, found matrix 1 "

@@ -81,7 +81,7 @@ def test_pose_goes_to_the_first_figure_that_it_fits(files):
 def test_values_beyond_limits_are_clamped_with_a_note(files):
     scene = viewer.load(files["legs"], files["far"])
     assert scene.warnings == (
-        f"{files['far']}: 1 DOFs of the pose were beyond their limits and clamped",
+        f"{files['far']}: 1 DOF of the pose was beyond its limits and clamped",
     )
     assert scene.actors[0].pose.dofs[[1, 3, 6]].tolist() == [1e8, 1, 0.5]
 
@@ -169,7 +169,7 @@ def test_pose_is_added_to_an_actor_in_place(files):
     assert pose.dofs[[3, 6]].tolist() == [0.25, 0.5]
     assert notes == []
     assert add_to_actor(additions(files, "far"), actor)[1] == [
-        f"{files['far']}: 1 DOFs of the pose were beyond their limits and clamped"
+        f"{files['far']}: 1 DOF of the pose was beyond its limits and clamped"
     ]
 
 

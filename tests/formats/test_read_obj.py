@@ -152,7 +152,7 @@ def test_colours_and_weights_are_left_out_and_said_once() -> None:
     assert figure.mesh.positions.tolist()[:3] == [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
     assert warnings == [
         "a.obj:1: the colour of 2 vertices is not used",
-        "a.obj:4: the w of 1 vertices is not used",
+        "a.obj:4: the w of 1 vertex is not used",
     ]
 
 
@@ -180,7 +180,7 @@ def test_a_vertex_with_several_normals_gets_their_mean() -> None:
     np.testing.assert_allclose(figure.mesh.normals[0], [0, half, half], atol=1e-15)
     assert figure.mesh.normals[1:].tolist() == [[0, 0, 1]] * 3
     assert warnings == [
-        "a.obj: 1 vertices have several normals, first 0: they get the mean, "
+        "a.obj: 1 vertex has several normals, first 0: it gets the mean, "
         "so hard edges are drawn smooth"
     ]
 
@@ -189,7 +189,7 @@ def test_normals_of_length_0_are_computed() -> None:
     figure, warnings = read(SQUARE + "vn 0 0 0\nvn 1 0 0\nf 1//1 2//2 3//2\n")
     assert figure.mesh.normals.tolist()[:3] == [[0, 0, 1], [1, 0, 0], [1, 0, 0]]
     assert warnings == [
-        "a.obj: 1 normals of length 0, first of vertex 0: computed from the triangles"
+        "a.obj: 1 normal of length 0, first of vertex 0: computed from the triangles"
     ]
 
 
@@ -245,7 +245,7 @@ def test_what_libraries_lack_is_said(tmp_path) -> None:
         f"{here}/a.obj:6: material library {here}/none.mtl: cannot be read: "
         "No such file or directory; drawn without textures",
         f"{here}/a.obj:6: material library ../up.mtl lies outside the folder: not read",
-        f"{here}/a.obj: 1 materials are in no library, first c: drawn without a texture",
+        f"{here}/a.obj: 1 material is in no library, first c: drawn without a texture",
         f"{here}/m.mtl:2: texture {here}/gone.png: cannot be read: "
         "No such file or directory; drawn untextured",
         f"{here}/m.mtl:4: texture ../b.png lies outside the folder: not read",
@@ -258,7 +258,7 @@ def test_what_is_not_drawn_is_said() -> None:
     assert warnings == [
         'a.obj:9: skipped unknown "cstype"',
         "a.obj: 2 lines are not drawn",
-        "a.obj: 1 points are not drawn",
+        "a.obj: 1 point is not drawn",
     ]
 
 
@@ -280,7 +280,7 @@ def test_points_alone_are_a_warning() -> None:
          "a.obj:1: v: expected 3 numbers, or 4, 6 or 7 with w or a colour, found 5"),
         ("\nv 0 up 0\n", 'a.obj:2: v: expected a number, found "up"'),
         ("v 0 nan 0\n", 'a.obj:1: v: expected a number, found "nan"'),
-        ("v 0 1e39 0\n", 'a.obj:1: v: expected a number, found "1e39"'),
+        ("v 0 1e39 0\n", 'a.obj:1: v: expected a number below 3.4e+38, found "1e39"'),
         ("v 0 0,5 0\n", 'a.obj:1: v: expected a number, found "0,5"'),
         (SQUARE + "vn 0 1\n", "a.obj:5: vn: expected 3 numbers, found 2"),
         (SQUARE + "vt\n", "a.obj:5: vt: expected 1 numbers, found 0"),

@@ -185,7 +185,7 @@ def test_points_alone_are_a_warning() -> None:
 
 
 def test_what_is_left_over_is_said() -> None:
-    assert read(GOOD + "1 2 3\n")[1] == ["a.ply: ignored 1 lines after the last element"]
+    assert read(GOOD + "1 2 3\n")[1] == ["a.ply: ignored 1 line after the last element"]
     data = binary("<", [("vertex", ["float x", "float y", "float z"], SQUARE)])
     assert read(data + b"abc")[1][0] == "a.ply: ignored 3 bytes after the last element"
 
@@ -193,7 +193,7 @@ def test_what_is_left_over_is_said() -> None:
 def test_faces_with_fewer_than_three_corners_are_left_out() -> None:
     figure, warnings = read(GOOD.replace("3 0 1 2\n", "2 0 1\n"))
     assert figure.mesh.triangles.tolist() == [[0, 1, 2], [0, 2, 3]]
-    assert warnings == ["a.ply: left out 1 faces with fewer than 3 corners, first face 0"]
+    assert warnings == ["a.ply: left out 1 face with fewer than 3 corners, first face 0"]
 
 
 def changed(old: str, new: str) -> str:

@@ -84,7 +84,7 @@ def test_any_number_of_influences_is_kept():
     assert figure.skin.starts.tolist() == [0, 1, 3, 5003]
     assert figure.skin.weights[3:].tolist() == [0.001] * 5000
     assert warnings == [
-        "a.skin:14: the weights of 1 vertices do not add up to 1 and are used as stored, "
+        "a.skin:14: the weights of 1 vertex do not add up to 1 and are used as stored, "
         "worst vertex 2 with 5"
     ]
 
@@ -190,7 +190,7 @@ def test_vertices_without_influence_are_a_warning():
 def test_negative_weights_are_a_warning():
     figure, warnings = read(GOOD.replace("0.25 1 0.75", "-0.25 1 1.25"))
     assert figure.skin.weights.tolist() == [1, -0.25, 1.25, 1]
-    assert warnings == ["a.skin:13: 1 negative weights are used as stored, first -0.25 of vertex 1"]
+    assert warnings == ["a.skin:13: 1 negative weight is used as stored, first -0.25 of vertex 1"]
 
 
 def test_weights_that_do_not_add_up_are_a_warning():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -22,6 +23,7 @@ from lint.sound import (
 from viewer.lint import CODES, Finding, lint_scene
 from viewer.rig.clip import Channel, Clip
 from viewer.rig.figure import Figure
+from viewer.rig.mesh import Mesh
 from viewer.rig.pose import rest_pose
 from viewer.rig.scene import Scene
 from viewer.rig.skin import Skin, skin_from_lists
@@ -168,6 +170,10 @@ def sink(root: np.ndarray, _: np.ndarray) -> None:
     root[40:, 1] = -0.2
 
 
+def float_about(root: np.ndarray, _: np.ndarray) -> None:
+    root[:, 1] = 2.0 + 0.3 * np.sin(2.0 * np.pi * np.arange(FRAMES) / 20)
+
+
 def gaps() -> Timing:
     rows = np.arange(FRAMES)
     rows[10:13] = rows[30] = -1
@@ -309,6 +315,9 @@ FAULTS: dict[str, tuple[Callable[[], Figure | Scene], str, str, list[int]]] = {
     "unused": (with_unused, "M004", "vertices", [20]),
     "hole": (lambda: meshed(lambda t: t[1:]), "M005", "vertices", [0, 1, 4]),
     "three on an edge": (lambda: meshed(three_on_an_edge), "M006", "vertices", [0, 1]),
+    "one normal inwards": (
+        lambda: with_normal(3, tuple(-column().mesh.normals[3])), "M009", "vertices", [3]
+    ),
     "zero normal": (lambda: with_normal(3, (0, 0, 0)), "M007", "vertices", [3]),
     "long normal": (lambda: with_normal(3, (0.8, -0.9, -0.8)), "M008", "vertices", [3]),
     "normals inwards": (against, "M009", "vertices", list(range(20))),
@@ -335,6 +344,7 @@ FAULTS: dict[str, tuple[Callable[[], Figure | Scene], str, str, list[int]]] = {
     ),
     "sliding": (lambda: moving(slide), "C007", "joints", [3]),
     "sinking": (lambda: moving(sink), "C008", "frames", list(range(140, 160))),
+    "no ground": (lambda: moving(float_about), "C013", "frames", []),
     "no duration": (lambda: keyed({}, end=0.0), "C010", "frames", []),
     "low confidence": (lambda: captured(low_confidence), "C011", "joints", [2]),
     "never seen": (lambda: captured(unseen), "C012", "joints", [1]),
@@ -413,6 +423,70 @@ def test_numbers_of_the_messages() -> None:
     assert "left_ankle slides by 983 mm in all, at most 0.5 m/s to frame" in texts["C007"]
 
 
+def test_numbers_of_meshes_and_gaps() -> None:
+    """Both ends of an edge, the first vertex of a normal, and which frames are missing."""
+    names = ("three on an edge", "hole", "one normal inwards", "gaps", "pose outside limits")
+    texts = {f.code: f.message for name in names for f in findings_of(FAULTS[name][0])}
+    assert texts["M006"] == (
+        "1 edge belongs to more than two triangles, at most 3, first between vertices 0 and 1"
+    )
+    assert texts["M005"].startswith("3 edges belong to one triangle only, first between vertices 0")
+    assert texts["M009"] == (
+        "1 of 20 normals points against all of its triangles, first of vertex 3"
+    )
+    assert texts["C005"] == "4 of 60 frames are missing in 2 gaps: frames 110 to 112, frame 130"
+    # 4 and 3 radians.
+    assert texts["S004"] == (
+        "1 DOF of the pose is outside its limits: knee.y is 229.2°, its limits are -171.9° and "
+        "171.9°"
+    )
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_one_is_singular(name: str) -> None:
+    """No count of 1 has a plural behind it, nor "are" or "have"."""
+    for finding in findings_of(FAULTS[name][0]):
+        text = re.sub(r"[\d.]+ of ", "", finding.message)  # the whole decides: 1 of 60 frames
+        of_one = re.findall(r"(?<![\d.:])1 ((?!units\b)[a-zA-Z]+s)\b(?! to | at )", text)
+        assert set(of_one) <= {"has", "is"}, finding.message
+        one = re.match(r"1 (?:of \d+ )?[\w ]*?\b(are|have|lie|move|list|point|belong)\b", text)
+        assert one is None, finding.message
+
+
+def test_a_gap_is_looked_at_just_before_it() -> None:
+    (gap,) = findings_of(FAULTS["gaps"][0])
+    # Frame 109 is the tenth, 9 / 30 s after the first.
+    assert gap.seek == pytest.approx(0.3)
+
+
+def test_who_is_not_there_for_long_is_counted_so() -> None:
+    """Person 1 is there in frames 100 to 119, 2 of them missing."""
+    rows = np.arange(FRAMES)
+    rows[20:] = rows[5] = rows[6] = -1
+    timing = Timing(RATE, rows, first_frame=100, holds=False)
+    (gap,) = lint_scene(moving(lambda root, turns: None, timing))
+    assert gap.message == "2 of 20 frames are missing in 1 gap: frames 105 to 106"
+
+
+def test_thin_sheets_and_creases_have_no_normals_against_them() -> None:
+    """Each side of a sheet has its own; a sheet whose sides share vertices agrees with one."""
+    square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    front = np.array([[0, 1, 2], [0, 2, 3]])
+    sides = Mesh(
+        np.vstack([square, square]),
+        np.repeat([[0.0, 0, 1], [0, 0, -1]], 4, axis=0),
+        np.vstack([front, front[:, ::-1] + 4]).astype(np.int32),
+    )
+    shared = Mesh(
+        square, np.tile([0.0, 0, 1], (4, 1)), np.vstack([front, front[:, ::-1]]).astype(np.int32)
+    )
+    for mesh in (sides, shared):
+        assert "M009" not in {f.code for f in lint_scene(scene_of(Figure("sheet", mesh)))}
+    turned = replace(sides, normals=-sides.normals)
+    found = [f for f in lint_scene(scene_of(Figure("sheet", turned))) if f.code == "M009"]
+    assert found[0].vertices.tolist() == list(range(8))
+
+
 def test_the_cost_of_a_cut_is_how_far_it_moves_the_mesh() -> None:
     """All joints but the root stay; e is moved by a translation of its own: 0.05 of it is lost."""
     figure = five_joints()
@@ -424,7 +498,7 @@ def test_the_cost_of_a_cut_is_how_far_it_moves_the_mesh() -> None:
     (found,) = [finding for finding in lint_scene(scene) if finding.code == "W007"]
     # The whole: 0.05 of 2 m. The cut keeps nothing of e: 100 mm in the present pose, 0 at rest.
     assert found.message == (
-        "1 vertices have more than 4 influences, at most 5; kept to 4 the mesh moves by up to "
+        "1 vertex has more than 4 influences, at most 5; kept to 4 the mesh moves by up to "
         "100 mm (vertex 8), 100 mm on average of these, over 6 poses"
     )
 
@@ -453,3 +527,20 @@ def test_seams_are_no_borders() -> None:
     mesh = make_mesh(positions, triangles)
     codes = {finding.code for finding in lint_scene(scene_of(Figure("seam", mesh)))}
     assert codes == set()
+
+
+def test_rare_keypoints_of_low_confidence_are_told_by_how_often_they_are_seen() -> None:
+    """Low in 3 of the 10 frames that see it; in 3 of 60, which is 5 %; and once of 2."""
+
+    def change(points: np.ndarray) -> None:
+        points[10:, 0, 3] = 0.0
+        points[4:7, 0, 3] = 0.2
+        points[20:23, 1, 3] = 0.1
+        points[2:, 2, 3] = 0.0
+        points[1, 2, 3] = 0.1
+
+    (low,) = lint_scene(captured(change))
+    assert low.message == (
+        "hip has a confidence below 0.3 in 30 % of the 10 frames that see it, first in frame 104"
+    )
+    assert low.frames.tolist() == [104, 105, 106] and low.joints.tolist() == [0]

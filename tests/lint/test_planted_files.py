@@ -189,13 +189,19 @@ def test_captures_with_gaps_and_low_confidence(tmp_path: Path) -> None:
     frames = {frame: [capture_files.points(0)] for frame in range(20)}
     del frames[7], frames[8]
     folder = capture_files.write_frames(tmp_path / "keypoints3d", frames)
-    found = {f.code: f for f in lint_files([folder], LintOptions(confidence=0.7))[1]}
-    assert found["C005"].frames.tolist() == [7, 8]
-    assert found["C005"].message == "2 of 20 frames are missing in 1 gaps, first frame 7"
-    # All 25 points, in all 18 frames, as the confidences are: 0.7 + 0.5 * waves.
-    confidence = 0.7 + 0.5 * capture_files.waves(25, 4)[:, 3]
-    share = 100 * (confidence < 0.7).mean()
-    assert f"{share:.0f} % of what is seen" in found["C011"].message
+    found = lint_files([folder], LintOptions(confidence=0.7))[1]
+    (gap,) = [f for f in found if f.code == "C005"]
+    assert gap.frames.tolist() == [7, 8]
+    assert gap.message == "2 of 20 frames are missing in 1 gap: frames 7 to 8"
+    # Of all 25 points, in all 18 frames, the confidence is 0.7 + 0.5 * waves.
+    low = np.flatnonzero(0.5 * capture_files.waves(25, 4)[:, 3] < 0.0)
+    named = [f for f in found if f.code == "C011"]
+    assert sorted(np.concatenate([f.joints for f in named]).tolist()) == low.tolist()
+    assert [len(f.joints) for f in named] == [1] * 6 + [len(low) - 6]
+    assert named[0].message.endswith(
+        " has a confidence below 0.7 in 100 % of the 18 frames that see it, first in frame 0"
+    )
+    assert f"{len(low) - 6} more keypoints have a confidence below 0.7: " in named[6].message
 
 
 def test_a_damaged_frame_is_a_gap_and_named(tmp_path: Path) -> None:

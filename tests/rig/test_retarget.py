@@ -374,7 +374,7 @@ def test_moves_of_inner_joints_are_carried_where_the_hierarchy_is_the_same() -> 
     np.testing.assert_allclose(clip.translations[:, 4], 2 * shifts[:, 4], atol=EXACT)
     _, notes = retarget(motion, figure_of(HIK, "mocap"))
     assert notes[-1] == (
-        "positions of 1 joints within their parents were left out, up to 0.0548 (left_knee)"
+        "positions of 1 joint within its parent were left out, up to 0.0548 (left_knee)"
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 from imgui_bundle import imgui
 
@@ -12,8 +13,9 @@ from viewer.app.lint_view import Checked, Running
 from viewer.app.reasons import no_job_room
 from viewer.app.shown_panels import set_open
 from viewer.app.state import AppState
-from viewer.errors import printable
-from viewer.lint import describe, finding_text, lint_scene, summary, worst_first
+from viewer.errors import counted, printable
+from viewer.lint import LintOptions, describe, finding_text, lint_again, summary, worst_first
+from viewer.loading import bundled_files
 from viewer.rendering.picking import Pick
 from viewer.rig.pose import pose_key
 from viewer.rig.scene import Actor, Scene
@@ -42,16 +44,25 @@ def start_check(state: AppState) -> None:
     """Check the scene as it is now, in a thread; nothing if other work goes on."""
     if no_job_room(state):
         return
-    source, options, running = state.scene, state.lint.options, Running()
-    copy = _copied(source)
+    source, options, running = state.scene, _options(state), Running()
+    copy, paths, view = _copied(source), state.paths, state.lint
+    settings, since = view.settings, view.opened_at
 
     def check(report: Report) -> list[str]:
-        findings = tuple(worst_first(lint_scene(copy, options, report)))
-        running.result = Checked(source, copy, options, findings)
+        # The figure that is shown without files comes from some as well.
+        files, is_likely = paths or bundled_files(), not paths
+        again = lint_again(copy, files, options, settings, since, report, is_likely)
+        findings = tuple(worst_first(again.findings))
+        running.result = Checked(source, copy, options, findings, again.n_files, again.notes)
         return [f"Checked: {summary(findings)}"]
 
     running.job = state.job = CountedJob(_TITLE, check)
     state.lint.running = running
+
+
+def _options(state: AppState) -> LintOptions:
+    """Return what counts as a fault; frames are those of the timeline."""
+    return replace(state.lint.options, frame_rate=state.playback.keyed_rate)
 
 
 def _copied(scene: Scene) -> Scene:
@@ -86,7 +97,7 @@ def is_stale(state: AppState) -> bool:
     actors, old = state.scene.actors, known.scene.actors
     return (
         view.is_edited
-        or view.options != known.options
+        or _options(state) != known.options
         or len(actors) != len(old)
         or any(map(_differs, actors, old))
     )
@@ -132,7 +143,10 @@ def choose_finding(state: AppState, index: int) -> None:
     take_pick(state, Pick(finding.actor, joint, -1, -1, actor.placement[:3, 3]), False)
     if len(finding.times) and state.playback.has_motion:
         state.playback.playing = False
-        state.playback.seek(float(finding.times[0]))
+        seek = finding.times[0] if finding.seek is None else finding.seek
+        state.playback.seek(float(seek))
+        if finding.seek is not None and finding.code == "C005":
+            state.say_status("The last frame before the gap: in it nobody is there")
     if not actor.visible:
         state.say_status(f"{printable(actor.name, 60)} is hidden: see the panel Actors")
 
@@ -145,8 +159,9 @@ def copy_findings(state: AppState, as_json: bool) -> None:
     if as_json:
         text = json.dumps(describe(known.findings, known.scene), indent=1, allow_nan=False)
     else:
-        text = "\n".join([*map(finding_text, known.findings), summary(known.findings)])
+        last = summary(known.findings, known.n_files)
+        text = "\n".join([*map(finding_text, known.findings), last])
     imgui.set_clipboard_text(text)
     count = len(known.findings)
     kind = "JSON" if as_json else "text"
-    state.say_status(f"{count} finding{'s' * (count != 1)} copied as {kind}")
+    state.say_status(f"{counted(count, 'finding')} copied as {kind}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -9,6 +10,7 @@ from viewer.lint import SEVERITIES, Finding, LintOptions
 
 if TYPE_CHECKING:
     from viewer.app.jobs import CountedJob
+    from viewer.loading import MotionSettings
     from viewer.rendering.marks import Marks
     from viewer.rig.scene import Scene
 
@@ -29,12 +31,18 @@ class Checked:
         What counted as a fault.
     findings : tuple of Finding
         The worst first.
+    n_files : int
+        How many files it came from, which were read again.
+    notes : tuple of str
+        What of these files is not as it was.
     """
 
     source: Scene
     scene: Scene
     options: LintOptions
     findings: tuple[Finding, ...]
+    n_files: int = 0
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(slots=True, eq=False)
@@ -53,6 +61,10 @@ class LintView:
     ----------
     options : LintOptions
         What counts as a fault when it is checked next.
+    opened_at : float
+        When the scene was opened, seconds since the epoch.
+    settings : MotionSettings or None
+        How its motions were taken, if it was asked for.
     checked : Checked or None
         The last check that ended.
     running : Running or None
@@ -80,6 +92,8 @@ class LintView:
     """
 
     options: LintOptions = field(default_factory=LintOptions)
+    opened_at: float = 0.0
+    settings: MotionSettings | None = None
     checked: Checked | None = None
     running: Running | None = None
     was_shown: bool = False
@@ -92,6 +106,10 @@ class LintView:
     marks: Marks | None = None
     marks_key: object = None
     marks_note: str = ""
+
+    def note_opened(self) -> None:
+        """Remember that another scene was opened now."""
+        self.opened_at, self.settings = time.time(), None
 
     @property
     def finding(self) -> Finding | None:

@@ -197,6 +197,7 @@ class AppState:
     loader: Loader | None = None
 
     def __post_init__(self) -> None:
+        self.lint.note_opened()
         self.playback.show(self.scene)
         self.history.time = self.playback.time
         self.history.start(self.scene, self.options)
@@ -227,6 +228,7 @@ class AppState:
         """Replace the scene; the camera keeps its direction and fits what is new."""
         points = scene_points(scene, self.options.show)
         self.scene, self.paths = scene, tuple(paths)
+        self.lint.note_opened()
         self.box = bounding_box(points)
         self.camera.up, self.camera.fixed = scene.up, None
         fit(self.camera, points, self.aspect)

@@ -27,6 +27,7 @@ from viewer.app.recent import (  # noqa: E402
 from viewer.app.state import AppState  # noqa: E402
 from viewer.app.theme import apply_theme, change_scale  # noqa: E402
 from viewer.errors import RenderError, printable  # noqa: E402
+from viewer.loading import MotionSettings  # noqa: E402
 from viewer.loading.capturing import Builder  # noqa: E402
 from viewer.rendering.camera import Camera, fit  # noqa: E402
 from viewer.rendering.context import explain  # noqa: E402
@@ -51,6 +52,7 @@ def show(
     fit_distance: bool = True,
     builders: Sequence[Builder] = (),
     plays: bool = False,
+    motion: MotionSettings | None = None,
 ) -> None:
     """Open a window and return when it is closed.
 
@@ -72,6 +74,8 @@ def show(
         Captures of the scene that are still to be read.
     plays : bool
         Whether motions play at once.
+    motion : MotionSettings, optional
+        How the scene's motions were taken.
 
     Raises
     ------
@@ -88,6 +92,7 @@ def show(
         fit(camera, points, _SIZE[0] / _SIZE[1])
     files = tuple(map(Path, paths))
     state = AppState(scene, camera, options, bounding_box(points), files)
+    state.lint.settings = motion
     state.recent = load_recent()
     state.closed_panels = load_closed_panels()
     state.say(*filter(None, [remember(state.recent, files)]))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from typing import Literal
 
 import numpy as np
 
@@ -28,6 +29,7 @@ from viewer.lint import (
     worst_first,
 )
 from viewer.loading import bundled_files
+from viewer.rig.motion import DEFAULT_RATE
 
 __all__ = ["add_arguments", "run"]
 
@@ -50,6 +52,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--ignore", default="", metavar="CODE,…", help="findings that are left out: W006,M005"
     )
+    _add_limits(group)
+
+
+def _add_limits(group: argparse._ArgumentGroup) -> None:
+    """Add what only the person who asks can know of motions."""
     group.add_argument(
         "--max-speed",
         type=number,
@@ -68,9 +75,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=number,
         default=0.3,
         metavar="C",
-        help="of captured keypoints: less is low (default: 0.3)",
+        help="of captured keypoints: less is low, and reported of those that are low in more than "
+        "5 %% of the frames that see them (default: 0.3)",
     )
-    group.add_argument("--fps", type=number, metavar="N", help="frames a second of captures")
+    group.add_argument(
+        "--ground",
+        type=_ground,
+        default="auto",
+        metavar="HEIGHT|auto|none",
+        help="of the scene, that no foot goes below by more than 1 %% of the figure's height "
+        "(17 mm for a person); auto: where feet rest longest, or none, and feet are not checked "
+        "(default: auto)",
+    )
+    group.add_argument(
+        "--fps",
+        type=number,
+        metavar="N",
+        help="frames a second of captures, and by which clips of keys are counted (default: 30)",
+    )
     group.add_argument("--hands", choices=("mean", "flat"), help="what hand poses of 0 mean")
 
 
@@ -84,6 +106,8 @@ def run(arguments: argparse.Namespace) -> int:
         max_speed=arguments.max_speed,
         max_turn=float(np.radians(arguments.max_turn)),
         confidence=arguments.confidence,
+        frame_rate=arguments.fps or DEFAULT_RATE,
+        ground=arguments.ground,
     )
     files = scene_files(arguments) or list(bundled_files())
     with Progress("checking", 1) as progress:
@@ -100,13 +124,18 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print(json.dumps(describe(findings, scene), indent=1, allow_nan=False))
     else:
-        files_text = f"{len(files)} file{'s' * (len(files) != 1)}"
-        print("\n".join([*map(finding_text, findings), f"{summary(findings)} in {files_text}"]))
+        print("\n".join([*map(finding_text, findings), summary(findings, len(files))]))
     if arguments.fail_on == "never":
         return 0
     limit = SEVERITIES.index(arguments.fail_on)
     is_bad = any(SEVERITIES.index(finding.severity) >= limit for finding in findings)
     return _FOUND if is_bad else 0
+
+
+def _ground(text: str) -> float | Literal["auto", "none"]:
+    if text == "auto":
+        return "auto"
+    return "none" if text == "none" else number(text)
 
 
 def _ignored(text: str) -> set[str]:

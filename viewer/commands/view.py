@@ -13,6 +13,7 @@ from viewer.commands._scene import (
     add_file_arguments,
     begin_scene,
     finish,
+    motion_settings,
     print_warnings,
     scene_files,
 )
@@ -91,6 +92,7 @@ def run(arguments: argparse.Namespace) -> int:
         fit_distance=arguments.distance is None and arguments.view is None,
         builders=builders,
         plays=arguments.play,
+        motion=motion_settings(arguments),
     )
     return 0
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from viewer.errors import FormatError, printable
 from viewer.formats._numbers import to_number
-from viewer.formats._source import Source, shown
+from viewer.formats._source import Source, no_number, shown
 
 __all__ = ["CHANNELS", "BvhJoint", "Hierarchy", "read_hierarchy"]
 
@@ -177,9 +177,7 @@ class _Parser:
 
     def _offset_error(self, joint: BvhJoint, keyword: Word, found: int) -> FormatError:
         if self.word is not None and self._keyword() not in (b"{", b"}", *_ITEMS):
-            return self._error(
-                f"OFFSET of {_called(joint)}: expected a number, found {self._shown()}"
-            )
+            return self._error(f"OFFSET of {_called(joint)}: {no_number(self.word.group())}")
         return self.source.error(
             f"OFFSET of {_called(joint)}: expected 3 numbers, found {found}", keyword.start()
         )

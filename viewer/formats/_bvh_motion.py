@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from viewer.errors import FormatError
+from viewer.errors import FormatError, counted
 from viewer.formats._numbers import parse_numbers, to_number
-from viewer.formats._source import Source, shown
+from viewer.formats._source import Source, no_number, shown
 from viewer.formats._tolerant import held_rows, read_words, refuse_words
 from viewer.rig.arrays import Floats
 
@@ -154,7 +154,8 @@ def _rows(source: Source, start: int, width: int, declared: int | None) -> Float
         word = source.next_word(offset)
         found = shown(word.group()) if word else "the end of the file"
         if declared is None or bad < declared * width:
-            raise source.error(f"frame {bad // width}: expected a number, found {found}", offset)
+            text = no_number(word.group() if word else None)
+            raise source.error(f"frame {bad // width}: {text}", offset)
         source.warn(f"ignored what follows the last frame, {found}", offset)
     whole, rest = divmod(len(values), width)
     if rest or (declared is not None and whole != declared):
@@ -194,7 +195,7 @@ def _wrong_row(source: Source, row: int, width: int, line: tuple[int, int]) -> F
 def _say_difference(
     source: Source, width: int, declared: int | None, whole: int, rest: int
 ) -> None:
-    wanted = "" if declared is None else f"expected {declared} frames as Frames says, "
+    wanted = "" if declared is None else f"expected {counted(declared, 'frame')} as Frames says, "
     part = f" and {rest} of {width} numbers of the next" if rest else ""
     if whole == 0 and (declared or rest):
         raise source.error(f"{wanted}found none{part}", len(source.data.rstrip()))

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from viewer.errors import printable
+from viewer.errors import counted, printable
 from viewer.formats._source import Source
 
 __all__ = ["BODIES", "POINTS", "FrameFiles", "FrameFolder", "find_frames"]
@@ -164,7 +164,8 @@ def _on_timeline(source: Source, folders: list[FrameFolder], found: list[list[st
             files.first_frame = first
         else:
             source.warn(
-                f"{len(order)} frames numbered from {first} to {last}: taken one after the other"
+                f"{counted(len(order), 'frame')} numbered from {first} to {last}: taken one after "
+                "the other"
             )
             rank = {number: index for index, number in enumerate(order)}
             place = {name: rank[number] for name, number in numbers.items()}

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from viewer.errors import counted
 from viewer.formats._archive import describe
 from viewer.formats._easymocap_bodies import Rows
 from viewer.formats._easymocap_json import MisfitError
@@ -144,12 +145,13 @@ class PointRows(Rows):
         is_odd = ~((np.abs(points) <= LARGEST).all(axis=-1) & (confidence >= 0.0)) & ~is_unseen
         points[is_odd | is_unseen] = 0.0
         faults = [
-            (
-                self.paths[row],
-                f"{int(is_odd[row].sum())} keypoints without finite numbers, or of a confidence "
-                "below 0, count as not seen",
-            )
+            (self.paths[row], _unseen_text(int(is_odd[row].sum())))
             for row in np.flatnonzero(is_odd.any(axis=1))
         ]
         points.flags.writeable = False  # so that it is not copied again
         return points, faults
+
+
+def _unseen_text(count: int) -> str:
+    which, verb = counted(count, "keypoint"), "counts" if count == 1 else "count"
+    return f"{which} without finite numbers, or of a confidence below 0, {verb} as not seen"

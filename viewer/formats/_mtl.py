@@ -10,7 +10,7 @@ Colours and other maps are not shown. An option is a word that begins with ``-``
 
 from __future__ import annotations
 
-from viewer.errors import FormatError, printable
+from viewer.errors import FormatError, counted, printable
 from viewer.formats._source import Source
 from viewer.formats._surface import is_below, texture
 from viewer.rig.arrays import Bytes
@@ -48,7 +48,8 @@ def read_libraries(
     missing = [name for name in names if name not in known]
     if missing and libraries:
         source.warn(
-            f"{len(missing)} materials are in no library, first {printable(missing[0], 60)}: "
+            f"{counted(len(missing), 'material', 'is', 'are')} in no library, first "
+            f"{printable(missing[0], 60)}: "
             "drawn without a texture"
         )
     loaded: dict[str, Bytes | None] = {}

@@ -23,6 +23,7 @@ __all__ = [
     "LARGEST",
     "is_infinite",
     "is_number",
+    "is_too_large",
     "parse_numbers",
     "parse_words",
     "to_number",
@@ -82,8 +83,15 @@ def is_infinite(word: bytes) -> bool:
     >>> is_infinite(b"-nan"), is_infinite(b"1e999"), is_infinite(b"-1.#IND"), is_infinite(b"up")
     (True, True, True, False)
     """
-    if _NOT_FINITE.fullmatch(word):
-        return True
+    return _NOT_FINITE.fullmatch(word) is not None or is_too_large(word)
+
+
+def is_too_large(word: bytes) -> bool:
+    """Return whether a word is a number that a float32 cannot hold.
+
+    >>> is_too_large(b"-1e300"), is_too_large(b"inf")
+    (True, False)
+    """
     return _NUMBER.fullmatch(word) is not None and to_number(word) is None
 
 

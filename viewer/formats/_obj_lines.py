@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.formats._numbers import parse_numbers, word_begins
-from viewer.formats._source import Source, shown
+from viewer.formats._source import Source, no_number
 from viewer.rig.arrays import Bools, Floats
 
 __all__ = ["KEYWORDS", "Lines", "Places", "Rows", "number_rows", "pieces", "rows_of"]
@@ -189,7 +189,7 @@ def number_rows(
         offset = rows.offset(int(begins[bad]))
         word = source.next_word(offset)
         assert word is not None  # it was found there
-        raise source.error(f"{keyword}: expected a number, found {shown(word.group())}", offset)
+        raise source.error(f"{keyword}: {no_number(word.group())}", offset)
     firsts = np.searchsorted(begins, rows.starts)
     counts = np.diff(firsts)
     short = np.flatnonzero(counts < width)

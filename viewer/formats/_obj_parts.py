@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from viewer.errors import counted
 from viewer.formats._obj_faces import CORNER_KINDS, FaceRows, read_faces
 from viewer.formats._obj_lines import KEYWORDS, Lines, Places, Rows, number_rows, pieces
 from viewer.formats._obj_mending import mended_faces, mended_rows, settled_corners
@@ -17,7 +18,7 @@ __all__ = ["ObjParts", "read_parts"]
 
 # Smoothing groups and what programs other than viewers need.
 _QUIET = frozenset((b"s", b"lod", b"vp", b"shadow_obj", b"trace_obj", b"bevel"))
-_SHAPES = {b"l": "lines", b"p": "points"}
+_SHAPES = {b"l": "line", b"p": "point"}
 _RUNS = (b"usemtl", b"g", b"o")
 
 
@@ -91,10 +92,10 @@ def read_parts(source: Source) -> ObjParts:
     for lines in pieces(source):
         _read_piece(source, lines, gathered)
     for what, (count, offset) in gathered.unused.items():
-        source.warn(f"{what} of {count} vertices is not used", offset)
+        source.warn(f"{what} of {counted(count, 'vertex')} is not used", offset)
     for keyword, name in _SHAPES.items():
         if gathered.odd[keyword]:
-            source.warn(f"{gathered.odd[keyword]} {name} are not drawn")
+            source.warn(f"{counted(gathered.odd[keyword], name, 'is', 'are')} not drawn")
     if source.faults is None:
         _check_indices(source, gathered)
         every = [rows.corners for rows in gathered.faces]

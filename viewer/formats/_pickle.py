@@ -15,7 +15,7 @@ their element size does not divide: whoever computes with one in a loop should c
 
 from __future__ import annotations
 
-from viewer.errors import printable
+from viewer.errors import counted, printable
 from viewer.formats._archive import Archive, Value
 from viewer.formats._pickle_machine import Machine
 from viewer.formats._pickle_resolve import resolve
@@ -38,7 +38,8 @@ def open_pickle(source: Source) -> Archive:
     whole = run(machine)
     rest = len(source.data) - machine.at
     if rest:
-        source.warn(f"{rest} bytes after the end of the pickle were ignored")
+        was = "was" if rest == 1 else "were"
+        source.warn(f"{counted(rest, 'byte')} after the end of the pickle {was} ignored")
     values = _named(source, whole)
     path, size = source.path, len(source.data)
 

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.errors import counted
 from viewer.formats._numbers import parse_numbers, parse_words
 from viewer.formats._ply_header import Element, Header
-from viewer.formats._source import Source, shown
+from viewer.formats._source import Source, no_number
 
 __all__ = ["Table", "read_tables"]
 
@@ -92,7 +93,7 @@ class _Text:
             word = source.next_word(offset)
             assert word is not None  # it was found there
             if source.faults is None:
-                raise source.error(f"expected a number, found {shown(word.group())}", offset)
+                raise source.error(no_number(word.group()), offset)
             self.values = parse_words(self.data, self.start, len(self.data))
         ends = np.flatnonzero((letters == 10) | (letters == 13))
         lines = np.searchsorted(ends, self.begins)
@@ -150,7 +151,7 @@ class _Text:
         """Warn of lines that no element has."""
         left = len(self.firsts) - self.line
         if left:
-            self.source.warn(f"ignored {left} lines after the last element")
+            self.source.warn(f"ignored {counted(left, 'line')} after the last element")
             words = np.flatnonzero(np.isnan(self.values[self.firsts[self.line] :]))
             if len(words):  # only where faults are noted: others were refused at the start
                 offset = self._offset(int(self.firsts[self.line] + words[0]))
@@ -284,7 +285,7 @@ class _Binary:
         """Warn of bytes that no element has."""
         left = len(self.data) - self.position
         if left:
-            self.source.warn(f"ignored {left} bytes after the last element")
+            self.source.warn(f"ignored {counted(left, 'byte')} after the last element")
 
     def _short(self, element: Element, left: int) -> Exception:
         return self.source.error(

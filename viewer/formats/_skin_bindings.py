@@ -6,6 +6,7 @@ import re
 
 import numpy as np
 
+from viewer.errors import counted
 from viewer.formats._skin_blocks import Block, block_numbers, find_block, opened
 from viewer.formats._source import Source, shown
 from viewer.formats._tolerant import read_words, refuse_words
@@ -31,12 +32,13 @@ def read_bindings(source: Source, count: int, header: Word, position: int) -> tu
         offsets.append(word.start())
     source.remember("bindings", offsets.__getitem__)
     if len(matrices) != count:
-        found = f"{len(matrices)} matrices, then " + (
+        found = f"{counted(len(matrices), 'matrix')}, then " + (
             "the end of the file" if word is None else shown(word.group())
         )
         where = len(source.data.rstrip()) if word is None else word.start()
         error = source.error(
-            f"bindings (line {source.line(header.start())}): expected {count} matrices, "
+            f"bindings (line {source.line(header.start())}): expected "
+            f"{counted(count, 'matrix')}, "
             f"found {found}",
             where,
         )

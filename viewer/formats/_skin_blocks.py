@@ -9,7 +9,7 @@ import numpy as np
 
 from viewer.errors import FormatError
 from viewer.formats._numbers import parse_numbers
-from viewer.formats._source import Source, shown
+from viewer.formats._source import Source, no_number, shown
 from viewer.rig.arrays import Floats, Ints
 
 __all__ = [
@@ -68,7 +68,7 @@ def block_numbers(source: Source, block: Block) -> Floats:
     offset, word = word_at(source, block, bad)
     if word in KEYWORDS or word == b"{":
         raise unclosed(source, block, offset, word)
-    raise source.error(f"{block.name}: expected a number, found {shown(word)}", offset)
+    raise source.error(f"{block.name}: {no_number(word)}", offset)
 
 
 def unclosed(source: Source, block: Block, offset: int, word: bytes) -> FormatError:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.errors import FormatError
+from viewer.errors import FormatError, counted
 from viewer.formats._numbers import LARGEST
 from viewer.formats._skin_mending import LOST
 from viewer.formats._skin_sections import Sections, check_declared
@@ -197,16 +197,17 @@ def check_weights(source: Source, skin: Skin) -> None:
     """Warn, once each, of weights that are negative, missing, or do not add up to 1."""
     moved = has_influence(skin)
     if not moved.all():
+        first, count = int((~moved).argmax()), int((~moved).sum())
+        stay = "stays where it was" if count == 1 else "stay where they were"
         source.warn(
-            f"{(~moved).sum()} vertices without influence stay where they were bound, "
-            f"first vertex {(~moved).argmax()}",
-            source.offset_of("weights", int((~moved).argmax())),
+            f"{counted(count, 'vertex')} without influence {stay} bound, first vertex {first}",
+            source.offset_of("weights", first),
         )
     negative = skin.weights < 0
     if negative.any():
         vertex = int(np.searchsorted(skin.starts, negative.argmax(), side="right")) - 1
         source.warn(
-            f"{negative.sum()} negative weights are used as stored, first "
+            f"{counted(int(negative.sum()), 'negative weight', 'is', 'are')} used as stored, first "
             f"{skin.weights[negative][0]:g} of vertex {vertex}",
             source.offset_of("weights", vertex),
         )
@@ -215,7 +216,7 @@ def check_weights(source: Source, skin: Skin) -> None:
     if off.any():
         worst = int(errors.argmax())
         source.warn(
-            f"the weights of {off.sum()} vertices do not add up to 1 and are used as stored, "
-            f"worst vertex {worst} with {weight_sums(skin)[worst]:.6g}",
+            f"the weights of {counted(int(off.sum()), 'vertex')} do not add up to 1 and are used "
+            f"as stored, worst vertex {worst} with {weight_sums(skin)[worst]:.6g}",
             source.offset_of("weights", worst),
         )

@@ -13,13 +13,13 @@ from numpy.typing import ArrayLike
 
 from viewer.errors import FormatError, printable
 from viewer.formats._faults import Fault, Part
-from viewer.formats._numbers import word_begins
+from viewer.formats._numbers import LARGEST, is_too_large, word_begins
 from viewer.rig.arrays import Ints
 
 if TYPE_CHECKING:
     from viewer.formats._archive import Archive
 
-__all__ = ["MAX_SIZE", "Source", "read_bytes", "shown"]
+__all__ = ["MAX_SIZE", "Source", "no_number", "read_bytes", "shown"]
 
 MAX_SIZE = 2 << 30
 """Largest file that is read, in bytes, unless the caller says otherwise."""
@@ -299,3 +299,16 @@ def shown(word: bytes) -> str:
     '"up\\x00"'
     """
     return f'"{printable(word[:200].decode("utf-8", "replace"), 40)}"'
+
+
+def no_number(word: bytes | None) -> str:
+    """Return what was expected and found where a number should be, None for the end of the file.
+
+    >>> no_number(b"up"), no_number(b"1e300")
+    ('expected a number, found "up"', 'expected a number below 3.4e+38, found "1e300"')
+    """
+    if word is None:
+        return "expected a number, found the end of the file"
+    # What is too large is written as a number is: it says what is wrong with it.
+    below = f" below {LARGEST:.1e}" if is_too_large(word) else ""
+    return f"expected a number{below}, found {shown(word)}"

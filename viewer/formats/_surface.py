@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.errors import printable
+from viewer.errors import counted, printable
 from viewer.formats._image import load_image
 from viewer.formats._source import Source
 from viewer.rig.arrays import Bytes, Floats, Ints
@@ -41,7 +41,7 @@ def filled_normals(
     zero = np.abs(normals).max(axis=1) < _SHORTEST
     if zero.any():
         source.warn(
-            f"{zero.sum()} normals of length 0, first of vertex {zero.argmax()}: "
+            f"{counted(int(zero.sum()), 'normal')} of length 0, first of vertex {zero.argmax()}: "
             "computed from the triangles"
         )
     missing = absent | zero

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from viewer.errors import FormatError
 from viewer.formats._faults import Part
 from viewer.formats._numbers import parse_numbers
-from viewer.formats._source import Source, shown
+from viewer.formats._source import Source, no_number
 from viewer.formats._tolerant import read_words, refuse_words
 from viewer.rig.arrays import Floats
 
@@ -57,8 +57,7 @@ def read_numbers(source: Source) -> Floats:
     if bad >= 0:
         offset = source.word_offset(0, bad)
         word = source.next_word(offset)
-        found = shown(word.group()) if word else "the end of the file"
-        raise source.error(f"expected a number, found {found}", offset)
+        raise source.error(no_number(word.group() if word else None), offset)
     return values
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from viewer.formats._faults import Part
 from viewer.formats._numbers import is_infinite, parse_words, word_begins
-from viewer.formats._source import Source, shown
+from viewer.formats._source import Source, no_number
 from viewer.rig.arrays import Bools, Floats, Ints
 
 __all__ = ["Words", "held_rows", "mended_corners", "mended_positions", "read_words", "refuse_words"]
@@ -96,7 +96,7 @@ def refuse_words(
             continue
         first = int(bad[chosen[0]])
         error = source.error(
-            f"{named(first)}: expected a number, found {shown(words.word(first))}",
+            f"{named(first)}: {no_number(words.word(first))}",
             int(words.offsets[first]),
         )
         error.code = "W003" if part == "weights" and code == "F003" else code

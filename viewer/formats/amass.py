@@ -19,7 +19,7 @@ import math
 
 import numpy as np
 
-from viewer.errors import FormatError, printable
+from viewer.errors import FormatError, counted, printable
 from viewer.formats._archive import Archive
 from viewer.formats._container import archive_of, finite
 from viewer.formats._source import Source
@@ -348,7 +348,7 @@ def _notice(source: Source, archive: Archive) -> None:
     if archive.has("dmpls"):
         moved = int(_rows(archive, "dmpls").any(axis=1).sum())
         if moved:
-            source.warn(f"dmpls, the soft tissue of {moved} frames, are left out")
+            source.warn(f"dmpls, the soft tissue of {counted(moved, 'frame')}, are left out")
     odd = [printable(key, 40) for key in archive.keys if key not in _KNOWN]
     if odd:
         source.warn(f"keys that mean nothing in a motion: {', '.join(odd[:12])}")

@@ -23,7 +23,7 @@ import numpy as np
 from viewer.errors import FormatError, UnsupportedFormatError
 from viewer.formats._numbers import to_number
 from viewer.formats._save import save_text
-from viewer.formats._source import Source, shown
+from viewer.formats._source import Source, no_number, shown
 from viewer.rig.clip import EXTRAPOLATIONS, TANGENT_RULES, Channel, Clip, Extrapolation, Tangent
 from viewer.rig.figure import Figure
 
@@ -215,7 +215,8 @@ class _Parser:
         """Read a number; NaN for a key's that is none, where faults are noted."""
         value = None if self.word is None else to_number(self.word.group())
         if value is None:
-            error = self._error(f"{item}: expected a number, found {self._found()}")
+            word = None if self.word is None else self.word.group()
+            error = self._error(f"{item}: {no_number(word)}")
             if not of_key or self.word is None or self.word.group() in (b"{", b"}"):
                 raise error
             self.source.refuse(error)

@@ -18,6 +18,7 @@ import re
 
 import numpy as np
 
+from viewer.errors import counted
 from viewer.formats._mtl import read_libraries
 from viewer.formats._obj_lines import Places
 from viewer.formats._obj_parts import ObjParts, read_parts
@@ -112,7 +113,8 @@ def _uvs(source: Source, parts: ObjParts, picks: Places) -> tuple[Floats | None,
         source.warn(f"{len(uvs)} texture coordinates that no face uses: left out")
         return None, None
     if absent.any():
-        source.warn(f"{absent.sum()} corners of triangles without vt: they get 0 0")
+        get = "it gets" if absent.sum() == 1 else "they get"
+        source.warn(f"{counted(int(absent.sum()), 'corner')} of triangles without vt: {get} 0 0")
         corners = np.where(absent, len(uvs), corners)
         uvs = np.vstack([uvs, [0.0, 0.0]])
     return uvs, corners.astype(np.int32)
@@ -136,9 +138,11 @@ def _normals(source: Source, parts: ObjParts) -> Floats | None:
     differs = (result[vertices] != listed[indices]).any(axis=1)
     several = np.bincount(vertices, differs, minlength=n_vertices) > 0
     if several.any():
+        have = counted(int(several.sum()), "vertex", "has", "have")
+        get = "it gets" if several.sum() == 1 else "they get"
         source.warn(
-            f"{several.sum()} vertices have several normals, first {several.argmax()}: "
-            "they get the mean, so hard edges are drawn smooth"
+            f"{have} several normals, first {several.argmax()}: {get} the mean, so hard edges are "
+            "drawn smooth"
         )
         result[several] = _means(n_vertices, vertices, indices, listed)[several]
     return result

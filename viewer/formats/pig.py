@@ -20,7 +20,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.errors import FormatError
+from viewer.errors import FormatError, counted
 from viewer.formats._pig_names import JOINTS, KEYPOINTS
 from viewer.formats._pig_parts import Part, PigFiles, open_parts
 from viewer.formats._source import Source
@@ -234,17 +234,21 @@ def _check_weights(source: Source, part: Part, skin: Skin) -> None:
     bare = np.flatnonzero(~has_influence(skin))
     if len(bare):
         source.warn(
-            f"{part.name}: {len(bare)} vertices without weights, first {bare[0]}: they stay at rest"
+            f"{part.name}: {counted(len(bare), 'vertex')} without weights, first {bare[0]}: "
+            f"{'it stays' if len(bare) == 1 else 'they stay'} at rest"
         )
     negative = np.flatnonzero(skin.weights < 0.0)
     if len(negative):
-        source.warn(f"{part.name}: {len(negative)} negative weights, kept as they are")
+        source.warn(
+            f"{part.name}: {counted(len(negative), 'negative weight')}, kept as "
+            f"{'it is' if len(negative) == 1 else 'they are'}"
+        )
     sums = np.where(has_influence(skin), weight_sums(skin), 1.0)
     off = np.abs(sums - 1.0)
     if off.max() > _ODD_SUM:
-        worst = int(off.argmax())
+        worst, n_off = int(off.argmax()), int((off > _ODD_SUM).sum())
         source.warn(
-            f"{part.name}: {int((off > _ODD_SUM).sum())} weight sums differ from 1 by more than "
+            f"{part.name}: {counted(n_off, 'weight sum', 'differs', 'differ')} from 1 by more than "
             f"{_ODD_SUM}, most vertex {worst} with {sums[worst]:.4g}"
         )
 

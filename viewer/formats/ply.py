@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.errors import printable
+from viewer.errors import counted, printable
 from viewer.formats._numbers import LARGEST
 from viewer.formats._ply_header import Header, read_header
 from viewer.formats._ply_rows import Table, read_tables
@@ -171,7 +171,8 @@ def _faces(
     uvs = _wedges(source, faces, counts)
     if small.any():
         source.warn(
-            f"left out {small.sum()} faces with fewer than 3 corners, first face {small.argmax()}"
+            f"left out {counted(int(small.sum()), 'face')} with fewer than 3 corners, first face "
+            f"{small.argmax()}"
         )
         keeps = np.repeat(~small, counts)
         counts, corners = counts[~small], corners[keeps]

@@ -20,13 +20,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from viewer.errors import FormatError
+from viewer.errors import FormatError, counted
 from viewer.formats._numbers import is_number, to_number
 from viewer.formats._skel_writing import KEYWORDS, UNLIMITED, write
-from viewer.formats._source import Source, shown
+from viewer.formats._source import Source, no_number, shown
 from viewer.rig.arrays import Floats
+from viewer.rig.dof_text import beyond_text
 from viewer.rig.figure import Figure
-from viewer.rig.skeleton import DOF_KINDS, Skeleton, dof_label
+from viewer.rig.skeleton import DOF_KINDS, Skeleton
 
 __all__ = ["read", "write"]
 
@@ -84,12 +85,9 @@ def _facts(skeleton: Skeleton, dofs: Floats) -> tuple[tuple[str, str], ...]:
     moved = np.flatnonzero(skeleton.rest_dofs != dofs)
     if len(moved) == 0:
         return ()
-    first = moved[0]
-    low, high = skeleton.dof_limits[first]
-    text = (
-        f"{len(moved)} DOFs, {dof_label(skeleton, first)} is {dofs[first]:g}, its limits are "
-        f"{low:g} and {high:g}: clamped"
-    )
+    first = int(moved[0])
+    beyond = beyond_text(skeleton, first, float(dofs[first]))
+    text = f"{counted(len(moved), 'DOF')}, {beyond}: clamped"
     return (("pose outside limits", text),)
 
 
@@ -195,7 +193,7 @@ class _Parser:
     def _numbers_error(self, keyword: Word, count: int, found: int) -> FormatError:
         if self.word is not None and self.word.group() not in (b"{", b"}", *KEYWORDS):
             return self.source.error(
-                f"{self._item(keyword)}: expected a number, found {shown(self.word.group())}",
+                f"{self._item(keyword)}: {no_number(self.word.group())}",
                 self.word.start(),
             )
         end = ", then the end of the file" * (self.word is None)
@@ -293,7 +291,7 @@ def _check_limits(source: Source, joints: list[_Joint], limits: Floats) -> None:
         joint, axis = joints[wrong[0] // 3], DOF_KINDS[3 + wrong[0] % 3]
         low, high = limits[wrong[0]]
         source.warn(
-            f"ignored {len(wrong)} limits whose minimum is above the maximum, first "
+            f"ignored {counted(len(wrong), 'limit')} whose minimum is above the maximum, first "
             f"rot{axis}limit {low:g} {high:g} of joint {_called(joint)}",
             joint.limit_starts[wrong[0] % 3],
         )

@@ -23,7 +23,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.errors import OutputError, UnsupportedFormatError, printable
+from viewer.errors import OutputError, UnsupportedFormatError, counted, printable
 from viewer.formats._image import load_image, save_image
 from viewer.formats._numbers import LARGEST
 from viewer.formats._save import as_words, save_text
@@ -126,7 +126,7 @@ def _normals(source: Source, sections: Sections, positions: Floats, triangles: I
     zero: Bools = longest < _SHORTEST
     if zero.any():
         source.warn(
-            f"{zero.sum()} normals of length 0, first of vertex {zero.argmax()}: "
+            f"{counted(int(zero.sum()), 'normal')} of length 0, first of vertex {zero.argmax()}: "
             "computed from the triangles",
             source.offset_of("normals", int(zero.argmax())),
         )

@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from viewer.lint._again import Again, lint_again
 from viewer.lint._aim import Places, places_of, points_of
 from viewer.lint._codes import CODES, SEVERITIES, Code
+from viewer.lint._counting import counting_of
 from viewer.lint._finding import Finding, LintOptions, Subject
 from viewer.lint._report import describe, finding_text, summary, worst_first
 from viewer.rig.arrays import Ints
@@ -24,6 +26,7 @@ __all__ = [
     "CHECKS",
     "CODES",
     "SEVERITIES",
+    "Again",
     "Check",
     "Code",
     "Finding",
@@ -33,6 +36,7 @@ __all__ = [
     "Subject",
     "describe",
     "finding_text",
+    "lint_again",
     "lint_files",
     "lint_scene",
     "places_of",
@@ -100,11 +104,12 @@ def lint_scene(
         By actor, in the order of ``CHECKS``; each names the actor and the places in it.
     """
     chosen = options or LintOptions()
+    counting = counting_of(scene, chosen.frame_rate)
     known: set[int] = set()
     steps: list[tuple[Subject, str]] = []
     for index, actor in enumerate(scene.actors):
         lost = spoiled[index] if index < len(spoiled) else {}
-        subject = Subject(actor, index, scene.up, chosen, lost)
+        subject = Subject(actor, index, scene.up, chosen, counting, lost)
         is_new = id(actor.figure) not in known
         known.add(id(actor.figure))
         steps += [(subject, name) for name, kind in CHECKS.items() if is_new or kind.of_motion]

@@ -27,7 +27,7 @@ class Places:
     triangles : (T, 3, 3)
         Their corners, the worst triangle first.
     joints : (J, 3)
-        Joints, or captured points that are seen.
+        Joints, or captured points that are seen; of findings about a whole motion, who moves.
     facing : (3,)
         Mean normal of what is on the surface: length 1 if all of it faces one way, 0 if it faces
         every way or there is nothing.
@@ -87,8 +87,14 @@ def _facing(normals: Floats, actor: Actor) -> Floats:
     return turned * (np.linalg.norm(mean) / length) if 0.0 < length < np.inf else np.zeros(3)
 
 
+def _names_places(finding: Finding) -> bool:
+    return bool(len(finding.vertices) or len(finding.triangles) or len(finding.joints))
+
+
 def _joint_places(finding: Finding, actor: Actor) -> Floats:
     joints, figure = finding.joints, actor.figure
+    if finding.part == "clip" and not _names_places(finding):
+        return _middle(actor)
     if len(joints) and isinstance(actor.clip, PointClip):
         if actor.points is None:
             return np.zeros((0, 3))
@@ -98,6 +104,19 @@ def _joint_places(finding: Finding, actor: Actor) -> Floats:
         world = joint_matrices(figure, actor.pose)[joints]
         return apply_transform(actor.placement, world[:, :3, 3])
     return np.zeros((0, 3))
+
+
+def _middle(actor: Actor) -> Floats:
+    """Return where a whole actor is: its roots, or the middle of its points. (N, 3)."""
+    figure, points = actor.figure, actor.points
+    if isinstance(actor.clip, PointClip):
+        seen = np.zeros((0, 3)) if points is None else points[points[:, 3] > 0.0, :3]
+        middle = seen.mean(axis=0, keepdims=True) if len(seen) else seen
+        return apply_transform(actor.placement, middle)
+    if figure.skeleton is None or actor.pose is None:
+        return np.zeros((0, 3))
+    roots = np.flatnonzero(figure.skeleton.parents < 0)
+    return apply_transform(actor.placement, joint_matrices(figure, actor.pose)[roots, :3, 3])
 
 
 def points_of(finding: Finding, scene: Scene, places: Places | None = None) -> Floats:
@@ -121,6 +140,8 @@ def points_of(finding: Finding, scene: Scene, places: Places | None = None) -> F
     """
     if finding.actor is None or finding.actor >= len(scene.actors):
         return np.zeros((0, 3))
+    if not _names_places(finding):
+        return actor_points(scene.actors[finding.actor])
     found = places or places_of(finding, scene)
     corners = found.triangles.reshape(-1, 3)
     several = (part for part in (found.vertices, corners, found.joints) if len(part))

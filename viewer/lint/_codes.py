@@ -22,17 +22,25 @@ class Code:
         For lists.
     hint : str
         What to do.
+    other_hint : str
+        The same where no line is known; empty if it is no other.
     """
 
     severity: str
     title: str
     hint: str
+    other_hint: str = ""
 
 
 CODES = {
     # Files
     "F001": Code("error", "file cannot be read", "check the name and the permissions"),
-    "F002": Code("error", "file breaks its format", "mend the line, or export the file again"),
+    "F002": Code(
+        "error",
+        "file breaks its format",
+        "mend the line, or export the file again",
+        "export it again, or open another file",
+    ),
     "F003": Code(
         "error", "number that is not finite", "look for a division by 0 where it was made"
     ),
@@ -100,5 +108,6 @@ CODES = {
     "C010": Code("note", "clip without duration", "give it keys at two times"),
     "C011": Code("warning", "keypoints of low confidence", "leave these out, or capture again"),
     "C012": Code("note", "keypoints that are never seen", "nothing, if the camera cannot see them"),
+    "C013": Code("note", "no ground found for the feet", "give its height (--ground)"),
 }
 """By code; codes are never given to something else."""

@@ -13,12 +13,14 @@ from numpy.typing import NDArray
 from viewer.lint._codes import CODES
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.mesh import bounding_box, box_size
+from viewer.rig.motion import DEFAULT_RATE
 from viewer.rig.scalars import length_text
 from viewer.rig.scene import Actor
 from viewer.rig.shape import rest_joints
 from viewer.rig.units import METRES
 
 if TYPE_CHECKING:
+    from viewer.lint._counting import Counting
     from viewer.lint._tracks import Track
 
 __all__ = ["Finding", "LintOptions", "Subject", "listed"]
@@ -42,13 +44,20 @@ class LintOptions:
     confidence : float
         Of captured keypoints: what is below is low.
     rate : float
-        Frames a second at which clips of keys are looked at.
+        How often a second clips of keys are looked at, at least.
+    frame_rate : float
+        Frames a second by which clips of keys are counted.
+    ground : float, "auto" or "none"
+        How high the ground is in the scene, along what is up; found out from the feet; or none,
+        and feet are not looked at.
     """
 
     max_speed: float | None = None
     max_turn: float = 60.0
     confidence: float = 0.3
     rate: float = 60.0
+    frame_rate: float = DEFAULT_RATE
+    ground: float | Literal["auto", "none"] = "auto"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,6 +88,8 @@ class Finding:
         As the file numbers them, the worst first.
     times : (N,)
         Seconds of the scene's clock at which these frames are shown.
+    seek : float or None
+        Seconds at which it is best looked at; None for the first of ``times``.
     at : (str, int) or None
         The thing that the message names first, as readers remember where it is in a file:
         ``("weights", 5)`` is the line of vertex 5's weights.
@@ -97,6 +108,7 @@ class Finding:
     joints: Ints = field(default_factory=lambda: _NONE)
     frames: Ints = field(default_factory=lambda: _NONE)
     times: Floats = field(default_factory=lambda: _NO_TIMES)
+    seek: float | None = None
     at: tuple[str, int] | None = None
 
     def __post_init__(self) -> None:
@@ -111,7 +123,8 @@ class Finding:
     @property
     def hint(self) -> str:
         """What to do about it."""
-        return CODES[self.code].hint
+        code = CODES[self.code]
+        return code.other_hint if code.other_hint and self.line is None else code.hint
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -128,6 +141,8 @@ class Subject:
         The scene's.
     options : LintOptions
         What counts as a fault.
+    counting : Counting or None
+        How clips of keys are counted in frames; None for by themselves.
     spoiled : mapping of str to (N,)
         What is not the file's own any more, because the file's own cannot be used: vertices by
         ``"positions"`` and ``"weights"``, ``"triangles"``, joints by ``"bindings"`` and
@@ -140,6 +155,7 @@ class Subject:
     index: int = 0
     up: Literal["y", "z"] = "y"
     options: LintOptions = field(default_factory=LintOptions)
+    counting: Counting | None = None
     spoiled: Mapping[str, Ints] = field(default_factory=dict)
     # What several checks need is made once: ``track_of`` keeps it here.
     tracks: list[Track] = field(default_factory=list)
@@ -198,6 +214,7 @@ class Subject:
         joints: Indices = _NONE,
         frames: Indices = _NONE,
         times: Floats = _NO_TIMES,
+        seek: float | None = None,
         at: tuple[str, int] | None = None,
     ) -> Finding:
         """Return a finding about this actor."""
@@ -213,6 +230,7 @@ class Subject:
             joints=np.asarray(joints, dtype=np.int32),
             frames=np.asarray(frames, dtype=np.int32),
             times=times,
+            seek=seek,
             at=at,
         )
 

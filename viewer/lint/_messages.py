@@ -29,7 +29,7 @@ _ERRORS = (
     ("B002", r"expected matrices that can be inverted"),
     (
         "B001",
-        r"binding matrices|bindings.*: expected \d+ matrices|beside `(?:bindings|skinweights)`",
+        r"binding matrices|bindings.*: expected \d+ matri|beside `(?:bindings|skinweights)`",
     ),
     ("C009", r"channels, .* needs|has \d+ joints, figure"),
     (
@@ -39,12 +39,12 @@ _ERRORS = (
     ),
 )
 _WARNINGS = (
-    ("W004", r"vertices without (?:influence|weights)"),
-    ("W002", r"negative weights"),
-    ("W001", r"do not add up to 1|weight sums differ from 1"),
-    ("S003", r"limits whose minimum is above the maximum"),
+    ("W004", r"(?:vertices|vertex) without (?:influence|weights)"),
+    ("W002", r"negative weights?\b"),
+    ("W001", r"do not add up to 1|weight sums? differs? from 1"),
+    ("S003", r"limits? whose minimum is above the maximum"),
     ("B003", r"can hardly be inverted"),
-    ("M007", r"normals of length 0"),
+    ("M007", r"normals? of length 0"),
     ("M010", r"units away from the others"),
     ("C001", r"keys sorted"),
     ("C010", r"channel \d+ has no keys"),

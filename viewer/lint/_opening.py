@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,14 +14,21 @@ from viewer.formats import MAX_SIZE, Fault, Source
 from viewer.lint._codes import SEVERITIES
 from viewer.lint._finding import Finding
 from viewer.lint._messages import CHECKED, of_error, of_faults, of_refusal, of_warning
+from viewer.lint._named import aimed_at
 from viewer.loading import Contents, MotionSettings, begin, read_source
 from viewer.rig.arrays import Ints
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor, Scene
 
-__all__ = ["Opened", "open_files", "spoiled_parts", "with_files"]
+if TYPE_CHECKING:
+    from viewer.loading.capturing import Builder
+
+__all__ = ["Opened", "Owners", "open_files", "spoiled_parts", "with_files"]
 
 Progress = Callable[[int, int, str], None]
+
+Owners = dict[str, int]
+"""For the parts of an actor, which actor of what was opened has the same: by ``Finding.part``."""
 
 _LISTS = (
     "figures",
@@ -76,7 +84,7 @@ def open_files(
     max_size : int
         Larger files are not read.
     progress : callable, optional
-        Called before each file; what it raises ends it.
+        Called before each file, and before each part of captures; what it raises ends it.
     """
     opened = Opened()
     known = {_resolved(Path(path)): Path(path) for path in reversed(paths)}
@@ -89,7 +97,7 @@ def open_files(
             if _resolved(other) not in known:
                 known[_resolved(other)] = other
                 queue.append(other)
-    _assemble(opened, settings)
+    _assemble(opened, settings, progress)
     return opened
 
 
@@ -141,7 +149,7 @@ def _loaded(figure: Figure, refusals: list[Finding]) -> Figure:
     return figure
 
 
-def _assemble(opened: Opened, settings: MotionSettings | None) -> None:
+def _assemble(opened: Opened, settings: MotionSettings | None, progress: Progress | None) -> None:
     """Make a scene; what does not fit is taken out, said, and looked at alone."""
     contents = replace(opened.contents)
     alone: list[Figure] = []
@@ -149,26 +157,43 @@ def _assemble(opened: Opened, settings: MotionSettings | None) -> None:
         if _is_unbound(figure, opened.sources[path]):
             alone += _take_out(contents, path)
     while any(getattr(contents, name) for name in _LISTS):
+        problem: ViewerError | None = None
         try:
             opened.scene, builders = begin(contents, settings)
-            for builder in builders:
-                while not builder.is_done:
-                    new, notes = builder.read_some()
-                    opened.scene.actors += new
-                    opened.scene.warnings += tuple(notes)
+        except ViewerError as refused:
+            problem = refused
+        else:
+            problem = _read_on(opened.scene, builders, progress)
+        if problem is None:
             break
-        except ViewerError as problem:
-            culprit = _culprit(problem, contents)
-            opened.findings.append(of_error(problem, culprit))
-            if culprit is None:
-                # A model that is not among the files: what needs one cannot be looked at.
-                contents = Contents(figures=contents.figures, clips=contents.clips)
-            else:
-                alone += _take_out(contents, culprit)
+        culprit = _culprit(problem, contents)
+        opened.findings.append(of_error(problem, culprit))
+        if culprit is None:
+            # A model that is not among the files: what needs one cannot be looked at.
+            contents = Contents(figures=contents.figures, clips=contents.clips)
+        else:
+            alone += _take_out(contents, culprit)
     opened.findings += [
         of_warning(text, _owner(text, opened.contents)) for text in opened.scene.warnings
     ]
     opened.scene.actors += [Actor(figure) for figure in alone]
+
+
+def _read_on(
+    scene: Scene, builders: Sequence[Builder], progress: Progress | None
+) -> ViewerError | None:
+    """Read captures to their ends; return what ended it before."""
+    for builder in builders:
+        while not builder.is_done:
+            if progress is not None:  # what it raises is no fault of a file
+                progress(builder.n_read, builder.capture.n_frames, "reading frames")
+            try:
+                new, notes = builder.read_some()
+            except ViewerError as problem:
+                return problem
+            scene.actors += new
+            scene.warnings += tuple(notes)
+    return None
 
 
 def _is_unbound(figure: Figure, source: Source) -> bool:
@@ -205,7 +230,11 @@ def _owner(text: str, contents: Contents) -> Path:
     return next((path for path in paths if text.startswith(printable(path, 300))), Path())
 
 
-def with_files(opened: Opened, findings: list[Finding]) -> list[Finding]:
+def with_files(
+    opened: Opened,
+    findings: list[Finding],
+    looked_at: tuple[Scene, Sequence[Owners]] | None = None,
+) -> list[Finding]:
     """Return all findings: those of the scene with their files, remarks that say the same dropped.
 
     Parameters
@@ -213,11 +242,17 @@ def with_files(opened: Opened, findings: list[Finding]) -> list[Finding]:
     opened : Opened
         Gives the remarks of readers, and what came from which file.
     findings : list of Finding
-        Of its scene.
+        Of its scene, or of the one that was looked at instead.
+    looked_at : (Scene, sequence of Owners), optional
+        Another scene, and for each of its actors what it shares with those of the opened one.
     """
-    placed = [_placed(finding, opened) for finding in findings]
+    if looked_at is None:
+        actors = opened.scene.actors
+        everything = [dict.fromkeys(_SPOILED, index) for index in range(len(actors))]
+        looked_at = opened.scene, everything
+    placed = [_placed(finding, opened, looked_at[1]) for finding in findings]
     remarks: list[Finding] = []
-    for remark in opened.findings:
+    for remark in _aimed(opened, *looked_at):
         twin = next((index for index, other in enumerate(placed) if _is_same(remark, other)), None)
         if twin is None:
             remarks.append(remark)
@@ -247,12 +282,32 @@ def _with_line(finding: Finding, opened: Opened) -> Finding:
     return finding if place is None else replace(finding, file=place[0], line=place[1])
 
 
-def _placed(finding: Finding, opened: Opened) -> Finding:
+def _placed(finding: Finding, opened: Opened, owners: Sequence[Owners]) -> Finding:
     """Return a finding with the file that holds the part of the actor it is about."""
-    if finding.actor is None:
+    owner = None if finding.actor is None else owners[finding.actor].get(finding.part or "mesh")
+    if owner is None:
         return finding
-    paths = _files_of(opened.scene.actors[finding.actor], finding.part, opened.contents)
+    paths = _files_of(opened.scene.actors[owner], finding.part, opened.contents)
     return replace(finding, file=paths[0]) if paths else finding
+
+
+def _aimed(opened: Opened, scene: Scene, owners: Sequence[Owners]) -> list[Finding]:
+    """Return what readers say with the actor that it is about, where they name a place in it."""
+    known: dict[tuple[Path, str], int] = {}
+    for number, parts in enumerate(owners):
+        for part, owner in parts.items():
+            for path in _files_of(opened.scene.actors[owner], part, opened.contents):
+                known.setdefault((path, part), number)
+    aimed = []
+    for remark in opened.findings:
+        found: Finding | None = None
+        for part in _SPOILED:
+            index = known.get((remark.file or Path(), part))
+            if found is None and index is not None:
+                found = aimed_at(remark, scene.actors[index], part)
+                found = None if found is None else replace(found, actor=index)
+        aimed.append(found or remark)
+    return aimed
 
 
 def _files_of(actor: Actor, part: str, contents: Contents) -> list[Path]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from viewer.errors import printable
+from viewer.errors import counted, printable
 from viewer.lint._codes import SEVERITIES
 from viewer.lint._finding import Finding
 from viewer.rig.scene import Scene
@@ -42,11 +42,19 @@ def finding_text(finding: Finding) -> str:
     return f"{head}{text}\n    {finding.title}: {finding.hint}"
 
 
-def summary(findings: Sequence[Finding]) -> str:
-    """Return how many there are of each severity: ``1 error, 0 warnings, 3 notes``."""
+def summary(findings: Sequence[Finding], n_files: int = 0) -> str:
+    """Return how many there are of each severity: ``1 error, 0 warnings, 3 notes in 2 files``.
+
+    Parameters
+    ----------
+    findings : sequence of Finding
+        All of them.
+    n_files : int
+        How many files they are of; 0 if of none.
+    """
     counts = Counter(finding.severity for finding in findings)
-    parts = [f"{counts[kind]} {kind}{'s' * (counts[kind] != 1)}" for kind in reversed(SEVERITIES)]
-    return ", ".join(parts)
+    parts = [counted(counts[kind], kind) for kind in reversed(SEVERITIES)]
+    return ", ".join(parts) + (f" in {counted(n_files, 'file')}" if n_files else "")
 
 
 def describe(findings: Sequence[Finding], scene: Scene) -> dict[str, Any]:

@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
+from viewer.lint._counting import Counting
 from viewer.lint._finding import Subject
+from viewer.lint._soles import soles_of
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.clip import Clip
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.motion import Frames, frames_of, world_frames
 from viewer.rig.points import PointClip
 from viewer.rig.sampled_clip import SampledClip
-from viewer.rig.shape import rest_joints
+from viewer.rig.shape import rest_joints, shaped
 
-__all__ = ["Track", "track_of"]
+__all__ = ["Indices", "Track", "frame_numbers", "key_times", "track_of"]
+
+Indices = NDArray[np.int64]
 
 _TOGETHER = 1000  # frames whose matrices are in memory at once
-_MOST = 200_000  # frames of a clip of keys
+_MOST = 200_000  # times at which a clip of keys is looked at
+_ON_STEP = 1e-6  # of a step
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,7 +37,8 @@ class Track:
     times : (F,)
         Seconds of the scene's clock.
     numbers : (F,) int32
-        What the file calls each frame.
+        What the file calls each frame; of keys, which frame of the timeline it is. Several rows
+        may be of one frame.
     present : (F,) bool
         Where False, the other rows mean nothing: nobody is there, or the file cannot say where.
     positions : (F, J, 3)
@@ -41,6 +49,10 @@ class Track:
         Of the skeleton at rest, in the scene.
     scale : float
         Scene units per figure unit.
+    feet : (N,) int32
+        The joint nearest to the ground of each foot; none of what has not two feet by name.
+    soles : (F, N)
+        How high each foot's lowest point is in the scene.
     """
 
     times: Floats
@@ -50,6 +62,19 @@ class Track:
     rotations: Floats
     size: float
     scale: float
+    feet: Ints
+    soles: Floats
+
+    @property
+    def n_frames(self) -> int:
+        """How many frames there are from the first in which somebody is there to the last."""
+        there = self.numbers[self.present]
+        return int(there[-1]) - int(there[0]) + 1 if len(there) else 0
+
+    def of_each(self, rows: Indices) -> Indices:
+        """Return rows without those whose frame is among the rows before: (N,)."""
+        _, first = np.unique(self.numbers[rows], return_index=True)
+        return rows[np.sort(first)]
 
 
 def track_of(subject: Subject) -> Track | None:
@@ -69,28 +94,59 @@ def _track(subject: Subject) -> Track | None:
         return None
     if isinstance(clip, SampledClip):
         timing = clip.timing
-        count, first = timing.n_frames, timing.first_frame
+        count = timing.n_frames
         times = timing.start + np.arange(count) / timing.frame_rate
+        numbers = timing.first_frame + np.arange(count, dtype=np.int32)
     else:
-        # A clip of keys has no frames of its own.
-        count = min(round((clip.end - clip.start) * subject.options.rate) + 1, _MOST)
-        first, times = 0, np.linspace(clip.start, clip.end, count)
+        times = key_times(subject, clip)
+        count = len(times)
+        numbers = frame_numbers(subject, times)
     frames = frames_of(figure, clip, times, actor.pose)
-    joints = np.empty((count, skeleton.n_joints, 3))
+    scale = float(np.cbrt(abs(np.linalg.det(actor.placement[:3, :3]))))
+    is_bound = figure.is_attached and not len(subject.spoiled.get("bindings", ()))
+    soles = soles_of(shaped(figure, frames.shape_weights[0]), is_bound) if count else None
+    feet = np.zeros(0, dtype=np.int32) if soles is None else soles.joints
+    joints, lowest = np.empty((count, skeleton.n_joints, 3)), np.empty((count, len(feet)))
+    axis = actor.placement[2 if subject.up == "z" else 1]
     for start in range(0, count, _TOGETHER):
         part = slice(start, start + _TOGETHER)
-        joints[part] = world_frames(figure, _slice(frames, part))[..., :3, 3]
+        world = world_frames(figure, _slice(frames, part))
+        joints[part] = world[..., :3, 3]
+        if soles is not None:
+            lowest[part] = soles.heights(world, axis, scale)
     placed = joints @ actor.placement[:3, :3].T + actor.placement[:3, 3]
-    scale = float(np.cbrt(abs(np.linalg.det(actor.placement[:3, :3]))))
     return Track(
         times=times + actor.offset,
-        numbers=first + np.arange(count, dtype=np.int32),
+        numbers=numbers,
         present=frames.present & _known(subject, clip, count),
         positions=placed,
         rotations=frames.rotations,
         size=scale * box_size(bounding_box(rest_joints(figure))),
         scale=scale,
+        feet=feet,
+        soles=lowest,
     )
+
+
+def key_times(subject: Subject, clip: Clip) -> Floats:
+    """Return when a clip of keys is looked at: its frames, and so many steps between them. (F,).
+
+    Seconds of the clip's own clock.
+    """
+    options = subject.options
+    rate = options.frame_rate * max(1, math.ceil(options.rate / options.frame_rate))
+    count = min(math.floor((clip.end - clip.start) * rate + _ON_STEP) + 1, _MOST)
+    return clip.start + np.arange(count) / rate
+
+
+def frame_numbers(subject: Subject, times: Floats) -> Ints:
+    """Return the frames of the timeline at times of a clip of keys: (F,) int32."""
+    actor = subject.actor
+    assert actor.clip is not None  # the callers looked
+    counting = subject.counting or Counting(
+        subject.options.frame_rate, actor.clip.start + actor.offset
+    )
+    return counting.numbers(times + actor.offset)
 
 
 def _known(subject: Subject, clip: Clip | SampledClip, count: int) -> Bools:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from viewer.errors import counted
 from viewer.lint._finding import Finding, Subject, listed
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure
@@ -32,24 +33,31 @@ def check(subject: Subject) -> list[Finding]:
     determinants = np.linalg.det(linear)
     flat = np.abs(determinants) <= _SINGULAR * lengths
     findings = _about(
-        subject, "B002", flat, determinants, "matrices cannot be inverted", "determinant"
+        subject, "B002", flat, determinants, ("cannot be inverted",) * 2, "determinant"
     )
     conditions = np.zeros(len(linear))
     conditions[~flat] = np.linalg.cond(linear[~flat])
     findings += _about(
-        subject, "B003", conditions > _NEARLY, conditions, "matrices can hardly be inverted",
+        subject, "B003", conditions > _NEARLY, conditions, ("can hardly be inverted",) * 2,
         "condition number",
     )  # fmt: skip
     mirrors = (determinants < 0.0) & ~flat
-    findings += _about(subject, "B005", mirrors, determinants, "matrices mirror", "determinant")
+    findings += _about(subject, "B005", mirrors, determinants, ("mirrors", "mirror"), "determinant")
     off = np.abs(skin.inverse_bind[:, 3] - [0.0, 0.0, 0.0, 1.0]).max(axis=1) * known
-    findings += _about(subject, "B006", off > _AFFINE, off, "matrices are not affine", "error")
+    findings += _about(
+        subject, "B006", off > _AFFINE, off, ("is not affine", "are not affine"), "error"
+    )
     usable = known & ~flat & (off <= _AFFINE)
     return findings + _elsewhere(subject, subject.actor.figure, usable)
 
 
 def _about(
-    subject: Subject, code: str, wrong: np.ndarray, values: Floats, what: str, measure: str
+    subject: Subject,
+    code: str,
+    wrong: np.ndarray,
+    values: Floats,
+    what: tuple[str, str],
+    measure: str,
 ) -> list[Finding]:
     joints = np.flatnonzero(wrong)
     if len(joints) == 0:
@@ -62,7 +70,7 @@ def _about(
     return [
         subject.found(
             code,
-            f"{len(joints)} of {len(values)} bind {what}: {listed(names)} "
+            f"{counted(len(joints), 'bind matrix', *what, of=len(values))}: {listed(names)} "
             f"({measure} {values[joints[0]]:.3g})",
             joints=joints,
             at=("bindings", int(joints[0])),
@@ -94,11 +102,12 @@ def _elsewhere(subject: Subject, figure: Figure, usable: Bools) -> list[Finding]
         return []
     away = away[np.argsort(-distances[away], kind="stable")]
     label = joint_labels(skeleton)[away[0]]
+    rest = "it rests" if len(away) == 1 else "they rest"
     return [
         subject.found(
             "B004",
-            f"{len(away)} joints were bound away from where they rest, {label} by "
-            f"{subject.length(distances[away[0]])}: at rest the mesh is not as it was bound",
+            f"{counted(len(away), 'joint', 'was', 'were')} bound away from where {rest}, {label} "
+            f"by {subject.length(distances[away[0]])}: at rest the mesh is not as it was bound",
             joints=away,
             at=("bindings", int(away[0])),
         )

@@ -3,14 +3,25 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
+from viewer.errors import counted
 from viewer.lint._finding import Finding, Subject, listed
 from viewer.lint.clips import missing_frames
+from viewer.rig.arrays import Floats, Ints
 from viewer.rig.points import PointClip
 
-__all__ = ["check"]
+__all__ = ["LOW_FRAMES", "LOW_SHARE", "check"]
 
-_SHARE = 0.05  # of all that was seen: fewer points of low confidence are usual
+Indices = NDArray[np.int64]
+
+LOW_SHARE = 0.05
+"""Of the frames that see a keypoint: so many of low confidence are usual."""
+
+LOW_FRAMES = 2
+"""So many of them there must be at least."""
+
+_SINGLE = 6  # keypoints of low confidence that are told one by one
 _SIZES = 15.0  # of the points that one may move in a second
 
 
@@ -39,29 +50,62 @@ def _confidence(subject: Subject, clip: PointClip, names: list[str]) -> list[Fin
     never = np.flatnonzero(~seen.any(axis=0))
     if len(never):
         shown = listed([names[point] for point in never])
-        text = f"{len(never)} of {len(names)} keypoints are never seen: {shown}"
+        text = f"{counted(len(never), 'keypoint', 'is', 'are', of=len(names))} never seen: {shown}"
         findings.append(subject.found("C012", text, part="clip", joints=never))
-    low = seen & (confidence < subject.options.confidence)
-    if low.sum() > _SHARE * seen.sum():
-        shares = low.sum(axis=0)
-        points = np.flatnonzero(shares)
-        points = points[np.argsort(-shares[points], kind="stable")]
-        per_frame = low.sum(axis=1)
-        frames = np.flatnonzero(per_frame)
-        frames = frames[np.argsort(-per_frame[frames], kind="stable")]
-        findings.append(
-            subject.found(
-                "C011",
-                f"{100.0 * low.sum() / seen.sum():.0f} % of what is seen has a confidence below "
-                f"{subject.options.confidence:g}, most often {names[points[0]]}, in "
-                f"{shares[points[0]]} of {len(numbers)} frames",
-                part="clip",
-                joints=points,
-                frames=numbers[frames] + clip.timing.first_frame,
-                times=_times(subject, clip, numbers[frames]),
-            )
+    return findings + _low(subject, clip, names, numbers, confidence)
+
+
+def _low(
+    subject: Subject, clip: PointClip, names: list[str], numbers: Indices, confidence: Floats
+) -> list[Finding]:
+    """Report keypoints of low confidence one by one, the worst first; the others together.
+
+    Parameters
+    ----------
+    subject, clip, names
+        Whose, the motion, and what the K keypoints are called.
+    numbers : (F,)
+        Frames in which somebody is there, from 0.
+    confidence : (F, K)
+        In these frames.
+    """
+    seen = confidence > 0.0
+    is_low = seen & (confidence < subject.options.confidence)
+    counts = is_low.sum(axis=0)
+    shares = counts / np.maximum(seen.sum(axis=0), 1)
+    points = np.flatnonzero((shares > LOW_SHARE) & (counts >= LOW_FRAMES))
+    points = points[np.argsort(-shares[points], kind="stable")]
+    limit = f"a confidence below {subject.options.confidence:g}"
+    findings = []
+    for point in points[:_SINGLE].tolist():
+        rows = np.flatnonzero(is_low[:, point])
+        first = numbers[rows[0]] + clip.timing.first_frame
+        words = (
+            f"{names[point]} has {limit} in {100.0 * shares[point]:.0f} % of the "
+            f"{int(seen[:, point].sum())} frames that see it, first in frame {first}"
         )
+        findings.append(_low_finding(subject, clip, words, [point], numbers[rows]))
+    rest = points[_SINGLE:]
+    if len(rest):
+        frames = np.flatnonzero(is_low[:, rest].any(axis=1))
+        which = counted(len(rest), "more keypoint", "has", "have")
+        shown = ", ".join(f"{names[k]} in {100.0 * shares[k]:.0f} %" for k in rest.tolist())
+        words = f"{which} {limit}: {shown} of the frames that see them"
+        findings.append(_low_finding(subject, clip, words, rest, numbers[frames]))
     return findings
+
+
+def _low_finding(
+    subject: Subject, clip: PointClip, text: str, points: Indices | list[int], frames: Indices
+) -> Finding:
+    return subject.found(
+        "C011",
+        text,
+        part="clip",
+        joints=points,
+        frames=frames + clip.timing.first_frame,
+        times=_times(subject, clip, frames),
+    )
 
 
 def _jumps(subject: Subject, clip: PointClip, names: list[str]) -> list[Finding]:
@@ -86,7 +130,7 @@ def _jumps(subject: Subject, clip: PointClip, names: list[str]) -> list[Finding]
     return [
         subject.found(
             "C003",
-            f"{len(wrong)} of {clip.timing.n_frames} frames: {names[point]} moves at "
+            f"{counted(len(wrong), 'frame', of=_n_frames(rows))}: {names[point]} moves at "
             f"{fastest[wrong[0]]:.3g} units a second (limit {limit:.3g}) to frame "
             f"{frames[0] + clip.timing.first_frame}",
             part="clip",
@@ -95,6 +139,12 @@ def _jumps(subject: Subject, clip: PointClip, names: list[str]) -> list[Finding]
             times=_times(subject, clip, frames),
         )
     ]
+
+
+def _n_frames(rows: Ints) -> int:
+    """Return how many frames there are from the first in which somebody is there to the last."""
+    there = np.flatnonzero(rows >= 0)
+    return int(there[-1] - there[0]) + 1 if len(there) else 0
 
 
 def _size(clip: PointClip) -> float:

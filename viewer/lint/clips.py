@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.lint._finding import Finding, Subject
-from viewer.lint._tracks import Track, track_of
+from viewer.errors import counted
+from viewer.lint._finding import Finding, Subject, listed
+from viewer.lint._tracks import Indices, Track, frame_numbers, key_times, track_of
 from viewer.rig.arrays import Floats
 from viewer.rig.clip import SHORTEST, Clip
 from viewer.rig.clip_table import evaluate_all
+from viewer.rig.dof_text import beyond_text
 from viewer.rig.points import PointClip
 from viewer.rig.sampled_clip import SampledClip
-from viewer.rig.skeleton import Skeleton, dof_label, joint_labels
+from viewer.rig.skeleton import Skeleton, joint_labels
 from viewer.rig.timing import Timing
 
 __all__ = ["check", "missing_frames"]
@@ -19,6 +21,7 @@ __all__ = ["check", "missing_frames"]
 _SIZES = 15.0  # of a figure that a joint may move in a second: some 30 m/s for a person
 _ALIKE = 1e-9  # share by which speeds of joints that move together differ
 _ROUNDING = 1e-6  # radians or lengths beyond a limit
+_MOST = 20_000  # times at which curves are held to their limits
 
 
 def check(subject: Subject) -> list[Finding]:
@@ -50,18 +53,28 @@ def missing_frames(subject: Subject, timing: Timing) -> list[Finding]:
     gaps = np.flatnonzero(~present[there[0] : there[-1]]) + there[0]
     if len(gaps) == 0:
         return []
-    runs = 1 + int((np.diff(gaps) > 1).sum())
+    runs = np.split(gaps, np.flatnonzero(np.diff(gaps) > 1) + 1)
     numbers = gaps + timing.first_frame
+    missing = counted(len(gaps), "frame", "is", "are", of=int(there[-1] - there[0]) + 1)
+    shown = listed([_run_text(run + timing.first_frame) for run in runs])
+    times = timing.start + gaps / timing.frame_rate + subject.actor.offset
     return [
         subject.found(
             "C005",
-            f"{len(gaps)} of {timing.n_frames} frames are missing in {runs} gaps, first frame "
-            f"{numbers[0]}",
+            f"{missing} missing in {counted(len(runs), 'gap')}: {shown}",
             part="clip",
             frames=numbers,
-            times=timing.start + gaps / timing.frame_rate + subject.actor.offset,
+            times=times,
+            # In the gap nobody is there to be seen.
+            seek=float(times[0]) - 1.0 / timing.frame_rate,
         )
     ]
+
+
+def _run_text(numbers: Indices) -> str:
+    if len(numbers) == 1:
+        return f"frame {numbers[0]}"
+    return f"frames {numbers[0]} to {numbers[-1]}"
 
 
 def _keys(subject: Subject, clip: Clip) -> list[Finding]:
@@ -74,7 +87,8 @@ def _keys(subject: Subject, clip: Clip) -> list[Finding]:
     return [
         subject.found(
             "C002",
-            f"{count} keys lie at the time of the one before, first in channel {channel} at "
+            f"{counted(count, 'key', 'lies', 'lie')} at the time of the one before, first in "
+            f"channel {channel} at "
             f"{times[channel][0]:g} s",
             part="clip",
             times=np.unique(np.concatenate(times)) + subject.actor.offset,
@@ -85,8 +99,7 @@ def _keys(subject: Subject, clip: Clip) -> list[Finding]:
 
 def _outside(subject: Subject, clip: Clip, skeleton: Skeleton) -> list[Finding]:
     """Report curves that leave the limits: they are held there while playing."""
-    count = max(2, int((clip.end - clip.start) * subject.options.rate) + 1)
-    times = np.linspace(clip.start, clip.end, min(count, 20_000))
+    times = np.append(key_times(subject, clip)[:_MOST], clip.end)
     targets, values = evaluate_all(clip, times)
     low, high = skeleton.dof_limits[targets].T
     beyond = np.maximum(low - values, values - high)
@@ -94,17 +107,23 @@ def _outside(subject: Subject, clip: Clip, skeleton: Skeleton) -> list[Finding]:
     if len(outside) == 0:
         return []
     worst = int(outside[beyond[:, outside].max(axis=0).argmax()])
-    frame = int(beyond[:, worst].argmax())
+    row = int(beyond[:, worst].argmax())
+    number = int(frame_numbers(subject, times[row : row + 1])[0])
+    text = beyond_text(
+        skeleton,
+        int(targets[worst]),
+        float(values[row, worst]),
+        f" in frame {number} at {times[row] + subject.actor.offset:.3f} s",
+    )
     order = np.flatnonzero((beyond > _ROUNDING).any(axis=1))
     return [
         subject.found(
             "C006",
-            f"{len(outside)} curves leave their limits: {dof_label(skeleton, targets[worst])} is "
-            f"{values[frame, worst]:.4g} at {times[frame]:.3g} s, its limits are "
-            f"{low[worst]:.4g} and {high[worst]:.4g}",
+            f"{counted(len(outside), 'curve', 'leaves its', 'leave their')} limits: {text}",
             part="clip",
             joints=np.unique(skeleton.dof_joints[targets[outside]]),
             times=times[order] + subject.actor.offset,
+            seek=float(times[row] + subject.actor.offset),
             at=("channels", int(targets[worst])),
         )
     ]
@@ -146,15 +165,16 @@ def _too_fast(
     else:
         how = f"turns by {np.degrees(rate):.0f} degrees a second (limit {np.degrees(limit):.0f})"
     joints = np.flatnonzero((rates > limit).any(axis=0))
+    each = track.of_each(frames)
     return [
         subject.found(
             code,
-            f"{len(frames)} of {len(track.times)} frames: {label} {how} to frame "
+            f"{counted(len(each), 'frame', of=track.n_frames)}: {label} {how} to frame "
             f"{track.numbers[frames[0]]} at {track.times[frames[0]]:.3f} s",
             part="clip",
             joints=np.concatenate([[joint], joints[joints != joint]]),
-            frames=track.numbers[frames],
-            times=track.times[frames],
+            frames=track.numbers[each],
+            times=track.times[each],
             at=("frames", int(frames[0])),
         )
     ]

@@ -4,44 +4,56 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.lint._finding import Finding, Subject
+from viewer.errors import counted
+from viewer.lint._finding import Finding, Subject, listed
+from viewer.lint._ground import Ground, ground_of
+from viewer.lint._soles import extent
 from viewer.lint._tracks import Track, track_of
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure
-from viewer.rig.joint_names import canonical_names
-from viewer.rig.shape import rest_joints
 from viewer.rig.skeleton import joint_labels
 
 __all__ = ["check"]
 
+# Below the ground, in heights of the figure at rest: 17 mm for a person, 51 mm below a guess.
+_SINKS, _SINKS_OF_GUESS = 0.01, 0.03
+_FACTOR = 3.0  # so much deeper even a single frame counts
 # Lengths in sizes of the skeleton at rest, about 1.9 m for a person with arms spread.
 _TOUCHES = 0.02  # above the ground
-_SINKS = 0.03  # below the ground
 _SLIDES = 0.15  # a second
 _SWINGS = 1.0  # a second: faster is a foot that swings close above the ground
 _FAR = 0.03  # in all, while one foot stands
 _WINDOW = 0.1  # seconds over which a foot's speed is taken: single frames are noisy
-_STANDS = 0.3  # share of the frames in which a foot is on the ground, or there is none
 
 
 def check(subject: Subject) -> list[Finding]:
     """Look at the feet of a body in motion: of a skeleton that has two ankles by name."""
     figure = subject.actor.figure
     track = None if figure.skeleton is None else _moving(subject, figure)
-    if track is None or figure.skeleton is None:
+    if track is None or figure.skeleton is None or subject.options.ground == "none":
         return []
-    feet = _feet(figure)
+    feet = track.feet.tolist()
     if len(feet) < 2:
         return []
     up = 2 if subject.up == "z" else 1
-    heights = track.positions[:, feet, up] - track.scale * _rest_heights(figure)[feet]
-    lowest = np.where(track.present, heights.min(axis=1), np.inf)
-    ground = _ground(lowest[track.present], track.size)
-    if ground is None:
-        return []
+    sole, height = extent(figure)
+    heights = track.soles
+    given = subject.options.ground
+    ground, sinks = 0.0, _SINKS
+    if isinstance(given, float | int):
+        ground = float(given)
+    else:
+        step = float(track.times[1] - track.times[0])
+        # Where the figure stands at rest, or else on the axes' origin.
+        axis, placement = 2 if figure.up == "z" else 1, subject.actor.placement
+        likely = (float(placement[up, axis] * sole + placement[up, 3]), 0.0)
+        found = ground_of(heights.min(axis=1), track.present, step, track.scale * height, likely)
+        if found.height is None:
+            return [_unsure(subject, found, step)]
+        ground, sinks = found.height, _SINKS_OF_GUESS if found.is_guess else _SINKS
     labels = [joint_labels(figure.skeleton)[joint] for joint in feet]
     return [
-        *_sunk(subject, track, feet, labels, heights - ground),
+        *_sunk(subject, track, feet, labels, heights - ground, sinks * height),
         *_slipped(subject, track, feet, labels, heights - ground, up),
     ]
 
@@ -54,55 +66,47 @@ def _moving(subject: Subject, figure: Figure) -> Track | None:
     return track if track is not None and track.size > 0.0 and len(track.times) > 2 else None
 
 
-def _feet(figure: Figure) -> list[int]:
-    """Return the joint nearest to the ground of each leg: the ball of the foot, or the ankle."""
-    assert figure.skeleton is not None  # the caller looked
-    names = canonical_names(figure.skeleton.names, figure.skeleton.parents)
-    feet = []
-    for side in ("left", "right"):
-        found = [names.index(name) for name in (f"{side}_foot", f"{side}_ankle") if name in names]
-        feet += found[:1]
-    return feet
-
-
-def _rest_heights(figure: Figure) -> Floats:
-    """Return how high each joint is above the sole while the figure stands at rest: (J,)."""
-    axis = 2 if figure.up == "z" else 1
-    joints = rest_joints(figure)[:, axis]
-    lowest = joints.min() if figure.mesh is None else figure.mesh.positions[:, axis].min()
-    return joints - lowest
-
-
-def _ground(lowest: Floats, size: float) -> float | None:
-    """Return the height on which the lower foot mostly is; 0 if that is near; None if on none."""
-    if len(lowest) == 0:
-        return None
-    middle = float(np.median(lowest))
-    ground = 0.0 if abs(middle) < _SINKS * size else middle
-    share = float((np.abs(lowest - ground) < _SINKS * size).mean())
-    return ground if share >= _STANDS else None
+def _unsure(subject: Subject, found: Ground, step: float) -> Finding:
+    """Say that nobody knows where the ground is, so that feet were not checked."""
+    if found.levels:
+        shown = listed([f"{level:.4g} for {count * step:.2g} s" for level, count in found.levels])
+        why = f"feet rest at {counted(len(found.levels), 'height')}, {shown}"
+    else:
+        why = "feet rest at no height for long"
+    text = f"{why}: it is not clear where the ground is, and they were not checked"
+    return subject.found("C013", text, part="clip")
 
 
 def _sunk(
-    subject: Subject, track: Track, feet: list[int], labels: list[str], heights: Floats
+    subject: Subject,
+    track: Track,
+    feet: list[int],
+    labels: list[str],
+    heights: Floats,
+    limit: float,
 ) -> list[Finding]:
+    """Report feet that are deeper than a limit, a length of the figure's."""
     depths = np.where(track.present[:, None], -heights, 0.0)
     deepest = depths.max(axis=1)
-    frames = np.flatnonzero(deepest > _SINKS * track.size)
+    is_deep = np.pad(deepest > limit * track.scale, 1)
+    # A single frame may be noise, unless it is far too deep.
+    lasts = is_deep[1:-1] & (is_deep[:-2] | is_deep[2:])
+    frames = np.flatnonzero(lasts | (deepest > _FACTOR * limit * track.scale))
     if len(frames) == 0:
         return []
     frames = frames[np.argsort(-deepest[frames], kind="stable")]
     worst = int(depths[frames[0]].argmax())
+    each = track.of_each(frames)
     return [
         subject.found(
             "C008",
-            f"{len(frames)} of {len(track.times)} frames: {labels[worst]} is "
+            f"{counted(len(each), 'frame', of=track.n_frames)}: {labels[worst]} is "
             f"{subject.length(deepest[frames[0]] / track.scale)} below the ground in frame "
             f"{track.numbers[frames[0]]}",
             part="clip",
             joints=[feet[worst]],
-            frames=track.numbers[frames],
-            times=track.times[frames],
+            frames=track.numbers[each],
+            times=track.times[each],
             at=("frames", int(frames[0])),
         )
     ]
@@ -134,17 +138,18 @@ def _slipped(
     worst = int(paths.argmax())
     frames = np.flatnonzero(slides.any(axis=1)) + width
     fastest = int(np.where(slides[:, worst], speeds[:, worst], 0.0).argmax())
+    each = track.of_each(np.concatenate([[fastest + width], frames]))
     return [
         subject.found(
             "C007",
-            f"{len(frames)} of {len(track.times)} frames: {labels[worst]} slides by "
+            f"{counted(len(each), 'frame', of=track.n_frames)}: {labels[worst]} slides by "
             f"{subject.length(paths[worst] / track.scale)} in all, at most "
             f"{subject.speed(speeds[fastest, worst] / track.scale)} to frame "
             f"{track.numbers[fastest + width]}",
             part="clip",
             joints=[feet[worst]],
-            frames=np.concatenate([[track.numbers[fastest + width]], track.numbers[frames]]),
-            times=np.concatenate([[track.times[fastest + width]], track.times[frames]]),
+            frames=track.numbers[each],
+            times=track.times[each],
             at=("frames", fastest + width),
         )
     ]

@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.errors import counted
 from viewer.lint._finding import Finding, Subject
 from viewer.lint._topology import edges_of, orientations, welded
-from viewer.rig.arrays import Bools, Floats
-from viewer.rig.mesh import Mesh, triangle_areas, vertex_normals
+from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.mesh import Mesh, triangle_areas
+from viewer.rig.vectors import unit
 
 __all__ = ["check"]
 
@@ -17,7 +19,7 @@ Indices = NDArray[np.int64]
 _FLAT = 1e-7  # height of a triangle relative to the mesh: the rounding of float32
 _UNIT = 0.01  # of a normal's length from 1
 _ZERO = 1e-12  # of a normal's length
-_AGAINST = 0.5  # share of vertices whose normal points against their triangles
+_AGAINST = -0.1  # cosine to a triangle's own normal: those across it are smoothed over an edge
 _CLOSED = 0.25  # border edges squared, by triangles: holes up to this leave a volume its sign
 # Times the median distance of vertices from their median: feet are 16 times as far in models
 # with half of their vertices in the face.
@@ -41,6 +43,7 @@ def check(subject: Subject) -> list[Finding]:
     corners = welded(mesh.positions, mesh.triangles)[sound]
     return [
         *findings,
+        *_against(subject, mesh, np.flatnonzero(~flat & known)),
         *_flat(subject, flat),
         *_doubled(subject, mesh, np.flatnonzero(whole)),
         *_crowded_edges(subject, mesh, np.flatnonzero(whole)),
@@ -70,8 +73,8 @@ def _flat(subject: Subject, flat: Bools) -> list[Finding]:
     return [
         subject.found(
             "M001",
-            f"{len(triangles)} of {len(flat)} triangles have no area, first triangle "
-            f"{triangles[0]}",
+            f"{counted(len(triangles), 'triangle', 'has', 'have', of=len(flat))} no area, first "
+            f"triangle {triangles[0]}",
             triangles=triangles,
             at=("triangles", int(triangles[0])),
         )
@@ -90,7 +93,8 @@ def _doubled(subject: Subject, mesh: Mesh, whole: Indices) -> list[Finding]:
     return [
         subject.found(
             "M011",
-            f"{len(copies)} triangles have the corners of another one, first triangle {copies[0]}",
+            f"{counted(len(copies), 'triangle', 'has', 'have')} the corners of another one, first "
+            f"triangle {copies[0]}",
             triangles=copies,
             at=("triangles", int(copies[0])),
         )
@@ -104,17 +108,25 @@ def _crowded_edges(subject: Subject, mesh: Mesh, whole: Indices) -> list[Finding
     if len(places) == 0:
         return []
     triangles = whole[np.unique(places // 3)]
-    vertices = np.unique(mesh.triangles[whole].ravel()[places])
+    ends = np.unique(_edge_ends(mesh.triangles[whole], places), axis=0)
+    vertices = np.unique(ends)
     return [
         subject.found(
             "M006",
-            f"{len(np.unique(edges.keys[places]))} edges belong to more than two triangles, at "
-            f"most {int(edges.counts.max())}, first at vertex {vertices[0]}",
+            f"{counted(len(ends), 'edge', 'belongs', 'belong')} to more than two triangles, at "
+            f"most {int(edges.counts.max())}, first between vertices {ends[0, 0]} and {ends[0, 1]}",
             triangles=triangles,
             vertices=vertices,
-            at=("positions", int(vertices[0])),
+            at=("positions", int(ends[0, 0])),
         )
     ]
+
+
+def _edge_ends(triangles: Ints, places: Indices) -> Indices:
+    """Return the two vertices of edges, the smaller first; corner k begins edge 3 t + k. (N, 2)."""
+    rows, corners = np.divmod(places, 3)
+    ends = np.stack([triangles[rows, corners], triangles[rows, (corners + 1) % 3]], axis=1)
+    return np.sort(ends, axis=1).astype(np.int64)
 
 
 def _sides(
@@ -126,11 +138,12 @@ def _sides(
     findings = []
     if flipped.any():
         triangles = sound[flipped]
+        wound = ("is wound against its", "are wound against their")
         findings.append(
             subject.found(
                 "M002",
-                f"{len(triangles)} of {mesh.n_triangles} triangles are wound against their "
-                f"neighbours, first triangle {triangles[0]}",
+                f"{counted(len(triangles), 'triangle', *wound, of=mesh.n_triangles)} neighbours, "
+                f"first triangle {triangles[0]}",
                 triangles=triangles,
                 at=("triangles", int(triangles[0])),
             )
@@ -140,8 +153,8 @@ def _sides(
         findings.append(
             subject.found(
                 "M012",
-                f"a surface of {len(triangles)} triangles has no two sides, with triangle "
-                f"{triangles[0]}",
+                f"a surface of {counted(len(triangles), 'triangle')} has no two sides, with "
+                f"triangle {triangles[0]}",
                 triangles=triangles,
                 at=("triangles", int(triangles[0])),
             )
@@ -157,14 +170,17 @@ def _sides(
 def _borders(subject: Subject, mesh: Mesh, sound: Indices, border: Bools) -> list[Finding]:
     if not border.any():
         return []
-    vertices = np.unique(mesh.triangles[sound].ravel()[border])
+    ends = _edge_ends(mesh.triangles[sound], np.flatnonzero(border))
+    vertices = np.unique(ends)
+    first = ends[np.lexsort(ends.T[::-1])[0]]
     return [
         subject.found(
             "M005",
-            f"{int(border.sum())} edges belong to one triangle only, first at vertex {vertices[0]}",
+            f"{counted(len(ends), 'edge', 'belongs', 'belong')} to one triangle only, first "
+            f"between vertices {first[0]} and {first[1]}",
             vertices=vertices,
             triangles=sound[np.unique(np.flatnonzero(border) // 3)],
-            at=("positions", int(vertices[0])),
+            at=("positions", int(first[0])),
         )
     ]
 
@@ -202,8 +218,8 @@ def _inside_out(
     return [
         subject.found(
             "M003",
-            f"{len(wrong)} closed parts with {len(triangles)} triangles are inside out, "
-            f"first triangle {triangles[0]}",
+            f"{counted(len(wrong), 'closed part')} with {counted(len(triangles), 'triangle')} "
+            f"{'is' if len(wrong) == 1 else 'are'} inside out, first triangle {triangles[0]}",
             triangles=triangles,
             at=("triangles", int(triangles[0])),
         )
@@ -218,7 +234,8 @@ def _normals(subject: Subject, mesh: Mesh) -> list[Finding]:
         findings.append(
             subject.found(
                 "M007",
-                f"{len(zero)} normals have length 0, first of vertex {zero[0]}",
+                f"{counted(len(zero), 'normal', 'has', 'have')} length 0, first of vertex "
+                f"{zero[0]}",
                 vertices=zero,
                 at=("normals", int(zero[0])),
             )
@@ -229,28 +246,39 @@ def _normals(subject: Subject, mesh: Mesh) -> list[Finding]:
         findings.append(
             subject.found(
                 "M008",
-                f"{len(odd)} normals are not of length 1, that of vertex {odd[0]} is "
-                f"{lengths[odd[0]]:.4g} long",
+                f"{counted(len(odd), 'normal', 'is', 'are')} not of length 1, that of vertex "
+                f"{odd[0]} is {lengths[odd[0]]:.4g} long",
                 vertices=odd,
                 at=("normals", int(odd[0])),
             )
         )
-    return findings + _against(subject, mesh)
+    return findings
 
 
-def _against(subject: Subject, mesh: Mesh) -> list[Finding]:
-    """Report normals that mostly point to the other side than their triangles."""
-    used = np.unique(mesh.triangles)
-    facing = np.einsum(
-        "va,va->v", mesh.normals[used], vertex_normals(mesh.positions, mesh.triangles)[used]
-    )
-    against = used[facing < 0.0]
-    if len(against) <= _AGAINST * max(len(used), 1):
+def _against(subject: Subject, mesh: Mesh, sound: Indices) -> list[Finding]:
+    """Report normals that point to the other side than every triangle of their vertex.
+
+    Triangles without area face no side. The two sides of a thin sheet have vertices of their own,
+    or share them, and then each normal is with one side.
+    """
+    corners = mesh.triangles[sound]
+    a, b, c = (mesh.positions[corners[:, k]] for k in range(3))
+    facing = unit(np.cross(b - a, c - a))
+    cosines = np.einsum("tka,ta->tk", unit(mesh.normals)[corners], facing)
+    places, count = corners.ravel(), mesh.n_vertices
+    numbers = np.bincount(places, minlength=count)
+    opposed = np.bincount(places, cosines.ravel() < _AGAINST, minlength=count)
+    # Where triangles are lost, one of those may have agreed.
+    against = np.flatnonzero((numbers > 0) & (opposed == numbers) & ~_beside_lost(subject, mesh))
+    if len(against) == 0:
         return []
+    used = int((numbers > 0).sum())
+    point = "points against all of its" if len(against) == 1 else "point against all of their"
     return [
         subject.found(
             "M009",
-            f"{len(against)} of {len(used)} normals point against their triangles",
+            f"{counted(len(against), 'normal', of=used)} {point} triangles, first of vertex "
+            f"{against[0]}",
             vertices=against,
             at=("normals", int(against[0])),
         )
@@ -266,8 +294,8 @@ def _vertices(subject: Subject, mesh: Mesh) -> list[Finding]:
         findings.append(
             subject.found(
                 "M004",
-                f"{len(unused)} of {mesh.n_vertices} vertices belong to no triangle, first vertex "
-                f"{unused[0]}",
+                f"{counted(len(unused), 'vertex', 'belongs', 'belong', of=mesh.n_vertices)} to no "
+                f"triangle, first vertex {unused[0]}",
                 vertices=unused,
                 at=("positions", int(unused[0])),
             )
@@ -280,8 +308,8 @@ def _vertices(subject: Subject, mesh: Mesh) -> list[Finding]:
         findings.append(
             subject.found(
                 "M010",
-                f"{len(far)} vertices are far from the others, vertex {far[0]} by "
-                f"{distances[far[0]] / typical:.2g} times what is usual",
+                f"{counted(len(far), 'vertex', 'is', 'are')} far from the others, vertex {far[0]} "
+                f"by {distances[far[0]] / typical:.2g} times what is usual",
                 vertices=far,
                 at=("positions", int(far[0])),
             )

@@ -7,8 +7,9 @@ from collections import Counter
 
 import numpy as np
 
-from viewer.errors import printable
+from viewer.errors import counted, printable
 from viewer.lint._finding import Finding, Subject, listed
+from viewer.rig.dof_text import beyond_text
 from viewer.rig.pose import Pose
 from viewer.rig.skeleton import Skeleton, dof_label, joint_labels
 
@@ -43,7 +44,7 @@ def _names(subject: Subject, skeleton: Skeleton) -> list[Finding]:
         findings.append(
             subject.found(
                 "S006",
-                f"{len(repeated)} joints share their names with others: {shown}",
+                f"{counted(len(repeated), 'joint')} share their names with others: {shown}",
                 part="skeleton",
                 joints=repeated,
                 at=("joints", repeated[0]),
@@ -54,7 +55,8 @@ def _names(subject: Subject, skeleton: Skeleton) -> list[Finding]:
         findings.append(
             subject.found(
                 "S007",
-                f"{len(nameless)} joints have no name, first joint {nameless[0]}",
+                f"{counted(len(nameless), 'joint', 'has', 'have')} no name, first joint "
+                f"{nameless[0]}",
                 part="skeleton",
                 joints=nameless,
                 at=("joints", nameless[0]),
@@ -85,8 +87,8 @@ def _rest(subject: Subject, skeleton: Skeleton) -> list[Finding]:
         findings.append(
             subject.found(
                 "S009",
-                f"{len(odd)} rest rotations are not of length 1, {labels[odd[0]]} has "
-                f"{lengths[odd[0]]:.4g}",
+                f"{counted(len(odd), 'rest rotation', 'is', 'are')} not of length 1, "
+                f"{labels[odd[0]]} has {lengths[odd[0]]:.4g}",
                 part="skeleton",
                 joints=odd,
                 at=("joints", int(odd[0])),
@@ -98,7 +100,8 @@ def _rest(subject: Subject, skeleton: Skeleton) -> list[Finding]:
         findings.append(
             subject.found(
                 "S010",
-                f"{len(flat)} rest scales are 0 or less, {labels[flat[0]]} has {scale}",
+                f"{counted(len(flat), 'rest scale', 'is', 'are')} 0 or less, {labels[flat[0]]} has "
+                f"{scale}",
                 part="skeleton",
                 joints=flat,
                 at=("joints", int(flat[0])),
@@ -110,7 +113,7 @@ def _rest(subject: Subject, skeleton: Skeleton) -> list[Finding]:
 def _named(skeleton: Skeleton, text: str) -> list[int]:
     """Return the joint of the DOF that a reader's words name, if it can be told."""
     labels = joint_labels(skeleton)
-    found = re.match(r"\d+ DOFs, (.+)\.\w+ is ", text)
+    found = re.match(r"\d+ DOFs?, (.+)\.\w+ is ", text)
     return [labels.index(found[1])] if found is not None and found[1] in labels else []
 
 
@@ -128,12 +131,13 @@ def _limits(subject: Subject, skeleton: Skeleton, pose: Pose | None) -> list[Fin
         if len(outside):
             outside = outside[np.argsort(-beyond[outside], kind="stable")]
             worst = outside[0]
+            which = counted(len(outside), "DOF")
+            are = "is outside its" if len(outside) == 1 else "are outside their"
             findings.append(
                 subject.found(
                     "S004",
-                    f"{len(outside)} DOFs of the pose are outside their limits: "
-                    f"{dof_label(skeleton, worst)} is {pose.dofs[worst]:.4g}, "
-                    f"its limits are {low[worst]:.4g} and {high[worst]:.4g}",
+                    f"{which} of the pose {are} limits: "
+                    f"{beyond_text(skeleton, int(worst), float(pose.dofs[worst]))}",
                     part="skeleton",
                     joints=np.unique(skeleton.dof_joints[outside]),
                     at=("joints", int(skeleton.dof_joints[worst])),
@@ -146,7 +150,8 @@ def _limits(subject: Subject, skeleton: Skeleton, pose: Pose | None) -> list[Fin
         findings.append(
             subject.found(
                 "S005",
-                f"{len(locked)} of {skeleton.n_dofs} DOFs are locked: {', '.join(labels)}{more}",
+                f"{counted(len(locked), 'DOF', 'is', 'are', of=skeleton.n_dofs)} locked: "
+                f"{', '.join(labels)}{more}",
                 part="skeleton",
                 joints=np.unique(skeleton.dof_joints[locked]),
                 at=("joints", int(skeleton.dof_joints[locked[0]])),

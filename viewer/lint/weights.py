@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from viewer.errors import counted
 from viewer.lint._finding import Finding, Subject, listed
 from viewer.lint._poses import some_poses
 from viewer.lint._topology import components, welded
@@ -49,8 +50,8 @@ def _sums(subject: Subject, skin: Skin, moved: Bools) -> list[Finding]:
     return [
         subject.found(
             "W001",
-            f"weights of {len(off)} vertices do not sum to 1: {sums[worst]:.6g} at vertex {worst}, "
-            f"an error of {errors[worst]:.3g}",
+            f"weights of {counted(len(off), 'vertex')} do not sum to 1: {sums[worst]:.6g} at "
+            f"vertex {worst}, an error of {errors[worst]:.3g}",
             severity="warning" if errors[worst] > _WRONG else "note",
             vertices=off,
             at=("weights", worst),
@@ -68,8 +69,8 @@ def _negative(subject: Subject, skin: Skin) -> list[Finding]:
     return [
         subject.found(
             "W002",
-            f"{len(negative)} weights are negative: {skin.weights[first]:.6g} at vertex "
-            f"{vertices[0]} for joint {_label(subject, int(skin.joints[first]))}",
+            f"{counted(len(negative), 'weight', 'is', 'are')} negative: {skin.weights[first]:.6g} "
+            f"at vertex {vertices[0]} for joint {_label(subject, int(skin.joints[first]))}",
             vertices=_distinct(vertices),
             joints=_distinct(skin.joints[negative]),
             at=("weights", int(vertices[0])),
@@ -92,11 +93,13 @@ def _bare(subject: Subject, skin: Skin, mesh: Mesh, moved: Bools) -> list[Findin
     if lost.any():
         vertices = np.unique(mesh.triangles[lost])
         names = np.unique(islands[lost])
+        what = counted(len(vertices), "vertex", "has", "have" if len(names) > 1 else "has")
+        stay = "it stays where it was" if len(names) == 1 else "they stay where they were"
         findings.append(
             subject.found(
                 "W005",
-                f"{len(names)} islands with {len(vertices)} vertices have no weight at all, "
-                f"first at vertex {vertices[0]}: they stay where they were bound",
+                f"{counted(len(names), 'island')} with {what} no weight at all, first at vertex "
+                f"{vertices[0]}: {stay} bound",
                 vertices=vertices,
                 triangles=np.flatnonzero(lost),
                 at=("weights", int(vertices[0])),
@@ -106,11 +109,12 @@ def _bare(subject: Subject, skin: Skin, mesh: Mesh, moved: Bools) -> list[Findin
         bare[vertices] = False
     single = np.flatnonzero(bare)
     if len(single):
+        stay = "stays where it was" if len(single) == 1 else "stay where they were"
         findings.append(
             subject.found(
                 "W004",
-                f"{len(single)} vertices without influence stay where they were bound, "
-                f"first vertex {single[0]}",
+                f"{counted(len(single), 'vertex')} without influence {stay} bound, first vertex "
+                f"{single[0]}",
                 vertices=single,
                 at=("weights", int(single[0])),
             )
@@ -124,7 +128,7 @@ def _idle_joints(subject: Subject, figure: Figure, skin: Skin) -> list[Finding]:
     if len(idle) == 0 or len(subject.spoiled.get("weights", ())):
         return []  # weights that are lost may have been theirs
     labels = [_label(subject, int(joint)) for joint in idle]
-    text = f"{len(idle)} joints move no vertex: {listed(labels)}"
+    text = f"{counted(len(idle), 'joint', 'moves', 'move')} no vertex: {listed(labels)}"
     return [subject.found("W006", text, joints=idle, at=("bindings", int(idle[0])))]
 
 
@@ -136,7 +140,8 @@ def _doubled(subject: Subject, skin: Skin, known: Bools) -> list[Finding]:
     return [
         subject.found(
             "W009",
-            f"{len(fewer)} vertices list a joint more than once, first vertex {fewer[0]}",
+            f"{counted(len(fewer), 'vertex', 'lists', 'list')} a joint more than once, first "
+            f"vertex {fewer[0]}",
             vertices=fewer,
             at=("weights", int(fewer[0])),
         )
@@ -157,7 +162,8 @@ def _crowded(subject: Subject, figure: Figure, known: Bools) -> list[Finding]:
         if len(crowded) == 0:
             continue
         text = (
-            f"{len(crowded)} vertices have more than {limit} influences, at most {int(used.max())}"
+            f"{counted(len(crowded), 'vertex', 'has', 'have')} more than {limit} influences, at "
+            f"most {int(used.max())}"
         )
         if can_pose:
             errors, n_poses = _cut_errors(subject, limit)
@@ -167,7 +173,7 @@ def _crowded(subject: Subject, figure: Figure, known: Bools) -> list[Finding]:
             text += (
                 f"; kept to {limit} the mesh moves by up to {subject.length(errors[worst])} "
                 f"(vertex {worst}), {subject.length(float(errors[crowded].mean()))} on average "
-                f"of these, over {n_poses} poses"
+                f"of these, over {counted(n_poses, 'pose')}"
             )
         at = ("weights", int(crowded[0]))
         findings.append(subject.found(code, text, vertices=crowded, at=at))

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from viewer.errors import RigError
+from viewer.errors import RigError, counted
 from viewer.rig.arrays import Floats, frozen
 from viewer.rig.figure import Figure
 from viewer.rig.hands import Hand
@@ -129,9 +129,10 @@ def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[str
             lost.append(name)
     notes += _put_hands(motion, figure, vectors)
     if lost:
+        were = "was" if len(lost) == 1 else "were"
         rest = f", … and {len(lost) - _LISTED} more" * (len(lost) > _LISTED)
         notes.append(
-            f"{len(lost)} joints that {figure.name} lacks were left out: "
+            f"{counted(len(lost), 'joint')} that {figure.name} lacks {were} left out: "
             f"{', '.join(lost[:_LISTED])}{rest}"
         )
     weights, more = _weights(motion, figure)

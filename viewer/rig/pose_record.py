@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from viewer.errors import RigError
+from viewer.errors import RigError, counted
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.hands import Hand, hand_vectors
@@ -216,7 +216,9 @@ def _apply_dofs(record: PoseRecord, figure: Figure, pose: Pose) -> list[str]:
 
 def _beyond_limits(skeleton: Skeleton, dofs: Floats) -> list[str]:
     count = int((clamp_dofs(skeleton, dofs) != dofs).sum())
-    return [f"{count} DOFs of the pose were beyond their limits and clamped"] if count else []
+    which = counted(count, "DOF")
+    were = "was beyond its" if count == 1 else "were beyond their"
+    return [f"{which} of the pose {were} limits and clamped"] if count else []
 
 
 def _apply_vector(vector: Floats, figure: Figure, pose: Pose) -> list[str]:
@@ -245,7 +247,8 @@ def _apply_vector(vector: Floats, figure: Figure, pose: Pose) -> list[str]:
         else:
             lost += bool(row.any())
     _turn(figure, pose, joints, wanted.ravel())
-    return [f"{lost} joints of the pose that {figure.name} lacks were left out"] if lost else []
+    which, was = counted(lost, "joint"), "was" if lost == 1 else "were"
+    return [f"{which} of the pose that {figure.name} lacks {was} left out"] if lost else []
 
 
 def _apply_part(
@@ -285,7 +288,8 @@ def _apply_body(values: Floats, figure: Figure, pose: Pose) -> list[str]:
 
 def _left_out(rest: Floats, own: int) -> str:
     count = int(rest.reshape(-1, 3).any(axis=1).sum())
-    return f"{count} joints of the pose beyond the body's {own} were left out"
+    was = "was" if count == 1 else "were"
+    return f"{counted(count, 'joint')} of the pose beyond the body's {own} {was} left out"
 
 
 def _hand(figure: Figure, name: str) -> Hand | None:

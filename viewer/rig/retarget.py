@@ -17,7 +17,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from viewer.errors import RigError
+from viewer.errors import RigError, counted
 from viewer.rig._joint_matches import Matches, match_joints
 from viewer.rig._rest_poses import RestPose, alignment, is_same_rest, rest_of
 from viewer.rig.arrays import Floats, Ints
@@ -296,8 +296,9 @@ def _lost(carried: _Carried) -> list[str]:
     if not len(found):
         return []
     worst = int(found[largest[found].argmax()])
+    whose = "its parent" if len(found) == 1 else "their parents"
     return [
-        f"positions of {len(found)} joints within their parents were left out, up to "
+        f"positions of {counted(len(found), 'joint')} within {whose} were left out, up to "
         f"{largest[worst]:.3g} ({joint_label(carried.source, worst)})"
     ]
 

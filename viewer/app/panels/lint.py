@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from imgui_bundle import imgui
@@ -18,9 +19,11 @@ from viewer.app.lint_actions import (
 from viewer.app.lint_view import Checked
 from viewer.app.reasons import no_job_room
 from viewer.app.state import AppState
-from viewer.app.widgets import button, explain, note_item, same_line_if_room, slider
+from viewer.app.widgets import button, choice, explain, note_item, same_line_if_room, slider
 from viewer.errors import printable
 from viewer.lint import SEVERITIES, Finding, LintOptions
+from viewer.lint.captures import LOW_FRAMES, LOW_SHARE
+from viewer.rig.mesh import box_size
 
 __all__ = ["draw"]
 
@@ -30,6 +33,11 @@ _COLORS = {
     "note": (0.52, 0.74, 1.0, 1.0),
 }
 _STALE_COLOR = _COLORS["warning"]
+_GROUNDS = {
+    "auto": "where feet rest",
+    "height": "at a height",
+    "none": "none: feet are not checked",
+}
 _LONGEST = 400  # characters of a message in the list
 _FASTEST = 100.0  # speeds that can be set, units a second
 _TIP_WIDTH = 30.0  # letters' heights
@@ -51,19 +59,25 @@ def draw(state: AppState) -> None:
             imgui.text_wrapped("This scene has not been checked yet.")
         return
     if is_stale(state):
-        imgui.push_style_color(imgui.Col_.text, _STALE_COLOR)
-        imgui.text_wrapped("Figure, pose or limits are others than when it was checked.")
-        imgui.pop_style_color()
+        _draw_warning("Figure, pose or limits are others than when it was checked.")
+    for note in known.notes:
+        _draw_warning(note)
     _draw_filters(state, known)
     if view.chosen >= 0 and view.marks_note:
         imgui.text_wrapped(view.marks_note)
     _draw_list(state, known)
 
 
+def _draw_warning(text: str) -> None:
+    imgui.push_style_color(imgui.Col_.text, _STALE_COLOR)
+    imgui.text_wrapped(text)
+    imgui.pop_style_color()
+
+
 def _draw_buttons(state: AppState, known: Checked | None) -> None:
     if button(state, "Check" if known is None else "Recheck", no_job_room(state)):
         start_check(state)
-    explain("look for faults in rigs, meshes and motions as they are now")
+    explain("look for faults in rigs, meshes and motions as they are now, and in their files")
     same_line_if_room("Limits…")
     if button(state, "Limits…"):
         imgui.open_popup("lint limits")
@@ -97,12 +111,34 @@ def _draw_limits(state: AppState) -> None:
         view.options = replace(view.options, max_speed=moved if moved > 0.0 else None)
     sure = options.confidence
     moved = slider(state, "Low confidence", sure, 0.0, 1.0)
-    explain("captured points below are reported")
+    explain(
+        "a captured point is reported if its confidence is below in more than "
+        f"{100.0 * LOW_SHARE:g} % of the frames that see it, and in {LOW_FRAMES} at least"
+    )
     if moved != sure:
         view.options = replace(view.options, confidence=moved)
+    _draw_ground(state)
     if button(state, "Usual limits"):
         view.options = LintOptions()
     imgui.end_popup()
+
+
+def _draw_ground(state: AppState) -> None:
+    """Draw where the ground is: found out, at a height, or nowhere."""
+    view, ground = state.lint, state.lint.options.ground
+    is_given = not isinstance(ground, str)
+    chosen = choice(state, "Ground", "height" if is_given else str(ground), _GROUNDS)
+    explain("no foot may be below by more than 1 % of the figure's height")
+    if chosen == "height":
+        height = float(ground) if is_given else 0.0
+        size = box_size(state.box) or 1.0
+        ground = slider(state, "Ground height", height, -size, size, "%.3f")
+    elif chosen == "auto":
+        ground = "auto"
+    else:
+        ground = "none"
+    if ground != view.options.ground:
+        view.options = replace(view.options, ground=ground)
 
 
 def _draw_progress(state: AppState) -> None:
@@ -162,7 +198,15 @@ def _draw_list(state: AppState, known: Checked) -> None:
 def _words(finding: Finding) -> str:
     """Return what the filter looks at, in small letters."""
     words = (finding.code, finding.severity, finding.title, finding.message, finding.name)
-    return " ".join(words).lower()
+    return " ".join((*words, _place(finding))).lower()
+
+
+def _place(finding: Finding) -> str:
+    """Return the file's name and the line, empty if there is none."""
+    if finding.file is None or finding.file == Path():
+        return ""
+    line = "" if finding.line is None else f":{finding.line}"
+    return f"{printable(finding.file.name, 60)}{line}"
 
 
 def _draw_row(state: AppState, index: int, finding: Finding, several: bool) -> None:
@@ -172,6 +216,8 @@ def _draw_row(state: AppState, index: int, finding: Finding, several: bool) -> N
     title, message = finding.title, printable(finding.message, _LONGEST)
     if several and finding.name:
         title = f"{printable(finding.name, 60)}: {title}"
+    if _place(finding):
+        title = f"{title} ({_place(finding)})"
     room = max(imgui.get_content_region_avail().x, 1.0)
     heights = [imgui.calc_text_size(text, False, room).y for text in (title, message)]
     imgui.text_wrapped(title)
@@ -198,6 +244,9 @@ def _draw_tooltip(finding: Finding) -> None:
         imgui.push_text_wrap_pos(_TIP_WIDTH * imgui.get_font_size())
         imgui.text_colored(_COLORS[finding.severity], f"{finding.severity} {finding.code}")
         imgui.text_unformatted(finding.title)
+        if _place(finding):
+            line = "" if finding.line is None else f":{finding.line}"
+            imgui.text_unformatted(f"{printable(finding.file, 300)}{line}")
         imgui.text_unformatted(printable(finding.message, 2000))
         imgui.text_unformatted(f"What to do: {finding.hint}")
         imgui.text_disabled("a click shows it in the view; another one, or Esc, ends that")

@@ -1,0 +1,172 @@
+"""An open scene checked with its files: nothing twice, places, and files that are others now."""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from formats import skel_text, skin_text
+from lint.sound import column, scene_of
+from lint.test_planted_files import LATE_KEYS
+
+import viewer
+from viewer.lint import Finding, finding_text, lint_again, lint_files
+from viewer.lint._messages import of_warning
+from viewer.lint._named import aimed_at
+from viewer.loading import bundled_files
+from viewer.rig.scene import Scene
+
+ZERO_NORMAL = skin_text.GOOD.replace("0 0 1\n  0 1 0", "0 0 0\n  0 1 0", 1)
+TEXTS = {
+    "a.skel": skel_text.GOOD.replace("rotxlimit -1 1", "rotxlimit 1 -1"),
+    "a.skin": ZERO_NORMAL.replace("2 0 0.25", "2 0 0.5", 1),
+    "a.anim": LATE_KEYS,
+}
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> list[Path]:
+    """A rig and a clip with faults that readers mend: they are in no figure any more."""
+    for name, text in TEXTS.items():
+        (tmp_path / name).write_text(text)
+    return [tmp_path / name for name in TEXTS]
+
+
+def checked(files: list[Path], scene: Scene | None = None) -> list[Finding]:
+    return lint_again(scene or viewer.load(*files), files).findings
+
+
+def test_what_readers_mend_is_found_as_the_command_finds_it(files: list[Path]) -> None:
+    again = lint_again(viewer.load(*files), files)
+    assert again.n_files == 3 and again.notes == ()
+    texts = [*map(finding_text, again.findings)]
+    assert texts == [*map(finding_text, lint_files(files)[1])]
+    places = {(f.code, f.file.name, f.line) for f in again.findings if f.file is not None}
+    assert {
+        ("S003", "a.skel", 5), ("M007", "a.skin", 8), ("W001", "a.skin", 13), ("C001", "a.anim", 12)
+    } <= places  # fmt: skip
+
+
+def test_nothing_is_told_twice(files: list[Path]) -> None:
+    codes = [f.code for f in checked(files)]
+    assert [code for code in codes if code in ("W001", "M007", "S003", "C001")] == [
+        "S003", "M007", "C001", "W001"
+    ]  # fmt: skip
+
+
+def test_remarks_lead_to_the_place_they_name(files: list[Path]) -> None:
+    found = {f.code: f for f in checked(files)}
+    assert (found["M007"].actor, found["M007"].vertices.tolist()) == (0, [1])
+    assert (found["S003"].actor, found["S003"].joints.tolist()) == (0, [0])
+    # The ninth channel turns the second joint, beside three that move the root.
+    assert (found["C001"].actor, found["C001"].joints.tolist()) == (0, [1])
+
+
+def test_what_was_edited_has_no_line(files: list[Path]) -> None:
+    scene = viewer.load(*files)
+    figure = scene.actors[0].figure
+    weights = np.array(figure.skin.weights)
+    weights[0] = 0.5
+    skin = replace(figure.skin, weights=weights)
+    scene.actors[0] = replace(scene.actors[0], figure=replace(figure, skin=skin))
+    found = {f.code: f for f in checked(files, scene)}
+    assert found["W001"].message.startswith("weights of 2 vertices") and found["W001"].file is None
+    # The skeleton is the file's own still.
+    assert found["S003"].file.name == "a.skel" and found["S003"].actor == 0
+    # Of the reader's words about the skin nobody knows whether they are of this mesh.
+    assert found["M007"].file.name == "a.skin" and found["M007"].actor is None
+
+
+def test_files_that_are_gone_are_named(files: list[Path]) -> None:
+    scene = viewer.load(*files)
+    files[1].unlink()
+    again = lint_again(scene, files)
+    assert again.notes == ("a.skin is gone: only what is open was checked",)
+    (gone,) = [f for f in again.findings if f.severity == "error" and f.code[0] == "F"]
+    assert (gone.code, gone.file) == ("F001", files[1])
+    found = {f.code: f for f in again.findings}
+    assert found["W001"].file is None and found["S003"].line == 5
+
+
+def test_files_that_changed_are_named(files: list[Path]) -> None:
+    scene, opened_at = viewer.load(*files), time.time()
+    assert lint_again(scene, files, since=opened_at + 60.0).notes == ()
+    os.utime(files[0], (opened_at + 100.0,) * 2)
+    again = lint_again(scene, files, since=opened_at + 60.0)
+    assert again.notes == (
+        "a.skel was changed after opening: what readers say is of the new contents",
+    )
+    for path in files:
+        os.utime(path, (opened_at + 100.0,) * 2)
+    again = lint_again(scene, files, since=opened_at + 60.0)
+    assert again.notes[0].startswith("a.skel, a.skin, a.anim were changed")
+
+
+def test_a_file_inside_a_folder_counts(tmp_path: Path) -> None:
+    from formats import pig_text
+
+    folder = pig_text.write(tmp_path / "pig")
+    scene, opened_at = viewer.load(folder), time.time()
+    os.utime(folder / "vertices.txt", (opened_at + 100.0,) * 2)
+    assert lint_again(scene, [folder], since=opened_at + 60.0).notes[0].startswith("pig was")
+
+
+def test_a_new_fault_of_a_changed_file_is_told(files: list[Path]) -> None:
+    scene = viewer.load(*files)
+    files[1].write_text(TEXTS["a.skin"].replace("2 0 0", "2 up 0", 1))
+    found = checked(files, scene)
+    assert ("F002", files[1], 3) in [(f.code, f.file, f.line) for f in found]
+
+
+def test_likely_files_count_only_if_the_scene_is_of_them() -> None:
+    bundled = list(bundled_files())
+    again = lint_again(viewer.load(), bundled, is_likely=True)
+    assert again.n_files == 2 and all(f.file in bundled for f in again.findings)
+    assert lint_again(scene_of(column()), bundled, is_likely=True).n_files == 0
+
+
+def test_people_of_a_capture_keep_their_folder(shared_data: Path) -> None:
+    folder = shared_data / "smpl_synthetic" / "easymocap" / "keypoints3d"
+    found = checked([folder])
+    assert [(f.code, f.actor, f.file) for f in found if f.code == "C012"] == [
+        ("C012", 0, folder), ("C012", 1, folder)
+    ]  # fmt: skip
+
+
+def test_progress_may_stop_while_frames_are_read(shared_data: Path) -> None:
+    class StopError(viewer.ViewerError):
+        pass
+
+    folder = shared_data / "smpl_synthetic" / "easymocap" / "keypoints3d"
+    scene = viewer.load(folder)
+
+    def stop(done: int, total: int, what: str) -> None:
+        if what == "reading frames":
+            raise StopError
+
+    with pytest.raises(StopError):
+        lint_again(scene, [folder], progress=stop)
+
+
+@pytest.mark.parametrize(
+    ("text", "part", "vertices", "joints"),
+    [
+        ("a.skin:8: 3 normals of length 0, first of vertex 5: computed", "mesh", [5], []),
+        ("a.skin:8: vertex 99 is far", "mesh", None, None),  # there are 20
+        ("a.skin:8: matrix 1 of bindings can hardly be inverted", "mesh", [], [1]),
+        ("a.skel:8: ignored 1 limit, first rotxlimit 1 -1 of joint knee", "skeleton", [], [1]),
+        ("a.skel:8: ignored 1 limit, first rotxlimit 1 -1 of joint tail", "skeleton", None, None),
+        ("a.anim:8: channel 4: key 1 is before key 0; keys sorted", "clip", [], [0]),
+        ("a.anim: no range: that of the keys is played, 0 to 1", "clip", None, None),
+    ],
+)
+def test_words_of_readers_name_places(text, part, vertices, joints) -> None:
+    found = aimed_at(of_warning(text, Path(text.split(":")[0])), scene_of(column()).actors[0], part)
+    if vertices is None:
+        assert found is None
+    else:
+        assert (found.vertices.tolist(), found.joints.tolist()) == (vertices, joints)

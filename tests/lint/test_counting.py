@@ -1,0 +1,95 @@
+"""Clips of keys are told in the frames of the timeline, however finely they are looked at."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from lint.sound import column, legs, scene_of, standing
+
+from viewer.app.playback import Playback
+from viewer.lint import Finding, LintOptions, lint_scene
+from viewer.rig.clip import Channel, Clip
+from viewer.rig.scene import Actor, Scene
+
+
+def jumping(start: float, at: float, length: float = 4.0, offset: float = 0.0) -> Actor:
+    """Return the column with a clip that jumps by 90 m, in a hundredth of a second."""
+    figure = column()
+    channels = [
+        Channel(target, [start], [0.0], (("linear", "linear"),))
+        for target in range(figure.skeleton.n_dofs)
+    ]
+    times = [start, start + at, start + at + 0.01, start + length]
+    channels[0] = Channel(0, times, [0.0, 0.0, 90.0, 90.0], (("linear", "linear"),) * 4)
+    return Actor(figure, clip=Clip("keys", tuple(channels), start, start + length), offset=offset)
+
+
+def jump_of(scene: Scene, options: LintOptions | None = None) -> Finding:
+    (found,) = [f for f in lint_scene(scene, options) if f.code == "C003"]
+    return found
+
+
+def shown_frame(scene: Scene, time: float) -> int:
+    """Return what the window's timeline says at a time."""
+    playback = Playback()
+    playback.show(scene)
+    playback.seek(time)
+    return playback.frame + playback.first_frame
+
+
+@pytest.mark.parametrize(("start", "offset"), [(0.0, 0.0), (2.5, 0.0), (1.0, 3.2)])
+def test_a_jump_is_in_the_frame_that_the_timeline_shows_there(start: float, offset: float) -> None:
+    scene = Scene([jumping(start, 2.0, offset=offset)])
+    found = jump_of(scene)
+    # It is looked at 60 times a second, of 0 to 4 s: from frame 60, at 2 s, to half a frame on.
+    assert found.frames.tolist() == [60]
+    assert found.times == pytest.approx([start + offset + 2.0 + 1 / 60])
+    assert found.message.startswith("1 of 121 frames: foot moves at")
+    assert found.message.endswith(f"to frame 60 at {start + offset + 2.0 + 1 / 60:.3f} s")
+    assert shown_frame(scene, float(found.times[0])) == 60
+
+
+def test_frames_are_those_of_the_rate_that_is_asked_for() -> None:
+    found = jump_of(Scene([jumping(0.0, 2.0)]), LintOptions(frame_rate=24.0))
+    # Looked at 72 times a second.
+    assert found.frames.tolist() == [48] and found.times == pytest.approx([2.0 + 1 / 72])
+    assert found.message.startswith("1 of 97 frames")
+
+
+def test_several_clips_are_counted_from_the_first_start() -> None:
+    scene = Scene([jumping(0.0, 1.0), jumping(2.0, 1.0)])
+    first, second = (f for f in lint_scene(scene) if f.code == "C003")
+    assert (first.frames.tolist(), second.frames.tolist()) == ([30], [90])
+    assert shown_frame(scene, float(second.times[0])) == 90
+
+
+def test_beside_a_capture_its_frames_count() -> None:
+    figure = legs()
+    scene = Scene([jumping(0.0, 1.0, length=1.5), Actor(figure, clip=standing(figure))])
+    found = jump_of(scene)
+    # The capture's first frame is called 100.
+    assert found.frames.tolist() == [130] == [shown_frame(scene, float(found.times[0]))]
+
+
+def test_curves_beyond_limits_say_frame_and_degrees() -> None:
+    figure = column()
+    channel = Channel(7, [0.0, 1.0], [0.0, 4.0], (("linear", "linear"),) * 2)
+    scene = scene_of(figure, Clip("keys", (channel,), 0.0, 1.0))
+    (found,) = [f for f in lint_scene(scene) if f.code == "C006"]
+    # 4 radians at the end, of at most 3.
+    assert found.message == (
+        "1 curve leaves its limits: knee.y is 229.2° in frame 30 at 1.000 s, its limits are "
+        "-171.9° and 171.9°"
+    )
+    assert found.seek == pytest.approx(1.0)
+
+
+def test_a_file_s_frames_stay_its_own() -> None:
+    figure = legs()
+    clip = standing(figure)
+    places = np.array(clip.translations)
+    places[20, 0, 0] = 3.0
+    scene = scene_of(figure, replace(clip, translations=places))
+    assert sorted(jump_of(scene).frames.tolist()) == [120, 121]

@@ -1,0 +1,135 @@
+"""Where the ground is, and feet that sink into it: made by hand, each with what must be said."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from lint.sound import FRAMES, RATE, legs, scene_of, standing
+
+from viewer.lint import Finding, LintOptions, lint_scene
+from viewer.lint._ground import Ground, ground_of
+from viewer.rig.timing import Timing
+
+Change = Callable[[np.ndarray], np.ndarray]
+FLOORS = [0.0, 0.8, -0.95]
+_K = np.arange(FRAMES)
+
+
+def found(heights: np.ndarray, floor: float, **options: object) -> list[Finding]:
+    """Check legs whose root is so much higher in every frame than on the floor."""
+    figure = legs()
+    clip, count = standing(figure), len(heights)
+    places = np.zeros((count, figure.skeleton.n_joints, 3))
+    places[:, 0, 1] = heights + floor
+    clip = replace(
+        clip,
+        rotations=np.tile(clip.rotations[:1], (count, 1, 1)),
+        translations=places,
+        timing=Timing(RATE, np.arange(count), first_frame=100),
+    )
+    return lint_scene(scene_of(figure, clip), LintOptions(**options))
+
+
+@pytest.mark.parametrize("floor", FLOORS)
+@pytest.mark.parametrize("depth", [0.02, 0.05, 0.1, 0.2])
+def test_a_short_sink_is_found_however_deep_and_wherever(depth: float, floor: float) -> None:
+    (sunk,) = found(np.where((_K >= 20) & (_K < 30), -depth, 0.0), floor)
+    assert sunk.code == "C008" and sorted(sunk.frames.tolist()) == list(range(120, 130))
+    assert sunk.message == (
+        f"10 of 60 frames: left_ankle is {1000 * depth:g} mm below the ground in frame 120"
+    )
+
+
+@pytest.mark.parametrize("depth", [0.02, 0.05, 0.1, 0.2])
+def test_half_of_the_motion_sunk_is_found_where_the_ground_is_by_custom(depth: float) -> None:
+    (sunk,) = found(np.where(_K >= 30, -depth, 0.0), 0.0)
+    assert sunk.code == "C008" and sorted(sunk.frames.tolist()) == list(range(130, 160))
+
+
+@pytest.mark.parametrize("depth", [0.05, 0.1, 0.2])
+def test_half_of_the_motion_sunk_elsewhere_is_said_to_be_unclear(depth: float) -> None:
+    (note,) = found(np.where(_K >= 30, -depth, 0.0), 0.8)
+    # The ankles of the legs are 0.1 above the root's floor.
+    assert (note.code, note.severity) == ("C013", "note")
+    assert note.message == (
+        f"feet rest at 2 heights, 0.9 for 1 s, {0.9 - depth:g} for 1 s: it is not clear where the "
+        "ground is, and they were not checked"
+    )
+
+
+@pytest.mark.parametrize("floor", FLOORS)
+@pytest.mark.parametrize("depth", [0.1, 0.2])
+def test_a_ramp_down_after_standing_is_found(depth: float, floor: float) -> None:
+    (sunk,) = found(np.where(_K >= 30, -depth * (_K - 30) / 29, 0.0), floor)
+    assert sunk.code == "C008" and sunk.frames[0] == 159
+    assert f"left_ankle is {1000 * depth:g} mm below" in sunk.message
+
+
+@pytest.mark.parametrize("floor", FLOORS)
+@pytest.mark.parametrize("depth", [0.05, 0.1, 0.2])
+def test_a_ramp_without_a_level_is_said_to_be_unclear(depth: float, floor: float) -> None:
+    assert [f.code for f in found(-depth * _K / 59, floor)] == ["C013"]
+
+
+SOUND = {
+    "standing": 0.0 * _K,
+    "stairs up": 0.17 * (_K // 10),
+    "stairs down": -0.17 * (_K // 10),
+    "stairs down after standing": -0.17 * np.clip((_K - 20) // 8, 0, 3),
+    # 0.5 s in the air: v = g t / 2, and 5 frames on the ground.
+    "jumping": np.maximum(0.0, np.where(
+        _K % 20 >= 5, 2.45 * (_K % 20 - 5) / RATE - 4.9 * ((_K % 20 - 5) / RATE) ** 2, 0.0
+    )),
+    "walking": 0.006 * np.sin(_K),
+    "noise": np.random.default_rng(0).normal(0.0, 0.008, 300),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("floor", FLOORS)
+@pytest.mark.parametrize("name", SOUND)
+def test_what_is_sound_is_not_alarming(name: str, floor: float) -> None:
+    assert {f.code for f in found(SOUND[name], floor)} <= {"C013"}
+    if "stairs" not in name:
+        assert found(SOUND[name], floor) == []
+
+
+def test_a_single_noisy_frame_is_none_but_a_deep_one_is() -> None:
+    assert found(np.where(_K == 30, -0.02, 0.0), 0.0) == []
+    (sunk,) = found(np.where(_K == 30, -0.03, 0.0), 0.0)
+    assert sunk.message == "1 of 60 frames: left_ankle is 30 mm below the ground in frame 130"
+
+
+def test_the_ground_can_be_given_or_left_out() -> None:
+    half = np.where(_K >= 30, -0.1, 0.0)
+    (sunk,) = found(half, 0.8, ground=0.9)
+    assert sunk.code == "C008" and len(sunk.frames) == 30
+    assert found(half, 0.8, ground=0.8) == []
+    assert found(half, 0.8, ground="none") == []
+
+
+def test_a_body_that_floats_and_turns_has_no_ground() -> None:
+    rises = 2.0 + 0.3 * np.sin(2.0 * np.pi * _K / 20)
+    (note,) = found(rises, 0.0)
+    assert note.message == (
+        "feet rest at no height for long: it is not clear where the ground is, and they were not "
+        "checked"
+    )
+
+
+def test_levels_are_counted_the_longest_first() -> None:
+    lowest = np.concatenate([np.full(40, 5.0), np.full(10, 4.0), np.full(12, 6.0)])
+    here = np.ones(62, dtype=np.bool_)
+    assert ground_of(lowest, here, 1 / 30, 1.7) == Ground(5.0, ((5.0, 40), (6.0, 12), (4.0, 10)))
+
+
+def test_nobody_has_no_ground() -> None:
+    assert ground_of(np.zeros(9), np.zeros(9, dtype=np.bool_), 1 / 30, 1.7) == Ground(None)
+
+
+def test_who_is_away_does_not_count() -> None:
+    lowest = np.where(np.arange(60) < 40, 7.0, 1.0)
+    found_ground = ground_of(lowest, np.arange(60) < 40, 1 / 30, 1.7)
+    assert found_ground == Ground(7.0, ((7.0, 40),))

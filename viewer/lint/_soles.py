@@ -1,0 +1,157 @@
+"""The soles of a body: points of the mesh that may touch the ground, however a foot turns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.figure import Figure
+from viewer.rig.joint_names import canonical_names
+from viewer.rig.mesh import Mesh
+from viewer.rig.shape import rest_joints
+from viewer.rig.skeleton import Skeleton
+from viewer.rig.skin import Skin, owners
+
+__all__ = ["Soles", "extent", "soles_of"]
+
+_STRAYS = 0.001  # of the vertices at either end, which do not count for the height
+_TILTS = np.radians([20.0, 45.0, 70.0])  # of a foot in steps and on tiptoe
+_WAYS = 8  # directions of a tilt
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Soles:
+    """Points that move with the joints of feet.
+
+    Attributes
+    ----------
+    joints : (N,) int32
+        Of N feet the joint nearest to the ground: the ball of the foot, or the ankle.
+    feet : (P,)
+        Which foot each point is of.
+    movers : (P,) int32
+        The joint that it moves with.
+    places : (P, 3)
+        In that joint's space.
+    above : (P,)
+        How much higher it is at rest than the sole: 0 on a mesh.
+    """
+
+    joints: Ints
+    feet: Ints
+    movers: Ints
+    places: Floats
+    above: Floats
+
+    def heights(self, world: Floats, axis: Floats, scale: float) -> Floats:
+        """Return how high the lowest point of each foot is.
+
+        Parameters
+        ----------
+        world : (F, J, 4, 4)
+            Joint space to figure space.
+        axis : (4,)
+            Row of the placement that gives the height.
+        scale : float
+            Scene units per figure unit.
+
+        Returns
+        -------
+        (F, N)
+            Along what is up in the scene.
+        """
+        rows = np.einsum("a,fpab->fpb", axis[:3], world[:, self.movers, :3])
+        heights = np.einsum("fpb,pb->fp", rows[..., :3], self.places) + rows[..., 3] + axis[3]
+        heights -= scale * self.above
+        result = np.empty((len(world), len(self.joints)))
+        for foot in range(len(self.joints)):
+            result[:, foot] = heights[:, self.feet == foot].min(axis=1)
+        return result
+
+
+def extent(figure: Figure) -> tuple[float, float]:
+    """Return where the sole is along what is up while the figure stands at rest, and its height."""
+    axis = _axis(figure)
+    values = rest_joints(figure)[:, axis]
+    if figure.mesh is not None:
+        ends = (_STRAYS, 1.0 - _STRAYS)
+        values = np.quantile(figure.mesh.positions[:, axis], ends, method="nearest")
+    return float(values.min()), float(np.ptp(values))
+
+
+def _axis(figure: Figure) -> int:
+    return 2 if figure.up == "z" else 1
+
+
+def soles_of(figure: Figure, is_bound: bool) -> Soles | None:
+    """Return the soles of a skeleton that has two feet by name, None if it has not.
+
+    Parameters
+    ----------
+    figure : Figure
+        In the shape that it moves in.
+    is_bound : bool
+        Whether its bindings are to be trusted; else joints stand for the mesh.
+    """
+    skeleton = figure.skeleton
+    if skeleton is None:
+        return None
+    names = canonical_names(skeleton.names, skeleton.parents)
+    feet = []
+    for side in ("left", "right"):
+        found = [names.index(name) for name in (f"{side}_foot", f"{side}_ankle") if name in names]
+        feet.append(found)
+    if not all(feet):
+        return None
+    sole, _ = extent(figure)
+    parts = []
+    for number, found in enumerate(feet):
+        mover, place = np.array([found[0]]), np.zeros((1, 3))
+        above = rest_joints(figure)[mover, _axis(figure)] - sole
+        if is_bound and figure.mesh is not None and figure.skin is not None:
+            whole = _whole_foot(skeleton, found)
+            points = _points(figure.mesh, figure.skin, whole, _axis(figure))
+            if points is not None:
+                (mover, place), above = points, np.zeros(len(points[0]))
+        parts.append((np.full(len(mover), number), mover, place, above))
+    every, movers, places, above = (np.concatenate(column) for column in zip(*parts, strict=True))
+    nearest = np.array([found[0] for found in feet], dtype=np.int32)
+    return Soles(nearest, every.astype(np.int32), movers.astype(np.int32), places, above)
+
+
+def _whole_foot(skeleton: Skeleton, found: list[int]) -> Bools:
+    """Return which joints are of a foot: the ankle, or the ball, and what hangs from it. (J,)."""
+    result = np.zeros(skeleton.n_joints, dtype=np.bool_)
+    result[found] = True
+    for joint, parent in enumerate(skeleton.parents.tolist()):
+        result[joint] |= parent >= 0 and bool(result[parent])
+    return result
+
+
+def _points(mesh: Mesh, skin: Skin, is_foot: Bools, axis: int) -> tuple[Ints, Floats] | None:
+    """Return corners of a foot's hull that can be lowest: their joints (P,), places (P, 3)."""
+    vertices = owners(skin)
+    order = np.lexsort((skin.weights, vertices))
+    last = np.flatnonzero(np.diff(vertices[order], append=-1))
+    strongest = order[last]  # influence of each vertex that has one
+    strongest = strongest[is_foot[skin.joints[strongest]] & (skin.weights[strongest] > 0.0)]
+    if len(strongest) == 0:
+        return None
+    positions = mesh.positions[vertices[strongest]]
+    lowest = strongest[np.unique((positions @ _directions(axis).T).argmax(axis=0))]
+    joints, points = skin.joints[lowest], mesh.positions[vertices[lowest]]
+    bind = skin.inverse_bind[joints]
+    return joints, np.einsum("pab,pb->pa", bind[:, :3, :3], points) + bind[:, :3, 3]
+
+
+def _directions(axis: int) -> Floats:
+    """Return directions down and tilted from there to all sides: (D, 3)."""
+    turns = np.arange(_WAYS) * 2.0 * np.pi / _WAYS
+    sides = np.zeros((_WAYS, 3))
+    flat = [index for index in range(3) if index != axis]
+    sides[:, flat] = np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    down = -np.eye(3)[axis]
+    tilted = [np.cos(tilt) * down + np.sin(tilt) * sides for tilt in _TILTS]
+    return np.concatenate([down[None], *tilted])

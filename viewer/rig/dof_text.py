@@ -1,0 +1,61 @@
+"""Values of DOFs in words, as sliders show them: angles in degrees."""
+
+from __future__ import annotations
+
+import math
+
+from viewer.rig.skeleton import Skeleton, dof_label
+
+__all__ = ["beyond_text", "dof_value_text"]
+
+_FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
+_MOST_DIGITS = 9  # of decimals: radians of float64 differ by no less
+
+
+def dof_value_text(skeleton: Skeleton, dof: int, value: float, digits: int = 1) -> str:
+    """Return a value of a DOF in words: ``"28.6°"``, or a length ``"0.25"``.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Holds the DOF table.
+    dof : int
+        Row of the DOF.
+    value : float
+        Radians, or a length in the figure's unit.
+    digits : int
+        Decimals of angles; lengths have three more.
+    """
+    if skeleton.dof_kinds[dof] >= _FIRST_ROTATION:
+        return f"{math.degrees(value) + 0.0:.{digits}f}\N{DEGREE SIGN}"
+    return f"{value:.{digits + 3}g}"
+
+
+def beyond_text(skeleton: Skeleton, dof: int, value: float, when: str = "") -> str:
+    """Return what is wrong with a DOF beyond its limits: ``"a.x is 0.0°, its limits are …"``.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Holds the DOF table.
+    dof : int
+        Row of the DOF.
+    value : float
+        Radians, or a length in the figure's unit; less than the minimum, or more than the maximum.
+    when : str
+        Follows the value: ``" in frame 3"``.
+    """
+    low, high = (float(limit) for limit in skeleton.dof_limits[dof])
+    limit = low if value < low else high
+    digits = 1
+    # So many decimals that the value is seen to be beyond.
+    while digits < _MOST_DIGITS and dof_value_text(skeleton, dof, value, digits) == dof_value_text(
+        skeleton, dof, limit, digits
+    ):
+        digits += 1
+    texts = [dof_value_text(skeleton, dof, number, digits) for number in (value, low, high)]
+    head = f"{dof_label(skeleton, dof)} is {texts[0]}{when}"
+    if math.isfinite(low) and math.isfinite(high):
+        return f"{head}, its limits are {texts[1]} and {texts[2]}"
+    which = f"minimum is {texts[1]}" if value < low else f"maximum is {texts[2]}"
+    return f"{head}, its {which}"
