@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property, partial
+from functools import partial
 from typing import TYPE_CHECKING
 
 import moderngl
@@ -13,6 +13,7 @@ from viewer.rendering.camera import Camera
 from viewer.rendering.crowd_pass import draw_crowd
 from viewer.rendering.ground_pass import GroundPass
 from viewer.rendering.joint_pass import JointPass
+from viewer.rendering.late_passes import LatePasses
 from viewer.rendering.mesh_pass import MeshPass
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.program import Programs
@@ -38,15 +39,10 @@ from viewer.rig.scene import Actor, Scene
 
 if TYPE_CHECKING:
     from viewer.rendering.annotation import Annotation
-    from viewer.rendering.annotation_pass import AnnotationPass
-    from viewer.rendering.ghost_pass import Ghost, GhostPass
-    from viewer.rendering.keypoint_pass import KeypointPass
+    from viewer.rendering.ghost_pass import Ghost
     from viewer.rendering.legend import Legend
-    from viewer.rendering.legend_pass import LegendPass
     from viewer.rendering.marks import Marks
-    from viewer.rendering.picking import Pick, PickPass
-    from viewer.rendering.point_pass import PointPass
-    from viewer.rendering.trail_pass import TrailPass
+    from viewer.rendering.picking import Pick
 
 __all__ = ["Renderer"]
 
@@ -93,69 +89,9 @@ class Renderer:
         self.annotations: Sequence[Annotation] = ()
         self.ghost: Ghost | None = None
         self.names_left_out = 0, 0
-        self._late: list[PointPass | PickPass | LegendPass | AnnotationPass | GhostPass] = []
-
-    # What many scenes never need is imported and made when it is first asked for.
-
-    @cached_property
-    def keypoint_pass(self) -> KeypointPass:
-        """Draws keypoints that figures themselves have."""
-        from viewer.rendering.keypoint_pass import KeypointPass
-
-        return KeypointPass(self.joint_pass)
-
-    @cached_property
-    def point_pass(self) -> PointPass:
-        """Draws captured points."""
-        from viewer.rendering.point_pass import PointPass
-
-        points = PointPass(self.context, self.programs)
-        self._late.append(points)
-        return points
-
-    @cached_property
-    def trail_pass(self) -> TrailPass:
-        """Draws paths of joints."""
-        from viewer.rendering.trail_pass import TrailPass
-
-        return TrailPass(self.context, self.programs)
-
-    @cached_property
-    def pick_pass(self) -> PickPass:
-        """Finds what is seen at a pixel."""
-        from viewer.rendering.picking import Passes, PickPass
-
-        passes = Passes(self.programs, self.mesh_pass, self.point_pass, self.buffers)
-        picks = PickPass(self.context, passes)
-        self._late.append(picks)
-        return picks
-
-    @cached_property
-    def legend_pass(self) -> LegendPass:
-        """Draws legends into pictures."""
-        from viewer.rendering.legend_pass import LegendPass
-
-        legends = LegendPass(self.context, self.programs)
-        self._late.append(legends)
-        return legends
-
-    @cached_property
-    def annotation_pass(self) -> AnnotationPass:
-        """Draws marks, what is seen of joints beside their boxes, and annotations."""
-        from viewer.rendering.annotation_pass import AnnotationPass
-
-        annotations = AnnotationPass(self.context, self.programs)
-        self._late.append(annotations)
-        return annotations
-
-    @cached_property
-    def ghost_pass(self) -> GhostPass:
-        """Draws what is shown over the scene."""
-        from viewer.rendering.ghost_pass import GhostPass
-
-        ghosts = GhostPass(self.context, self.programs, self.mesh_pass)
-        self._late.append(ghosts)
-        return ghosts
+        self.late = LatePasses(
+            context, self.programs, self.mesh_pass, self.joint_pass, self.buffers
+        )
 
     @property
     def scalar_range(self) -> tuple[float, float]:
@@ -214,7 +150,7 @@ class Renderer:
         for actor in filter(has_points, scene.actors):
             points = self.buffers.points_of(actor)
             points.update(actor, actor.placement, view, options.min_confidence)
-            self.point_pass.draw(points, actor.placement, view, options, has_meshes)
+            self.late.point_pass.draw(points, actor.placement, view, options, has_meshes)
         self._draw_trails(scene, view, options, target.size)
         for actor, joint in skeletons:
             if shows_mesh(actor.figure, options):
@@ -254,7 +190,7 @@ class Renderer:
             As ``draw`` takes it.
         """
         self.buffers.keep_only(scene.actors)
-        return self.pick_pass.pick(scene, view_of(camera, size, box), options, size, (x, y))
+        return self.late.pick_pass.pick(scene, view_of(camera, size, box), options, size, (x, y))
 
     def prepare(self, scene: Scene) -> None:
         """Upload what a scene needs, so that a refusal comes before the old scene is given up.
@@ -311,7 +247,7 @@ class Renderer:
     def _draw_legend(self, size: tuple[int, int]) -> None:
         assert self.legend is not None  # meshes were drawn with their numbers
         note = f"a picture of {size[0]} x {size[1]} pixels has no room for a legend"
-        if not self.legend_pass.draw(self.legend, size) and note not in self.notes:
+        if not self.late.legend_pass.draw(self.legend, size) and note not in self.notes:
             self.notes.append(note)
 
     def _draw_skeleton(
@@ -330,7 +266,7 @@ class Renderer:
         markers = self.buffers.keypoints_of(actor)
         markers.update(actor.pose, options.skinning)
         # The markers' place is part of their positions.
-        self.keypoint_pass.draw(markers, actor.placement, view, options)
+        self.late.keypoint_pass.draw(markers, actor.placement, view, options)
 
     def _draw_marks(
         self,
@@ -347,15 +283,15 @@ class Renderer:
 
             joints = joint_annotation(scene.actors, options, size, selected)
             if joints is not None:
-                self.annotation_pass.draw(joints, view, size)
+                self.late.annotation_pass.draw(joints, view, size)
                 drawn.append(joints)
         if self.ghost is not None:
-            self.ghost_pass.draw(self.ghost, view, options)
+            self.late.ghost_pass.draw(self.ghost, view, options)
         over = [*self._marked(), *self.annotations]
         for annotation in over:
-            self.annotation_pass.draw(annotation, view, size)
+            self.late.annotation_pass.draw(annotation, view, size)
         if drawn or over:
-            left_out = self.annotation_pass.write([*drawn, *over], view, size)
+            left_out = self.late.annotation_pass.write([*drawn, *over], view, size)
             self.names_left_out = left_out[0] if drawn else (0, 0)
 
     def _marked(self) -> list[Annotation]:
@@ -380,7 +316,7 @@ class Renderer:
             if joints and actor.visible and actor.clip is not None:
                 paths = self.buffers.trail(actor)
                 paths.update(actor, joints, options.min_confidence)
-                self.trail_pass.draw(paths, actor.placement, view, size, at)
+                self.late.trail_pass.draw(paths, actor.placement, view, size, at)
 
     def posed_mesh(self, actor: Actor) -> PosedMesh:
         """Return an actor's posed buffer, made on first use; the figure's mesh must exist."""
@@ -394,6 +330,5 @@ class Renderer:
     def release(self) -> None:
         """Free everything."""
         self.buffers.keep_only([])
-        passes = self.mesh_pass, self.joint_pass, self.ground_pass, *self._late
-        for item in (*passes, self.programs):
+        for item in (self.mesh_pass, self.joint_pass, self.ground_pass, self.late, self.programs):
             item.release()
