@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -107,6 +108,18 @@ def test_ring_turns_the_template_about_its_middle(hand):
     assert_allclose(after.rotation, quarter @ before.rotation, atol=0.02)
     assert_allclose(middle(hand)[0], center, atol=1e-3)
     assert after.scale == pytest.approx(before.scale, rel=1e-5)
+
+
+@pytest.mark.parametrize("kind", ["factors", "own_factors"])
+def test_ring_turns_a_stretched_template_about_its_middle(hand, kind):
+    laid = laid_template(hand.state)
+    stretch = np.array([1.3, 1.0, 1.0]) / 1.3 ** (1 / 3)
+    straight = replace(similarity(hand), rotation=np.eye(3), **{kind: stretch})
+    move_by_hand(hand.state, laid, straight)
+    hand.step(2)
+    test_ring_turns_the_template_about_its_middle(hand)
+    assert_allclose(similarity(hand).own_factors, stretch, atol=0.01)
+    assert (similarity(hand).factors == 1.0).all()
 
 
 def test_drag_is_one_step_of_undoing_with_its_error(hand):

@@ -7,6 +7,7 @@ Its handles for scaling cannot be taken hold of from far away, so for that there
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from imgui_bundle import imgui, imguizmo
@@ -23,7 +24,7 @@ from viewer.app.state import AppState
 from viewer.app.view_frame import view_frame
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import bounding_box
-from viewer.rig.transform import translation_matrix
+from viewer.rig.transform import apply_transform, translation_matrix
 
 __all__ = ["RADIUS", "use_gizmo"]
 
@@ -58,7 +59,10 @@ def use_gizmo(state: AppState, template: Template) -> None:
     after = _scaled(state, before) if view.tool == "scale" else _manipulated(state, before)
     if after is not None:
         moved = np.linalg.inv(place) @ after @ translation_matrix(-middle)
-        move_by_hand(state, template, as_similarity(moved, now))
+        laid = as_similarity(moved, now)
+        # What is left of a shear must not push the template aside, frame by frame.
+        slip = apply_transform(moved, middle) - laid.apply(middle)
+        move_by_hand(state, template, replace(laid, shift=laid.shift + slip))
         view.was_dragged = True
 
 

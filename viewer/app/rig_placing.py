@@ -103,13 +103,19 @@ def as_similarity(matrix: Floats, like: Similarity | None = None) -> Similarity:
     matrix : (4, 4)
         Not mirrored, nearly one; digits that are missing to a rotation are made up for.
     like : Similarity or None
-        What was moved: as it is stretched, so is the result.
+        What was moved: if it is stretched, so is the result, along the template's own axes, which
+        turn with it.
     """
-    factors, own = (np.ones(3), np.ones(3)) if like is None else (like.factors, like.own_factors)
-    linear = np.asarray(matrix, dtype=np.float64)[:3, :3] / factors[:, None] / own
+    linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
+    own = np.ones(3)
+    if like is not None and not like.is_plain:
+        own = np.linalg.norm(linear, axis=0)
+        own = own / np.cbrt(np.prod(own))
+    linear = linear / own
     scale = float(np.cbrt(max(np.linalg.det(linear), 1e-30)))
     rotation = np.asarray(nearest_rotations(linear / scale)[0], dtype=np.float64)
-    return Similarity(scale, rotation, np.asarray(matrix, dtype=np.float64)[:3, 3], factors, own)
+    shift = np.asarray(matrix, dtype=np.float64)[:3, 3]
+    return Similarity(scale, rotation, shift, np.ones(3), own)
 
 
 def move_by_hand(state: AppState, template: Template, similarity: Similarity) -> None:

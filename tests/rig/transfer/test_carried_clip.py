@@ -49,6 +49,22 @@ def test_frames_keep_their_turns_and_scale_their_paths():
     assert found.shape_weights is None
 
 
+def test_path_goes_by_the_legs():
+    clip = Clip("walk", (curve(1), curve(4)), 0.0, 1.0)
+    found = carry_clip(clip, SKELETON, 10.0, 2.0, path_scale=12.0)
+    assert_allclose(found.channels[0].values, [24.0, 48.0])
+    frames = SampledClip(
+        "run",
+        Timing(30.0, np.array([0])),
+        np.tile([0.0, 0.0, 0.0, 1.0], (1, 2, 1)),
+        translations=np.ones((1, 2, 3)),
+        figure_translations=np.ones((1, 3)),
+    )
+    found = carry_clip(frames, SKELETON, 10.0, 2.0, path_scale=12.0)
+    assert_allclose(found.translations[0], [[24.0] * 3, [20.0] * 3])
+    assert_allclose(found.figure_translations, 12.0)
+
+
 def test_frames_without_paths_stay_without():
     clip = SampledClip("turn", Timing(30.0, np.array([0])), np.ones((1, 2, 4)))
     found = carry_clip(clip, SKELETON, 10.0)

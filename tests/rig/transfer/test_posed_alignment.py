@@ -64,6 +64,15 @@ def test_person_with_lowered_arms_is_found_from_behind(standing):
     assert found.lines[0].startswith("pose: the template's joints turned to fit, ")
 
 
+def test_person_whose_mesh_is_inside_out_is_found_alike(standing):
+    figure, target, joints = standing
+    found, _ = aligned(figure, mesh_of(target.positions, target.triangles[:, ::-1]))
+    assert found.alignment.how == "fit"
+    size = np.linalg.norm(np.ptp(target.positions, axis=0))
+    places = found.alignment.placed.apply(joint_matrices(found.figure, found.pose)[:, :3, 3])
+    assert np.linalg.norm(places - joints, axis=1).max() < 0.02 * size
+
+
 def test_facing_that_is_given_is_kept(standing):
     figure, target, _ = standing
     found, _ = aligned(figure, target, facing="z")

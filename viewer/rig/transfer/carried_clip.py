@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from viewer.errors import RigError
+from viewer.rig.arrays import Floats
 from viewer.rig.clip import Channel, Clip
 from viewer.rig.sampled_clip import SampledClip
 from viewer.rig.skeleton import Skeleton
@@ -15,7 +18,11 @@ _FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
 
 
 def carry_clip(
-    clip: Clip | SampledClip, skeleton: Skeleton, length_scale: float, figure_scale: float = 1.0
+    clip: Clip | SampledClip,
+    skeleton: Skeleton,
+    length_scale: float,
+    figure_scale: float = 1.0,
+    path_scale: float | None = None,
 ) -> Clip | SampledClip:
     """Return a clip of the template for the rigged target.
 
@@ -33,6 +40,9 @@ def carry_clip(
     figure_scale : float
         The scale that the template's pose gave the whole figure: it is part of the target's
         lengths already.
+    path_scale : float or None
+        The same as ``length_scale`` for the figure's place and its roots, which go by the length
+        of the legs; None if it is the same.
 
     Returns
     -------
@@ -45,7 +55,9 @@ def carry_clip(
     RigError
         If the clip has another number of joints.
     """
-    inside = length_scale * figure_scale
+    path = length_scale if path_scale is None else path_scale
+    roots = skeleton.parents < 0
+    inside = np.where(roots, path, length_scale) * figure_scale
     if isinstance(clip, Clip):
         channels = tuple(_scaled(channel, skeleton, inside) for channel in clip.channels)
         return replace(clip, channels=channels)
@@ -56,14 +68,14 @@ def carry_clip(
     places, scales, moves = clip.figure_translations, clip.figure_scales, clip.translations
     return replace(
         clip,
-        translations=None if moves is None else moves * inside,
-        figure_translations=None if places is None else places * length_scale,
+        translations=None if moves is None else moves * inside[:, None],
+        figure_translations=None if places is None else places * path,
         figure_scales=None if scales is None else scales / figure_scale,
         shape_weights=None,
     )
 
 
-def _scaled(channel: Channel, skeleton: Skeleton, factor: float) -> Channel:
+def _scaled(channel: Channel, skeleton: Skeleton, factors: Floats) -> Channel:
     """Scale a curve of lengths: its values, and slopes that are given as numbers."""
     if channel.target >= skeleton.n_dofs:
         raise RigError(
@@ -71,6 +83,7 @@ def _scaled(channel: Channel, skeleton: Skeleton, factor: float) -> Channel:
         )
     if skeleton.dof_kinds[channel.target] >= _FIRST_ROTATION:
         return channel
+    factor = float(factors[skeleton.dof_joints[channel.target]])
     tangents = tuple(
         (
             before if isinstance(before, str) else before * factor,

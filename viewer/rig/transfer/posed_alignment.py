@@ -15,7 +15,7 @@ import numpy as np
 
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
-from viewer.rig.mesh import Mesh
+from viewer.rig.mesh import Mesh, volume
 from viewer.rig.pose import Pose
 from viewer.rig.rotation import rotation_vector_to_matrix
 from viewer.rig.skeleton import joint_label
@@ -134,14 +134,17 @@ def align_posed(
     assert template.mesh is not None  # the caller looked
     posed = deform(template, pose)[0]
     ours = Posed(posed, template.mesh.triangles)
-    theirs = Posed(target.positions, target.triangles)
+    triangles = target.triangles
+    if volume(target.positions, triangles) < 0.0:
+        triangles = triangles[:, ::-1]  # normals tell which side of a limb is which
+    theirs = Posed(target.positions, triangles)
     rigid = align(ours, theirs, template.up, settings, lambda s, what: report(0.5 * s, what))
     kept = PosedAlignment(rigid, template, pose, posed, ())
     is_part = rigid.away > PART
     gap = misfit(rigid, is_part)
     if settings.scale == "axes" or gap <= min(_CLOSE, _STRETCH_GAP):
         return kept
-    exact = Triangles(target.positions, target.triangles, _SAMPLES)
+    exact = Triangles(target.positions, triangles, _SAMPLES)
     stretched = None
     if settings.scale == "uniform" and rigid.how in _FOUND and not is_part:
         report(0.5, "proportions")
@@ -149,7 +152,7 @@ def align_posed(
         if fits and stretched is not None and misfit(stretched.alignment, False) <= _STRETCH_GAP:
             return stretched
     if fits and gap > _CLOSE:
-        dense = sample_surface(target.positions, target.triangles, _DENSE)
+        dense = sample_surface(target.positions, triangles, _DENSE)
         scales = settings.scale != "none" and not is_part
         job = _Job(template, pose, Cloud(exact.samples, dense), exact, scales)
         kept = _if_better(job, ours, kept, settings.facing, report)

@@ -15,6 +15,7 @@ from viewer.rig.pose import Pose, dof_rotations, joint_rotations
 from viewer.rig.pose_vector import rotation_rows
 from viewer.rig.rotation import matrix_to_euler, matrix_to_quaternion, quaternion_to_matrix
 from viewer.rig.skeleton import Skeleton, joint_label
+from viewer.rig.transfer.leg_scale import leg_scale
 from viewer.rig.transfer.similarity import Similarity
 
 __all__ = ["RestSkeleton", "fit_rest_skeleton"]
@@ -35,6 +36,8 @@ class RestSkeleton:
         Of the pose in which the template is bound.
     pose : Pose
         Puts the joints where they are in the target.
+    root_scale : float
+        What lengths of the root are scaled by, see ``leg_scale``.
     lines : tuple of str
         What was changed beside the lengths.
     """
@@ -42,19 +45,25 @@ class RestSkeleton:
     skeleton: Skeleton
     inverse_bind: Floats
     pose: Pose
+    root_scale: float
     lines: tuple[str, ...]
 
 
 def fit_rest_skeleton(
-    template: Figure, pose: Pose, placed: Similarity, joints: Floats, carried: Bools | None
+    template: Figure,
+    pose: Pose,
+    placed: Similarity,
+    joints: Floats,
+    carried: Bools | None,
+    original: Skeleton | None = None,
 ) -> RestSkeleton:
     """Find rest offsets that put a posed skeleton's joints at given places.
 
     The target's joint j stands in the world with the linear part R P_j, P_j being that of the
     template's pose and R the alignment's rotation. So the offset from its parent i is
     (R P_i)^-1 (p_j - p_i), of which the DOFs' translations, scaled, are part. The rest root is
-    the template's, scaled; the figure's translation carries it to the target, and R goes into
-    the root's rotation.
+    the template's, scaled as the legs are; the figure's translation carries it to the target, and
+    R goes into the root's rotation.
 
     Parameters
     ----------
@@ -70,6 +79,8 @@ def fit_rest_skeleton(
         Which of them were measured on the target. A symmetric template then gives a symmetric
         skeleton: left and right offsets are averaged, or taken from the side that was measured.
         None leaves the joints as they are.
+    original : Skeleton or None
+        The template's before its limbs were resized; None if they were not.
 
     Returns
     -------
@@ -90,25 +101,20 @@ def fit_rest_skeleton(
     offsets[0] = scale * skeleton.rest_translations[0]
     if carried is not None:
         offsets = _symmetric(template, offsets, scale, carried)
+    provisional = _with_offsets(skeleton, offsets, np.full(len(roots), scale))
+    root_scale = leg_scale(original or skeleton, provisional, template.up, scale)
+    offsets[roots] += (root_scale - scale) * skeleton.rest_translations[0]
     longer = offsets - scale * skeleton.rest_translations
-    limits = skeleton.dof_limits.copy()
-    is_move = skeleton.dof_kinds < _FIRST_ROTATION
-    limits[is_move] *= scale
-    rest_dofs = np.where(is_move, scale * skeleton.rest_dofs, skeleton.rest_dofs)
-    boxes = None if skeleton.boxes is None else scale * skeleton.boxes
-    fitted = replace(
-        skeleton,
-        rest_translations=offsets,
-        dof_limits=limits,
-        rest_dofs=rest_dofs,
-        boxes=boxes,
-    )
-    posed = _scaled_pose(skeleton, pose, scale)
+    joint_scales = np.where(roots, root_scale, scale)
+    fitted = _with_offsets(skeleton, offsets, joint_scales)
+    if skeleton.boxes is not None:
+        fitted = replace(fitted, boxes=scale * skeleton.boxes)
+    posed = _scaled_pose(skeleton, pose, joint_scales)
     fitted, lines = _turn_roots(fitted, posed, placed.rotation)
     _move_roots(fitted, posed, joints)
     bind = _bind_matrices(skeleton.parents, skin.inverse_bind, longer, scale)
     inverse_bind = np.asarray(np.linalg.inv(bind), dtype=np.float64)
-    return RestSkeleton(fitted, inverse_bind, posed, tuple(lines))
+    return RestSkeleton(fitted, inverse_bind, posed, root_scale, tuple(lines))
 
 
 def _moves(skeleton: Skeleton, pose: Pose) -> Floats:
@@ -169,11 +175,27 @@ def _zero_pose(skeleton: Skeleton) -> Pose:
     )
 
 
-def _scaled_pose(skeleton: Skeleton, pose: Pose, scale: float) -> Pose:
+def _with_offsets(skeleton: Skeleton, offsets: Floats, joint_scales: Floats) -> Skeleton:
+    """Return a skeleton with other rest offsets, its lengths scaled: (J, 3), (J,)."""
+    scales = _dof_scales(skeleton, joint_scales)
+    return replace(
+        skeleton,
+        rest_translations=offsets,
+        dof_limits=scales[:, None] * skeleton.dof_limits,
+        rest_dofs=scales * skeleton.rest_dofs,
+    )
+
+
+def _dof_scales(skeleton: Skeleton, joint_scales: Floats) -> Floats:
+    is_move = skeleton.dof_kinds < _FIRST_ROTATION
+    return np.where(is_move, joint_scales[skeleton.dof_joints], 1.0)
+
+
+def _scaled_pose(skeleton: Skeleton, pose: Pose, joint_scales: Floats) -> Pose:
     """Return a pose in the target's unit, without shape, scale and place of its own."""
     posed = pose.copy()
-    posed.dofs[skeleton.dof_kinds < _FIRST_ROTATION] *= scale
-    posed.translations *= scale
+    posed.dofs *= _dof_scales(skeleton, joint_scales)
+    posed.translations *= joint_scales[:, None]
     posed.shape_weights = np.zeros(0)
     posed.figure_scale = 1.0
     posed.figure_translation[:] = 0.0

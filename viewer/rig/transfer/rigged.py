@@ -46,7 +46,7 @@ class Rigged:
         Largest distance between the posed figure and the target, over the target's size.
     outside : tuple of int
         Joints that lie outside the target, and inside the template.
-    length_scale, figure_scale : float
+    length_scale, figure_scale, path_scale : float
         What ``clip_for`` scales lengths by.
     lines : tuple of str
         What a person should know, one sentence each.
@@ -62,6 +62,7 @@ class Rigged:
     outside: tuple[int, ...]
     length_scale: float
     figure_scale: float
+    path_scale: float
     lines: tuple[str, ...]
 
     @property
@@ -98,4 +99,4 @@ def clip_for(rigged: Rigged, clip: Clip | SampledClip) -> Clip | SampledClip:
     """
     skeleton = rigged.figure.skeleton
     assert skeleton is not None  # a rigged figure has one
-    return carry_clip(clip, skeleton, rigged.length_scale, rigged.figure_scale)
+    return carry_clip(clip, skeleton, rigged.length_scale, rigged.figure_scale, rigged.path_scale)

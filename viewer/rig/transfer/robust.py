@@ -12,6 +12,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.kinematics import skinning_matrices, world_matrices
 from viewer.rig.mesh import Mesh, bounding_box, box_size, vertex_normals
 from viewer.rig.pose import Pose, joint_rotations
+from viewer.rig.skeleton import Skeleton
 from viewer.rig.skinning import joint_matrices
 from viewer.rig.transfer.alignment import Alignment, alignment_lines
 from viewer.rig.transfer.carried_correctives import carry_correctives
@@ -60,11 +61,12 @@ def robust(
         Of the new figure.
     """
     met = align_posed(template, pose, target, how.alignment, how.fits, _within(report, 0.0, 0.4))
-    alignment, template, pose, posed = met.alignment, met.figure, met.pose, met.positions
+    alignment, pose, posed = met.alignment, met.pose, met.positions
+    original, template = template.skeleton, met.figure
     laid = alignment.placed.apply(posed)
     weights = _weighed(template, laid, target, how, report)
     report(0.8, "joints")
-    rest, carried, lines = _carried_skeleton(template, pose, alignment, laid, target, how)
+    rest, carried, lines = _carried_skeleton(template, original, pose, alignment, laid, target, how)
     report(0.85, "rest pose")
     scale = alignment.placed.scale * pose.figure_scale
     figure, guarded = _at_rest(template, rest, weights, target, scale, how, name)
@@ -93,6 +95,7 @@ def robust(
         outside=out,
         length_scale=alignment.placed.scale,
         figure_scale=pose.figure_scale,
+        path_scale=rest.root_scale / pose.figure_scale,
         lines=tuple(lines),
     )
 
@@ -119,6 +122,7 @@ def _within(report: Report, low: float, high: float) -> Report:
 
 def _carried_skeleton(
     template: Figure,
+    original: Skeleton | None,
     pose: Pose,
     alignment: Alignment,
     laid: Floats,
@@ -130,7 +134,7 @@ def _carried_skeleton(
     assert mesh is not None and skeleton is not None and skin is not None  # the caller looked
     joints = alignment.placed.apply(joint_matrices(template, pose)[:, :3, 3])
     if how.joints == "copied":
-        rest = fit_rest_skeleton(template, pose, alignment.placed, joints, None)
+        rest = fit_rest_skeleton(template, pose, alignment.placed, joints, None, original)
         return rest, None, ["joints: those of the template, aligned"]
     reach = _JOINT_REACH * box_size(bounding_box(target.positions[target.triangles.ravel()]))
     normals = vertex_normals(laid, mesh.triangles)
@@ -143,7 +147,9 @@ def _carried_skeleton(
         ways,
         matched,
     )
-    rest = fit_rest_skeleton(template, pose, alignment.placed, found.positions, found.carried)
+    rest = fit_rest_skeleton(
+        template, pose, alignment.placed, found.positions, found.carried, original
+    )
     by = "the joint regressor" if regressor else "the boundaries of the joints' regions"
     count = int(found.carried.sum())
     line = f"joints: {count} of {skeleton.n_joints} carried by {by}"

@@ -79,6 +79,7 @@ def nearest(template: Figure, pose: Pose, target: Mesh, report: Report, name: st
         outside=out,
         length_scale=1.0,
         figure_scale=1.0,
+        path_scale=1.0,
         lines=lines,
     )
 

@@ -1,0 +1,48 @@
+"""How much longer a figure's legs are than another's: what its path and its height go by.
+
+A root stands as high as the legs below it are long, and a step is as wide as the leg is long. So
+where limbs were resized, or the whole was stretched, lengths of the root scale with the legs.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.rig.arrays import Floats
+from viewer.rig.kinematics import world_matrices
+from viewer.rig.pose import rest_pose
+from viewer.rig.skeleton import Skeleton
+
+__all__ = ["leg_scale"]
+
+_LOW = 0.1  # of the joints' height: joints this near to the lowest are feet
+_LEGS = 0.2  # of the joints' height: a root that is less above them stands on no legs
+
+
+def leg_scale(before: Skeleton, after: Skeleton, up: str, otherwise: float) -> float:
+    """Return the ratio of two skeletons' heights of the root above the feet, both at rest.
+
+    Parameters
+    ----------
+    before, after : Skeleton
+        Of the same joints.
+    up : "y" or "z"
+        The axis that points up, of both.
+    otherwise : float
+        What is returned where there are no legs: hands, heads, a root on the ground.
+    """
+    axis = "xyz".index(up)
+    heights = _heights(before, axis)
+    low, span = heights.min(), np.ptp(heights)
+    feet = heights <= low + _LOW * span
+    own = heights[0] - heights[feet].mean()
+    if own <= _LEGS * span:
+        return otherwise
+    other = _heights(after, axis)
+    found = float((other[0] - other[feet].mean()) / own)
+    return found if found > 0.0 else otherwise
+
+
+def _heights(skeleton: Skeleton, axis: int) -> Floats:
+    heights: Floats = world_matrices(skeleton, rest_pose(skeleton))[:, axis, 3]
+    return heights
