@@ -163,5 +163,16 @@ def test_word_of_5_mb_is_refused_without_quadratic_time(word):
 
 
 def test_number_of_5_mb_is_read():
-    assert parsed("0." + "0" * 5_000_000 + "1") == ([0.0], -1)
+    assert parsed("0." + "0" * 5_000_000 + "1") == ([5e-324], -1)
     assert parsed("0" * 5_000_000 + "7") == ([7.0], -1)
+
+
+@pytest.mark.parametrize("word", ["1e-400", "1e-324", ".0001e-330f", "0." + "0" * 400 + "1"])
+def test_what_is_too_small_does_not_become_a_whole_number(word):
+    assert parsed(f"{word} -{word}") == ([5e-324, -5e-324], -1)
+    assert parsed(f"{word}\x01 1")[1] == 0
+
+
+@pytest.mark.parametrize("word", ["0e-400", "-0.0e-999", ".0e5", "0" * 400, "0." + "0" * 400])
+def test_zero_is_zero_however_it_is_written(word):
+    assert parsed(word) == ([0.0], -1)

@@ -18,12 +18,13 @@ from viewer.rig.pose_transfer import JointTurns
 
 NAMES = ("root", "", "left knee", "knee", "knee")
 ROWS = np.array([[0.5, 0.5, 0.5, 0.5], [0, 0, 0, 1], [0.6, 0, 0, 0.8], [0, 1, 0, 0], [0, 0, -1, 0]])
+BENEATH = ROWS[::-1] / 3  # of any length: they come back as they are
 SHIFTS = np.arange(15.0).reshape(5, 3) / 7
 GOOD = {"dofs": {"a.x": 1.0}, "joint_names": ["a"], "joint_turns": [[0, 0, 0, 1]]}
 
 
-def turns(shifts=SHIFTS) -> JointTurns:
-    return JointTurns("some cat", NAMES, ROWS, shifts, "z", "0123abcd")
+def turns(shifts=SHIFTS, rotations=None) -> JointTurns:
+    return JointTurns("some cat", NAMES, ROWS, shifts, "z", "0123abcd", rotations)
 
 
 @pytest.mark.parametrize("suffix", [".json", ".npz"])
@@ -41,6 +42,47 @@ def test_turns_come_back(tmp_path: Path, suffix, shifts):
     assert_array_equal(found.shifts, shifts)
 
 
+@pytest.mark.parametrize("suffix", [".json", ".npz"])
+def test_rotations_beneath_the_dofs_come_back(tmp_path: Path, suffix):
+    path = tmp_path / f"a{suffix}"
+    viewer.write(PoseRecord(dofs={"a.x": 0.25}, turns=turns(rotations=BENEATH)), path)
+    source = Source(path, path.read_bytes())
+    assert_array_equal(pose.read(source).turns.rotations, BENEATH)
+    assert source.warnings == []
+
+
+def test_what_is_at_rest_is_not_written():
+    named = json.loads(pose.pose_text(PoseRecord(dofs={"a.x": 1.0}, turns=turns(0 * SHIFTS))))
+    assert "joint_turns" in named
+    assert "joint_rotations" not in named and "joint_shifts" not in named
+
+
+def test_edited_dof_of_a_saved_pose_is_what_a_figure_gets():
+    skeleton = viewer.Skeleton(
+        names=("hip", "knee"),
+        parents=np.array([-1, 0]),
+        rest_translations=np.zeros((2, 3)),
+        rest_rotations=np.tile([0.0, 0, 0, 1], (2, 1)),
+        rest_scales=np.ones((2, 3)),
+        dof_joints=np.array([0, 1]),
+        dof_kinds=np.array([3, 3]),
+        rest_dofs=np.zeros(2),
+        dof_limits=np.array([[-1.0, 1.0]] * 2),
+    )
+    figure = viewer.Figure("legs", skeleton=skeleton)
+    posed = viewer.rest_pose(skeleton)
+    posed.dofs[:] = 0.25, 0.5
+    posed.rotations[1] = 0.0, 0.6, 0.0, 0.8
+    values = json.loads(pose.pose_text(viewer.record_of(figure, posed)))
+    values["dofs"] |= {"hip.x": -0.5, "knee.x": 7.0}
+    record = pose.read(Source("a.json", json.dumps(values).encode()))
+    found = viewer.rest_pose(skeleton)
+    notes = viewer.apply_record(record, figure, found)
+    assert notes == ["1 DOF of the pose was beyond its limits and clamped"]
+    assert found.dofs.tolist() == [-0.5, 1.0]
+    assert found.rotations.tolist() == [[0, 0, 0, 1], [0, 0.6, 0, 0.8]]
+
+
 def read(**values):
     return pose.read(Source("a.json", json.dumps(GOOD | values).encode()))
 
@@ -48,6 +90,7 @@ def read(**values):
 def test_a_file_needs_no_more_than_names_and_turns():
     found = read(joint_turns=[[0, 0, 0, 2]]).turns
     assert found.turns.tolist() == [[0, 0, 0, 1]] and found.shifts.tolist() == [[0, 0, 0]]
+    assert found.rotations is None
     assert (found.figure, found.up, found.layout) == ("", "y", "")
 
 
@@ -74,6 +117,10 @@ def test_without_turns_the_other_words_mean_nothing():
         ({"joint_turns": [[0, 0, 0, 1e300]]},
          "joint_turns: expected finite numbers, found 1e+300"),
         ({"joint_shifts": [[0, 0]]}, "joint_shifts: expected 1 x 3 numbers, found 1 x 2"),
+        ({"joint_rotations": [[0, 0, 1]]},
+         "joint_rotations: expected 1 x 4 numbers, found 1 x 3"),
+        ({"joint_rotations": [[0, 0, 0, 0]]},
+         "joint_rotations: a: expected a quaternion, found four zeros"),
         ({"up": "x"}, 'up: expected "y" or "z", found "x"'),
         ({"up": 3}, "up: expected a word, found 3"),
         ({"dof_layout": [1]}, "dof_layout: expected a word, found a list of 1"),

@@ -301,6 +301,24 @@ def test_points_alone_are_a_warning() -> None:
          'a.obj:5: f: expected a corner v, v/vt, v//vn or v/vt/vn, found "3/x"'),
         (SQUARE + "f 1 2 1.5\n",
          'a.obj:5: f: expected a corner v, v/vt, v//vn or v/vt/vn, found "1.5"'),
+        *(
+            (SQUARE + f"vt 0 0\nvn 0 0 1\nf 1 2 {word}\n",
+             f'a.obj:7: f: expected a corner v, v/vt, v//vn or v/vt/vn, found "{word}"')
+            for word in ("1e-400", "-1e-400", "0x1", "1e-1", "2.5e0", "1e-1000f")
+        ),
+        *(
+            (SQUARE + f"vt 0 0\nvn 0 0 1\nf 1{rest} 2{rest} {word}\n",
+             f'a.obj:7: f: expected a corner v, v/vt, v//vn or v/vt/vn, found "{word}"')
+            for rest, word in (
+                ("//1", "1e-400"), ("/1", "1e-324/1"), ("/1", "3/1e-400"), ("//1", "3//1e-400"),
+                ("/1", "3/1.5"), ("//1", "3//1.5"), ("/1/1", "3/1/0x1"), ("/1/1", "3/1/1e-999"),
+            )
+        ),
+        *(
+            (SQUARE + f"f 1 2 {word}\n", "a.obj:5: f: expected an index from 1, found 0")
+            for word in (".0", "-.0", "0.", "+0.0", "0e5", "0f", "00")
+        ),
+        (SQUARE + "f 1 2 1e3\n", "a.obj:5: f: expected a vertex 1 to 4, found 1000"),
         (SQUARE + "f 1/ 2/ 3/\n",
          'a.obj:5: f: expected a corner v, v/vt, v//vn or v/vt/vn, found "1/"'),
         (SQUARE + "vt 0 0\nf 1/1 /1 3/1\n",

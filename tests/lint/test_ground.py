@@ -74,6 +74,41 @@ def test_a_ramp_without_a_level_is_said_to_be_unclear(depth: float, floor: float
     assert [f.code for f in found(-depth * _K / 59, floor)] == ["C013"]
 
 
+@pytest.mark.parametrize("floor", [0.015, 0.02, 0.03, 0.05, -0.02, -0.05, 0.8])
+@pytest.mark.parametrize("depth", [0.01, 0.02, 0.03, 0.05])
+@pytest.mark.parametrize("count", [6, 8, 12, 14])
+def test_feet_sunk_for_some_time_are_found_near_the_usual_ground(
+    floor: float, depth: float, count: int
+) -> None:
+    # At rest the feet of the legs are on floor 0: there, they may rest while they are sunk.
+    sunk = found(np.where((_K >= 20) & (20 + count > _K), -depth, 0.0), floor)
+    assert [f.code for f in sunk] == ["C008"]
+    assert sorted(sunk[0].frames.tolist()) == list(range(120, 120 + count))
+
+
+@pytest.mark.parametrize("height", [0.1, 0.2, 0.4])
+@pytest.mark.parametrize("count", [8, 14, 19])
+def test_a_short_rest_on_the_usual_ground_far_below_is_said_to_be_unclear(
+    height: float, count: int
+) -> None:
+    # It stands or sits higher, or has sunk: nobody knows.
+    (note,) = found(np.where(count > _K, 0.0, height), 0.0)
+    assert note.code == "C013" and f"feet rest at 2 heights, {0.1 + height:g}" in note.message
+
+
+@pytest.mark.parametrize("count", [8, 14, 19])
+def test_a_long_rest_below_the_usual_ground_is_said_to_be_unclear(count: int) -> None:
+    assert [f.code for f in found(np.where(count > _K, 0.0, -0.05), 0.0)] == ["C013"]
+
+
+@pytest.mark.parametrize("height", [0.1, 0.4])
+@pytest.mark.parametrize("count", [22, 30, 40])
+def test_the_usual_ground_breaks_a_near_tie(height: float, count: int) -> None:
+    assert found(np.where(count > _K, 0.0, height), 0.0) == []
+    (sunk,) = found(np.where(count > _K, 0.0, -height), 0.0)
+    assert sunk.code == "C008" and sorted(sunk.frames.tolist()) == list(range(100 + count, 160))
+
+
 SOUND = {
     "standing": 0.0 * _K,
     "stairs up": 0.17 * (_K // 10),
@@ -133,3 +168,16 @@ def test_who_is_away_does_not_count() -> None:
     lowest = np.where(np.arange(60) < 40, 7.0, 1.0)
     found_ground = ground_of(lowest, np.arange(60) < 40, 1 / 30, 1.7)
     assert found_ground == Ground(7.0, ((7.0, 40),))
+
+
+def test_the_longest_level_wins_but_for_near_ties() -> None:
+    here = np.ones(240, dtype=np.bool_)
+
+    def ground(count: int) -> float | None:
+        lowest = np.where(np.arange(240) < count, -0.02, 0.03)
+        return ground_of(lowest, here, 1 / 60, 1.7, (0.0,)).height
+
+    # Of 240 frames 30 to 60 are at most a third of the others, 70 are more, 80 and more half.
+    assert [ground(count) for count in (30, 45, 60)] == [0.03] * 3
+    assert ground(70) is None
+    assert [ground(count) for count in (80, 120, 200)] == [-0.02] * 3

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 from viewer.errors import RigError
+from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.figure import Figure
 from viewer.rig.pose import joint_rotations, pose_key, rest_pose
 from viewer.rig.pose_record import apply_record, record_of
@@ -157,6 +160,7 @@ def test_repeated_and_empty_names_match_nothing() -> None:
 def test_same_numbers_need_the_same_dofs_rest_and_up() -> None:
     one = figure("ab", ["xyz", "xyz"])
     assert shares_dofs(one, one) and shares_dofs(one, figure("ab", ["xyz", "xyz"], "other"))
+    assert shares_dofs(one, shaped(one, 3)) and shares_dofs(shaped(one, 10), shaped(one, 8))
     assert not shares_dofs(one, figure("ab", ["xyz", "zyx"]))
     assert not shares_dofs(one, figure("ac", ["xyz", "xyz"]))
     assert not shares_dofs(one, figure("ab", ["xyz", "xyz"], up="z"))
@@ -190,7 +194,7 @@ def test_record_of_the_same_dofs_brings_back_what_lies_beneath_them() -> None:
     found = posed(one, 0, 0, 0, -1.0)
     found.rotations[0] = 0.0, 1.0, 0.0, 0.0
     assert apply_record(record_of(one, pose), one, found) == []
-    assert_allclose(found.rotations, pose.rotations, atol=1e-12)
+    assert found.rotations.tolist() == pose.rotations.tolist()
     assert found.dofs.tolist() == pose.dofs.tolist()
     assert found.translations.tolist() == pose.translations.tolist()
 
@@ -221,11 +225,126 @@ def test_refused_record_leaves_the_pose() -> None:
 
 
 def test_hand_written_part_of_a_record_leaves_the_rest_beneath() -> None:
-    from dataclasses import replace
-
     one = figure("ab", ["xyz", "x"])
     found = rest_pose(one.skeleton)
     found.rotations[1] = 0.0, 1.0, 0.0, 0.0
     part = replace(record_of(one, posed(one, 0, 0, 0, 0.4)), dofs={"b.x": 0.25})
     assert apply_record(part, one, found) == []
     assert found.dofs.tolist() == [0, 0, 0, 0.25] and found.rotations[1].tolist() == [0, 1, 0, 0]
+
+
+def test_edited_dofs_count_and_not_the_turns_beside_them() -> None:
+    one = figure("ab", ["xyz", "x"], rest=[[0, 0, 0, 1], [HALF, 0, 0, HALF]])
+    record = record_of(one, posed(one, 0.1, 0.2, 0.3, 0.4))
+    edited = replace(record, dofs={**record.dofs, "a.y": -0.5, "b.x": 0.25})
+    found = posed(one, 1.0, 1.0, 1.0, 1.0)
+    found.rotations[0] = 0.0, 1.0, 0.0, 0.0
+    found.translations[1] = 1.0, 2.0, 3.0
+    assert apply_record(edited, one, found) == []
+    assert found.dofs.tolist() == [0.1, -0.5, 0.3, 0.25]
+    assert found.rotations.tolist() == [[0, 0, 0, 1], [HALF, 0, 0, HALF]]
+    assert not found.translations.any()
+    # Rx(90) Rx(0.25) within the parent: the edit is seen in full.
+    turned = about(0, np.pi / 2 + 0.25)
+    assert_allclose(joint_rotations(one.skeleton, found)[1], turned, atol=1e-12)
+
+
+def test_edited_dofs_keep_what_lies_beneath_them() -> None:
+    one = figure("ab", ["xyz", "x"])
+    pose = posed(one, 0, 0, 0, 0.4)
+    pose.rotations[1] = 0.0, np.sin(0.35), 0.0, np.cos(0.35)
+    pose.translations[1] = 0.5, 0.25, -1.0
+    record = record_of(one, pose)
+    found = rest_pose(one.skeleton)
+    assert apply_record(replace(record, dofs={**record.dofs, "b.x": -0.5}), one, found) == []
+    wanted = about(1, 0.7) @ about(0, -0.5)
+    assert_allclose(joint_rotations(one.skeleton, found)[1], wanted, atol=1e-12)
+    assert found.translations.tolist() == [[0, 0, 0], [0.5, 0.25, -1.0]]
+
+
+def test_edited_dof_beyond_its_limit_leaves_no_rotation_beneath() -> None:
+    one = figure("a", ["xyz"], limits=[[-0.5, 0.5]] * 3)
+    record = record_of(one, posed(one, 0.1, 0.2, 0.3))
+    found = rest_pose(one.skeleton)
+    notes = apply_record(replace(record, dofs={**record.dofs, "a.x": 2.0}), one, found)
+    assert notes == ["1 DOF of the pose was beyond its limits and clamped"]
+    assert found.dofs.tolist() == [0.5, 0.2, 0.3]
+    assert found.rotations.tolist() == [[0, 0, 0, 1]]
+
+
+def test_part_of_a_record_brings_what_it_says_of_what_lies_beneath() -> None:
+    one = figure("ab", ["xyz", "x"])
+    pose = posed(one, 0, 0, 0, 0.4)
+    pose.rotations[1] = 0.0, 1.0, 0.0, 0.0
+    pose.translations[0] = 0.0, 2.0, 0.0
+    found = posed(one, 0.1, 0, 0, 0)
+    assert apply_record(replace(record_of(one, pose), dofs={"b.x": 0.25}), one, found) == []
+    assert found.dofs.tolist() == [0.1, 0, 0, 0.25]
+    assert found.rotations.tolist() == [[0, 0, 0, 1], [0, 1, 0, 0]]
+    assert found.translations.tolist() == [[0, 2, 0], [0, 0, 0]]
+
+
+def test_lists_that_do_not_fit_the_skeleton_go_by_name() -> None:
+    # Somebody took a joint out of the file's lists, and left the word that tells its DOFs.
+    one = figure("ab", ["xyz", "x"], "cat")
+    record = record_of(one, posed(one, 0.1, 0, 0, 0.4))
+    named = record.turns
+    turns = replace(named, names=("a",), turns=named.turns[:1], shifts=named.shifts[:1],
+                    rotations=np.array([[0, 0, 0, 1.0]]))  # fmt: skip
+    found = posed(one, 0, 0, 0, 0.3)
+    notes = apply_record(replace(record, turns=turns), one, found)
+    assert notes == ["1 of 1 joints of cat taken over"]
+    assert_allclose(found.dofs, [0.1, 0, 0, 0.3], atol=1e-12)
+
+
+def shaped(fig: Figure, shapes: int, expressions: int = 0) -> Figure:
+    """Return a figure with blend shapes of both groups."""
+    count = shapes + expressions
+    groups = ("shape",) * shapes + ("expression",) * expressions
+    names = tuple(f"s{row}" for row in range(count))
+    return replace(fig, blend_shapes=BlendShapes(names, np.zeros((count, 0, 3)), groups))
+
+
+def body_pose(fig: Figure):
+    """Return a pose of a body with four shapes and two expressions, put somewhere."""
+    pose = posed(fig, 0.1, 0.2, 0.3, 0.4)
+    pose.figure_translation[:] = 0, 1, 2
+    pose.figure_scale = 1.2
+    pose.shape_weights = np.array([2.0, -1.0, 0.5, 0.25, 3.0, -4.0])
+    return pose
+
+
+@pytest.mark.parametrize("cut", [False, True])
+def test_same_skeleton_with_fewer_shapes_takes_place_size_and_the_shapes_of_both(cut) -> None:
+    bones = figure("ab", ["xyz", "x"])
+    one, other = shaped(bones, 4, 2), replace(shaped(bones, 2, 1), name="kin")
+    found = rest_pose(bones.skeleton)
+    assert apply_record(record_of(one, body_pose(one)), other, found, cut) == [
+        "shape coefficients 3 to 4 were left out, as kin has 2 (largest 0.5)",
+        "expression coefficient 2 was left out, as kin has 1 (largest 4)",
+    ]
+    assert found.dofs.tolist() == [0.1, 0.2, 0.3, 0.4]
+    assert found.shape_weights.tolist() == [2, -1, 3]
+    assert found.figure_translation.tolist() == [0, 1, 2] and found.figure_scale == 1.2
+
+
+def test_same_skeleton_with_more_shapes_takes_place_size_and_the_shapes_of_both() -> None:
+    bones = figure("ab", ["xyz", "x"])
+    one, other = shaped(bones, 4, 2), shaped(bones, 5, 3)
+    found = rest_pose(bones.skeleton)
+    found.shape_weights = np.ones(8)
+    assert apply_record(record_of(one, body_pose(one)), other, found) == []
+    assert found.shape_weights.tolist() == [2, -1, 0.5, 0.25, 0, 3, -4, 0]
+    assert found.figure_translation.tolist() == [0, 1, 2] and found.figure_scale == 1.2
+
+
+def test_same_skeleton_without_shapes_says_which_it_leaves() -> None:
+    bones = figure("ab", ["xyz", "x"], "bones")
+    one = shaped(bones, 4, 2)
+    found = rest_pose(bones.skeleton)
+    assert apply_record(record_of(one, body_pose(one)), bones, found) == [
+        "shape coefficients 1 to 4 were left out, as bones has 0 (largest 2)",
+        "expression coefficients 1 to 2 were left out, as bones has 0 (largest 4)",
+    ]
+    assert found.dofs.tolist() == [0.1, 0.2, 0.3, 0.4] and found.shape_weights.size == 0
+    assert found.figure_translation.tolist() == [0, 1, 2] and found.figure_scale == 1.2

@@ -1,4 +1,4 @@
-"""Parse long blocks of decimal numbers with numpy, exactly as ``float()`` would.
+"""Parse long blocks of decimal numbers with numpy, exactly as ``float()`` would above 5e-324.
 
 Eight characters are treated as one 64-bit word ("SIMD within a register"). A number with at
 most 15 digits is an integer below 2^53 divided by a power of ten not above 10^22, both exact
@@ -11,6 +11,7 @@ stricter than ``float()``, which takes ``nan``, ``1_000`` and digits of other sc
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 
@@ -38,6 +39,8 @@ _NUMBER = re.compile(rb"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)
 _NOT_FINITE = re.compile(
     rb"[+-]?(?:nan(?:\(\w*\))?|inf(?:inity)?|1\.?#(?:q?nan|snan|ind|inf)\w*)", re.IGNORECASE
 )
+_NOT_ZERO = re.compile(rb"[+-]?[0.]*[1-9]")
+_SMALLEST = float(np.nextafter(0.0, 1.0))  # above 0 in float64
 _SPACE = re.compile(rb"[ \t\n\r\v\f]")
 _CHUNK = 1 << 17  # bytes; temporaries stay inside the processor's cache
 _PAD = 16  # bytes before a chunk, so that the first words can be read as 16 characters
@@ -68,12 +71,17 @@ def is_number(word: bytes) -> bool:
 def to_number(word: bytes) -> float | None:
     """Return a word's value, or None if it is not a finite number that a float32 can hold.
 
-    >>> to_number(b"2.5f")
-    2.5
+    A number other than 0 stays one, however small.
+
+    >>> to_number(b"2.5f"), to_number(b"1e-400")
+    (2.5, 5e-324)
     """
     if not _NUMBER.fullmatch(word):
         return None
     value = float(word.rstrip(b"fF"))
+    if value == 0.0 and _NOT_ZERO.match(word):
+        # No index and no count may take what is only too small for 0, a whole number.
+        value = math.copysign(_SMALLEST, value)
     return value if abs(value) <= LARGEST else None
 
 

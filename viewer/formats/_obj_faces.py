@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +18,6 @@ CORNER_KINDS = {"v": "vertex", "vt": "texture coordinate", "vn": "normal"}
 """What the three numbers of a corner refer to."""
 
 _SLASH = ord("/")
-_ZERO = re.compile(rb"[ \t\n\r\v\f/][+-]?0+(?:\.0*)?(?![0-9.])")  # an index that nothing has
 CORNER = "expected a corner v, v/vt, v//vn or v/vt/vn"
 FEWEST = 3  # corners of a face
 
@@ -67,9 +65,6 @@ def read_faces(source: Source, lines: Lines, before: dict[str, int]) -> FaceRows
         With the line of a corner that is none.
     """
     rows = rows_of(lines, "f")
-    zero = _ZERO.search(rows.body)
-    if zero is not None:
-        raise source.error("f: expected an index from 1, found 0", rows.offset(zero.end() - 1))
     begins = word_begins(rows.letters)
     counts = np.diff(np.searchsorted(begins, rows.starts))
     small = np.flatnonzero(counts < FEWEST)
@@ -107,6 +102,10 @@ def _check_back(
 def _corner_numbers(source: Source, rows: Rows, begins: Places) -> Places:
     """Return the three numbers of every corner as written, 0 where there is none: (C, 3)."""
     values, bad = parse_numbers(rows.body.replace(b"/", b" "), 0, len(rows.body))
+    zeros = np.flatnonzero(values == 0.0)
+    if len(zeros):  # an index that nothing has; below, 0 means that there is none
+        place = int(_number_begins(rows)[zeros[0]])
+        raise source.error("f: expected an index from 1, found 0", rows.offset(place))
     slashes = np.flatnonzero(rows.letters == _SLASH)
     if len(slashes) == 0:
         # The most common file besides that of three numbers a corner: vertices alone.

@@ -17,7 +17,15 @@ from viewer.rig.pose_transfer import JointTurns
 
 __all__ = ["KEYS", "named_turns", "read_turns"]
 
-KEYS = ("joint_turns", "joint_names", "joint_shifts", "up", "dof_layout", "figure")
+KEYS = (
+    "joint_turns",
+    "joint_names",
+    "joint_rotations",
+    "joint_shifts",
+    "up",
+    "dof_layout",
+    "figure",
+)
 """What is read; nothing is unless the first is there."""
 
 _UPS = ("y", "z")
@@ -43,27 +51,24 @@ def read_turns(source: Source, values: Mapping[str, Any]) -> JointTurns | None:
     if values.get("joint_turns") is None:
         return None
     names = _names(source, values.get("joint_names"))
-    turns = _rows(source, "joint_turns", values["joint_turns"], len(names), 4)
-    lengths = np.linalg.norm(turns, axis=1)
-    short = np.flatnonzero(lengths < _SHORTEST)
-    if len(short):
-        name = printable(names[short[0]], 60)
-        raise source.error(f"joint_turns: {name}: expected a quaternion, found four zeros")
+    turns = _quaternions(source, "joint_turns", values["joint_turns"], names)
+    rotations = values.get("joint_rotations")
     shifts = values.get("joint_shifts")
     return JointTurns(
         _word(source, "figure", values.get("figure", "")),
         names,
-        turns / lengths[:, None],
+        turns / np.linalg.norm(turns, axis=1, keepdims=True),
         np.zeros((len(names), 3))
         if shifts is None
         else _rows(source, "joint_shifts", shifts, len(names), 3),
         _up(source, values.get("up", "y")),
         _word(source, "dof_layout", values.get("dof_layout", "")),
+        None if rotations is None else _quaternions(source, "joint_rotations", rotations, names),
     )
 
 
 def named_turns(turns: JointTurns) -> dict[str, Any]:
-    """Return turns by the names that files have for them; shifts only where there are some."""
+    """Return turns by the names that files have for them; what is at rest is left out."""
     named: dict[str, Any] = {
         "figure": printable(turns.figure, _LONGEST_WORD),
         "up": turns.up,
@@ -71,6 +76,8 @@ def named_turns(turns: JointTurns) -> dict[str, Any]:
         "joint_names": list(turns.names),
         "joint_turns": turns.turns.tolist(),
     }
+    if turns.rotations is not None:
+        named["joint_rotations"] = turns.rotations.tolist()
     if turns.shifts.any():
         named["joint_shifts"] = turns.shifts.tolist()
     return named
@@ -103,6 +110,16 @@ def _rows(source: Source, key: str, value: Any, count: int, width: int) -> Float
     if len(wrong):
         raise source.error(f"{key}: expected finite numbers, found {wrong[0]:g}")
     return array
+
+
+def _quaternions(source: Source, key: str, value: Any, names: tuple[str, ...]) -> Floats:
+    """Return a quaternion per joint, of any length but 0."""
+    rows = _rows(source, key, value, len(names), 4)
+    short = np.flatnonzero(np.linalg.norm(rows, axis=1) < _SHORTEST)
+    if len(short):
+        name = printable(names[short[0]], 60)
+        raise source.error(f"{key}: {name}: expected a quaternion, found four zeros")
+    return rows
 
 
 def _word(source: Source, key: str, value: Any) -> str:

@@ -5,12 +5,14 @@
     .json  {"viewer_pose": 1, "figure": name, "dofs": {"left_knee.x": radians, …},
             "shape": […], "expression": […], "translation": [x, y, z], "scale": s,
             "own_numbers": […], "joint_names": […], "joint_turns": [[x, y, z, w], …],
-            "joint_shifts": [[x, y, z], …], "up": "y", "dof_layout": word}
+            "joint_rotations": [[x, y, z, w], …], "joint_shifts": [[x, y, z], …], "up": "y",
+            "dof_layout": word}
     .npz   the same arrays, dof_names and dofs apart
     .txt   the model's own numbers, separated by blanks: 190 for PIG, 72 for SMPL …
 
 The turns of the joints, quaternions in the figure's axes, are for figures with other DOFs, which
-``dof_layout`` tells; those with the same take ``dofs``.
+``dof_layout`` tells. Those with the same take ``dofs``, edited or not, and what lies beneath them:
+rotations and shifts of joints within their parents, written only where they are not at rest.
 
 Both kinds of named values may instead hold one frame of what smplx takes: ``global_orient``,
 ``body_pose``, ``left_hand_pose``, ``right_hand_pose``, ``jaw_pose``, ``leye_pose``, ``reye_pose``,

@@ -11,6 +11,8 @@ from viewer.rig.arrays import Bools, Floats
 
 __all__ = ["Ground", "ground_of"]
 
+Level = tuple[float, int]  # a height, and in how many frames feet rest on it
+
 # Lengths in heights of the figure at rest: 17 mm for a person are 0.01.
 _ALIKE = 0.005  # up to which heights are one level: about half of what counts as sunk
 _APART = 0.01  # from which a level is another one
@@ -21,8 +23,10 @@ _CALM = 0.006  # that it moves up or down meanwhile; at the top of a jump it fal
 _MOST = 0.5  # of the frames that are so near where they are on average
 _RESTS = 0.2  # of all frames: with fewer at rest a few are alike by chance
 _SHARE = 0.1  # of the frames at rest that make a level
+_TIE = 0.5  # of the frames on the longest level: from there, what is likely decides
 _CLEAR = 1.0 / 3.0  # of the frames on the longest level: with more, another one may be the ground
 _ROLLS = 0.02  # from the longest level: a foot that rolls makes others so near
+_STEP = 0.06  # below the longest level: the ground may be so deep below a step or a seat
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +43,7 @@ class Ground:
     """
 
     height: float | None
-    levels: tuple[tuple[float, int], ...] = ()
+    levels: tuple[Level, ...] = ()
 
     @property
     def is_guess(self) -> bool:
@@ -52,9 +56,9 @@ def ground_of(
 ) -> Ground:
     """Return the height on which feet rest, as far as the motion says one clearly.
 
-    It is the one that is likely, if they rest there, else the one on which they rest longest, if
-    they rest much shorter on others; but none if they rest on two levels below it, as on stairs
-    that lead down.
+    It is the one on which they rest longest, or one that is likely and comes near to that. It is
+    none if they rest nearly as long on another level, or on a likely one that is a step away; and
+    none if they rest on two levels below it, as on stairs that lead down.
 
     Parameters
     ----------
@@ -73,12 +77,10 @@ def ground_of(
     levels = _levels(rests, size) if len(rests) > _RESTS * present.sum() else ()
     if not levels:
         return Ground(_guess(lowest[present], size, likely))
-    at_likely = (_level_at(rests, height, size) for height in likely)
-    ground = next((height for height in at_likely if height is not None), None)
+    customs = [level for height in likely for level in _level_at(rests, height, size)]
+    ground = next((level for level, n in customs if n >= _TIE * levels[0][1]), None)
     if ground is None:
-        longest, count = levels[0]
-        rivals = (n > _CLEAR * count and abs(h - longest) > _ROLLS * size for h, n in levels[1:])
-        ground = None if any(rivals) else longest
+        ground = None if _has_rival(levels, customs, size) else levels[0][0]
     if ground is None or sum(height < ground - _APART * size for height, _ in levels) > 1:
         return Ground(None, levels)
     return Ground(ground, levels)
@@ -95,12 +97,24 @@ def _guess(lowest: Floats, size: float, likely: Sequence[float]) -> float | None
     return next(iter(near), None)
 
 
-def _level_at(rests: Floats, height: float, size: float) -> float | None:
-    """Return the level nearest to a height, None if feet hardly rest there."""
+def _level_at(rests: Floats, height: float, size: float) -> list[Level]:
+    """Return the level that is nearest to a height, if feet rest near it at all."""
     near = rests[np.abs(rests - height) <= _CUSTOM * size]
-    if len(near) < _SHARE * len(rests):
-        return None
-    return min((level for level, _ in _levels(near, size)), key=lambda level: abs(level - height))
+    levels = _levels(near, size) if len(near) >= _SHARE * len(rests) else ()
+    return sorted(levels, key=lambda level: abs(level[0] - height))[:1]
+
+
+def _has_rival(levels: Sequence[Level], customs: Sequence[Level], size: float) -> bool:
+    """Return whether the ground may be another level than the longest.
+
+    A likely level on which they rest for a short time is none just below it: there, feet have sunk.
+    It is one a step below, as of somebody who sits or stands on a box, and one above, as the
+    longest may itself be sunk.
+    """
+    longest, count = levels[0]
+    long = [h for h, n in levels[1:] if n > _CLEAR * count and abs(h - longest) > _ROLLS * size]
+    steps = [h for h, _ in customs if longest - h > _STEP * size or h - longest > _ROLLS * size]
+    return bool(long or steps)
 
 
 def _resting(lowest: Floats, present: Bools, step: float, size: float) -> Bools:
@@ -120,10 +134,10 @@ def _resting(lowest: Floats, present: Bools, step: float, size: float) -> Bools:
     return rests
 
 
-def _levels(heights: Floats, size: float) -> tuple[tuple[float, int], ...]:
+def _levels(heights: Floats, size: float) -> tuple[Level, ...]:
     """Return where heights are dense, and how many lie there, the most first."""
     left = np.sort(heights)
-    levels: list[tuple[float, int]] = []
+    levels: list[Level] = []
     while len(left) and len(left) >= _SHARE * len(heights):
         ends = np.searchsorted(left, left + 2.0 * _ALIKE * size, side="right")
         counts = ends - np.arange(len(left))

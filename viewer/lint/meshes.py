@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from viewer.errors import counted
 from viewer.lint._finding import Finding, Subject
-from viewer.lint._topology import edges_of, orientations, welded
+from viewer.lint._topology import Edges, edges_of, orientations, welded
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.mesh import Mesh, triangle_areas
 from viewer.rig.vectors import unit
@@ -163,7 +163,7 @@ def _sides(
     border = (edges.counts == 1) & ~(unsure | np.roll(unsure, -1, axis=1)).ravel()
     # Flipped ones are reported already; what the file does not say has no volume.
     signs = np.where(flipped, -1.0, 1.0) * known[sound]
-    findings += _inside_out(subject, mesh, sound, component, signs, border.reshape(-1, 3))
+    findings += _inside_out(subject, mesh, sound, component, signs, edges)
     return findings + _borders(subject, mesh, sound, border)
 
 
@@ -198,14 +198,17 @@ def _inside_out(
     sound: Indices,
     component: Indices,
     signs: Floats,
-    border: Bools,
+    edges: Edges,
 ) -> list[Finding]:
     """Report closed components whose volume is negative, sum a . (b x c) / 6."""
     count = len(sound)
-    members = np.bincount(component, minlength=count)
-    open_edges = np.bincount(component, border.sum(axis=1), minlength=count)
+    is_known = signs != 0.0
+    members = np.bincount(component, is_known, minlength=count)
+    open_edges = _open_edges(component, is_known, edges)
     centers = mesh.positions[mesh.triangles[sound]].mean(axis=1)
-    sums = [np.bincount(component, centers[:, axis], minlength=count) for axis in range(3)]
+    sums = [
+        np.bincount(component, centers[:, axis] * is_known, minlength=count) for axis in range(3)
+    ]
     middle = np.stack(sums, axis=1) / np.maximum(members, 1)[:, None]
     a, b, c = (mesh.positions[mesh.triangles[sound, k]] - middle[component] for k in range(3))
     volumes = signs * np.einsum("ta,ta->t", a, np.cross(b, c))
@@ -224,6 +227,17 @@ def _inside_out(
             at=("triangles", int(triangles[0])),
         )
     ]
+
+
+def _open_edges(component: Indices, is_known: Bools, edges: Edges) -> Indices:
+    """Return how many edges of known triangles in each component have no known one beyond: (T,).
+
+    What the file lost closes nothing: the surface may well have ended there.
+    """
+    alone = np.flatnonzero(np.repeat(is_known, 3) & (edges.counts == 1)) // 3
+    beside = edges.pairs[is_known[edges.pairs].sum(axis=1) == 1, 0]
+    owners = component[np.concatenate([alone, beside])]
+    return np.bincount(owners, minlength=len(component))
 
 
 def _normals(subject: Subject, mesh: Mesh) -> list[Finding]:

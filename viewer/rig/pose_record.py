@@ -14,9 +14,9 @@ from viewer.rig.hands import Hand, hand_vectors
 from viewer.rig.pose import Pose
 from viewer.rig.pose_transfer import (
     JointTurns,
-    dof_layout,
     joint_turns,
-    restore_rest,
+    restore_beneath,
+    shares_layout,
     turn_joints,
 )
 from viewer.rig.pose_vector import read_vector, set_joint_rotations, write_vector
@@ -68,7 +68,8 @@ class PoseRecord:
         Whether hand poses are coefficients; None: all but 45 numbers are.
     turns : JointTurns or None
         What a figure with other DOFs takes in place of the numbers: its joints of the same names
-        turn as much, and its place, size and shape stay.
+        turn as much, and its place, size and shape stay. Figures with the same DOFs take all else,
+        and the shapes that they have.
     """
 
     dofs: Mapping[str, float] = field(default_factory=dict)
@@ -123,7 +124,7 @@ def apply_record(record: PoseRecord, figure: Figure, pose: Pose, cut: bool = Fal
         Changed; what the record does not mention stays.
     cut : bool
         Leave coefficients out that a figure with shapes has not, as files made for its kin need,
-        instead of refusing them.
+        instead of refusing them. Records with ``turns`` need no asking.
 
     Returns
     -------
@@ -139,7 +140,7 @@ def apply_record(record: PoseRecord, figure: Figure, pose: Pose, cut: bool = Fal
     skeleton = figure.skeleton
     if skeleton is None:
         raise RigError(f"figure {figure.name} has no skeleton to pose")
-    if record.turns is not None and record.turns.layout != dof_layout(figure):
+    if record.turns is not None and not shares_layout(record.turns, figure):
         work, notes = turn_joints(record.turns, figure, pose)
         _take_over(work, pose)
         return notes + _left_as_they_were(record)
@@ -150,6 +151,9 @@ def apply_record(record: PoseRecord, figure: Figure, pose: Pose, cut: bool = Fal
         notes += _apply_vector(record.vector, figure, work)
     for name, values in record.parts.items():
         notes += _apply_part(name, values, record, figure, work)
+    has_shapes = figure.blend_shapes is not None and "shape" in figure.blend_shapes.groups
+    # A pose that was made by a figure of the same skeleton is taken as far as it goes.
+    cut = record.turns is not None or (cut and has_shapes)
     notes += _apply_weights("shape", record.shape, figure, work, cut)
     notes += _apply_weights("expression", record.expression, figure, work, cut)
     if record.translation is not None:
@@ -207,8 +211,9 @@ def _apply_dofs(record: PoseRecord, figure: Figure, pose: Pose) -> list[str]:
     assert skeleton is not None
     for label, value in record.dofs.items():
         pose.dofs[find_dof(skeleton, label)] = value
-    if record.turns is not None and len(record.dofs) == skeleton.n_dofs:
-        restore_rest(skeleton, pose, record.turns)
+    if record.turns is not None:
+        is_whole = len(record.dofs) == skeleton.n_dofs
+        restore_beneath(skeleton, pose, record.turns, is_whole)
     notes = _beyond_limits(skeleton, pose.dofs)
     pose.dofs[:] = clamp_dofs(skeleton, pose.dofs)
     return notes
@@ -373,7 +378,7 @@ def _apply_weights(
     rows = [index for index, name in enumerate(groups) if (name == "shape") == (group == "shape")]
     values = np.asarray(values, dtype=np.float64).ravel()
     notes = unused_coefficients(group, values, len(rows), figure.name)
-    if notes and not (cut and "shape" in groups):
+    if notes and not cut:
         raise RigError(f"{figure.name} has {len(rows)} {group} coefficients, found {len(values)}")
     if np.abs(values).max() > _MOST_SIGMA:
         raise RigError(

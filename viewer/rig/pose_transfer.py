@@ -7,7 +7,8 @@ world rotations W of the pose and W0 of the skeleton with every DOF at 0,
     W_target = C W_source W0_source^T C^T W0_target
 
 where C turns the source's up axis into the target's. The turns W_source W0_source^T are all that
-has to be known of the source: they go with a pose into files and onto the clipboard.
+has to be known of the source: they go with a pose into files and onto the clipboard. Figures with
+the source's skeleton take its DOFs instead, and what it has beneath them.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from viewer.errors import RigError, printable
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.joint_turning import nearest_dofs
-from viewer.rig.pose import Pose, dof_rotations, joint_rotations, rest_pose
+from viewer.rig.pose import Pose, joint_rotations, rest_pose
 from viewer.rig.rotation import matrix_to_quaternion, quaternion_to_matrix
 from viewer.rig.skeleton import Skeleton
 
@@ -32,14 +33,14 @@ __all__ = [
     "dof_layout",
     "joint_turns",
     "joints_by_name",
-    "restore_rest",
+    "restore_beneath",
+    "shares_layout",
     "turn_joints",
 ]
 
 _LISTED = 12  # names in a note
 _INEXACT = 1e-4  # radians: a turn that is missed by less is met
 _REST_DIGITS = 5  # of rest rotations that count as the same
-_ROUNDING = 1e-9  # of a rotation matrix: what differs less is the same
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,7 +60,9 @@ class JointTurns:
     up : str
         The figure's up axis, ``"y"`` or ``"z"``.
     layout : str
-        As ``dof_layout`` gives it: where it is the same, the DOFs' values say more.
+        As ``dof_layout`` gives it: where it is the same, the DOFs' values count, not the turns.
+    rotations : (J, 4) or None
+        Beneath the DOFs, as a ``Pose`` has them; None: those of the rest pose.
     """
 
     figure: str
@@ -68,6 +71,7 @@ class JointTurns:
     shifts: Floats
     up: str
     layout: str
+    rotations: Floats | None = None
 
 
 def joint_turns(figure: Figure, pose: Pose) -> JointTurns:
@@ -90,11 +94,14 @@ def joint_turns(figure: Figure, pose: Pose) -> JointTurns:
         pose.translations.copy(),
         figure.up,
         dof_layout(figure),
+        None if np.array_equal(pose.rotations, skeleton.rest_rotations) else pose.rotations.copy(),
     )
 
 
 def dof_layout(figure: Figure) -> str:
-    """Return a word that two figures share if a pose's numbers mean the same to both.
+    """Return a word that two figures share if a pose's DOFs mean the same to both.
+
+    Blend shapes do not count: how many a file has of them changes no joint's turn.
 
     Parameters
     ----------
@@ -105,7 +112,7 @@ def dof_layout(figure: Figure) -> str:
     assert skeleton is not None  # whoever has a pose has a skeleton
     rest = quaternion_to_matrix(skeleton.rest_rotations).round(_REST_DIGITS) + 0.0  # no -0
     parts = (
-        repr((skeleton.names, figure.up, figure.n_shapes)).encode("utf-8", "surrogatepass"),
+        repr((skeleton.names, figure.up)).encode("utf-8", "surrogatepass"),
         *(
             array.astype(np.int32).tobytes()
             for array in (skeleton.parents, skeleton.dof_joints, skeleton.dof_kinds)
@@ -115,30 +122,46 @@ def dof_layout(figure: Figure) -> str:
     return hashlib.sha256(b"|".join(parts)).hexdigest()[:16]
 
 
-def restore_rest(skeleton: Skeleton, pose: Pose, source: JointTurns) -> None:
-    """Give a pose with the source's DOFs the source's rotations and shifts beneath them, in place.
+def shares_layout(source: JointTurns, figure: Figure) -> bool:
+    """Return whether a figure takes the DOFs of a pose, and not only the turns of its joints.
+
+    Parameters
+    ----------
+    source : JointTurns
+        Of the pose.
+    figure : Figure
+        With a skeleton.
+    """
+    skeleton = figure.skeleton
+    assert skeleton is not None  # whoever has a pose has a skeleton
+    # Files are edited by hand: the word alone does not make their lists as long as the skeleton.
+    return source.layout == dof_layout(figure) and source.names == skeleton.names
+
+
+def restore_beneath(skeleton: Skeleton, pose: Pose, source: JointTurns, is_whole: bool) -> None:
+    """Give a pose the source's rotations and shifts beneath its DOFs, in place.
 
     They are beside the rest pose where a motion turns a joint about more axes than its DOFs have.
+    The turns are not looked at: what they say of the DOFs is out of date once these are edited.
 
     Parameters
     ----------
     skeleton : Skeleton
         Of a figure with the source's layout.
     pose : Pose
-        With the source's values in ``dofs``, not yet clamped.
+        Its DOFs are left alone.
     source : JointTurns
-        All else that is known of its pose.
+        What lies beneath the DOFs of its pose.
+    is_whole : bool
+        Whether the source's pose is taken with every DOF: joints of which it says nothing then go
+        to rest, instead of staying as they are.
     """
-    world = quaternion_to_matrix(source.turns) @ _turned(skeleton, _unturned(skeleton))
-    parents = skeleton.parents
-    above = np.where((parents >= 0)[:, None, None], world[parents], np.eye(3))
-    turned = dof_rotations(skeleton, pose.dofs)
-    beneath = np.swapaxes(above, 1, 2) @ world @ np.swapaxes(turned, 1, 2)
-    rest = quaternion_to_matrix(skeleton.rest_rotations)
-    differs = np.abs(beneath - rest).max(axis=(1, 2)) > _ROUNDING
-    pose.rotations[:] = skeleton.rest_rotations
-    pose.rotations[differs] = matrix_to_quaternion(beneath[differs])
-    pose.translations[:] = source.shifts
+    if source.rotations is not None:
+        pose.rotations[:] = source.rotations
+    elif is_whole:
+        pose.rotations[:] = skeleton.rest_rotations
+    if is_whole or source.shifts.any():
+        pose.translations[:] = source.shifts
 
 
 def joints_by_name(source: Sequence[str], target: Sequence[str]) -> Ints:
