@@ -81,7 +81,7 @@ def test_worst_joint_vertex_and_weight_are_named_and_the_exit_code_says_so(tmp_p
     code, lines, _ = said(capsys, *arguments, "--tolerance", "0.09")
     assert code == 1
     assert "    vertices: at most 0.5 (10 % of the size) (vertex 2, own pose)," in lines[3]
-    assert lines[4] == "    weights: at most 0.5 (vertex 2, every pose), mean 0.125"
+    assert lines[4] == "    weights: at most 0.5 (vertex 2), mean 0.125"
     assert lines[-1] == "  differs by more than the tolerance of 0.09"
     assert said(capsys, *arguments, "--tolerance", "0.5")[0] == 0  # the weights' 0.5 is within
     assert said(capsys, *arguments)[0] == 0  # nothing was asked
@@ -100,6 +100,42 @@ def test_many_are_a_table_and_one_that_cannot_be_read_does_not_stop_the_others(t
     assert lines[1].endswith("within")
     assert "0.5 (10 % of the size)" in lines[2] and lines[2].endswith("DIFFERS")
     assert lines[3].endswith('a.skel:2: offset of joint base: expected a number, found "zero"')
+
+
+def test_a_stray_skeleton_is_named_and_the_figure_of_the_same_name_is_compared(tmp_path, capsys):
+    reference, other = write(tmp_path / "ref"), write(tmp_path / "other", tip="3.5")
+    # It comes before a.skel, and is the reference's very skeleton.
+    (tmp_path / "other" / "0.skel").write_text(SKEL % "3")
+    code, lines, _ = said(capsys, reference, other, "--poses", "0", "--tolerance", "1")
+    assert code == 1  # something is there that was not asked for
+    assert lines[:3] == [
+        f"{other}:",
+        f"  only in {other}: 0 (a skeleton)",
+        "  a:",
+    ]
+    assert lines[3].startswith(
+        "    joint positions: at most 0.5 (10 % of the size) (tip, own pose)"
+    )
+    _, lines, _ = said(capsys, reference, other, reference, "--poses", "0")
+    assert lines[1].split("  ")[1:2] == ["0.5 (10 % of the size)"]
+    assert lines[1].endswith("1 mismatch")
+    _, lines, _ = said(capsys, other, reference, "--poses", "0")
+    assert lines[1] == "  only in the reference: 0 (a skeleton)"
+
+
+def test_a_partner_of_another_name_is_told(tmp_path, capsys):
+    reference, other = write(tmp_path / "ref"), write(tmp_path / "other")
+    (tmp_path / "other" / "a.skel").rename(tmp_path / "other" / "b.skel")
+    (tmp_path / "other" / "a.skin").rename(tmp_path / "other" / "b.skin")
+    _, lines, _ = said(capsys, reference, other, "--poses", "0")
+    assert not any("held against" in line for line in lines)  # there is nothing else
+    (tmp_path / "other" / "c.skel").write_text(SKEL % "3")
+    _, lines, _ = said(capsys, reference, other, "--poses", "0")
+    assert lines[1:4] == [
+        f"  only in {other}: c (a skeleton)",
+        "  a:",
+        "    note: held against b",
+    ]
 
 
 def test_json_holds_every_joint_and_the_place_of_the_worst(tmp_path, capsys):

@@ -212,6 +212,21 @@ def frames(*rows: str) -> str:
     return f"{head}MOTION\nFrames: {len(rows)}\nFrame Time: 0.1\n{text}\n"
 
 
+@pytest.mark.parametrize(
+    ("item", "below"),
+    [("boxmin -0.2 inf -0.4", 0), ("offset 1 x", 0), ("pose 0 0 0 0", 0), ("pose 0 up\n0 1", 1),
+     ("boxmin nan\nnan\n0", 2), ("boxmin 0 x 0 and more", 0)],
+)  # fmt: skip
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_a_lost_item_of_a_skeleton_takes_no_line_with_it(item: str, below: int, end: str) -> None:
+    text = f"balljoint a {{\n{item}\ncolour red\nballjoint b {{ }} }}".replace("\n", end)
+    source = Source("a.skel", text.encode())
+    source.faults = []
+    figure = skel.read(source)
+    assert len(source.faults) == 1 and figure.skeleton.names == ("a", "b")
+    assert source.warnings == [f'a.skel:{3 + below}: skipped unknown "colour"']
+
+
 def test_a_frame_that_is_lost_is_as_the_one_before() -> None:
     good = [f"{k} 1 0" + " 0" * 12 for k in range(5)]
     bad = [good[0], good[1].replace("1", "nan", 1), good[2], good[3] + " 7", good[4]]

@@ -180,7 +180,9 @@ def test_minimum_above_maximum_is_ignored_with_a_warning():
         ("joint{}", ["joint"]),
         ("joint end { offset 1 2 3 joint { pose 9 9 9 } balljoint b { } }", ["joint"]),
         ("limits { x { 1 2 } y { 3 4 } }", ["limits"]),
-        ("colour red", ["colour", "red"]),
+        ("colour red", ["colour"]),
+        ("colour 1 red 2", ["colour"]),
+        ("colour\nred", ["colour", "red"]),
         ("{ offset 9 9 9 }", ["{"]),
         ("flag", ["flag"]),
         ("scale 2 { 3 }", ["scale"]),
@@ -194,7 +196,8 @@ def test_unknown_item_is_skipped_whole(item, words, place):
     assert skeleton.names == ("root", "arm")
     assert skeleton.parents.tolist() == [-1, 0]
     assert skeleton.rest_translations.tolist() == [[1, 2, 3], [0, 1, 0]]
-    assert warnings == [f'a.skel:2: skipped unknown "{word}"' for word in words]
+    lines = [f'a.skel:{line}: skipped unknown "{word}"' for line, word in enumerate(words, 2)]
+    assert warnings == lines
 
 
 def test_numbers_that_belong_to_nothing_are_skipped():
@@ -216,9 +219,9 @@ def test_unknown_keyword_is_named_once_and_with_its_first_line():
 
 
 def test_warnings_of_a_hopeless_file_end_after_100():
-    _, warnings = read(f"balljoint a {{ {' '.join(f'w{number}' for number in range(500))} }}")
+    _, warnings = read(f"balljoint a {{ {chr(10).join(f'w{number}' for number in range(500))} }}")
     assert len(warnings) == 101
-    assert warnings[99] == 'a.skel:1: skipped unknown "w99"'
+    assert warnings[99] == 'a.skel:100: skipped unknown "w99"'
     assert warnings[100] == "a.skel: further warnings are left out"
 
 

@@ -82,6 +82,7 @@ def test_weights_differ_by_the_l1_distance_of_rows_however_they_are_listed() -> 
     found = compare(Actor(figure()), Actor(figure(influences=other)), n_poses=0)
     weights = measures(found)["weights"]
     assert_allclose(weights.item_maxima, [0.0, 0.6, 0.0, 2.0], atol=1e-12)
+    assert (weights.item, weights.step) == ("vertex 3", "")  # they are the same in every pose
     assert measures(found)["vertices"].maximum == 0.0  # at rest nothing shows
 
 
@@ -118,8 +119,17 @@ def test_meshes_with_other_triangles_are_compared_by_closest_points_both_ways() 
 def test_what_only_one_has_is_a_mismatch_that_no_tolerance_covers() -> None:
     names = skeleton([-1, 0, 1], names=("base", "tip", "claw"))
     found = compare(Actor(Figure("a", skeleton=names)), Actor(figure()), n_poses=0)
-    assert found.mismatches == ("1 joints only in the first: claw", "only the second has a mesh")
+    assert found.mismatches == ("1 joint only in the first: claw", "only the second has a mesh")
     assert found.exceeds(1e9)
+
+
+def test_joints_without_a_name_are_told_by_number() -> None:
+    one = Figure("a", skeleton=skeleton([-1, 0], names=("base", "")))
+    other = Figure("b", skeleton=skeleton([-1], names=("base",)))
+    found = compare(Actor(one), Actor(other))
+    assert found.mismatches == ("1 joint only in the first: joint 1 (no name)",)
+    found = compare(Actor(one), Actor(one))
+    assert measures(found)["joint positions"].items == ("base", "joint 1 (no name)")
 
 
 def test_joints_in_another_order_are_told() -> None:
@@ -148,7 +158,7 @@ def test_joints_without_a_common_name_are_compared_by_number() -> None:
 
 def test_other_limits_are_told_with_both() -> None:
     found = compare(Actor(figure()), Actor(figure(joints=arm(low=-0.5))))
-    assert found.mismatches == ("other limits of 1 DOFs, as tip.z: -1 to 1 and -0.5 to 1",)
+    assert found.mismatches == ("other limits of 1 DOF, as tip.z: -1 to 1 and -0.5 to 1",)
 
 
 def walk(angles, rate=10.0, name="walk") -> SampledClip:

@@ -25,7 +25,7 @@ class Compared:
     differences : tuple of (str, Difference)
         Of each actor, by the reference's name.
     mismatches : tuple of str
-        Actors that only one has.
+        Actors that only one has, and which.
     error : str
         Why it could not be opened; empty if it could.
     warnings : tuple of str
@@ -61,8 +61,8 @@ def lines_of(compared: Compared, tolerance: float | None) -> list[str]:
     lines = [f"{printable(compared.name, 300)}:"]
     if compared.error:
         return [*lines, f"  could not be compared: {compared.error}"]
-    lines += [f"  only one has it: {text}" for text in compared.mismatches]
-    many = len(compared.differences) > 1
+    lines += [f"  {text}" for text in compared.mismatches]
+    many = len(compared.differences) > 1 or bool(compared.mismatches)
     for name, difference in compared.differences:
         if many:
             lines.append(f"  {printable(name)}:")
@@ -80,7 +80,8 @@ def lines_of(compared: Compared, tolerance: float | None) -> list[str]:
 def _line(measure: Measure, difference: Difference) -> str:
     most = amount(measure.maximum, measure.kind, difference)
     mean = amount(measure.mean, measure.kind, difference)
-    where = f" ({printable(measure.item)}, {measure.step})" if measure.maximum > 0.0 else ""
+    place = ", ".join(filter(None, (printable(measure.item), measure.step)))
+    where = f" ({place})" if measure.maximum > 0.0 else ""
     return f"    {measure.name}: at most {most}{where}, mean {mean}"
 
 
@@ -161,7 +162,7 @@ def _actor(name: str, difference: Difference) -> dict[str, object]:
                 "maximum": measure.maximum,
                 "mean": measure.mean,
                 "relative": measure.relative(difference.size),
-                "step": measure.step,
+                "step": measure.step or None,
                 "item": measure.item,
                 "compared": measure.n_compared,
                 "maxima": dict(zip(measure.items, measure.item_maxima.tolist(), strict=True))

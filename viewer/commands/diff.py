@@ -6,9 +6,11 @@ import argparse
 import math
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from viewer.commands._diff_inputs import input_files
+from viewer.commands._diff_pairs import Pairing, pair_actors
 from viewer.commands._diff_picture import Heat, heat_of, save_heat
 from viewer.commands._diff_report import Compared, json_text, lines_of, table_of
 from viewer.commands._frame_numbers import parse_range
@@ -176,9 +178,10 @@ def _compared(
     n_poses: int,
     frames: FrameRange | None,
 ) -> tuple[Compared, Heat | None]:
-    pairs, mismatches = _pair_actors(reference.actors, other.actors)
+    pairing = pair_actors(reference.actors, other.actors)
+    is_choice = len(reference.actors) > 1 or len(other.actors) > 1
     found: list[tuple[Actor, Difference]] = []
-    for first, second in pairs:
+    for first, second in pairing.pairs:
         # The reference is posed on the way, and must start alike for everybody.
         with Progress(f"comparing {Path(name).name}", 1) as progress:
 
@@ -188,29 +191,19 @@ def _compared(
 
             posed = first.copy()
             difference = compare(posed, second, skinning, n_poses, frames, report)
+        if is_choice and first.figure.name != second.figure.name:
+            note = f"held against {printable(second.name, 60)}"
+            difference = replace(difference, notes=(note, *difference.notes))
         found.append((posed, difference))
     differences = tuple((actor.name, difference) for actor, difference in found)
-    row = Compared(name, differences, mismatches, warnings=other.warnings)
+    row = Compared(name, differences, _lone(name, pairing), warnings=other.warnings)
     return row, heat_of(name, found)
 
 
-def _pair_actors(
-    first: Sequence[Actor], second: Sequence[Actor]
-) -> tuple[list[tuple[Actor, Actor]], tuple[str, ...]]:
-    """Pair actors: people of captures by their number, others in order."""
-    left = list(second)
-    pairs, mismatches = [], []
-    for actor in first:
-        same = [other for other in left if other.person == actor.person]
-        alike = [o for o in same if (o.figure.points is None) == (actor.figure.points is None)]
-        chosen = next(iter(alike or same), None)
-        if chosen is None:
-            mismatches.append(f"{actor.name} only in the reference")
-        else:
-            left.remove(chosen)
-            pairs.append((actor, chosen))
-    mismatches += [f"{actor.name} not in the reference" for actor in left]
-    return pairs, tuple(mismatches)
+def _lone(name: str, pairing: Pairing) -> tuple[str, ...]:
+    """Say what only one side has, and which."""
+    sides = (("the reference", pairing.first), (printable(name, 300), pairing.second))
+    return tuple(f"only in {side}: {printable(one, 60)}" for side, lone in sides for one in lone)
 
 
 def _print(arguments: argparse.Namespace, rows: Sequence[Compared]) -> None:

@@ -20,6 +20,7 @@ from viewer.commands._scene import (
 from viewer.errors import ViewerError, printable
 from viewer.lint import (
     CODES,
+    MAX_TURN,
     SEVERITIES,
     LintOptions,
     describe,
@@ -66,9 +67,9 @@ def _add_limits(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--max-turn",
         type=number,
-        default=3400.0,
+        default=MAX_TURN,
         metavar="DEGREES",
-        help="that a joint may turn in a second (default: 3400)",
+        help=f"that a joint may turn in a second (default: {MAX_TURN:g})",
     )
     group.add_argument(
         "--confidence",

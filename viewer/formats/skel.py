@@ -21,7 +21,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from viewer.errors import FormatError, counted
-from viewer.formats._numbers import is_number, to_number
+from viewer.formats._numbers import is_infinite, is_number, to_number
 from viewer.formats._skel_writing import KEYWORDS, UNLIMITED, write
 from viewer.formats._source import Source, no_number, shown
 from viewer.rig.arrays import Floats
@@ -187,8 +187,23 @@ class _Parser:
         """Refuse an item; where faults are noted, go on behind it."""
         moves = keyword.group() == b"offset"
         self.source.refuse(error, 1, "joints" if moves else "", [self.open[-1]] if moves else ())
+        self._skip_item()
+
+    def _skip_item(self, on_line: bool = True) -> None:
+        """Move behind what belongs to an item: the rest of its line, and numbers below that."""
         while self.word is not None and self.word.group() not in (b"{", b"}", *KEYWORDS):
+            last = self.word
+            if not (on_line or is_number(last.group()) or is_infinite(last.group())):
+                return
             self._advance()
+            on_line = on_line and self._is_beside(last)
+
+    def _is_beside(self, last: Word) -> bool:
+        """Return whether the current word is in one line with the one before."""
+        if self.word is None:
+            return False
+        between = self.source.data[last.end() : self.word.start()]
+        return b"\n" not in between and b"\r" not in between
 
     def _numbers_error(self, keyword: Word, count: int, found: int) -> FormatError:
         if self.word is not None and self.word.group() not in (b"{", b"}", *KEYWORDS):
@@ -205,14 +220,14 @@ class _Parser:
         return f"{keyword.group().decode()} of joint {_called(self.found[self.open[-1]])}"
 
     def _skip_unknown(self) -> None:
-        """Skip a word we do not know with its numbers, or with its whole balanced block."""
+        """Skip a word we do not know with its line and numbers, or its whole balanced block."""
         assert self.word is not None  # the caller looked at it
         keyword = self.word
         self.source.warn(f"skipped unknown {shown(keyword.group())}", keyword.start())
         if keyword.group() != b"{":
             self._advance()
-        while self.word is not None and is_number(self.word.group()):
-            self._advance()
+            # One warning for its whole line: "colour red" is one thing that we do not know.
+            self._skip_item(self._is_beside(keyword))
         if not self._finds_block():
             return
         depth = 0

@@ -14,7 +14,7 @@ from viewer.lint._again import Again, lint_again
 from viewer.lint._aim import Places, places_of, points_of
 from viewer.lint._codes import CODES, SEVERITIES, Code
 from viewer.lint._counting import counting_of
-from viewer.lint._finding import Finding, LintOptions, Subject
+from viewer.lint._finding import MAX_TURN, Finding, LintOptions, Subject
 from viewer.lint._report import describe, finding_text, summary, worst_first
 from viewer.rig.arrays import Ints
 from viewer.rig.scene import Scene
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 __all__ = [
     "CHECKS",
     "CODES",
+    "MAX_TURN",
     "SEVERITIES",
     "Again",
     "Check",

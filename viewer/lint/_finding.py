@@ -23,10 +23,15 @@ if TYPE_CHECKING:
     from viewer.lint._counting import Counting
     from viewer.lint._tracks import Track
 
-__all__ = ["Finding", "LintOptions", "Subject", "listed"]
+__all__ = ["MAX_TURN", "Finding", "LintOptions", "Subject", "listed"]
+
+MAX_TURN = 3400.0
+"""Degrees a second that a joint may turn against its parent unless somebody says otherwise."""
 
 _NONE: Ints = np.zeros(0, dtype=np.int32)
 _NO_TIMES: Floats = np.zeros(0)
+_STRAYS = 0.02  # of the vertices that may be strays, at each end of an axis
+_FAR = 10.0  # a box this many times that of the others is one of strays
 
 Indices = NDArray[np.int64] | Ints | list[int]
 
@@ -40,7 +45,7 @@ class LintOptions:
     max_speed : float or None
         Of a joint or keypoint, figure units a second; None for 15 times the figure's size.
     max_turn : float
-        Of a joint against its parent, radians a second.
+        Of a joint against its parent, radians a second; ``MAX_TURN`` in degrees.
     confidence : float
         Of captured keypoints: what is below is low.
     rate : float
@@ -53,7 +58,7 @@ class LintOptions:
     """
 
     max_speed: float | None = None
-    max_turn: float = 60.0
+    max_turn: float = float(np.radians(MAX_TURN))
     confidence: float = 0.3
     rate: float = 60.0
     frame_rate: float = DEFAULT_RATE
@@ -194,12 +199,28 @@ class Subject:
             return f"{speed * METRES[unit]:.3g} m/s"
         return f"{speed:.3g} units a second" + self._share(speed)
 
-    def _share(self, length: float) -> str:
+    def size(self) -> float:
+        """Return the diagonal of the box of the mesh, or else of the joints at rest.
+
+        Figure units; 0 without either. Stray vertices far away do not count.
+        """
         figure = self.actor.figure
-        if figure.mesh is not None:
-            size = box_size(bounding_box(figure.mesh.positions))
-        else:
-            size = 0.0 if figure.skeleton is None else box_size(bounding_box(rest_joints(figure)))
+        if figure.mesh is None:
+            return 0.0 if figure.skeleton is None else box_size(bounding_box(rest_joints(figure)))
+        positions = figure.mesh.positions
+        size = box_size(bounding_box(positions))
+        if len(positions) == 0:
+            return size
+        # Partitioning finds the two quantiles of an axis without sorting it.
+        inner = np.quantile(positions, [_STRAYS, 1.0 - _STRAYS], axis=0, method="nearest")
+        usual = box_size(inner)
+        if not size > _FAR * usual > 0.0:
+            return size
+        near = np.linalg.norm(positions - inner.mean(axis=0), axis=1) < _FAR / 2 * usual
+        return box_size(bounding_box(positions[near]))
+
+    def _share(self, length: float) -> str:
+        size = self.size()
         return f" ({100.0 * length / size:.3g} % of its size)" if size > 0.0 else ""
 
     def found(

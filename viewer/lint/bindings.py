@@ -9,17 +9,34 @@ from viewer.lint._finding import Finding, Subject, listed
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure
 from viewer.rig.kinematics import world_matrices
-from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.pose import rest_pose
 from viewer.rig.shape import rest_joints
 from viewer.rig.skeleton import joint_labels
 
-__all__ = ["check"]
+__all__ = ["are_singular", "check"]
 
 _SINGULAR = 1e-12  # determinant relative to the product of the column lengths
 _NEARLY = 1e6  # condition number
 _AFFINE = 1e-6  # of the last row
 _ELSEWHERE = 0.01  # of the figure's size: nearer than that is rounding of old files
+
+
+def are_singular(matrices: Floats) -> Bools:
+    """Return which matrices flatten space, so that nothing can be undone that they do.
+
+    Parameters
+    ----------
+    matrices : (J, 4, 4)
+        Affine; only their linear parts count.
+
+    Returns
+    -------
+    (J,)
+        True where the determinant is 0 beside the product of the column lengths.
+    """
+    linear = matrices[:, :3, :3]
+    lengths = np.linalg.norm(linear, axis=1).prod(axis=1)
+    return np.abs(np.linalg.det(linear)) <= _SINGULAR * lengths
 
 
 def check(subject: Subject) -> list[Finding]:
@@ -29,9 +46,8 @@ def check(subject: Subject) -> list[Finding]:
         return []
     known = subject.sound("bindings", skin.n_joints)
     linear = np.where(known[:, None, None], skin.inverse_bind[:, :3, :3], np.eye(3))
-    lengths = np.linalg.norm(linear, axis=1).prod(axis=1)
     determinants = np.linalg.det(linear)
-    flat = np.abs(determinants) <= _SINGULAR * lengths
+    flat = are_singular(linear)
     findings = _about(
         subject, "B002", flat, determinants, ("cannot be inverted",) * 2, "determinant"
     )
@@ -83,8 +99,8 @@ def _elsewhere(subject: Subject, figure: Figure, usable: Bools) -> list[Finding]
 
     Figures are bound with all DOFs at 0 or in their files' own pose; the nearer one counts.
     """
-    skin, mesh, skeleton = figure.skin, figure.mesh, figure.skeleton
-    if skin is None or mesh is None or skeleton is None:
+    skin, skeleton = figure.skin, figure.skeleton
+    if skin is None or figure.mesh is None or skeleton is None:
         return []
     # Where one joint is not known, nobody knows where those below it are.
     known = subject.sound("joints", skeleton.n_joints)
@@ -95,9 +111,8 @@ def _elsewhere(subject: Subject, figure: Figure, usable: Bools) -> list[Finding]
     bound = np.linalg.inv(matrices)[:, :3, 3]
     own = world_matrices(skeleton, rest_pose(skeleton))[:, :3, 3]
     both = [np.linalg.norm(bound - joints, axis=1) for joints in (rest_joints(figure), own)]
-    distances = min((known * part for part in both), key=np.max)
-    size = box_size(bounding_box(mesh.positions))
-    away = np.flatnonzero(distances > _ELSEWHERE * size)
+    distances = min((np.where(known, part, 0.0) for part in both), key=np.max)
+    away = np.flatnonzero(distances > _ELSEWHERE * subject.size())
     if len(away) == 0:
         return []
     away = away[np.argsort(-distances[away], kind="stable")]

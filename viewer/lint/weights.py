@@ -8,6 +8,7 @@ from viewer.errors import counted
 from viewer.lint._finding import Finding, Subject, listed
 from viewer.lint._poses import some_poses
 from viewer.lint._topology import components, welded
+from viewer.lint.bindings import are_singular
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh
@@ -166,24 +167,43 @@ def _crowded(subject: Subject, figure: Figure, known: Bools) -> list[Finding]:
             f"most {int(used.max())}"
         )
         if can_pose:
-            errors, n_poses = _cut_errors(subject, limit)
-            errors[~(_posable(subject, skin) & known)] = 0.0
-            worst = int(errors.argmax())
-            crowded = crowded[np.argsort(-errors[crowded], kind="stable")]
-            text += (
-                f"; kept to {limit} the mesh moves by up to {subject.length(errors[worst])} "
-                f"(vertex {worst}), {subject.length(float(errors[crowded].mean()))} on average "
-                f"of these, over {counted(n_poses, 'pose')}"
-            )
+            cost, crowded = _cost(subject, skin, limit, crowded)
+            text += f"; {cost}"
         at = ("weights", int(crowded[0]))
         findings.append(subject.found(code, text, vertices=crowded, at=at))
     return findings
 
 
+def _cost(subject: Subject, skin: Skin, limit: int, crowded: np.ndarray) -> tuple[str, np.ndarray]:
+    """Return what a cut would move, in words, and the vertices with the largest cost first.
+
+    Vertices whose cost nobody can know come last, and are counted.
+    """
+    errors, n_poses = _cut_errors(subject, limit)
+    is_told = (_posable(subject, skin) & np.isfinite(errors))[crowded]
+    told, lost = crowded[is_told], crowded[~is_told]
+    needs = "it needs" if len(lost) == 1 else "they need"
+    left_out = (
+        f"{counted(len(lost), 'vertex', 'is', 'are')} left out, as a position or bind matrix that "
+        f"{needs} cannot be used"
+    )
+    if len(told) == 0:
+        return f"what keeping {limit} would move is not known: {left_out}", crowded
+    told = told[np.argsort(-errors[told], kind="stable")]
+    text = (
+        f"kept to {limit} the mesh moves by up to {subject.length(float(errors[told[0]]))} "
+        f"(vertex {told[0]}), {subject.length(float(errors[told].mean()))} on average "
+        f"of these, over {counted(n_poses, 'pose')}"
+    )
+    return text + f"; {left_out}" * bool(len(lost)), np.concatenate([told, lost])
+
+
 def _posable(subject: Subject, skin: Skin) -> Bools:
     """Return which vertices go where the file says: they and all their joints are its own."""
-    lost = ~subject.sound("bindings", skin.n_joints)
-    held = np.bincount(owners(skin), lost[skin.joints], minlength=skin.n_vertices)
+    lost = ~subject.sound("bindings", skin.n_joints) | are_singular(skin.inverse_bind)
+    # A joint of weight 0 moves nothing.
+    holds = lost[skin.joints] & (skin.weights != 0.0)
+    held = np.bincount(owners(skin), holds, minlength=skin.n_vertices)
     return subject.sound("positions", skin.n_vertices) & (held == 0)
 
 

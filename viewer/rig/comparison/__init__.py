@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from viewer.errors import counted
 from viewer.rig.arrays import Floats
 from viewer.rig.closest_point import Surface, SurfacePoints
 from viewer.rig.comparison.difference import Difference, Measure, Tally
@@ -104,10 +105,8 @@ class _Comparison:
         if self.is_same:
             self.vertices = self._tally("vertices", "length", first.n_vertices)
             return
-        counts = [
-            f"{m.n_vertices:,} vertices, {m.n_triangles:,} triangles" for m in (first, second)
-        ]
-        self.notes.append(f"meshes differ ({counts[0]}; {counts[1]}): closest points are compared")
+        counts = f"{_counts(first)}; {_counts(second)}"
+        self.notes.append(f"meshes differ ({counts}): closest points are compared")
         self.vertices = self._tally("surface, from the first", "length", first.n_vertices)
         self.back = self._tally("surface, from the second", "length", second.n_vertices)
 
@@ -117,7 +116,7 @@ class _Comparison:
         if first is None or second is None:
             self._lone("captured points", first, second)
             return
-        self.points = pair_names(first.names, second.names, "points")
+        self.points = pair_names(first.names, second.names, "point")
         self.mismatches += self.points.mismatches
         self.notes += self.points.notes
         names = self.points.names
@@ -151,12 +150,12 @@ class _Comparison:
             self.numbers[step] = number
             if size == 0.0:
                 size = _size(self.first)
-                self._compare_weights(step)
+                self._compare_weights()
             self._compare_joints(step)
             self._compare_points(step)
             self._compare_meshes(step, number in searched)
         if absent:
-            self.mismatches.append(f"in {absent} frames only one of them is there")
+            self.mismatches.append(f"in {counted(absent, 'frame')} only one of them is there")
         self._pose_at_worst()
         measures = [tally.result() for tally in self.tallies]
         return Difference(
@@ -210,7 +209,7 @@ class _Comparison:
         self.vertices.add(step, _closest(one, other, self.second).distances)
         self.back.add(step, _closest(other, one, self.first).distances)
 
-    def _compare_weights(self, step: str) -> None:
+    def _compare_weights(self) -> None:
         """Compare weights once: they are the same in every pose."""
         first, second = self.first.figure, self.second.figure
         if first.skin is None or second.skin is None or self.joints is None:
@@ -221,9 +220,7 @@ class _Comparison:
             assert second.mesh is not None  # a skin has one
             other = skin_at(second.skin, second.mesh.triangles, found)
         tally = self._tally("weights", "weight", first.skin.n_vertices)
-        tally.add(
-            "every pose" if self.is_same else step, row_distances(first.skin, other, self.joints)
-        )
+        tally.add("", row_distances(first.skin, other, self.joints))
 
     def _posed(self, actor: Actor) -> Floats:
         return deform(actor.figure, actor.pose, self.skinning)[0]
@@ -232,6 +229,12 @@ class _Comparison:
 def _closest(points: Floats, positions: Floats, actor: Actor) -> SurfacePoints:
     assert actor.figure.mesh is not None  # the caller has its positions
     return Surface(positions, actor.figure.mesh.triangles).closest(points)
+
+
+def _counts(mesh: Mesh) -> str:
+    vertices = "vertex" if mesh.n_vertices == 1 else "vertices"
+    triangles = "triangle" if mesh.n_triangles == 1 else "triangles"
+    return f"{mesh.n_vertices:,} {vertices}, {mesh.n_triangles:,} {triangles}"
 
 
 def _is_same_topology(first: Mesh, second: Mesh) -> bool:

@@ -24,7 +24,8 @@ class Measure:
     maximum, mean : float
         Over all items and steps that were compared.
     step, item : str
-        Where the maximum is: a frame or test pose, a joint or vertex.
+        Where the maximum is: a frame or test pose, a joint or vertex. Weights are the same in
+        every pose: their step is empty.
     items : tuple of str
         What each entry of ``item_maxima`` is; empty for vertices, which are numbered.
     item_maxima : (N,)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from viewer.errors import counted
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.skeleton import Skeleton, joint_labels
 
@@ -50,7 +51,7 @@ def pair_joints(first: Skeleton, second: Skeleton) -> Pairs:
         With a mismatch for joints without a partner, and for partners with other parents; a note
         if both have them in another order, which skins and clips go by.
     """
-    pairs = pair_names(joint_labels(first), joint_labels(second), "joints")
+    pairs = pair_names(_called(first), _called(second), "joint")
     parents = [
         np.append(np.arange(len(pairs.first)), -1)[_places(found, skeleton.n_joints)[above]]
         for found, skeleton in ((pairs.first, first), (pairs.second, second))
@@ -67,14 +68,23 @@ def pair_joints(first: Skeleton, second: Skeleton) -> Pairs:
     )
 
 
+def _called(skeleton: Skeleton) -> tuple[str, ...]:
+    """Return what messages call the joints, no two alike; those without a name by number."""
+    return tuple(
+        label if name else f"joint {joint} (no name)"
+        for joint, (name, label) in enumerate(
+            zip(skeleton.names, joint_labels(skeleton), strict=True)
+        )
+    )
+
+
 def _order_notes(pairs: Pairs, second: Skeleton) -> list[str]:
     order = np.argsort(pairs.second)
     other = np.flatnonzero(order != np.arange(len(order)))
     if not len(other):
         return []
     place = int(other[0])
-    labels = joint_labels(second)
-    here, there = pairs.names[place], labels[int(pairs.second[order[place]])]
+    here, there = pairs.names[place], _called(second)[int(pairs.second[order[place]])]
     return [
         f"joints come in another order, which .skin and .anim files go by: where the first has "
         f"{here}, the second has {there}"
@@ -96,20 +106,25 @@ def pair_names(first: Sequence[str], second: Sequence[str], what: str) -> Pairs:
     first, second : sequences of str
         Each without repetition.
     what : str
-        Plural, for messages: ``"joints"``.
+        What one of them is, for messages: ``"joint"``.
+
+    Returns
+    -------
+    Pairs
+        By number, with a note, if no name is shared and both are as long.
     """
     numbers = {name: number for number, name in enumerate(second)}
     shared = [(number, numbers[name]) for number, name in enumerate(first) if name in numbers]
     if not shared and len(first) == len(second) > 0:
         same = np.arange(len(first), dtype=np.int32)
-        note = f"{what} share no name: compared by number"
+        note = f"{what}s share no name: compared by number"
         return Pairs(same, same, tuple(first), notes=(note,))
     both = np.array(shared, dtype=np.int32).reshape(-1, 2)
     mismatches = []
     for ordinal, names, others in (("first", first, second), ("second", second, first)):
         lone = [name for name in names if name not in set(others)]
         if lone:
-            mismatches.append(f"{len(lone)} {what} only in the {ordinal}: {_listed(lone)}")
+            mismatches.append(f"{counted(len(lone), what)} only in the {ordinal}: {_listed(lone)}")
     names = tuple(first[number] for number in both[:, 0])
     return Pairs(both[:, 0], both[:, 1], names, tuple(mismatches))
 

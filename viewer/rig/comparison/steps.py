@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from viewer.errors import RigError
+from viewer.errors import RigError, counted
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.clip import Clip
 from viewer.rig.comparison.pairs import pair_names
@@ -151,7 +151,7 @@ def _motion_steps(first: Actor, second: Actor, frames: FrameRange | None) -> Ste
 def _test_poses(first: Skeleton, second: Skeleton, n_poses: int) -> Steps:
     labels = [dof_label(first, dof) for dof in range(first.n_dofs)]
     others = [dof_label(second, dof) for dof in range(second.n_dofs)]
-    pairs = pair_names(labels, others, "DOFs")
+    pairs = pair_names(labels, others, "DOF")
     limits = np.stack([first.dof_limits[pairs.first], second.dof_limits[pairs.second]])
     mismatches = list(pairs.mismatches)
     other = np.flatnonzero((limits[0] != limits[1]).any(axis=1))
@@ -159,7 +159,7 @@ def _test_poses(first: Skeleton, second: Skeleton, n_poses: int) -> Steps:
         dof = int(other[0])
         low, high = limits[0][dof].tolist(), limits[1][dof].tolist()
         mismatches.append(
-            f"other limits of {len(other)} DOFs, as {pairs.names[dof]}: "
+            f"other limits of {counted(len(other), 'DOF')}, as {pairs.names[dof]}: "
             f"{low[0]:.6g} to {low[1]:.6g} and {high[0]:.6g} to {high[1]:.6g}"
         )
     dofs = _drawn(first, pairs.first, limits, n_poses)

@@ -1,0 +1,132 @@
+"""Who ``viewer diff`` holds against whom."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.commands._diff_pairs import pair_actors
+from viewer.rig.clip import Channel, Clip
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import Mesh
+from viewer.rig.points import PointLayout
+from viewer.rig.scene import Actor
+from viewer.rig.skeleton import Skeleton
+from viewer.rig.skin import skin_from_lists
+
+
+def bones() -> Skeleton:
+    """Return one joint with the six DOFs of a course rig."""
+    return Skeleton(
+        names=("root",),
+        parents=np.array([-1], dtype=np.int32),
+        rest_translations=np.zeros((1, 3)),
+        rest_rotations=np.array([[0.0, 0.0, 0.0, 1.0]]),
+        rest_scales=np.ones((1, 3)),
+        dof_joints=np.zeros(6, dtype=np.int32),
+        dof_kinds=np.arange(6, dtype=np.int32),
+        rest_dofs=np.zeros(6),
+        dof_limits=np.tile([-np.inf, np.inf], (6, 1)),
+    )
+
+
+def mesh() -> Mesh:
+    triangle = np.array([[0, 1, 2]], dtype=np.int32)
+    return Mesh(np.eye(3), np.tile([0.0, 0, 1], (3, 1)), triangle)
+
+
+def skeleton(name: str, clip: Clip | None = None, person: int | None = None) -> Actor:
+    return Actor(Figure(name, skeleton=bones()), clip=clip, person=person)
+
+
+def rig(name: str, clip: Clip | None = None) -> Actor:
+    skin = skin_from_lists([[(0, 1.0)]] * 3, np.eye(4)[None])
+    return Actor(Figure(name, mesh(), bones(), skin), clip=clip)
+
+
+def surface(name: str) -> Actor:
+    return Actor(Figure(name, mesh()))
+
+
+def points(name: str, person: int | None = None) -> Actor:
+    return Actor(
+        Figure(name, points=PointLayout("dots", ("a",), np.zeros((0, 2)), np.zeros(1))),
+        person=person,
+    )
+
+
+def motion(name: str) -> Clip:
+    still = (("flat", "flat"),)
+    channels = [Channel(dof, np.zeros(1), np.zeros(1), still) for dof in range(6)]
+    return Clip(name, tuple(channels), 0.0, 1.0)
+
+
+def paired(first: list[Actor], second: list[Actor]) -> list[tuple[int, int]]:
+    """Return the numbers of those that are paired, by their figures."""
+    figures = [[actor.figure for actor in actors] for actors in (first, second)]
+    pairs = pair_actors(first, second).pairs
+    return [(figures[0].index(a.figure), figures[1].index(b.figure)) for a, b in pairs]
+
+
+def test_names_count_before_order() -> None:
+    assert paired([rig("a"), rig("b")], [rig("b"), rig("c"), rig("a")]) == [(0, 2), (1, 0)]
+
+
+def test_of_one_name_the_one_of_the_same_kind_counts() -> None:
+    assert paired([rig("a")], [skeleton("a"), surface("a"), rig("a")]) == [(0, 2)]
+    assert paired([surface("a")], [rig("a"), skeleton("a")]) == [(0, 0)]
+
+
+def test_without_a_common_name_the_kind_counts_then_the_order() -> None:
+    assert paired([rig("a"), skeleton("b")], [skeleton("x"), rig("y")]) == [(0, 1), (1, 0)]
+    assert paired([rig("a"), rig("b")], [rig("x"), rig("y")]) == [(0, 0), (1, 1)]
+    assert paired([rig("a")], [surface("x")]) == [(0, 0)]
+
+
+def test_a_name_is_not_taken_by_one_that_comes_first() -> None:
+    assert paired([rig("x"), rig("a")], [rig("a"), rig("b")]) == [(0, 1), (1, 0)]
+
+
+def test_people_are_paired_by_their_number() -> None:
+    first = [points("a", person=1), points("a", person=2)]
+    second = [points("a", person=2), points("a", person=3)]
+    found = pair_actors(first, second)
+    assert [(one.person, other.person) for one, other in found.pairs] == [(2, 2)]
+    assert found.first == (f"{first[0].name} (captured points)",)
+    assert found.second == (f"{second[1].name} (captured points)",)
+
+
+def test_what_is_left_is_named_on_the_side_that_has_it() -> None:
+    found = pair_actors([rig("a")], [skeleton("other"), surface("skin"), rig("a"), rig("b")])
+    assert found.first == ()
+    assert found.second == ("other (a skeleton)", "skin (a mesh)", "b")
+    found = pair_actors([rig("a"), rig("b")], [rig("b")])
+    assert found.first == ("a",) and found.second == ()
+
+
+def test_a_clip_that_a_stray_skeleton_was_given_is_the_partners() -> None:
+    walk, mine = motion("walk"), motion("walk")
+    first, second = [rig("a", walk)], [skeleton("stray", mine), rig("a")]
+    for turned in (False, True):
+        found = pair_actors(second, first) if turned else pair_actors(first, second)
+        (one, other) = found.pairs[0][::-1] if turned else found.pairs[0]
+        assert one.clip is walk and other.clip is mine and other.figure.name == "a"
+        assert (found.first, found.second)[:: -1 if turned else 1] == ((), ("stray (a skeleton)",))
+    assert second[0].clip is mine and second[1].clip is None  # both are left as they are
+
+
+def test_clips_are_paired_by_name_then_as_they_are() -> None:
+    run, walk = motion("run"), motion("walk")
+    first = [rig("a", motion("walk")), rig("b", motion("run"))]
+    pairs = pair_actors(first, [rig("a", run), rig("b", walk)]).pairs
+    assert [other.clip for _, other in pairs] == [walk, run]
+    pairs = pair_actors([rig("a", motion("one"))], [rig("a", run)]).pairs
+    assert pairs[0][1].clip is run
+
+
+def test_a_clip_of_another_name_is_taken_only_where_one_is_wanted() -> None:
+    run = motion("run")
+    found = pair_actors([rig("a", motion("walk"))], [skeleton("s", run), rig("a")])
+    assert found.pairs[0][1].clip is run
+    found = pair_actors([rig("a")], [skeleton("s", run), rig("a")])
+    assert found.pairs[0][1].clip is None
+    assert found.second == ("s (a skeleton)", "motion run")

@@ -1,0 +1,56 @@
+"""Bind matrices: which are singular, and what is found in spite of one that is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from lint.sound import column, scene_of
+
+from viewer.lint import lint_scene
+from viewer.lint.bindings import are_singular
+
+
+def test_singular_is_what_flattens_whatever_its_scale() -> None:
+    matrices = np.tile(np.eye(4), (5, 1, 1))
+    matrices[1, :3, :3] *= 1e-30
+    matrices[2, 2, 2] = 1e-11
+    matrices[3, 1] = 2 * matrices[3, 0]
+    matrices[4, :3, :3] = 0.0
+    assert are_singular(matrices).tolist() == [False, False, False, True, True]
+
+
+def test_other_joints_are_held_against_the_skeleton_beside_a_singular_one() -> None:
+    """The knee was bound at y = 3, and rests at 2."""
+    figure = column()
+    matrices = figure.skin.inverse_bind.copy()
+    matrices[0, :3, :3] = 0.0
+    matrices[1, 1, 3] = -3.0
+    scene = scene_of(replace(figure, skin=replace(figure.skin, inverse_bind=matrices)))
+    found = {finding.code: finding for finding in lint_scene(scene)}
+    assert found["B002"].joints.tolist() == [0]
+    assert found["B004"].joints.tolist() == [1]
+    assert "knee by 1000 mm" in found["B004"].message
+
+
+def test_a_stray_vertex_does_not_hide_joints_that_were_bound_elsewhere() -> None:
+    """0.1 is 2 % of the column's size, and nothing beside a box of 1700."""
+    figure = column()
+    mesh, skin = figure.mesh, figure.skin
+    # Enough vertices that one of them is a stray: the column three times.
+    positions = np.tile(mesh.positions, (3, 1))
+    positions[-1] = 1000.0
+    counts = np.tile(np.diff(skin.starts), 3)
+    matrices = skin.inverse_bind.copy()
+    matrices[1, 1, 3] = -2.1
+    thrice = replace(
+        skin,
+        starts=np.concatenate([[0], np.cumsum(counts)]).astype(np.int32),
+        joints=np.tile(skin.joints, 3),
+        weights=np.tile(skin.weights, 3),
+        inverse_bind=matrices,
+    )
+    normals = np.tile(mesh.normals, (3, 1))
+    strayed = replace(mesh, positions=positions, normals=normals)
+    scene = scene_of(replace(figure, mesh=strayed, skin=thrice, symmetry=None))
+    assert "B004" in {finding.code for finding in lint_scene(scene)}

@@ -1,0 +1,87 @@
+"""What cutting influences costs where some joints or vertices cannot be used."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from lint.sound import column, make_skeleton, scene_of
+
+from viewer.lint import Finding, lint_scene
+from viewer.rig.arrays import Ints
+from viewer.rig.figure import Figure
+from viewer.rig.scene import Scene
+from viewer.rig.skin import skin_from_lists
+
+CROWDED = [(0, 0.3), (1, 0.3), (2, 0.2), (3, 0.15), (4, 0.05)]
+LAST = [(0, 0.3), (1, 0.3), (2, 0.2), (3, 0.15), (5, 0.05)]
+
+
+def scene(rows: dict[int, list[tuple[int, float]]], singular: bool = True) -> Scene:
+    """Return the column on six joints in a row; joint 4 is 2 m aside, the last one is singular."""
+    figure = column()
+    offsets = [[0, 0, 0]] + [[0, 1, 0]] * 5
+    skeleton = make_skeleton(tuple("abcdef"), [-1, 0, 1, 2, 3, 4], offsets, (0.0, 0.0))
+    matrices = np.tile(np.eye(4), (6, 1, 1))
+    matrices[:, 1, 3] = -np.arange(6.0)
+    if singular:
+        matrices[5, 1, 1] = 0.0
+    influences = [rows.get(v, [(v // 4, 1.0)]) for v in range(20)]
+    skin = skin_from_lists(influences, matrices)
+    result = scene_of(Figure("column", figure.mesh, skeleton, skin, unit="m"))
+    result.actors[0].pose.translations[4, 0] = 2.0
+    return result
+
+
+def cost(scene: Scene, **spoiled: Ints) -> Finding:
+    (found,) = [f for f in lint_scene(scene, spoiled=[spoiled]) if f.code == "W007"]
+    return found
+
+
+# Joint 4 is 2 m away from where it rests, so 0.05 of it is 100 mm; all else stays.
+TOLD = (
+    "kept to 4 the mesh moves by up to 100 mm (vertex 8), 100 mm on average of these, over 6 poses"
+)
+
+
+def test_vertices_of_a_singular_joint_are_left_out_and_counted() -> None:
+    found = cost(scene({8: CROWDED, 5: LAST}))
+    assert found.message == (
+        f"2 vertices have more than 4 influences, at most 5; {TOLD}; 1 vertex is left out, as a "
+        "position or bind matrix that it needs cannot be used"
+    )
+    assert found.vertices.tolist() == [8, 5]  # what nobody knows comes last
+    found = cost(scene({8: CROWDED, 5: LAST, 6: LAST}))
+    assert found.message.endswith(
+        f"{TOLD}; 2 vertices are left out, as a position or bind matrix that they need cannot be "
+        "used"
+    )
+
+
+def test_a_joint_of_weight_0_leaves_nothing_out() -> None:
+    found = cost(scene({8: [*CROWDED, (5, 0.0)]}))
+    assert found.message == f"1 vertex has more than 4 influences, at most 5; {TOLD}"
+
+
+def test_a_cost_that_nobody_can_know_is_not_told_as_0() -> None:
+    assert cost(scene({5: LAST})).message == (
+        "1 vertex has more than 4 influences, at most 5; what keeping 4 would move is not known: "
+        "1 vertex is left out, as a position or bind matrix that it needs cannot be used"
+    )
+
+
+@pytest.mark.parametrize(("part", "places"), [("bindings", [5]), ("positions", [5])])
+def test_what_is_not_the_files_own_is_left_out_too(part: str, places: list[int]) -> None:
+    lost = np.array(places, dtype=np.int32)
+    found = cost(scene({8: CROWDED, 5: LAST}, singular=False), **{part: lost})
+    assert f"{TOLD}; 1 vertex is left out, as" in found.message
+
+
+def test_costs_beyond_all_numbers_are_left_out() -> None:
+    whole = scene({8: CROWDED, 5: LAST}, singular=False)
+    figure = whole.actors[0].figure
+    matrices = figure.skin.inverse_bind.copy()
+    matrices[5, :3, :3] *= 1e308  # squares of what it moves are infinite
+    whole.actors[0].figure = replace(figure, skin=replace(figure.skin, inverse_bind=matrices))
+    assert f"{TOLD}; 1 vertex is left out, as" in cost(whole).message
