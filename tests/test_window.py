@@ -16,9 +16,12 @@ import numpy as np
 import pytest
 from app.driver import Driver
 from app.tiny import write_rig
+from imgui_bundle import imgui
 from PIL import Image, ImageGrab
 
 import viewer
+from viewer.app.view_picks import vertex_at
+from viewer.app.window import _Rest
 from viewer.rendering.camera import Camera, fit
 from viewer.rig.scene import scene_points
 
@@ -211,6 +214,12 @@ class Window:
         fields = Path(f"/proc/{self.process.pid}/stat").read_text().rpartition(")")[2].split()
         return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
+    def is_asleep(self, seconds=0.8):
+        """Return whether the window draws nothing for some time."""
+        spent, since = self.seconds_of_cpu(), time.monotonic()
+        time.sleep(seconds)
+        return (self.seconds_of_cpu() - spent) / (time.monotonic() - since) < 0.05
+
 
 def test_window_does_what_hands_ask_for(window, places, figure):
     rects, view = places
@@ -320,18 +329,80 @@ def test_layout_is_remembered_between_runs(window, places):
     _wait_for(lambda: (again.screen()[strip] == wider[strip]).mean() > 0.98, "the same layout")
 
 
+def test_what_was_awaited_is_followed_by_frames_that_show_it():
+    for at in range(1, 9):  # the frame that brings it, be it the last one before the window sleeps
+        rest = _Rest()
+        for frame in range(at):
+            rest.count(happened=frame % 4 == 0, awaits=True)
+        drawn = 0
+        for _ in range(12):
+            rest.count(happened=False, awaits=False)
+            drawn += rest.left >= 0
+        # ImGui measures a window in its first frame, and shows it with its size in the second.
+        assert drawn >= 2 and rest.left < 0
+
+
+def test_rest_ends_when_nothing_happens():
+    rest, drawn = _Rest(), 0
+    for _ in range(20):
+        rest.count(happened=False, awaits=False)
+        drawn += rest.left >= 0
+    assert 0 < drawn < 5
+
+
+@pytest.fixture(scope="module")
+def surface(figure):
+    """Where the tab of the Weights panel is, and places in the window on the figure's surface."""
+    driver = Driver(*figure, size=SIZE, samples=1)
+    tab = imgui.internal.find_window_by_name("Weights").dc.dock_tab_item_rect
+    driver.key("f")
+    driver.step(3)
+    state, renderer = driver.state, driver.app.frame.renderer
+    x, y, width, height = state.view_rect
+    size = round(width), round(height)
+    seen = [
+        (round(x + across), round(y + down))
+        for down in np.linspace(0.2, 0.8, 25) * height
+        for across in np.linspace(0.2, 0.8, 25) * width
+        if vertex_at(state, renderer, size, (across, down)) is not None
+    ]
+    driver.close()
+    middle = (tab.min.x + 0.3 * (tab.max.x - tab.min.x), (tab.min.y + tab.max.y) / 2)
+    return middle, seen
+
+
+def test_text_about_a_vertex_comes_whole_wherever_the_mouse_rests(window, places, surface):
+    (x, y, width, height), (tab, seen) = places[1], surface
+    part = np.s_[int(y) : int(y + height), int(x) : int(x + width)]
+    app = window()
+    app.tell("mousemove", *map(round, tab))
+    time.sleep(0.5)  # tabs are hovered before they can be pressed
+    app.drag(tab, tab)
+    time.sleep(0.5)
+    beside = round(x + 15), round(y + 0.4 * height)
+    app.tell("mousemove", *beside)
+    _wait_for(app.is_asleep, "messages to go")
+    empty = app.screen()[part]
+    for place in seen[:: max(len(seen) // 5, 1)][:5]:
+        app.tell("mousemove", *beside)
+        time.sleep(0.5)
+        app.tell("mousemove", place[0] - 3, place[1])
+        app.tell("mousemove", *place)
+        _wait_for(app.is_asleep, "an idle processor")
+        shown = app.screen()[part]
+        assert (shown != empty).any(axis=-1).sum() > 5000  # a text of some lines
+        app.key("shift")  # which means nothing, but brings frames
+        _wait_for(app.is_asleep, "an idle processor")
+        assert (app.screen()[part] == shown).all()
+
+
 def test_idle_window_burns_no_processor(window):
     app = window()
     # Messages at the start go away after some seconds; until then frames are drawn.
     time.sleep(0.5)
     app.tell("mousemove", 640, 870)
 
-    def is_idle():
-        spent, since = app.seconds_of_cpu(), time.monotonic()
-        time.sleep(1.5)
-        return (app.seconds_of_cpu() - spent) / (time.monotonic() - since) < 0.05
-
-    _wait_for(is_idle, "an idle processor")
+    _wait_for(lambda: app.is_asleep(1.5), "an idle processor")
 
 
 def test_bad_file_opens_no_window(display, tmp_path):

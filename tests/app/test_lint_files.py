@@ -99,6 +99,40 @@ def test_files_that_are_gone_or_changed_are_said(lint, files, texts):
     assert "a.skel was changed after opening: what readers say is of the new contents" in texts
 
 
+def test_a_finding_of_the_file_alone_says_so_and_copies_its_place(lint, files, texts, monkeypatch):
+    hand = lint(*files)
+    copied = []
+    monkeypatch.setattr(imgui, "set_clipboard_text", copied.append)
+    # The second vertex stands in the third line, and the scene has it from before.
+    files[1].write_text(TEXTS["a.skin"].replace("2 0 0", "2 nan 0", 1))
+    hand.click("Recheck")
+    finish(hand)
+    row = row_of(hand, "F003")
+    assert hand.state.lint.checked.findings[int(row.split()[1])].actor is None
+    texts.clear()
+    hand.move(row)
+    hand.step(60)
+    words = "it is in the file, not in the figure that is shown: a click copies its path and line"
+    assert words in texts and f"{files[1]}:3" in texts
+    target = hand.state.camera.target.copy()
+    hand.click(row)
+    assert copied == [f"{files[1]}:3"] and hand.says(f"Copied {files[1]}:3")
+    assert hand.state.lint.chosen == -1 and (hand.state.camera.target == target).all()
+
+
+def test_rows_say_what_a_click_does(lint, files, texts):
+    hand = lint(*files)
+    row = row_of(hand, "M007")
+    hand.move(row)
+    hand.step(60)
+    assert "a click shows it in the view; another one, or Esc, ends that" in texts
+    actor = hand.state.actor
+    hand.state.scene.actors[0] = replace(actor, figure=replace(actor.figure))
+    texts.clear()
+    hand.step(2)
+    assert "a click chooses the actor: its figure is another than when it was checked" in texts
+
+
 def gappy() -> Scene:
     """Return a column that stands at x = 7 in frame 109 and is missing in frames 110 to 112."""
     figure = column()

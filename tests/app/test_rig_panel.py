@@ -25,7 +25,7 @@ from viewer.export import export
 from viewer.formats.rigged import save
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import deform
-from viewer.rig.transfer.alignment import AlignmentSettings
+from viewer.rig.transfer.alignment import Alignment, AlignmentSettings
 from viewer.rig.transform import apply_transform
 
 SIZE = (900, 1250)
@@ -88,6 +88,43 @@ def test_alignment_is_found_and_shown_with_its_error(rigging, texts):
     hand.key("z", "ctrl")
     hand.step(2)
     assert hand.state.rig.placing is None and hand.app.frame.renderer.ghost is None
+
+
+@pytest.mark.parametrize(
+    ("factors", "own", "words"),
+    [
+        ((1.0, 1.0, 1.0), (1.0, 1.0, 1.0), "pose and limbs fitted"),
+        ((1.3, 1.0, 1.0), (1.0, 1.0, 1.0), "stretched, pose kept"),
+        ((1.0, 1.0, 1.0), (1.0, 0.8, 1.0), "stretched, pose kept"),
+    ],
+)
+def test_words_beside_the_error_say_what_was_done(rigging, texts, factors, own, words):
+    hand = rigging()
+    finish(hand)  # the gap where it was laid is being measured
+    placing = placing_now(hand.state)
+    where = replace(placing.similarity, factors=np.array(factors), own_factors=np.array(own))
+    found = Alignment(where, 0.0015, 0.002, (0.001, 0.001), "fit")
+    hand.state.rig.placing = replace(placing, similarity=where, alignment=found)
+    texts.clear()
+    hand.step()
+    assert f"error 0.15 % ({words})" in texts
+
+
+@pytest.mark.parametrize("fits", [True, False])
+def test_align_says_what_it_does(rigging, monkeypatch, fits):
+    said, show = [], imgui.set_tooltip
+    monkeypatch.setattr(imgui, "set_tooltip", lambda text: said.append(text) or show(text))
+    hand = rigging()
+    finish(hand)
+    hand.state.rig.choices.fits = fits
+    also = "; joints are turned and limbs resized{} where that fits much better" if fits else ""
+    for label, words in (
+        ("Align", "found by closest points" + also.format(", or all of it stretched,")),
+        ("Refine", "from where it lies, by closest points" + also.format("")),
+    ):
+        hand.move(label)
+        hand.step(60)
+        assert said[-1] == words
 
 
 def test_template_posed_after_aligning_says_so(rigging, texts):

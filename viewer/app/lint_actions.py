@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 from imgui_bundle import imgui
 
@@ -14,7 +15,15 @@ from viewer.app.reasons import no_job_room
 from viewer.app.shown_panels import set_open
 from viewer.app.state import AppState
 from viewer.errors import counted, printable
-from viewer.lint import LintOptions, describe, finding_text, lint_again, summary, worst_first
+from viewer.lint import (
+    Finding,
+    LintOptions,
+    describe,
+    finding_text,
+    lint_again,
+    summary,
+    worst_first,
+)
 from viewer.loading import bundled_files
 from viewer.rendering.picking import Pick
 from viewer.rig.pose import pose_key
@@ -24,6 +33,10 @@ __all__ = [
     "check_rig",
     "choose_finding",
     "copy_findings",
+    "copy_place",
+    "file_place",
+    "is_in_scene",
+    "is_known_there",
     "is_stale",
     "start_check",
     "take_findings",
@@ -133,7 +146,7 @@ def choose_finding(state: AppState, index: int) -> None:
     view = state.lint
     view.chosen = -1 if index == view.chosen else index
     finding = view.finding
-    if finding is None or finding.actor is None or finding.actor >= len(state.scene.actors):
+    if finding is None or finding.actor is None or not is_in_scene(state, finding):
         return
     view.wants_aim = True
     actor = state.scene.actors[finding.actor]
@@ -149,6 +162,44 @@ def choose_finding(state: AppState, index: int) -> None:
             state.say_status("The last frame before the gap: in it nobody is there")
     if not actor.visible:
         state.say_status(f"{printable(actor.name, 60)} is hidden: see the panel Actors")
+
+
+def is_in_scene(state: AppState, finding: Finding) -> bool:
+    """Return whether a finding is about an actor that is shown; others are of files alone."""
+    return finding.actor is not None and finding.actor < len(state.scene.actors)
+
+
+def is_known_there(state: AppState, finding: Finding) -> bool:
+    """Return whether an actor's figure is still the one in which something was found.
+
+    Parameters
+    ----------
+    state : AppState
+        With the check.
+    finding : Finding
+        Of its last check.
+    """
+    known, index = state.lint.checked, finding.actor
+    if known is None or index is None or not is_in_scene(state, finding):
+        return False
+    return state.scene.actors[index].figure is known.scene.actors[index].figure
+
+
+def file_place(finding: Finding) -> str:
+    """Return path and line of a finding, as editors take them; empty if it is in no file."""
+    if finding.file is None or finding.file == Path():
+        return ""
+    line = "" if finding.line is None else f":{finding.line}"
+    return f"{printable(finding.file, 300)}{line}"
+
+
+def copy_place(state: AppState, finding: Finding) -> None:
+    """Put path and line of a finding that is in no figure on the clipboard; look at none."""
+    choose_finding(state, -1)
+    place = file_place(finding)
+    if place:
+        imgui.set_clipboard_text(place)
+        state.say_status(f"Copied {place}")
 
 
 def copy_findings(state: AppState, as_json: bool) -> None:

@@ -182,18 +182,19 @@ class _Window:
 
     def run(self, fits: bool) -> None:
         """Draw frames until the window is closed; sleep while nothing happens."""
-        left = _SETTLE_FRAMES
+        rest = _Rest()
         while not glfw.window_should_close(self.handle):
-            left = _SETTLE_FRAMES if self._wait(left > 0) else left - 1
+            happened = self._wait(rest.left > 0)
+            rest.count(happened, self._awaits())
             if self._dropped:
                 self.frame.open(self._dropped)
                 self._dropped = []
-            if left < 0 or not self._draw():
+            if rest.left < 0 or not self._draw():
                 continue
-            if fits and left == 0:
+            if fits and rest.left == 0:
                 # Only now it is known how much room the panels leave.
                 fit_view(self.state)
-                fits, left = False, 1
+                fits, rest.left = False, 1
             if "quit" in self.state.wants:
                 glfw.set_window_should_close(self.handle, True)
 
@@ -210,13 +211,18 @@ class _Window:
         if is_settling or state.playback.playing or steps:
             glfw.poll_events()
         else:
-            moves = bool(state.loader or state.stream) or _awaits_tooltip(self._imgui)
-            moves |= state.weights.is_waiting or state.job is not None
+            moves = self._awaits() or state.job is not None
             glfw.wait_events_timeout(_BUSY_SECONDS if moves else _IDLE_SECONDS)
             # Messages that time out, the bar of a file being read, a text cursor that blinks.
             self._is_dirty |= moves or bool(state.notes or imgui.get_io().want_text_input)
         self._is_dirty |= state.playback.playing or state.job is not None
         return self._is_dirty or bool(self._dropped) or len(self._imgui.input_events_queue) > 0
+
+    def _awaits(self) -> bool:
+        """Return whether something comes without an event: files, a tooltip, words on a vertex."""
+        state = self.state
+        is_read = state.loader is not None or state.stream is not None
+        return is_read or state.weights.is_waiting or _awaits_tooltip(self._imgui)
 
     def _draw(self) -> bool:
         """Draw one frame; return False if the window has no pixels at present."""
@@ -255,6 +261,31 @@ class _Window:
         self.frame.release()
         self.context.release()
         glfw.destroy_window(self.handle)
+
+
+class _Rest:
+    """Counts the frames that are still drawn until all stands as it will stay."""
+
+    def __init__(self) -> None:
+        self.left = _SETTLE_FRAMES
+        self._awaited = False
+
+    def count(self, happened: bool, awaits: bool) -> None:
+        """Go on to the next frame: drawn if ``left`` is not negative.
+
+        What was awaited comes within a frame, maybe the last one, when panels have been drawn; so
+        it counts as an event that there is nothing more to await. Its window needs frames to size.
+
+        Parameters
+        ----------
+        happened : bool
+            Whether there was an event, or something moves.
+        awaits : bool
+            Whether something comes soon without an event.
+        """
+        has_come = self._awaited and not awaits
+        self._awaited = awaits
+        self.left = _SETTLE_FRAMES if happened or has_come else self.left - 1
 
 
 def _awaits_tooltip(context: Any) -> bool:

@@ -44,6 +44,7 @@ __all__ = ["draw_alignment"]
 _FEWEST = 3  # landmarks
 _DOUBTFUL = 0.03  # error over size, as in the report
 _WARNING = (1.0, 0.77, 0.30, 1.0)
+_STRETCHED = "stretched, pose kept"
 _HOW = {
     "in place": "about the origin of both",
     "search": "by closest points",
@@ -52,6 +53,8 @@ _HOW = {
     "given": "by hand",
 }
 """How a template came to where it lies, as ``Alignment.how`` says it."""
+_POSES = "; joints are turned and limbs resized where that fits much better"
+_FITS = "; joints are turned and limbs resized, or all of it stretched, where that fits much better"
 _SCALE_TEXTS = {"uniform": "one scale", "axes": "one along each axis", "none": "as it is"}
 
 
@@ -69,13 +72,13 @@ def draw_alignment(state: AppState) -> None:
     if button(state, "Align", why):
         start_align(state)
     if not why:
-        explain("found by closest points")
+        explain(f"found by closest points{_FITS if choices.fits else ''}")
     same_line_if_room("Refine")
     refuses = why or ("" if placing_now(state) else "align the template first")
     if button(state, "Refine", refuses):
         _refine(state)
     if not refuses:
-        explain("from where it lies, by closest points")
+        explain(f"from where it lies, by closest points{_POSES if choices.fits else ''}")
     _draw_placing(placing_now(state))
     state.rig.ghost = choice(state, "Template shown", state.rig.ghost, GHOSTS)
     _draw_tools(state)
@@ -105,7 +108,7 @@ def _draw_error(found: Alignment | None) -> None:
     if found is None:
         imgui.text_disabled("error: not measured here")
         return
-    text = f"error {100.0 * found.error:.2f} % ({_HOW[found.how]})"
+    text = f"error {100.0 * found.error:.2f} % ({_how(found)})"
     if found.error > _DOUBTFUL:
         imgui.push_style_color(imgui.Col_.text, _WARNING)
         imgui.text_wrapped(f"{text}: doubtful")
@@ -116,6 +119,12 @@ def _draw_error(found: Alignment | None) -> None:
         "of the target's size: RMS distance of its best 90 % from the template; of the template "
         f"from the target: {100.0 * found.away:.2f} %"
     )
+
+
+def _how(found: Alignment) -> str:
+    """Say how a template came to where it lies: fitted limbs come with one scale for all axes."""
+    is_even = (found.placed.factors == 1.0).all() and (found.placed.own_factors == 1.0).all()
+    return _HOW[found.how] if found.how != "fit" or is_even else _STRETCHED
 
 
 def _refine(state: AppState) -> None:

@@ -12,6 +12,10 @@ from imgui_bundle import imgui
 from viewer.app.lint_actions import (
     choose_finding,
     copy_findings,
+    copy_place,
+    file_place,
+    is_in_scene,
+    is_known_there,
     is_stale,
     start_check,
     take_findings,
@@ -229,29 +233,43 @@ def _draw_row(state: AppState, index: int, finding: Finding, several: bool) -> N
     flags = imgui.SelectableFlags_.span_all_columns
     size = (0.0, sum(heights) + imgui.get_style().item_spacing.y)
     if imgui.selectable("##finding", index == state.lint.chosen, flags, size)[0]:
-        choose_finding(state, index)
+        if is_in_scene(state, finding):
+            choose_finding(state, index)
+        else:
+            copy_place(state, finding)
     note_item(state, f"finding {index}")
     if imgui.is_item_hovered(imgui.HoveredFlags_.delay_normal):
-        _draw_tooltip(finding)
+        _draw_tooltip(state, finding)
     imgui.set_cursor_screen_pos(place)
     _draw_severity(finding.severity)
     imgui.same_line(0.0, imgui.get_style().item_inner_spacing.x)
     imgui.text_colored(_COLORS[finding.severity], finding.code)
 
 
-def _draw_tooltip(finding: Finding) -> None:
+def _draw_tooltip(state: AppState, finding: Finding) -> None:
     if imgui.begin_tooltip():
         imgui.push_text_wrap_pos(_TIP_WIDTH * imgui.get_font_size())
         imgui.text_colored(_COLORS[finding.severity], f"{finding.severity} {finding.code}")
         imgui.text_unformatted(finding.title)
-        if _place(finding):
-            line = "" if finding.line is None else f":{finding.line}"
-            imgui.text_unformatted(f"{printable(finding.file, 300)}{line}")
+        if file_place(finding):
+            imgui.text_unformatted(file_place(finding))
         imgui.text_unformatted(printable(finding.message, 2000))
         imgui.text_unformatted(f"What to do: {finding.hint}")
-        imgui.text_disabled("a click shows it in the view; another one, or Esc, ends that")
+        imgui.text_disabled(_click_text(state, finding))
         imgui.pop_text_wrap_pos()
         imgui.end_tooltip()
+
+
+def _click_text(state: AppState, finding: Finding) -> str:
+    """Return what a click on the row of a finding does."""
+    if is_known_there(state, finding):
+        return "a click shows it in the view; another one, or Esc, ends that"
+    if is_in_scene(state, finding):
+        return "a click chooses the actor: its figure is another than when it was checked"
+    if not file_place(finding):
+        return "nothing in the view is what this is about"
+    copied = "its path" if finding.line is None else "its path and line"
+    return f"it is in the file, not in the figure that is shown: a click copies {copied}"
 
 
 def _draw_severity(severity: str) -> None:
