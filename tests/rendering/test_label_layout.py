@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -75,13 +76,43 @@ def test_point_between_others_gets_a_line_to_its_label():
         assert np.hypot(*away) >= 6.0
 
 
-def test_search_ends_after_many_without_room():
-    # 220 labels at one place have room for four; the one aside comes too late.
-    anchors = np.array([(20.0, 30.0)] * 220 + [(80.0, 5.0)])
-    layout = lay_out(anchors, np.arange(221), np.full((221, 2), [10, 8]), PICTURE, 4.0)
-    assert 220 not in layout.chosen
-    layout = lay_out(anchors, np.arange(220, -1, -1), np.full((221, 2), [10, 8]), PICTURE, 4.0)
-    assert 220 in layout.chosen
+WIDE = (1920, 1080)
+
+
+def crowd(n_across, step):
+    """Return a square of points."""
+    steps = np.arange(n_across) * step
+    return np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2) + 300.0
+
+
+def drawn(anchors, size=(60, 14), gap=7.0):
+    """Return the indices of the labels that are drawn in a large picture."""
+    order = np.arange(len(anchors), dtype=np.int32)
+    return lay_out(anchors, order, np.tile(size, (len(anchors), 1)), WIDE, gap).chosen
+
+
+LONELY = np.array([(1000.0, 200.0), (1000.0, 500.0), (1400.0, 300.0), (1500.0, 800.0),
+                   (900.0, 900.0)])  # fmt: skip
+
+
+@pytest.mark.parametrize(("n_across", "step"), [(16, 4.0), (50, 4.0), (50, 1.0), (50, 0.1)])
+def test_points_far_from_others_have_names_however_many_came_before(n_across, step):
+    near = crowd(n_across, step)
+    found = drawn(np.concatenate([near, LONELY]))
+    assert set(range(len(near), len(near) + 5)) <= set(found.tolist())
+
+
+def test_labels_at_one_place_leave_room_for_one_aside():
+    # 2,000 labels at one place have room for four.
+    anchors = np.concatenate([np.full((2000, 2), 300.0), LONELY[:1]])
+    found = drawn(anchors)
+    assert len(found) == 5 and found[-1] == 2000
+
+
+def test_all_points_with_room_around_them_have_names():
+    # 96 x 54 cells of 20 x 20 pixels with a word of 6 x 6 each: there is always room to the right.
+    grid = np.stack(np.meshgrid(np.arange(96), np.arange(54)), axis=-1).reshape(-1, 2)
+    assert len(drawn(grid * 20.0 + 5.0, (6, 6), 3.0)) == 96 * 54
 
 
 def test_label_wider_than_the_picture_is_left_out():
@@ -91,12 +122,13 @@ def test_label_wider_than_the_picture_is_left_out():
 
 @given(
     st.lists(
-        st.tuples(st.floats(0, 99), st.floats(0, 59), st.integers(1, 40), st.integers(1, 20)),
+        st.tuples(st.integers(0, 396), st.integers(0, 236), st.integers(1, 40), st.integers(1, 20)),
         max_size=30,
     )
 )
 def test_no_two_labels_overlap_and_none_seems_that_of_another_point(rows):
-    anchors = np.array([row[:2] for row in rows]).reshape(-1, 2)
+    # Those within a quarter of a pixel are one.
+    anchors = np.array([row[:2] for row in rows], dtype=float).reshape(-1, 2) / 4.0
     sizes = np.array([row[2:] for row in rows], dtype=np.int32).reshape(-1, 2)
     layout = lay_out(anchors, np.arange(len(rows)), sizes, PICTURE, 3.0)
     cover = np.zeros(PICTURE[::-1], dtype=int)

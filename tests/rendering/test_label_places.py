@@ -1,0 +1,102 @@
+"""Places of labels: what is said of all at once is what one finds point by point."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from viewer.rendering.label_cells import Cells, Dots
+from viewer.rendering.label_places import (
+    clear_places,
+    crowded,
+    crowded_lines,
+    line_pixels,
+    places_of,
+)
+
+PICTURE, GAP = (300, 200), 8.0
+
+
+def test_label_in_the_middle_has_eight_places_in_three_distances():
+    places = places_of(np.array([(150.0, 100.0)]), np.array([(30, 10)]), PICTURE, GAP)
+    assert places.ranks.tolist() == list(range(24))
+    assert places.has_line.tolist() == [False] * 8 + [True] * 16
+    # Right, left, above and below, and the same three gaps away.
+    rows = [0, 1, 6, 7, 8, 9, 14, 15]
+    assert places.low[rows].tolist() == [
+        [158, 95], [112, 95], [135, 82], [135, 108],
+        [174, 95], [96, 95], [135, 66], [135, 124],
+    ]  # fmt: skip
+    np.testing.assert_array_equal(places.own[rows], [8.0] * 4 + [24.0] * 4)
+
+
+def test_places_outside_of_the_picture_are_none():
+    places = places_of(np.array([(4.0, 100.0)]), np.array([(30, 10)]), PICTURE, GAP)
+    assert (places.low[:, 0] >= 0).all() and 1 not in places.ranks
+    # Above it is room, as the label may be shifted along.
+    assert places.low[places.ranks == 6].tolist() == [[0, 82]]
+
+
+def test_line_runs_from_half_a_gap_to_a_pixel_before_its_label():
+    places = places_of(np.array([(150.0, 100.0)]), np.array([(30, 10)]), PICTURE, GAP)
+    pixels, are_part = line_pixels(places, GAP)
+    assert not are_part[:8].any()
+    assert pixels[8, are_part[8]].tolist() == [[x, 100] for x in range(154, 173)]
+
+
+@pytest.fixture(params=[60, 300, 1500])
+def scene(request):
+    """Return points a quarter of a pixel apart or more, their labels' places, and their dots."""
+    rng = np.random.default_rng(2)
+    points = np.unique(rng.integers(0, 4 * np.array(PICTURE), (request.param, 2)), axis=0) / 4.0
+    sizes = rng.integers(2, 30, (len(points), 2)).astype(np.int32)
+    places = places_of(points, sizes, PICTURE, GAP)
+    return points, places, Dots(Cells(PICTURE, 4), points)
+
+
+def by_hand(points, places):
+    """Return how far the places and their lines are from points that are not alike: (M,)."""
+    clear, beside = np.full((2, len(places.labels)), np.inf)
+    for row, (anchor, end) in enumerate(zip(places.anchors, places.ends, strict=True)):
+        others = points[np.abs(points - anchor).max(axis=1) >= 1.0]
+        nearest = np.clip(others, places.low[row], places.high[row])
+        clear[row] = np.linalg.norm(others - nearest, axis=1).min()
+        if places.has_line[row]:
+            share = np.clip((others - anchor) @ (end - anchor) / places.own[row] ** 2, 0, 1)
+            on_line = anchor + share[:, None] * (end - anchor)
+            beside[row] = np.linalg.norm(others - on_line, axis=1).min()
+    return clear, beside
+
+
+def test_places_are_clear_of_other_points_and_the_best_come_first(scene):
+    points, places, dots = scene
+    clear, beside = by_hand(points, places)
+    least = 1.5 * np.where(places.has_line, GAP, places.own)
+    fits = (clear >= least) & (beside >= 0.75 * GAP)
+    manner = np.where(places.has_line, 2, np.where(clear >= 3.0 * places.own, 0, 1))
+    wanted = sorted(zip(places.labels[fits], manner[fits], places.ranks[fits], strict=True))
+    found = clear_places(places, dots, GAP)
+    assert list(zip(found.labels, found.ranks, strict=True)) == [
+        (label, rank) for label, _, rank in wanted
+    ]
+    assert len(wanted) > 0 or len(points) > 1000
+
+
+def test_what_is_found_crowded_is_so_and_most_of_it_is_found(scene):
+    points, places, dots = scene
+    clear, beside = by_hand(points, places)
+    found = crowded(places, points, dots, GAP)
+    is_near = clear < 1.5 * np.where(places.has_line, GAP, places.own)
+    assert not (found & ~is_near).any()
+    pixels, are_part = line_pixels(places, GAP)
+    lines = crowded_lines(places, pixels, are_part, dots, GAP)
+    assert not (lines & (beside >= 0.75 * GAP)).any()
+    if len(points) > 1000:
+        assert found.mean() > 0.9 and lines[places.has_line].mean() > 0.9
+
+
+def test_cells_larger_than_the_room_beside_a_line_say_nothing(scene):
+    points, places, _ = scene
+    pixels, are_part = line_pixels(places, GAP)
+    dots = Dots(Cells(PICTURE, 5), points)
+    assert not crowded_lines(places, pixels, are_part, dots, GAP).any()

@@ -1,0 +1,187 @@
+"""A picture in square cells, to ask cheaply for many rectangles at once what lies in them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from viewer.rig.arrays import Floats, Ints
+
+__all__ = ["Cells", "Dots", "summed", "sums_within"]
+
+_FINE = 4  # parts of a pixel, both ways, of which each has one dot
+_BLOCK = 4  # cells, both ways
+_CROWD = 8  # dots in a block on average, from which on they are looked at in layers
+_PAIRS = 1 << 18  # pairs of a rectangle and a dot that are looked at together
+
+
+class Cells:
+    """The cells: 1 to ``n`` both ways within the picture, 0 and ``n + 1`` are what lies outside.
+
+    Parameters
+    ----------
+    picture : (int, int)
+        Width and height, pixels.
+    side : int
+        Of a cell, pixels.
+
+    Attributes
+    ----------
+    shape : (int, int)
+        Rows and columns of a table with a number for every cell.
+    """
+
+    def __init__(self, picture: tuple[int, int], side: int) -> None:
+        self.side = side
+        self._counts = np.array([-(-length // side) for length in picture])  # columns, rows
+        self.shape = int(self._counts[1]) + 2, int(self._counts[0]) + 2
+
+    def of(self, points: Floats) -> Ints:
+        """Return the cells of points: (..., 2), column and row."""
+        found = np.clip(np.floor(points / self.side) + 1.0, 0, self._counts + 1)
+        return np.asarray(found.astype(np.int32))
+
+    def within(self, low: Floats, high: Floats) -> tuple[Ints, Ints]:
+        """Return the first cells wholly within rectangles, and those after the last: (..., 2)."""
+        first = np.clip(np.ceil(low / self.side) + 1.0, 1, self._counts + 1)
+        after = np.clip(np.floor(high / self.side) + 1.0, first, self._counts + 1)
+        return first.astype(np.int32), after.astype(np.int32)
+
+    def touching(self, low: Floats, high: Floats) -> tuple[Ints, Ints]:
+        """Return the first cells that rectangles touch, and those after the last: (..., 2)."""
+        return self.of(low), self.of(high) + np.int32(1)
+
+
+def summed(table: Ints) -> Ints:
+    """Return a table's sums from its corner to every cell, one row and column larger.
+
+    Crow 1984, Summed-area tables for texture mapping: four of them give the sum of a rectangle.
+    """
+    sums = np.zeros((table.shape[0] + 1, table.shape[1] + 1), dtype=np.int32)
+    table.cumsum(axis=0, out=sums[1:, 1:], dtype=np.int32)
+    sums[1:, 1:].cumsum(axis=1, out=sums[1:, 1:])
+    return sums
+
+
+def sums_within(sums: Ints, first: Ints, after: Ints) -> Ints:
+    """Return the sums of rectangles of cells: (...,).
+
+    Parameters
+    ----------
+    sums : (rows + 1, columns + 1)
+        As ``summed`` gives them.
+    first, after : (..., 2)
+        Column and row of the first cells and of those after the last; nothing where they are equal.
+    """
+    flat, width = sums.ravel(), sums.shape[1]
+    low, high = first[..., 1] * width, after[..., 1] * width
+    left, right = first[..., 0], after[..., 0]
+    return flat[high + right] - flat[high + left] - flat[low + right] + flat[low + left]
+
+
+class Dots:
+    """Points in cells.
+
+    Parameters
+    ----------
+    cells : Cells
+        Of the picture.
+    points : (N, 2)
+        Pixels from the picture's left and upper edge. Of those within a quarter of a pixel both
+        ways, one counts: else all joints of a figure far away would be compared with each other.
+    """
+
+    def __init__(self, cells: Cells, points: Floats) -> None:
+        self.cells = cells
+        points = points[_firsts(np.floor(points * _FINE))]
+        places = cells.of(points)
+        numbers = places[:, 1] * np.int64(cells.shape[1]) + places[:, 0]
+        counts = np.bincount(numbers, minlength=math.prod(cells.shape)).astype(np.int32)
+        self._counts = counts.reshape(cells.shape)
+        self._sums = summed(self._counts)
+        order = np.argsort(numbers, kind="stable")
+        levels = _levels(places)[order]
+        points, numbers = points[order], numbers[order]
+        self._layers = [
+            (points[levels == level], self._starts(numbers[levels == level]))
+            for level in range(int(levels.max(initial=0)) + 1)
+        ]
+
+    @property
+    def n_layers(self) -> int:
+        """Parts of the dots; the first has few of them, enough to see most crowds."""
+        return len(self._layers)
+
+    def _starts(self, places: Ints) -> Ints:
+        """Return where the dots of each cell begin, and their number at the end."""
+        counts = np.bincount(places, minlength=math.prod(self.cells.shape))
+        return np.concatenate([[0], counts.cumsum()]).astype(np.int32)
+
+    def count_at(self, pixels: Ints) -> Ints:
+        """Return how many dots are in the cells of pixels within the picture: (...,)."""
+        places = pixels // self.cells.side + 1
+        return self._counts[places[..., 1], places[..., 0]]
+
+    def fewest_within(self, low: Floats, high: Floats) -> Ints:
+        """Return how many dots lie within rectangles, or fewer: (M,)."""
+        return sums_within(self._sums, *self.cells.within(low, high))
+
+    def most_within(self, low: Floats, high: Floats) -> Ints:
+        """Return how many dots lie within rectangles, or more: (M,)."""
+        return sums_within(self._sums, *self.cells.touching(low, high))
+
+    def pairs(self, low: Floats, high: Floats, layer: int) -> Iterator[tuple[Ints, Floats]]:
+        """Give rectangles and the dots of a layer in the cells that they touch, in parts.
+
+        Parameters
+        ----------
+        low, high : (M, 2)
+            Corners of the rectangles.
+        layer : int
+            Which dots, less than ``n_layers``.
+
+        Yields
+        ------
+        owners : (P,)
+            Indices of rectangles.
+        dots : (P, 2)
+            A point in or near each, pixels.
+        """
+        points, begins = self._layers[layer]
+        first, after = self.cells.touching(low, high)
+        owners, rows = spread(first[:, 1], after[:, 1] - first[:, 1])
+        rows = rows * self.cells.shape[1]
+        starts = begins[rows + first[owners, 0]]
+        counts = begins[rows + after[owners, 0]] - starts
+        some = np.flatnonzero(counts)
+        part = (counts[some].cumsum() - 1) // _PAIRS
+        for ranges in np.split(some, np.flatnonzero(np.diff(part)) + 1):
+            ranks, places = spread(starts[ranges], counts[ranges])
+            yield owners[ranges[ranks]], points[places]
+
+
+def _levels(places: Ints) -> Ints:
+    """Return the layers of dots by their cells: one of a block, of a cell, and the others; (N,)."""
+    firsts = _firsts(places // _BLOCK)
+    if len(places) < _CROWD * len(firsts):
+        return np.zeros(len(places), dtype=np.int32)
+    levels = np.full(len(places), 2, dtype=np.int32)
+    levels[_firsts(places)] = 1
+    levels[firsts] = 0
+    return levels
+
+
+def _firsts(rows: Floats | Ints) -> Ints:
+    """Return the first of each kind of rows of two whole numbers: (M,), indices."""
+    pairs = rows.astype(np.float64).view(np.complex128)[:, 0]  # sorted faster than rows are
+    return np.unique(pairs, return_index=True)[1].astype(np.int32)
+
+
+def spread(starts: Ints, counts: Ints) -> tuple[Ints, Ints]:
+    """Return the numbers of ranges one after the other, and before them whose they are: (P,)."""
+    owners = np.repeat(np.arange(len(counts)), counts)
+    before = starts - (counts.cumsum() - counts)
+    numbers = np.arange(len(owners)) + before[owners]
+    return owners.astype(np.int32), numbers.astype(np.int32)
