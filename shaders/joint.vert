@@ -32,7 +32,11 @@ vec4 world_row(int row) {
 void main() {
     vec4 corner = vec4(mix(in_low, in_high, in_corner), 1.0);
     vec4 x = world_row(0), y = world_row(1), z = world_row(2);
-    vec3 normal = vec3(dot(x.xyz, in_normal), dot(y.xyz, in_normal), dot(z.xyz, in_normal));
+    // Rows of the cofactor matrix: exact under joints that scale. Boxes that are mirrored keep
+    // outward normals outward.
+    vec3 a = cross(y.xyz, z.xyz), b = cross(z.xyz, x.xyz), c = cross(x.xyz, y.xyz);
+    vec3 normal = vec3(dot(a, in_normal), dot(b, in_normal), dot(c, in_normal));
+    normal *= dot(x.xyz, a) < 0.0 ? -1.0 : 1.0;
     vec4 position = u_model_view * vec4(dot(x, corner), dot(y, corner), dot(z, corner), 1.0);
     v_position = position.xyz;
     v_normal = u_normal_matrix * normal;

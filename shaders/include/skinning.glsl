@@ -19,6 +19,9 @@ uniform sampler2D u_offsets;    // pose correctives, row after row
 // Of the instance; main sets them before anything is called.
 vec3 rest_shift;     // rest centre minus posed centre
 vec3 center;         // posed centre, figure space
+#ifdef AFFINE_PALETTE  // some joint of some instance scales or shears
+bool is_rigid;       // none of this instance does
+#endif
 
 // Sum of the vertex's weights, minus 1.
 float excess() {
@@ -42,6 +45,27 @@ vec4 palette_row(int joint, int row) {
 vec3 unit(vec3 v) {
     float size = length(v);
     return size > 0.0 ? v / size : v;
+}
+
+// A normal under a blended matrix, given as rows; any length.
+vec3 blended_normal(vec3 x, vec3 y, vec3 z, vec3 normal) {
+#ifdef AFFINE_PALETTE
+    if (!is_rigid) {
+        // The inverse transpose times |determinant|: rows of the cofactor matrix, with the sign
+        // that keeps outward normals outward where a joint mirrors. Scaled to entries of at most
+        // 1, as only directions count; then rounding reaches 1e-5 of the determinant.
+        vec3 sizes = max(max(abs(x), abs(y)), abs(z));
+        float size = max(max(sizes.x, sizes.y), sizes.z);
+        size = size > 0.0 ? size : 1.0;
+        x /= size;
+        y /= size;
+        z /= size;
+        vec3 a = cross(y, z), b = cross(z, x), c = cross(x, y);
+        vec3 moved = vec3(dot(a, normal), dot(b, normal), dot(c, normal));
+        return dot(x, a) < -1e-5 ? -moved : moved;
+    }
+#endif
+    return vec3(dot(x, normal), dot(y, normal), dot(z, normal));
 }
 
 // One offset of a vertex: upload.py's rows hold 4096.

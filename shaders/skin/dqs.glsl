@@ -47,8 +47,5 @@ void skin(inout vec3 position, inout vec3 normal) {
     vec3 stretched = vec3(dot(x, point), dot(y, point), dot(z, point));
     vec3 shift = 2.0 * (real.w * dual.xyz - dual.w * real.xyz + cross(real.xyz, dual.xyz));
     position = rotate(real, stretched) + shift;
-    // The cofactor matrix of the stretch keeps normals exact under any scale.
-    vec3 a = vec3(x.x, y.x, z.x), b = vec3(x.y, y.y, z.y), c = vec3(x.z, y.z, z.z);
-    vec3 turned = cross(b, c) * normal.x + cross(c, a) * normal.y + cross(a, b) * normal.z;
-    normal = rotate(real, turned);
+    normal = rotate(real, blended_normal(x.xyz, y.xyz, z.xyz, normal));
 }

@@ -1,4 +1,5 @@
-// Linear blend skinning: v' = (sum w M) [v 1], n' = (sum w M) [n 0].
+// Linear blend skinning: v' = B [v 1] and n' = B [n 0] with B = sum w M, or n' = B^-T n where joints
+// scale or shear.
 void skin(inout vec3 position, inout vec3 normal) {
     vec4 x = vec4(0.0), y = vec4(0.0), z = vec4(0.0);
     uint end = in_bindings.x + in_bindings.y;
@@ -12,5 +13,5 @@ void skin(inout vec3 position, inout vec3 normal) {
     vec4 point = vec4(position, 1.0);
     // The matrices have the posed centre subtracted once per unit of weight.
     position = vec3(dot(x, point), dot(y, point), dot(z, point)) + excess() * center;
-    normal = vec3(dot(x.xyz, normal), dot(y.xyz, normal), dot(z.xyz, normal));
+    normal = blended_normal(x.xyz, y.xyz, z.xyz, normal);
 }

@@ -44,10 +44,10 @@ def test_one_influence_is_the_affine_map(motion, joint):
     palette[joint] = motion
     moved, turned = moved_by(palette, [(joint, 1.0)])
     assert_allclose(moved, POINTS @ motion[:3, :3].T + motion[:3, 3], atol=1e-13)
-    # Exact normals are those of the cofactor matrix, det(M) M^-T, which flattening leaves finite.
+    # Exact normals are those of |det(M)| M^-T, by cofactors, which flattening leaves finite.
     a, b, c = motion[:3, :3].T
     cofactors = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
-    exact = NORMALS @ cofactors.T
+    exact = (-1.0 if np.linalg.det(motion) < 0.0 else 1.0) * NORMALS @ cofactors.T
     assert_allclose(turned, exact / np.linalg.norm(exact, axis=1, keepdims=True), atol=1e-13)
 
 

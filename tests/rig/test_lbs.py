@@ -136,15 +136,6 @@ def test_normals_are_unit(seed):
     assert_allclose(lengths, 1.0, atol=1e-15)
 
 
-def test_normals_follow_the_blended_matrix_not_its_inverse_transpose():
-    # Twice as long along x: the seed's formula turns (1, 0, 1) towards x, to (2, 0, 1).
-    palette = np.array([np.diag([2.0, 1, 1, 1])] * 3)
-    tilted = mesh([[0, 0, 0]], [[1.0, 0, 1.0]])
-    skin = skin_from_lists([[(0, 1.0)]], np.tile(np.eye(4), (3, 1, 1)))
-    _, normals = skin_mesh(tilted, skin, palette)
-    assert_allclose(normals, [np.array([2, 0, 1]) / np.sqrt(5)], atol=1e-15)
-
-
 def test_unit_leaves_zero_alone():
     assert unit(np.array([[0.0, 0, 0], [0, -3, 0]])).tolist() == [[0, 0, 0], [0, -1, 0]]
 

@@ -30,10 +30,10 @@ from viewer.rendering.upload import (
     write_stacked,
 )
 from viewer.rendering.view import View
-from viewer.rig.arrays import Floats
+from viewer.rig.arrays import Bools, Floats
 from viewer.rig.crowd import local_rotations, placements, worlds
 from viewer.rig.figure import Figure
-from viewer.rig.kinematics import skinning_matrices
+from viewer.rig.kinematics import is_rigid, skinning_matrices
 from viewer.rig.pose import Pose, skinning_key
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
@@ -51,6 +51,7 @@ _PER_INSTANCE = (
     ("in_actor_color", 3),
     ("in_rest_shift", 3),
     ("in_center", 3),
+    ("in_is_rigid", 1),
 )
 _FLOATS = sum(count for _, count in _PER_INSTANCE)
 
@@ -86,6 +87,7 @@ class CrowdBuffers:
         self._words: tuple[object, ...] = ()
         self._keys: list[tuple[bytes, ...]] = []
         self._centers: Floats = np.zeros((0, 3))
+        self._is_rigid: Bools = np.ones(0, dtype=np.bool_)
         self._rows: NDArray[np.float32] = np.zeros((0, self._n_joints, 3, 4), "f4")
         self._rigid_rows: NDArray[np.float32] = np.zeros((0, self._n_joints, 5, 4), "f4")
         self._palette: moderngl.Texture | None = None
@@ -135,6 +137,7 @@ class CrowdBuffers:
         self._rows = np.concatenate([self._rows, empty[:, :, :3]])
         self._rigid_rows = np.concatenate([self._rigid_rows, empty])
         self._centers = np.concatenate([self._centers, np.zeros((more, 3))])
+        self._is_rigid = np.concatenate([self._is_rigid, np.ones(more, dtype=np.bool_)])
 
     def _write(self, figure: Figure, poses: list[Pose], rows: NDArray[np.intp]) -> None:
         """Upload T(-center') M T(center) of the poses at ``rows``, as ``PosedMesh`` does of one."""
@@ -142,6 +145,7 @@ class CrowdBuffers:
         assert skeleton is not None and skin is not None and self._palette is not None
         rotations = local_rotations(skeleton, poses)
         palette = skinning_matrices(worlds(skeleton, poses, rotations), skin.inverse_bind)
+        self._is_rigid[rows] = is_rigid(palette)
         palette[..., :3, 3] += palette[..., :3, :3] @ self.mesh.center
         shares = self.mesh.skin(how).joint_shares
         moved = np.einsum("j,aji->ai", shares, palette[..., :3, 3])
@@ -173,7 +177,8 @@ class CrowdBuffers:
         centers = self._centers[: self.count]
         model[:, :3, 3] += np.einsum("aij,aj->ai", model[:, :3, :3], centers)
         colors = np.array([actor.color or SKIN_COLOR for actor in actors])
-        rows = [model[:, :3].reshape(-1, 12), colors, self.mesh.center - centers, centers]
+        rigid = self._is_rigid[: self.count, None]
+        rows = [model[:, :3].reshape(-1, 12), colors, self.mesh.center - centers, centers, rigid]
         self._instances.write(float32(np.concatenate(rows, axis=1)))
 
     def use(self, program: moderngl.Program, view: View) -> None:
@@ -204,6 +209,11 @@ class CrowdBuffers:
     def method(self) -> str:
         """The skinning method, a key of ``viewer.rig.skinning.METHODS``."""
         return self._how.method
+
+    @property
+    def is_affine(self) -> bool:
+        """Whether joints of some actor scale or shear."""
+        return not self._is_rigid[: self.count].all()
 
     def array(
         self, program: moderngl.Program, indices: IndexSet | None = None

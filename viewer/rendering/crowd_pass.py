@@ -72,7 +72,9 @@ def draw_crowd(
     options : DisplayOptions
         Shading and lights.
     """
-    program = programs.drawing("crowd", options.shading, "mesh", skin=crowd.method)
+    program = programs.drawing(
+        "crowd", options.shading, "mesh", skin=crowd.method, affine=crowd.is_affine
+    )
     crowd.place(actors, view)
     crowd.use(program, view)
     set_lights(program, view, options.lights)

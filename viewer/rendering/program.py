@@ -59,10 +59,16 @@ class Programs:
 
     def __init__(self, context: moderngl.Context) -> None:
         self.context = context
-        self._cache: dict[tuple[str, ...], moderngl.Program] = {}
+        self._cache: dict[tuple[str | bool, ...], moderngl.Program] = {}
 
     def drawing(
-        self, name: str, chunk: str = "", fragment: str = "", skin: str = "", geometry: str = ""
+        self,
+        name: str,
+        chunk: str = "",
+        fragment: str = "",
+        skin: str = "",
+        geometry: str = "",
+        affine: bool = False,
     ) -> moderngl.Program:
         """Return the program of ``name.vert`` and a fragment shader, each with its chunk.
 
@@ -78,25 +84,32 @@ class Programs:
             A key of ``viewer.rig.skinning.METHODS``, for vertex shaders that skin.
         geometry : str
             Of the geometry shader, if there is one between the two.
+        affine : bool
+            For vertex shaders that skin: joints may scale or shear.
 
         Raises
         ------
         RenderError
             If the driver refuses a shader; the message names our file and its line.
         """
-        return self._get((name, skin, fragment or name, chunk, geometry), ())
+        return self._get((name, skin, fragment or name, chunk, geometry, affine), ())
 
-    def feedback(self, name: str, chunk: str, outputs: tuple[str, ...]) -> moderngl.Program:
-        """Return a program without fragments whose outputs are captured, interleaved."""
-        return self._get((name, chunk, "", "", ""), outputs)
+    def feedback(
+        self, name: str, chunk: str, outputs: tuple[str, ...], affine: bool = False
+    ) -> moderngl.Program:
+        """Return a program without fragments whose outputs are captured, interleaved.
+
+        Its chunk skins; ``affine`` says whether joints may scale or shear.
+        """
+        return self._get((name, chunk, "", "", "", affine), outputs)
 
     def _get(
-        self, key: tuple[str, str, str, str, str], outputs: tuple[str, ...]
+        self, key: tuple[str, str, str, str, str, bool], outputs: tuple[str, ...]
     ) -> moderngl.Program:
         if key not in self._cache:
-            name, skin, fragment_name, chunk, middle = key
+            name, skin, fragment_name, chunk, middle, affine = key
             files: list[str] = []
-            vertex = _compose(f"{name}.vert", skin, files)
+            vertex = _compose(f"{name}.vert", skin, files, "AFFINE_PALETTE" if affine else "")
             fragment = _compose(f"{fragment_name}.frag", chunk, files) if fragment_name else None
             geometry = _compose(f"{middle}.geom", "", files) if middle else None
             if geometry:
@@ -136,7 +149,7 @@ class Programs:
         self._cache.clear()
 
 
-def _compose(name: str, chunk: str, files: list[str]) -> str:
+def _compose(name: str, chunk: str, files: list[str], define: str = "") -> str:
     """Return a shader's text with its chunk and includes, each line numbered as in its own file.
 
     The line tells the file too, as ``_LINES_PER_FILE`` times its index in ``files``: Mesa forgets
@@ -154,6 +167,8 @@ def _compose(name: str, chunk: str, files: list[str]) -> str:
             parts.append(_chunk(folder, chunk, files))
         else:
             parts.append(f"{line}\n")
+        if define and line.startswith("#version"):
+            parts.append(f"#define {define}\n")
         if include or line.startswith(("#version", _CHUNK_MARK)):
             parts.append(f"#line {base + number + 1}\n")
     return "".join(parts)

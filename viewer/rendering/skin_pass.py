@@ -24,7 +24,7 @@ from viewer.rendering.upload import (
 )
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
-from viewer.rig.kinematics import skinning_matrices, world_matrices
+from viewer.rig.kinematics import is_rigid, skinning_matrices, world_matrices
 from viewer.rig.pose import Pose, skinning_key
 from viewer.rig.shape import shaped
 from viewer.rig.skin import bind_positions
@@ -81,6 +81,7 @@ class PosedMesh:
         self.scalars = self._owner.keep(ScalarBuffer(context, mesh))
         self._arrays: dict[tuple[object, ...], moderngl.VertexArray] = {}
         self._key: tuple[object, ...] | None = None
+        self._is_affine = False
         self.n_updates = 0
 
     def update(self, pose: Pose | None, skinning: Skinning | str = "lbs") -> None:
@@ -142,6 +143,7 @@ class PosedMesh:
         skeleton, skin = figure.skeleton, figure.skin
         assert skeleton is not None and skin is not None  # the caller looked
         palette = skinning_matrices(world_matrices(skeleton, pose), skin.inverse_bind)
+        self._is_affine = not is_rigid(palette)
         palette[:, :3, 3] += palette[:, :3, :3] @ self.mesh.center
         if buffers.joint_shares.any():
             self.center = buffers.joint_shares @ palette[:, :3, 3]
@@ -158,9 +160,11 @@ class PosedMesh:
         mesh, rest = self.mesh, self._rest
         positions = rest.positions if attached else mesh.positions
         normals = rest.normals if attached else mesh.normals
-        key = (method, id(skin), id(positions))
+        # Rigid joints, by far the most common, get a program that does not pay for the others.
+        affine = attached and self._is_affine
+        key = (method, affine, id(skin), id(positions))
         if key not in self._arrays:
-            program = self.programs.feedback("skin", method, ("v_position", "v_normal"))
+            program = self.programs.feedback("skin", method, ("v_position", "v_normal"), affine)
             attributes = [
                 (positions, "3f4", "in_position"),
                 (normals, "3f4", "in_normal"),

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.rig.arrays import Floats, Ints
+from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.pose import Pose, local_matrices
 from viewer.rig.skeleton import Skeleton
 
-__all__ = ["forward_kinematics", "skinning_matrices", "world_matrices"]
+__all__ = ["forward_kinematics", "is_rigid", "skinning_matrices", "world_matrices"]
+
+_RIGID = 1e-5  # relative; normals taken for rigid are off by half as many radians at most
 
 
 def forward_kinematics(parents: Ints, local: Floats, root: Floats | None = None) -> Floats:
@@ -81,3 +83,30 @@ def skinning_matrices(world: Floats, inverse_bind: Floats) -> Floats:
         Bind-to-posed matrices.
     """
     return world @ inverse_bind
+
+
+def is_rigid(palette: Floats) -> Bools:
+    """Return whether all joints rotate and translate only, or share one uniform scale as well.
+
+    Parameters
+    ----------
+    palette : (..., J, 4, 4)
+        Skinning matrices.
+
+    Returns
+    -------
+    (...,) bool
+        True if every 3 x 3 part A satisfies A^T A = s^2 I with one common s, and det A > 0.
+
+    >>> palette = np.stack([np.eye(4)] * 2)
+    >>> bool(is_rigid(palette)), bool(is_rigid(palette * np.array([2.0, 1.0, 1.0, 1.0])))
+    (True, False)
+    """
+    linear = palette[..., :3, :3]
+    gram = np.swapaxes(linear, -1, -2) @ linear
+    squares = gram[..., 0, 0].max(axis=-1, initial=0.0)
+    errors = np.abs(gram - squares[..., None, None, None] * np.eye(3))
+    is_alike = errors.max(axis=(-3, -2, -1), initial=0.0) <= _RIGID * squares
+    first, second, third = np.moveaxis(linear, -1, 0)
+    volumes = np.einsum("...a,...a->...", np.cross(first, second), third)
+    return is_alike & (volumes > 0.0).all(axis=-1)

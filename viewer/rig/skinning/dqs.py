@@ -12,6 +12,7 @@ import numpy as np
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.rotation import matrix_to_quaternion, nearest_rotations
 from viewer.rig.skin import Skin, bind_positions, strongest_first
+from viewer.rig.skinning._normals import inverse_transposed
 from viewer.rig.vectors import unit
 
 __all__ = ["deform", "split_palette"]
@@ -27,7 +28,8 @@ def deform(
     """Stretch linearly, then move by the unit dual quaternion of the weighted sum.
 
     Weights count relative to their sum, as the method demands. Quaternions are added on the
-    strongest influence's side of the sphere (eq. 14 and its text: antipodality).
+    strongest influence's side of the sphere (eq. 14 and its text: antipodality). Normals take the
+    inverse transpose of the blended stretch, then the blended rotation.
 
     Parameters
     ----------
@@ -134,7 +136,8 @@ def _move(
     blended /= np.where(is_moved, lengths, 1.0)[:, None]
     stretched = np.einsum("vab,vb->va", stretch[:, :, :3], positions) + stretch[:, :, 3]
     moved = _rigid(blended, stretched)
-    turned = _rotated(blended[:, :4], _stretched_normals(stretch[:, :, :3], normals))
+    stretched_normals = inverse_transposed(np.moveaxis(stretch[:, :, :3], 0, -1), normals)
+    turned = _rotated(blended[:, :4], stretched_normals)
     keep = ~is_moved
     moved[keep], turned[keep] = positions[keep], normals[keep]
     return moved, turned
@@ -152,10 +155,3 @@ def _rigid(duals: Floats, points: Floats) -> Floats:
 def _rotated(quaternions: Floats, vectors: Floats) -> Floats:
     axis, w = quaternions[:, :3], quaternions[:, 3:4]
     return vectors + 2.0 * np.cross(axis, np.cross(axis, vectors) + w * vectors)
-
-
-def _stretched_normals(stretch: Floats, normals: Floats) -> Floats:
-    """Multiply by the cofactor matrix, det(S) S^-T: exact normals under any stretch."""
-    x, y, z = np.moveaxis(stretch, -1, 0)  # columns
-    cofactors = np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)], axis=-1)
-    return np.einsum("vab,vb->va", cofactors, normals)

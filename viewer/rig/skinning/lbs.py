@@ -7,8 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from viewer.rig.arrays import Floats
+from viewer.rig.kinematics import is_rigid
 from viewer.rig.skin import Skin
 from viewer.rig.skinning._blocks import Block, blocks_of
+from viewer.rig.skinning._normals import inverse_transposed
 from viewer.rig.vectors import unit
 
 __all__ = ["blended_matrices", "deform", "move"]
@@ -20,9 +22,10 @@ _IDENTITY = np.eye(3, 4).reshape(12)
 def deform(
     positions: Floats, normals: Floats, skin: Skin, palette: Floats, share: float = 1.0
 ) -> tuple[Floats, Floats]:
-    """Blend matrices, then move: v' = (sum_i w_i M_i) [v 1], n' = unit((sum_i w_i M_i) [n 0]).
+    """Blend matrices, then move: v' = B [v 1] and n' = unit(B [n 0]), with B = sum_i w_i M_i.
 
-    Normals use the blended matrix itself, not its inverse transpose: CSE169 course notes.
+    Where all joints are rigid, normals use the blended matrix itself: CSE169 course notes. Where
+    some scale or shear they use its inverse transpose, n' = unit(B^-T n).
 
     Parameters
     ----------
@@ -50,7 +53,7 @@ def deform(
 def move(
     positions: Floats, skin: Skin, palette: Floats, normals: Floats | None = None
 ) -> tuple[Floats, Floats | None]:
-    """Move positions, and turn normals if there are any, by blended matrices.
+    """Move positions, and normals if there are any, by blended matrices.
 
     Frames of a clip are best moved one by one: their matrices stay in the processor's cache, and
     that is twice as fast as one large product (``tests/bench/bench_deform.py``).
@@ -75,10 +78,15 @@ def move(
     """
     moved = np.empty(positions.shape)
     turned = None if normals is None else np.empty(positions.shape)
+    rigid = normals is not None and is_rigid(palette)
     for rows, matrices in _blended(skin, palette):
         moved[rows] = (_product(matrices, positions[rows]) + matrices[:, 3]).T
         if normals is not None and turned is not None:
-            turned[rows] = _product(matrices, normals[rows]).T
+            turned[rows] = (
+                _product(matrices, normals[rows]).T
+                if rigid
+                else inverse_transposed(matrices[:, :3], normals[rows])
+            )
     return moved, turned
 
 
