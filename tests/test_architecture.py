@@ -15,9 +15,9 @@ SOURCES = sorted(PACKAGE.rglob("*.py"))
 # Which parts of the package each part may import.
 ALLOWED = {
     "rig": {"rig", "errors"},
-    "formats": {"formats", "rig", "errors"},
-    "rendering": {"rendering", "rig", "errors", "resources"},
-    "export": {"export", "formats", "rig", "errors"},
+    "formats": {"formats", "rig", "errors", "interrupts"},
+    "rendering": {"rendering", "rig", "errors", "interrupts", "resources"},
+    "export": {"export", "formats", "rig", "errors", "interrupts"},
     "loading": {"loading", "formats", "rig", "errors", "resources"},
     "app": {
         "app",
@@ -29,11 +29,13 @@ ALLOWED = {
         "rendering",
         "rig",
         "errors",
+        "interrupts",
         "resources",
     },
     "lint": {"lint", "loading", "formats", "rig", "errors"},
-    "models": {"formats", "errors"},
+    "models": {"formats", "errors", "interrupts"},
     "errors": set(),
+    "interrupts": set(),
     "resources": {"errors"},
 }
 # Third-party modules with a single home.

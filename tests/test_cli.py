@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 from app.tiny import write_rig
+from children import listening
 
 import viewer
 from viewer.cli import run
@@ -157,7 +158,7 @@ def test_signal_while_writing_leaves_no_file(rig, tmp_path, number, code):
     folder = tmp_path / "out"
     folder.mkdir()
     done = subprocess.run(
-        [sys.executable, "-c", program, "render", *rig, "-o", folder / "x.png", "--size", "40x30"],
+        listening("-c", program, "render", *rig, "-o", folder / "x.png", "--size", "40x30"),
         env=ENVIRONMENT, capture_output=True, timeout=60, check=False,
     )  # fmt: skip
     _refused(done, code)
@@ -168,7 +169,7 @@ def test_sigterm_ends_a_program_that_waits(rig, tmp_path):
     pipe = tmp_path / "pipe.png"
     os.mkfifo(pipe)
     process = subprocess.Popen(
-        [*COMMAND, "render", *rig, "-o", pipe, "--size", "40x30"],
+        listening("-m", "viewer", "render", *rig, "-o", pipe, "--size", "40x30"),
         env=ENVIRONMENT, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
     )  # fmt: skip
     deadline = time.monotonic() + 20

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from app.driver import Driver
 from app.tiny import write_rig
+from children import listening
 from imgui_bundle import imgui
 from PIL import Image, ImageGrab
 
@@ -147,7 +148,7 @@ class Window:
         }
         self.environment.pop("WAYLAND_DISPLAY", None)
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "viewer", *map(str, arguments)],
+            listening("-m", "viewer", *arguments),
             cwd=folder, env=self.environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
         )  # fmt: skip
         self.id = _wait_for(self._find, "the window")
@@ -305,11 +306,15 @@ def test_window_closes_as_window_managers_ask(window):
     app.finish()
 
 
-def test_window_ends_at_sigterm_without_a_traceback(window):
+@pytest.mark.parametrize(
+    ("number", "code", "word"),
+    [(signal.SIGINT, 130, b"interrupted"), (signal.SIGTERM, 143, b"terminated")],
+)
+def test_window_ends_at_a_signal_without_a_traceback(window, number, code, word):
     app = window()
-    app.process.send_signal(signal.SIGTERM)
+    app.process.send_signal(number)
     out, err = app.process.communicate(timeout=PATIENCE)
-    assert (app.process.returncode, out, err) == (143, b"", b"viewer: terminated\n")
+    assert (app.process.returncode, out, err) == (code, b"", b"viewer: " + word + b"\n")
 
 
 def test_layout_is_remembered_between_runs(window, places):

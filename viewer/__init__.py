@@ -11,10 +11,12 @@ Importing this module imports nothing heavy: each name loads its own module on f
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
-
+# Not imported from ``typing``: that takes longer than all else here, while nobody yet looks after
+# signals. Type checkers know the name.
+TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from typing import Any
+
     from viewer.app.window import show
     from viewer.errors import ViewerError
     from viewer.export import export
@@ -116,6 +118,8 @@ _HOMES = {
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from importlib import import_module
+
     value = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
     globals()[name] = value
     return value

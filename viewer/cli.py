@@ -6,16 +6,15 @@ import argparse
 import contextlib
 import io
 import os
-import signal
 import sys
 from collections.abc import Sequence
 from importlib import import_module
-from types import FrameType
 from typing import NoReturn
 
 import viewer
 from viewer.commands import COMMANDS
 from viewer.errors import FormatError, ViewerError, printable
+from viewer.interrupts import Interrupted, watched
 
 __all__ = ["run"]
 
@@ -24,18 +23,17 @@ Without a command, FILES open in a window; without files, the bundled figure doe
 "viewer COMMAND --help" lists a command's options.
 
 exit codes: 0 done, 1 lint found or diff measured too much, 2 bad input, 4 no usable OpenGL,
-5 output could not be written
+5 output could not be written, 130 interrupted (Ctrl-C), 143 terminated; a signal that comes when
+all is written changes nothing
 """
 
 _DOWNWARD = ("-y", "-z")  # axes that point up the other way; no option has these letters
 
 
-class _Terminated(BaseException):
-    """SIGTERM arrived; unwinds like Ctrl-C, so that no temporary file stays behind."""
-
-
 def run(arguments: Sequence[str]) -> int:
     """Run one command.
+
+    Signals end it as they end the program, and are the caller's own again afterwards.
 
     Parameters
     ----------
@@ -45,14 +43,21 @@ def run(arguments: Sequence[str]) -> int:
     Returns
     -------
     int
-        The exit code: 0, or that of the ``ViewerError``.
+        The exit code: 0, that of the ``ViewerError``, or 128 and the signal's number.
     """
-    signal.signal(signal.SIGTERM, _terminate)
+    try:
+        with watched():
+            return _attempt(list(arguments))
+    except Interrupted as stop:
+        return _fail(str(stop), stop.exit_code)
+
+
+def _attempt(arguments: list[str]) -> int:
     if isinstance(sys.stdout, io.TextIOWrapper):
         # A name that the terminal's encoding lacks is no reason to fail.
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
-        code = _dispatch(list(arguments))
+        code = _dispatch(arguments)
         if sys.stdout is not None:
             sys.stdout.flush()
         return code
@@ -61,10 +66,6 @@ def run(arguments: Sequence[str]) -> int:
         return _fail(printable(problem, 2000), problem.exit_code, prefix="")
     except ViewerError as problem:
         return _fail(printable(problem, 2000), problem.exit_code)
-    except KeyboardInterrupt:
-        return _fail("interrupted", 130)
-    except _Terminated:
-        return _fail("terminated", 143)
     except BrokenPipeError:
         # The reader of our output has gone (``viewer info x | head -1``): nothing to report.
         _drop_output()
@@ -132,7 +133,8 @@ def _overview() -> argparse.ArgumentParser:
 
 
 def _fail(message: str, code: int, prefix: str = "viewer: ") -> int:
-    print(f"{prefix}{message}", file=sys.stderr)
+    with contextlib.suppress(OSError):  # the terminal may be gone, which is what ended us
+        print(f"{prefix}{message}", file=sys.stderr)
     return code
 
 
@@ -141,7 +143,3 @@ def _drop_output() -> None:
     if sys.stdout is not None:
         with contextlib.suppress(io.UnsupportedOperation):  # no file, as in tests
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-def _terminate(signum: int, frame: FrameType | None) -> None:
-    raise _Terminated

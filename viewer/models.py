@@ -9,6 +9,7 @@ from pathlib import Path
 
 from viewer.errors import OutputError, ViewerError, printable
 from viewer.formats import save_bytes
+from viewer.interrupts import deferred
 
 __all__ = [
     "find_model",
@@ -70,7 +71,8 @@ def save_model_folder(folder: str | Path) -> Path:
     except OSError as problem:
         raise OutputError(f"{printable(_settings_file(), 300)}: {problem.strerror}") from None
     text = json.dumps({"folder": str(path.resolve())}, indent=1)
-    save_bytes(_settings_file(), text.encode("utf-8", "replace"))
+    with deferred():  # signals raise again afterwards: this is no result
+        save_bytes(_settings_file(), text.encode("utf-8", "replace"))
     return path
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from app.tiny import write_rig
+from children import listening
 from formats.capture_files import body, write_frames
 from formats.synthetic_smpl import model
 from PIL import Image
@@ -515,7 +516,7 @@ def test_missing_folder_is_said_before_anything_is_drawn(draw, walk, tmp_path, n
 
 
 def start(walk, tmp_path, name) -> subprocess.Popen:
-    command = [sys.executable, "-m", "viewer", "render", *walk, "-o", str(tmp_path / name)]
+    command = listening("-m", "viewer", "render", *walk, "-o", tmp_path / name)
     options = ["--turntable", "200", "--size", "320x240", "--force"]
     return subprocess.Popen(
         [*command, *options], env={**os.environ, "PYTHONPATH": str(ROOT)}, stderr=subprocess.PIPE

@@ -27,6 +27,7 @@ from viewer.app.recent import (  # noqa: E402
 from viewer.app.state import AppState  # noqa: E402
 from viewer.app.theme import apply_theme, change_scale  # noqa: E402
 from viewer.errors import RenderError, printable  # noqa: E402
+from viewer.interrupts import hold, poll  # noqa: E402
 from viewer.loading import MotionSettings  # noqa: E402
 from viewer.loading.capturing import Builder  # noqa: E402
 from viewer.rendering.camera import Camera, fit  # noqa: E402
@@ -91,6 +92,7 @@ def show(
     if fit_distance:
         fit(camera, points, _SIZE[0] / _SIZE[1])
     files = tuple(map(Path, paths))
+    hold()  # callbacks of GLFW swallow what is raised in them
     state = AppState(scene, camera, options, bounding_box(points), files)
     state.lint.settings = motion
     state.recent = load_recent()
@@ -184,6 +186,7 @@ class _Window:
         """Draw frames until the window is closed; sleep while nothing happens."""
         rest = _Rest()
         while not glfw.window_should_close(self.handle):
+            poll()
             happened = self._wait(rest.left > 0)
             rest.count(happened, self._awaits())
             if self._dropped:

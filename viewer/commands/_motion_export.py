@@ -20,6 +20,7 @@ from viewer.export import (
 )
 from viewer.export._motion_paths import motion_paths
 from viewer.export._options import GAPS, ROTATION_ORDERS
+from viewer.interrupts import hold, raising
 from viewer.rig.arrays import Bools
 from viewer.rig.clip import Clip
 from viewer.rig.person import is_tracked, person_label
@@ -185,15 +186,20 @@ def _write(parts: list[_Part], output: Path, key: str, options: MotionOptions) -
     if key == "easymocap":
         return _write_capture(parts, output, options)
     lines: list[str] = []
+    hold()
     for part in parts:
         options.world_up = part.up
-        if isinstance(part.take, Take):
-            lines += export_take(part.take, part.path, key, options)
-        else:
-            from viewer.export.npz import export_points
-
-            lines += export_points(part.take, part.path, options)
+        with raising():  # until it is written
+            lines += _write_one(part, key, options)
     return lines
+
+
+def _write_one(part: _Part, key: str, options: MotionOptions) -> list[str]:
+    if isinstance(part.take, Take):
+        return export_take(part.take, part.path, key, options)
+    from viewer.export.npz import export_points
+
+    return export_points(part.take, part.path, options)
 
 
 def _write_capture(parts: list[_Part], output: Path, options: MotionOptions) -> list[str]:

@@ -21,6 +21,7 @@ from viewer.commands._shots import Shots, Turntable, parse_turntable, shots_of
 from viewer.commands._view import camera_of
 from viewer.errors import OutputError, ViewerError, printable
 from viewer.formats._video_kinds import VIDEOS
+from viewer.interrupts import hold, poll
 from viewer.rig.scene import Scene
 
 if TYPE_CHECKING:
@@ -194,12 +195,15 @@ def draw_sequence(
     frame_size = getattr(sink, "cell", size)
     recording = _recording(arguments, scene, shots, options, frame_size)
     title = f"drawing {printable(outputs[0].name)}"
+    hold()
     with Offscreen(arguments.gpu) as offscreen, offscreen.context:
         steps = record(recording, offscreen.renderer, sink)
         # Closed while the context is still there, whatever happens.
         with Progress(title, recording.n_frames) as line, contextlib.closing(steps):
             for progress in steps:
                 line.show(progress.done)
+                if progress.done < progress.total:  # afterwards the sink may be done any moment
+                    poll()
         print_warnings(offscreen.renderer.notes)
     return _summary(request, shots, outputs, frame_size, sink)
 

@@ -34,6 +34,7 @@ from viewer.errors import OutputError, RigError, UnsupportedFormatError, printab
 from viewer.export import EXPORTERS, export, files_written
 from viewer.formats import all_or_none
 from viewer.formats._save import require_folder
+from viewer.interrupts import raising
 from viewer.rig.scene import Scene
 from viewer.rig.skinning import Skinning
 from viewer.rig.upright import upright_actor
@@ -108,7 +109,8 @@ def _write_poses(
     lines = []
     with all_or_none(files):
         for actor in actors:
-            lines += export(upright_actor(scene, actor), places[actor], skinning)
+            with raising():  # until it is written
+                lines += export(upright_actor(scene, actor), places[actor], skinning)
     away = [actor for actor in shown if not actor.is_present]
     lines += [f"{printable(a.name)}: not there at that time, and not written" for a in away]
     return lines + left_out_lines(scene, shown)

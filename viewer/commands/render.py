@@ -29,6 +29,7 @@ from viewer.commands._view import (
 )
 from viewer.errors import OutputError, ViewerError, printable
 from viewer.formats._video_kinds import VIDEOS
+from viewer.interrupts import deferred
 from viewer.rendering.camera import Camera
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.arrays import Bytes, Floats
@@ -141,7 +142,7 @@ def draw_scene(
     """Return the scene's pixels, (H, W, 4) uint8; what the driver could not do is printed."""
     from viewer.rendering.offscreen import Offscreen
 
-    with Offscreen(device) as offscreen:
+    with deferred(), Offscreen(device) as offscreen:
         pixels = offscreen.render(scene, size, camera, options, box)
         print_warnings(offscreen.renderer.notes)
         if options.joint_names:
@@ -167,7 +168,7 @@ def _draw_panels(
     if min(size) < 200:
         raise ViewerError(f"--panels needs at least 200 x 200 pixels, found {size[0]} x {size[1]}")
     state = AppState(scene, camera=camera, options=options, box=box)
-    with HeadlessApp(state, size, device=device) as app:
+    with deferred(), HeadlessApp(state, size, device=device) as app:
         return app.picture(fits)
 
 

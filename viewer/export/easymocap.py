@@ -32,6 +32,7 @@ from viewer.export._family_frames import (
 )
 from viewer.export._gaps import gaps_text, kept_gaps
 from viewer.export._options import MotionOptions
+from viewer.interrupts import hold, poll
 from viewer.rig.arrays import Floats
 from viewer.rig.person import person_label
 from viewer.rig.take import Take
@@ -105,6 +106,7 @@ def export_takes(
     stop = max(take.first_frame + take.frames.n_frames for take in takes)
     with _new_folder(path) as folder:
         for frame in range(first, stop):
+            poll()
             rows = [
                 records.text(frame - take.first_frame)
                 for _, take, records in people
@@ -178,6 +180,7 @@ def _used(rows: Floats, count: int) -> Floats:
 @contextlib.contextmanager
 def _new_folder(path: Path) -> Iterator[Path]:
     """Give a folder to fill beside ``path/smpl``, and put it there when the block succeeds."""
+    hold()  # also for the folder that is filled, which must not stay behind
     target = path / _FOLDER
     made = None
     try:

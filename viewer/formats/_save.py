@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.errors import OutputError, printable
+from viewer.interrupts import hold, poll, raising
 
 __all__ = [
     "Replacement",
@@ -109,6 +110,8 @@ def save_bytes(path: str | Path, data: bytes) -> None:
     OutputError
         With the path and the system's reason.
     """
+    hold()  # a signal that comes after the rename must not make a failure of it
+    poll()
     path = Path(path)
     try:
         mode = _mode(path)
@@ -172,6 +175,7 @@ class Replacement:
     def commit(self) -> int:
         """Put the temporary file in the target's place; return its number of bytes."""
         assert self.temporary is not None  # begin() made it
+        poll(in_any_thread=True)  # as in _replace; this is the encoder's thread
         try:
             with self.temporary.open("rb+") as stream:
                 os.fsync(stream.fileno())
@@ -206,6 +210,8 @@ def all_or_none(paths: Iterable[Path]) -> Iterator[None]:
     OutputError
         If there is no room to keep what they hold.
     """
+    hold()  # also for the copies, none of which may stay behind
+    poll()
     copies: dict[Path, Path | None] = {}
     try:
         for path in paths:
@@ -262,7 +268,8 @@ def _mode(target: Path) -> int:
 
 def _write_through(target: Path, data: bytes) -> None:
     # Closing may fail too: /dev/full reports its error only there.
-    with target.open("wb") as stream:
+    # A pipe whose other end nobody opens or reads waits for ever.
+    with raising(), target.open("wb") as stream:
         stream.write(data)
 
 
@@ -275,6 +282,7 @@ def _replace(target: Path, data: bytes, permissions: int) -> None:
             stream.flush()
             os.fsync(stream.fileno())
         Path(name).chmod(permissions)
+        poll()  # the last moment at which a signal is not too late
         Path(name).replace(target)
     except BaseException:  # also Ctrl-C: the temporary file must not stay behind
         with contextlib.suppress(OSError):

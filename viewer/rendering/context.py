@@ -12,6 +12,7 @@ from typing import Any
 import moderngl
 
 from viewer.errors import RenderError
+from viewer.interrupts import deferred
 
 __all__ = [
     "check_errors",
@@ -76,7 +77,8 @@ def _create(options: Mapping[str, int]) -> moderngl.Context:
         # Mesa would print lines of its own before the one that says what to do.
         os.environ.setdefault("EGL_LOG_LEVEL", "fatal")
     try:
-        return moderngl.create_context(**settings)
+        with deferred():
+            return moderngl.create_context(**settings)
     except Exception as problem:  # glcontext raises nothing more special
         text = str(problem)
         offer = _offered_version(settings) if "0x3009" in text or "version" in text else ""

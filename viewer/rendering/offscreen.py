@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import threading
 
+from viewer.interrupts import deferred
 from viewer.rendering.camera import Camera, fit
 from viewer.rendering.context import headless_context, is_software, unreadable_devices
 from viewer.rendering.options import DisplayOptions
@@ -155,11 +156,14 @@ def render(
     >>> viewer.render(viewer.load(), size=(64, 48)).shape
     (48, 64, 4)
     """
-    if not hasattr(_thread, "kept"):
-        _thread.kept = _OfThread()
-    offscreen: Offscreen = _thread.kept.offscreen
-    with offscreen.context:
-        check_size(offscreen.context, size)  # before the camera divides by it
+    with deferred():
+        if not hasattr(_thread, "kept"):
+            _thread.kept = _OfThread()
+        offscreen: Offscreen = _thread.kept.offscreen
+        with offscreen.context:
+            check_size(offscreen.context, size)  # before the camera divides by it
     options = options or DisplayOptions()
     camera = camera or default_camera(scene, size, options.show)
-    return offscreen.render(scene, size, camera, options, scene_box(scene, options.show))
+    box = scene_box(scene, options.show)
+    with deferred():
+        return offscreen.render(scene, size, camera, options, box)

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 import moderngl
 
 from viewer.errors import RenderError
+from viewer.interrupts import deferred
 from viewer.resources import resource
 
 __all__ = ["SHADING", "Programs", "set_uniforms"]
@@ -116,12 +117,15 @@ class Programs:
                 # Both take and give the fragment shader's inputs: those of the first are renamed.
                 vertex = re.sub(r"\bv_(\w+)", r"v_vertex_\1", vertex)
             try:
-                self._cache[key] = self.context.program(
-                    vertex_shader=vertex,
-                    fragment_shader=fragment,
-                    geometry_shader=geometry,
-                    varyings=outputs,
-                )
+                # moderngl has functions in Python describe what a program has, and crashes if one
+                # of them raises, as handlers of signals may (5.13: no check for NULL).
+                with deferred():
+                    self._cache[key] = self.context.program(
+                        vertex_shader=vertex,
+                        fragment_shader=fragment,
+                        geometry_shader=geometry,
+                        varyings=outputs,
+                    )
             except moderngl.Error as problem:
                 raise RenderError(self._explain(str(problem), files)) from None
         return self._cache[key]

@@ -1,0 +1,353 @@
+"""Signals at chosen moments: what ends the program, what comes too late, what stays behind.
+
+Programs signal themselves at the moment that is tested, so nothing depends on how fast they are.
+"""
+
+from __future__ import annotations
+
+import gc
+import os
+import signal
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+from app.tiny import write_rig
+from children import listening
+from PIL import Image
+
+from viewer.cli import run
+from viewer.interrupts import Interrupted, deferred, hold, poll, raising, watched
+
+ROOT = Path(__file__).resolve().parents[1]
+OLD = b"the old file"
+INT, TERM = signal.SIGINT, signal.SIGTERM
+ENDINGS = {INT: (130, b"viewer: interrupted\n"), TERM: (143, b"viewer: terminated\n")}
+BOTH = pytest.mark.parametrize("number", [INT, TERM], ids=["int", "term"])
+
+# What a child runs: ``strike()`` signals it, once, at a moment that the test's own lines choose.
+PROGRAM = """
+import os, sys
+from viewer.__main__ import main
+done = []
+def strike():
+    if not done:
+        done.append(True)
+        os.kill(os.getpid(), {number})
+def before(owner, name):
+    old = getattr(owner, name)
+    def new(*given, **named):
+        strike()
+        return old(*given, **named)
+    setattr(owner, name, new)
+def after(owner, name, skipped=0):
+    old, left = getattr(owner, name), [skipped]
+    def new(*given, **named):
+        value = old(*given, **named)
+        left[0] -= 1
+        if left[0] < 0:
+            strike()
+        return value
+    setattr(owner, name, new)
+class At:
+    def __init__(self, module):
+        self.module = module
+    def find_spec(self, name, path=None, target=None):
+        if name == self.module:
+            strike()
+{moment}
+code = main()
+assert done or {is_late}, "nothing has been signalled"
+sys.exit(code)
+"""
+
+
+CLIP = """animation {
+range 0 0.2
+numchannels 9
+%s
+}"""
+CHANNEL = """channel {
+extrapolate constant constant
+keys 2 {
+0 0 linear linear
+0.2 %g linear linear
+}
+}"""
+
+
+@pytest.fixture
+def end(tmp_path):
+    """Return a function that runs a command and returns exit code, error stream and output."""
+    files = [str(file) for file in write_rig(tmp_path)]
+    clip = tmp_path / "walk.anim"
+    # Three translations, then x, y, z of the root and of the arm.
+    clip.write_text(CLIP % "\n".join(CHANNEL % end for end in (4, 0, 0, 0, 0, 0, 0, 0, 1.5)))
+    folder = tmp_path / "out"
+    folder.mkdir()
+
+    def ends(moment, number, command, *options, name="", moves=False, is_late=False):
+        program = PROGRAM.format(number=int(number), moment=moment, is_late=is_late)
+        inputs = [*files, *[str(clip)] * moves]
+        if name:
+            (folder / name).write_bytes(OLD)
+            options = (*options, "-o", folder / name, "--force")
+        done = subprocess.run(
+            listening("-c", program, command, *inputs, *options),
+            env={**os.environ, "PYTHONPATH": str(ROOT)},
+            cwd=tmp_path, capture_output=True, timeout=100, check=False,
+        )  # fmt: skip
+        assert sorted(file.name for file in folder.iterdir()) == [name] * bool(name), done.stderr
+        return done.returncode, done.stderr, (folder / name).read_bytes() if name else b""
+
+    return ends
+
+
+PNG = ("render", "--size", "40x30"), {"name": "x.png"}
+MP4 = ("render", "--size", "48x32", "--frames", "0:6"), {"name": "x.mp4", "moves": True}
+OBJ = ("convert",), {"name": "x.ply"}
+INFO = ("info",), {}
+
+
+@pytest.mark.parametrize(
+    "module",
+    [
+        "viewer.interrupts",
+        "viewer.cli",
+        "argparse",
+        "viewer.commands.render",
+        "numpy",
+        "datetime",  # asked for by numpy's own C code, which makes an ImportError of anything
+        "numpy.linalg",
+        "viewer.formats",
+        "viewer.formats.skin",
+        "viewer.rendering.offscreen",
+        "moderngl",
+        "viewer.rendering.program",
+    ],
+)
+def test_import_that_is_interrupted_ends_in_one_line(end, module):
+    command, places = PNG
+    moment = f"sys.meta_path.insert(0, At({module!r}))"
+    assert end(moment, INT, *command, **places) == (*ENDINGS[INT], OLD)
+
+
+@BOTH
+@pytest.mark.parametrize("helper", ["make_attribute", "make_uniform", "make_varying"])
+@pytest.mark.parametrize("kind", [PNG, MP4], ids=["png", "mp4"])
+def test_signal_while_moderngl_calls_python_is_no_crash(end, number, helper, kind):
+    command, places = kind
+    moment = f"import _moderngl\nbefore(_moderngl, {helper!r})"
+    assert end(moment, number, *command, **places) == (*ENDINGS[number], OLD)
+
+
+@BOTH
+@pytest.mark.parametrize(
+    "moment",
+    [
+        "import viewer.rendering.recorder as r\nafter(r._Drawer, '_draw', 2)",
+        "import viewer.rendering.recorder as r\nbefore(r._Drawer, 'release')\n"
+        "def fail(*_): strike()\nr.pose_scene = fail",
+        "import viewer.formats._video as v\nafter(v.VideoSink, 'write')",
+        "import viewer.formats._video as v\nbefore(v.VideoSink, 'close')",
+    ],
+    ids=["frame", "pose", "encoding", "finishing"],
+)
+def test_video_that_is_interrupted_leaves_the_old_file(end, number, moment):
+    command, places = MP4
+    assert end(moment, number, *command, **places) == (*ENDINGS[number], OLD)
+
+
+@BOTH
+@pytest.mark.parametrize(
+    ("kind", "moment"),
+    [
+        (INFO, "import viewer.formats.skin as m\nbefore(m, 'read')"),
+        (INFO, "import viewer.loading as m\nafter(m, 'begin')"),
+        ((("lint",), {}), "import viewer.commands.lint as m\nbefore(m, 'lint_files')"),
+        (OBJ, "import viewer.rig.skinning as m\nbefore(m, 'deform')"),
+        (PNG, "import viewer.rendering.renderer as m\nbefore(m.Renderer, 'draw')"),
+        (PNG, "import os\nbefore(os, 'fsync')"),
+        (OBJ, "import tempfile\nbefore(tempfile, 'mkstemp')"),
+    ],
+)
+def test_command_that_is_interrupted_leaves_the_old_file(end, number, kind, moment):
+    command, places = kind
+    output = OLD if places else b""
+    assert end(moment, number, *command, **places) == (*ENDINGS[number], output)
+
+
+LATE = {
+    "rename": "from pathlib import Path\nafter(Path, 'replace')",
+    "summary": "import builtins\nbefore(builtins, 'print')",
+    "result": "import viewer.cli as c\nafter(c, 'run')",
+    "exit, noted before": "import atexit\natexit.register(strike)",
+    "exit, noted after": "import atexit, viewer.cli as c\n"
+    "before_run = c.run\n"
+    "c.run = lambda given: (atexit.register(strike), before_run(given))[1]",
+    "teardown": "class Last:\n"
+    "    def __del__(self, kill=os.kill, pid=os.getpid()):\n"
+    "        kill(pid, {number})\n"
+    "sys.modules['last'] = Last()",
+}
+
+
+@BOTH
+@pytest.mark.parametrize("moment", LATE)
+@pytest.mark.parametrize("kind", [PNG, MP4, OBJ], ids=["png", "mp4", "ply"])
+def test_signal_after_the_work_is_done_changes_nothing(end, number, moment, kind, tmp_path):
+    command, places = kind
+    lines = LATE[moment].replace("{number}", str(int(number)))
+    is_late = moment[:4] in ("exit", "tear")
+    code, said, output = end(lines, number, *command, **places, is_late=is_late)
+    assert (code, said) == (0, b"") and output not in (OLD, b"")
+    if kind is PNG:
+        with Image.open(tmp_path / "out" / "x.png") as picture:
+            picture.load()
+            assert picture.size == (40, 30)
+
+
+def test_signal_that_python_drops_is_raised_again(end):
+    # What a destructor raises is only reported; so is what a weak reference's callback raises.
+    moment = (
+        "import viewer.commands.info as m\n"
+        "class Dropped:\n"
+        "    def __del__(self): strike()\n"
+        "old = m.run\n"
+        "def run(arguments):\n"
+        "    Dropped()\n"
+        "    while True: pass\n"
+        "m.run = run"
+    )
+    assert end(moment, INT, *INFO[0]) == (*ENDINGS[INT], b"")
+
+
+def test_second_signal_ends_a_program_that_does_not_react(end):
+    moment = (
+        "import time, viewer.commands.info as m\n"
+        "from viewer.interrupts import hold\n"
+        "def run(arguments):\n"
+        "    hold()\n"
+        "    while True:\n"
+        "        os.kill(os.getpid(), 2)\n"
+        "        time.sleep(0.3)\n"
+        "m.run = run"
+    )
+    assert end(moment, INT, *INFO[0], is_late=True) == (*ENDINGS[INT], b"")
+
+
+def test_ignored_signal_stays_ignored(end):
+    command, places = PNG
+    ignores = "import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\n"
+    moment = ignores + "import viewer.rendering.renderer as m\nbefore(m.Renderer, 'draw')"
+    code, said, output = end(moment, INT, *command, **places)
+    assert (code, said) == (0, b"") and output != OLD
+
+
+@pytest.mark.parametrize("arguments", [["--version"], ["info", "/no/such.skel"], ["info", "-?"]])
+def test_callers_handlers_are_back_afterwards(arguments, capsys):
+    def mine(number, frame):
+        """Do nothing."""
+
+    kept = {number: signal.signal(number, mine) for number in (INT, TERM)}
+    hook = sys.unraisablehook
+    try:
+        run(arguments)
+        assert [signal.getsignal(number) for number in kept] == [mine, mine]
+        assert sys.unraisablehook is hook
+    finally:
+        for number, handler in kept.items():
+            signal.signal(number, handler)
+
+
+def test_run_works_in_another_thread(tmp_path, capsys):
+    codes = []
+    files = [str(file) for file in write_rig(tmp_path)]
+    thread = threading.Thread(target=lambda: codes.append(run(["info", *files])))
+    thread.start()
+    thread.join()
+    assert codes == [0] and not capsys.readouterr().err
+
+
+@pytest.fixture
+def ctrl_c():
+    """Return a function that interrupts these tests, which are started as any program is."""
+    kept = signal.signal(INT, signal.default_int_handler)
+    yield lambda: signal.raise_signal(INT)
+    signal.signal(INT, kept)
+
+
+def test_signal_raises_while_watched(ctrl_c):
+    reached = []
+    with pytest.raises(Interrupted) as stop, watched():
+        ctrl_c()
+        reached.append(1)
+    assert stop.value.exit_code == 130 and not reached
+
+
+def test_deferred_signal_raises_at_the_end_of_the_block(ctrl_c):
+    reached = []
+    with pytest.raises(Interrupted), watched():
+        with deferred():
+            with deferred():
+                ctrl_c()
+            reached.append("inner")
+        reached.append("after")
+    assert reached == ["inner"]
+
+
+def test_signal_is_left_to_the_caller_where_nobody_watches(ctrl_c):
+    reached = []
+    with pytest.raises(KeyboardInterrupt):
+        with deferred(), deferred():
+            ctrl_c()
+            reached.append("inner")
+        reached.append("after")
+    assert reached == ["inner"]
+    assert signal.getsignal(INT) is signal.default_int_handler
+
+
+def test_held_signal_waits_for_a_poll(ctrl_c):
+    reached = []
+    with pytest.raises(Interrupted), watched():
+        hold()
+        with deferred():
+            ctrl_c()
+        reached.append("held")
+        poll()
+        reached.append("polled")
+    assert reached == ["held"]
+
+
+def test_held_signal_that_nobody_polls_is_too_late(ctrl_c):
+    with watched():
+        hold()
+        ctrl_c()
+    gc.collect()
+
+
+def test_hold_lasts_until_the_end_of_the_block(ctrl_c):
+    reached = []
+    with pytest.raises(Interrupted), watched():
+        with deferred():
+            hold()
+        hold()
+        with raising():
+            ctrl_c()
+            reached.append(1)
+    assert not reached
+
+
+def test_clean_up_is_not_interrupted_again(ctrl_c):
+    reached = []
+    with pytest.raises(Interrupted), watched():
+        try:
+            ctrl_c()
+        finally:
+            ctrl_c()
+            poll()
+            with deferred():
+                reached.append("clean-up")
+    assert reached == ["clean-up"]

@@ -1,0 +1,286 @@
+"""Ctrl-C, SIGTERM and SIGHUP: noted at once, acted on only where nothing can break.
+
+A handler that raises does so between any two steps of Python: inside a callback of a C library that
+does not expect it (``moderngl.Context.program`` then dereferences NULL), inside an import, inside
+clean-up. So the handler notes the signal, and raises ``Interrupted`` only while Python alone is at
+work::
+
+    with watched():            # the command: reading files, arrays; signals raise within it
+        with deferred():       # OpenGL: noted, raised at the end of the block
+            draw()
+        hold()                 # results are written: from now on only poll() raises
+        for file in files:
+            poll()             # nothing is half done here
+            write(file)
+
+What is signalled after the last ``poll`` comes too late: the work is done, and that is success. A
+second signal that comes a while after the first is for a program that does not react: it ends it.
+"""
+
+from __future__ import annotations
+
+import _thread
+import os
+import signal
+import sys
+import threading
+import time
+from contextlib import contextmanager
+
+# As in ``viewer/__init__.py``: what is imported here delays the moment of looking after signals.
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from sys import UnraisableHookArgs
+    from types import FrameType
+    from typing import Any
+
+__all__ = ["Interrupted", "deferred", "hold", "poll", "program", "raising", "watched"]
+
+_WORDS = {"SIGINT": "interrupted", "SIGTERM": "terminated", "SIGHUP": "hung up"}
+_SIGNALS = {getattr(signal, name): word for name, word in _WORDS.items() if hasattr(signal, name)}
+_SAME = 1.0  # seconds in which further signals count as one: a nervous finger, a group of processes
+_PAUSE = 0.02  # seconds until it is tried again to raise
+
+
+class Interrupted(BaseException):
+    """A signal ends the run; no ``Exception``, so that nobody takes it for a fault of a file.
+
+    Parameters
+    ----------
+    number : int
+        The signal.
+    """
+
+    def __init__(self, number: int) -> None:
+        super().__init__(_SIGNALS[number])
+        self.number = number
+
+    @property
+    def exit_code(self) -> int:
+        """As shells have it: 130 after Ctrl-C, 143 after SIGTERM."""
+        return 128 + self.number
+
+
+class _Watch:
+    """The signals of one run, from ``start`` to ``stop``, both in the main thread."""
+
+    def __init__(self, is_held: bool, owns_process: bool = False) -> None:
+        self.number = 0  # of the signal that came; 0 for none
+        self.is_held = is_held
+        self._owns_process = owns_process
+        self._since = 0.0
+        self._is_echo = False
+        self._is_over = False
+        self._lock = threading.Lock()
+        self._others: dict[int, Any] = {}
+        self._hook = sys.unraisablehook
+
+    def start(self) -> None:
+        for number in _SIGNALS:
+            other = signal.getsignal(number)
+            # Ignored as nohup and shells want it for jobs in the background; None: not Python's.
+            if other not in (signal.SIG_IGN, None):
+                self._others[number] = other
+                signal.signal(number, self._on_signal)
+        self._hook, sys.unraisablehook = sys.unraisablehook, self._on_unraisable
+
+    def stop(self) -> None:
+        """Give the signals back to those who had them."""
+        with self._lock:
+            self._is_over = True
+        sys.unraisablehook = self._hook
+        for number, other in self._others.items():
+            signal.signal(number, other)
+
+    def ignore(self) -> None:
+        """Let signals pass for good: the result stands, and Python is taking itself apart."""
+        for number in self._others:
+            signal.signal(number, signal.SIG_IGN)
+
+    def poll(self) -> None:
+        if self.number and not _is_unwinding():
+            raise Interrupted(self.number)
+
+    def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        is_echo, self._is_echo = self._is_echo, False
+        if not self.number:
+            self.number, self._since = number, time.monotonic()
+        elif not is_echo:
+            if time.monotonic() > self._since + _SAME:
+                self._force(number)
+            return
+        if self.is_held or _is_unwinding():
+            return
+        if _is_importing(frame):
+            self._ring_again()
+        else:
+            raise Interrupted(self.number)
+
+    def _force(self, number: int) -> None:
+        """End a program that does not react; whoever calls it as a library decides on its own."""
+        if self._owns_process:
+            os.write(2, f"viewer: {_SIGNALS[number]}\n".encode())
+            os._exit(128 + number)
+        self.stop()
+        signal.raise_signal(number)
+
+    def _on_unraisable(self, problem: UnraisableHookArgs, /) -> None:
+        """Notice that the signal was raised where Python drops exceptions, as in ``__del__``."""
+        if isinstance(problem.exc_value, Interrupted):
+            self._ring_again()
+        else:
+            self._hook(problem)
+
+    def _ring_again(self) -> None:
+        timer = threading.Timer(_PAUSE, self._echo)
+        timer.daemon = True
+        timer.start()
+
+    def _echo(self) -> None:
+        with self._lock:
+            if not self._is_over:
+                self._is_echo = True
+                _thread.interrupt_main(signal.Signals(self.number))
+
+
+# There is one: signals belong to the process.
+_current: _Watch | None = None
+
+
+def _mine() -> _Watch | None:
+    """Return the watch if this is its thread: others are told by it to end."""
+    is_main = threading.current_thread() is threading.main_thread()
+    return _current if is_main else None
+
+
+@contextmanager
+def watched() -> Iterator[None]:
+    """Raise signals within the block, but for the places that say otherwise.
+
+    Handlers are as before afterwards. In other threads than the main one, to which Python hands
+    signals, this does nothing.
+
+    Raises
+    ------
+    Interrupted
+        In the block, or at its beginning if ``program`` has noted a signal.
+    """
+    global _current
+    outer = _mine()
+    if outer is not None or threading.current_thread() is not threading.main_thread():
+        with _held(outer, False):
+            yield
+        return
+    watch = _current = _Watch(is_held=False)
+    try:
+        watch.start()
+        yield
+    finally:
+        watch.is_held = True  # before anything is called: handlers may run at every call
+        watch.stop()
+        _current = None
+
+
+def program(run: Callable[[], int]) -> int:
+    """Run the whole of a process: signals are noted from now on, and only raised if ``watched``."""
+    global _current
+    import atexit
+
+    watch = _current = _Watch(is_held=True, owns_process=True)
+    watch.start()
+    # First in, last out: Python resets handlers soon after, and must not be killed meanwhile.
+    atexit.register(watch.ignore)
+    return run()
+
+
+@contextmanager
+def deferred() -> Iterator[None]:
+    """Put signals off until the end of the block, for work of C libraries.
+
+    Where nobody watches, as in programs that use the package as a library, their own handlers
+    are called then.
+    """
+    watch = _mine()
+    if watch is not None:
+        with _held(watch, True):
+            yield
+        if not watch.is_held:
+            watch.poll()
+    elif threading.current_thread() is not threading.main_thread():
+        yield
+    else:
+        watch = _Watch(is_held=True)
+        try:
+            watch.start()
+            yield
+        finally:
+            watch.stop()
+            if watch.number:
+                signal.raise_signal(watch.number)
+
+
+@contextmanager
+def raising() -> Iterator[None]:
+    """Let signals raise in the block, even after ``hold``: it takes long, or waits for others."""
+    with _held(_mine(), False):
+        yield
+
+
+@contextmanager
+def _held(watch: _Watch | None, is_held: bool) -> Iterator[None]:
+    if watch is None:
+        yield
+        return
+    before, watch.is_held = watch.is_held, is_held
+    try:
+        if not is_held:
+            watch.poll()
+        yield
+    finally:
+        watch.is_held = before
+
+
+def hold() -> None:
+    """Put signals off until the end of the enclosing block: from now on only ``poll`` raises."""
+    watch = _mine()
+    if watch is not None:
+        watch.is_held = True
+
+
+def poll(in_any_thread: bool = False) -> None:
+    """Raise a signal that was put off, for which this is a good moment.
+
+    Parameters
+    ----------
+    in_any_thread : bool
+        Raise in this thread, even if it is not the one that was interrupted: for the last step of
+        work that the other one waits for.
+
+    Raises
+    ------
+    Interrupted
+        If there was one.
+    """
+    watch = _current if in_any_thread else _mine()
+    if watch is not None:
+        watch.poll()
+
+
+def _is_importing(frame: FrameType | None) -> bool:
+    """Return whether a module is being imported: whatever is raised there may become anything."""
+    while frame is not None:
+        if frame.f_code.co_filename.startswith("<frozen importlib"):
+            return True
+        frame = frame.f_back
+    return False
+
+
+def _is_unwinding() -> bool:
+    """Return whether the signal was raised already, and clean-up is going on."""
+    problem = sys.exc_info()[1]
+    while problem is not None:
+        if isinstance(problem, Interrupted):
+            return True
+        problem = problem.__context__
+    return False
