@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections import Counter
 from typing import Any
 
 from viewer.errors import FormatError, printable
@@ -21,8 +22,8 @@ class MisfitError(ValueError):
 def _unique(pairs: list[tuple[str, Any]]) -> Record:
     values = dict(pairs)
     if len(values) != len(pairs):
-        keys = [key for key, _ in pairs]
-        twice = next(key for key in keys if keys.count(key) > 1)
+        counts = Counter(key for key, _ in pairs)
+        twice = next(key for key, count in counts.items() if count > 1)
         raise MisfitError(f'expected every key once, found "{printable(twice, 40)}" twice')
     return values
 
