@@ -13,6 +13,7 @@ from numpy.testing import assert_array_equal
 
 from viewer.errors import FormatError
 from viewer.formats._archive import Archive, Opaque, Sparse, is_archive, open_archive
+from viewer.formats._container import are_indices
 from viewer.formats._source import Source
 from viewer.rig.arrays import Deferred
 
@@ -280,3 +281,11 @@ def test_values_are_kept() -> None:
     assert isinstance(first, Deferred)
     assert archive.get("v") is first
     assert archive.get("o") == Opaque("object array")
+
+
+def test_halves_are_widened(tmp_path: Path) -> None:
+    """65504 is the largest half: comparing one with a larger number would overflow."""
+    np.savez(tmp_path / "a.npz", half=np.array([0.5, 65504], "f2"))
+    half = open_archive(Source.open(tmp_path / "a.npz")).array("half").values()
+    assert (half.dtype, half.tolist()) == (np.float64, [0.5, 65504.0])
+    assert not are_indices(half, 100_000) and are_indices(half[1:], 100_000)

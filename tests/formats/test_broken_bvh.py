@@ -204,7 +204,7 @@ def test_malformed_files_are_refused_with_their_line(text: str, message: str) ->
         (
             GOOD.replace("0.0333333", "0"),
             2,
-            ["Frame Time is 0: taken for 30 frames a second"],
+            ["Frame Time is 0, expected 1e-06 to 1,000,000 seconds: taken for 30 frames a second"],
         ),
         (
             GOOD.replace("Frames: 2", "Frames: 0").replace(FRAMES, ""),

@@ -60,7 +60,7 @@ def cameras(folder, intrinsic=INTRINSIC, extrinsic=EXTRINSIC):
 
 
 def storage(text):
-    return read_storage(Source("a.yml", text.encode()))
+    return read_storage(Source("a.yml", text.encode())).values
 
 
 def test_cameras_are_read(tmp_path):
@@ -112,14 +112,22 @@ def test_one_file_is_not_enough(tmp_path):
 @pytest.mark.parametrize(
     ("file", "old", "new", "message"),
     [
-        ("intri", "K_01", "K_02", "K_01: expected 3 x 3 numbers, found no such key"),
-        ("intri", "1.2e+03", "-1", "K_01: expected focal lengths above 0 and the last row 0 0 1"),
-        ("extri", "T_01", "T_1", "T_01: expected 3 numbers, found no such key"),
+        ("intri", "K_01", "K_02", "3: K_01: expected 3 x 3 numbers, found no such key"),
+        ("intri", "1.2e+03", "-1",
+         "6: K_01: expected focal lengths above 0 and the last row 0 0 1"),
+        ("intri", "1.2e+03", "1e30", "6: K_01: expected focal lengths of 0.001 to 1e+09 pixels, "
+         "found 1e+30 and 1100.5"),
+        ("intri", "1100.5", "1e-320", "6: K_01: expected focal lengths of 0.001 to 1e+09 pixels, "
+         "found 1200 and 9.99989e-321"),
+        ("intri", "512.", "-1e10", "6: K_01: expected numbers up to 1e+09, found -1e+10"),
+        ("intri", "-0.1,", "-2e6,", "12: dist_01: expected numbers up to 1e+06, found -2e+06"),
+        ("extri", "-1.0, 3.0", "1e38, 3.0", "14: T_01: expected numbers up to 1e+09, found 1e+38"),
+        ("extri", "T_01", "T_1", "3: T_01: expected 3 numbers, found no such key"),
         ("extri", "Rot_01: !!opencv-matrix\n  rows: 3\n  cols: 3",
          "Rot_01: !!opencv-matrix\n  rows: 9\n  cols: 1",
-         "Rot_01: expected 3 x 3 numbers, found 9 x 1"),
+         "9: Rot_01: expected 3 x 3 numbers, found 9 x 1"),
         ("extri", "-1.0, 0.0, 1.0, 0.0]", "-1.0, 0.0, -1.0, 0.0]",
-         "Rot_01: expected a rotation, found a matrix that is none"),
+         "9: Rot_01: expected a rotation, found a matrix that is none"),
     ],
 )  # fmt: skip
 def test_one_broken_camera_is_left_out(tmp_path, file, old, new, message):
@@ -128,7 +136,7 @@ def test_one_broken_camera_is_left_out(tmp_path, file, old, new, message):
     texts[file] = texts[file].replace(old, new, 1)
     views, notes = cameras(tmp_path, *texts.values())
     assert [view.name for view in views] == ["b c"]
-    assert notes == [f"{tmp_path}/{file}.yml: {message}; this camera is left out"]
+    assert notes == [f"{tmp_path}/{file}.yml:{message}; this camera is left out"]
 
 
 @pytest.mark.parametrize(

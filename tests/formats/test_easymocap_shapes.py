@@ -1,6 +1,7 @@
 """Coefficients that records leave out: which of the earlier ones they get."""
 
 import numpy as np
+import pytest
 from capture_files import body, opened, rows_of, waves, write_frames
 from numpy.testing import assert_array_equal
 
@@ -124,3 +125,34 @@ def test_faulty_record_without_shapes_leaves_the_others_alone(tmp_path):
     write_frames(tmp_path / "smpl", {**frames, 3: [bare]})
     _, parts, _ = opened(tmp_path)
     assert rows_of(parts, 0) == [0, 1, 3] and shapes_of(parts, 0) == [2.0] * 3
+
+
+@pytest.mark.parametrize("key", ["shapes", "expression"])
+@pytest.mark.parametrize("empty", [[], [[]]], ids=["list", "matrix"])
+def test_empty_coefficients_are_none(tmp_path, key, empty):
+    missing = write_frames(tmp_path / "a", {0: [body(0, **{key: None})], 1: [body(0)]})
+    written = write_frames(tmp_path / "b", {0: [body(0, **{key: empty})], 1: [body(0)]})
+    expected, found = (opened(folder)[1] for folder in (missing, written))
+    assert rows_of(found, 0) == [0, 1]
+    for part, other in zip(found, expected, strict=True):
+        assert [text.partition(": ")[2] for text in part.warnings] == [
+            text.partition(": ")[2] for text in other.warnings
+        ]
+        motion, wanted = part.bodies[0], other.bodies[0]
+        assert (motion.expression is None) == (wanted.expression is None)
+        if key == "shapes":
+            assert_array_equal(motion.shape, wanted.shape)
+
+
+def test_empty_shapes_are_carried_on(tmp_path):
+    frames = {0: [body(0, shapes=[[2.0] * 10])], 1: [body(0, shapes=[])], 2: [body(0, shapes=[[]])]}
+    write_frames(tmp_path / "smpl", frames)
+    _, parts, _ = opened(tmp_path)
+    assert rows_of(parts, 0) == [0, 1, 2] and shapes_of(parts, 0) == [2.0] * 3
+
+
+@pytest.mark.parametrize("empty", [[], [[]]])
+def test_hands_without_components_are_not_there(tmp_path, empty):
+    write_frames(tmp_path / "smpl", {0: [body(0, 63, handl=empty, handr=[[0.5] * 6])]})
+    _, parts, _ = opened(tmp_path)
+    assert list(parts[0].bodies[0].hands) == ["right"]

@@ -197,3 +197,19 @@ def test_distortion_by_hand():
     assert error(0.0, 0.0, 0.0, 0.01) == pytest.approx(math.hypot(0.5, 1.0))
     # k4 = 1 divides by 1.5: each axis loses a third of its 50 pixels.
     assert error(0, 0, 0, 0, 0, 1.0) == pytest.approx(50 / 3 * math.sqrt(2))
+
+
+def test_a_camera_very_far_away_keeps_a_depth_range():
+    for distance in (1e9, 1e20, 1e38):
+        camera = Camera(fixed=camera_view(translation=[0.0, 0.0, distance]))
+        matrix = camera.projection_matrix(1.0, BOX)
+        assert np.isfinite(matrix).all()
+        clip = matrix @ [0.0, 0.0, -distance, 1.0]
+        assert -1.0 <= clip[2] / clip[3] <= 1.0
+
+
+def test_a_lens_that_divides_by_zero_bends_beyond_all_bounds():
+    """Corners at r^2 = 0.5, so k4 = -2 makes the divisor 1 - 2 * 0.5 = 0."""
+    k = np.array([[100.0, 0.0, 50.0], [0.0, 100.0, 50.0], [0.0, 0.0, 1.0]])
+    view = camera_view(intrinsic=k, size=(101, 101), distortion=[0.0] * 5 + [-2.0])
+    assert distortion_error(view) > 1e9

@@ -19,6 +19,7 @@ __all__ = [
     "apply_time",
     "numbering_of",
     "parse_range",
+    "rate",
 ]
 
 _SLOWEST, _FASTEST = 0.001, 100_000.0  # frames a second
@@ -178,7 +179,7 @@ def add_frame_arguments(parser: argparse.ArgumentParser, many: str = "") -> None
     )
     group.add_argument(
         "--fps",
-        type=_rate,
+        type=rate,
         metavar="R",
         help="frames a second: of captures, and by which frames of clips are counted "
         "(default: the file's own, or 30)",
@@ -204,7 +205,8 @@ def parse_range(text: str) -> Range:
     )
 
 
-def _rate(text: str) -> float:
+def rate(text: str) -> float:
+    """Return the frames a second that an option is given; see ``number`` for what it raises."""
     value = number(text)
     if not _SLOWEST <= value <= _FASTEST:
         raise argparse.ArgumentTypeError(

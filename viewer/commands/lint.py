@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from viewer.commands._frame_numbers import rate
 from viewer.commands._numbers import number
 from viewer.commands._progress import Progress
 from viewer.commands._scene import (
@@ -90,7 +91,7 @@ def _add_limits(group: argparse._ArgumentGroup) -> None:
     )
     group.add_argument(
         "--fps",
-        type=number,
+        type=rate,
         metavar="N",
         help="frames a second of captures, and by which clips of keys are counted (default: 30)",
     )

@@ -228,7 +228,8 @@ class _Writer:
         motion = bvh.read(Source(path, text))
         skeleton, clip = motion.figure.skeleton, motion.clip
         assert skeleton is not None  # the reader gives one
-        place = [skeleton.names.index(name) for name in self.names]
+        numbers = {name: joint for joint, name in enumerate(skeleton.names)}
+        place = [numbers[name] for name in self.names]
         first = int(self.options.rest_frame)
         worst = (0.0, self.names[0])
         for row in range(start, stop, _BLOCK):

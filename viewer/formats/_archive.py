@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from viewer.errors import FormatError, printable
 from viewer.formats._faults import Part
+from viewer.formats._floats import in_double, widened
 from viewer.formats._source import MAX_SIZE, Source
 from viewer.rig.arrays import Deferred
 
@@ -221,7 +222,7 @@ class Archive:
         if value is None or value.dtype.kind not in kinds or not _fits(shape, value.shape):
             found = describe(self.get(key))
             raise self.error(key, f"expected {_wanted(shape, kinds)}, found {found}")
-        return value
+        return widened(value)
 
     def sparse(self, key: str, shape: Axes | None = None) -> Sparse:
         """Return a matrix as its entries, no matter whether the file holds it sparse or dense.
@@ -241,7 +242,7 @@ class Archive:
         value = self.get(key)
         if isinstance(value, Sparse):
             if _fits(shape, value.shape):
-                return value
+                return replace(value, data=in_double(value.data))
             found = describe(value)
             raise self.error(key, f"expected {_wanted(shape, 'biuf')}, found {found}")
         dense = self.array(key, (None, None) if shape is None else shape).values()

@@ -12,6 +12,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.joint_names import canonical_names
 from viewer.rig.motion import DEFAULT_RATE, frames_of, world_frames
 from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.timing import FASTEST, SLOWEST, is_rate
 from viewer.rig.units import METRES, SIZES, WORDS
 
 __all__ = ["frame_rate", "guess_unit", "guess_up"]
@@ -37,8 +38,9 @@ def frame_rate(source: Source, frame_time: bytes | None) -> float:
     ``0.0333333`` is 30 a second, ``0.033367`` is 30000/1001, ``0.1`` is 10.
     """
     seconds = 0.0 if frame_time is None else float(frame_time.rstrip(b"fF"))
-    if seconds == 0.0 or not 1e-6 < 1.0 / seconds < 1e6:
-        found = "is missing" if frame_time is None else f"is {seconds:g}"
+    if seconds == 0.0 or not is_rate(1.0 / seconds):
+        usual = f"expected {1.0 / FASTEST:g} to {1.0 / SLOWEST:,.0f} seconds"
+        found = "is missing" if frame_time is None else f"is {seconds:g}, {usual}"
         source.warn(f"Frame Time {found}: taken for {DEFAULT_RATE:g} frames a second")
         return DEFAULT_RATE
     assert frame_time is not None  # or there would be no seconds

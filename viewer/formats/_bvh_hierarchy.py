@@ -71,19 +71,21 @@ class _Parser:
         self.source = source
         self.words = source.words()
         self.word: Word | None = None
+        self.keyword = b""  # the word in capitals
         self.found: list[BvhJoint] = []
         self.open: list[int] = []
+        self.n_joints = 0  # of those found; the others are End Sites
         self.extra_braces = 0
 
     def hierarchy(self) -> Hierarchy:
         """Return the joints and the place of the motion."""
         self._advance()
-        if self._keyword() != b"HIERARCHY":
+        if self.keyword != b"HIERARCHY":
             looks = self.source.looks_like()
             hint = f" ({looks})" if looks else ""
             raise self._error(f"expected HIERARCHY, found {self._shown()}{hint}")
         self._advance()
-        while self.word is not None and (self.open or self._keyword() != b"MOTION"):
+        while self.word is not None and (self.open or self.keyword != b"MOTION"):
             self._item()
         if self.open:
             raise self._still_open()
@@ -94,7 +96,7 @@ class _Parser:
         return Hierarchy(self.found, -1 if self.word is None else self.word.end())
 
     def _item(self) -> None:
-        keyword = self._keyword()
+        keyword = self.keyword
         joint = self.found[self.open[-1]] if self.open else None
         if keyword == b"}":
             self._close()
@@ -118,9 +120,9 @@ class _Parser:
 
     def _open_joint(self, is_end: bool = False) -> None:
         assert self.word is not None  # the caller looked at it
-        start, keyword = self.word.start(), self._keyword()
+        start, keyword = self.word.start(), self.keyword
         self._advance()
-        if keyword == b"END" and self._keyword() == b"SITE":
+        if keyword == b"END" and self.keyword == b"SITE":
             self._advance()
         name: list[str] = []
         while self.word is not None and self.word.group() not in (b"{", b"}"):
@@ -139,12 +141,13 @@ class _Parser:
             )
         self.open.append(len(self.found))
         self.found.append(joint)
+        self.n_joints += not is_end
         self._advance()
 
     def _begins_item(self) -> bool:
         """Return whether a name is over because its "{" is missing: a keyword with its number."""
         assert self.word is not None  # the caller looked at it
-        if self._keyword() not in _ITEMS[:2]:
+        if self.keyword not in _ITEMS[:2]:
             return False
         following = self.source.next_word(self.word.end())
         return following is not None and to_number(following.group()) is not None
@@ -176,7 +179,7 @@ class _Parser:
         joint.offset = values
 
     def _offset_error(self, joint: BvhJoint, keyword: Word, found: int) -> FormatError:
-        if self.word is not None and self._keyword() not in (b"{", b"}", *_ITEMS):
+        if self.word is not None and self.keyword not in (b"{", b"}", *_ITEMS):
             return self._error(f"OFFSET of {_called(joint)}: {no_number(self.word.group())}")
         return self.source.error(
             f"OFFSET of {_called(joint)}: expected 3 numbers, found {found}", keyword.start()
@@ -184,10 +187,9 @@ class _Parser:
 
     def _refuse_offset(self, joint: BvhJoint, error: FormatError) -> None:
         """Refuse an OFFSET; where faults are noted it is 0 0 0, and reading goes on behind it."""
-        place = sum(not other.is_end for other in self.found) - 1
-        self.source.refuse(error, 1, "joints", () if joint.is_end else [place])
+        self.source.refuse(error, 1, "joints", () if joint.is_end else [self.n_joints - 1])
         joint.offset = [0.0, 0.0, 0.0]
-        while self.word is not None and self._keyword() not in (b"{", b"}", *_ITEMS):
+        while self.word is not None and self.keyword not in (b"{", b"}", *_ITEMS):
             self._advance()
 
     def _channels(self, joint: BvhJoint) -> None:
@@ -203,8 +205,8 @@ class _Parser:
             )
         self._advance()
         codes: list[int] = []
-        while self.word is not None and self._keyword() not in (b"{", b"}", *_ITEMS):
-            code = CHANNELS.get(self._keyword())
+        while self.word is not None and self.keyword not in (b"{", b"}", *_ITEMS):
+            code = CHANNELS.get(self.keyword)
             if code is None:
                 raise self._error(
                     f"CHANNELS of {_called(joint)}: expected {_CHANNEL_NAMES}, "
@@ -227,9 +229,7 @@ class _Parser:
 
     def _advance(self) -> None:
         self.word = next(self.words, None)
-
-    def _keyword(self) -> bytes:
-        return b"" if self.word is None else self.word.group().upper()
+        self.keyword = b"" if self.word is None else self.word.group().upper()
 
     def _shown(self) -> str:
         return "the end of the file" if self.word is None else shown(self.word.group())

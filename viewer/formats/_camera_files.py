@@ -34,7 +34,7 @@ from viewer.rig.arrays import Floats
 from viewer.rig.camera_view import CameraView
 from viewer.rig.rotation import rotation_vector_to_matrix
 
-__all__ = ["find_cameras", "read_storage"]
+__all__ = ["Storage", "find_cameras", "read_storage"]
 
 _INTRINSIC, _EXTRINSIC = "intri.yml", "extri.yml"
 _KEY = re.compile(rb"([^\s:\-#\"][^\s:]*|\"[^\"\r\n]*\")[ \t]*:(?:[ \t]+|$)(.*)")
@@ -42,8 +42,35 @@ _PART = re.compile(rb"[ \t]+(rows|cols|dt|data)[ \t]*:[ \t]*(.*)")
 _ITEM = re.compile(rb"[ \t]*-[ \t]*(.*)")
 _MOST = 100_000  # numbers of a matrix
 _NEAR = 1e-3  # calibrations are written with few digits
+_LARGEST = 1e9  # pixels of a calibration, and scene units to a camera
+_SHORTEST = 1e-3  # focal length, pixels
+_MOST_BENT = 1e6  # coefficient of a lens
 
 Value = Floats | list[str] | str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Storage:
+    """What a FileStorage file holds.
+
+    Attributes
+    ----------
+    source : Source
+        The file.
+    values : dict
+        Matrices, lists of texts and single texts by name.
+    lines : dict of str to int
+        Where each key is.
+    """
+
+    source: Source
+    values: dict[str, Value] = field(default_factory=dict)
+    lines: dict[str, int] = field(default_factory=dict)
+
+    def error(self, key: str, message: str) -> FormatError:
+        """Return an error at the line of a key; at that of the cameras' names if it is missing."""
+        line = self.lines.get(key, self.lines.get("names"))
+        return FormatError(self.source.path, f"{printable(key, 40)}: {message}", line)
 
 
 def find_cameras(
@@ -84,70 +111,75 @@ def _cameras(intrinsic: Source, extrinsic: Source) -> tuple[tuple[CameraView, ..
     views, notes = [], []
     for name in _names(inner, outer):
         try:
-            views.append(_camera(name, intrinsic, inner, extrinsic, outer))
+            views.append(_camera(name, inner, outer))
         except FormatError as problem:
             notes.append(f"{problem}; this camera is left out")
     return tuple(views), notes
 
 
-def _names(inner: dict[str, Value], outer: dict[str, Value]) -> list[str]:
+def _names(inner: Storage, outer: Storage) -> list[str]:
     """Return the cameras that one of the files lists, or else those that have a matrix K."""
-    for values in (inner, outer):
-        listed = values.get("names")
+    for file in (inner, outer):
+        listed = file.values.get("names")
         if isinstance(listed, list):
             return list(dict.fromkeys(listed))
-    return [key.removeprefix("K_") for key in inner if key.startswith("K_")]
+    return [key.removeprefix("K_") for key in inner.values if key.startswith("K_")]
 
 
-def _camera(
-    name: str,
-    intrinsic: Source,
-    inner: dict[str, Value],
-    extrinsic: Source,
-    outer: dict[str, Value],
-) -> CameraView:
-    matrix = _matrix(intrinsic, inner, f"K_{name}", (3, 3))
-    if not (matrix[[0, 1], [0, 1]] > 0).all() or not np.allclose(matrix[2], [0, 0, 1]):
-        raise intrinsic.error(
-            f"K_{printable(name, 40)}: expected focal lengths above 0 and the last row 0 0 1"
-        )
-    lens = next((inner[key] for key in (f"dist_{name}", f"D_{name}") if key in inner), None)
-    distortion = lens.ravel() if isinstance(lens, np.ndarray) else np.zeros(0)
-    sizes = [inner.get(f"{axis}_{name}") for axis in "WH"]
-    pixels = [_pixels(size) for size in sizes]
-    width, height = pixels
+def _camera(name: str, inner: Storage, outer: Storage) -> CameraView:
+    matrix = _matrix(inner, f"K_{name}", (3, 3))
+    focal = matrix[[0, 1], [0, 1]]
+    if not (focal > 0).all() or not np.allclose(matrix[2], [0, 0, 1]):
+        raise inner.error(f"K_{name}", "expected focal lengths above 0 and the last row 0 0 1")
+    if not (focal.min() >= _SHORTEST and focal.max() <= _LARGEST):
+        wanted = f"expected focal lengths of {_SHORTEST:g} to {_LARGEST:g} pixels"
+        raise inner.error(f"K_{name}", f"{wanted}, found {focal[0]:g} and {focal[1]:g}")
+    _check_size(inner, f"K_{name}", matrix[:2])
+    lens = next((key for key in (f"dist_{name}", f"D_{name}") if key in inner.values), "")
+    values = inner.values.get(lens)
+    distortion = values.ravel() if isinstance(values, np.ndarray) else np.zeros(0)
+    _check_size(inner, lens, distortion, _MOST_BENT)
+    translation = _matrix(outer, f"T_{name}", (3,))
+    _check_size(outer, f"T_{name}", translation)
+    sizes = [inner.values.get(f"{axis}_{name}") for axis in "WH"]
+    width, height = [_pixels(size) for size in sizes]
     return CameraView(
         name,
         matrix,
-        _rotation(extrinsic, outer, name),
-        _matrix(extrinsic, outer, f"T_{name}", (3,)),
+        _rotation(outer, name),
+        translation,
         (width, height) if width and height else None,
         distortion,
     )
 
 
-def _rotation(source: Source, values: dict[str, Value], name: str) -> Floats:
+def _check_size(file: Storage, key: str, values: Floats, largest: float = _LARGEST) -> None:
+    """Refuse numbers beyond those with which single precision can draw."""
+    worst = float(values.ravel()[np.abs(values).argmax()]) if values.size else 0.0
+    if abs(worst) > largest:
+        raise file.error(key, f"expected numbers up to {largest:g}, found {worst:g}")
+
+
+def _rotation(file: Storage, name: str) -> Floats:
     """Return R: the matrix if the file has it, else of the rotation vector."""
-    if f"Rot_{name}" not in values:
-        return rotation_vector_to_matrix(_matrix(source, values, f"R_{name}", (3,)))
-    rotation = _matrix(source, values, f"Rot_{name}", (3, 3))
+    if f"Rot_{name}" not in file.values:
+        return rotation_vector_to_matrix(_matrix(file, f"R_{name}", (3,)))
+    rotation = _matrix(file, f"Rot_{name}", (3, 3))
     off = np.abs(rotation @ rotation.T - np.eye(3)).max()
     if off > _NEAR or np.linalg.det(rotation) < 0.0:
-        raise source.error(
-            f"Rot_{printable(name, 40)}: expected a rotation, found a matrix that is none"
-        )
+        raise file.error(f"Rot_{name}", "expected a rotation, found a matrix that is none")
     return rotation
 
 
-def _matrix(source: Source, values: dict[str, Value], key: str, shape: tuple[int, ...]) -> Floats:
-    value = values.get(key)
+def _matrix(file: Storage, key: str, shape: tuple[int, ...]) -> Floats:
+    value = file.values.get(key)
     wanted = " x ".join(map(str, shape))
     if not isinstance(value, np.ndarray):
         found = "no such key" if value is None else "something else"
-        raise source.error(f"{printable(key, 40)}: expected {wanted} numbers, found {found}")
+        raise file.error(key, f"expected {wanted} numbers, found {found}")
     if value.size != np.prod(shape) or (len(shape) == 2 and value.shape != shape):
         found = " x ".join(map(str, value.shape))
-        raise source.error(f"{printable(key, 40)}: expected {wanted} numbers, found {found}")
+        raise file.error(key, f"expected {wanted} numbers, found {found}")
     return value.reshape(shape)
 
 
@@ -168,8 +200,8 @@ class _Matrix:
     is_open: bool = False  # whether the list of numbers goes on
 
 
-def read_storage(source: Source) -> dict[str, Value]:
-    """Return what a FileStorage file holds: matrices, lists of texts and single texts by name.
+def read_storage(source: Source) -> Storage:
+    """Return what a FileStorage file holds.
 
     Parameters
     ----------
@@ -181,7 +213,8 @@ def read_storage(source: Source) -> dict[str, Value]:
     FormatError
         With the line that is not understood.
     """
-    values: dict[str, Value] = {}
+    file = Storage(source)
+    values = file.values
     matrix: _Matrix | None = None
     listed: list[str] | None = None
     for number, line in _lines(source.data):
@@ -192,6 +225,7 @@ def read_storage(source: Source) -> dict[str, Value]:
             name, rest = _text(key[1]), key[2].strip()
             if name in values:
                 raise FormatError(source.path, f'expected every key once, found "{name}"', number)
+            file.lines[name] = number
             if rest.startswith(b"!!opencv-matrix"):
                 matrix = _Matrix(name, number)
             elif rest.startswith(b"[") and rest.endswith(b"]"):
@@ -208,7 +242,7 @@ def read_storage(source: Source) -> dict[str, Value]:
             found = shown(line.strip())
             raise FormatError(source.path, f"expected name: value, found {found}", number)
     _close(source, matrix, values)
-    return values
+    return file
 
 
 def _lines(data: bytes) -> Iterator[tuple[int, bytes]]:

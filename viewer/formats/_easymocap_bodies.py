@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from viewer.formats._easymocap_json import MisfitError, row_of, take_row
+from viewer.formats._easymocap_json import MisfitError, has_numbers, row_of, take_row
 from viewer.formats._easymocap_shapes import COEFFICIENTS, carry, last_given
 from viewer.formats._numbers import LARGEST
 from viewer.rig.arrays import Bools, Floats
@@ -104,10 +104,10 @@ def body_layout(record: dict[str, Any]) -> BodyLayout:
         known = ", ".join(str(number) for number in sorted(_LAYOUTS))
         raise MisfitError(f"poses: expected {known} numbers, found {count}")
     widths = [("Rh", 3), ("Th", 3), ("poses", count)]
-    widths += [(key, len(row_of(record, key))) for key in COEFFICIENTS if key in record]
+    widths += [(key, len(row_of(record, key))) for key in COEFFICIENTS if has_numbers(record, key)]
     hands = layout.hands
     if count == 63:
-        keys = [key for key in ("handl", "handr") if key in record]
+        keys = [key for key in ("handl", "handr") if has_numbers(record, key)]
         widths += [(key, len(row_of(record, key))) for key in keys]
     return BodyLayout(
         layout.model,
@@ -129,7 +129,7 @@ def with_coefficients(layout: BodyLayout, record: dict[str, Any]) -> BodyLayout:
         If they are no numbers.
     """
     known = [key for key, _ in layout.widths]
-    new = [key for key in COEFFICIENTS if key in record and key not in known]
+    new = [key for key in COEFFICIENTS if has_numbers(record, key) and key not in known]
     more = [(key, len(row_of(record, key))) for key in new]
     return replace(layout, widths=(*layout.widths, *more))
 
@@ -216,7 +216,7 @@ class BodyRows(Rows):
         self._drop_unfinished()
         try:
             for key, count, put in self._plan:
-                if key in record or key not in COEFFICIENTS:
+                if has_numbers(record, key) or key not in COEFFICIENTS:
                     take_row(record, key, count, put)
                 else:
                     self._lack(key, count, put)

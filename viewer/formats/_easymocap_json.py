@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import os
+from collections import Counter
 from typing import Any
 
 from viewer.errors import FormatError, printable
 from viewer.formats._archive import describe
 
-__all__ = ["MisfitError", "load_people", "person_of", "row_of", "take_row"]
+__all__ = ["MisfitError", "has_numbers", "load_people", "person_of", "row_of", "take_row"]
 
 Record = dict[str, Any]
 
@@ -21,8 +22,8 @@ class MisfitError(ValueError):
 def _unique(pairs: list[tuple[str, Any]]) -> Record:
     values = dict(pairs)
     if len(values) != len(pairs):
-        keys = [key for key, _ in pairs]
-        twice = next(key for key in keys if keys.count(key) > 1)
+        counts = Counter(key for key, _ in pairs)
+        twice = next(key for key, count in counts.items() if count > 1)
         raise MisfitError(f'expected every key once, found "{printable(twice, 40)}" twice')
     return values
 
@@ -101,6 +102,11 @@ def person_of(record: Any, place: int) -> int:
     if abs(person) >= 1 << 31:
         raise MisfitError(f"id: expected less than 2147483648, found {describe(person)}")
     return person
+
+
+def has_numbers(record: Record, key: str) -> bool:
+    """Return whether a record has a key, and more than an empty list or matrix under it."""
+    return key in record and record[key] not in ([], [[]])
 
 
 def row_of(record: Record, key: str) -> list[Any]:

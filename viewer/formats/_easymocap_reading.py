@@ -15,7 +15,7 @@ from viewer.formats._easymocap_bodies import (
     with_coefficients,
 )
 from viewer.formats._easymocap_files import FrameFiles, FrameFolder
-from viewer.formats._easymocap_json import MisfitError, load_people, person_of
+from viewer.formats._easymocap_json import MisfitError, has_numbers, load_people, person_of
 from viewer.formats._easymocap_points import KEY, Parts, PointRows, point_layout
 from viewer.formats._easymocap_shapes import COEFFICIENTS
 from viewer.rig.arrays import Floats
@@ -185,8 +185,7 @@ class Reading:
         layout = self.body_layout
         if layout is None:
             layout = body_layout(record)
-        elif any(key in record for key in self._awaited):
-            first = [key for key in self._awaited if key in record]
+        elif first := [key for key in self._awaited if has_numbers(record, key)]:
             layout = with_coefficients(layout, record)
             self._say_once(path, f"the first record with {' and '.join(first)}: 0 before it")
         else:

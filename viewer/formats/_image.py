@@ -11,6 +11,7 @@ import numpy as np
 
 from viewer.errors import FormatError, printable
 from viewer.formats._png import encode_png
+from viewer.formats._references import referenced_path
 from viewer.formats._save import save_bytes
 from viewer.formats._source import Source, read_bytes
 from viewer.rig.arrays import Bytes
@@ -33,7 +34,7 @@ def load_image(source: Source, name: str, offset: int) -> Bytes | None:
     source : Source
         The file that names the picture.
     name : str
-        The picture, relative to that file's folder; back slashes count as slashes.
+        The picture, which must lie below that file's folder, see ``referenced_path``.
     offset : int
         Where the name is in the file.
 
@@ -42,7 +43,10 @@ def load_image(source: Source, name: str, offset: int) -> Bytes | None:
     (H, W, 4) uint8 or None
         sRGB with alpha, first row at the top.
     """
-    path = source.path.parent / name.replace("\\", "/")
+    path = referenced_path(source.path.parent, name)
+    if path is None:
+        source.warn(f"texture {printable(name)} lies outside the folder: not read", offset)
+        return None
     try:
         return _decode(path, read_bytes(path))
     except FormatError as problem:

@@ -11,8 +11,9 @@ Colours and other maps are not shown. An option is a word that begins with ``-``
 from __future__ import annotations
 
 from viewer.errors import FormatError, counted, printable
+from viewer.formats._image import load_image
+from viewer.formats._references import referenced_path
 from viewer.formats._source import Source
-from viewer.formats._surface import is_below, texture
 from viewer.rig.arrays import Bytes
 from viewer.rig.mesh import Material
 
@@ -60,7 +61,7 @@ def read_libraries(
             continue
         file, where, library = pictures[name]
         if file not in loaded:
-            loaded[file] = texture(library, file, where)
+            loaded[file] = load_image(library, file, where)
         materials.append(Material(name, file, loaded[file]))
     return tuple(materials)
 
@@ -69,11 +70,12 @@ def _opened(source: Source, text: bytes, offset: int) -> list[Source]:
     """Return the libraries of one ``mtllib``: one whose name may hold blanks, or several."""
     whole = text.decode("utf-8", "surrogateescape")
     names = [whole]
-    if " " in whole and not (is_below(whole) and (source.path.parent / whole).is_file()):
+    path = referenced_path(source.path.parent, whole)
+    if " " in whole and not (path and path.is_file()):
         names = whole.split()
     found = []
     for name in names:
-        if not is_below(name):
+        if referenced_path(source.path.parent, name) is None:
             source.warn(
                 f"material library {printable(name)} lies outside the folder: not read", offset
             )

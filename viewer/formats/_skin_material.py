@@ -49,13 +49,14 @@ def read_material(
     """
     name, brace = _name(source, header, keywords)
     texture: str | None = None
+    named = header.start()
     position = brace.end()
     while (word := source.next_word(position)) is not None and word.group() != b"}":
         if word.group() == b"texture":
             rest = _FILE_NAME.match(source.data, word.end())
             assert rest is not None  # the pattern matches the empty string too
             texture = rest[1].strip().decode("utf-8", "surrogateescape") or None
-            position = rest.end()
+            named, position = word.start(), rest.end()
         else:
             source.warn(f"skipped unknown {shown(word.group())} in a material", word.start())
             position = _skip(source, word)
@@ -69,7 +70,7 @@ def read_material(
         source.warn("material without texture: drawn untextured", header.start())
         return Material(name), word.end()
     if texture not in pictures:
-        pictures[texture] = load_image(source, texture, header.start())
+        pictures[texture] = load_image(source, texture, named)
     return Material(name, texture, pictures[texture]), word.end()
 
 

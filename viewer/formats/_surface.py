@@ -1,21 +1,19 @@
-"""What readers of plain meshes share: normals for every vertex, textures, the up axis."""
+"""What readers of plain meshes share: normals for every vertex, the up axis, the unit."""
 
 from __future__ import annotations
 
 import re
-from pathlib import PurePath
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.errors import counted, printable
-from viewer.formats._image import load_image
+from viewer.errors import counted
 from viewer.formats._source import Source
-from viewer.rig.arrays import Bytes, Floats, Ints
+from viewer.rig.arrays import Floats, Ints
 from viewer.rig.mesh import vertex_normals
 
-__all__ = ["filled_normals", "is_below", "polygon_text", "stated_unit", "stated_up", "texture"]
+__all__ = ["filled_normals", "polygon_text", "stated_unit", "stated_up"]
 
 _SHORTEST = 1e-15  # of a normal: the square of a shorter one is 0 in float32
 _SIZES = {3: "triangles", 4: "quads"}
@@ -57,21 +55,6 @@ def polygon_text(counts: NDArray[np.int64], n_triangles: int) -> str:
     parts = [text for text in sizes if not text.startswith("0 ")]
     parts += [f"{large} with 5 or more corners"] * (large > 0)
     return f"{', '.join(parts)}: {n_triangles} triangles in all"
-
-
-def texture(source: Source, name: str, offset: int) -> Bytes | None:
-    """Return the pixels of a picture below the file's folder; a warning where there are none."""
-    if not is_below(name):
-        source.warn(f"texture {printable(name)} lies outside the folder: not read", offset)
-        return None
-    return load_image(source, name, offset)
-
-
-def is_below(name: str) -> bool:
-    """Return whether a path stays inside the folder that it is relative to."""
-    path = PurePath(name.replace("\\", "/"))
-    has_drive = re.match(r"[A-Za-z]:", name) is not None
-    return not (path.is_absolute() or has_drive or ".." in path.parts or not path.parts)
 
 
 def stated_up(comment: str) -> Literal["y", "z"]:

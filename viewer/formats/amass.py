@@ -27,7 +27,7 @@ from viewer.formats._tolerant import held_rows
 from viewer.rig.arrays import Deferred, Floats, Ints
 from viewer.rig.body_motion import BodyMotion
 from viewer.rig.smpl_family import FAMILY, members_by_numbers
-from viewer.rig.timing import Timing
+from viewer.rig.timing import RATES, Timing, is_rate
 
 __all__ = ["has_frames", "read"]
 
@@ -68,6 +68,7 @@ _KNOWN = {
 _OF_MOTIONS = (*_RATES, "mocap_time_length")
 _OF_AMASS = ("mocap_framerate", "mocap_frame_rate", "mocap_time_length", "dmpls", "pose_body")
 _RATE, _RATE_OF_AIST = 30.0, 60.0
+_MOST_SCALED = 1e6  # of a body; AIST++ scales by about 100
 _SAME = 1e-5  # radians or metres: what float32 leaves of numbers below 100
 
 
@@ -272,9 +273,10 @@ def _translations(source: Source, archive: Archive, count: int, first: str) -> F
     if rows.shape[1] != 3:
         raise archive.error(key, f"expected 3 numbers a frame, found {rows.shape[1]}")
     scale = _single(archive, "smpl_scaling") if archive.has("smpl_scaling") else 1.0
-    if scale <= 0.0:
-        raise archive.error("smpl_scaling", f"expected a number above 0, found {scale:g}")
-    return rows / scale
+    if not 1.0 / _MOST_SCALED <= scale <= _MOST_SCALED:
+        wanted = f"expected {1.0 / _MOST_SCALED:g} to {_MOST_SCALED:g}"
+        raise archive.error("smpl_scaling", f"{wanted}, found {scale:g}")
+    return finite(archive, key, rows / scale)
 
 
 def _coefficients(
@@ -300,8 +302,8 @@ def _single(archive: Archive, key: str) -> float:
 def _rate(source: Source, archive: Archive, is_aist: bool) -> float:
     rates = {key: _single(archive, key) for key in _RATES if archive.has(key)}
     for key, rate in rates.items():
-        if not 0.0 < rate < 1e6:
-            raise archive.error(key, f"expected more than 0 frames a second, found {rate:g}")
+        if not is_rate(rate):
+            raise archive.error(key, f"expected {RATES}, found {rate:g}")
     if len(set(rates.values())) > 1:
         given = ", ".join(f"{key} {rate:g}" for key, rate in rates.items())
         source.warn(f"frame rates that differ ({given}): the first is taken")

@@ -105,15 +105,15 @@ def _table(source: Source, joints: list[BvhJoint]) -> _Table:
     kept: list[BvhJoint] = []
     count = 0
     for index, joint in enumerate(joints):
-        what = f"joint {printable(joint.name, 60)}" if joint.name else "a joint without a name"
         if joint.offset is None:
             end = "an End Site of " * joint.is_end
-            source.warn(f"{end}{what} has no OFFSET: taken for 0 0 0", joint.start)
+            source.warn(f"{end}{_called(joint)} has no OFFSET: taken for 0 0 0", joint.start)
         codes = joint.channels or []
         if joint.is_end:
             ends.append((place[joint.parent], joint.offset or [0.0, 0.0, 0.0]))
             if codes:
-                source.warn(f"ignored the channels of an End Site of {what}", joint.start)
+                what = f"the channels of an End Site of {_called(joint)}"
+                source.warn(f"ignored {what}", joint.start)
         else:
             place[index] = len(kept)
             kept.append(joint)
@@ -127,6 +127,10 @@ def _table(source: Source, joints: list[BvhJoint]) -> _Table:
         ends,
         count,
     )
+
+
+def _called(joint: BvhJoint) -> str:
+    return f"joint {printable(joint.name, 60)}" if joint.name else "a joint without a name"
 
 
 def _refuse_empty_joints(source: Source, table: _Table, motion: Motion) -> None:

@@ -17,12 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.errors import counted, printable
+from viewer.formats._image import load_image
 from viewer.formats._numbers import LARGEST
 from viewer.formats._ply_header import Header, read_header
 from viewer.formats._ply_rows import Table, read_tables
 from viewer.formats._polygons import first_known, triangles_of, triangulate
 from viewer.formats._source import Source
-from viewer.formats._surface import filled_normals, polygon_text, stated_unit, stated_up, texture
+from viewer.formats._surface import filled_normals, polygon_text, stated_unit, stated_up
 from viewer.formats._tolerant import mended_positions
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
@@ -233,7 +234,7 @@ def _materials(source: Source, header: Header, has_uvs: bool) -> tuple[Material,
     if len(named) > 1:
         source.warn(f"{len(named)} textures: only the first is used", named[1][1])
     name, offset = named[0]
-    return (Material(name, name, texture(source, name, offset)),)
+    return (Material(name, name, load_image(source, name, offset)),)
 
 
 def _note_words(source: Source, table: Table, names: list[str]) -> None:

@@ -5,7 +5,8 @@ r"""Read ``.rig`` files (UCSD course CSE169): the names of files that belong tog
     rig   = "rig" name? "{" item* "}"
     item  = "skeleton" file | "skin" file | "morphs" n "{" file*n "}"
 
-Files are relative to the ``.rig`` itself. A name may have blanks if it stands in double quotes.
+Files are relative to the folder of the ``.rig``, and must lie below it. A name may have blanks if
+it stands in double quotes.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from pathlib import Path
 
 from viewer.errors import FormatError
 from viewer.formats._numbers import to_number
+from viewer.formats._references import referenced_path
 from viewer.formats._source import Source, shown
 
 __all__ = ["NamedFiles", "read"]
@@ -61,7 +63,7 @@ def read(source: Source) -> NamedFiles:
     while words and words[-1].group() not in (b"{", b"}"):
         name.append(_text(words.pop()))
     _expect(source, words, b"{")
-    files: list[str] = []
+    files: list[Path] = []
     while words and words[-1].group() != b"}":
         files += _item(source, words)
     if not words:
@@ -70,11 +72,10 @@ def read(source: Source) -> NamedFiles:
         source.warn(f"ignored what follows the rig, {shown(words[-2].group())}", words[-2].start())
     if not files:
         raise source.error("expected a skeleton or a skin, found no name of a file")
-    folder = source.path.parent
-    return NamedFiles(" ".join(name) or source.path.stem, tuple(folder / file for file in files))
+    return NamedFiles(" ".join(name) or source.path.stem, tuple(files))
 
 
-def _item(source: Source, words: Words) -> list[str]:
+def _item(source: Source, words: Words) -> list[Path]:
     word = words.pop()
     if word.group() in (b"skeleton", b"skin"):
         return [_file(source, words, word.group().decode())]
@@ -96,10 +97,17 @@ def _item(source: Source, words: Words) -> list[str]:
     return files
 
 
-def _file(source: Source, words: Words, what: str) -> str:
+def _file(source: Source, words: Words, what: str) -> Path:
     if not words or words[-1].group() in (b"{", b"}"):
         raise _wrong(source, words, f"{what}: expected the name of a file")
-    return _text(words.pop())
+    word = words.pop()
+    path = referenced_path(source.path.parent, _text(word))
+    if path is None:
+        raise source.error(
+            f"{what}: expected a file below the folder of the .rig, found {shown(word.group())}",
+            word.start(),
+        )
+    return path
 
 
 def _text(word: re.Match[bytes]) -> str:

@@ -16,6 +16,7 @@ rotation DOFs; the first also has three translations, which ``.anim`` calls the 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -45,12 +46,12 @@ class _Joint:
     name: str
     parent: int
     start: int
-    offset: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
-    boxmin: list[float] = field(default_factory=lambda: [-0.1, -0.1, -0.1])
-    boxmax: list[float] = field(default_factory=lambda: [0.1, 0.1, 0.1])
-    pose: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
-    limits: list[list[float]] = field(default_factory=lambda: [[-np.inf, np.inf] for _ in "xyz"])
-    limit_starts: list[int] = field(default_factory=lambda: [0, 0, 0])
+    offset: Sequence[float] = (0.0, 0.0, 0.0)
+    boxmin: Sequence[float] = (-0.1, -0.1, -0.1)
+    boxmax: Sequence[float] = (0.1, 0.1, 0.1)
+    pose: Sequence[float] = (0.0, 0.0, 0.0)
+    # By axis: the limits, and where they are.
+    limits: dict[int, tuple[list[float], int]] = field(default_factory=dict)
 
 
 def read(source: Source) -> Figure:
@@ -154,8 +155,7 @@ class _Parser:
         start = self.word.start()
         values = self._numbers(2)
         if values:
-            joint = self.found[self.open[-1]]
-            joint.limits[axis], joint.limit_starts[axis] = values, start
+            self.found[self.open[-1]].limits[axis] = values, start
 
     def _numbers(self, count: int) -> list[float]:
         """Read the numbers of an item; the current word is its keyword.
@@ -276,7 +276,10 @@ def _skeleton(source: Source, joints: list[_Joint]) -> tuple[Skeleton, Floats]:
     # The root's translations come first, as in the channels of .anim.
     kinds = np.concatenate([np.arange(6), np.tile([3, 4, 5], n_joints - 1)])
     owners = np.concatenate([np.zeros(6, int), np.repeat(np.arange(1, n_joints), 3)])
-    rotation_limits = np.array([joint.limits for joint in joints]).reshape(-1, 2)
+    rotation_limits = np.tile([-np.inf, np.inf], (3 * n_joints, 1))
+    for index, joint in enumerate(joints):
+        for axis, (values, _) in joint.limits.items():
+            rotation_limits[3 * index + axis] = values
     _check_limits(source, joints, rotation_limits)
     limits = np.concatenate([np.tile([-np.inf, np.inf], (3, 1)), rotation_limits])
     dofs = np.concatenate([np.zeros(3), np.array([joint.pose for joint in joints]).ravel()])
@@ -308,6 +311,6 @@ def _check_limits(source: Source, joints: list[_Joint], limits: Floats) -> None:
         source.warn(
             f"ignored {counted(len(wrong), 'limit')} whose minimum is above the maximum, first "
             f"rot{axis}limit {low:g} {high:g} of joint {_called(joint)}",
-            joint.limit_starts[wrong[0] % 3],
+            joint.limits[int(wrong[0] % 3)][1],
         )
         limits[wrong] = -np.inf, np.inf

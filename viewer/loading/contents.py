@@ -7,8 +7,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
-from viewer.errors import FormatError
-from viewer.formats import MAX_SIZE, Source, claims, detect, is_picture, read, read_picture
+from viewer.errors import FormatError, printable
+from viewer.formats import (
+    MAX_SIZE,
+    Source,
+    claims,
+    detect,
+    is_picture,
+    read,
+    read_picture,
+    referenced_path,
+)
 from viewer.loading.settings import MotionSettings
 from viewer.rig.arrays import Bytes
 from viewer.rig.figure import Figure
@@ -165,6 +174,9 @@ def _with_own_picture(source: Source, figure: Figure) -> Figure:
     for path in sorted(source.path.iterdir()):
         inside = source.inside(path.name)
         if path.is_file() and _is_picture(inside):
+            if referenced_path(source.path, path.name) is None:
+                source.warn(f"texture {printable(path.name)} lies outside the folder: not read")
+                continue
             pictures.append(inside)
     if len(pictures) > 1:
         source.warn(f"{len(pictures)} pictures in the folder: name the texture to show it")

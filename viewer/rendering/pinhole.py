@@ -12,6 +12,8 @@ from viewer.rig.mesh import box_size
 __all__ = ["distortion_error", "picture_size", "pinhole_projection", "pinhole_view"]
 
 _FLIP = np.diag([1.0, -1.0, -1.0])  # OpenCV looks along z with y down, OpenGL along -z with y up
+_UNBOUNDED = 1e9  # in place of an infinite distortion
+_THINNEST = 1e-6  # depth before and behind what is drawn, in distances
 _NEAREST = 5e-3  # near plane, of the distance to the middle of what is drawn
 
 
@@ -74,7 +76,9 @@ def pinhole_projection(view: CameraView, aspect: float, box: Floats) -> Floats:
     k = view.intrinsic / view.intrinsic[2, 2]
     distance = float(np.linalg.norm(view.rotation @ box.mean(axis=0) + view.translation))
     reach = box_size(box) or distance or 1.0
-    near, far = max(distance - reach, _NEAREST * (distance + reach)), distance + 20.0 * reach
+    # Seen from very far away, both planes would be at the same distance.
+    before, behind = max(reach, _THINNEST * distance), max(20.0 * reach, _THINNEST * distance)
+    near, far = max(distance - before, _NEAREST * (distance + reach)), distance + behind
     matrix = np.zeros((4, 4))
     # Camera space is OpenCV's with y and z turned round: its z is -w.
     matrix[0, :3] = 2.0 * k[0, 0] / width, -2.0 * k[0, 1] / width, _offset(k[0, 2], width)
@@ -121,7 +125,10 @@ def distortion_error(view: CameraView) -> float:
     corners = [[u, v, 1.0] for u in (0.0, width - 1.0) for v in (0.0, height - 1.0)]
     x, y, _ = np.linalg.solve(k, np.transpose(corners))
     r2 = x * x + y * y
-    radial = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)))
+    # Where the divisor is 0, the model has no place for the corner.
+    with np.errstate(divide="ignore", invalid="ignore"):
+        radial = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)))
+    radial = np.where(np.isfinite(radial), radial, _UNBOUNDED)
     dx = x * (radial - 1.0) + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
     dy = y * (radial - 1.0) + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
     moved = k[:2, :2] @ np.stack([dx, dy])

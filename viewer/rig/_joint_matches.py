@@ -10,7 +10,7 @@ import numpy as np
 from viewer.errors import RigError
 from viewer.rig.arrays import Ints
 from viewer.rig.joint_names import canonical_names, plain_names
-from viewer.rig.skeleton import Skeleton, joint_label
+from viewer.rig.skeleton import Skeleton, joint_labels
 
 __all__ = ["Matches", "match_joints"]
 
@@ -148,8 +148,9 @@ def _misfit(
 
 def _left(source: Skeleton, target: Skeleton, partners: Ints) -> tuple[list[str], list[str]]:
     used = set(partners.tolist())
-    unused = [joint_label(source, j) for j in range(source.n_joints) if j not in used]
-    return unused, [joint_label(target, int(j)) for j in np.flatnonzero(partners < 0)]
+    unused = [label for j, label in enumerate(joint_labels(source)) if j not in used]
+    idle = joint_labels(target)
+    return unused, [idle[j] for j in np.flatnonzero(partners < 0)]
 
 
 def _listed(names: list[str], limit: int) -> str:
@@ -160,8 +161,9 @@ def _listed(names: list[str], limit: int) -> str:
 def _notes(
     source: Skeleton, target: Skeleton, partners: Ints, titles: tuple[str, str]
 ) -> list[str]:
+    moved, movers = joint_labels(target), joint_labels(source)
     pairs = [
-        f"{joint_label(target, joint)} by {joint_label(source, partner)}"
+        f"{moved[joint]} by {movers[partner]}"
         for joint, partner in enumerate(partners)
         if partner >= 0 and target.names[joint] != source.names[partner]
     ]

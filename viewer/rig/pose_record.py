@@ -21,7 +21,7 @@ from viewer.rig.pose_transfer import (
 )
 from viewer.rig.pose_vector import read_vector, set_joint_rotations, write_vector
 from viewer.rig.rotation import rotation_vector_to_matrix
-from viewer.rig.skeleton import DOF_KINDS, Skeleton, clamp_dofs, dof_label, find_dof
+from viewer.rig.skeleton import DOF_KINDS, Skeleton, clamp_dofs, dof_labels, find_dof
 from viewer.rig.smpl_family import members_by_numbers
 
 __all__ = ["PARTS", "PoseRecord", "apply_record", "record_of", "unused_coefficients"]
@@ -101,7 +101,7 @@ def record_of(figure: Figure, pose: Pose) -> PoseRecord:
     weights[: len(pose.shape_weights)] = pose.shape_weights
     is_shape = np.array([group == "shape" for group in groups], dtype=bool)
     return PoseRecord(
-        dofs={dof_label(skeleton, dof): float(v) for dof, v in enumerate(pose.dofs)},
+        dofs=dict(zip(dof_labels(skeleton), pose.dofs.tolist(), strict=True)),
         vector=write_vector(figure.pose_layout, skeleton, pose),
         shape=weights[is_shape] if is_shape.any() else None,
         expression=weights[~is_shape] if (~is_shape).any() else None,

@@ -16,6 +16,7 @@ __all__ = [
     "ball_skeleton",
     "clamp_dofs",
     "dof_label",
+    "dof_labels",
     "find_dof",
     "find_joint",
     "joint_label",
@@ -225,6 +226,13 @@ def dof_label(skeleton: Skeleton, dof: int) -> str:
         Joint label, a dot, and the kind from ``DOF_KINDS``.
     """
     return f"{joint_label(skeleton, skeleton.dof_joints[dof])}.{DOF_KINDS[skeleton.dof_kinds[dof]]}"
+
+
+def dof_labels(skeleton: Skeleton) -> list[str]:
+    """Return the names of all DOFs, as ``dof_label`` does for one; linear in the joints."""
+    joints = joint_labels(skeleton)
+    owners, kinds = skeleton.dof_joints.tolist(), skeleton.dof_kinds.tolist()
+    return [f"{joints[joint]}.{DOF_KINDS[kind]}" for joint, kind in zip(owners, kinds, strict=True)]
 
 
 def find_dof(skeleton: Skeleton, label: str) -> int:

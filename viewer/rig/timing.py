@@ -9,9 +9,24 @@ import numpy as np
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints, frozen
 
-__all__ = ["Timing"]
+__all__ = ["FASTEST", "RATES", "SLOWEST", "Timing", "is_rate"]
+
+SLOWEST, FASTEST = 1e-6, 1e6
+"""Frames a second: with fewer or more, times of long motions have no exact numbers."""
+
+RATES = f"{SLOWEST:g} to {FASTEST:,.0f} frames a second"
+"""The same, for messages."""
 
 _ON_FRAME = 1e-6  # of a frame: nearer than this to a frame is that frame
+
+
+def is_rate(rate: float) -> bool:
+    """Return whether a motion can have so many frames a second.
+
+    >>> is_rate(29.97), is_rate(1e-320), is_rate(float("nan"))
+    (True, False, False)
+    """
+    return SLOWEST <= rate <= FASTEST
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,10 +55,8 @@ class Timing:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "rows", frozen("rows", self.rows, (None,), np.int32))
-        if not 0.0 < self.frame_rate < 1e6:
-            raise RigError(
-                f"frame rate: expected more than 0 frames a second, found {self.frame_rate:g}"
-            )
+        if not is_rate(self.frame_rate):
+            raise RigError(f"frame rate: expected {RATES}, found {self.frame_rate:g}")
 
     @property
     def n_frames(self) -> int:

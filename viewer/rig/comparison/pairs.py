@@ -122,7 +122,8 @@ def pair_names(first: Sequence[str], second: Sequence[str], what: str) -> Pairs:
     both = np.array(shared, dtype=np.int32).reshape(-1, 2)
     mismatches = []
     for ordinal, names, others in (("first", first, second), ("second", second, first)):
-        lone = [name for name in names if name not in set(others)]
+        known = set(others)
+        lone = [name for name in names if name not in known]
         if lone:
             mismatches.append(f"{counted(len(lone), what)} only in the {ordinal}: {_listed(lone)}")
     names = tuple(first[number] for number in both[:, 0])

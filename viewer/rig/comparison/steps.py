@@ -13,7 +13,7 @@ from viewer.rig.comparison.pairs import pair_names
 from viewer.rig.motion import frame_rate, pose_actor
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor, figure_pose
-from viewer.rig.skeleton import Skeleton, dof_label
+from viewer.rig.skeleton import Skeleton, dof_labels
 
 __all__ = ["FrameRange", "Steps", "steps_of"]
 
@@ -149,9 +149,7 @@ def _motion_steps(first: Actor, second: Actor, frames: FrameRange | None) -> Ste
 
 
 def _test_poses(first: Skeleton, second: Skeleton, n_poses: int) -> Steps:
-    labels = [dof_label(first, dof) for dof in range(first.n_dofs)]
-    others = [dof_label(second, dof) for dof in range(second.n_dofs)]
-    pairs = pair_names(labels, others, "DOF")
+    pairs = pair_names(dof_labels(first), dof_labels(second), "DOF")
     limits = np.stack([first.dof_limits[pairs.first], second.dof_limits[pairs.second]])
     mismatches = list(pairs.mismatches)
     other = np.flatnonzero((limits[0] != limits[1]).any(axis=1))

@@ -1,0 +1,187 @@
+"""Files that a file names must lie below its folder, links resolved, in every format alike."""
+
+import json
+
+import numpy as np
+import pytest
+from pig_text import write as write_pig
+from PIL import Image
+from skin_text import BINDINGS, NORMALS, POSITIONS, TRIANGLES, WEIGHTS
+
+import viewer
+from viewer.errors import FormatError
+from viewer.formats import Source, read, referenced_path
+from viewer.formats.rig import NamedFiles
+from viewer.loading.contents import read_files
+
+UVS = "texcoords 3 {\n 0 0\n 1 0\n 0 1\n}\n"
+OBJ = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\n"
+PLY = (
+    "ply\nformat ascii 1.0\ncomment TextureFile {}\nelement vertex 3\nproperty float x\n"
+    "property float y\nproperty float z\nproperty float s\nproperty float t\nelement face 1\n"
+    "property list uchar int vertex_indices\nend_header\n0 0 0 0 0\n1 0 0 1 0\n0 1 0 0 1\n3 0 1 2\n"
+)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Return a model's folder, with a secret picture beside it, and links that lead there."""
+    model = tmp_path / "model"
+    (tmp_path / "secret").mkdir()
+    (model / "sub").mkdir(parents=True)
+    for path in (tmp_path / "secret" / "x.png", model / "in.png", model / "sub" / "in.png"):
+        Image.new("RGB", (1, 1), (9, 8, 7)).save(path)
+    (model / "link.png").symlink_to(tmp_path / "secret" / "x.png")
+    (model / "way").symlink_to(tmp_path / "secret")
+    (model / "same.png").symlink_to("sub/in.png")
+    return model
+
+
+OUTSIDE = [
+    "../secret/x.png",
+    "..\\secret\\x.png",
+    "sub/../../secret/x.png",
+    "link.png",
+    "way/x.png",
+    "{top}/secret/x.png",
+    "{top}/model/in.png",  # a name that fits only this machine
+    "C:\\x.png",
+    "C:x.png",
+    "../model2/x.png",
+    "..",
+    ".",
+    "",
+]
+INSIDE = [
+    "in.png",
+    "sub/in.png",
+    "sub\\in.png",
+    "same.png",
+    "sub/../in.png",
+    "./in.png",
+    "gone.png",
+]
+
+
+@pytest.mark.parametrize("name", OUTSIDE)
+def test_what_leads_out_of_the_folder_is_refused(folder, name):
+    (folder.parent / "model2").mkdir()
+    assert referenced_path(folder, name.format(top=folder.parent)) is None
+
+
+@pytest.mark.parametrize("name", INSIDE)
+def test_what_stays_below_the_folder_is_found(folder, name):
+    assert referenced_path(folder, name) == folder / name.replace("\\", "/")
+
+
+def test_links_in_a_circle_stay_where_they_are(folder):
+    (folder / "round.png").symlink_to("round.png")
+    assert referenced_path(folder, "round.png") == folder / "round.png"
+
+
+def skin_text(name):
+    material = f"material a {{\n texture {name}\n}}\n"
+    return POSITIONS + NORMALS + UVS + WEIGHTS + material + TRIANGLES + BINDINGS
+
+
+def write_model(folder, kind, name):
+    """Write a model that names a picture; return its path, and file and line of the name."""
+    path = folder / f"a.{kind}"
+    if kind == "obj":
+        (folder / "m.mtl").write_text(f"newmtl a\nmap_Kd {name}\n")
+        path.write_text(OBJ)
+        return path, f"{folder}/m.mtl:2"
+    text = skin_text(name) if kind == "skin" else PLY.format(name)
+    path.write_text(text)
+    line = next(number for number, row in enumerate(text.splitlines(), 1) if name in row)
+    return path, f"{path}:{line}"
+
+
+@pytest.mark.parametrize("kind", ["skin", "obj", "ply"])
+@pytest.mark.parametrize("name", ["../secret/x.png", "{top}/secret/x.png", "link.png", "way/x.png"])
+def test_a_texture_from_outside_is_not_read(folder, kind, name):
+    name = name.format(top=folder.parent)
+    path, place = write_model(folder, kind, name)
+    source = Source.open(path)
+    (material,) = read(source).mesh.materials
+    assert (material.texture, material.image) == (name, None)
+    assert source.warnings == [f"{place}: texture {name} lies outside the folder: not read"]
+
+
+@pytest.mark.parametrize("kind", ["skin", "obj", "ply"])
+@pytest.mark.parametrize("name", ["in.png", "sub/in.png", "same.png"])
+def test_a_texture_below_the_folder_is_read(folder, kind, name):
+    path, _ = write_model(folder, kind, name)
+    source = Source.open(path)
+    (material,) = read(source).mesh.materials
+    assert material.image.tolist() == [[[9, 8, 7, 255]]]
+    assert source.warnings == []
+
+
+def test_a_library_behind_a_link_is_not_read(folder):
+    path, _ = write_model(folder, "obj", "in.png")
+    (folder / "m.mtl").rename(folder.parent / "secret" / "m.mtl")
+    (folder / "m.mtl").symlink_to(folder.parent / "secret" / "m.mtl")
+    source = Source.open(path)
+    assert read(source).mesh.materials[0].image is None
+    assert source.warnings[0] == (
+        f"{path}:1: material library m.mtl lies outside the folder: not read"
+    )
+
+
+@pytest.mark.parametrize("item", ["skeleton {}", "skin {}", "morphs 1 {{ {} }}"])
+@pytest.mark.parametrize("name", ["../secret/a.skel", "{top}/secret/a.skel", "way/a.skel"])
+def test_a_rig_that_names_files_elsewhere_is_refused(folder, item, name):
+    name = name.format(top=folder.parent)
+    with pytest.raises(FormatError) as caught:
+        read(Source(folder / "a.rig", f"rig a {{\n{item.format(name)}\n}}\n".encode()))
+    assert caught.value.line == 2
+    assert f'below the folder of the .rig, found "{name[:39]}' in str(caught.value)
+
+
+def test_a_rig_may_use_back_slashes(folder):
+    named = read(Source(folder / "a.rig", b"rig a { skeleton sub\\a.skel }"))
+    assert isinstance(named, NamedFiles)
+    assert named.paths == (folder / "sub" / "a.skel",)
+
+
+def test_the_picture_of_a_pig_folder_may_not_be_a_link_out_of_it(folder):
+    pig = write_pig(folder / "pig")
+    (pig / "skin.png").symlink_to(folder.parent / "secret" / "x.png")
+    contents = read_files([pig])
+    assert contents.figures[0][1].mesh.materials == ()
+    assert f"{pig}: texture skin.png lies outside the folder: not read" in contents.warnings
+
+
+def test_a_link_is_opened_beside_its_neighbours(folder):
+    path, _ = write_model(folder, "skin", "in.png")
+    elsewhere = folder.parent / "elsewhere"
+    elsewhere.mkdir()
+    (elsewhere / "b.skin").symlink_to(path)
+    source = Source.open(elsewhere / "b.skin")
+    assert read(source).mesh.materials[0].image is None
+    assert f"texture {elsewhere}/in.png: cannot be read" in source.warnings[0]
+    Image.new("RGB", (1, 1), (1, 2, 3)).save(elsewhere / "in.png")
+    (material,) = read(Source.open(elsewhere / "b.skin")).mesh.materials
+    assert material.image.tolist() == [[[1, 2, 3, 255]]]
+
+
+def test_a_picture_that_the_user_names_may_lie_anywhere(folder):
+    path, _ = write_model(folder, "skin", "gone.png")
+    scene = viewer.load(path, folder / "link.png")
+    (material,) = scene.actors[0].figure.mesh.materials
+    assert np.asarray(material.image).tolist() == [[[9, 8, 7, 255]]]
+
+
+def test_a_secret_picture_is_not_written_again(folder, tmp_path, capsys):
+    from viewer.cli import run
+
+    path, place = write_model(folder, "skin", "../secret/x.png")
+    out = tmp_path / "out"
+    out.mkdir()
+    assert run(["convert", str(path), "-o", str(out / "a.gltf")]) == 0
+    assert sorted(file.name for file in out.iterdir()) == ["a.bin", "a.gltf"]
+    assert "images" not in json.loads((out / "a.gltf").read_text())
+    assert f"{place}: texture ../secret/x.png lies outside the folder: not read" in (
+        capsys.readouterr().err
+    )
