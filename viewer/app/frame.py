@@ -105,11 +105,11 @@ class Frame:
         state.limit_camera()
         self._do_wanted()
         self._take_loaded()
-        self._take_streamed()
         self._work()
+        self._keep_edits()
+        self._take_streamed()
         self._pose()
         self.renderer.marks, self.renderer.ghost = show_finding(state), show_rig(state)
-        state.history.observe(state.scene, state.options, is_held(state))
         self._draw_scene(scale)
         if self.target is not None:
             answer_picks(state, self.renderer, self.target.size, scale, self._drawn)
@@ -130,23 +130,29 @@ class Frame:
         if drag is None or drag.has_moved:
             self.state.playback.advance(imgui.get_io().delta_time)
 
+    def _keep_edits(self) -> None:
+        """Keep what was edited as a step, before the clock poses the scene; or restore a step.
+
+        Undo has brought back clips and poses: the clock follows to their time.
+        """
+        state, history = self.state, self.state.history
+        history.observe(state.scene, state.options, is_held(state))
+        if history.has_restored:
+            self._clips = _clips(state.scene)
+            state.playback.follow(state.scene.actors, state.actor)
+            state.playback.seek(history.time)
+            state.playback.pose(state.scene, again=True)
+            history.settle(state.scene, state.playback.time)
+            follow_actor(state)
+
     def _pose(self) -> None:
         """Pose the actors for the time that is shown, if it or their clips changed."""
-        state = self.state
-        clips = tuple((actor.clip, actor.offset) for actor in state.scene.actors)
+        state, clips = self.state, _clips(self.state.scene)
         changed = clips != self._clips
         if changed:
             self._clips = clips
-            if not (self._is_first or state.history.has_restored):
-                # Undoing goes back to the time and poses from before the clock follows.
-                state.history.observe(state.scene, state.options, is_held(state))
             state.playback.follow(state.scene.actors, state.actor)
-        if state.history.has_restored:
-            # Undoing has brought back poses with their time: they stay as they were.
-            state.playback.seek(state.history.time)
-            state.playback.accept()
-            state.history.has_restored = False
-        elif state.playback.pose(state.scene, again=changed and not self._is_first):
+        if state.playback.pose(state.scene, again=changed and not self._is_first):
             state.history.follow(state.scene, state.playback.time)
             follow_actor(state)
         self._is_first = False
@@ -175,7 +181,7 @@ class Frame:
             return
         if grew:
             state.scene.actors += new
-            self._clips = tuple((actor.clip, actor.offset) for actor in state.scene.actors)
+            self._clips = _clips(state.scene)
             state.playback.follow(state.scene.actors, state.actor)
             state.playback.pose(state.scene, again=True)
             state.history.add_actors(state.scene, state.options)
@@ -393,3 +399,8 @@ class Frame:
         if self.target is not None:
             self.target.release()
         self.renderer.release()
+
+
+def _clips(scene: Scene) -> tuple[object, ...]:
+    """Return what actors are posed by, and when."""
+    return tuple((actor.clip, actor.offset) for actor in scene.actors)

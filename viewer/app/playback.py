@@ -253,10 +253,6 @@ class Playback:
         pose_actors(scene.actors, self.time, self.fill_gaps)
         return True
 
-    def accept(self) -> None:
-        """Take the present poses for those of the time shown: they were edited, or undone."""
-        self._posed = self.time, self.fill_gaps
-
 
 def _length(actor: Actor) -> float:
     assert actor.clip is not None  # only what moves is compared
