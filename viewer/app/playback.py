@@ -156,6 +156,17 @@ class Playback:
         """Return the seconds of a frame."""
         return self.origin + frame / self.frame_rate
 
+    def nearest_frame_time(self, time: float) -> float:
+        """Return the seconds of the frame of the whole range that is nearest to a time."""
+        low, high = self.frame_range
+        if low > high:  # too short for a frame
+            return time
+        return self.frame_time(min(max(round((time - self.origin) * self.frame_rate), low), high))
+
+    def scrub(self, time: float, between: bool = False) -> None:
+        """Go to the frame that is nearest to a time; to the time itself if asked to."""
+        self.seek(time if between else self.nearest_frame_time(time))
+
     def seek(self, time: float) -> None:
         """Go to a time; within the range unless playing runs on."""
         is_free = self.mode == "run on"
