@@ -79,7 +79,7 @@ def test_undoing_a_key_edit_shows_the_restored_clip(curves, name, held, monkeypa
     go(curves, time)
     before = curves.dofs()
     if held:
-        monkeypatch.setattr("viewer.app.frame.is_held", lambda state: True)
+        monkeypatch.setattr("viewer.app.clock.is_held", lambda state: True)
     EDITS[name](state)
     curves.step(2)
     monkeypatch.undo()
@@ -252,7 +252,7 @@ def test_edits_while_another_actor_plays_have_their_steps(curves, held, monkeypa
     curves.step(3)
     steps = curves.undo_steps
     if held:
-        monkeypatch.setattr("viewer.app.frame.is_held", lambda state: True)
+        monkeypatch.setattr("viewer.app.clock.is_held", lambda state: True)
     still.pose.dofs[ARM_X] = 0.4
     curves.step(3)
     monkeypatch.undo()
@@ -268,7 +268,7 @@ def test_edits_while_another_actor_plays_have_their_steps(curves, held, monkeypa
 
 def test_drag_there_and_back_is_no_step(curves, monkeypatch):
     pose = curves.state.actor.pose
-    monkeypatch.setattr("viewer.app.frame.is_held", lambda state: True)
+    monkeypatch.setattr("viewer.app.clock.is_held", lambda state: True)
     start = pose.dofs[ARM_X]
     for value in (0.4, start):
         pose.dofs[ARM_X] = value

@@ -12,10 +12,9 @@ import moderngl
 import numpy as np
 from imgui_bundle import imgui
 
-from viewer.app.actions import follow_actor
+from viewer.app.clock import Clock
 from viewer.app.explanation_lines import draw_hovered, pinned_annotations
 from viewer.app.file_dialog import PICTURES, FileDialog, draw_file_dialog, folder_of
-from viewer.app.gizmo import is_held
 from viewer.app.gizmo_drawing import draw_gizmo
 from viewer.app.interface import draw_interface
 from viewer.app.jobs import FrameJob
@@ -74,8 +73,7 @@ class Frame:
         self.renderer = Renderer(context)
         self.target: Target | None = None
         self._drawn: object = None
-        self._clips: tuple[object, ...] = ()
-        self._is_first = True
+        self.clock = Clock(state)
         state.stats.renderer = context.info["GL_RENDERER"]
         state.stats.version = context.info["GL_VERSION"]
 
@@ -93,7 +91,7 @@ class Frame:
         """
         started = time.perf_counter()
         state = self.state
-        self._play()
+        self.clock.advance()
         self._check_shapes()
         self.open(draw_interface(state))
         draw_record_dialog(state)
@@ -106,9 +104,9 @@ class Frame:
         self._do_wanted()
         self._take_loaded()
         self._work()
-        self._keep_edits()
+        self.clock.keep_edits()
         self._take_streamed()
-        self._pose()
+        self.clock.pose()
         self.renderer.marks, self.renderer.ghost = show_finding(state), show_rig(state)
         self._draw_scene(scale)
         if self.target is not None:
@@ -119,43 +117,6 @@ class Frame:
         framebuffer.clear(0.10, 0.11, 0.12, 1.0)
         imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
         state.stats.frame_ms = 1e3 * (time.perf_counter() - started)
-
-    def _play(self) -> None:
-        """Let the clock run on, by the time since the last frame was begun.
-
-        It waits while a handle is held that has not been dragged yet: a click must not pause, and
-        the pose in which a drag began must stay.
-        """
-        drag = self.state.posing.drag
-        if drag is None or drag.has_moved:
-            self.state.playback.advance(imgui.get_io().delta_time)
-
-    def _keep_edits(self) -> None:
-        """Keep what was edited as a step, before the clock poses the scene; or restore a step.
-
-        Undo has brought back clips and poses: the clock follows to their time.
-        """
-        state, history = self.state, self.state.history
-        history.observe(state.scene, state.options, is_held(state))
-        if history.has_restored:
-            self._clips = _clips(state.scene)
-            state.playback.follow(state.scene.actors, state.actor)
-            state.playback.seek(history.time)
-            state.playback.pose(state.scene, again=True)
-            history.settle(state.scene, state.playback.time)
-            follow_actor(state)
-
-    def _pose(self) -> None:
-        """Pose the actors for the time that is shown, if it or their clips changed."""
-        state, clips = self.state, _clips(self.state.scene)
-        changed = clips != self._clips
-        if changed:
-            self._clips = clips
-            state.playback.follow(state.scene.actors, state.actor)
-        if state.playback.pose(state.scene, again=changed and not self._is_first):
-            state.history.follow(state.scene, state.playback.time)
-            follow_actor(state)
-        self._is_first = False
 
     def _work(self) -> None:
         """Go on with what takes longer than a frame, and say how it ended."""
@@ -180,12 +141,7 @@ class Frame:
             stream.cancel()
             return
         if grew:
-            state.scene.actors += new
-            self._clips = _clips(state.scene)
-            state.playback.follow(state.scene.actors, state.actor)
-            state.playback.pose(state.scene, again=True)
-            state.history.add_actors(state.scene, state.options)
-            state.history.follow(state.scene, state.playback.time)
+            self.clock.add(new)
         state.say(*notes)
         if stream.is_done:
             state.stream = None
@@ -324,7 +280,7 @@ class Frame:
         if state.stream is not None:
             state.stream.cancel()
         state.show_scene(scene, paths)
-        self._is_first = True
+        self.clock.is_first = True
         self.stream(builders)
         if self.keeps_recent:
             problem_text = remember(state.recent, paths)
@@ -399,8 +355,3 @@ class Frame:
         if self.target is not None:
             self.target.release()
         self.renderer.release()
-
-
-def _clips(scene: Scene) -> tuple[object, ...]:
-    """Return what actors are posed by, and when."""
-    return tuple((actor.clip, actor.offset) for actor in scene.actors)

@@ -10,6 +10,7 @@ import numpy as np
 from viewer.errors import RigError, ViewerError, printable
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.arrays import Floats
+from viewer.rig.number_text import number_text
 from viewer.rig.scalars import (
     SCALARS,
     categories,
@@ -155,7 +156,8 @@ def scalar_text(scene: Scene, options: DisplayOptions) -> str:
     if view.unit == "length":
         return f", {title}: 0 to {length_text(having[0].figure, high)}"
     unit = shown_unit(name, having[0].figure)[1]
-    return f", {title}: {low:.3g} to {high:.3g}{f' {unit}' if unit else ''}"
+    span = f"{number_text(low, '.3g')} to {number_text(high, '.3g')}"
+    return f", {title}: {span}{f' {unit}' if unit else ''}"
 
 
 def _n_different(name: str, scene: Scene, values: list[Floats]) -> str:
