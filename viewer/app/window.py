@@ -27,6 +27,7 @@ from viewer.app.recent import (  # noqa: E402
 from viewer.app.state import AppState  # noqa: E402
 from viewer.app.theme import apply_theme, change_scale  # noqa: E402
 from viewer.app.typed_keys import TypedKeys  # noqa: E402
+from viewer.app.weights_actions import start_heat_map  # noqa: E402
 from viewer.errors import RenderError, printable  # noqa: E402
 from viewer.loading import MotionSettings  # noqa: E402
 from viewer.loading.capturing import Builder  # noqa: E402
@@ -94,6 +95,8 @@ def show(
     files = tuple(map(Path, paths))
     state = AppState(scene, camera, options, bounding_box(points), files)
     state.lint.settings = motion
+    if options.shading == "scalar":
+        start_heat_map(state)
     state.recent = load_recent()
     state.closed_panels = load_closed_panels()
     state.say(*filter(None, [remember(state.recent, files)]))

@@ -8,7 +8,7 @@ from imgui_bundle import imgui
 
 from viewer.app.reasons import no_mesh
 from viewer.app.state import AppState
-from viewer.app.weights_actions import no_view, show_scalar, shown_joint, unpin
+from viewer.app.weights_actions import no_view, show_scalar, shown_joint, start_heat_map, unpin
 from viewer.app.widgets import (
     button,
     checkbox,
@@ -37,7 +37,10 @@ def draw(state: AppState) -> None:
     options, why = state.options, no_mesh(state)
     shows = options.shading == "scalar"
     if checkbox(state, "Heat map", shows, why) != shows:
-        options.shading = "phong" if shows else "scalar"
+        if shows:
+            options.shading = "phong"
+        else:
+            start_heat_map(state)
     _draw_views(state)
     key = split_name(options.scalar)[0]
     if SCALARS[key].takes_joint:
