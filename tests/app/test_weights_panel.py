@@ -37,6 +37,7 @@ def _posed(hand, dofs):
     hand.show_panel("Weights")
     hand.state.actor.pose.dofs[:] = dofs
     hand.state.options.skinning.max_influences = 4
+    hand.state.options.scalar = "cut"
     hand.state.history.start(hand.state.scene, hand.state.options)
     hand.step(2)
     return hand
@@ -86,8 +87,8 @@ def test_heat_map_is_undone(wide):
 @pytest.mark.parametrize("name", SCALARS)
 def test_scalar_range_is_that_of_the_vertices(wide, texts, name):
     _chosen(wide).max_influences = 2
-    wide.state.options.scalar, wide.state.selected_joint = name, 0
     wide.click("Heat map")
+    wide.state.options.scalar, wide.state.selected_joint = name, 0
     wide.step(2)
     actor = wide.state.actor
     joint = ":#0" if SCALARS[name].takes_joint else ""
@@ -310,7 +311,7 @@ def test_named_joint_gives_way_to_the_selected_one(bent, texts):
 
 def test_key_shows_weights_of_the_selected_joint_and_goes_back(bent):
     bent.key("v")
-    assert bent.says("Weights of the joint that you select")
+    assert bent.says("Weights of root")
     bent.click(bent.place("joint arm", 0.5))
     bent.step(2)
     assert bent.state.stats.legend.title == "Weight of arm"

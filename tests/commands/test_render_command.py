@@ -196,11 +196,18 @@ def test_dof_is_set_in_radians_degrees_or_lengths(scene, setting, index, value):
     assert np.delete(after, index).tolist() == np.delete(before, index).tolist()
 
 
-@pytest.mark.parametrize(("text", "value"), [("5", 1.0), ("-5", -1.0), ("180deg", 1.0)])
-def test_dof_beyond_a_limit_is_clamped_with_a_warning(scene, text, value):
+@pytest.mark.parametrize(
+    ("text", "value", "limits"),
+    [
+        ("5", 1.0, "-1 to 1 rad"),
+        ("-5", -1.0, "-1 to 1 rad"),
+        ("180deg", 1.0, "-57.2958 to 57.2958deg"),
+    ],
+)
+def test_dof_beyond_a_limit_is_clamped_with_a_warning(scene, text, value, limits):
     notes = apply_dofs(scene, [f"root.x={text}"])
     assert scene.actors[0].pose.dofs[3] == value
-    assert notes == [f"root.x={text} is clamped to its limits -1 to 1 rad"]
+    assert notes == [f"root.x={text} is clamped to its limits {limits}"]
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from viewer.rendering.options import SHOWN, Lights
 from viewer.rendering.picking import Pick
 from viewer.rendering.pinhole import distortion_error
 from viewer.rig.follow import followed_point
+from viewer.rig.number_text import number_text
 from viewer.rig.pose import rest_pose
 from viewer.rig.scene import Actor, scene_points
 
@@ -184,7 +185,7 @@ def range_in(state: AppState) -> None:
     playback = state.playback
     if playback.has_motion:
         playback.set_range(playback.time, max(playback.end, playback.time))
-        state.say_status(f"The range starts at {playback.start:.3f} s")
+        state.say_status(f"The range starts at {number_text(playback.start, '.3f')} s")
 
 
 def range_out(state: AppState) -> None:
@@ -192,7 +193,7 @@ def range_out(state: AppState) -> None:
     playback = state.playback
     if playback.has_motion:
         playback.set_range(min(playback.start, playback.time), playback.time)
-        state.say_status(f"The range ends at {playback.end:.3f} s")
+        state.say_status(f"The range ends at {number_text(playback.end, '.3f')} s")
 
 
 def follow_actor(state: AppState) -> None:

@@ -11,6 +11,7 @@ from viewer.errors import printable
 from viewer.formats import FORMATS, write
 from viewer.rig.clip import Clip
 from viewer.rig.clip_edit import clip_from_pose, key_pose
+from viewer.rig.number_text import number_text
 
 __all__ = ["ask_for_clip", "can_have_keys", "key_present_pose", "new_clip", "save_clip"]
 
@@ -40,7 +41,7 @@ def key_present_pose(state: AppState, only_changed: bool = False) -> None:
     old, skeleton = actor.clip, actor.figure.skeleton
     actor.clip = key_pose(old, skeleton, actor.pose, time, only_changed)
     keys = [sum(len(channel.times) for channel in clip.channels) for clip in (old, actor.clip)]
-    state.say_status(f"Pose keyed at {time:.3f} s: {keys[1] - keys[0]} new keys")
+    state.say_status(f"Pose keyed at {number_text(time, '.3f')} s: {keys[1] - keys[0]} new keys")
 
 
 def ask_for_clip(state: AppState) -> None:

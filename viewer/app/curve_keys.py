@@ -20,6 +20,7 @@ from viewer.app.curve_edit import (
 from viewer.app.curve_view import KeyPlace
 from viewer.rig.arrays import Floats
 from viewer.rig.clip import Channel, Clip, slopes
+from viewer.rig.number_text import number_text
 
 __all__ = ["draw_keys", "edit"]
 
@@ -197,7 +198,9 @@ def _add_key(plot: Plot, clip: Clip, row: int, time: float) -> None:
     near = np.flatnonzero(np.abs(times - time) * plot.scale[0] <= _SAME_KEY)
     if len(near):
         plot.view.keys = frozenset({(row, int(near[0]))})
-        plot.state.say_status(f"There is a key at {times[near[0]]:.4g} s already")
+        plot.state.say_status(
+            f"There is a key at {number_text(float(times[near[0]]), '.4g')} s already"
+        )
     else:
         add_key_at(plot.state, [row], time)
 

@@ -12,10 +12,9 @@ import moderngl
 import numpy as np
 from imgui_bundle import imgui
 
-from viewer.app.actions import follow_actor
+from viewer.app.clock import Clock
 from viewer.app.explanation_lines import draw_hovered, pinned_annotations
 from viewer.app.file_dialog import PICTURES, FileDialog, draw_file_dialog, folder_of
-from viewer.app.gizmo import is_held
 from viewer.app.gizmo_drawing import draw_gizmo
 from viewer.app.interface import draw_interface
 from viewer.app.jobs import FrameJob
@@ -74,8 +73,7 @@ class Frame:
         self.renderer = Renderer(context)
         self.target: Target | None = None
         self._drawn: object = None
-        self._clips: tuple[object, ...] = ()
-        self._is_first = True
+        self.clock = Clock(state)
         state.stats.renderer = context.info["GL_RENDERER"]
         state.stats.version = context.info["GL_VERSION"]
 
@@ -93,7 +91,7 @@ class Frame:
         """
         started = time.perf_counter()
         state = self.state
-        self._play()
+        self.clock.advance()
         self._check_shapes()
         self.open(draw_interface(state))
         draw_record_dialog(state)
@@ -105,11 +103,11 @@ class Frame:
         state.limit_camera()
         self._do_wanted()
         self._take_loaded()
-        self._take_streamed()
         self._work()
-        self._pose()
+        self.clock.keep_edits()
+        self._take_streamed()
+        self.clock.pose()
         self.renderer.marks, self.renderer.ghost = show_finding(state), show_rig(state)
-        state.history.observe(state.scene, state.options, is_held(state))
         self._draw_scene(scale)
         if self.target is not None:
             answer_picks(state, self.renderer, self.target.size, scale, self._drawn)
@@ -119,37 +117,6 @@ class Frame:
         framebuffer.clear(0.10, 0.11, 0.12, 1.0)
         imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
         state.stats.frame_ms = 1e3 * (time.perf_counter() - started)
-
-    def _play(self) -> None:
-        """Let the clock run on, by the time since the last frame was begun.
-
-        It waits while a handle is held that has not been dragged yet: a click must not pause, and
-        the pose in which a drag began must stay.
-        """
-        drag = self.state.posing.drag
-        if drag is None or drag.has_moved:
-            self.state.playback.advance(imgui.get_io().delta_time)
-
-    def _pose(self) -> None:
-        """Pose the actors for the time that is shown, if it or their clips changed."""
-        state = self.state
-        clips = tuple((actor.clip, actor.offset) for actor in state.scene.actors)
-        changed = clips != self._clips
-        if changed:
-            self._clips = clips
-            if not (self._is_first or state.history.has_restored):
-                # Undoing goes back to the time and poses from before the clock follows.
-                state.history.observe(state.scene, state.options, is_held(state))
-            state.playback.follow(state.scene.actors, state.actor)
-        if state.history.has_restored:
-            # Undoing has brought back poses with their time: they stay as they were.
-            state.playback.seek(state.history.time)
-            state.playback.accept()
-            state.history.has_restored = False
-        elif state.playback.pose(state.scene, again=changed and not self._is_first):
-            state.history.follow(state.scene, state.playback.time)
-            follow_actor(state)
-        self._is_first = False
 
     def _work(self) -> None:
         """Go on with what takes longer than a frame, and say how it ended."""
@@ -174,12 +141,7 @@ class Frame:
             stream.cancel()
             return
         if grew:
-            state.scene.actors += new
-            self._clips = tuple((actor.clip, actor.offset) for actor in state.scene.actors)
-            state.playback.follow(state.scene.actors, state.actor)
-            state.playback.pose(state.scene, again=True)
-            state.history.add_actors(state.scene, state.options)
-            state.history.follow(state.scene, state.playback.time)
+            self.clock.add(new)
         state.say(*notes)
         if stream.is_done:
             state.stream = None
@@ -318,7 +280,7 @@ class Frame:
         if state.stream is not None:
             state.stream.cancel()
         state.show_scene(scene, paths)
-        self._is_first = True
+        self.clock.is_first = True
         self.stream(builders)
         if self.keeps_recent:
             problem_text = remember(state.recent, paths)

@@ -125,6 +125,7 @@ MOUSE = (
     ("Left drag", "orbit"),
     ("Right drag, Shift drag", "pan"),
     ("Wheel", "zoom to the pointer"),
+    ("Alt drag of the time", "between whole frames"),
     ("Drop files", "open them"),
 )
 

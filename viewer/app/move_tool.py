@@ -17,6 +17,7 @@ from viewer.app.view_frame import Place, ViewFrame
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.inverse_kinematics import chain_above, reach
+from viewer.rig.number_text import number_text
 from viewer.rig.pose import Pose
 from viewer.rig.skeleton import Skeleton, joint_label
 
@@ -257,5 +258,4 @@ def _nearest_to(center: Floats, axis: Floats, origin: Floats, direction: Floats)
 
 
 def _shift_text(name: str, way: Floats) -> str:
-    x, y, z = way
-    return f"{name}   {x:+.3g} {y:+.3g} {z:+.3g}"
+    return f"{name}   {' '.join(number_text(part, '+.3g') for part in way.tolist())}"

@@ -156,6 +156,17 @@ class Playback:
         """Return the seconds of a frame."""
         return self.origin + frame / self.frame_rate
 
+    def nearest_frame_time(self, time: float) -> float:
+        """Return the seconds of the frame of the whole range that is nearest to a time."""
+        low, high = self.frame_range
+        if low > high:  # too short for a frame
+            return time
+        return self.frame_time(min(max(round((time - self.origin) * self.frame_rate), low), high))
+
+    def scrub(self, time: float, between: bool = False) -> None:
+        """Go to the frame that is nearest to a time; to the time itself if asked to."""
+        self.seek(time if between else self.nearest_frame_time(time))
+
     def seek(self, time: float) -> None:
         """Go to a time; within the range unless playing runs on."""
         is_free = self.mode == "run on"
@@ -252,10 +263,6 @@ class Playback:
         scene.time = self.time
         pose_actors(scene.actors, self.time, self.fill_gaps)
         return True
-
-    def accept(self) -> None:
-        """Take the present poses for those of the time shown: they were edited, or undone."""
-        self._posed = self.time, self.fill_gaps
 
 
 def _length(actor: Actor) -> float:

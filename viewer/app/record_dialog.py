@@ -11,6 +11,7 @@ from viewer.app.file_dialog import FileDialog, folder_of
 from viewer.app.state import AppState
 from viewer.app.widgets import button, checkbox, choice, note_item
 from viewer.errors import printable
+from viewer.rig.number_text import number_text
 
 __all__ = ["KINDS", "RecordSettings", "draw_record_dialog"]
 
@@ -146,7 +147,7 @@ def _span_text(state: AppState, settings: RecordSettings) -> str:
     if not playback.has_motion:
         return "one turn" if settings.turntable else "nothing moves: one frame"
     low, high = playback.start, playback.end
-    return f"the range that is played: {low:.3f} to {high:.3f} s"
+    return f"the range that is played: {number_text(low, '.3f')} to {number_text(high, '.3f')} s"
 
 
 def _ask_where(state: AppState, settings: RecordSettings) -> None:

@@ -18,6 +18,7 @@ from viewer.app.view_frame import Place, ViewFrame
 from viewer.rig.arrays import Floats
 from viewer.rig.inverse_kinematics import rotation_axes
 from viewer.rig.joint_turning import nearest_dofs, rotation_dofs, turns_freely
+from viewer.rig.number_text import angle_text
 from viewer.rig.pose import Pose, joint_rotations
 from viewer.rig.rotation import rotation_vector_to_matrix
 from viewer.rig.skeleton import Skeleton, dof_label, joint_label
@@ -285,9 +286,7 @@ class TurnHandle:
         return Outcome(pose, text, tuple(found.limited.tolist()), angle=turn)
 
     def _text(self, angle: float, sign: str = "") -> str:
-        if self.in_degrees:
-            return f"{math.degrees(angle):{sign}.1f}\N{DEGREE SIGN}"
-        return f"{angle:{sign}.3f} rad"
+        return angle_text(angle, self.in_degrees, sign)
 
 
 def limit_text(skeleton: Skeleton, limited: tuple[int, ...]) -> str:

@@ -33,7 +33,7 @@ _BACK = (1.0, 1.0, 1.0, 0.03)
 
 
 def draw_tracks(state: AppState) -> None:
-    """Draw the ruler and the tracks; dragging in them moves time."""
+    """Draw the ruler and the tracks; dragging in them moves time by whole frames, Alt freely."""
     size = imgui.get_font_size()
     moving = [index for index, actor in enumerate(state.scene.actors) if actor.clip is not None]
     height = imgui.get_text_line_height_with_spacing()
@@ -51,7 +51,8 @@ def draw_tracks(state: AppState) -> None:
     imgui.invisible_button("##scrub", (max(width, 1.0), area[3]))
     note_item(state, "Scrubber")
     if imgui.is_item_active() and imgui.is_mouse_down(imgui.MouseButton_.left):
-        state.playback.seek(low + (imgui.get_mouse_pos().x - left) / scale)
+        time = low + (imgui.get_mouse_pos().x - left) / scale
+        state.playback.scrub(time, between=imgui.get_io().key_alt)
     first = max(0, int((imgui.get_scroll_y() - height) / height))
     last = first + int(imgui.get_window_height() / height) + 3
     for row in range(first, min(last, len(moving))):

@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+from viewer.app.selection import select_joint
 from viewer.app.shown_panels import is_open, set_open
 from viewer.app.state import AppState
 from viewer.app.weights_view import Pinned
+from viewer.errors import printable
 from viewer.rig.explanation import Explanation, explain
 from viewer.rig.pose import pose_key
-from viewer.rig.scalars import SCALARS, joint_text, missing_part, split_name
+from viewer.rig.scalars import (
+    SCALARS,
+    joint_influences,
+    joint_text,
+    missing_part,
+    most_influential,
+    split_name,
+    telling_view,
+)
 
 __all__ = [
     "explained",
@@ -15,11 +25,15 @@ __all__ = [
     "pin_vertex",
     "show_scalar",
     "shown_joint",
+    "start_heat_map",
     "toggle_picking",
     "toggle_telling",
     "toggle_weights",
     "unpin",
 ]
+
+_FIRST = ("weight", "field", "class", "parts")
+"""Views to begin with, the best first."""
 
 
 def no_view(state: AppState, key: str) -> str:
@@ -41,12 +55,49 @@ def no_view(state: AppState, key: str) -> str:
     return f"no figure here has {lacks[0]}"
 
 
+def start_heat_map(state: AppState) -> None:
+    """Show numbers as colours, and begin with something to see.
+
+    A view that no figure here has is replaced by one that there is; a joint without influence, or
+    none, by the one with the most; a field that is 0 everywhere by the first that is not.
+    """
+    options = state.options
+    options.shading = "scalar"
+    key, about = split_name(options.scalar)
+    if no_view(state, key):
+        key, about = next((one for one in _FIRST if not no_view(state, one)), key), ""
+        options.scalar = key
+    if about:
+        return
+    if SCALARS[key].takes_joint:
+        _start_with_joint(state, key)
+    elif SCALARS[key].about:
+        options.scalar = telling_view(key, [actor.figure for actor in state.scene.actors])
+
+
+def _start_with_joint(state: AppState, key: str) -> None:
+    """Select the joint with the most influence if the selected one has none."""
+    figure, joint = state.actor.figure, state.selected_joint
+    sums = joint_influences(figure)
+    if 0 <= joint < len(sums) and sums[joint]:
+        return
+    most = most_influential(figure)
+    if most < 0:  # the chosen actor has no weights, another one may
+        state.options.scalar = telling_view(key, [actor.figure for actor in state.scene.actors])
+        return
+    if joint >= 0:
+        names = (printable(joint_text(figure, one), 60) for one in (joint, most))
+        state.say("{} has no influence: {} is selected, which has the most".format(*names))
+    select_joint(state, most)
+
+
 def show_scalar(state: AppState, name: str) -> None:
     """Show a scalar view; a range that was fixed for another one is let go of."""
     options = state.options
     if split_name(name)[0] != split_name(options.scalar)[0]:
         options.scalar_range = options.isolines = None
-    options.shading, options.scalar = "scalar", name
+    options.scalar = name
+    start_heat_map(state)
 
 
 def shown_joint(state: AppState) -> str:
@@ -72,7 +123,7 @@ def toggle_weights(state: AppState) -> None:
         return
     show_scalar(state, "weight")
     joint = shown_joint(state)
-    state.say_status(f"Weights of {joint}" if joint else "Weights of the joint that you select")
+    state.say_status(f"Weights of {printable(joint, 60)}" if joint else "No joint has influence")
 
 
 def toggle_telling(state: AppState) -> None:

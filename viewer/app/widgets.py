@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import math
+import re
 from collections.abc import Iterator
 
 from imgui_bundle import imgui
 
 from viewer.app.state import AppState
+from viewer.rig.number_text import number_text
 
 __all__ = [
     "Rect",
@@ -21,11 +23,13 @@ __all__ = [
     "explain",
     "menu_item",
     "note_item",
-    "number_text",
     "overlay_rect",
+    "plain_zero",
     "same_line_if_room",
     "slider",
 ]
+
+_NUMBER = re.compile(r"%[0-9.+]*[efg]")
 
 Rect = tuple[float, float, float, float]
 """Left, upper, right and lower edge, in window coordinates."""
@@ -102,7 +106,8 @@ def slider(
     flags: int = 0,
 ) -> float:
     """Draw a slider and return its value; one that was not moved keeps every digit."""
-    changed, moved = imgui.slider_float(label, value, low, high, unit, flags)
+    shown = plain_zero(value, unit)
+    changed, moved = imgui.slider_float(label, shown, low, high, unit, flags)
     note_item(state, label)
     # "nan" and "1e99" can be typed into a slider.
     return moved if changed and math.isfinite(moved) else value
@@ -162,10 +167,12 @@ def choice(state: AppState, label: str, value: str, texts: dict[str, str]) -> st
     return keys[chosen] if changed else value
 
 
-def number_text(value: float) -> str:
-    """Return a number with three digits, or with all before the point if there are more.
+def plain_zero(value: float, text: str) -> float:
+    """Return a number for a widget: 0 in place of one that its format would show as -0.
 
-    >>> number_text(0.012345), number_text(1234.5)
-    ('0.0123', '1,234')
+    >>> plain_zero(-0.04, "%.1f s"), plain_zero(-0.06, "%.1f s")
+    (0.0, -0.06)
     """
-    return f"{value:.3g}" if abs(value) < 999.5 else f"{value:,.0f}"
+    spec = _NUMBER.search(text)
+    shown = spec.group() % value if spec else ""
+    return value if not shown.startswith("-") or number_text(float(shown)) != "0" else 0.0

@@ -26,6 +26,8 @@ from viewer.app.recent import (  # noqa: E402
 )
 from viewer.app.state import AppState  # noqa: E402
 from viewer.app.theme import apply_theme, change_scale  # noqa: E402
+from viewer.app.typed_keys import TypedKeys  # noqa: E402
+from viewer.app.weights_actions import start_heat_map  # noqa: E402
 from viewer.errors import RenderError, printable  # noqa: E402
 from viewer.interrupts import hold, poll  # noqa: E402
 from viewer.loading import MotionSettings  # noqa: E402
@@ -95,6 +97,8 @@ def show(
     hold()  # callbacks of GLFW swallow what is raised in them
     state = AppState(scene, camera, options, bounding_box(points), files)
     state.lint.settings = motion
+    if options.shading == "scalar":
+        start_heat_map(state)
     state.recent = load_recent()
     state.closed_panels = load_closed_panels()
     state.say(*filter(None, [remember(state.recent, files)]))
@@ -137,6 +141,7 @@ class _Window:
         self._dropped: list[Path] = []
         self._is_dirty = True
         self._title = ""
+        self._typed_keys = TypedKeys()
         self._set_callbacks()
         self._imgui: Any = imgui.create_context()
         self._implot: Any = implot.create_context()
@@ -151,6 +156,11 @@ class _Window:
 
     def _on_drop(self, _: Any, names: Sequence[str]) -> None:
         self._dropped += map(Path, names)
+
+    def _on_key(self, _: Any, key: int, code: int, action: int, modifiers: int) -> None:
+        is_typing = imgui.get_io().want_text_input
+        if self._typed_keys.passes(key, action, modifiers, is_typing):
+            imgui.backends.glfw_key_callback(self._address, key, code, action, modifiers)
 
     def _on_change(self, *_: Any) -> None:
         self._is_dirty = True
@@ -168,8 +178,9 @@ class _Window:
         self._given_scale = scale
         self._scale = scale or self._screen_scale()
         apply_theme(self._scale)
-        address = ctypes.cast(self.handle, ctypes.c_void_p).value or 0
-        imgui.backends.glfw_init_for_opengl(address, True)
+        self._address = ctypes.cast(self.handle, ctypes.c_void_p).value or 0
+        imgui.backends.glfw_init_for_opengl(self._address, True)
+        glfw.set_key_callback(self.handle, self._on_key)  # in place of ImGui's own
         imgui.backends.opengl3_init("#version 330")
 
     def _screen_scale(self) -> float:

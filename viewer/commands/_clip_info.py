@@ -9,6 +9,7 @@ import numpy as np
 
 from viewer.errors import printable
 from viewer.rig.clip import Clip
+from viewer.rig.number_text import number_text
 from viewer.rig.points import PointClip
 from viewer.rig.sampled_clip import SampledClip
 from viewer.rig.scene import Motion
@@ -68,14 +69,16 @@ def gaps_of(timing: Timing) -> list[list[int]]:
 def clip_lines(clip: dict[str, Any]) -> list[str]:
     """Return the same as lines of text."""
     start, end = clip["range"]
-    head = f"  clip       {printable(clip['name'])}: {start:g} to {end:g} s, "
+    head = f"  clip       {printable(clip['name'])}: {number_text(start)} to {number_text(end)} s, "
     if "kind" in clip:
         return [head + _rows_text(clip), *_gap_lines(clip)]
     modes = ", ".join(f"{mode} {count}" for mode, count in clip["extrapolation"].items())
     lines = [f"{head}{clip['channels']} channels, {clip['keys']} keys"]
     if clip["key_times"]:
         first, last = clip["key_times"]
-        lines.append(f"    keys from {first:g} to {last:g} s; beyond them {modes}")
+        lines.append(
+            f"    keys from {number_text(first)} to {number_text(last)} s; beyond them {modes}"
+        )
     return lines
 
 

@@ -10,6 +10,7 @@ from viewer.errors import printable
 from viewer.rig.figure import Figure
 from viewer.rig.measure import measure
 from viewer.rig.mirror import asymmetry
+from viewer.rig.number_text import number_text
 from viewer.rig.pose import Pose
 from viewer.rig.pose_vector import write_vector
 from viewer.rig.scalars import compute, length_text, strongest
@@ -108,7 +109,7 @@ def model_lines(model: dict[str, Any], figure: Figure) -> list[str]:
             f"{rest['mass']:.1f} kg at 985 kg/m3"
         )
     if any(model.get("shape_weights", [])):
-        weights = ", ".join(f"{weight:g}" for weight in model["shape_weights"])
+        weights = ", ".join(number_text(weight) for weight in model["shape_weights"])
         lines.append(f"  shape      {weights}")
     if "body_parts" in model:
         counts = ", ".join(f"{printable(n)} {c}" for n, c in model["body_parts"].items())

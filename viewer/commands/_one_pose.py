@@ -10,6 +10,7 @@ from viewer.commands._frame_numbers import numbering_of
 from viewer.errors import ViewerError
 from viewer.export import EXPORTERS, MotionOptions
 from viewer.rig.clip import Clip
+from viewer.rig.number_text import number_text
 from viewer.rig.pose_take import posed_take
 from viewer.rig.sampled_clip import SampledClip
 from viewer.rig.scene import Actor, Scene
@@ -63,7 +64,7 @@ def pose_line(arguments: argparse.Namespace) -> str:
     if arguments.frame is not None:
         return f"one frame: the pose at frame {arguments.frame}"
     if arguments.time is not None:
-        return f"one frame: the pose at {arguments.time:g} s"
+        return f"one frame: the pose at {number_text(arguments.time)} s"
     return "one frame: nothing moves, so the present pose was written"
 
 

@@ -17,6 +17,7 @@ from viewer.formats import Source, read
 from viewer.rig.arrays import Floats
 from viewer.rig.hands import hand_vectors
 from viewer.rig.mirror import mirror_pose
+from viewer.rig.number_text import number_text
 from viewer.rig.pose_record import PoseRecord, apply_record
 from viewer.rig.pose_vector import set_joint_rotations
 from viewer.rig.rotation import rotation_vector_to_matrix
@@ -255,9 +256,12 @@ def apply_dofs(scene: Scene, settings: Sequence[str]) -> list[str]:
         clamped = clamp_dofs(skeleton, wanted)
         if clamped[dof] != wanted[dof]:
             low, high = skeleton.dof_limits[dof]
-            name, unit = dof_label(skeleton, dof), " rad" if is_rotation else ""
-            limits = f"{low:g} to {high:g}{unit}"
-            how = f"locked at {low:g}{unit}" if low == high else f"clamped to its limits {limits}"
+            name, factor, unit = dof_label(skeleton, dof), 1.0, " rad" if is_rotation else ""
+            if is_rotation and text.strip().endswith("deg"):
+                factor, unit = math.degrees(1.0), "deg"
+            least, most = (number_text(factor * float(limit)) for limit in (low, high))
+            limits = f"{least} to {most}{unit}"
+            how = f"locked at {least}{unit}" if low == high else f"clamped to its limits {limits}"
             notes.append(f"{name}={text} is {how}")
         actor.pose.dofs[:] = clamped
     return notes

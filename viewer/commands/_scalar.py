@@ -10,6 +10,7 @@ import numpy as np
 from viewer.errors import RigError, ViewerError, printable
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.arrays import Floats
+from viewer.rig.number_text import number_text
 from viewer.rig.scalars import (
     SCALARS,
     categories,
@@ -21,11 +22,12 @@ from viewer.rig.scalars import (
     missing_part,
     shown_unit,
     split_name,
+    telling_view,
     view_title,
 )
 from viewer.rig.scene import Scene
 
-__all__ = ["add_scalar_arguments", "check_joint", "scalar_notes", "scalar_text", "set_scalar"]
+__all__ = ["add_scalar_arguments", "choose_subject", "scalar_notes", "scalar_text", "set_scalar"]
 
 _WHOLE = ("discrete", "categorical")
 
@@ -98,13 +100,19 @@ def _parse_range(text: str) -> tuple[float, float]:
     return low, high
 
 
-def check_joint(options: DisplayOptions) -> None:
-    """Refuse a view that is about the selected joint where none can be selected."""
-    if options.shading != "scalar":
-        return
-    key, joint = split_name(options.scalar)
-    if SCALARS[key].takes_joint and not joint:
-        raise ViewerError(f"--scalar {key}: expected a joint, as {key}:pelvis or {key}:#0")
+def choose_subject(scene: Scene, options: DisplayOptions) -> list[str]:
+    """Choose a joint or field for a view that names none; return one line about a joint.
+
+    That is the joint with the most influence, or the first field that is not 0 everywhere.
+    """
+    key, about = split_name(options.scalar)
+    if options.shading != "scalar" or about:
+        return []
+    options.scalar = telling_view(key, [actor.figure for actor in scene.actors])
+    if not SCALARS[key].takes_joint or options.scalar == key:
+        return []
+    joint = printable(split_name(options.scalar)[1], 60)
+    return [f"--scalar {key}: shows {joint}, which has the most influence; {key}:JOINT names one"]
 
 
 def scalar_notes(scene: Scene, options: DisplayOptions) -> list[str]:
@@ -129,7 +137,7 @@ def scalar_notes(scene: Scene, options: DisplayOptions) -> list[str]:
         except RigError as problem:
             raise ViewerError(f"--scalar {printable(options.scalar, 60)}: {problem}") from None
     if SCALARS[key].takes_joint and not joint and bound is not None:
-        return [f"--scalar {key}: shows the joint that is selected, or name one: {key}:#0"]
+        return []  # the window selects one
     return [f"--scalar {options.scalar}: {SCALARS[key].title}: no figure has {missing[0]}"]
 
 
@@ -155,7 +163,8 @@ def scalar_text(scene: Scene, options: DisplayOptions) -> str:
     if view.unit == "length":
         return f", {title}: 0 to {length_text(having[0].figure, high)}"
     unit = shown_unit(name, having[0].figure)[1]
-    return f", {title}: {low:.3g} to {high:.3g}{f' {unit}' if unit else ''}"
+    span = f"{number_text(low, '.3g')} to {number_text(high, '.3g')}"
+    return f", {title}: {span}{f' {unit}' if unit else ''}"
 
 
 def _n_different(name: str, scene: Scene, values: list[Floats]) -> str:

@@ -17,6 +17,7 @@ from viewer.errors import printable
 from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.mesh import Mesh, bounding_box, box_size, triangle_areas
 from viewer.rig.morph_target import MORPH_GROUP
+from viewer.rig.number_text import number_text
 from viewer.rig.scene import Actor, Scene, actor_points
 from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_labels
 from viewer.rig.skin import Skin, has_influence, influence_counts, weight_sums
@@ -210,7 +211,9 @@ def _skeleton_lines(skeleton: dict[str, Any]) -> list[str]:
         limits = "unlimited" if low is None and high is None else f"{_bound(low)} to {_bound(high)}"
         if low is not None and low == high:
             limits = "locked"
-        lines.append(f"    {printable(dof['name']):<24} {dof['value']:>10.6g}  {limits}")
+        lines.append(
+            f"    {printable(dof['name']):<24} {number_text(dof['value'], '>10.6g')}  {limits}"
+        )
     left_out = skeleton["dofs"] - (len(lines) - 1)
     if left_out:
         lines.append(f"    {left_out} more are 0 and unlimited (--json lists all)")
@@ -218,7 +221,7 @@ def _skeleton_lines(skeleton: dict[str, Any]) -> list[str]:
 
 
 def _bound(value: float | None) -> str:
-    return "unlimited" if value is None else f"{value:.6g}"
+    return "unlimited" if value is None else number_text(value, ".6g")
 
 
 def _mesh_lines(mesh: dict[str, Any]) -> list[str]:
@@ -244,7 +247,9 @@ def _skin_lines(skin: dict[str, Any]) -> list[str]:
         f"    vertices by number of influences   {histogram}",
     ]
     if sums:
-        lines.append(f"    weight sums {sums[0]:.6g} to {sums[1]:.6g}")
+        lines.append(
+            f"    weight sums {number_text(sums[0], '.6g')} to {number_text(sums[1], '.6g')}"
+        )
     for key, text in (
         ("zero_weights", "weights are 0"),
         ("negative_weights", "weights are negative"),
@@ -258,4 +263,4 @@ def _skin_lines(skin: dict[str, Any]) -> list[str]:
 
 
 def _point(values: list[float]) -> str:
-    return f"({', '.join(f'{value:.6g}' for value in values)})"
+    return f"({', '.join(number_text(value, '.6g') for value in values)})"

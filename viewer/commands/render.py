@@ -9,7 +9,7 @@ from pathlib import Path
 from viewer.commands._frame_numbers import add_frame_arguments
 from viewer.commands._output import PICTURES, STDOUT, check_output
 from viewer.commands._pose import add_pose_arguments, add_skinning_arguments
-from viewer.commands._scalar import check_joint, scalar_text
+from viewer.commands._scalar import choose_subject, scalar_text
 from viewer.commands._scene import (
     add_capture_arguments,
     add_file_arguments,
@@ -82,11 +82,11 @@ def run(arguments: argparse.Namespace) -> int:
     if request is None or request.kind != "pictures":
         check_output(output, [Path(file) for file in arguments.files], arguments.force)
     options = display_of(arguments)
-    check_joint(options)
     if options.background == "transparent" and output.suffix.lower() in _OPAQUE:
         print_warnings([f"{printable(output)}: this format knows no transparency"])
     scene = open_scene(arguments)
     hide_parts(arguments, scene, options)
+    print_warnings(choose_subject(scene, options))
     print_warnings(warn_of_missing(scene, options) + lens_notes(arguments, scene))
     if request is not None and (request.is_certain or any(a.clip for a in scene.actors)):
         print(draw_sequence(request, arguments, scene, options, size))

@@ -100,8 +100,10 @@ def run(arguments: argparse.Namespace) -> int:
 def _draw_instead(
     reason: str, scene: Scene, camera: Camera, options: DisplayOptions, box: Floats
 ) -> int:
+    from viewer.commands._scalar import choose_subject
     from viewer.commands.render import draw_scene, save_picture
 
+    print_warnings(choose_subject(scene, options))
     path = free_path(Path.cwd(), scene.actors[0].figure.name, ".png")
     save_picture(path, draw_scene(scene, SIZE, camera, options, box))
     print(f"{reason}; drew {printable(path, 300)} instead")

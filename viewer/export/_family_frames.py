@@ -12,6 +12,7 @@ from viewer.rig.arrays import Floats
 from viewer.rig.body_motion import root_positions
 from viewer.rig.figure import Figure
 from viewer.rig.motion import Frames
+from viewer.rig.number_text import number_text
 from viewer.rig.quaternion import multiply, rotation_vector_to_quaternion
 from viewer.rig.rotation import rotation_vector_to_matrix
 from viewer.rig.smpl_family import FAMILY, Member
@@ -219,7 +220,7 @@ def _bare_skeleton(figure: Figure, root: Floats) -> list[str]:
     if figure.unit != "m":
         notes.append(f"lengths were {WORDS[figure.unit]}, and are written as metres")
     if figure.mesh is None:
-        place = ", ".join(f"{number:.4g}" for number in (root + 0.0).tolist())
+        place = ", ".join(number_text(number, ".4g") for number in root.tolist())
         notes.append(
             f"places count from the skeleton's own root at rest, ({place}) m: a model whose root "
             "rests elsewhere stands off by the difference (--model drives one, and is exact)"

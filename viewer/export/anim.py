@@ -18,6 +18,7 @@ from viewer.rig.clip_edit import clip_from_frames
 from viewer.rig.clip_table import evaluate_all
 from viewer.rig.figure import Figure
 from viewer.rig.motion import Frames, frames_of, world_frames
+from viewer.rig.number_text import number_text
 from viewer.rig.rotation import quaternion_to_matrix
 from viewer.rig.scalars import length_text
 from viewer.rig.scene import figure_pose
@@ -193,7 +194,7 @@ def _summary(path: Path, clip: Clip) -> str:
     keys = sum(len(channel.times) for channel in clip.channels)
     return (
         f"{printable(path, 300)}: {len(clip.channels)} channels with {keys} keys, "
-        f"{clip.start:g} to {clip.end:g} s"
+        f"{number_text(clip.start)} to {number_text(clip.end)} s"
     )
 
 

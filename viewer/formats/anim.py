@@ -26,6 +26,7 @@ from viewer.formats._save import save_text
 from viewer.formats._source import Source, no_number, shown
 from viewer.rig.clip import EXTRAPOLATIONS, TANGENT_RULES, Channel, Clip, Extrapolation, Tangent
 from viewer.rig.figure import Figure
+from viewer.rig.number_text import number_text
 
 __all__ = ["read", "write"]
 
@@ -97,13 +98,15 @@ class _Parser:
         word, start, end = self.word, self._number("range"), self._number("range")
         if start > end:
             where = None if word is None else word.start()
-            self.source.warn(f"range ends before it begins: read as {end:g} to {start:g}", where)
+            span = f"{number_text(end)} to {number_text(start)}"
+            self.source.warn(f"range ends before it begins: read as {span}", where)
         return min(start, end), max(start, end)
 
     def _key_span(self, channels: list[Channel]) -> tuple[float, float]:
         times = np.concatenate([np.zeros(0), *(channel.times for channel in channels)])
         span = (float(times.min()), float(times.max())) if len(times) else (0.0, 0.0)
-        self.source.warn(f"no range: that of the keys is played, {span[0]:g} to {span[1]:g}")
+        shown_span = f"{number_text(span[0])} to {number_text(span[1])}"
+        self.source.warn(f"no range: that of the keys is played, {shown_span}")
         return span
 
     def _finish(self, count: int | None, found: int) -> None:

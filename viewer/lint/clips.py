@@ -11,6 +11,7 @@ from viewer.rig.arrays import Floats
 from viewer.rig.clip import SHORTEST, Clip
 from viewer.rig.clip_table import evaluate_all
 from viewer.rig.dof_text import beyond_text
+from viewer.rig.number_text import number_text
 from viewer.rig.points import PointClip
 from viewer.rig.sampled_clip import SampledClip
 from viewer.rig.skeleton import Skeleton, joint_labels
@@ -36,7 +37,7 @@ def check(subject: Subject) -> list[Finding]:
         findings += _keys(subject, clip)
         findings += _outside(subject, clip, skeleton)
     if clip.end - clip.start <= SHORTEST:
-        text = f"it begins and ends at {clip.start:g} s"
+        text = f"it begins and ends at {number_text(clip.start)} s"
         return [*findings, subject.found("C010", text, part="clip")]
     track = track_of(subject)
     assert track is not None  # there is a clip and a skeleton
@@ -88,8 +89,7 @@ def _keys(subject: Subject, clip: Clip) -> list[Finding]:
         subject.found(
             "C002",
             f"{counted(count, 'key', 'lies', 'lie')} at the time of the one before, first in "
-            f"channel {channel} at "
-            f"{times[channel][0]:g} s",
+            f"channel {channel} at {number_text(float(times[channel][0]))} s",
             part="clip",
             times=np.unique(np.concatenate(times)) + subject.actor.offset,
             at=("channels", channel),
@@ -113,7 +113,7 @@ def _outside(subject: Subject, clip: Clip, skeleton: Skeleton) -> list[Finding]:
         skeleton,
         int(targets[worst]),
         float(values[row, worst]),
-        f" in frame {number} at {times[row] + subject.actor.offset:.3f} s",
+        f" in frame {number} at {number_text(times[row] + subject.actor.offset, '.3f')} s",
     )
     order = np.flatnonzero((beyond > _ROUNDING).any(axis=1))
     return [
@@ -170,7 +170,7 @@ def _too_fast(
         subject.found(
             code,
             f"{counted(len(each), 'frame', of=track.n_frames)}: {label} {how} to frame "
-            f"{track.numbers[frames[0]]} at {track.times[frames[0]]:.3f} s",
+            f"{track.numbers[frames[0]]} at {number_text(track.times[frames[0]], '.3f')} s",
             part="clip",
             joints=np.concatenate([[joint], joints[joints != joint]]),
             frames=track.numbers[each],

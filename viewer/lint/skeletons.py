@@ -10,6 +10,7 @@ import numpy as np
 from viewer.errors import counted, printable
 from viewer.lint._finding import Finding, Subject, listed
 from viewer.rig.dof_text import beyond_text
+from viewer.rig.number_text import number_text
 from viewer.rig.pose import Pose
 from viewer.rig.skeleton import Skeleton, dof_label, joint_labels
 
@@ -96,7 +97,7 @@ def _rest(subject: Subject, skeleton: Skeleton) -> list[Finding]:
         )
     flat = np.flatnonzero((skeleton.rest_scales <= 0.0).any(axis=1) & known)
     if len(flat):
-        scale = " ".join(f"{value:g}" for value in skeleton.rest_scales[flat[0]])
+        scale = " ".join(map(number_text, skeleton.rest_scales[flat[0]].tolist()))
         findings.append(
             subject.found(
                 "S010",

@@ -14,6 +14,7 @@ from viewer.rig.arrays import Bytes, Floats
 from viewer.rig.figure import Figure
 from viewer.rig.memo import Memo
 from viewer.rig.mesh import triangle_areas
+from viewer.rig.number_text import short_number
 from viewer.rig.scalars import (
     categories,
     find_view,
@@ -234,5 +235,5 @@ def _vertex_areas(figure: Figure) -> Floats:
 
 def _text(number: float, signed: bool = False) -> str:
     """Return a number with three digits."""
-    text = f"{number:.3g}" if abs(number) < 999.5 else f"{number:,.0f}"
+    text = short_number(number)
     return f"+{text}" if signed and number > 0.0 else text

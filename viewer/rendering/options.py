@@ -134,7 +134,7 @@ class DisplayOptions:
     samples: int = 4
     lights: Lights = field(default_factory=Lights)
     skinning: Skinning = field(default_factory=Skinning)
-    scalar: str = "cut"
+    scalar: str = "weight"
     scalar_range: tuple[float, float] | None = None
     isolines: bool | None = None
     legend: bool = False

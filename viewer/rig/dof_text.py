@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from viewer.rig.number_text import number_text
 from viewer.rig.skeleton import Skeleton, dof_label
 
 __all__ = ["beyond_text", "dof_value_text"]
@@ -27,8 +28,8 @@ def dof_value_text(skeleton: Skeleton, dof: int, value: float, digits: int = 1) 
         Decimals of angles; lengths have three more.
     """
     if skeleton.dof_kinds[dof] >= _FIRST_ROTATION:
-        return f"{math.degrees(value) + 0.0:.{digits}f}\N{DEGREE SIGN}"
-    return f"{value:.{digits + 3}g}"
+        return f"{number_text(math.degrees(value), f'.{digits}f')}\N{DEGREE SIGN}"
+    return number_text(value, f".{digits + 3}g")
 
 
 def beyond_text(skeleton: Skeleton, dof: int, value: float, when: str = "") -> str:

@@ -7,6 +7,7 @@ import numpy as np
 from viewer.errors import printable
 from viewer.rig.arrays import Floats
 from viewer.rig.explanation import DualTerms, Explanation
+from viewer.rig.number_text import number_text
 from viewer.rig.skinning import METHODS
 
 __all__ = ["explanation_text"]
@@ -68,7 +69,9 @@ class _Text:
         """Say what one joint does: its matrix, its image of the vertex, its term."""
         one, number = self.one, index + 1
         name = printable(one.names[index], _LONGEST)
-        self.lines.append(f"{number}. {name}: w{number} = {one.weights[index]:.{self.digits}f}")
+        self.lines.append(
+            f"{number}. {name}: w{number} = {self._number(float(one.weights[index]))}"
+        )
         for row, values in enumerate(one.matrices[index]):
             label = f"   M{number} =" if row == 0 else ""
             self.lines.append(f"{label:<8}[ {self._numbers(values)} ]")
@@ -77,7 +80,7 @@ class _Text:
 
     def sums(self) -> None:
         """Say what the terms add up to."""
-        self.lines.append(f"sum of w = {float(self.one.weights.sum()):.{self.digits}f}")
+        self.lines.append(f"sum of w = {self._number(float(self.one.weights.sum()))}")
         self._vector("sum of w M p", self.one.linear)
 
     def dual(self, dual: DualTerms) -> None:
@@ -113,7 +116,9 @@ class _Text:
         self.lines.append(f"{label}real [ {self._numbers(values[:4])} ]")
         self.lines.append(f"{label}dual [ {self._numbers(values[4:])} ]")
 
+    def _number(self, value: float) -> str:
+        return number_text(value, f".{self.digits}f")
+
     def _numbers(self, values: Floats) -> str:
-        # Adding 0 makes -0 a plain 0, also for what is rounded to it.
-        rounded = np.round(values, self.digits) + 0.0
-        return "  ".join(f"{value:{self.width}.{self.digits}f}" for value in rounded.tolist())
+        spec = f"{self.width}.{self.digits}f"
+        return "  ".join(number_text(value, spec) for value in values.tolist())

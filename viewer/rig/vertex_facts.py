@@ -9,6 +9,7 @@ import numpy as np
 from viewer.errors import RigError, printable
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
+from viewer.rig.number_text import number_text
 from viewer.rig.pose import Pose
 from viewer.rig.scalars import joint_text
 from viewer.rig.single_vertices import check_vertices, deform_vertices
@@ -130,12 +131,12 @@ def facts_text(facts: VertexFacts) -> list[str]:
     ]
     lines += [f"uv {_numbers(uv)}" for uv in facts.uvs]
     lines += [
-        f"{weight:.4f} {printable(name, _LONGEST)}"
+        f"{number_text(weight, '.4f')} {printable(name, _LONGEST)}"
         for weight, name in zip(facts.weights[:_MOST], facts.names[:_MOST], strict=True)
     ]
     if len(facts.weights) > _MOST:
         rest = facts.weights[_MOST:]
-        lines.append(f"{rest.sum():.4f} {len(rest)} more")
+        lines.append(f"{number_text(float(rest.sum()), '.4f')} {len(rest)} more")
     if len(facts.weights) == 0:
         lines.append("no influence")
     return lines
@@ -158,4 +159,4 @@ def _uvs(figure: Figure, vertex: int, triangle: int) -> Floats:
 
 
 def _numbers(values: Floats) -> str:
-    return "  ".join(f"{value:.4f}" for value in (np.round(values, 4) + 0.0).tolist())
+    return "  ".join(number_text(value, ".4f") for value in values.tolist())

@@ -8,9 +8,10 @@ import numpy as np
 from imgui_bundle import imgui
 
 from viewer.app.state import AppState, HeldVector
-from viewer.app.widgets import note_item
+from viewer.app.widgets import note_item, plain_zero
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
+from viewer.rig.number_text import number_text
 from viewer.rig.pose import Pose, joint_rotations
 from viewer.rig.pose_vector import own_numbers, rotation_rows, set_joint_rotations
 from viewer.rig.rotation import matrix_to_rotation_vector, rotation_vector_to_matrix
@@ -40,7 +41,11 @@ def draw_vector_component(
     text = "%.1f\N{DEGREE SIGN}" if state.in_degrees else "%.4f rad"
     reach = math.pi * factor
     changed, moved = imgui.slider_float(
-        f"##vector{joint}.{axis}", float(vector[axis]) * factor, -reach, reach, text
+        f"##vector{joint}.{axis}",
+        plain_zero(float(vector[axis]) * factor, text),
+        -reach,
+        reach,
+        text,
     )
     note_item(state, f"{label}.r{'xyz'[axis]}")
     is_reset = False
@@ -77,7 +82,9 @@ def draw_own_numbers(state: AppState, figure: Figure, pose: Pose, joint: int) ->
         return
     numbers = own_numbers(layout, joint_rotations(skeleton, pose))[joint]
     kind = "angles z y x" if layout.is_euler[joint] else "vector"
-    imgui.text_disabled(f"file: {numbers[0]:.4f}  {numbers[1]:.4f}  {numbers[2]:.4f}")
+    imgui.text_disabled(
+        f"file: {'  '.join(number_text(number, '.4f') for number in numbers.tolist())}"
+    )
     note_item(state, f"own {joint}")
     if imgui.is_item_hovered():
         start = int(layout.starts[joint])

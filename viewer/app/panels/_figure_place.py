@@ -7,7 +7,7 @@ import math
 from imgui_bundle import imgui
 
 from viewer.app.state import AppState
-from viewer.app.widgets import note_item
+from viewer.app.widgets import note_item, plain_zero
 from viewer.rig.mesh import box_size
 from viewer.rig.pose import Pose
 
@@ -35,7 +35,9 @@ def _row(state: AppState, name: str, value: float, low: float, high: float, rest
     imgui.text_disabled(name)
     imgui.same_line(4.2 * imgui.get_font_size())
     imgui.set_next_item_width(-1.0)
-    changed, moved = imgui.slider_float(f"##figure {name}", value, low, high, "%.4f")
+    changed, moved = imgui.slider_float(
+        f"##figure {name}", plain_zero(value, "%.4f"), low, high, "%.4f"
+    )
     note_item(state, f"figure.{name}")
     if imgui.is_item_hovered():
         imgui.set_tooltip(f"figure.{name}\nCtrl+click types a value, double-click resets")

@@ -30,6 +30,7 @@ from viewer.app.widgets import (
     disabled,
     explain,
     note_item,
+    plain_zero,
     same_line_if_room,
 )
 from viewer.errors import ViewerError
@@ -181,7 +182,9 @@ def _inputs(
     flags = imgui.InputTextFlags_.enter_returns_true
     typed: list[Floats | None] = []
     for label, values, digits in (("Shift", shift, "%.4g"), ("Turn (degrees)", angles, "%.2f")):
-        changed, new = imgui.input_float3(label, values.tolist(), digits, flags)
+        changed, new = imgui.input_float3(
+            label, [plain_zero(value, digits) for value in values.tolist()], digits, flags
+        )
         note_item(state, label)
         fits = changed and bool(np.isfinite(new).all())
         typed.append(np.array(new, dtype=np.float64) if fits else None)

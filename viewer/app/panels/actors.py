@@ -7,7 +7,7 @@ from imgui_bundle import imgui
 
 from viewer.app.actions import start_following, stop_following
 from viewer.app.state import AppState
-from viewer.app.widgets import button, checkbox, explain, note_item, same_line_if_room
+from viewer.app.widgets import button, checkbox, explain, note_item, plain_zero, same_line_if_room
 from viewer.errors import printable
 from viewer.rig.fit_error import fitted_body, keypoint_distances
 from viewer.rig.mesh import box_size
@@ -74,13 +74,14 @@ def _draw_actor(state: AppState, index: int, actor: Actor) -> None:
 def _draw_place(state: AppState, actor: Actor) -> None:
     """Draw when and where the chosen actor is."""
     if actor.clip is not None:
-        changed, value = imgui.drag_float("Starts at", actor.offset, 0.01, 0.0, 0.0, "%.3f s")
+        shown = plain_zero(actor.offset, "%.3f s")
+        changed, value = imgui.drag_float("Starts at", shown, 0.01, 0.0, 0.0, "%.3f s")
         note_item(state, "Starts at")
         if changed and abs(value) < 1e6:
             actor.offset = value
         explain("seconds by which its motion starts later than the scene's clock")
     size = box_size(state.box) or 1.0
-    place = actor.placement[:3, 3].tolist()
+    place = [plain_zero(part, "%.3f") for part in actor.placement[:3, 3].tolist()]
     changed, moved = imgui.drag_float3("Stands at", place, 0.002 * size, 0.0, 0.0, "%.3f")
     note_item(state, "Stands at")
     if changed and all(abs(value) < 1e6 * size for value in moved):

@@ -22,7 +22,7 @@ from viewer.app.curve_edit import (
 from viewer.app.curve_plot import draw_plot
 from viewer.app.curve_view import KeyPlace
 from viewer.app.state import AppState
-from viewer.app.widgets import button, choice, explain, note_item, same_line_if_room
+from viewer.app.widgets import button, choice, explain, note_item, plain_zero, same_line_if_room
 from viewer.rig.clip import EXTRAPOLATIONS, TANGENT_RULES, Channel, Clip, slopes
 
 __all__ = ["draw"]
@@ -250,7 +250,7 @@ def _draw_key_fields(state: AppState, curves: tuple[Curve, ...]) -> None:
 def _field(state: AppState, label: str, value: float) -> float | None:
     """Draw a number; return what was typed and entered."""
     flags = imgui.InputTextFlags_.enter_returns_true | imgui.InputTextFlags_.auto_select_all
-    entered, typed = imgui.input_double(label, value, 0.0, 0.0, "%.5g", flags)
+    entered, typed = imgui.input_double(label, plain_zero(value, "%.5g"), 0.0, 0.0, "%.5g", flags)
     note_item(state, label)
     # "nan" and "1e999" can be typed.
     return typed if entered and math.isfinite(typed) and abs(typed) < _FARTHEST else None

@@ -8,6 +8,7 @@ from viewer.app.actions import show
 from viewer.app.reasons import no_mesh, no_skeleton, no_skin, no_texture
 from viewer.app.state import AppState
 from viewer.app.view_menu import JOINT_TOGGLES
+from viewer.app.weights_actions import start_heat_map
 from viewer.app.widgets import (
     checkbox,
     choice,
@@ -49,7 +50,10 @@ def draw(state: AppState) -> None:
             state, "Skeleton opacity", options.skeleton_opacity, 0.0, 1.0, flags=_CLAMP
         )
     imgui.separator()
-    options.shading = choice(state, "Shading", options.shading, SHADING)
+    before = options.shading
+    options.shading = choice(state, "Shading", before, SHADING)
+    if options.shading == "scalar" != before:
+        start_heat_map(state)
     _draw_extras(state)
     why = no_mesh(state)
     options.flat = checkbox(state, "Flat", options.flat, why)

@@ -8,7 +8,7 @@ import numpy as np
 from imgui_bundle import imgui
 
 from viewer.app.state import AppState
-from viewer.app.widgets import button, note_item, same_line_if_room
+from viewer.app.widgets import button, note_item, plain_zero, same_line_if_room
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.hands import Hand, hand_coefficients, hand_vectors
@@ -58,7 +58,7 @@ def _draw_hand(state: AppState, figure: Figure, pose: Pose, hand: Hand) -> None:
     values = _values(hand, vectors)
     for index in range(min(state.n_hand_components, len(hand.components))):
         changed, value = imgui.slider_float(
-            f"{side} {index}", float(values[index]), -_REACH, _REACH, "%.2f"
+            f"{side} {index}", plain_zero(float(values[index]), "%.2f"), -_REACH, _REACH, "%.2f"
         )
         note_item(state, f"{side} component {index}")
         if changed and math.isfinite(value) and abs(value) < 1e3:

@@ -15,10 +15,11 @@ from viewer.app.panels._captured_points import draw_captured_points
 from viewer.app.panels._figure_place import draw_figure_place
 from viewer.app.pose_actions import copy_numbers, copy_pose, mirror, paste_pose
 from viewer.app.state import AppState
-from viewer.app.widgets import button, checkbox, menu_item, note_item, same_line_if_room
+from viewer.app.widgets import button, checkbox, menu_item, note_item, plain_zero, same_line_if_room
 from viewer.errors import printable
 from viewer.rig.memo import Memo
 from viewer.rig.mesh import box_size
+from viewer.rig.number_text import angle_text, number_text
 from viewer.rig.pose import Pose
 from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_labels
 
@@ -114,14 +115,20 @@ def _draw_head(state: AppState) -> None:
     _draw_pose_menu(state)
     same_line_if_room("degrees")
     if imgui.radio_button("degrees", state.in_degrees):
-        state.in_degrees = True
+        _show_angles(state, in_degrees=True)
     note_item(state, "degrees")
     same_line_if_room("radians")
     if imgui.radio_button("radians", not state.in_degrees):
-        state.in_degrees = False
+        _show_angles(state, in_degrees=False)
     note_item(state, "radians")
     if state.actor.figure.pose_layout is not None:
         state.as_vectors = checkbox(state, "Rotation vectors", state.as_vectors)
+
+
+def _show_angles(state: AppState, in_degrees: bool) -> None:
+    """Choose the unit of angles; curves are fitted again, as their axis has other numbers."""
+    state.curves.wants_fit |= in_degrees != state.in_degrees
+    state.in_degrees = in_degrees
 
 
 def _draw_pose_menu(state: AppState) -> None:
@@ -252,18 +259,20 @@ def _draw_dof(
     imgui.end_disabled()
     note_item(state, f"{label}.{name}")
     if imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):
-        imgui.set_tooltip(f"{label}.{name}\n{_limits_text(low, high, kind)}")
+        imgui.set_tooltip(f"{label}.{name}\n{_limits_text(low, high, kind, state.in_degrees)}")
         if imgui.is_mouse_double_clicked(imgui.MouseButton_.left) and not locked:
             value = float(skeleton.rest_dofs[dof])
     if imgui.begin_popup_context_item(f"menu of DOF {dof}"):
-        why = f"locked at {low:g}" if locked else ""
+        why = f"locked at {_value_text(low, kind, state.in_degrees)}" if locked else ""
         if menu_item(state, "Reset", why=why):
             value = float(skeleton.rest_dofs[dof])
         outside = "" if low <= 0.0 <= high else "0 is outside of its limits"
         if menu_item(state, "Set to 0", why=why or outside):
             value = 0.0
         if menu_item(state, "Copy value"):
-            imgui.set_clipboard_text(repr(float(pose.dofs[dof])))
+            is_angle = state.in_degrees and kind >= _FIRST_ROTATION
+            shown = math.degrees(pose.dofs[dof]) if is_angle else float(pose.dofs[dof])
+            imgui.set_clipboard_text(repr(shown + 0.0))
         imgui.end_popup()
     pose.dofs[dof] = min(max(value, low), high)
 
@@ -280,7 +289,7 @@ def _dof_slider(state: AppState, skeleton: Skeleton, pose: Pose, dof: int) -> fl
     bounded = math.isfinite(low) and math.isfinite(high)
     changed, moved = imgui.slider_float(
         f"##dof{dof}",
-        float(pose.dofs[dof]) * factor,
+        plain_zero(float(pose.dofs[dof]) * factor, text),
         (low if math.isfinite(low) else min(-unlimited, high - unlimited)) * factor,
         (high if math.isfinite(high) else max(unlimited, low + unlimited)) * factor,
         text,
@@ -295,13 +304,22 @@ def _reach(state: AppState) -> float:
     return box_size(state.box) or 1.0
 
 
-def _limits_text(low: float, high: float, kind: int) -> str:
+def _limits_text(low: float, high: float, kind: int, in_degrees: bool) -> str:
+    """Return what a slider's tooltip says of its limits, in the unit that is shown."""
+    texts = [_value_text(limit, kind, in_degrees) for limit in (low, high)]
     if low == high:
-        return f"locked at {low:g}"
+        return f"locked at {texts[0]}"
     if not math.isfinite(low) and not math.isfinite(high):
         return "unlimited; Ctrl+click types any value\ndouble-click resets"
-    unit = " rad" if kind >= _FIRST_ROTATION else ""
-    return f"{low:g} to {high:g}{unit}\nCtrl+click types a value, double-click resets"
+    span = f"{texts[0]} to {texts[1]}"
+    if not math.isfinite(low) or not math.isfinite(high):
+        span = f"at most {texts[1]}" if math.isfinite(high) else f"at least {texts[0]}"
+    return f"{span}\nCtrl+click types a value, double-click resets"
+
+
+def _value_text(value: float, kind: int, in_degrees: bool) -> str:
+    """Return a DOF's value in the unit that is shown."""
+    return angle_text(value, in_degrees) if kind >= _FIRST_ROTATION else number_text(value)
 
 
 def _reset(state: AppState, dofs: np.ndarray) -> None:

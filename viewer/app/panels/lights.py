@@ -7,7 +7,7 @@ from imgui_bundle import imgui
 from viewer.app.actions import reset_lights
 from viewer.app.srgb import decode_srgb, encode_srgb
 from viewer.app.state import AppState
-from viewer.app.widgets import button, checkbox, note_item, slider
+from viewer.app.widgets import button, checkbox, note_item, plain_zero, slider
 from viewer.rendering.options import Light
 
 __all__ = ["draw"]
@@ -45,7 +45,7 @@ def _draw_light(state: AppState, name: str, light: Light) -> None:
         ("inclination", "Inclination", -90.0, 90.0, "%.0f\N{DEGREE SIGN}"),
     ):
         changed, value = imgui.slider_float(
-            text, getattr(light, attribute), low, high, unit, _CLAMP
+            text, plain_zero(getattr(light, attribute), unit), low, high, unit, _CLAMP
         )
         note_item(state, f"{name} {text}")
         if changed:

@@ -7,7 +7,7 @@ from imgui_bundle import imgui
 
 from viewer.app.pose_actions import random_shape, reset_shape
 from viewer.app.state import AppState
-from viewer.app.widgets import button, checkbox, note_item, same_line_if_room
+from viewer.app.widgets import button, checkbox, note_item, plain_zero, same_line_if_room
 from viewer.errors import printable
 from viewer.rig.figure import Figure
 from viewer.rig.measure import measure
@@ -118,7 +118,7 @@ def _draw_slider(state: AppState, name: str, index: int, pose: Pose, is_morph: b
     shown = printable(name, 40)
     low, high = (0.0, 1.0) if is_morph else (-_REACH, _REACH)
     changed, value = imgui.slider_float(
-        f"{shown}##{index}", float(pose.shape_weights[index]), low, high, "%.2f"
+        f"{shown}##{index}", plain_zero(float(pose.shape_weights[index]), "%.2f"), low, high, "%.2f"
     )
     note_item(state, f"coefficient {index}")
     if changed and abs(value) < 1e6:  # "nan" and "1e99" can be typed into a slider

@@ -20,6 +20,7 @@ from viewer.app.widgets import (
     same_line_if_room,
     slider,
 )
+from viewer.rig.number_text import number_text
 
 __all__ = ["draw"]
 
@@ -78,7 +79,7 @@ def _draw_place(state: AppState) -> None:
         playback.playing = False
         playback.seek(playback.frame_time(frame - playback.first_frame))
     first, last = (playback.first_frame + number for number in playback.frame_range)
-    text = f"of {first} to {last}    {playback.time:.3f} s"
+    text = f"of {first} to {last}    {number_text(playback.time, '.3f')} s"
     same_line_if_room(text)
     imgui.text_unformatted(text)
 

@@ -16,6 +16,7 @@ from viewer.errors import ViewerError, printable
 from viewer.rig.arrays import Floats
 from viewer.rig.explanation import DualTerms, Explanation
 from viewer.rig.explanation_text import explanation_text
+from viewer.rig.number_text import number_text
 from viewer.rig.skinning import METHODS
 
 __all__ = ["draw", "fitting", "matrix_text"]
@@ -258,8 +259,7 @@ def _draw_rows(sheet: _Sheet, name: str, rows: Sequence[tuple[str, Floats]]) -> 
 def _draw_number(value: float, digits: int) -> None:
     """Draw a number at the right edge of the next cell."""
     imgui.table_next_column()
-    # Adding 0 makes -0 a plain 0, also for what is rounded to it.
-    text = f"{round(value, digits) + 0.0:.{digits}f}"
+    text = number_text(value, f".{digits}f")
     room = imgui.get_content_region_avail().x - imgui.calc_text_size(text).x
     imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + max(room, 0.0))
     imgui.text_unformatted(text)

@@ -8,7 +8,7 @@ from imgui_bundle import imgui
 
 from viewer.app.reasons import no_mesh
 from viewer.app.state import AppState
-from viewer.app.weights_actions import no_view, show_scalar, shown_joint, unpin
+from viewer.app.weights_actions import no_view, show_scalar, shown_joint, start_heat_map, unpin
 from viewer.app.widgets import (
     button,
     checkbox,
@@ -16,12 +16,13 @@ from viewer.app.widgets import (
     disabled,
     explain,
     note_item,
-    number_text,
+    plain_zero,
     same_line_if_room,
 )
 from viewer.errors import printable
 from viewer.rendering.scalar_look import TYPICAL
 from viewer.rig.figure import Figure
+from viewer.rig.number_text import short_number
 from viewer.rig.scalars import SCALARS, length_unit, menu_title, shown_unit, split_name
 
 __all__ = ["draw"]
@@ -36,7 +37,10 @@ def draw(state: AppState) -> None:
     options, why = state.options, no_mesh(state)
     shows = options.shading == "scalar"
     if checkbox(state, "Heat map", shows, why) != shows:
-        options.shading = "phong" if shows else "scalar"
+        if shows:
+            options.shading = "phong"
+        else:
+            start_heat_map(state)
     _draw_views(state)
     key = split_name(options.scalar)[0]
     if SCALARS[key].takes_joint:
@@ -104,7 +108,7 @@ def _draw_largest(state: AppState, key: str) -> None:
     """Say how large a length gets, in the figure's unit."""
     if state.options.shading == "scalar" and SCALARS[key].unit == "length":
         factor, unit = length_unit(state.actor.figure)
-        most = number_text(factor * state.stats.scalar_range[1])
+        most = short_number(factor * state.stats.scalar_range[1])
         imgui.text_wrapped(f"up to {most} {unit} in this pose")
 
 
@@ -143,7 +147,7 @@ def _end_field(
 ) -> float:
     """Draw a field for one end of the range; the ends keep their order."""
     imgui.set_next_item_width(7.0 * imgui.get_font_size())
-    changed, typed = imgui.input_double(label, value, 0.0, 0.0, "%.6g")
+    changed, typed = imgui.input_double(label, plain_zero(value, "%.6g"), 0.0, 0.0, "%.6g")
     note_item(state, label)
     if unit:
         imgui.same_line()

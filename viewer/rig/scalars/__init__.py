@@ -21,6 +21,7 @@ from viewer.rig.scalars._asked import Asked, influences_kept
 from viewer.rig.scalars._fields import field_of
 from viewer.rig.scalars._joints import joint_of, joint_text
 from viewer.rig.scalars._lengths import length_text, length_unit
+from viewer.rig.scalars._start import joint_influences, most_influential, telling_view
 from viewer.rig.skeleton import joint_labels
 from viewer.rig.skinning import Skinning
 
@@ -30,15 +31,18 @@ __all__ = [
     "categories",
     "compute",
     "find_view",
+    "joint_influences",
     "joint_of",
     "joint_text",
     "length_text",
     "length_unit",
     "menu_title",
     "missing_part",
+    "most_influential",
     "shown_unit",
     "split_name",
     "strongest",
+    "telling_view",
     "view_title",
 ]
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints, frozen
+from viewer.rig.number_text import number_text
 from viewer.rig.transfer.axes_fit import fit_axes
 from viewer.rig.transfer.icp import (
     Cloud,
@@ -320,7 +321,7 @@ def alignment_lines(alignment: Alignment) -> list[str]:
     how = _HOW[alignment.how]
     if alignment.how == "in place" and placed.scale == 1.0 and angle == 0.0:
         how = "the target lies on the template as it is"
-    shift = ", ".join(f"{value:.4g}" for value in placed.shift + 0.0)
+    shift = ", ".join(number_text(value, ".4g") for value in placed.shift.tolist())
     factors = ""
     for values, whose in ((placed.factors, ""), (placed.own_factors, "the template's ")):
         if (values != 1.0).any():

@@ -16,6 +16,7 @@ import numpy as np
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh, volume
+from viewer.rig.number_text import number_text
 from viewer.rig.pose import Pose
 from viewer.rig.rotation import rotation_vector_to_matrix
 from viewer.rig.skeleton import joint_label
@@ -294,9 +295,10 @@ def _lines(found: Fitted) -> tuple[str, ...]:
     angle, name = _most_turned(found)
     longest = int(np.abs(found.grown[0]).argmax())
     change = 100.0 * np.expm1(found.grown[0, longest])
+    longer = number_text(change, "+.0f")
     return (
         f"pose: the template's joints turned to fit, {name} by {np.degrees(angle):.0f} degrees; "
-        f"its limbs resized, {joint_label(skeleton, longest)} by {change:+.0f} % in length",
+        f"its limbs resized, {joint_label(skeleton, longest)} by {longer} % in length",
     )
 
 

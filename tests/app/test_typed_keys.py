@@ -1,0 +1,88 @@
+"""Text that arrives faster than frames are drawn, and clicks and keys between two frames."""
+
+from __future__ import annotations
+
+import pytest
+from imgui_bundle import imgui
+
+from viewer.app.typed_keys import TypedKeys
+
+A, ENTER, BACKSPACE, KEYPAD_1, KEYPAD_ENTER = 65, 257, 259, 321, 335
+PRESS, RELEASE, REPEAT = 1, 0, 2
+CTRL = 2
+
+
+@pytest.fixture
+def type_at_once(hand):
+    """A function that sends what a keyboard sends for a text, all of it between two frames."""
+    keys = TypedKeys()
+
+    def send(letter, action, modifiers=0):
+        if keys.passes(ord(letter.upper()), action, modifiers, hand.io.want_text_input):
+            hand.io.add_key_event(getattr(imgui.Key, letter.lower()), action == PRESS)
+
+    def type_text(text):
+        for letter in text:
+            send(letter, PRESS)
+            hand.io.add_input_character(ord(letter))
+            send(letter, RELEASE)
+
+    return type_text
+
+
+def test_text_that_is_typed_between_two_frames_arrives_whole(hand, type_at_once):
+    hand.click("Filter")
+    type_at_once("abba cadabra".replace(" ", ""))
+    hand.step(1)
+    assert hand.state.joint_filter == "abbacadabra"
+
+
+def test_enter_and_backspace_between_two_frames_keep_their_order(hand, type_at_once):
+    hand.click("Filter")
+    type_at_once("armx")
+    for is_down in (True, False):
+        hand.io.add_key_event(imgui.Key.backspace, is_down)
+    hand.step(3)
+    assert hand.state.joint_filter == "arm"
+
+
+def test_click_between_two_frames_acts_also_while_text_is_entered(hand, type_at_once):
+    hand.click("Filter")
+    type_at_once("arm")
+    hand.step(2)
+    x, y = hand.place("radians", 0.1)
+    hand.io.add_mouse_pos_event(x, y)
+    hand.step(1)
+    for is_down in (True, False):
+        hand.io.add_mouse_button_event(0, is_down)
+    hand.step(3)
+    assert not hand.state.in_degrees
+
+
+def test_key_between_two_frames_acts_where_nothing_is_typed(hand, type_at_once):
+    was_on = hand.state.options.wireframe
+    type_at_once("w")
+    hand.step(3)
+    assert hand.state.options.wireframe != was_on
+
+
+@pytest.mark.parametrize(
+    ("key", "modifiers", "passes"),
+    [(A, 0, False), (A, CTRL, True), (ENTER, 0, True), (BACKSPACE, 0, True),
+     (KEYPAD_1, 0, False), (KEYPAD_ENTER, 0, True)],
+)  # fmt: skip
+def test_only_keys_that_type_are_left_out(key, modifiers, passes):
+    keys = TypedKeys()
+    assert keys.passes(key, PRESS, modifiers, is_typing=True) == passes
+    assert keys.passes(key, REPEAT, modifiers, is_typing=True) == passes
+    assert keys.passes(key, RELEASE, modifiers, is_typing=True) == passes
+    assert keys.passes(key, RELEASE, modifiers, is_typing=True)  # known to be up
+
+
+def test_key_that_was_down_before_the_field_was_active_comes_up():
+    keys = TypedKeys()
+    assert keys.passes(A, PRESS, 0, is_typing=False)
+    assert keys.passes(A, RELEASE, 0, is_typing=True)
+    assert not keys.passes(A, PRESS, 0, is_typing=True)
+    assert not keys.passes(A, RELEASE, 0, is_typing=False)
+    assert keys.passes(A, PRESS, 0, is_typing=False)

@@ -1,0 +1,54 @@
+"""Numbers as text, for everything that shows numbers to people."""
+
+from __future__ import annotations
+
+import math
+
+__all__ = ["angle_text", "number_text", "short_number"]
+
+_NOT_ZERO = set("123456789n")  # "inf" and "nan" have an n
+
+
+def number_text(value: float, spec: str = "g") -> str:
+    """Return a number in a format; one that is shown as 0 has no minus.
+
+    Parameters
+    ----------
+    value : float
+        Any.
+    spec : str
+        Of Python's ``format``.
+
+    >>> number_text(-0.0), number_text(-0.04, ".1f"), number_text(-0.0, "+.1f")
+    ('0', '0.0', '+0.0')
+    >>> number_text(-0.06, ".1f"), number_text(-1e-9), number_text(-math.inf)
+    ('-0.1', '-1e-09', '-inf')
+    """
+    text = format(value, spec)
+    return text if _NOT_ZERO.intersection(text) else format(0.0, spec)
+
+
+def short_number(value: float) -> str:
+    """Return a number with three digits, or with all before the point if there are more.
+
+    >>> short_number(0.012345), short_number(1234.5), short_number(-0.0)
+    ('0.0123', '1,234', '0')
+    """
+    return number_text(value, ".3g" if abs(value) < 999.5 else ",.0f")
+
+
+def angle_text(radians: float, in_degrees: bool, sign: str = "") -> str:
+    """Return an angle in the unit that is shown: ``"28.6°"`` or ``"0.500 rad"``.
+
+    Parameters
+    ----------
+    radians : float
+        The angle.
+    in_degrees : bool
+        Whether it is shown in degrees.
+    sign : str
+        ``"+"`` to give angles above 0 a sign too.
+    """
+    if in_degrees:
+        return f"{number_text(math.degrees(radians), f'{sign}.1f')}\N{DEGREE SIGN}"
+    return f"{number_text(radians, f'{sign}.3f')} rad"

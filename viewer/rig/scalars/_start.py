@@ -1,0 +1,52 @@
+"""What a scalar view shows at first: a joint or a field that is not 0 everywhere."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from viewer.rig.arrays import Floats
+from viewer.rig.figure import Figure
+from viewer.rig.scalars._joints import joint_text
+
+__all__ = ["joint_influences", "most_influential", "telling_field", "telling_view"]
+
+
+def joint_influences(figure: Figure) -> Floats:
+    """Return the sum of the weights, without their signs, that each joint has: (J,)."""
+    skin = figure.skin
+    if skin is None:
+        return np.zeros(0)
+    sums = np.bincount(skin.joints, np.abs(skin.weights), skin.n_joints)
+    return sums.astype(np.float64, copy=False)
+
+
+def most_influential(figure: Figure) -> int:
+    """Return the joint with the largest sum of weights, -1 if no joint has influence."""
+    sums = joint_influences(figure)
+    return int(sums.argmax()) if sums.any() else -1
+
+
+def telling_field(figure: Figure) -> str:
+    """Return the name of the first field of numbers that is not 0 everywhere; empty for none."""
+    fields = [field for field in figure.fields if not field.names]
+    return next((field.name for field in fields if field.values.any()), "")
+
+
+def telling_view(key: str, figures: Iterable[Figure]) -> str:
+    """Return the name of a view with a joint or field that is not 0 everywhere.
+
+    Parameters
+    ----------
+    key : str
+        Of ``SCALARS``; one that is about neither is its own name.
+    figures : iterable of Figure
+        The first that has something to see counts.
+    """
+    for figure in figures:
+        if key == "weight" and (joint := most_influential(figure)) >= 0:
+            return f"weight:{joint_text(figure, joint)}"
+        if key == "field" and (field := telling_field(figure)):
+            return f"field:{field}"
+    return key
