@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import copy
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import moderngl
-import numpy as np
 from imgui_bundle import imgui
 
 from viewer.app.actions import follow_actor
@@ -24,9 +22,11 @@ from viewer.app.lint_marks import show_finding
 from viewer.app.loader import Loader
 from viewer.app.mouse import handle_mouse
 from viewer.app.overlays import draw_hints
+from viewer.app.picture_key import picture_key
 from viewer.app.recent import remember
 from viewer.app.record_dialog import draw_record_dialog
 from viewer.app.rig_tools import draw_rig_tools, show_rig
+from viewer.app.shape_guard import drop_unreadable_shapes
 from viewer.app.state import AppState
 from viewer.app.stream import Stream
 from viewer.app.view_picks import answer_picks
@@ -37,9 +37,7 @@ from viewer.loading.capturing import Builder
 from viewer.rendering.renderer import Renderer
 from viewer.rendering.target import Target
 from viewer.rig.arrays import Bytes
-from viewer.rig.pose import pose_key
 from viewer.rig.scene import Scene
-from viewer.rig.shape import shaped
 
 __all__ = ["Frame"]
 
@@ -94,7 +92,7 @@ class Frame:
         started = time.perf_counter()
         state = self.state
         self._play()
-        self._check_shapes()
+        drop_unreadable_shapes(state)
         self.open(draw_interface(state))
         draw_record_dialog(state)
         draw_file_dialog(state)
@@ -186,19 +184,6 @@ class Frame:
             if stream.error:
                 state.error = stream.error
 
-    def _check_shapes(self) -> None:
-        """Take back a shape whose directions turn out to be unreadable, before panels use it."""
-        state = self.state
-        try:
-            for actor in state.scene.actors:
-                if actor.pose is not None:
-                    shaped(actor.figure, actor.pose.shape_weights)
-        except ViewerError as problem:
-            state.error = str(problem)
-            for actor in state.scene.actors:
-                if actor.pose is not None:
-                    actor.pose.shape_weights = np.zeros(actor.figure.n_shapes)
-
     def _draw_scene(self, scale: float) -> None:
         """Draw the scene if anything about it changed, and put it behind the panels."""
         state = self.state
@@ -207,7 +192,7 @@ class Frame:
         if min(size) < 1:
             return
         self.renderer.annotations = pinned_annotations(state, size)
-        key = self._scene_key(size)
+        key = picture_key(state, self.renderer, size)
         if key != self._drawn:
             self._drawn = key  # also if it fails: not again before something has changed
             self._draw_target(size)
@@ -241,28 +226,6 @@ class Frame:
             state.error = str(problem)
         state.say(*self.renderer.notes)
         self.renderer.notes.clear()
-
-    def _scene_key(self, size: tuple[int, int]) -> object:
-        """Return everything the picture of the scene depends on."""
-        state, camera = self.state, self.state.camera
-        poses = tuple(
-            (
-                id(actor),
-                id(actor.figure),
-                actor.is_drawn,
-                actor.color,
-                b"" if actor.points is None else actor.points.tobytes(),
-                actor.placement.tobytes(),
-                *(pose_key(actor.pose) if actor.pose else ()),
-            )
-            for actor in state.scene.actors
-        )
-        selected = (state.chosen_actor, state.selected_joint)
-        place = (camera.target.tobytes(), camera.distance, camera.azimuth, camera.inclination)
-        lens = (camera.fov, camera.orthographic, camera.up, id(camera.fixed))
-        marks, options = self.renderer.marks, copy.deepcopy(state.options)
-        drawn_over = marks, self.renderer.ghost, self.renderer.annotations
-        return (size, place, lens, options, poses, *selected, *drawn_over)
 
     def _target(self, size: tuple[int, int]) -> Target:
         samples = self.state.options.samples
