@@ -20,7 +20,7 @@ from viewer.app.jobs import FrameJob
 from viewer.app.keys import handle_keys
 from viewer.app.lint_marks import show_finding
 from viewer.app.loader import Loader
-from viewer.app.mouse import handle_mouse
+from viewer.app.mouse import drop_motion_before_press, handle_mouse
 from viewer.app.overlays import draw_hints
 from viewer.app.picture_key import picture_key
 from viewer.app.recent import remember
@@ -91,6 +91,7 @@ class Frame:
         """
         started = time.perf_counter()
         state = self.state
+        drop_motion_before_press()
         self._play()
         drop_unreadable_shapes(state)
         self.open(draw_interface(state))
