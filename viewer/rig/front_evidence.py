@@ -147,10 +147,11 @@ def _mirrors(positions: Floats, axis: int) -> bool:
     middle = bounding_box(positions).mean(axis=0)[axis]
     mirrored[:, axis] = 2.0 * middle - mirrored[:, axis]
     low = positions.min(axis=0)
-    known = _cells((positions - low) / size)
+    known = np.unique(_cells((positions - low) / size))
     found = np.zeros(len(mirrored), dtype=bool)
     for step in np.ndindex(3, 3, 3):
-        found |= np.isin(_cells((mirrored - low) / size + step - 1.0), known)
+        cells = _cells((mirrored - low) / size + step - 1.0)
+        found |= known[np.minimum(np.searchsorted(known, cells), len(known) - 1)] == cells
     return bool(found.mean() > _MIRRORED)
 
 
