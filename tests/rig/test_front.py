@@ -134,9 +134,7 @@ def _walk(way, n_frames=11):
     turns = np.tile([0.0, 0.0, 0.0, 1.0], (n_frames, 2, 1))
     places = np.outer(np.linspace(0.0, 1.0, n_frames), way)
     timing = Timing(30.0, np.arange(n_frames))
-    return Actor(
-        figure(chain), clip=SampledClip("walk", timing, turns, figure_translations=places)
-    )
+    return Actor(figure(chain), clip=SampledClip("walk", timing, turns, figure_translations=places))
 
 
 def test_travel_shows_the_front_where_nothing_else_does():

@@ -13,6 +13,7 @@ from imgui_bundle import imgui
 from viewer.app.actions import follow_actor
 from viewer.app.explanation_lines import draw_hovered, pinned_annotations
 from viewer.app.file_dialog import PICTURES, FileDialog, draw_file_dialog, folder_of
+from viewer.app.framing import keep_fitting
 from viewer.app.gizmo import is_held
 from viewer.app.gizmo_drawing import draw_gizmo
 from viewer.app.interface import draw_interface
@@ -107,6 +108,7 @@ class Frame:
         self._take_streamed()
         self._work()
         self._pose()
+        keep_fitting(state)
         self.renderer.marks, self.renderer.ghost = show_finding(state), show_rig(state)
         state.history.observe(state.scene, state.options, is_held(state))
         self._draw_scene(scale)

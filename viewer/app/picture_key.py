@@ -39,5 +39,6 @@ def picture_key(state: AppState, renderer: Renderer, size: tuple[int, int]) -> o
     selected = (state.chosen_actor, state.selected_joint)
     place = (camera.target.tobytes(), camera.distance, camera.azimuth, camera.inclination)
     lens = (camera.fov, camera.orthographic, camera.up, id(camera.fixed))
+    ground, options = state.box.tobytes(), copy.deepcopy(state.options)
     drawn_over = renderer.marks, renderer.ghost, renderer.annotations
-    return (size, place, lens, copy.deepcopy(state.options), poses, *selected, *drawn_over)
+    return (size, place, lens, ground, options, poses, *selected, *drawn_over)

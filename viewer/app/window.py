@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from viewer.app.actions import fit_view
 from viewer.app.display import find_display, import_glfw
 
 glfw = import_glfw()
@@ -29,9 +28,10 @@ from viewer.app.theme import apply_theme, change_scale  # noqa: E402
 from viewer.errors import RenderError, printable  # noqa: E402
 from viewer.loading import MotionSettings  # noqa: E402
 from viewer.loading.capturing import Builder  # noqa: E402
-from viewer.rendering.camera import Camera, fit  # noqa: E402
+from viewer.rendering.camera import Camera, facing_camera  # noqa: E402
 from viewer.rendering.context import explain  # noqa: E402
 from viewer.rendering.options import DisplayOptions  # noqa: E402
+from viewer.rig.front import guess_front  # noqa: E402
 from viewer.rig.mesh import bounding_box  # noqa: E402
 from viewer.rig.scene import Scene, scene_points  # noqa: E402
 
@@ -69,7 +69,7 @@ def show(
     scale : float, optional
         Size of the interface; the screen's own if omitted.
     fit_distance : bool
-        Whether the camera steps back until the scene fills the view.
+        Whether the camera keeps the distance at which the scene fills the view, until it is moved.
     builders : sequence of Builder
         Captures of the scene that are still to be read.
     plays : bool
@@ -87,12 +87,11 @@ def show(
     find_display()
     options = options or DisplayOptions()
     points = scene_points(scene, options.show)
-    camera = camera or Camera(up=scene.up)
-    if fit_distance:
-        fit(camera, points, _SIZE[0] / _SIZE[1])
+    camera = camera or facing_camera(guess_front(scene), scene.up)
     files = tuple(map(Path, paths))
     state = AppState(scene, camera, options, bounding_box(points), files)
     state.lint.settings = motion
+    state.framing.is_fitting = fit_distance
     state.recent = load_recent()
     state.closed_panels = load_closed_panels()
     state.say(*filter(None, [remember(state.recent, files)]))
@@ -100,7 +99,7 @@ def show(
     window = _Window(state, scale)
     try:
         window.frame.stream(builders)
-        window.run(fit_distance)
+        window.run()
     finally:
         window.release()
 
@@ -180,7 +179,7 @@ class _Window:
         pixels = glfw.get_framebuffer_size(self.handle)[0]
         return pixels / width if width and pixels else 1.0
 
-    def run(self, fits: bool) -> None:
+    def run(self) -> None:
         """Draw frames until the window is closed; sleep while nothing happens."""
         rest = _Rest()
         while not glfw.window_should_close(self.handle):
@@ -191,10 +190,6 @@ class _Window:
                 self._dropped = []
             if rest.left < 0 or not self._draw():
                 continue
-            if fits and rest.left == 0:
-                # Only now it is known how much room the panels leave.
-                fit_view(self.state)
-                fits, rest.left = False, 1
             if "quit" in self.state.wants:
                 glfw.set_window_should_close(self.handle, True)
 
@@ -219,9 +214,10 @@ class _Window:
         return self._is_dirty or bool(self._dropped) or len(self._imgui.input_events_queue) > 0
 
     def _awaits(self) -> bool:
-        """Return whether something comes without an event: files, a tooltip, words on a vertex."""
+        """Return whether something comes without an event: files, the extent of a motion, texts."""
         state = self.state
         is_read = state.loader is not None or state.stream is not None
+        is_read |= not state.framing.is_settled
         return is_read or state.weights.is_waiting or _awaits_tooltip(self._imgui)
 
     def _draw(self) -> bool:
