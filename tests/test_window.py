@@ -23,7 +23,8 @@ from PIL import Image, ImageGrab
 import viewer
 from viewer.app.view_picks import vertex_at
 from viewer.app.window import _Rest
-from viewer.rendering.camera import Camera, fit
+from viewer.rendering.camera import facing_camera, fit
+from viewer.rig.front import guess_front
 from viewer.rig.scene import scene_points
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -288,7 +289,7 @@ def test_screenshot_is_the_headless_picture_to_the_pixel(window, places, figure)
     height, width = saved.shape[:2]
     assert (width, height) == tuple(round(side) for side in places[1][2:])
     scene = viewer.load(*figure)
-    camera = Camera(up=scene.up)
+    camera = facing_camera(guess_front(scene), scene.up)
     fit(camera, scene_points(scene), width / height)
     assert (saved == viewer.render(scene, (width, height), camera)).all()
     # And the window shows these pixels, but for tools at the upper edge, messages at the lower.
@@ -365,11 +366,16 @@ def surface(figure):
     state, renderer = driver.state, driver.app.frame.renderer
     x, y, width, height = state.view_rect
     size = round(width), round(height)
+
+    def is_inside(across, down):  # not at an edge, which another rounding would miss
+        around = [(across + i, down + j) for i in (-3, 0, 3) for j in (-3, 0, 3)]
+        return all(vertex_at(state, renderer, size, place) is not None for place in around)
+
     seen = [
         (round(x + across), round(y + down))
         for down in np.linspace(0.2, 0.8, 25) * height
         for across in np.linspace(0.2, 0.8, 25) * width
-        if vertex_at(state, renderer, size, (across, down)) is not None
+        if is_inside(across, down)
     ]
     driver.close()
     middle = (tab.min.x + 0.3 * (tab.max.x - tab.min.x), (tab.min.y + tab.max.y) / 2)

@@ -10,8 +10,9 @@ from imgui_bundle import imgui
 import viewer
 from viewer.app.headless import HeadlessApp
 from viewer.app.state import AppState
-from viewer.rendering.camera import Camera, fit
+from viewer.rendering.camera import facing_camera, fit
 from viewer.rendering.options import DisplayOptions
+from viewer.rig.front import guess_front
 from viewer.rig.scene import Scene, scene_box, scene_points
 from viewer.rig.skeleton import find_dof
 
@@ -24,7 +25,7 @@ MODIFIERS = {
 
 def make_state(scene: Scene, paths=(), samples=4) -> AppState:
     """Return the state that the window starts with."""
-    camera = Camera(up=scene.up)
+    camera = facing_camera(guess_front(scene), scene.up)
     fit(camera, scene_points(scene), 1.0)
     files = tuple(map(Path, paths))
     options = DisplayOptions(samples=samples)

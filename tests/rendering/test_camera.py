@@ -7,7 +7,19 @@ import math
 import numpy as np
 import pytest
 
-from viewer.rendering.camera import VIEWS, Camera, camera_axes, eye, fit, orbit, pan, zoom
+from viewer.rendering.camera import (
+    VIEWS,
+    Camera,
+    camera_axes,
+    eye,
+    facing_camera,
+    fit,
+    front_azimuth,
+    look_from,
+    orbit,
+    pan,
+    zoom,
+)
 
 BOX = np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
 ANGLES = [(0, 0), (35, 15), (-120, -60), (180, 0), (90, 90), (-30, -90), (10, 89.999)]
@@ -261,3 +273,50 @@ def test_copy_shares_nothing():
     assert (twin.fov, twin.orthographic, twin.up) == (7.0, True, "z")
     twin.target[0] = 9.0
     assert camera.target[0] == 1.0
+
+
+AXES = {"+x": (1, 0, 0), "-x": (-1, 0, 0), "+y": (0, 1, 0), "-y": (0, -1, 0), "+z": (0, 0, 1)}
+AXES["-z"] = (0, 0, -1)
+FACING = [("y", front) for front in ("+x", "-x", "+z", "-z")]
+FACING += [("z", front) for front in ("+x", "-x", "+y", "-y")]
+
+
+@pytest.mark.parametrize(("up", "front"), FACING)
+def test_front_view_stands_on_the_axis_that_is_faced(up, front):
+    camera = facing_camera(front, up)
+    look_from(camera, "front")
+    np.testing.assert_allclose(camera_axes(camera)[2], AXES[front], atol=1e-12)
+    look_from(camera, "back")
+    np.testing.assert_allclose(camera_axes(camera)[2], np.negative(AXES[front]), atol=1e-12)
+    # left x up is the front, so up x front is the left
+    left = np.cross(AXES[f"+{up}"], AXES[front])
+    look_from(camera, "left")
+    np.testing.assert_allclose(camera_axes(camera)[2], left, atol=1e-12)
+    look_from(camera, "top")
+    np.testing.assert_allclose(camera_axes(camera)[2], AXES[f"+{up}"], atol=1e-12)
+    np.testing.assert_allclose(camera_axes(camera)[1], np.negative(AXES[front]), atol=1e-12)
+
+
+@pytest.mark.parametrize(("up", "front"), FACING)
+def test_first_view_is_35_degrees_from_the_front(up, front):
+    camera = facing_camera(front, up)
+    away = camera.azimuth - front_azimuth(front, up)
+    assert math.cos(math.radians(away - 35)) == pytest.approx(1.0)
+    assert -180 <= camera.azimuth <= 180 and camera.inclination == 15
+
+
+def test_usual_front_is_the_first_view_there_always_was():
+    for up, front in (("y", "+z"), ("z", "-y")):
+        camera, plain = facing_camera(front, up), Camera(up=up)
+        assert (camera.azimuth, camera.inclination) == (plain.azimuth, plain.inclination)
+
+
+@pytest.mark.parametrize("orthographic", [False, True])
+def test_fit_leaves_as_much_of_the_height_as_is_asked(orthographic):
+    camera = Camera(azimuth=0.0, inclination=0.0, orthographic=orthographic)
+    tall = np.array([[-0.1, -1.0, 0.0], [0.1, 1.0, 0.0]])
+    fit(camera, tall, 1.0, 0.7)
+    np.testing.assert_allclose(np.abs(project(camera, tall)[:, 1]), 0.7, atol=1e-9)
+    wide = tall[:, [1, 0, 2]]
+    fit(camera, wide, 1.0, 0.7)
+    np.testing.assert_allclose(np.abs(project(camera, wide)[:, 0]), 1 / 1.08, atol=1e-9)

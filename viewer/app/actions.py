@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from viewer.app.framing import fit_again, fit_shown
 from viewer.app.posing_actions import cancel_drag
 from viewer.app.reasons import no_motion
 from viewer.app.rig_tools import drop_rig_tool
@@ -9,17 +10,19 @@ from viewer.app.selection import select_joint
 from viewer.app.state import AppState
 from viewer.app.weights_actions import unpin
 from viewer.errors import ViewerError, printable
-from viewer.rendering.camera import VIEWS, Camera, camera_from_view, fit
+from viewer.rendering.camera import Camera, camera_from_view, look_from
 from viewer.rendering.options import SHOWN, Lights
 from viewer.rendering.picking import Pick
 from viewer.rendering.pinhole import distortion_error
 from viewer.rig.follow import followed_point
+from viewer.rig.front import Front
 from viewer.rig.number_text import number_text
 from viewer.rig.pose import rest_pose
-from viewer.rig.scene import Actor, scene_points
+from viewer.rig.scene import Actor
 
 __all__ = [
     "cancel",
+    "face",
     "fit_view",
     "follow_actor",
     "go_to_end",
@@ -80,14 +83,20 @@ def toggle_option(state: AppState, name: str, text: str) -> None:
 
 def fit_view(state: AppState) -> None:
     """Aim the camera at the scene as it is posed and fill the view with it."""
-    state.camera.fixed = None
-    fit(state.camera, scene_points(state.scene, state.options.show), state.aspect)
+    fit_shown(state)
 
 
 def look(state: AppState, name: str) -> None:
-    """Turn the camera to a named view."""
+    """Turn the camera to a named view, and fill the view with what is shown."""
     state.camera.fixed = None
-    state.camera.azimuth, state.camera.inclination = VIEWS[name]
+    look_from(state.camera, name)
+    fit_again(state)
+
+
+def face(state: AppState, front: Front) -> None:
+    """Say which axis the figures face, "auto" for a guess; the camera sees them as before."""
+    state.set_front(front)
+    fit_again(state)
 
 
 def look_through(state: AppState, index: int) -> None:
@@ -102,6 +111,7 @@ def look_through(state: AppState, index: int) -> None:
     except ViewerError as problem:
         state.error = str(problem)
         return
+    seen.front = state.camera.front
     for name in Camera.__slots__:
         setattr(state.camera, name, getattr(seen, name))
     error = distortion_error(view)
@@ -212,6 +222,7 @@ def follow_actor(state: AppState) -> None:
 
 def start_following(state: AppState, actor: int, joint: int) -> None:
     """Let the camera follow an actor's joint, or its middle (-1), from where it is now."""
+    state.framing.is_fitting = False
     state.followed = actor, joint
     state.followed_from = followed_point(state.scene.actors[actor], joint)
     name = state.scene.actors[actor].name

@@ -2,30 +2,31 @@
 
 from __future__ import annotations
 
-import copy
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import moderngl
-import numpy as np
 from imgui_bundle import imgui
 
 from viewer.app.clock import Clock
 from viewer.app.explanation_lines import draw_hovered, pinned_annotations
 from viewer.app.file_dialog import PICTURES, FileDialog, draw_file_dialog, folder_of
+from viewer.app.framing import keep_fitting
 from viewer.app.gizmo_drawing import draw_gizmo
 from viewer.app.interface import draw_interface
 from viewer.app.jobs import FrameJob
 from viewer.app.keys import handle_keys
 from viewer.app.lint_marks import show_finding
 from viewer.app.loader import Loader
-from viewer.app.mouse import handle_mouse
+from viewer.app.mouse import drop_motion_before_press, handle_mouse
 from viewer.app.overlays import draw_hints
+from viewer.app.picture_key import picture_key
 from viewer.app.recent import remember
 from viewer.app.record_dialog import draw_record_dialog
 from viewer.app.rig_tools import draw_rig_tools, show_rig
+from viewer.app.shape_guard import drop_unreadable_shapes
 from viewer.app.state import AppState
 from viewer.app.stream import Stream
 from viewer.app.view_picks import answer_picks
@@ -36,9 +37,7 @@ from viewer.loading.capturing import Builder
 from viewer.rendering.renderer import Renderer
 from viewer.rendering.target import Target
 from viewer.rig.arrays import Bytes
-from viewer.rig.pose import pose_key
 from viewer.rig.scene import Scene
-from viewer.rig.shape import shaped
 
 __all__ = ["Frame"]
 
@@ -91,8 +90,9 @@ class Frame:
         """
         started = time.perf_counter()
         state = self.state
+        drop_motion_before_press()
         self.clock.advance()
-        self._check_shapes()
+        drop_unreadable_shapes(state)
         self.open(draw_interface(state))
         draw_record_dialog(state)
         draw_file_dialog(state)
@@ -107,6 +107,7 @@ class Frame:
         self.clock.keep_edits()
         self._take_streamed()
         self.clock.pose()
+        keep_fitting(state)
         self.renderer.marks, self.renderer.ghost = show_finding(state), show_rig(state)
         self._draw_scene(scale)
         if self.target is not None:
@@ -148,19 +149,6 @@ class Frame:
             if stream.error:
                 state.error = stream.error
 
-    def _check_shapes(self) -> None:
-        """Take back a shape whose directions turn out to be unreadable, before panels use it."""
-        state = self.state
-        try:
-            for actor in state.scene.actors:
-                if actor.pose is not None:
-                    shaped(actor.figure, actor.pose.shape_weights)
-        except ViewerError as problem:
-            state.error = str(problem)
-            for actor in state.scene.actors:
-                if actor.pose is not None:
-                    actor.pose.shape_weights = np.zeros(actor.figure.n_shapes)
-
     def _draw_scene(self, scale: float) -> None:
         """Draw the scene if anything about it changed, and put it behind the panels."""
         state = self.state
@@ -169,7 +157,7 @@ class Frame:
         if min(size) < 1:
             return
         self.renderer.annotations = pinned_annotations(state, size)
-        key = self._scene_key(size)
+        key = picture_key(state, self.renderer, size)
         if key != self._drawn:
             self._drawn = key  # also if it fails: not again before something has changed
             self._draw_target(size)
@@ -203,28 +191,6 @@ class Frame:
             state.error = str(problem)
         state.say(*self.renderer.notes)
         self.renderer.notes.clear()
-
-    def _scene_key(self, size: tuple[int, int]) -> object:
-        """Return everything the picture of the scene depends on."""
-        state, camera = self.state, self.state.camera
-        poses = tuple(
-            (
-                id(actor),
-                id(actor.figure),
-                actor.is_drawn,
-                actor.color,
-                b"" if actor.points is None else actor.points.tobytes(),
-                actor.placement.tobytes(),
-                *(pose_key(actor.pose) if actor.pose else ()),
-            )
-            for actor in state.scene.actors
-        )
-        selected = (state.chosen_actor, state.selected_joint)
-        place = (camera.target.tobytes(), camera.distance, camera.azimuth, camera.inclination)
-        lens = (camera.fov, camera.orthographic, camera.up, id(camera.fixed))
-        marks, options = self.renderer.marks, copy.deepcopy(state.options)
-        drawn_over = marks, self.renderer.ghost, self.renderer.annotations
-        return (size, place, lens, options, poses, *selected, *drawn_over)
 
     def _target(self, size: tuple[int, int]) -> Target:
         samples = self.state.options.samples

@@ -6,7 +6,6 @@ import math
 
 from imgui_bundle import imgui, implot
 
-from viewer.app.actions import fit_view
 from viewer.app.frame import Frame
 from viewer.app.state import AppState
 from viewer.app.theme import apply_theme
@@ -79,11 +78,10 @@ class HeadlessApp:
         """
         for note in self.state.notes:
             note.until = math.inf
+        self.state.framing.is_fitting = fits
         self.step(_SETTLE_FRAMES)
-        if fits:
-            distance = self.state.camera.distance
-            fit_view(self.state)
-            self.state.camera.distance = max(distance, self.state.camera.distance)
+        while self.state.stream is None and not self.state.framing.is_settled:
+            self.step(1)
         self.state.stats.frame_ms = 0.0  # the same picture every time
         self.step(1)
         pixels = self.screen.read()

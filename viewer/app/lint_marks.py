@@ -7,10 +7,11 @@ from dataclasses import astuple
 
 import numpy as np
 
+from viewer.app.framing import fit_points
 from viewer.app.state import AppState
 from viewer.errors import ViewerError
 from viewer.lint import Places, places_of, points_of
-from viewer.rendering.camera import Camera, camera_axes, fit
+from viewer.rendering.camera import Camera, camera_axes
 from viewer.rendering.marks import Marks
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import bounding_box, box_size
@@ -147,9 +148,8 @@ def aim(state: AppState, points: Floats, facing: Floats, around: float) -> None:
     whole = _finite(actor_points(state.scene.actors[state.lint.finding.actor]))
     size = box_size(bounding_box(whole if len(whole) else points)) or box_size(state.box) or 1.0
     room = bounding_box(points).mean(axis=0) + around * size * np.array([[-1.0], [1.0]])
-    camera.fixed = None
     _turn(camera, facing)
-    fit(camera, np.concatenate([points, room]), state.aspect)
+    fit_points(state, np.concatenate([points, room]))
 
 
 def _turn(camera: Camera, facing: Floats) -> None:

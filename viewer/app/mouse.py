@@ -10,11 +10,25 @@ from viewer.app.state import AppState
 from viewer.app.weights_view import wants_vertex
 from viewer.rendering.camera import orbit, pan, zoom
 
-__all__ = ["handle_mouse"]
+__all__ = ["drop_motion_before_press", "handle_mouse"]
 
 _DEGREES_PER_POINT = 0.4
 _ZOOM_PER_NOTCH = 0.88
-_BUTTONS = (imgui.MouseButton_.left, imgui.MouseButton_.right, imgui.MouseButton_.middle)
+_LEFT = imgui.MouseButton_.left
+_BUTTONS = (_LEFT, imgui.MouseButton_.right, imgui.MouseButton_.middle)
+
+
+def drop_motion_before_press() -> None:
+    """Take the way that the pointer came to the place of a press out of this frame's motion.
+
+    ImGui hands a motion and the press after it over in one frame. Whatever drags by the frame's
+    motion, as plots do, would begin with a leap. To be called before anything is drawn.
+    """
+    io = imgui.get_io()
+    clicked = [button for button in _BUTTONS if imgui.is_mouse_clicked(button)]
+    held = [button for button in _BUTTONS if imgui.is_mouse_down(button)]
+    if clicked and clicked == held:  # what an earlier press drags goes on
+        io.mouse_delta = imgui.ImVec2(0.0, 0.0)
 
 
 def handle_mouse(state: AppState) -> None:
@@ -25,21 +39,19 @@ def handle_mouse(state: AppState) -> None:
         return
     if io.want_capture_mouse or width < 1 or height < 1:
         return
+    dragging = [button for button in _BUTTONS if _drags(button)]
     delta = io.mouse_delta
-    moves = bool(delta.x or delta.y) and any(map(_drags, _BUTTONS))
-    if moves or io.mouse_wheel:
+    if (dragging and (delta.x or delta.y)) or io.mouse_wheel:
         state.camera.fixed = None  # go on from where the calibrated camera stands
-    left = _drags(imgui.MouseButton_.left)
-    pans = _drags(imgui.MouseButton_.right) or _drags(imgui.MouseButton_.middle)
-    if pans or (left and io.key_shift):
+    if dragging and (dragging != [_LEFT] or io.key_shift):
         pan(state.camera, -delta.x / height, delta.y / height)
-    elif left:
+    elif dragging:
         orbit(state.camera, -_DEGREES_PER_POINT * delta.x, _DEGREES_PER_POINT * delta.y)
     place = (io.mouse_pos.x - x, io.mouse_pos.y - y)
-    if imgui.is_mouse_double_clicked(imgui.MouseButton_.left):
+    if imgui.is_mouse_double_clicked(_LEFT):
         state.wants_pick = (*place, True)
     elif (
-        imgui.is_mouse_released(imgui.MouseButton_.left)
+        imgui.is_mouse_released(_LEFT)
         and _is_click()
         and (wants_vertex(state.weights) or not choose_joint(state))
     ):
@@ -51,12 +63,15 @@ def handle_mouse(state: AppState) -> None:
 
 
 def _drags(button: imgui.MouseButton_) -> bool:
+    """Return whether the way that the pointer came since the last frame belongs to a drag."""
+    if imgui.is_mouse_clicked(button):
+        return False  # it came that way before the button went down
     # A quick hand moves and lets go within one frame: that way belongs to the drag as well.
     return imgui.is_mouse_dragging(button, 0.0) or imgui.is_mouse_released(button)
 
 
 def _is_click() -> bool:
     """Return whether the button that went up had not been dragged, nor clicked twice."""
-    io, left = imgui.get_io(), imgui.MouseButton_.left
+    io, left = imgui.get_io(), _LEFT
     is_still = io.mouse_drag_max_distance_sqr[left] < io.mouse_drag_threshold**2
     return is_still and io.mouse_clicked_last_count[left] < 2 and not io.key_shift

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from imgui_bundle import imgui
 
+from viewer.app.framing import fit_points
 from viewer.app.rig_placing import (
     ghost_place,
     laid_template,
@@ -16,7 +17,6 @@ from viewer.app.rig_sources import target_mesh
 from viewer.app.rig_view import Landmark, Template
 from viewer.app.state import AppState
 from viewer.app.view_frame import ViewFrame, view_frame
-from viewer.rendering.camera import fit
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import Mesh
 from viewer.rig.ray_hit import RayHit, first_hit, surface_point
@@ -40,8 +40,7 @@ def show_both(state: AppState) -> None:
         apply_transform(ghost_place(state, template), mesh.positions),
         apply_transform(target_place(view.target), target_mesh(state).positions),
     )
-    state.camera.fixed = None
-    fit(state.camera, np.concatenate(points), state.aspect)
+    fit_points(state, np.concatenate(points))
 
 
 def take_click(state: AppState) -> None:

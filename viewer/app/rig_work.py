@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from viewer.app.framing import restart_framing
 from viewer.app.jobs import CountedJob, Report
 from viewer.app.reasons import no_job_room
 from viewer.app.rig_placing import laid_template, placing_now, target_place
@@ -31,11 +32,10 @@ from viewer.app.rig_view import Landmark, Placing, Result, RigChoices, Running, 
 from viewer.app.state import AppState
 from viewer.errors import RigError, printable
 from viewer.loading import load
-from viewer.rendering.camera import fit
 from viewer.rig.arrays import Floats
-from viewer.rig.mesh import Mesh, bounding_box
+from viewer.rig.mesh import Mesh
 from viewer.rig.ray_hit import surface_point
-from viewer.rig.scene import Actor, scene_points
+from viewer.rig.scene import Actor
 from viewer.rig.transfer.alignment import AlignmentSettings
 from viewer.rig.transfer.pipeline import transfer
 from viewer.rig.transfer.settings import METHODS
@@ -119,9 +119,7 @@ def _show_added(state: AppState, actor: Actor) -> None:
     """Choose a mesh that came to the scene, and bring it into view."""
     choose_target(state, actor)
     state.choose_actor(len(state.scene.actors) - 1)
-    points = scene_points(state.scene, state.options.show)
-    state.box, state.camera.fixed = bounding_box(points), None
-    fit(state.camera, points, state.aspect)
+    restart_framing(state)
 
 
 def start_reading(

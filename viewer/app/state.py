@@ -12,16 +12,18 @@ import numpy as np
 
 from viewer.app.curve_view import CurveView
 from viewer.app.edits import History
+from viewer.app.framing import Framing, restart_framing
 from viewer.app.lint_view import LintView
 from viewer.app.messages import MessageLog
 from viewer.app.playback import Playback
 from viewer.app.posing import Posing
 from viewer.app.rig_view import RigView
 from viewer.app.weights_view import WeightsView
-from viewer.rendering.camera import Camera, fit
+from viewer.rendering.camera import Camera, front_azimuth, orbit
 from viewer.rendering.legend import Legend
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.arrays import Floats
+from viewer.rig.front import Front, guess_front
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.scene import Actor, Scene, scene_points
 
@@ -79,7 +81,8 @@ class AppState:
     scene, camera, options : Scene, Camera, DisplayOptions
         What is shown, from where, and how.
     box : (2, 3)
-        The scene's box as it was opened: the grid lies under it.
+        Around the scene in its present shape, as it was opened or over its whole motion: the grid
+        lies under it.
     paths : tuple of Path
         The files of the scene; empty for the bundled figure.
     chosen_actor : int
@@ -108,6 +111,8 @@ class AppState:
         What the window has to do after the frame: "screenshot", "quit", "open dialog".
     wants_open : list of Path
         Files to open after the frame.
+    framing : Framing
+        Whether the camera keeps fitting what is shown.
     playback : Playback
         The scene's clock.
     curves : CurveView
@@ -179,6 +184,7 @@ class AppState:
     log: MessageLog = field(default_factory=MessageLog)
     stats: Stats = field(default_factory=Stats)
     history: History = field(default_factory=History)
+    framing: Framing = field(default_factory=Framing)
     playback: Playback = field(default_factory=Playback)
     curves: CurveView = field(default_factory=CurveView)
     lint: LintView = field(default_factory=LintView)
@@ -225,13 +231,14 @@ class AppState:
         return max(width, 1.0) / max(height, 1.0)
 
     def show_scene(self, scene: Scene, paths: Sequence[Path]) -> None:
-        """Replace the scene; the camera keeps its direction and fits what is new."""
+        """Replace the scene; the camera sees its front from where it saw the last one's."""
         points = scene_points(scene, self.options.show)
         self.scene, self.paths = scene, tuple(paths)
         self.lint.note_opened()
         self.box = bounding_box(points)
         self.camera.up, self.camera.fixed = scene.up, None
-        fit(self.camera, points, self.aspect)
+        self.set_front("auto")
+        restart_framing(self)
         # Body parts and levels of detail mean something else on another model.
         self.options.hidden_parts, self.options.reduced = (), False
         self.options.trail_joints = ()
@@ -241,6 +248,18 @@ class AppState:
         self.history.time = self.playback.time
         self.history.start(scene, self.options)
         self.say(*scene.warnings)
+
+    def set_front(self, front: Front) -> None:
+        """Say which axis the figures face, or let it be guessed; the camera turns as far.
+
+        Parameters
+        ----------
+        front : str
+            ``"auto"``, or an axis as ``"+z"``, not the one that points up.
+        """
+        ahead = front_azimuth(guess_front(self.scene) if front == "auto" else front, self.scene.up)
+        orbit(self.camera, ahead - self.camera.front, 0.0)
+        self.camera.front = ahead
 
     def limit_camera(self) -> None:
         """Keep the camera where float32 still draws the scene: near it, by its size."""

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from viewer.app.actions import fit_view
 from viewer.app.display import find_display, import_glfw
 
 glfw = import_glfw()
@@ -32,9 +31,10 @@ from viewer.errors import RenderError, printable  # noqa: E402
 from viewer.interrupts import hold, poll  # noqa: E402
 from viewer.loading import MotionSettings  # noqa: E402
 from viewer.loading.capturing import Builder  # noqa: E402
-from viewer.rendering.camera import Camera, fit  # noqa: E402
+from viewer.rendering.camera import Camera, facing_camera  # noqa: E402
 from viewer.rendering.context import explain  # noqa: E402
 from viewer.rendering.options import DisplayOptions  # noqa: E402
+from viewer.rig.front import guess_front  # noqa: E402
 from viewer.rig.mesh import bounding_box  # noqa: E402
 from viewer.rig.scene import Scene, scene_points  # noqa: E402
 
@@ -72,7 +72,7 @@ def show(
     scale : float, optional
         Size of the interface; the screen's own if omitted.
     fit_distance : bool
-        Whether the camera steps back until the scene fills the view.
+        Whether the camera keeps the distance at which the scene fills the view, until it is moved.
     builders : sequence of Builder
         Captures of the scene that are still to be read.
     plays : bool
@@ -90,13 +90,12 @@ def show(
     find_display()
     options = options or DisplayOptions()
     points = scene_points(scene, options.show)
-    camera = camera or Camera(up=scene.up)
-    if fit_distance:
-        fit(camera, points, _SIZE[0] / _SIZE[1])
+    camera = camera or facing_camera(guess_front(scene), scene.up)
     files = tuple(map(Path, paths))
     hold()  # callbacks of GLFW swallow what is raised in them
     state = AppState(scene, camera, options, bounding_box(points), files)
     state.lint.settings = motion
+    state.framing.is_fitting = fit_distance
     if options.shading == "scalar":
         start_heat_map(state)
     state.recent = load_recent()
@@ -106,7 +105,7 @@ def show(
     window = _Window(state, scale)
     try:
         window.frame.stream(builders)
-        window.run(fit_distance)
+        window.run()
     finally:
         window.release()
 
@@ -193,7 +192,7 @@ class _Window:
         pixels = glfw.get_framebuffer_size(self.handle)[0]
         return pixels / width if width and pixels else 1.0
 
-    def run(self, fits: bool) -> None:
+    def run(self) -> None:
         """Draw frames until the window is closed; sleep while nothing happens."""
         rest = _Rest()
         while not glfw.window_should_close(self.handle):
@@ -205,10 +204,6 @@ class _Window:
                 self._dropped = []
             if rest.left < 0 or not self._draw():
                 continue
-            if fits and rest.left == 0:
-                # Only now it is known how much room the panels leave.
-                fit_view(self.state)
-                fits, rest.left = False, 1
             if "quit" in self.state.wants:
                 glfw.set_window_should_close(self.handle, True)
 
@@ -233,9 +228,10 @@ class _Window:
         return self._is_dirty or bool(self._dropped) or len(self._imgui.input_events_queue) > 0
 
     def _awaits(self) -> bool:
-        """Return whether something comes without an event: files, a tooltip, words on a vertex."""
+        """Return whether something comes without an event: files, the extent of a motion, texts."""
         state = self.state
         is_read = state.loader is not None or state.stream is not None
+        is_read |= not state.framing.is_settled
         return is_read or state.weights.is_waiting or _awaits_tooltip(self._imgui)
 
     def _draw(self) -> bool:

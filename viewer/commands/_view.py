@@ -9,13 +9,14 @@ from viewer.commands._numbers import number
 from viewer.commands._pose import skinning_of
 from viewer.commands._scalar import add_scalar_arguments, scalar_notes, set_scalar
 from viewer.errors import ViewerError, printable
-from viewer.rendering.camera import Camera, camera_from_view, fit
+from viewer.rendering.camera import Camera, camera_from_view, facing_camera, fit, front_azimuth
 from viewer.rendering.ground_pass import parse_color
 from viewer.rendering.options import BACKGROUNDS, SHOWN, DisplayOptions
 from viewer.rendering.pinhole import distortion_error
 from viewer.rendering.program import SHADING
 from viewer.rig.arrays import Floats
 from viewer.rig.camera_view import CameraView
+from viewer.rig.front import FRONTS, Front, front_axes, guess_front
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.scene import Scene
 
@@ -37,6 +38,14 @@ def add_camera_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options that aim the camera; what is not given fits the scene."""
     group = parser.add_argument_group("camera")
     group.add_argument("--azimuth", type=number, metavar="A", help="degrees about the up axis")
+    group.add_argument(
+        "--front",
+        choices=("auto", *FRONTS),
+        default="auto",
+        metavar="AXIS",
+        help="the axis that the figures face, as --front=-z: the first view is from there "
+        "(default: auto, judged by the figures)",
+    )
     group.add_argument("--inclination", type=number, metavar="I", help="degrees above the horizon")
     group.add_argument(
         "--distance", type=number, metavar="D", help="from the target, in units (default: fits)"
@@ -109,8 +118,10 @@ def camera_of(
 ) -> Camera:
     """Return the camera asked for; its distance fits the points unless it is given."""
     if arguments.view is not None:
-        return camera_from_view(_find_view(scene, arguments.view), size, scene.up)
-    camera = Camera(up=scene.up, orthographic=arguments.orthographic)
+        camera = camera_from_view(_find_view(scene, arguments.view), size, scene.up)
+        camera.front = front_azimuth(_front_of(arguments, scene), scene.up)
+        return camera
+    camera = facing_camera(_front_of(arguments, scene), scene.up, arguments.orthographic)
     if arguments.azimuth is not None:
         camera.azimuth = arguments.azimuth
     if arguments.inclination is not None:
@@ -129,6 +140,17 @@ def camera_of(
             )
         camera.distance = arguments.distance
     return camera
+
+
+def _front_of(arguments: argparse.Namespace, scene: Scene) -> Front:
+    """Return the front asked for, or else the one that the figures show."""
+    front: Front = arguments.front
+    if front == "auto":
+        return guess_front(scene)
+    if front not in front_axes(scene.up):
+        axes = ", ".join(front_axes(scene.up))
+        raise ViewerError(f"--front: {scene.up} is up here: expected {axes}, found {front}")
+    return front
 
 
 def _find_view(scene: Scene, text: str) -> CameraView:

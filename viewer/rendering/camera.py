@@ -20,7 +20,10 @@ __all__ = [
     "camera_axes",
     "camera_from_view",
     "eye",
+    "facing_camera",
     "fit",
+    "front_azimuth",
+    "look_from",
     "orbit",
     "pan",
     "zoom",
@@ -34,7 +37,9 @@ VIEWS = {
     "top": (0.0, 90.0),
     "bottom": (0.0, -90.0),
 }
-"""Azimuth and inclination in degrees; "left" looks at the side of a left hand (+x)."""
+"""Azimuth from the front, and inclination, in degrees; "left" looks at a left hand's side."""
+
+_USUAL_AZIMUTH = 35.0  # from the front, at first
 
 _MARGIN = 1.08  # room around a fitted figure
 _SMALLEST = 1e-9  # distance of a camera that fits nothing
@@ -51,8 +56,8 @@ class Camera:
     distance : float
         From eye to target, scene units.
     azimuth, inclination : float
-        Degrees about the up axis, and above the horizon. At 0, 0 the camera looks at the
-        front: along -z if y is up, along +y if z is up.
+        Degrees about the up axis, and above the horizon. At 0, 0 the camera looks along -z if y
+        is up, along +y if z is up.
     fov : float
         Vertical field of view, degrees.
     orthographic : bool
@@ -62,16 +67,19 @@ class Camera:
     fixed : CameraView or None
         A calibrated camera that is looked through: the matrices are then its own, and all else
         says where the camera will be once this is None again.
+    front : float
+        Azimuth from which the front is seen: named views count from it.
     """
 
     target: Floats = field(default_factory=lambda: np.zeros(3))
     distance: float = 3.0
-    azimuth: float = 35.0
+    azimuth: float = _USUAL_AZIMUTH
     inclination: float = 15.0
     fov: float = 35.0
     orthographic: bool = False
     up: Literal["y", "z"] = "y"
     fixed: CameraView | None = None
+    front: float = 0.0
 
     def copy(self) -> Camera:
         """Return a camera that shares nothing with this one."""
@@ -84,6 +92,7 @@ class Camera:
             self.orthographic,
             self.up,
             self.fixed,
+            self.front,
         )
 
     @property
@@ -153,6 +162,37 @@ def camera_axes(camera: Camera) -> tuple[Floats, Floats, Floats]:
     return right, up, backward
 
 
+def front_azimuth(front: str, up: Literal["y", "z"]) -> float:
+    """Return the azimuth of a camera that sees a front, as ``"+x"``, from straight ahead: degrees.
+
+    >>> front_azimuth("+z", "y"), front_azimuth("+x", "z"), front_azimuth("-z", "y")
+    (0.0, 90.0, 180.0)
+    """
+    sign = 1.0 if front[0] == "+" else -1.0
+    if front[1] == "x":
+        return 90.0 * sign
+    ahead = sign if up == "y" else -sign  # +z if y is up, -y if z is up
+    return 0.0 if ahead > 0.0 else 180.0
+
+
+def facing_camera(front: str, up: Literal["y", "z"], orthographic: bool = False) -> Camera:
+    """Return a camera that looks at a front from a little to its left and above, not yet fitted."""
+    ahead = front_azimuth(front, up)
+    azimuth = _wrapped(ahead + _USUAL_AZIMUTH)
+    return Camera(azimuth=azimuth, orthographic=orthographic, up=up, front=ahead)
+
+
+def look_from(camera: Camera, view: str) -> None:
+    """Turn to a named view, a key of ``VIEWS``."""
+    azimuth, camera.inclination = VIEWS[view]
+    camera.azimuth = _wrapped(camera.front + azimuth)
+
+
+def _wrapped(angle: float) -> float:
+    """Return an angle in degrees as -180 to 180; half a turn keeps its sign."""
+    return angle if -180.0 <= angle <= 180.0 else (angle + 180.0) % 360.0 - 180.0
+
+
 def eye(camera: Camera) -> Floats:
     """Return the position of the camera in scene space: (3,)."""
     return camera.target + camera.distance * camera_axes(camera)[2]
@@ -204,7 +244,7 @@ def camera_from_view(
     )
 
 
-def fit(camera: Camera, points: Floats, aspect: float) -> None:
+def fit(camera: Camera, points: Floats, aspect: float, free_height: float = 1.0) -> None:
     """Aim at the middle of some points and step back until all are seen; direction stays.
 
     Parameters
@@ -215,11 +255,14 @@ def fit(camera: Camera, points: Floats, aspect: float) -> None:
         What to see, scene space.
     aspect : float
         Width / height of the picture.
+    free_height : float
+        How much of the picture's height is to be used, about its middle; 0 to 1.
     """
     camera.target = bounding_box(points).mean(axis=0)
     across, upward, near = ((points - camera.target) @ np.stack(camera_axes(camera)).T).T
     tangent = math.tan(math.radians(camera.fov) / 2)
-    needed = np.maximum(np.abs(across) / (tangent * aspect), np.abs(upward) / tangent) * _MARGIN
+    wide, high = tangent * aspect / _MARGIN, tangent * min(free_height, 1.0 / _MARGIN)
+    needed = np.maximum(np.abs(across) / wide, np.abs(upward) / high)
     # Perspective makes what is near larger, so a near point needs the camera further away.
     distance = float((needed if camera.orthographic else needed + near).max(initial=0.0))
     camera.distance = distance if distance > _SMALLEST else 1.0

@@ -15,7 +15,14 @@ from viewer.rig.follow import followed_point
 from viewer.rig.mesh import bounding_box
 from viewer.rig.scene import Actor, Scene, scene_points
 
-__all__ = ["find_follow", "fit_turning", "follow_candidates", "frame_motion", "outermost"]
+__all__ = [
+    "find_follow",
+    "fit_turning",
+    "follow_candidates",
+    "frame_motion",
+    "frames_looked_at",
+    "outermost",
+]
 
 _MOST_FRAMES, _MOST_POINTS = 32, 10_000_000  # looked at for fitting
 _N_DIRECTIONS = 1000
@@ -63,30 +70,41 @@ def _looked_at(recording: Recording) -> list[int]:
         return [0][: recording.n_frames]
     meshes = [actor.figure.mesh for actor in recording.scene.actors]
     n_points = sum(mesh.n_vertices for mesh in meshes if mesh is not None)
-    count = min(max(_MOST_POINTS // max(n_points, 1), 4), _MOST_FRAMES, recording.n_frames)
-    places = np.linspace(0, recording.n_frames - 1, count)
+    most = min(max(_MOST_POINTS // max(n_points, 1), 4), _MOST_FRAMES)
+    return frames_looked_at(recording.n_frames, most)
+
+
+def frames_looked_at(n_frames: int, most: int) -> list[int]:
+    """Return frames that stand for all, evenly spread from the first to the last.
+
+    >>> frames_looked_at(7, 3)
+    [0, 3, 6]
+    """
+    places = np.linspace(0, n_frames - 1, min(most, n_frames))
     return sorted(set(np.rint(places).astype(int).tolist()))
 
 
-def outermost(points: Floats) -> Floats:
-    """Return the points that lie furthest along each of some 1000 directions.
+def outermost(points: Floats, n_directions: int = _N_DIRECTIONS) -> Floats:
+    """Return the points that lie furthest along each of many directions.
 
     The box around them is exact. What else a camera that is fitted to them may miss is well below
-    1 % of their size: the directions are 7 degrees apart, and ``fit`` leaves 8 % of room.
+    1 % of their size: 1000 directions are 7 degrees apart, and ``fit`` leaves 8 % of room.
 
     Parameters
     ----------
     points : (N, 3)
         At least one.
+    n_directions : int
+        100 are 20 degrees apart: what is missed is below 2 %.
 
     Returns
     -------
     (M, 3)
-        Some of the points, M at most 1006.
+        Some of the points, at most 6 more than there are directions; all if they are not more.
     """
-    if len(points) <= _N_DIRECTIONS:
+    if len(points) <= n_directions:
         return points
-    directions = np.concatenate([np.eye(3), -np.eye(3), _directions(_N_DIRECTIONS)]).T
+    directions = np.concatenate([np.eye(3), -np.eye(3), _directions(n_directions)]).T
     best = points[np.zeros(directions.shape[1], dtype=np.int64)]
     for start in range(0, len(points), _BLOCK):
         block = points[start : start + _BLOCK]

@@ -6,12 +6,13 @@ import sys
 import threading
 
 from viewer.interrupts import deferred
-from viewer.rendering.camera import Camera, fit
+from viewer.rendering.camera import Camera, facing_camera, fit
 from viewer.rendering.context import headless_context, is_software, unreadable_devices
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.renderer import Renderer
 from viewer.rendering.target import Target, check_size
 from viewer.rig.arrays import Bytes, Floats
+from viewer.rig.front import guess_front
 from viewer.rig.scene import Scene, scene_box, scene_points
 
 __all__ = ["Offscreen", "default_camera", "render"]
@@ -113,7 +114,7 @@ def default_camera(scene: Scene, size: tuple[int, int], show: str = "skin") -> C
     show : str
         What of the figures is drawn, a key of ``SHOWN``.
     """
-    camera = Camera(up=scene.up)
+    camera = facing_camera(guess_front(scene), scene.up)
     fit(camera, scene_points(scene, show), size[0] / size[1])
     return camera
 

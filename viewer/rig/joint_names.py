@@ -16,7 +16,7 @@ from collections.abc import Sequence
 
 from viewer.rig.arrays import Ints
 
-__all__ = ["canonical_names", "plain_names"]
+__all__ = ["canonical_names", "plain_names", "sided_words"]
 
 _WORDS = {
     "pelvis": "pelvis hips",
@@ -94,6 +94,25 @@ def plain_names(names: Sequence[str]) -> tuple[str, ...]:
         used.add(chosen)
         result.append(chosen)
     return tuple(result)
+
+
+def sided_words(names: Sequence[str]) -> list[tuple[str, str]]:
+    """Return the side and the word of every name, whatever program it comes from.
+
+    Parameters
+    ----------
+    names : sequence of J str
+        As in the file.
+
+    Returns
+    -------
+    list of J (str, str)
+        ``"left"``, ``"right"`` or nothing, and the rest in small letters.
+
+    >>> sided_words(["LeftFoot", "hip_01_r", "spine"])
+    [('left', 'foot'), ('right', 'hip01'), ('', 'spine')]
+    """
+    return _keys(names)
 
 
 def canonical_names(names: Sequence[str], parents: Ints) -> tuple[str, ...]:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from viewer.app.actions import fit_view, look, look_through, toggle_projection
+from viewer.app.actions import face, fit_view, look, look_through, toggle_projection
 from viewer.app.state import AppState
-from viewer.app.widgets import button, checkbox, note_item, slider
+from viewer.app.widgets import button, checkbox, choice, explain, note_item, slider
 from viewer.errors import printable
-from viewer.rendering.camera import VIEWS
+from viewer.rendering.camera import VIEWS, front_azimuth
+from viewer.rig.front import front_axes
 from viewer.rig.mesh import box_size
 
 __all__ = ["draw"]
@@ -46,6 +47,18 @@ def draw(state: AppState) -> None:
             imgui.same_line()
         if button(state, name.capitalize()):
             look(state, name)
+    _draw_front(state)
+
+
+def _draw_front(state: AppState) -> None:
+    """Draw the choice of the axis that the figures face, from which named views count."""
+    up, ahead = state.scene.up, state.camera.front
+    texts = {axis: axis for axis in front_axes(up)}
+    now = next((axis for axis in texts if front_azimuth(axis, up) == ahead), "auto")
+    chosen = choice(state, "Front axis", now, {**texts, "auto": "guess"})
+    explain("the axis that the figures face: named views go by it")
+    if chosen != now:
+        face(state, chosen)
 
 
 def _place(state: AppState) -> tuple[float, ...]:
