@@ -15,7 +15,7 @@ SOURCES = sorted(PACKAGE.rglob("*.py"))
 # Which parts of the package each part may import.
 ALLOWED = {
     "rig": {"rig", "errors"},
-    "formats": {"formats", "rig", "errors"},
+    "formats": {"formats", "rig", "errors", "streams"},
     "rendering": {"rendering", "rig", "errors", "resources"},
     "export": {"export", "formats", "rig", "errors"},
     "loading": {"loading", "formats", "rig", "errors", "resources"},
@@ -35,6 +35,7 @@ ALLOWED = {
     "models": {"formats", "errors"},
     "errors": set(),
     "resources": {"errors"},
+    "streams": {"errors"},
 }
 # Third-party modules with a single home.
 HOMES = {

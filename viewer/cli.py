@@ -11,11 +11,15 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 from types import FrameType
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 import viewer
 from viewer.commands import COMMANDS
 from viewer.errors import FormatError, ViewerError, printable
+from viewer.streams import standard_streams
+
+if TYPE_CHECKING:
+    from _typeshed import SupportsWrite
 
 __all__ = ["run"]
 
@@ -34,6 +38,7 @@ class _Terminated(BaseException):
     """SIGTERM arrived; unwinds like Ctrl-C, so that no temporary file stays behind."""
 
 
+@standard_streams()
 def run(arguments: Sequence[str]) -> int:
     """Run one command.
 
@@ -101,6 +106,13 @@ class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         raise ViewerError(f"{message} ({self.prog} --help lists the options)")
 
+    def print_help(self, file: SupportsWrite[str] | None = None) -> None:
+        # argparse ignores that its help cannot be printed, and prints it as an error instead of
+        # into an output that is closed.
+        print(self.format_help(), end="", file=file)
+        if sys.stdout is not None:
+            sys.stdout.flush()  # argparse leaves the program next
+
 
 def _protect_numbers(arguments: list[str]) -> list[str]:
     """Join ``--option -1`` to ``--option=-1``: argparse takes ``-1,2`` and ``-z`` for options."""
@@ -116,7 +128,7 @@ def _protect_numbers(arguments: list[str]) -> list[str]:
 
 
 def _overview() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="viewer",
         description="See, check and produce skinned characters.",
         epilog=_EPILOG,
