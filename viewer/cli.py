@@ -9,12 +9,16 @@ import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 import viewer
 from viewer.commands import COMMANDS
 from viewer.errors import FormatError, ViewerError, printable
 from viewer.interrupts import Interrupted, watched
+from viewer.streams import standard_streams
+
+if TYPE_CHECKING:
+    from _typeshed import SupportsWrite
 
 __all__ = ["run"]
 
@@ -30,6 +34,7 @@ all is written changes nothing
 _DOWNWARD = ("-y", "-z")  # axes that point up the other way; no option has these letters
 
 
+@standard_streams()
 def run(arguments: Sequence[str]) -> int:
     """Run one command.
 
@@ -102,6 +107,13 @@ class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         raise ViewerError(f"{message} ({self.prog} --help lists the options)")
 
+    def print_help(self, file: SupportsWrite[str] | None = None) -> None:
+        # argparse ignores that its help cannot be printed, and prints it as an error instead of
+        # into an output that is closed.
+        print(self.format_help(), end="", file=file)
+        if sys.stdout is not None:
+            sys.stdout.flush()  # argparse leaves the program next
+
 
 def _protect_numbers(arguments: list[str]) -> list[str]:
     """Join ``--option -1`` to ``--option=-1``: argparse takes ``-1,2`` and ``-z`` for options."""
@@ -117,7 +129,7 @@ def _protect_numbers(arguments: list[str]) -> list[str]:
 
 
 def _overview() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="viewer",
         description="See, check and produce skinned characters.",
         epilog=_EPILOG,

@@ -98,7 +98,7 @@ def save_heat(heats: Sequence[Heat], output: Path, skinning: Skinning) -> str:
 
 
 def _save_one(output: Path, pixels: Bytes) -> str:
-    from viewer.commands.render import save_picture
+    from viewer.formats import save_image
 
-    save_picture(output, pixels)
+    save_image(output, pixels)
     return f"{printable(output)}: the largest distance of every vertex"

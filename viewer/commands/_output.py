@@ -6,14 +6,12 @@ from pathlib import Path
 
 from viewer.errors import OutputError, printable
 from viewer.formats._save import refuse_inputs
+from viewer.streams import is_stdout, require_stdout
 
-__all__ = ["PICTURES", "STDOUT", "check_output"]
+__all__ = ["PICTURES", "check_output"]
 
 PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".ppm", ".tga", ".tif", ".tiff", ".webp")
 """Suffixes of pictures that can be written."""
-
-STDOUT = ("/dev/stdout", "/dev/fd/1", "/proc/self/fd/1")
-"""Names of the output stream."""
 
 
 def check_output(output: Path, inputs: list[Path], force: bool) -> None:
@@ -25,11 +23,12 @@ def check_output(output: Path, inputs: list[Path], force: bool) -> None:
         If the output is one of the inputs, a folder, or exists without ``--force``.
     """
     shown = printable(output, 300)
+    require_stdout(output)
     try:
         if output.is_dir():
             raise OutputError(f"{shown}: is a folder")
         refuse_inputs([output], inputs)
-        if output.is_file() and not force and str(output) not in STDOUT:
+        if output.is_file() and not force and not is_stdout(output):
             raise OutputError(f"{shown}: exists already (--force replaces it)")
     except (OSError, ValueError) as problem:
         reason = getattr(problem, "strerror", None) or problem

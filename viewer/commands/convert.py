@@ -38,6 +38,7 @@ from viewer.interrupts import raising
 from viewer.rig.scene import Scene
 from viewer.rig.skinning import Skinning
 from viewer.rig.upright import upright_actor
+from viewer.streams import is_stdout, require_stdout, summary_stream
 
 __all__ = ["add_arguments", "run"]
 
@@ -75,13 +76,19 @@ def run(arguments: argparse.Namespace) -> int:
     scene = open_scene(arguments)
     write = _write_motions if is_motion(arguments, output, scene) else _write_poses
     lines = write(arguments, scene, output, skinning)
-    print("\n".join(lines))
+    print("\n".join(lines), file=summary_stream(output))
     return 0
 
 
 def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:
     """Refuse what can be refused before anything is read."""
     check_frame_options(arguments)
+    require_stdout(output)
+    if is_stdout(output) and not output.suffix:
+        name = printable(output, 300)
+        raise UnsupportedFormatError(
+            f"{name}: expected a suffix, which chooses the format; a link to {name} may have one"
+        )
     suffix = output.suffix.lower() or "/"
     kinds = [kind for kind in EXPORTERS.values() if suffix in kind.suffixes]
     if not kinds:

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TextIO
 
 from viewer.commands._diff_inputs import input_files
 from viewer.commands._diff_pairs import Pairing, pair_actors
@@ -26,6 +27,7 @@ from viewer.rig.comparison.steps import FrameRange
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import Skinning
 from viewer.rig.units import METRES
+from viewer.streams import require_stdout, summary_stream
 
 __all__ = ["add_arguments", "run"]
 
@@ -117,10 +119,11 @@ def run(arguments: argparse.Namespace) -> int:
             row, heat = Compared(name, error=printable(problem, 500)), None
         rows.append(row)
         heats += [] if heat is None else [heat]
-    _print(arguments, rows)
+    stream = sys.stdout if output is None else summary_stream(output)
+    _print(arguments, rows, stream)
     if output is not None:
         said = save_heat(heats, output, skinning)
-        print(said, file=sys.stderr if arguments.json else sys.stdout)
+        print(said, file=sys.stderr if arguments.json else stream)
     if any(row.error for row in rows):
         return _UNREADABLE
     exceeds = tolerance is not None and any(row.exceeds(tolerance) for row in rows)
@@ -132,6 +135,7 @@ def _checked_output(arguments: argparse.Namespace) -> Path | None:
     if arguments.output is None:
         return None
     output = Path(arguments.output)
+    require_stdout(output)
     if output.suffix.lower() not in PICTURES:
         raise OutputError(
             f"{printable(output, 300)}: pictures cannot be written as "
@@ -206,12 +210,12 @@ def _lone(name: str, pairing: Pairing) -> tuple[str, ...]:
     return tuple(f"only in {side}: {printable(one, 60)}" for side, lone in sides for one in lone)
 
 
-def _print(arguments: argparse.Namespace, rows: Sequence[Compared]) -> None:
+def _print(arguments: argparse.Namespace, rows: Sequence[Compared], stream: TextIO) -> None:
     tolerance = arguments.tolerance
     if arguments.json:
-        print(json_text(arguments.reference, rows, tolerance))
+        print(json_text(arguments.reference, rows, tolerance), file=stream)
     elif len(rows) > 1:
-        print("\n".join(table_of(rows, tolerance)))
+        print("\n".join(table_of(rows, tolerance)), file=stream)
     else:
         print_warnings(rows[0].warnings)
-        print("\n".join(lines_of(rows[0], tolerance)))
+        print("\n".join(lines_of(rows[0], tolerance)), file=stream)

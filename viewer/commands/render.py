@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
 from viewer.commands._frame_numbers import add_frame_arguments
-from viewer.commands._output import PICTURES, STDOUT, check_output
+from viewer.commands._output import PICTURES, check_output
 from viewer.commands._pose import add_pose_arguments, add_skinning_arguments
 from viewer.commands._scalar import choose_subject, scalar_text
 from viewer.commands._scene import (
@@ -35,6 +34,7 @@ from viewer.rendering.options import DisplayOptions
 from viewer.rig.arrays import Bytes, Floats
 from viewer.rig.mesh import bounding_box
 from viewer.rig.scene import Scene, scene_points
+from viewer.streams import summary_stream
 
 __all__ = ["add_arguments", "run"]
 
@@ -89,7 +89,8 @@ def run(arguments: argparse.Namespace) -> int:
     print_warnings(choose_subject(scene, options))
     print_warnings(warn_of_missing(scene, options) + lens_notes(arguments, scene))
     if request is not None and (request.is_certain or any(a.clip for a in scene.actors)):
-        print(draw_sequence(request, arguments, scene, options, size))
+        said = draw_sequence(request, arguments, scene, options, size)
+        print(said, file=summary_stream(output))
     else:
         _draw_still(arguments, scene, options, size)
     return 0
@@ -98,6 +99,8 @@ def run(arguments: argparse.Namespace) -> int:
 def _draw_still(
     arguments: argparse.Namespace, scene: Scene, options: DisplayOptions, size: tuple[int, int]
 ) -> None:
+    from viewer.formats import save_image
+
     output = Path(arguments.output)
     points = scene_points(scene, options.show)
     camera = camera_of(arguments, scene, points, size)
@@ -107,12 +110,11 @@ def _draw_still(
         pixels = _draw_panels(scene, size, camera, options, box, arguments.gpu, fits)
     else:
         pixels = draw_scene(scene, size, camera, options, box, arguments.gpu)
-    save_picture(output, pixels)
+    save_image(output, pixels)
     grid = f", grid {_grid_step(points):g}" if options.grid else ""
-    # A picture on its way through a pipe must not be followed by words.
-    stream = sys.stderr if str(output) in STDOUT else sys.stdout
     colors = scalar_text(scene, options)
-    print(f"{printable(output)}: {size[0]} x {size[1]}{grid}{colors}", file=stream)
+    said = f"{printable(output)}: {size[0]} x {size[1]}{grid}{colors}"
+    print(said, file=summary_stream(output))
 
 
 def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:
@@ -170,23 +172,6 @@ def _draw_panels(
     state = AppState(scene, camera=camera, options=options, box=box)
     with deferred(), HeadlessApp(state, size, device=device) as app:
         return app.picture(fits)
-
-
-def save_picture(path: Path, pixels: Bytes) -> None:
-    """Write a picture in the format of its suffix; a PNG into a pipe or redirected output."""
-    from viewer.formats import save_image
-    from viewer.formats._image import encode_png
-
-    try:
-        if str(path) in STDOUT:
-            sys.stdout.buffer.write(encode_png(pixels))
-            return
-        save_image(path, pixels)
-    except BrokenPipeError:
-        raise
-    except (KeyError, ValueError, OSError) as problem:  # what Pillow raises
-        reason = problem if isinstance(problem, OSError) else "pictures cannot be written as this"
-        raise OutputError(f"{printable(path, 300)}: {reason}") from None
 
 
 def _grid_step(points: Floats) -> float:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import argparse
 import math
+import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 
@@ -32,6 +34,7 @@ from viewer.rig.transfer.pipeline import transfer
 from viewer.rig.transfer.rigged import Rigged
 from viewer.rig.transfer.settings import JOINTS, METHODS, TransferSettings
 from viewer.rig.transfer.weights import WeightSettings
+from viewer.streams import summary_stream
 
 __all__ = ["add_arguments", "run"]
 
@@ -166,9 +169,11 @@ def run(arguments: argparse.Namespace) -> int:
             lambda share, what: progress.show(round(100.0 * share)),
             name=target.name,
         )
-    _tell(rigged)
+    stream = sys.stdout if output is None else summary_stream(output)
+    _tell(rigged, stream)
     if output is not None:
-        print("\n".join([*write_rigged(rigged, output), *write_clips(rigged, clips)]))
+        lines = [*write_rigged(rigged, output), *write_clips(rigged, clips)]
+        print("\n".join(lines), file=stream)
     if arguments.view:
         _show(rigged, target)
     return 0
@@ -294,11 +299,12 @@ def _settings(
     )
 
 
-def _tell(rigged: Rigged) -> None:
+def _tell(rigged: Rigged, stream: TextIO) -> None:
     """Print what was found, and warnings where errors go."""
     mark = "warning: "
     print_warnings([line.removeprefix(mark) for line in rigged.lines if line.startswith(mark)])
-    print("\n".join(line for line in rigged.lines if not line.startswith(mark)))
+    found = [line for line in rigged.lines if not line.startswith(mark)]
+    print("\n".join(found), file=stream)
 
 
 def _show(rigged: Rigged, target: Figure) -> None:

@@ -101,10 +101,11 @@ def _draw_instead(
     reason: str, scene: Scene, camera: Camera, options: DisplayOptions, box: Floats
 ) -> int:
     from viewer.commands._scalar import choose_subject
-    from viewer.commands.render import draw_scene, save_picture
+    from viewer.commands.render import draw_scene
+    from viewer.formats import save_image
 
     print_warnings(choose_subject(scene, options))
     path = free_path(Path.cwd(), scene.actors[0].figure.name, ".png")
-    save_picture(path, draw_scene(scene, SIZE, camera, options, box))
+    save_image(path, draw_scene(scene, SIZE, camera, options, box))
     print(f"{reason}; drew {printable(path, 300)} instead")
     return 0

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from viewer.errors import FormatError, printable
+from viewer.errors import FormatError, OutputError, printable
 from viewer.formats._png import encode_png
 from viewer.formats._references import referenced_path
 from viewer.formats._save import save_bytes
@@ -100,7 +100,7 @@ def _open(data: bytes) -> Image.Image:
     return Image.open(io.BytesIO(data), formats=_FORMATS)
 
 
-def save_image(path: Path, pixels: Bytes) -> None:
+def save_image(path: Path, pixels: Bytes) -> int:
     """Write a picture in the format of its suffix, PNG if that is none.
 
     Parameters
@@ -110,24 +110,37 @@ def save_image(path: Path, pixels: Bytes) -> None:
     pixels : (H, W, 4) uint8
         First row at the top.
 
+    Returns
+    -------
+    int
+        Number of bytes.
+
     Raises
     ------
     OutputError
         If it cannot be written.
     """
+    data = _encoded(path, pixels)
+    save_bytes(path, data)
+    return len(data)
+
+
+def _encoded(path: Path, pixels: Bytes) -> bytes:
     suffix = path.suffix.lower()
     if suffix in ("", ".png"):
-        save_bytes(path, encode_png(pixels))
-        return
+        return encode_png(pixels)
     from PIL import Image
 
     kind = Image.registered_extensions().get(suffix, "PNG")
     if kind == "PNG":
-        save_bytes(path, encode_png(pixels))
-        return
+        return encode_png(pixels)
     stream = io.BytesIO()
     picture = Image.fromarray(pixels)
     if kind in ("JPEG", "PPM") or (pixels[..., 3] == 255).all():
         picture = picture.convert("RGB")
-    picture.save(stream, kind)
-    save_bytes(path, stream.getvalue())
+    try:
+        picture.save(stream, kind)
+    except (KeyError, ValueError, OSError):  # what Pillow raises
+        name = printable(path, 300)
+        raise OutputError(f"{name}: pictures cannot be written as this") from None
+    return stream.getvalue()

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.errors import OutputError, ViewerError, printable
+from viewer.errors import ViewerError
 from viewer.formats._digits import write_number
 from viewer.formats._image import save_image
 from viewer.rig.arrays import Bytes
@@ -61,7 +61,7 @@ class PictureSink:
         OutputError
             If it cannot be written.
         """
-        _save(self.paths[frame], pixels)
+        save_image(self.paths[frame], pixels)
 
     def close(self) -> None:
         """Do nothing: every picture is there."""
@@ -137,8 +137,7 @@ class SheetSink:
             If it cannot be written.
         """
         assert self._sheet is not None  # there is at least one frame
-        _save(self.path, self._sheet)
-        self.n_bytes = self.path.stat().st_size
+        self.n_bytes = save_image(self.path, self._sheet)
 
     def abort(self) -> None:
         """Forget the frames; nothing is written before ``close``."""
@@ -161,11 +160,3 @@ def sheet_layout(size: tuple[int, int], count: int) -> tuple[int, int]:
 
     columns = min(range(1, count + 1), key=badness)
     return columns, math.ceil(count / columns)
-
-
-def _save(path: Path, pixels: Bytes) -> None:
-    try:
-        save_image(path, pixels)
-    except (KeyError, ValueError, OSError) as problem:  # what Pillow raises
-        reason = problem if isinstance(problem, OSError) else "pictures cannot be written as this"
-        raise OutputError(f"{printable(path, 300)}: {reason}") from None

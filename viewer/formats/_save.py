@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from viewer.errors import OutputError, printable
 from viewer.interrupts import hold, poll, raising
+from viewer.streams import is_stdout, write_stdout
 
 __all__ = [
     "Replacement",
@@ -95,8 +96,8 @@ def save_arrays(path: str | Path, arrays: Mapping[str, NDArray[Any]]) -> None:
 def save_bytes(path: str | Path, data: bytes) -> None:
     """Replace a file's content in one step, or leave everything as it was.
 
-    A link is followed. A device or pipe is written to directly, never replaced. The new file
-    keeps the old one's permissions.
+    A link is followed. A device or pipe is written to directly, never replaced, and so is the
+    output stream, whatever it leads to. The new file keeps the old one's permissions.
 
     Parameters
     ----------
@@ -113,6 +114,9 @@ def save_bytes(path: str | Path, data: bytes) -> None:
     hold()  # a signal that comes after the rename must not make a failure of it
     poll()
     path = Path(path)
+    if is_stdout(path):
+        write_stdout(path, data)
+        return
     try:
         mode = _mode(path)
         if stat.S_ISDIR(mode):
@@ -147,7 +151,7 @@ class Replacement:
             mode = _mode(self.path)
             if stat.S_ISDIR(mode):
                 raise IsADirectoryError(None, "is a folder")
-            if not stat.S_ISREG(mode):
+            if not stat.S_ISREG(mode) or is_stdout(self.path):
                 raise ValueError("is not a regular file, which a video must be written to")
             self._target, self._permissions = self.path.resolve(), stat.S_IMODE(mode)
             _require_folder(self._target)
@@ -233,6 +237,8 @@ def all_or_none(paths: Iterable[Path]) -> Iterator[None]:
 
 def _keep_copy(path: Path, copies: dict[Path, Path | None]) -> None:
     """Copy what a path leads to; None stands for no file. Devices and the like are left alone."""
+    if is_stdout(path):
+        return
     try:
         target = path.resolve()
         if not target.exists():

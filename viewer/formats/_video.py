@@ -15,14 +15,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from viewer.errors import ViewerError, printable
+from viewer.errors import OutputError, ViewerError, printable
 from viewer.formats._gif_palette import PaletteChooser, PaletteUser
 from viewer.formats._save import Replacement
+from viewer.formats._video_file import VideoFile
 from viewer.formats._video_kinds import MOST_GIF_RATE, VideoKind, video_kind
 from viewer.rig.arrays import Bytes
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator
 
     import av
     from av.video.frame import VideoFrame
@@ -95,6 +96,8 @@ class VideoSink:
         self._coded = _even(size) if self._kind.needs_even else size
         self._note(transparent)
         self._file = Replacement(path)
+        self._output: VideoFile | None = None
+        self._problem: OutputError | None = None
         self._container: av.container.OutputContainer | None = None
         self._stream: Any = None
         self.n_samples = _GIF_SAMPLES if self.encoder == "gif" else 0
@@ -130,9 +133,10 @@ class VideoSink:
         Raises
         ------
         OutputError
-            If the encoder refuses it or the file cannot be written.
+            If the encoder refuses it or the file cannot be written, and for every frame after
+            that.
         """
-        try:
+        with self._errors():
             if self._container is None:
                 if self.encoder == "gif" and self._chooser is None:
                     self.look(pixels)  # better than none
@@ -140,8 +144,6 @@ class VideoSink:
             picture = self._picture(pixels)
             picture.pts, picture.time_base = frame, 1 / self.rate
             self._encode(self._converted(picture))
-        except (OSError, ValueError, self._av.FFmpegError) as problem:
-            raise self._file.error(problem) from None
 
     def close(self) -> None:
         """Finish the video and put it in its place.
@@ -151,19 +153,20 @@ class VideoSink:
         OutputError
             If it cannot be finished; then what was there before stays.
         """
-        assert self._container is not None  # there is at least one frame
-        try:
+        assert self._container is not None and self._output is not None  # there is a frame
+        with self._errors():
             if self._palette is not None:
                 self._encode(self._palette.taken(None))
             self._container.mux(self._stream.encode(None))
             self._container.close()
-        except (OSError, ValueError, self._av.FFmpegError) as problem:
-            raise self._file.error(problem) from None
+            self._output.finish()
         self._container = None
         self.n_bytes = self._file.commit()
 
     def abort(self) -> None:
         """Remove the unfinished file."""
+        if self._output is not None:
+            self._output.drop()
         if self._container is not None:
             # It is thrown away anyway, most often because the disk is full.
             with contextlib.suppress(OSError, ValueError, self._av.FFmpegError):
@@ -171,13 +174,34 @@ class VideoSink:
             self._container = None
         self._file.discard()
 
+    @contextlib.contextmanager
+    def _errors(self) -> Iterator[None]:
+        """Turn the first error into one line, and repeat it: the encoder is not asked again."""
+        if self._problem is not None:
+            raise self._problem
+        try:
+            yield
+            if self._output is not None and self._output.problem is not None:
+                raise self._output.problem
+        except (OSError, ValueError, self._av.FFmpegError) as problem:
+            # What the library says is often but a consequence of what the file said before.
+            first = self._output.problem if self._output is not None else None
+            self._problem = self._file.error(first or problem)
+            raise self._problem from None
+        except OutputError as problem:
+            self._problem = problem
+            raise
+
     def _open(self) -> None:
         temporary = self._file.begin()
         format_name = temporary.suffix.lower()[1:]
         muxer = dict(self._kind.muxer)
         if self.encoder == "gif":
             muxer["final_delay"] = str(round(100 / self.rate))  # 1/100 s
-        self._container = self._av.open(str(temporary), "w", format=format_name, options=muxer)
+        self._output = VideoFile(temporary)
+        self._container = self._av.open(
+            self._output, "w", format=format_name, options=muxer, io_open=self._output.reopen
+        )
         rate = Fraction(100) if self.encoder == "gif" else self.rate
         options = _encoder_options(self.encoder, self._quality)
         stream: Any = self._container.add_stream(self.encoder, rate=rate, options=options)

@@ -1,0 +1,198 @@
+"""Standard streams that are closed, full, redirected or read by nobody: one line at most."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from app.tiny import write_rig
+
+from viewer.errors import OutputError
+from viewer.formats import all_or_none, save_bytes
+from viewer.formats._save import Replacement
+from viewer.streams import is_stdout, standard_streams
+
+ROOT = Path(__file__).resolve().parents[1]
+ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONWARNINGS": "error"}
+FULL = Path("/dev/full")
+NAMES = ["/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"]
+
+pytestmark = pytest.mark.skipif(not Path(NAMES[0]).exists(), reason="no name for the output stream")
+
+
+@pytest.fixture
+def rig(tmp_path):
+    return [str(path) for path in write_rig(tmp_path)]
+
+
+def shell(line: str, *words: str, folder: Path | None = None) -> subprocess.CompletedProcess:
+    """Run a line of bash in which ``viewer`` is the program and ``"$@"`` are some words."""
+    line = line.replace("viewer", f'"{sys.executable}" -m viewer')
+    return subprocess.run(
+        ["bash", "-c", line, "bash", *words],
+        env=ENVIRONMENT, cwd=folder, capture_output=True, timeout=120, check=False,
+    )  # fmt: skip
+
+
+def refused(done: subprocess.CompletedProcess, *words: str) -> None:
+    """Assert that one line says that the output cannot be written."""
+    lines = done.stderr.decode().splitlines()
+    assert done.returncode == 5 and len(lines) == 1, lines
+    assert all(word in lines[0] for word in words), lines
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_picture_into_a_closed_output_is_refused(rig, name):
+    refused(shell(f'viewer render "$@" -o {name} --size 64x64 >&-', *rig), name)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        'convert "$@" -o /dev/stdout',
+        'convert "$@" -o link.obj',
+        'convert "$@" -o link.json',
+        'diff "$1" "$1" -o /dev/fd/1',
+        'rig "$2" -o /dev/stdout',
+        'rig "$2" -o link.npz',
+        'render "$@" --turntable --contact-sheet 2 -o link.png',
+    ],
+)
+def test_every_command_refuses_a_closed_output(rig, tmp_path, command):
+    for suffix in (".obj", ".json", ".npz", ".png"):
+        (tmp_path / f"link{suffix}").symlink_to("/dev/stdout")
+    done = shell(f"viewer {command} >&-", *rig, folder=tmp_path)
+    refused(done, "link" if "link" in command else "/dev/", "closed")
+
+
+@pytest.mark.skipif(not FULL.exists(), reason="only Linux has /dev/full")
+@pytest.mark.parametrize(
+    "command",
+    [
+        "--help",
+        "--version",
+        "render --help",
+        "doctor --help",
+        'info "$@"',
+        'info "$@" --json',
+        'lint "$@" --fail-on never',
+        'diff "$1" "$1" --json',
+        'render "$@" --size 64x64 -o /dev/stdout',
+    ],
+)
+def test_full_output_is_refused(rig, command):
+    refused(shell(f"viewer {command} >/dev/full", *rig), "No space left on device")
+
+
+@pytest.mark.parametrize(
+    "command", ["--help", "--version", "render --help", 'info "$@"', 'diff "$1" "$1" --json']
+)
+def test_text_for_nobody_is_no_fault(rig, command):
+    for redirection in (">&-", "<&- >&-", "| true; exit ${PIPESTATUS[0]}"):
+        done = shell(f"viewer {command} {redirection}", *rig)
+        assert (done.returncode, done.stdout, done.stderr) == (0, b"", b"")
+
+
+@pytest.mark.parametrize("sink", ["&-", "/dev/full"])
+def test_messages_for_nobody_change_no_result(rig, tmp_path, sink):
+    done = shell(f"viewer info missing.skel 2>{sink}", *rig)
+    assert (done.returncode, done.stdout) == (2, b"")
+    target = tmp_path / "x.bmp"
+    # That BMP is opaque is a warning.
+    line = f'viewer render "$@" -o "{target}" --size 64x64 --background transparent'
+    assert b"transparency" in shell(line, *rig).stderr
+    done = shell(f"{line} --force 2>{sink}", *rig)
+    assert done.returncode == 0 and done.stdout.startswith(os.fsencode(target))
+
+
+def test_picture_with_all_streams_closed_is_whole(rig, tmp_path):
+    target = tmp_path / "x.png"
+    done = shell(f'viewer render "$@" --size 64x64 -o "{target}" <&- >&- 2>&-', *rig)
+    assert done.returncode == 0 and target.read_bytes().endswith(b"IEND\xaeB`\x82")
+
+
+@pytest.mark.parametrize(
+    ("options", "name", "begin"),
+    [
+        ("", "/dev/stdout", b"\x89PNG"),
+        ("--turntable --contact-sheet 2", "/dev/stdout", b"\x89PNG"),
+        ("", "link.bmp", b"BM"),
+    ],
+)
+def test_redirected_file_is_appended_to(rig, tmp_path, options, name, begin):
+    """It must not be replaced by a picture, as a file of that name would be."""
+    (tmp_path / "link.bmp").symlink_to("/dev/stdout")
+    log = tmp_path / "log"
+    log.write_bytes(b"precious\n")
+    line = f'viewer render "$@" {options} --size 64x64 -o {name} >> log'
+    done = shell(line, *rig, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert log.read_bytes().startswith(b"precious\n" + begin)
+    # What was written is said where it does not get into the picture.
+    assert done.stderr.startswith(os.fsencode(name)) and done.stderr.count(b"\n") == 1
+    assert os.fsencode(name) not in log.read_bytes()
+
+
+def test_mesh_into_a_pipe_is_the_mesh_alone(rig, tmp_path):
+    (tmp_path / "link.obj").symlink_to("/dev/stdout")
+    done = shell('viewer convert "$@" -o link.obj | cat', *rig, folder=tmp_path)
+    assert done.returncode == 0 and done.stdout.startswith(b"# ")
+    kinds = {line.partition(b" ")[0] for line in done.stdout.splitlines()}
+    assert kinds <= {b"#", b"o", b"v", b"vt", b"vn", b"f", b"mtllib", b"usemtl"}
+
+
+def test_pipe_that_nobody_reads_is_no_fault(rig):
+    done = shell(
+        'viewer render "$@" --turntable --contact-sheet 2 -o /dev/stdout | true; '
+        "exit ${PIPESTATUS[0]}",
+        *rig,
+    )
+    assert done.returncode == 0 and b"Broken pipe" not in done.stderr
+
+
+def test_names_of_the_output_stream(tmp_path):
+    (tmp_path / "first").symlink_to("/dev/stdout")
+    (tmp_path / "second").symlink_to("first")
+    (tmp_path / "loop").symlink_to("loop")
+    assert all(map(is_stdout, [*NAMES, tmp_path / "first", tmp_path / "second"]))
+    others = ["/dev/null", "/dev/fd/2", tmp_path / "loop", tmp_path / "missing", "a\0b"]
+    assert not any(map(is_stdout, others))
+
+
+def test_output_stream_is_no_file_to_keep_or_replace(tmp_path, capsysbinary):
+    link = tmp_path / "x.mp4"
+    link.symlink_to("/dev/stdout")
+    with pytest.raises(OutputError, match="regular file"):
+        Replacement(link)
+    with pytest.raises(OutputError, match="full"), all_or_none([link]):
+        save_bytes(link, b"data")
+        raise OutputError("full")
+    assert capsysbinary.readouterr().out == b"data"
+    assert [path.name for path in tmp_path.iterdir()] == ["x.mp4"]
+
+
+def test_streams_are_those_of_the_caller_again(monkeypatch):
+    before = sys.stderr
+    with standard_streams():
+        assert sys.stderr is not before
+    assert sys.stderr is before
+    monkeypatch.setattr(sys, "stderr", None)
+    with standard_streams():
+        print("dropped", file=sys.stderr)
+    assert sys.stderr is None
+
+
+def test_reserved_descriptors_are_given_back():
+    program = (
+        "import os\n"
+        "from viewer.streams import standard_streams\n"
+        "with standard_streams():\n"
+        "    assert os.dup(0) > 2 and os.fstat(1) and os.fstat(2)\n"
+        "free = os.open(os.devnull, os.O_RDONLY)\n"
+        "os._exit(0 if free == 0 else 1)\n"
+    )
+    line = f'exec {sys.executable} -c "$1" <&- >&- 2>&-'
+    assert shell(line, program).returncode == 0

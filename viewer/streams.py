@@ -1,0 +1,144 @@
+"""The standard streams, also where the caller closed them, filled their disk or reads no more."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TextIO, cast
+
+from viewer.errors import OutputError, printable
+
+__all__ = ["is_stdout", "require_stdout", "standard_streams", "summary_stream", "write_stdout"]
+
+_STDOUT = ("/dev/stdout", "/dev/fd/1", "/proc/self/fd/1")
+_MOST_LINKS = 40  # as the kernel follows
+
+
+def is_stdout(path: str | Path) -> bool:
+    """Return whether a path is a name of the output stream, or a link to one.
+
+    What the stream leads to is another question: a redirected file must never be replaced, as the
+    caller may append to it.
+    """
+    text = str(path)
+    for _ in range(_MOST_LINKS):
+        if text in _STDOUT:
+            return True
+        try:
+            text = str(Path(text).parent / Path(text).readlink())
+        except (OSError, ValueError):
+            return False
+    return False
+
+
+def require_stdout(path: str | Path) -> None:
+    """Refuse a name of the output stream where that is closed.
+
+    Raises
+    ------
+    OutputError
+        With the name.
+    """
+    if is_stdout(path) and getattr(sys.stdout, "buffer", None) is None:
+        raise OutputError(f"{printable(path, 300)}: standard output is closed")
+
+
+def write_stdout(path: str | Path, data: bytes) -> None:
+    """Write bytes to the output stream.
+
+    Parameters
+    ----------
+    path : str or Path
+        What the stream is called in messages.
+    data : bytes
+        What to write.
+
+    Raises
+    ------
+    OutputError
+        If the stream is closed, takes no bytes, or its disk is full.
+    BrokenPipeError
+        If nobody reads it any more.
+    """
+    require_stdout(path)
+    try:
+        sys.stdout.flush()
+        sys.stdout.buffer.write(data)
+        sys.stdout.buffer.flush()
+    except BrokenPipeError:
+        raise
+    except (OSError, ValueError) as problem:
+        reason = getattr(problem, "strerror", None) or problem
+        raise OutputError(f"{printable(path, 300)}: {reason}") from None
+
+
+def summary_stream(output: str | Path) -> TextIO:
+    """Return where to say what was written: a file on its way through a pipe ends with its data."""
+    return sys.stderr if is_stdout(output) else sys.stdout
+
+
+@contextlib.contextmanager
+def standard_streams() -> Iterator[None]:
+    """Make messages harmless for a while, and keep files from getting a standard descriptor.
+
+    A message that cannot be written changes neither result nor exit code. Where the error stream
+    is closed, messages are dropped; ``print`` would write them into the output.
+    """
+    before = sys.stderr
+    with contextlib.ExitStack() as stack:
+        if sys.stdin is None or sys.stdout is None or before is None:
+            _reserve(stack)
+        messages = stack.enter_context(Path(os.devnull).open("w")) if before is None else before
+        sys.stderr = cast("TextIO", _Messages(messages))
+        try:
+            yield
+        finally:
+            sys.stderr = before
+
+
+def _reserve(stack: contextlib.ExitStack) -> None:
+    """Open closed descriptors below 3: what a library prints must not get into a result."""
+    while (descriptor := os.open(os.devnull, os.O_RDWR)) < 3:
+        stack.callback(os.close, descriptor)
+    os.close(descriptor)
+
+
+class _Messages(io.TextIOBase):
+    """A text stream whose errors nobody has to handle."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        """Write, or drop, a text."""
+        try:
+            self._stream.write(text)
+        except (OSError, ValueError):
+            self._lose()
+        return len(text)
+
+    def flush(self) -> None:
+        """Write what is held back, or drop it."""
+        try:
+            self._stream.flush()
+        except (OSError, ValueError):
+            self._lose()
+
+    def isatty(self) -> bool:
+        """Return whether a person reads along."""
+        return not self._stream.closed and self._stream.isatty()
+
+    def fileno(self) -> int:
+        """Return the descriptor of the stream itself."""
+        return self._stream.fileno()
+
+    def _lose(self) -> None:
+        # Python would complain at its end about what is still held back.
+        with contextlib.suppress(OSError, ValueError):  # no file, as in tests
+            null = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(null, self._stream.fileno())
+            os.close(null)
