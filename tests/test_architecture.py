@@ -14,11 +14,11 @@ SOURCES = sorted(PACKAGE.rglob("*.py"))
 
 # Which parts of the package each part may import.
 ALLOWED = {
-    "rig": {"rig", "errors"},
-    "formats": {"formats", "rig", "errors"},
-    "rendering": {"rendering", "rig", "errors", "resources"},
-    "export": {"export", "formats", "rig", "errors"},
-    "loading": {"loading", "formats", "rig", "errors", "resources"},
+    "rig": {"rig", "errors", "near_names"},
+    "formats": {"formats", "rig", "errors", "near_names"},
+    "rendering": {"rendering", "rig", "errors", "near_names", "resources"},
+    "export": {"export", "formats", "rig", "errors", "near_names"},
+    "loading": {"loading", "formats", "rig", "errors", "near_names", "resources"},
     "app": {
         "app",
         "export",
@@ -29,11 +29,13 @@ ALLOWED = {
         "rendering",
         "rig",
         "errors",
+        "near_names",
         "resources",
     },
-    "lint": {"lint", "loading", "formats", "rig", "errors"},
-    "models": {"formats", "errors"},
+    "lint": {"lint", "loading", "formats", "rig", "errors", "near_names"},
+    "models": {"formats", "errors", "near_names"},
     "errors": set(),
+    "near_names": {"errors"},
     "resources": {"errors"},
 }
 # Third-party modules with a single home.

@@ -57,7 +57,9 @@ def test_ignored_codes_do_not_count(rig, capsys) -> None:
     assert run([*arguments, ",".join(heavy).lower()]) == 0
     assert " W001: " not in capsys.readouterr().out
     assert run([*arguments, "X999"]) == 2
-    assert 'no code "X999"' in capsys.readouterr().err
+    assert '"X999"' in capsys.readouterr().err
+    assert run([*arguments, "W0066"]) == 2
+    assert "did you mean W006" in capsys.readouterr().err
 
 
 def json_of(arguments: list[str], capsys) -> dict:

@@ -77,7 +77,16 @@ NUMBERS_WANTED = "expected numbers separated by commas, found"
             '--dof: no joint is called "knee"; there are 5: root, left, left_hand, right, '
             "right_hand",
         ),
-        ("arms.skel --dof left.tx=1", "--dof: joint left has no DOF tx"),
+        ("arms.skel --dof left.tx=1", "--dof: joint left has no DOF tx; it has x, y, z"),
+        (
+            "arms.skel --dof left_hnd.x=1",
+            '--dof: no joint is called "left_hnd"; did you mean left_hand?',
+        ),
+        # Of several figures, the one that has nearly such a joint.
+        (
+            "smpl.npz arms.skel --dof left_hnad.x=1",
+            '--dof: no joint is called "left_hnad"; did you mean left_hand?',
+        ),
         ("arms.skel --dof left.x", '--dof: expected NAME.X=VALUE, found "left.x"'),
         ("arms.skel --dof left.x=far", '--dof: expected a number after "=", found "left.x=far"'),
         (
@@ -212,7 +221,11 @@ def test_first_figure_that_fits_is_posed(folder, capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ("pig --hide-part TAIL", '--hide-part: no part "TAIL"; there are: NOT_BODY, FEET, BACK'),
+        (
+            "pig --hide-part TAIL",
+            '--hide-part: no part is called "TAIL"; there are 3: NOT_BODY, FEET, BACK',
+        ),
+        ("pig --hide-part FEAT", '--hide-part: no part is called "FEAT"; did you mean FEET?'),
         ("smpl.npz --hide-part HEAD", "--hide-part: no figure has body parts"),
         ("arms.skel --hide-part HEAD", "--hide-part: no figure has body parts"),
     ],

@@ -14,6 +14,7 @@ from viewer.commands._morph_weights import has_only_morphs, is_named, morph_reco
 from viewer.commands._numbers import number
 from viewer.errors import RigError, ViewerError, printable
 from viewer.formats import Source, read
+from viewer.near_names import near_names
 from viewer.rig.arrays import Floats
 from viewer.rig.hands import hand_vectors
 from viewer.rig.mirror import mirror_pose
@@ -21,7 +22,7 @@ from viewer.rig.pose_record import PoseRecord, apply_record
 from viewer.rig.pose_vector import set_joint_rotations
 from viewer.rig.rotation import rotation_vector_to_matrix
 from viewer.rig.scene import Actor, Scene
-from viewer.rig.skeleton import clamp_dofs, dof_label, find_dof
+from viewer.rig.skeleton import clamp_dofs, dof_label, find_dof, joint_labels
 from viewer.rig.skinning import METHODS, Skinning
 
 __all__ = [
@@ -281,16 +282,22 @@ def _place(scene: Scene, label: str, setting: str, text: str) -> bool:
 
 
 def _find(scene: Scene, label: str) -> tuple[Actor, int, list[str]]:
-    problem: RigError | None = None
+    problems: list[RigError] = []
+    near: list[RigError] = []
     found: list[tuple[Actor, int]] = []
     for actor in scene.actors:
-        if actor.figure.skeleton is not None:
+        skeleton = actor.figure.skeleton
+        if skeleton is not None:
             try:
-                found.append((actor, find_dof(actor.figure.skeleton, label)))
+                found.append((actor, find_dof(skeleton, label)))
             except RigError as error:
-                problem = problem or error
+                problems.append(error)
+                joint = label.rpartition(".")[0]
+                near += [error] if near_names(joint, joint_labels(skeleton)) else []
     if not found:
-        raise ViewerError(f"--dof: {problem or 'no file has a skeleton'}")
+        # Of several figures the one is spoken of that has such a joint, or nearly.
+        problem = next(iter([*near, *problems]), "no file has a skeleton")
+        raise ViewerError(f"--dof: {problem}")
     note = []
     if len(found) > 1:
         first = printable(found[0][0].figure.name)

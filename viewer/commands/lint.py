@@ -30,6 +30,7 @@ from viewer.lint import (
     worst_first,
 )
 from viewer.loading import bundled_files
+from viewer.near_names import did_you_mean
 from viewer.rig.motion import DEFAULT_RATE
 
 __all__ = ["add_arguments", "run"]
@@ -143,7 +144,8 @@ def _ignored(text: str) -> set[str]:
     codes = {code.strip().upper() for code in text.split(",") if code.strip()}
     unknown = sorted(codes - CODES.keys())
     if unknown:
-        raise ViewerError(f'--ignore: no code "{printable(unknown[0], 40)}" (--codes lists them)')
+        hint = did_you_mean(unknown[0], CODES) or "--codes lists them"
+        raise ViewerError(f'--ignore: no code is called "{printable(unknown[0], 40)}"; {hint}')
     return codes
 
 
