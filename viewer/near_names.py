@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from viewer.errors import printable
 
-__all__ = ["did_you_mean", "name_hint", "near_names"]
+__all__ = ["did_you_mean", "name_hint", "near_names", "question"]
 
 _MOST_NEAR = 5
 _MOST_LISTED = 20  # a list that is not longer is shown whole
@@ -26,7 +26,7 @@ def near_names(text: str, names: Iterable[str], alike: float = 0.6) -> list[str]
         Those there are. Empty names are skipped, repeated ones count once.
     alike : float
         Smallest ratio of equal letters, as difflib measures it: 1 for equal names. Names that
-        contain the text count as just alike enough.
+        contain the text, if it is no single letter, count as just alike enough.
 
     >>> near_names("left_kne", ["right_knee", "left_knee", "head"])
     ['left_knee']
@@ -42,7 +42,7 @@ def near_names(text: str, names: Iterable[str], alike: float = 0.6) -> list[str]
     for name in names:
         if name and name not in scores:
             matcher.set_seq1(name.lower())
-            is_part = bool(wanted) and wanted in name.lower()
+            is_part = len(wanted) > 1 and wanted in name.lower()
             scores[name] = max(matcher.ratio(), alike * is_part)
     least = max(alike, max(scores.values(), default=0.0) - _MARGIN)
     near = [name for name, score in scores.items() if score >= least]
@@ -55,11 +55,18 @@ def did_you_mean(text: str, names: Iterable[str], alike: float = 0.6) -> str:
     >>> did_you_mean("rendr", ["render", "rig"])
     'did you mean render?'
     """
-    near = [printable(name, _LONGEST) for name in near_names(text, names, alike)]
-    if not near:
-        return ""
-    head = ", ".join(near[:-1])
-    return f"did you mean {f'{head} or ' if head else ''}{near[-1]}?"
+    return question(near_names(text, names, alike))
+
+
+def question(names: Sequence[str]) -> str:
+    """Return the question whether one of some names was meant, "" if there are none.
+
+    >>> question(["--size", "--speed", "--scale"])
+    'did you mean --size, --speed or --scale?'
+    """
+    shown = [printable(name, _LONGEST) for name in names]
+    head = ", ".join(shown[:-1])
+    return f"did you mean {f'{head} or ' if head else ''}{shown[-1]}?" if shown else ""
 
 
 def name_hint(text: str, names: Iterable[str]) -> str:
@@ -74,9 +81,9 @@ def name_hint(text: str, names: Iterable[str]) -> str:
     'there are 2: hip, knee'
     """
     all_names = [*names]
-    question = did_you_mean(text, all_names)
-    if question:
-        return question
+    near = did_you_mean(text, all_names)
+    if near:
+        return near
     if not all_names:
         return "there are none"
     count = len(all_names)

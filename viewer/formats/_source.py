@@ -117,8 +117,8 @@ def _near_files(path: Path) -> str:
     except OSError:  # the folder is missing too, or may not be listed
         return ""
     # A link that leads nowhere has this name itself.
-    question = did_you_mean(path.name, [name for name in names if name != path.name], _ALIKE)
-    return f"; {question}" if question else ""
+    near = did_you_mean(path.name, [name for name in names if name != path.name], _ALIKE)
+    return f"; {near}" if near else ""
 
 
 class Source:
