@@ -14,6 +14,7 @@ from viewer.commands._morph_weights import has_only_morphs, is_named, morph_reco
 from viewer.commands._numbers import number
 from viewer.errors import RigError, ViewerError, printable
 from viewer.formats import Source, read
+from viewer.formats.pose import pose_error
 from viewer.near_names import near_names
 from viewer.rig.arrays import Floats
 from viewer.rig.hands import hand_vectors
@@ -128,8 +129,9 @@ def apply_pose(scene: Scene, arguments: argparse.Namespace) -> list[str]:
     if arguments.hands:
         _apply_hands(scene, arguments.hands)
     if arguments.pose:
-        record, warnings = _pose(arguments.pose)
-        notes += [*warnings, *_apply_record("--pose", record, scene)]
+        record, source = _pose(arguments.pose)
+        notes += [] if source is None else source.warnings
+        notes += _apply_record("--pose", record, scene, source)
     # What is asked for here counts more than what a pose file says.
     if arguments.shape is not None:
         notes += _apply_shape(scene, arguments.shape)
@@ -147,15 +149,15 @@ def pose_files(arguments: argparse.Namespace) -> list[str]:
     return [arguments.pose] if arguments.pose and not _is_numbers(arguments.pose) else []
 
 
-def _pose(text: str) -> tuple[PoseRecord, list[str]]:
-    """Return the pose that a file or the numbers themselves hold, and what its reader noticed."""
+def _pose(text: str) -> tuple[PoseRecord, Source | None]:
+    """Return the pose that a file or the numbers themselves hold, and the file."""
     if _is_numbers(text):
-        return PoseRecord(vector=_numbers("--pose", text)), []
+        return PoseRecord(vector=_numbers("--pose", text)), None
     source = Source.open(text)
     record = read(source)
     if not isinstance(record, PoseRecord):
         raise source.error("--pose: expected a pose, found a figure or clip")
-    return record, source.warnings
+    return record, source
 
 
 def _is_numbers(text: str) -> bool:
@@ -175,8 +177,10 @@ def _numbers(option: str, text: str | None) -> Floats | None:
         ) from None
 
 
-def _apply_record(option: str, record: PoseRecord, scene: Scene) -> list[str]:
-    """Apply a record to the first actor that takes it."""
+def _apply_record(
+    option: str, record: PoseRecord, scene: Scene, source: Source | None = None
+) -> list[str]:
+    """Apply a record, which may be from a file, to the first actor that takes it."""
     problem: RigError | None = None
     for actor in scene.actors:
         if actor.pose is not None:
@@ -184,6 +188,8 @@ def _apply_record(option: str, record: PoseRecord, scene: Scene) -> list[str]:
                 return apply_record(record, actor.figure, actor.pose, cut=option == "--pose")
             except RigError as found:
                 problem = problem or found
+    if problem is not None and source is not None:
+        raise pose_error(source.path, record, problem)
     raise ViewerError(f"{option}: {problem or 'no file has a skeleton'}")
 
 
