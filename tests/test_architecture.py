@@ -14,11 +14,11 @@ SOURCES = sorted(PACKAGE.rglob("*.py"))
 
 # Which parts of the package each part may import.
 ALLOWED = {
-    "rig": {"rig", "errors"},
-    "formats": {"formats", "rig", "errors", "interrupts", "streams"},
-    "rendering": {"rendering", "rig", "errors", "interrupts", "resources"},
-    "export": {"export", "formats", "rig", "errors", "interrupts"},
-    "loading": {"loading", "formats", "rig", "errors", "resources"},
+    "rig": {"rig", "errors", "near_names"},
+    "formats": {"formats", "rig", "errors", "interrupts", "near_names", "streams"},
+    "rendering": {"rendering", "rig", "errors", "interrupts", "near_names", "resources"},
+    "export": {"export", "formats", "rig", "errors", "interrupts", "near_names"},
+    "loading": {"loading", "formats", "rig", "errors", "near_names", "resources"},
     "app": {
         "app",
         "export",
@@ -30,12 +30,14 @@ ALLOWED = {
         "rig",
         "errors",
         "interrupts",
+        "near_names",
         "resources",
     },
-    "lint": {"lint", "loading", "formats", "rig", "errors"},
-    "models": {"formats", "errors", "interrupts"},
+    "lint": {"lint", "loading", "formats", "rig", "errors", "near_names"},
+    "models": {"formats", "errors", "interrupts", "near_names"},
     "errors": set(),
     "interrupts": set(),
+    "near_names": {"errors"},
     "resources": {"errors"},
     "streams": {"errors"},
 }

@@ -86,9 +86,78 @@ def test_downward_axes_may_follow_a_blank(words, rig, capsys):
     assert capsys.readouterr().err == ""
 
 
-def test_word_that_is_no_command_is_taken_for_a_file(capsys):
+@pytest.mark.parametrize(
+    ("word", "meant"),
+    [
+        ("rendr", "render"),
+        ("infoo", "info"),
+        ("Lint", "lint"),
+        ("doctr", "doctor"),
+        ("vew", "view"),
+    ],
+)
+def test_mistyped_command_is_told_the_nearest(word, meant, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for rest in ([], ["x.skel"], ["x.skel", "-o", "y.png"]):
+        assert run([word, *rest]) == 2
+        said = capsys.readouterr().err
+        assert f'"{word}"; did you mean {meant}?' in said and said.count("\n") == 1
+
+
+def test_word_that_is_no_command_is_taken_for_a_file(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    # Far from every command, with a suffix, in a folder, or there.
+    for word in ("walk", "rendr.skel", "./rendr"):
+        assert run([word]) == 2
+        said = capsys.readouterr().err
+        assert said.startswith(f"{word.removeprefix('./')}: ") and "command" not in said
+    Path("infoo").write_text("")
     assert run(["infoo"]) == 2
-    assert "infoo" in capsys.readouterr().err
+    assert capsys.readouterr().err.startswith("infoo: expected a ")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "unknown", "meant"),
+    [
+        (["render", "--sise", "4x4"], "--sise", "--size"),  # -o is missing too
+        (["render", "--ouput=x.png"], "--ouput", "--output"),
+        (["convert", "--frams", "0:2"], "--frams", "--frames"),
+        (["rig", "--form", "fox"], "--form", "--from"),
+        (["diff", "--toleranse", "1"], "--toleranse", "--tolerance"),
+        (["lint", "--jsn"], "--jsn", "--json"),
+        (["info", "--metod", "x"], "--metod", "--method"),
+        (["--ply"], "--ply", "--play"),
+        (["doctor", "--hlp"], "--hlp", "--help"),
+    ],
+)
+def test_unknown_option_comes_first_and_with_the_nearest(arguments, unknown, meant, capsys):
+    assert run(arguments) == 2
+    said = capsys.readouterr().err
+    assert f"option {unknown}; did you mean {meant}" in said and "required" not in said
+
+
+def test_unknown_letters_are_refused_and_known_ones_are_not(capsys, rig, tmp_path):
+    assert run(["render", "-x"]) == 2
+    assert "unknown option -x (" in capsys.readouterr().err
+    picture = str(tmp_path / "x.png")
+    for output in ([f"-o{picture}"], ["--outp", picture, "--force"]):
+        assert run(["render", *map(str, rig), *output, "--size=8x8"]) == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "choices", "meant"),
+    [
+        (["render", "--shading", "phonk"], "phong, normals, ", "phong"),
+        (["info", "--method", "dbs"], "lbs, dqs, mix", "lbs or dqs"),
+        (["lint", "--fail-on", "warn"], "error, warning, note, never", "warning"),
+        (["rig", "--scale", "unifrom"], "uniform, ", "uniform"),
+        (["convert", "--as", "gtlf"], "gltf", "gltf"),
+    ],
+)
+def test_unknown_value_lists_the_choices_and_the_nearest(arguments, choices, meant, capsys):
+    assert run(arguments) == 2
+    said = capsys.readouterr().err
+    assert choices in said and f'"{arguments[-1]}"; did you mean {meant}?' in said
 
 
 def test_bad_file_is_one_line_with_its_place(tmp_path):
@@ -229,5 +298,18 @@ def test_headless_commands_import_no_interface(rig, tmp_path, command):
 
 
 def test_program_runs_from_any_folder_without_files(tmp_path):
-    done = call("info", cwd=tmp_path)
-    assert done.returncode == 0 and done.stdout.startswith(b"fox\n")
+    done = call("render", "-o", "fox.png", "--size", "40x30", cwd=tmp_path)
+    assert done.returncode == 0 and done.stdout.startswith(b"fox.png: 40 x 30")
+
+
+def test_info_needs_files(capsys):
+    assert run(["info"]) == 2
+    said = capsys.readouterr()
+    assert "FILES" in said.err and said.err.count("\n") == 1 and not said.out
+    assert run(["info", "--body"]) == 0
+
+
+@pytest.mark.parametrize("command", ["diff", "rig"])
+def test_other_commands_that_need_files_name_them(command, capsys):
+    assert run([command]) == 2
+    assert {"diff": "REFERENCE", "rig": "TARGET"}[command] in capsys.readouterr().err

@@ -249,6 +249,16 @@ def test_missing_file_is_named(tmp_path):
     assert refusal(path) == f"{path}: cannot be read: No such file or directory"
 
 
+def test_missing_file_comes_with_the_nearest_name(tmp_path):
+    for name in ("wasp.skel", "wasp.skin", "tube.skel"):
+        (tmp_path / name).write_text("")
+    path = tmp_path / "wasp.skl"
+    missing = "cannot be read: No such file or directory"
+    assert refusal(path) == f"{path}: {missing}; did you mean wasp.skel or wasp.skin?"
+    assert refusal(tmp_path / "bug.skel") == f"{tmp_path}/bug.skel: {missing}"
+    assert refusal(tmp_path / "none" / "wasp.skel") == f"{tmp_path}/none/wasp.skel: {missing}"
+
+
 def test_folder_is_refused(tmp_path):
     wanted = (
         "expected a file, or a folder with a PIG model's tables or EasyMocap's frames, found a "

@@ -9,16 +9,13 @@ import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
-from typing import TYPE_CHECKING, NoReturn
 
 import viewer
 from viewer.commands import COMMANDS
+from viewer.commands._usage import Parser, check_command
 from viewer.errors import FormatError, ViewerError, printable
 from viewer.interrupts import Interrupted, watched
 from viewer.streams import standard_streams
-
-if TYPE_CHECKING:
-    from _typeshed import SupportsWrite
 
 __all__ = ["run"]
 
@@ -89,30 +86,22 @@ def _dispatch(arguments: list[str]) -> int:
     if arguments and arguments[0] == "--version":
         print(f"viewer {viewer.__version__}")
         return 0
-    name = arguments.pop(0) if arguments and arguments[0] in COMMANDS else "view"
+    name = "view"
+    if arguments and arguments[0] in COMMANDS:
+        name = arguments.pop(0)
+    elif arguments:
+        check_command(arguments[0])
     command = import_module(f"viewer.commands.{name}")
-    parser = _Parser(prog=f"viewer {name}", description=COMMANDS[name])
+    parser = Parser(prog=f"viewer {name}", description=COMMANDS[name])
     command.add_arguments(parser)
     # What follows "--" are files, whatever they are called.
     end = arguments.index("--") if "--" in arguments else len(arguments)
-    parsed = parser.parse_intermixed_args(_protect_numbers(arguments[:end]))
+    before_end = _protect_numbers(arguments[:end])
+    parser.check_options(before_end)
+    parsed = parser.parse_intermixed_args(before_end)
     if arguments[end + 1 :]:
         parsed.files = [*getattr(parsed, "files", []), *arguments[end + 1 :]]
     return command.run(parsed)
-
-
-class _Parser(argparse.ArgumentParser):
-    """Reports a usage error in one line, like every other error."""
-
-    def error(self, message: str) -> NoReturn:
-        raise ViewerError(f"{message} ({self.prog} --help lists the options)")
-
-    def print_help(self, file: SupportsWrite[str] | None = None) -> None:
-        # argparse ignores that its help cannot be printed, and prints it as an error instead of
-        # into an output that is closed.
-        print(self.format_help(), end="", file=file)
-        if sys.stdout is not None:
-            sys.stdout.flush()  # argparse leaves the program next
 
 
 def _protect_numbers(arguments: list[str]) -> list[str]:
@@ -129,7 +118,7 @@ def _protect_numbers(arguments: list[str]) -> list[str]:
 
 
 def _overview() -> argparse.ArgumentParser:
-    parser = _Parser(
+    parser = Parser(
         prog="viewer",
         description="See, check and produce skinned characters.",
         epilog=_EPILOG,

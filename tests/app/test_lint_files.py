@@ -13,6 +13,7 @@ from lint.sound import FRAMES, RATE, column, keypoints, scene_of, standing
 from lint.test_again import TEXTS
 
 from viewer.cli import run
+from viewer.loading import bundled_files
 from viewer.rig.scene import Scene
 from viewer.rig.timing import Timing
 
@@ -66,7 +67,7 @@ def test_the_bundled_figure_has_files_too(lint, monkeypatch, capsys):
     copied = []
     monkeypatch.setattr(imgui, "set_clipboard_text", copied.append)
     hand.click("Copy text")
-    run(["lint"])
+    run(["lint", *map(str, bundled_files())])
     assert copied[-1] + "\n" == capsys.readouterr().out
 
 

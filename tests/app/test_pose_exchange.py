@@ -123,7 +123,7 @@ RUBBISH = {
     "hello there": "clipboard:1: expected a number",
     "1 2 3": "expected 9 pose numbers",
     "0 0 0 0.5 0 0 0 nan 0": 'clipboard:1: expected a number, found "nan"',
-    "{}": "clipboard: expected a pose",
+    "{}": "clipboard:1: expected a pose",
     '{"dofs": ': "clipboard:1: expected JSON",
     '{"dofs": {"tail.x": 1}}': "tail",
     '{"dofs": {"joint_1.x": "far"}}': "joint_1.x: expected a number",

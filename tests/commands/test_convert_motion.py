@@ -170,3 +170,25 @@ def test_worlds_that_hang_head_down_are_written_upright(recording, tmp_path):
     with np.load(tmp_path / "a-0.npz") as a, np.load(tmp_path / "b-0.npz") as b:
         assert (str(a["up"]), str(b["up"])) == ("y", "y")
         assert_allclose(a["joints"], b["joints"] * [1, -1, -1], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["-o", "w_{frame}.bvh"], (".obj", "found .bvh")),
+        (["-o", "w_{frame:03}.glb", "--frames", "0:2"], (".obj", "found .glb")),
+        (["-o", "w_{frame}"], (".obj", "found a folder")),
+        (["-o", "w_{fram}.obj", "--frames", "0:2"], ("{frame}",)),
+        (["-o", "w.obj", "--as", "bvh"], ("--as bvh", ".bvh", "found w.obj")),
+        (["-o", "w.skel", "--as", "easymocap"], ("--as easymocap", "/", "found w.skel")),
+    ],
+)
+def test_name_that_cannot_be_is_a_usage_error_before_anything_is_read(
+    tmp_path, monkeypatch, capsys, arguments, words
+):
+    monkeypatch.chdir(tmp_path)
+    assert run(["convert", "missing.skel", *arguments]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and "missing.skel" not in error
+    assert all(word in error for word in words)
+    assert not list(tmp_path.iterdir())

@@ -201,8 +201,9 @@ def test_heat_maps_of_several_are_one_sheet(tmp_path, capsys):
 
 def test_picture_that_cannot_be_written_is_refused_before_anything_is_compared(tmp_path, capsys):
     folder = write(tmp_path / "a")
-    code, lines, error = said(capsys, folder, folder, "-o", str(tmp_path / "heat.mp4"))
-    assert code == 5 and lines == [] and 'pictures cannot be written as ".mp4"' in error
+    for other in (folder, str(tmp_path / "missing.skel")):
+        code, lines, error = said(capsys, folder, other, "-o", str(tmp_path / "heat.mp4"))
+        assert code == 2 and lines == [] and ".png" in error and 'found ".mp4"' in error
 
 
 def test_folder_without_a_rig_is_refused(tmp_path, capsys):

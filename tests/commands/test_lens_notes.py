@@ -76,4 +76,8 @@ def test_what_cannot_be_seen_is_not_said(recording, tmp_path, capsys, options):
 
 def test_unknown_camera_is_refused(recording, tmp_path, capsys):
     assert draw(recording, tmp_path / "a.png", "--view", "9") == 2
-    assert capsys.readouterr().err.endswith('--view: no camera "9"; there are: 01, 02\n')
+    assert capsys.readouterr().err.endswith(
+        '--view: no camera is called "9"; there are 2: 01, 02\n'
+    )
+    assert draw(recording, tmp_path / "a.png", "--view", "021") == 2
+    assert capsys.readouterr().err.endswith("did you mean 01 or 02?\n")

@@ -12,6 +12,7 @@ from formats import skel_text, skin_text
 
 from viewer.cli import run
 from viewer.lint import CODES
+from viewer.loading import bundled_files
 
 
 @pytest.fixture
@@ -57,7 +58,9 @@ def test_ignored_codes_do_not_count(rig, capsys) -> None:
     assert run([*arguments, ",".join(heavy).lower()]) == 0
     assert " W001: " not in capsys.readouterr().out
     assert run([*arguments, "X999"]) == 2
-    assert 'no code "X999"' in capsys.readouterr().err
+    assert '"X999"' in capsys.readouterr().err
+    assert run([*arguments, "W0066"]) == 2
+    assert "did you mean W006" in capsys.readouterr().err
 
 
 def json_of(arguments: list[str], capsys) -> dict:
@@ -81,8 +84,15 @@ def test_codes_are_listed(capsys) -> None:
     assert lines[0] == "F001  error    file cannot be read: check the name and the permissions"
 
 
-def test_without_files_the_bundled_figure_is_checked(capsys) -> None:
-    assert run(["lint", "--fail-on", "warning"]) == 0
+def test_files_are_needed(capsys) -> None:
+    assert run(["lint", "--fail-on", "never"]) == 2
+    said = capsys.readouterr()
+    assert "FILES" in said.err and said.err.count("\n") == 1 and not said.out
+    assert run(["lint", "--body", "--fail-on", "never"]) == 0
+
+
+def test_the_bundled_figure_has_no_warnings(capsys) -> None:
+    assert run(["lint", *map(str, bundled_files()), "--fail-on", "warning"]) == 0
     assert capsys.readouterr().out.endswith("0 errors, 0 warnings, 3 notes in 2 files\n")
 
 

@@ -81,6 +81,7 @@ def test_names_of_a_body_beside_a_morphed_rig(folder):
     [
         (RIG, "narrow=1", 'no shape is called "narrow"; there are 2: sharp, wide'),
         (RIG, "sharp=1,narrow=1", 'no shape is called "narrow"; there are 2: sharp, wide'),
+        (RIG, "sharpe=1", 'no shape is called "sharpe"; did you mean sharp?'),
         (RIG, "sharp=much", 'expected NAME=NUMBER, found "sharp=much"'),
         (RIG, "sharp=nan", 'expected NAME=NUMBER, found "sharp=nan"'),
         (RIG, "=1", 'expected NAME=NUMBER, found "=1"'),

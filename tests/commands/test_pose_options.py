@@ -77,7 +77,16 @@ NUMBERS_WANTED = "expected numbers separated by commas, found"
             '--dof: no joint is called "knee"; there are 5: root, left, left_hand, right, '
             "right_hand",
         ),
-        ("arms.skel --dof left.tx=1", "--dof: joint left has no DOF tx"),
+        ("arms.skel --dof left.tx=1", "--dof: joint left has no DOF tx; it has x, y, z"),
+        (
+            "arms.skel --dof left_hnd.x=1",
+            '--dof: no joint is called "left_hnd"; did you mean left_hand?',
+        ),
+        # Of several figures, the one that has nearly such a joint.
+        (
+            "smpl.npz arms.skel --dof left_hnad.x=1",
+            '--dof: no joint is called "left_hnad"; did you mean left_hand?',
+        ),
         ("arms.skel --dof left.x", '--dof: expected NAME.X=VALUE, found "left.x"'),
         ("arms.skel --dof left.x=far", '--dof: expected a number after "=", found "left.x=far"'),
         (
@@ -212,7 +221,11 @@ def test_first_figure_that_fits_is_posed(folder, capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ("pig --hide-part TAIL", '--hide-part: no part "TAIL"; there are: NOT_BODY, FEET, BACK'),
+        (
+            "pig --hide-part TAIL",
+            '--hide-part: no part is called "TAIL"; there are 3: NOT_BODY, FEET, BACK',
+        ),
+        ("pig --hide-part FEAT", '--hide-part: no part is called "FEAT"; did you mean FEET?'),
         ("smpl.npz --hide-part HEAD", "--hide-part: no figure has body parts"),
         ("arms.skel --hide-part HEAD", "--hide-part: no figure has body parts"),
     ],
@@ -231,3 +244,53 @@ def test_unknown_view_lists_what_there_is(folder, capsys, option, known):
     error = capsys.readouterr().err
     assert error.startswith(f"viewer: argument {option}: ") and error.count("\n") == 1
     assert all(name in error for name in known)
+
+
+# Pose files that are wrong, or for another figure
+
+
+POSES = {
+    "unknown joint": (
+        "arms.skel",
+        "p.json",
+        '{"dofs": {\n"left.x": 1,\n"left_hnd.y": 2}}',
+        3,
+        ('"left_hnd.y"', "left_hand"),
+    ),
+    "unknown DOF": ("arms.skel", "p.json", '{"dofs": {\n\n"left.tx": 1}}', 3, ("x, y, z",)),
+    "too few numbers": ("smpl.npz", "p.json", '{\n"poses": [1,\n2]}', 2, ("72", "2")),
+    "too long a part": ("smpl.npz", "p.json", '{"betas": [1],\n"body_pose": [1, 2]}', 2, ("2",)),
+    "a huge coefficient": ("smpl.npz", "p.json", '{"betas":\n[1, 1e9]}', 2, ("1e+09",)),
+    "a text for a number": ("smpl.npz", "p.json", '{"betas": [1,\n2,\n"3"]}', 3, ("'3'",)),
+    "an infinite number": ("smpl.npz", "p.json", '{"betas": [1,\n1e999]}', 2, ("inf",)),
+    "no number": ("smpl.npz", "p.json", '{"betas": [1,\n\nNaN]}', 3, ("NaN",)),
+    "a key twice": ("smpl.npz", "p.json", '{"betas": [1],\n"betas": [2]}', 2, ('"betas"',)),
+    "a mistyped key": ("smpl.npz", "p.json", '{"viewer_pose": 1,\n"beta": [1]}', 2, ("betas",)),
+    "too few in a text": ("smpl.npz", "p.txt", "1 2 3\n4 5 6\n\n", 2, ("72", "6")),
+    "no number in a text": ("smpl.npz", "p.txt", "1 2 3\n4 up 6\n", 2, ('"up"',)),
+}
+
+
+@pytest.mark.parametrize("case", POSES)
+@pytest.mark.parametrize("option", [["--pose"], []], ids=["pose", "files"])
+def test_pose_file_is_refused_with_its_line(folder, capsys, case, option):
+    figure, name, text, line, words = POSES[case]
+    (folder / name).write_text(text)
+    said = refused(capsys, figure, *option, name)
+    assert said.startswith(f"{name}:{line}: ") and "expected" in said and "found" in said
+    assert all(word in said for word in words)
+
+
+def test_pose_archive_is_refused_by_its_name(folder, capsys):
+    np.savez(folder / "p.npz", dofs=np.ones(1), dof_names=np.array(["left_hnd.x"]))
+    said = refused(capsys, "arms.skel", "--pose", "p.npz")
+    assert said.startswith("p.npz: expected ") and "did you mean left_hand?" in said
+    np.savez(folder / "q.npz", poses=np.ones(3))
+    assert refused(capsys, "arms.skel", "--pose", "q.npz").startswith("q.npz: expected 18 ")
+
+
+def test_mistyped_key_beside_others_is_a_warning_with_its_line(folder, capsys):
+    (folder / "p.json").write_text('{"betas": [1],\n"trnsl": [1, 2, 3]}')
+    _, said = described(capsys, "smpl.npz", "--pose", "p.json")
+    assert len(said) == 1 and said[0].startswith("warning: p.json:2: ")
+    assert "trnsl (did you mean transl?)" in said[0]

@@ -301,17 +301,28 @@ def test_suffix_chooses_the_format(rig, tmp_path, suffix):
 
 
 @pytest.mark.parametrize("suffix", [".psd", ".fits"])
-def test_format_that_cannot_be_written_is_exit_code_5(rig, tmp_path, suffix, capsys):
+def test_suffix_of_no_picture_is_refused_before_anything_is_read(tmp_path, suffix, capsys):
     out = tmp_path / f"x{suffix}"
-    assert run(["render", *map(str, rig), "-o", str(out), "--size", "40x30"]) == 5
-    assert capsys.readouterr().err.count("\n") == 1 and not out.exists()
+    assert run(["render", "missing.skel", "-o", str(out), "--size", "40x30"]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and ".png" in error and f"found {suffix}" in error
+    assert not out.exists()
+
+
+def test_suffix_of_no_picture_goes_before_a_file_that_exists(tmp_path, capsys):
+    out = tmp_path / "x.psd"
+    out.write_text("precious")
+    assert run(["render", "missing.skel", "-o", str(out)]) == 2
+    assert "found .psd" in capsys.readouterr().err
+    assert run(["render", str(out), "-o", str(out)]) == 5
+    assert "is an input file" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("suffix", [".xyz", ".svg", ".skin", ".avi"])
 def test_picture_under_another_kind_of_name_is_refused(rig, tmp_path, suffix, capsys):
     out = tmp_path / f"x{suffix}"
     out.write_text("precious")
-    assert run(["render", *map(str, rig), "-o", str(out), "--force"]) == 5
+    assert run(["render", *map(str, rig), "-o", str(out), "--force"]) == 2
     assert capsys.readouterr().err == (
         f"viewer: {out}: expected a picture (.png, .jpg, .jpeg, .bmp, .gif, .ppm, .tga, .tif, "
         f".tiff, .webp) or a video (.mp4, .webm, .gif), found {suffix}\n"
@@ -321,7 +332,7 @@ def test_picture_under_another_kind_of_name_is_refused(rig, tmp_path, suffix, ca
 
 def test_kinds_of_video_are_listed_also_where_frames_are_asked_for(rig, tmp_path, capsys):
     out = tmp_path / "x.mov"
-    assert run(["render", *map(str, rig), "-o", str(out), "--frames", "0:5"]) == 5
+    assert run(["render", *map(str, rig), "-o", str(out), "--frames", "0:5"]) == 2
     assert " or a video (.mp4, .webm, .gif), found .mov\n" in capsys.readouterr().err
 
 

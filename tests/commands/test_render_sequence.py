@@ -564,3 +564,11 @@ def test_wasp_walks(draw, shared, tmp_path):
     assert ": 121 frames, 4.03 s, 160 x 90, 30 frames a second, " in said.out
     shown = frames(tmp_path / "walk.mp4")
     assert len(shown) == 121 and np.abs(shown[0] - shown[60]).mean() > 1.0
+
+
+@pytest.mark.parametrize("suffix", [".mp4", ".webm"])
+def test_numbered_files_are_pictures(tmp_path, monkeypatch, capsys, suffix):
+    monkeypatch.chdir(tmp_path)
+    assert run(["render", "missing.skel", "-o", f"f_{{frame}}{suffix}", "--frames", "0:2"]) == 2
+    error = capsys.readouterr().err
+    assert ".png" in error and f"found {suffix}" in error and "missing" not in error

@@ -300,7 +300,17 @@ def test_landmarks_are_points_or_joints_where_the_pose_has_them(tmp_path):
         (
             "head 1 2 3\n# no\n1 2 3 4 5\n",
             3,
-            'expected a joint of fox, found "1 2"',
+            'expected six numbers, or a joint and three numbers, found "1 2 3 4 5"',
+        ),
+        (
+            "hed 1 2 3\n",
+            1,
+            'expected a joint of fox, found "hed"; did you mean head?',
+        ),
+        (
+            "head 1 2 1_0\n",  # Python would take it for 10
+            1,
+            'expected six numbers, or a joint and three numbers, found "head 1 2 1_0"',
         ),
         (
             "head 1 2\n",
@@ -312,16 +322,21 @@ def test_landmarks_are_points_or_joints_where_the_pose_has_them(tmp_path):
             1,
             'expected six numbers, or a joint and three numbers, found "head 1 2 nan"',
         ),
-        ("wing 1 2 3\n", 1, 'expected a joint of fox, found "wing"'),
-        ("head 1 2 3\n", None, "expected 3 or more pairs of points, found 1"),
+        (
+            "wing 1 2 3\n",
+            1,
+            'expected a joint of fox, found "wing"; there are 37: pelvis, spine_1, spine_2, '
+            "chest, neck_1, neck_2, …",
+        ),
+        ("", 1, "expected 3 or more pairs of points, found 0"),
+        ("\nhead 1 2 3\n", 2, "expected 3 or more pairs of points, found 1"),
     ],
 )
 def test_landmarks_that_are_none_are_named_by_line(tmp_path, text, line, message):
     with pytest.raises(FormatError) as problem:
         landmarks(tmp_path, text)
     where = tmp_path / "pairs.txt"
-    expected = f"{where}:{line}: {message}" if line else f"{where}: {message}"
-    assert str(problem.value) == expected
+    assert str(problem.value) == f"{where}:{line}: {message}"
 
 
 def test_view_shows_the_result_over_the_hidden_target(folder, monkeypatch, capsys):

@@ -6,9 +6,16 @@ import numpy as np
 import pytest
 from app.tiny import write_rig
 from PIL import Image
+from rig.hand_made import mesh
 
 from viewer.cli import run
+from viewer.commands._scalar import scalar_notes
+from viewer.errors import ViewerError
+from viewer.rendering.options import DisplayOptions
 from viewer.resources import resource
+from viewer.rig.annotations import VertexField
+from viewer.rig.figure import Figure
+from viewer.rig.scene import Actor, Scene
 
 
 @pytest.fixture(scope="module")
@@ -92,7 +99,11 @@ def test_legend_stays_in_its_corner(render, body):
     [
         (
             ["--scalar", "weight:left_kneee"],
-            '--scalar weight:left_kneee: no joint is called "left_kneee"; close to it: left_knee',
+            '--scalar weight:left_kneee: no joint is called "left_kneee"; did you mean left_knee?',
+        ),
+        (
+            ["--scalar", "strech"],
+            'argument --scalar: no scalar view "strech"; did you mean stretch?',
         ),
         (
             ["--scalar", "stretch:pelvis"],
@@ -169,3 +180,22 @@ def test_numbers_of_a_sequence_are_drawn_with_their_legend(body, tmp_path):
     for cell in (changed[:, :half], changed[:, half:]):
         rows, columns = np.nonzero(cell)
         assert rows.min() <= 3 and columns.min() <= 3 and columns.max() < 0.7 * half
+
+
+def test_unknown_field_is_refused_with_the_nearest_name():
+    far = VertexField("distance", "Distance", np.zeros(3), "length")
+    matched = VertexField("match", "Match", np.zeros(3), names=("matched",))
+    scene = Scene([Actor(Figure("scan", mesh(np.eye(3)), fields=(far, matched)))])
+    for name, hint in (
+        ("field:distanc", 'no field is called "distanc"; did you mean distance?'),
+        ("class:distance", 'no field is called "distance"; there are 1: match'),
+    ):
+        with pytest.raises(ViewerError) as caught:
+            scalar_notes(scene, DisplayOptions(shading="scalar", scalar=name))
+        assert str(caught.value) == f"--scalar {name}: {hint}"
+
+
+def test_unknown_joint_is_looked_for_in_every_figure(render, body):
+    fox = [str(resource("assets", "samples", name)) for name in ("fox.skel", "fox.skin")]
+    _, said = render(*fox, body, "--scalar", "weight:left_kne")
+    assert "did you mean left_knee?" in said

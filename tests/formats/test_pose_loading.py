@@ -108,14 +108,19 @@ def test_pose_alone_is_refused(files):
 @pytest.mark.parametrize(
     ("figure", "pose", "message"),
     [
-        ("legs", "short", "expected 9 pose numbers for legs, found 3"),
-        ("pig", "short", "expected 13 pose numbers for pig, found 3"),
-        ("smpl", "bend", "expected 72 pose numbers for smpl, found 13"),
-        ("legs", "tail", 'no joint is called "tail"; there are 2: hip, knee'),
+        ("legs", "short", ":1: expected 9 pose numbers for legs, found 3"),
+        ("pig", "short", ":1: expected 13 pose numbers for pig, found 3"),
+        ("smpl", "bend", ":1: expected 72 pose numbers for smpl, found 13"),
+        (
+            "legs",
+            "tail",
+            ':1: expected a DOF of legs, found "tail.x": no joint is called "tail"; there are 2: '
+            "hip, knee",
+        ),
     ],
 )
 def test_pose_of_another_figure_is_refused_with_both(files, figure, pose, message):
-    assert refusal(files[figure], files[pose]) == f"{files[pose]}: {message}"
+    assert refusal(files[figure], files[pose]) == f"{files[pose]}{message}"
 
 
 # Pictures
@@ -188,7 +193,7 @@ def test_picture_makes_an_actor_with_the_same_pose(files):
 def test_what_does_not_fit_leaves_the_actor_as_it_was(files, names):
     actor = viewer.load(files["pig"]).actors[0]
     figure, before = actor.figure, pose_key(actor.pose)
-    with pytest.raises(RigError):
+    with pytest.raises(FormatError):
         add_to_actor(additions(files, *names), actor)
     assert actor.figure is figure
     assert pose_key(actor.pose) == before

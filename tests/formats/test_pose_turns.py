@@ -97,21 +97,21 @@ def test_a_file_needs_no_more_than_names_and_turns():
 def test_without_turns_the_other_words_mean_nothing():
     source = Source("a.json", b'{"dofs": {"a.x": 1}, "joint_names": 3, "up": "y"}')
     assert pose.read(source).turns is None
-    assert source.warnings == ["a.json: keys that mean nothing in a pose: joint_names, up"]
+    assert source.warnings == ["a.json:1: keys that mean nothing in a pose: joint_names, up"]
 
 
 @pytest.mark.parametrize(
     ("values", "message"),
     [
         ({"joint_names": None}, "joint_names: expected names, found nothing"),
-        ({"joint_names": [1]}, "joint_names: expected names, found a list of other things"),
+        ({"joint_names": [1]}, "joint_names: expected names, found 1"),
         ({"joint_names": "a"}, "joint_names: expected a list of names, found 0 dimensions"),
         ({"joint_names": ["a", "b"]}, "joint_turns: expected 2 x 4 numbers, found 1 x 4"),
         ({"joint_turns": [[0, 0, 1]]}, "joint_turns: expected 1 x 4 numbers, found 1 x 3"),
         ({"joint_turns": 1}, "joint_turns: expected 1 x 4 numbers, found one number"),
         ({"joint_turns": "a"}, "joint_turns: expected numbers, found 'a'"),
         ({"joint_turns": [[0, 0], [1]]},
-         "joint_turns: expected numbers, found a list of other things"),
+         "joint_turns: expected numbers, found lists of different lengths or depths"),
         ({"joint_turns": [[0, 0, 0, 0]]},
          "joint_turns: a: expected a quaternion, found four zeros"),
         ({"joint_turns": [[0, 0, 0, 1e300]]},
@@ -129,4 +129,4 @@ def test_without_turns_the_other_words_mean_nothing():
 def test_broken_turns_are_refused(values, message):
     with pytest.raises(FormatError) as caught:
         read(**values)
-    assert str(caught.value) == f"a.json: {message}"
+    assert str(caught.value) == f"a.json:1: {message}"

@@ -194,10 +194,30 @@ def test_joints_may_have_a_colon_in_their_names():
     assert follow_candidates(scene, "2:mixamorig:spine") == [(1, 1)]
 
 
-@pytest.mark.parametrize("name", ["leg", "leg/j1", "arm/j9", "", "/", ":", "none:j1", ":j1"])
+@pytest.mark.parametrize("name", ["leg", "leg/j1", "", "/", ":", "none:j1", ":j1"])
 def test_unknown_name_lists_the_actors(name):
     with pytest.raises(RigError) as caught:
         find_follow(Scene([Actor(arm(3)), captured()]), name)
     assert str(caught.value) == (
         f'no actor, joint or point is called "{name}"; actors: arm, keypoints'
     )
+
+
+@pytest.mark.parametrize(
+    ("name", "hint"),
+    [
+        ("arm/j9", "there are 3: j0, j1, j2"),
+        ("j11", "did you mean j1?"),
+        ("keypoint", "did you mean keypoints?"),
+        ("2:mixamorig:Spin", "did you mean mixamorig:Spine?"),
+        ("mixamorig:Hps", "did you mean mixamorig:Hips?"),
+    ],
+)
+def test_unknown_name_comes_with_the_nearest_of_its_owner(name, hint):
+    figure = arm(2)
+    names = ("mixamorig:Hips", "mixamorig:Spine")
+    named = replace(figure, name="fox", skeleton=replace(figure.skeleton, names=names))
+    scene = Scene([Actor(arm(3)), captured(), Actor(named, person=2)])
+    with pytest.raises(RigError) as caught:
+        find_follow(scene, name)
+    assert str(caught.value) == f'no actor, joint or point is called "{name}"; {hint}'

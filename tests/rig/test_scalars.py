@@ -157,7 +157,7 @@ def test_views_of_weights_and_parts_need_no_pose(name):
 def test_unknown_view_is_refused():
     with pytest.raises(RigError) as caught:
         compute("magic", sliding([[]] * 3), None, Skinning())
-    assert str(caught.value) == f'no scalar view "magic"; there are: {", ".join(SCALARS)}'
+    assert str(caught.value) == f'no scalar view "magic"; there are 16: {", ".join(SCALARS)}'
 
 
 @pytest.mark.parametrize(
@@ -216,14 +216,14 @@ def test_joint_is_found_by_name_or_index(text, joint):
         (
             ("hip", "left_knee", "right_knee"),
             "left_kne",
-            'no joint is called "left_kne"; close to it: left_knee',
+            'no joint is called "left_kne"; did you mean left_knee?',
         ),
-        (("hip", "L_Knee", "R_Knee"), "knee", 'no joint is called "knee"; close to it: '
-         "L_Knee, R_Knee"),
+        (("hip", "L_Knee", "R_Knee"), "knee", 'no joint is called "knee"; did you mean '
+         "L_Knee or R_Knee?"),
         (
             ("a", "b", "c", "d", "e", "f"),
             "tail",
-            'no joint is called "tail"; there are 6: a, b, c, d, e, …',
+            'no joint is called "tail"; there are 6: a, b, c, d, e, f',
         ),
         (("a", "b"), "#2", 'no joint is called "#2"; there are 2: a, b'),
         (("a", "a"), "a", '"a" names 2 joints: say which one, a#0, a#1'),
@@ -301,7 +301,7 @@ def test_fields_are_shown_by_name_or_the_first_of_their_kind():
     assert categories("class", figure) == ("near", "filled")
     assert missing_part("field:near", figure) == 'a field "near"'
     assert missing_part("class", replace(figure, fields=(FAR,))) == "classes"
-    with pytest.raises(RigError, match=r'^no field is called "match"; there are: far$'):
+    with pytest.raises(RigError, match=r'^no field is called "match"; there are 1: far$'):
         compute("field:match", figure, None, Skinning())
 
 

@@ -15,7 +15,7 @@ from viewer.errors import ViewerError, printable
 from viewer.export import export, files_written, refuse_inputs
 from viewer.formats import Source, write
 from viewer.rig.mirror import mirror_pose
-from viewer.rig.pose_record import PoseRecord, apply_record, record_of
+from viewer.rig.pose_record import PosePartError, PoseRecord, apply_record, record_of
 from viewer.rig.pose_vector import write_vector
 from viewer.rig.scene import figure_pose
 from viewer.rig.upright import upright_actor
@@ -78,7 +78,11 @@ def paste_pose(state: AppState) -> None:
         source = Source("clipboard", words.encode("utf-8", "replace"))
         if not text.strip():
             raise source.error("expected a pose, found nothing")
-        notes = apply_record(pose.read(source), actor.figure, actor.pose)
+        record = pose.read(source)
+        try:
+            notes = apply_record(record, actor.figure, actor.pose)
+        except PosePartError as problem:
+            raise pose.pose_error(source.path, record, problem) from None
     except ViewerError as problem:
         state.error = str(problem)
         return

@@ -13,6 +13,8 @@ import numpy as np
 
 from viewer.errors import FormatError, printable
 from viewer.formats import Source
+from viewer.formats._numbers import to_number
+from viewer.near_names import name_hint
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.pose import Pose
@@ -43,8 +45,8 @@ def read_landmarks(source: Source, template: Figure, pose: Pose) -> Floats:
     Raises
     ------
     FormatError
-        With the line, if it is no pair, or no joint has the name; without, if there are fewer
-        than three pairs.
+        With the line, if it is no pair, or no joint has the name; with the last one if there are
+        fewer than three pairs.
     """
     skeleton = template.skeleton
     assert skeleton is not None  # the template is attached
@@ -56,7 +58,7 @@ def read_landmarks(source: Source, template: Figure, pose: Pose) -> Floats:
         if not words:
             continue
         values = _floats(words if len(words) == 6 else words[-3:])
-        if values is None or len(words) < 4:
+        if values is None or len(words) < 4 or (len(words) != 6 and _floats(words) is not None):
             raise FormatError(
                 source.path,
                 "expected six numbers, or a joint and three numbers, "
@@ -70,18 +72,18 @@ def read_landmarks(source: Source, template: Figure, pose: Pose) -> Floats:
         if name not in skeleton.names:
             raise FormatError(
                 source.path,
-                f'expected a joint of {printable(template.name, 60)}, found "{printable(name)}"',
+                f'expected a joint of {printable(template.name, 60)}, found "{printable(name)}"; '
+                f"{name_hint(name, skeleton.names)}",
                 number,
             )
         pairs.append([joints[skeleton.names.index(name)].tolist(), values])
     if len(pairs) < 3:
-        raise FormatError(source.path, f"expected 3 or more pairs of points, found {len(pairs)}")
+        found = f"expected 3 or more pairs of points, found {len(pairs)}"
+        raise FormatError(source.path, found, max(len(source.data.splitlines()), 1))
     return np.array(pairs, dtype=np.float64)
 
 
 def _floats(words: list[str]) -> list[float] | None:
-    try:
-        values = [float(word) for word in words]
-    except ValueError:
-        return None
-    return values if all(abs(value) < _FARTHEST for value in values) else None
+    found = [to_number(word.encode()) for word in words]
+    values = [value for value in found if value is not None and abs(value) < _FARTHEST]
+    return values if len(values) == len(found) else None

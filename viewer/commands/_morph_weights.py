@@ -8,6 +8,7 @@ import numpy as np
 
 from viewer.commands._numbers import number
 from viewer.errors import ViewerError, printable
+from viewer.near_names import name_hint
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.morph_target import MORPH_GROUP
@@ -73,8 +74,7 @@ def named_record(scene: Scene, text: str) -> tuple[Actor, PoseRecord]:
     names = _names(shaped[0].figure)
     missing = next((name for name, _ in wanted if not _rows(shaped[0].figure, name)), wanted[0][0])
     raise ViewerError(
-        f'--shape: no shape is called "{printable(missing, 60)}"; there are {len(names)}: '
-        f"{_listed(names)}"
+        f'--shape: no shape is called "{printable(missing, 60)}"; {name_hint(missing, names)}'
     )
 
 

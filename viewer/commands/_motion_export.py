@@ -9,7 +9,7 @@ from pathlib import Path
 from viewer.commands._frame_numbers import numbering_of, parse_range
 from viewer.commands._numbers import number
 from viewer.commands._one_pose import asks_one_pose, pose_line, posed_actors, take_of_pose
-from viewer.errors import OutputError, RigError, UnsupportedFormatError, ViewerError, printable
+from viewer.errors import RigError, UnsupportedFormatError, ViewerError, printable
 from viewer.export import (
     EXPORTERS,
     MotionOptions,
@@ -35,6 +35,8 @@ from viewer.rig.units import METRES
 __all__ = [
     "add_motion_arguments",
     "check_frame_field",
+    "check_kind",
+    "check_numbered",
     "is_motion",
     "left_out_lines",
     "motion_paths",
@@ -286,9 +288,7 @@ def _exporter(arguments: argparse.Namespace, output: Path, scene: Scene) -> str:
             )
         return _OF_POINTS
     if arguments.kind is not None:
-        if arguments.kind not in found:
-            known = ", ".join(EXPORTERS[arguments.kind].suffixes)
-            raise UnsupportedFormatError(f"--as {arguments.kind}: expected a name with {known}")
+        check_kind(arguments, output)
         return str(arguments.kind)
     return suited_exporter(output, actors[0].figure)
 
@@ -303,6 +303,37 @@ def _frames(arguments: argparse.Namespace, actor: Actor) -> tuple[int, int | Non
     return numbering_of([actor], arguments.fps).span(found)
 
 
+def check_kind(arguments: argparse.Namespace, output: Path) -> None:
+    """Refuse a name whose suffix the exporter that is asked for does not write."""
+    if arguments.kind is None:
+        return
+    known, suffix = EXPORTERS[arguments.kind].suffixes, output.suffix.lower() or "/"
+    if suffix not in known:
+        raise UnsupportedFormatError(
+            f"--as {arguments.kind}: expected a name with {', '.join(known)}, "
+            f"found {printable(output, 300)}"
+        )
+
+
+def check_numbered(arguments: argparse.Namespace, output: Path) -> None:
+    """Hold the name of numbered files to what can be numbered.
+
+    Raises
+    ------
+    ViewerError
+        If the format holds a whole motion, or the names would all be the same.
+    """
+    suffix = output.suffix.lower()
+    if "{frame" not in output.name and not (arguments.frames and suffix in _ONE_A_FRAME):
+        return
+    if suffix not in _ONE_A_FRAME:
+        raise UnsupportedFormatError(
+            f"{printable(output, 300)}: expected {', '.join(_ONE_A_FRAME)} for one file a frame, "
+            f"found {suffix or 'a folder'}"
+        )
+    check_frame_field(output)
+
+
 def check_frame_field(output: Path) -> None:
     """Refuse names of numbered files that would all be the same, or that cannot be formed."""
     try:
@@ -310,7 +341,7 @@ def check_frame_field(output: Path) -> None:
     except (ValueError, KeyError, IndexError, AttributeError):
         first = second = ""
     if first == second:
-        raise OutputError(
+        raise ViewerError(
             f"{printable(output, 300)}: expected a name with {{frame}}, as in walk_{{frame:05}}"
             f"{output.suffix}, for one file a frame"
         )

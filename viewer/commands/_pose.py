@@ -14,6 +14,8 @@ from viewer.commands._morph_weights import has_only_morphs, is_named, morph_reco
 from viewer.commands._numbers import number
 from viewer.errors import RigError, ViewerError, printable
 from viewer.formats import Source, read
+from viewer.formats.pose import pose_error
+from viewer.near_names import near_names
 from viewer.rig.arrays import Floats
 from viewer.rig.hands import hand_vectors
 from viewer.rig.mirror import mirror_pose
@@ -22,7 +24,7 @@ from viewer.rig.pose_record import PoseRecord, apply_record
 from viewer.rig.pose_vector import set_joint_rotations
 from viewer.rig.rotation import rotation_vector_to_matrix
 from viewer.rig.scene import Actor, Scene
-from viewer.rig.skeleton import clamp_dofs, dof_label, find_dof
+from viewer.rig.skeleton import clamp_dofs, dof_label, find_dof, joint_labels
 from viewer.rig.skinning import METHODS, Skinning
 
 __all__ = [
@@ -128,8 +130,9 @@ def apply_pose(scene: Scene, arguments: argparse.Namespace) -> list[str]:
     if arguments.hands:
         _apply_hands(scene, arguments.hands)
     if arguments.pose:
-        record, warnings = _pose(arguments.pose)
-        notes += [*warnings, *_apply_record("--pose", record, scene)]
+        record, source = _pose(arguments.pose)
+        notes += [] if source is None else source.warnings
+        notes += _apply_record("--pose", record, scene, source)
     # What is asked for here counts more than what a pose file says.
     if arguments.shape is not None:
         notes += _apply_shape(scene, arguments.shape)
@@ -147,15 +150,15 @@ def pose_files(arguments: argparse.Namespace) -> list[str]:
     return [arguments.pose] if arguments.pose and not _is_numbers(arguments.pose) else []
 
 
-def _pose(text: str) -> tuple[PoseRecord, list[str]]:
-    """Return the pose that a file or the numbers themselves hold, and what its reader noticed."""
+def _pose(text: str) -> tuple[PoseRecord, Source | None]:
+    """Return the pose that a file or the numbers themselves hold, and the file."""
     if _is_numbers(text):
-        return PoseRecord(vector=_numbers("--pose", text)), []
+        return PoseRecord(vector=_numbers("--pose", text)), None
     source = Source.open(text)
     record = read(source)
     if not isinstance(record, PoseRecord):
         raise source.error("--pose: expected a pose, found a figure or clip")
-    return record, source.warnings
+    return record, source
 
 
 def _is_numbers(text: str) -> bool:
@@ -175,8 +178,10 @@ def _numbers(option: str, text: str | None) -> Floats | None:
         ) from None
 
 
-def _apply_record(option: str, record: PoseRecord, scene: Scene) -> list[str]:
-    """Apply a record to the first actor that takes it."""
+def _apply_record(
+    option: str, record: PoseRecord, scene: Scene, source: Source | None = None
+) -> list[str]:
+    """Apply a record, which may be from a file, to the first actor that takes it."""
     problem: RigError | None = None
     for actor in scene.actors:
         if actor.pose is not None:
@@ -184,6 +189,8 @@ def _apply_record(option: str, record: PoseRecord, scene: Scene) -> list[str]:
                 return apply_record(record, actor.figure, actor.pose, cut=option == "--pose")
             except RigError as found:
                 problem = problem or found
+    if problem is not None and source is not None:
+        raise pose_error(source.path, record, problem)
     raise ViewerError(f"{option}: {problem or 'no file has a skeleton'}")
 
 
@@ -285,16 +292,22 @@ def _place(scene: Scene, label: str, setting: str, text: str) -> bool:
 
 
 def _find(scene: Scene, label: str) -> tuple[Actor, int, list[str]]:
-    problem: RigError | None = None
+    problems: list[RigError] = []
+    near: list[RigError] = []
     found: list[tuple[Actor, int]] = []
     for actor in scene.actors:
-        if actor.figure.skeleton is not None:
+        skeleton = actor.figure.skeleton
+        if skeleton is not None:
             try:
-                found.append((actor, find_dof(actor.figure.skeleton, label)))
+                found.append((actor, find_dof(skeleton, label)))
             except RigError as error:
-                problem = problem or error
+                problems.append(error)
+                joint = label.rpartition(".")[0]
+                near += [error] if near_names(joint, joint_labels(skeleton)) else []
     if not found:
-        raise ViewerError(f"--dof: {problem or 'no file has a skeleton'}")
+        # Of several figures the one is spoken of that has such a joint, or nearly.
+        problem = next(iter([*near, *problems]), "no file has a skeleton")
+        raise ViewerError(f"--dof: {problem}")
     note = []
     if len(found) > 1:
         first = printable(found[0][0].figure.name)

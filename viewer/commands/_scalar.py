@@ -8,8 +8,10 @@ import math
 import numpy as np
 
 from viewer.errors import RigError, ViewerError, printable
+from viewer.near_names import name_hint, near_names
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.arrays import Floats
+from viewer.rig.figure import Figure
 from viewer.rig.number_text import number_text
 from viewer.rig.scalars import (
     SCALARS,
@@ -26,6 +28,7 @@ from viewer.rig.scalars import (
     view_title,
 )
 from viewer.rig.scene import Scene
+from viewer.rig.skeleton import joint_labels
 
 __all__ = ["add_scalar_arguments", "choose_subject", "scalar_notes", "scalar_text", "set_scalar"]
 
@@ -121,7 +124,7 @@ def scalar_notes(scene: Scene, options: DisplayOptions) -> list[str]:
     Raises
     ------
     ViewerError
-        If the view is about a joint that no figure has; the message lists close names.
+        If the view is about a joint or field that no figure has; the message has near names.
     """
     if options.shading != "scalar" or not scene.actors:
         return []
@@ -131,14 +134,32 @@ def scalar_notes(scene: Scene, options: DisplayOptions) -> list[str]:
         return []
     key, joint = split_name(options.scalar)
     bound = next((figure for figure in figures if figure.skin is not None), None)
-    if joint and bound is not None and SCALARS[key].takes_joint:
-        try:
-            joint_of(bound, joint)
-        except RigError as problem:
-            raise ViewerError(f"--scalar {printable(options.scalar, 60)}: {problem}") from None
+    if joint:
+        _refuse_name(figures, options.scalar)
     if SCALARS[key].takes_joint and not joint and bound is not None:
         return []  # the window selects one
     return [f"--scalar {options.scalar}: {SCALARS[key].title}: no figure has {missing[0]}"]
+
+
+def _refuse_name(figures: list[Figure], name: str) -> None:
+    """Raise if a view is about a joint or field that no figure has, though some have others."""
+    key, about = split_name(name)
+    option = f"--scalar {printable(name, 60)}"
+    problems, known = [], []
+    for figure in figures:
+        known += [field.name for field in figure.fields if bool(field.names) == (key == "class")]
+        if figure.skin is not None and SCALARS[key].takes_joint:
+            try:
+                joint_of(figure, about)
+            except RigError as problem:
+                labels = () if figure.skeleton is None else joint_labels(figure.skeleton)
+                problems.append((not near_names(about, labels), str(problem)))
+    if problems:
+        # Of several figures the one is spoken of that has such a joint, or nearly.
+        raise ViewerError(f"{option}: {min(problems, key=lambda pair: pair[0])[1]}")
+    if SCALARS[key].about == "field" and known:
+        hint = name_hint(about, known)
+        raise ViewerError(f'{option}: no field is called "{printable(about, 60)}"; {hint}')
 
 
 def scalar_text(scene: Scene, options: DisplayOptions) -> str:

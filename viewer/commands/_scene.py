@@ -38,20 +38,29 @@ __all__ = [
 LAYOUTS = ("body19", "panoptic", "coco", "h36m")
 """Keypoint layouts that share their number of points with another."""
 
+_DEFAULT = "the bundled figure"
 _SLOW_BYTES = 60e6  # about a second of reading
 _UNITS = {"k": 1 << 10, "m": 1 << 20, "g": 1 << 30}
 
 
-def add_scene_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add FILES and the options that pose what they hold."""
-    add_file_arguments(parser)
+def add_scene_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT) -> None:
+    """Add FILES and the options that pose what they hold; see ``add_file_arguments``."""
+    add_file_arguments(parser, default)
     add_capture_arguments(parser)
     add_frame_arguments(parser)
     add_pose_arguments(parser)
 
 
-def add_file_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add FILES and the options that say where they are."""
+def add_file_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT) -> None:
+    """Add FILES and the options that say where they are.
+
+    Parameters
+    ----------
+    parser : ArgumentParser
+        Of a command.
+    default : str
+        What is opened without files, for the help; empty if that is refused.
+    """
     group = parser.add_argument_group("files")
     group.add_argument(
         "files",
@@ -59,7 +68,8 @@ def add_file_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILES",
         help=".skel, .skin, .anim, .morph, .rig files; .obj and .ply meshes; body models (.npz, "
         ".pkl) or their names in the model folder, as smplx:neutral; PIG folders; EasyMocap "
-        "folders, AMASS and BVH files; poses; a texture picture (default: the bundled figure)",
+        "folders, AMASS and BVH files; poses; a texture picture"
+        f"{f' (default: {default})' if default else ''}",
     )
     group.add_argument("--body", action="store_true", help="open the bundled human body too")
     group.add_argument(

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING
 
 from viewer.commands._frame_numbers import Range, parse_range
 from viewer.commands._numbers import number
-from viewer.commands._output import check_output
+from viewer.commands._output import PICTURES, check_output
 from viewer.commands._pose import pose_files
 from viewer.commands._progress import Progress
 from viewer.commands._scene import print_warnings
 from viewer.commands._shots import Shots, Turntable, parse_turntable, shots_of
 from viewer.commands._view import camera_of
-from viewer.errors import OutputError, ViewerError, printable
+from viewer.errors import OutputError, UnsupportedFormatError, ViewerError, printable
 from viewer.formats._video_kinds import VIDEOS
 from viewer.interrupts import hold, poll
 from viewer.rig.scene import Scene
@@ -107,6 +107,7 @@ def request_of(arguments: argparse.Namespace, output: Path) -> Request | None:
         return None
     if kind == "pictures":
         _check_name(str(output))
+        _check_picture(output)
     return Request(kind, output, frames, turntable, is_certain)
 
 
@@ -164,6 +165,16 @@ def _check_name(name: str) -> None:
         raise ViewerError(
             "--output: expected {frame} or {frame:05} in the name of numbered pictures, as "
             f'frame_{{frame:05}}.png, found "{printable(name)}"'
+        )
+
+
+def _check_picture(output: Path) -> None:
+    """Refuse numbered pictures under the name of a video; a GIF may be either."""
+    suffix = output.suffix.lower()
+    if suffix in VIDEOS and suffix not in PICTURES:
+        raise UnsupportedFormatError(
+            f"{printable(output, 300)}: expected a picture ({', '.join(PICTURES)}) for one file a "
+            f"frame, found {suffix}"
         )
 
 

@@ -9,6 +9,7 @@ from viewer.commands._numbers import number
 from viewer.commands._pose import skinning_of
 from viewer.commands._scalar import add_scalar_arguments, scalar_notes, set_scalar
 from viewer.errors import ViewerError, printable
+from viewer.near_names import name_hint
 from viewer.rendering.camera import Camera, camera_from_view, facing_camera, fit, front_azimuth
 from viewer.rendering.ground_pass import parse_color
 from viewer.rendering.options import BACKGROUNDS, SHOWN, DisplayOptions
@@ -160,8 +161,8 @@ def _find_view(scene: Scene, text: str) -> CameraView:
             return view
     if text.isdecimal() and 1 <= int(text) <= len(scene.views):
         return scene.views[int(text) - 1]
-    names = ", ".join(printable(view.name, 40) for view in scene.views) or "none"
-    raise ViewerError(f'--view: no camera "{printable(text, 60)}"; there are: {names}')
+    hint = name_hint(text, [view.name for view in scene.views])
+    raise ViewerError(f'--view: no camera is called "{printable(text, 60)}"; {hint}')
 
 
 def display_of(arguments: argparse.Namespace) -> DisplayOptions:
@@ -226,9 +227,8 @@ def hide_parts(arguments: argparse.Namespace, scene: Scene, options: DisplayOpti
     hidden = []
     for wanted in arguments.hide_part:
         if wanted.lower() not in names:
-            raise ViewerError(
-                f'--hide-part: no part "{wanted}"; there are: {", ".join(parts.names)}'
-            )
+            hint = name_hint(wanted, parts.names)
+            raise ViewerError(f'--hide-part: no part is called "{printable(wanted, 60)}"; {hint}')
         hidden.append(names.index(wanted.lower()))
     options.hidden_parts = tuple(sorted(set(hidden)))
 

@@ -9,6 +9,8 @@ from viewer.commands._frame_numbers import add_frame_arguments
 from viewer.commands._motion_export import (
     add_motion_arguments,
     check_frame_field,
+    check_kind,
+    check_numbered,
     is_motion,
     left_out_lines,
     motion_paths,
@@ -93,6 +95,8 @@ def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:
     kinds = [kind for kind in EXPORTERS.values() if suffix in kind.suffixes]
     if not kinds:
         raise UnsupportedFormatError(f'no exporter for "{suffix}"; there are: {_known_suffixes()}')
+    check_kind(arguments, output)
+    check_numbered(arguments, output)
     if all(kind.writes_pose for kind in kinds) and "{frame" not in output.name:
         for path in _written(output):
             check_output(path, _inputs(arguments), arguments.force)

@@ -19,7 +19,7 @@ from viewer.commands._output import PICTURES, check_output
 from viewer.commands._pose import add_skinning_arguments, skinning_of
 from viewer.commands._progress import Progress
 from viewer.commands._scene import print_warnings
-from viewer.errors import OutputError, ViewerError, printable
+from viewer.errors import UnsupportedFormatError, ViewerError, printable
 from viewer.formats._save import require_folder
 from viewer.loading import MotionSettings, load
 from viewer.rig.comparison import Difference, compare
@@ -137,9 +137,9 @@ def _checked_output(arguments: argparse.Namespace) -> Path | None:
     output = Path(arguments.output)
     require_stdout(output)
     if output.suffix.lower() not in PICTURES:
-        raise OutputError(
-            f"{printable(output, 300)}: pictures cannot be written as "
-            f'"{output.suffix}"; there are: {", ".join(PICTURES)}'
+        raise UnsupportedFormatError(
+            f"{printable(output, 300)}: expected a picture ({', '.join(PICTURES)}), "
+            f'found "{output.suffix}"'
         )
     require_folder(output)
     asked = [arguments.reference, *arguments.files]

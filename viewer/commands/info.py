@@ -13,6 +13,7 @@ from viewer.commands._clip_info import clip_lines, describe_clip
 from viewer.commands._model_info import describe_model, model_lines
 from viewer.commands._pose import add_skinning_arguments, skinning_of
 from viewer.commands._scene import add_scene_arguments, open_scene
+from viewer.commands._usage import require_files
 from viewer.errors import printable
 from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.mesh import Mesh, bounding_box, box_size, triangle_areas
@@ -28,13 +29,14 @@ __all__ = ["add_arguments", "describe", "run"]
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    add_scene_arguments(parser)
+    add_scene_arguments(parser, default="")
     add_skinning_arguments(parser)
     parser.add_argument("--json", action="store_true", help="everything, for programs")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Print what the files hold."""
+    require_files(arguments, "info")
     skinning = skinning_of(arguments)
     scene = open_scene(arguments)
     found = describe(scene, skinning)

@@ -18,6 +18,7 @@ from viewer.commands._scene import (
     scene_files,
     size_limit,
 )
+from viewer.commands._usage import require_files
 from viewer.errors import ViewerError, printable
 from viewer.lint import (
     CODES,
@@ -30,7 +31,7 @@ from viewer.lint import (
     summary,
     worst_first,
 )
-from viewer.loading import bundled_files
+from viewer.near_names import did_you_mean
 from viewer.rig.motion import DEFAULT_RATE
 
 __all__ = ["add_arguments", "run"]
@@ -40,7 +41,7 @@ _FOUND = 1  # exit code
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    add_file_arguments(parser)
+    add_file_arguments(parser, default="")
     add_capture_arguments(parser)
     group = parser.add_argument_group("checks")
     group.add_argument("--json", action="store_true", help="everything, for programs")
@@ -103,6 +104,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.codes:
         print("\n".join(_code_lines()))
         return 0
+    require_files(arguments, "lint")
     ignored = _ignored(arguments.ignore)
     options = LintOptions(
         max_speed=arguments.max_speed,
@@ -111,7 +113,7 @@ def run(arguments: argparse.Namespace) -> int:
         frame_rate=arguments.fps or DEFAULT_RATE,
         ground=arguments.ground,
     )
-    files = scene_files(arguments) or list(bundled_files())
+    files = scene_files(arguments)
     with Progress("checking", 1) as progress:
 
         def show(done: int, total: int, what: str) -> None:
@@ -144,7 +146,8 @@ def _ignored(text: str) -> set[str]:
     codes = {code.strip().upper() for code in text.split(",") if code.strip()}
     unknown = sorted(codes - CODES.keys())
     if unknown:
-        raise ViewerError(f'--ignore: no code "{printable(unknown[0], 40)}" (--codes lists them)')
+        hint = did_you_mean(unknown[0], CODES) or "--codes lists them"
+        raise ViewerError(f'--ignore: no code is called "{printable(unknown[0], 40)}"; {hint}')
     return codes
 
 

@@ -26,7 +26,7 @@ from viewer.commands._view import (
     parse_size,
     warn_of_missing,
 )
-from viewer.errors import OutputError, ViewerError, printable
+from viewer.errors import UnsupportedFormatError, ViewerError, printable
 from viewer.formats._video_kinds import VIDEOS
 from viewer.interrupts import deferred
 from viewer.rendering.camera import Camera
@@ -126,8 +126,8 @@ def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:
         return  # check_output says what is wrong
     if suffix not in ("", *PICTURES, *VIDEOS) and is_ours:
         # That it is an input is worse, and said first.
-        check_output(output, [Path(file) for file in arguments.files], arguments.force)
-        raise OutputError(
+        check_output(output, [Path(file) for file in arguments.files], force=True)
+        raise UnsupportedFormatError(
             f"{printable(output, 300)}: expected a picture ({', '.join(PICTURES)}) or a video "
             f"({', '.join(VIDEOS)}), found {suffix}"
         )

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from viewer.errors import printable
 from viewer.formats._archive import describe
-from viewer.formats._numbers import LARGEST
-from viewer.formats._source import Source
+from viewer.formats._named_values import NamedValues
 from viewer.rig.arrays import Floats
 from viewer.rig.pose_transfer import JointTurns
 
@@ -33,14 +30,12 @@ _SHORTEST = 1e-6  # of a quaternion: a shorter one says nothing
 _LONGEST_WORD = 200  # characters
 
 
-def read_turns(source: Source, values: Mapping[str, Any]) -> JointTurns | None:
+def read_turns(named: NamedValues) -> JointTurns | None:
     """Return the turns in a pose file, None if there are none.
 
     Parameters
     ----------
-    source : Source
-        The file, for messages.
-    values : mapping of str to object
+    named : NamedValues
         What it holds by name.
 
     Raises
@@ -48,22 +43,23 @@ def read_turns(source: Source, values: Mapping[str, Any]) -> JointTurns | None:
     FormatError
         If they are incomplete or no quaternions.
     """
+    values = named.values
     if values.get("joint_turns") is None:
         return None
-    names = _names(source, values.get("joint_names"))
-    turns = _quaternions(source, "joint_turns", values["joint_turns"], names)
+    names = _names(named)
+    turns = _quaternions(named, "joint_turns", names)
     rotations = values.get("joint_rotations")
     shifts = values.get("joint_shifts")
     return JointTurns(
-        _word(source, "figure", values.get("figure", "")),
+        _word(named, "figure", ""),
         names,
         turns / np.linalg.norm(turns, axis=1, keepdims=True),
         np.zeros((len(names), 3))
         if shifts is None
-        else _rows(source, "joint_shifts", shifts, len(names), 3),
-        _up(source, values.get("up", "y")),
-        _word(source, "dof_layout", values.get("dof_layout", "")),
-        None if rotations is None else _quaternions(source, "joint_rotations", rotations, names),
+        else _rows(named, "joint_shifts", len(names), 3),
+        _up(named),
+        _word(named, "dof_layout", ""),
+        None if rotations is None else _quaternions(named, "joint_rotations", names),
     )
 
 
@@ -83,54 +79,43 @@ def named_turns(turns: JointTurns) -> dict[str, Any]:
     return named
 
 
-def _array(source: Source, key: str, value: Any, kinds: str, what: str) -> NDArray[Any]:
-    try:
-        array = np.asarray(value)
-    except ValueError:  # lists of different lengths
-        array = np.zeros(0, dtype=object)
-    if array.dtype.kind in kinds:
-        return array
-    found = "a list of other things" if isinstance(value, list | tuple) else describe(value)
-    raise source.error(f"{key}: expected {what}, found {found}")
-
-
-def _names(source: Source, value: Any) -> tuple[str, ...]:
-    names = _array(source, "joint_names", value, "U", "names")
+def _names(named: NamedValues) -> tuple[str, ...]:
+    names = named.array("joint_names", "U", "names")
     if names.ndim != 1:
-        raise source.error(f"joint_names: expected a list of names, found {names.ndim} dimensions")
+        found = f"joint_names: expected a list of names, found {names.ndim} dimensions"
+        raise named.error(found, "joint_names")
     return tuple(names.tolist())
 
 
-def _rows(source: Source, key: str, value: Any, count: int, width: int) -> Floats:
-    array = _array(source, key, value, "iuf", "numbers").astype(np.float64)
+def _rows(named: NamedValues, key: str, count: int, width: int) -> Floats:
+    array = named.array(key, "iuf", "numbers")
     if array.shape != (count, width):
         found = " x ".join(map(str, array.shape)) or "one number"
-        raise source.error(f"{key}: expected {count} x {width} numbers, found {found}")
-    wrong = array[~(np.abs(array) <= LARGEST)]
-    if len(wrong):
-        raise source.error(f"{key}: expected finite numbers, found {wrong[0]:g}")
-    return array
+        raise named.error(f"{key}: expected {count} x {width} numbers, found {found}", key)
+    return named.numbers(key)
 
 
-def _quaternions(source: Source, key: str, value: Any, names: tuple[str, ...]) -> Floats:
+def _quaternions(named: NamedValues, key: str, names: tuple[str, ...]) -> Floats:
     """Return a quaternion per joint, of any length but 0."""
-    rows = _rows(source, key, value, len(names), 4)
+    rows = _rows(named, key, len(names), 4)
     short = np.flatnonzero(np.linalg.norm(rows, axis=1) < _SHORTEST)
     if len(short):
-        name = printable(names[short[0]], 60)
-        raise source.error(f"{key}: {name}: expected a quaternion, found four zeros")
+        row = int(short[0])
+        found = f"{key}: {printable(names[row], 60)}: expected a quaternion, found four zeros"
+        raise named.error(found, key, row)
     return rows
 
 
-def _word(source: Source, key: str, value: Any) -> str:
+def _word(named: NamedValues, key: str, default: str) -> str:
+    value = named.values.get(key, default)
     word = value.item() if isinstance(value, np.ndarray) and value.ndim == 0 else value
     if not isinstance(word, str):
-        raise source.error(f"{key}: expected a word, found {describe(value)}")
+        raise named.error(f"{key}: expected a word, found {describe(value)}", key)
     return word[:_LONGEST_WORD]
 
 
-def _up(source: Source, value: Any) -> str:
-    word = _word(source, "up", value)
+def _up(named: NamedValues) -> str:
+    word = _word(named, "up", "y")
     if word not in _UPS:
-        raise source.error(f'up: expected "y" or "z", found "{printable(word, 20)}"')
+        raise named.error(f'up: expected "y" or "z", found "{printable(word, 20)}"', "up")
     return word

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import re
 import stat
 from collections.abc import Callable, Iterator
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +16,7 @@ from numpy.typing import ArrayLike
 from viewer.errors import FormatError, printable
 from viewer.formats._faults import Fault, Part
 from viewer.formats._numbers import LARGEST, is_too_large, word_begins
+from viewer.near_names import did_you_mean
 from viewer.rig.arrays import Ints
 
 if TYPE_CHECKING:
@@ -44,6 +47,8 @@ _MAGIC = (
     (b"\xfe\xff", "UTF-16 text"),
     (b"\x93NUMPY", "a numpy array"),
 )
+_MOST_FILES = 2000  # of a folder that are compared with the name of a missing one
+_ALIKE = 0.8  # names of files share their suffixes, and often more
 _LOOK = 4096  # bytes that show what a file is
 _KINDS = {
     stat.S_IFDIR: "a folder",
@@ -99,7 +104,21 @@ def _read(path: Path, size: int = -1) -> bytes:
 
 
 def _unreadable(path: Path, problem: Exception) -> FormatError:
-    return FormatError(path, f"cannot be read: {getattr(problem, 'strerror', None) or problem}")
+    reason = getattr(problem, "strerror", None) or problem
+    near = _near_files(path) if isinstance(problem, FileNotFoundError) else ""
+    return FormatError(path, f"cannot be read: {reason}{near}")
+
+
+def _near_files(path: Path) -> str:
+    """Return a question that offers files with a similar name, "" if there are none."""
+    try:
+        with os.scandir(path.parent) as entries:
+            names = [entry.name for entry in islice(entries, _MOST_FILES)]
+    except OSError:  # the folder is missing too, or may not be listed
+        return ""
+    # A link that leads nowhere has this name itself.
+    near = did_you_mean(path.name, [name for name in names if name != path.name], _ALIKE)
+    return f"; {near}" if near else ""
 
 
 class Source:

@@ -24,27 +24,27 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from viewer.errors import UnsupportedFormatError, printable
+from viewer.errors import FormatError, RigError, UnsupportedFormatError, printable
 from viewer.formats._archive import describe
 from viewer.formats._container import archive_of
-from viewer.formats._numbers import LARGEST
+from viewer.formats._named_values import NamedValues, described, parse_json
 from viewer.formats._pose_turns import KEYS, named_turns, read_turns
 from viewer.formats._save import save_arrays, save_text
 from viewer.formats._source import Source
 from viewer.formats._table import read_numbers
+from viewer.near_names import did_you_mean, near_names, question
 from viewer.rig.arrays import Deferred, Floats
 from viewer.rig.clip import Clip
 from viewer.rig.figure import Figure
-from viewer.rig.pose_record import PARTS, PoseRecord
+from viewer.rig.pose_record import PARTS, PosePartError, PoseRecord
 
-__all__ = ["parse_json", "pose_text", "read", "write"]
+__all__ = ["pose_error", "pose_text", "read", "write"]
 
 _HANDS = ("left_hand_pose", "right_hand_pose", "hand_pose")
 _VECTORS = ("own_numbers", "poses", "pose", "fullpose")
@@ -86,44 +86,17 @@ def read(source: Source) -> PoseRecord:
         If a value is no number, or there are several poses in it.
     """
     if source.peek(2).startswith((b"PK", b"\x80")) or source.archive is not None:
-        return _from_values(source, _archive_values(source))
+        return _from_values(_archive_values(source))
     if source.head(1) == b"{" or source.path.suffix.lower() == ".json":
-        return _from_values(source, parse_json(source))
+        return _from_values(parse_json(source))
     numbers = read_numbers(source)
     if len(numbers) == 0:
         raise source.error(f"expected the numbers of a pose, found {source.looks_like()}")
-    return PoseRecord(vector=numbers)
+    end = len(source.data.rstrip())
+    return PoseRecord(vector=numbers, line_of=lambda part, name: source.line(end))
 
 
-def parse_json(source: Source) -> dict[str, Any]:
-    """Return the object in a JSON file; numbers like NaN are refused.
-
-    Raises
-    ------
-    FormatError
-        With the line of what is no JSON.
-    """
-
-    def refuse(word: str) -> None:
-        raise ValueError(f"expected a finite number, found {word}")
-
-    try:
-        text = source.data.decode("utf-8", "surrogateescape")
-        values = json.loads(text, parse_constant=refuse)
-    except json.JSONDecodeError as problem:
-        offset = len(problem.doc[: problem.pos].encode("utf-8", "surrogateescape"))
-        what = printable(problem.msg, 100)
-        raise source.error(f"expected JSON, found a mistake: {what}", offset) from None
-    except (ValueError, RecursionError) as problem:
-        is_deep = isinstance(problem, RecursionError)
-        reason = "expected JSON, found too deep a nesting" if is_deep else printable(problem)
-        raise source.error(reason) from None
-    if not isinstance(values, dict):
-        raise source.error(f"expected an object with names, found a {type(values).__name__}")
-    return values
-
-
-def _archive_values(source: Source) -> dict[str, Any]:
+def _archive_values(source: Source) -> NamedValues:
     """Return what a pose needs; the other keys, which may be large, stay unread."""
     archive = archive_of(source)
     values: dict[str, Any] = dict.fromkeys(archive.keys)
@@ -133,114 +106,137 @@ def _archive_values(source: Source) -> dict[str, Any]:
         values[key] = value.values() if isinstance(value, Deferred) else value
     names, dofs = values.pop("dof_names", None), values.get("dofs")
     if names is not None and dofs is not None:
-        labels = _checked(source, "dof_names", names, "U", "names")
-        numbers = _checked(source, "dofs", dofs, "iuf", "numbers")
+        both = NamedValues(source, {"dof_names": names, "dofs": dofs})
+        labels = both.array("dof_names", "U", "names")
+        numbers = both.array("dofs", "iuf", "numbers")
         if labels.ndim != 1 or labels.shape != numbers.shape:
             raise source.error(
                 f"dof_names: expected {numbers.size} names as in dofs, found {labels.size}"
             )
         values["dofs"] = dict(zip(labels.tolist(), numbers.tolist(), strict=True))
-    return values
+    return NamedValues(source, values)
 
 
-def _from_values(source: Source, values: Mapping[str, Any]) -> PoseRecord:
+def _from_values(named: NamedValues) -> PoseRecord:
+    values = named.values
     version = values.get("viewer_pose", _VERSION)
     version = version.tolist() if isinstance(version, np.ndarray) else version
     if version != _VERSION:
-        raise source.error(f"viewer_pose: expected {_VERSION}, found {describe(version)}")
-    found: dict[str, Floats | None] = {
-        name: _first(source, values, keys) for name, keys in _NAMES.items()
-    }
-    parts = {key: array for key in _PARTS if (array := _array(source, values, key)) is not None}
-    scale = _array(source, values, "scale")
+        found = describe(version)
+        raise named.error(f"viewer_pose: expected {_VERSION}, found {found}", "viewer_pose")
+    # Which key each part of the pose is read from.
+    keys = {part: _first(named, names) for part, names in _NAMES.items()}
+    vector = _first(named, _VECTORS)
+    translation = _numbers(named, keys["translation"])
+    parts = {key: array for key in _PARTS if (array := _numbers(named, key)) is not None}
     record = PoseRecord(
-        dofs=_dofs(source, values.get("dofs")),
-        vector=_first(source, values, _VECTORS),
+        dofs=_dofs(named),
+        vector=_numbers(named, vector),
         parts=parts,
-        shape=found["shape"],
-        expression=found["expression"],
-        translation=found["translation"],
-        scale=None if scale is None else _single(source, "scale", scale),
-        flat_hands=_flag(source, values, "flat_hand_mean"),
-        hand_coefficients=_flag(source, values, "use_pca"),
-        turns=read_turns(source, values),
+        shape=_numbers(named, keys["shape"]),
+        expression=_numbers(named, keys["expression"]),
+        translation=translation,
+        scale=_single(named, "scale"),
+        flat_hands=_flag(named, "flat_hand_mean"),
+        hand_coefficients=_flag(named, "use_pca"),
+        turns=read_turns(named),
+        line_of=_line_of(named, {**keys, "vector": vector}),
     )
-    is_empty = not record.dofs and not record.parts and record.vector is None
-    if is_empty and all(value is None for value in (*found.values(), scale)):
-        keys = ", ".join(printable(key, 40) for key in list(values)[:12]) or "none"
-        raise source.error(f"expected a pose (dofs, poses, body_pose, betas …), found keys {keys}")
-    if record.translation is not None and len(record.translation) != 3:
-        raise source.error(f"translation: expected 3 numbers, found {len(record.translation)}")
-    used = (*_KNOWN, *_NOT_NEEDED) if record.turns is None else (*_KNOWN, *_NOT_NEEDED, *KEYS)
-    odd = [printable(key, 40) for key in values if key not in used]
-    if odd:
-        source.warn(f"keys that mean nothing in a pose: {', '.join(odd[:12])}")
+    if translation is not None and len(translation) != 3:
+        found = f"translation: expected 3 numbers, found {len(translation)}"
+        raise named.error(found, keys["translation"])
+    _check_keys(named, record)
     return record
 
 
-def _flag(source: Source, values: Mapping[str, Any], key: str) -> bool | None:
-    if values.get(key) is None:
+def _line_of(named: NamedValues, keys: Mapping[str, str]) -> Callable[[str, str], int | None]:
+    """Return what finds the line of a record's part; the names in it are those of DOFs."""
+
+    def line(part: str, name: str) -> int | None:
+        offset = named.offset(keys.get(part, part), *([name] if name else []))
+        return None if offset is None else named.source.line(offset)
+
+    return line
+
+
+def _check_keys(named: NamedValues, record: PoseRecord) -> None:
+    """Refuse a file that poses nothing; warn of keys that nobody reads."""
+    arrays = (record.vector, record.shape, record.expression, record.translation)
+    is_empty = not record.dofs and not record.parts and record.scale is None
+    if is_empty and all(array is None for array in arrays):
+        keys = ", ".join(printable(key, 40) for key in list(named.values)[:12]) or "none"
+        known = (*_KNOWN, *_NOT_NEEDED, *KEYS)
+        odd = next((key for key in named.values if key not in known), "")
+        near = did_you_mean(odd, known)
+        found = f"found keys {keys}{f'; {near}' if near else ''}"
+        message = f"expected a pose (dofs, poses, body_pose, betas …), {found}"
+        raise named.error(message, *([odd] if odd else []))
+    used = (*_KNOWN, *_NOT_NEEDED) if record.turns is None else (*_KNOWN, *_NOT_NEEDED, *KEYS)
+    unread = [key for key in named.values if key not in used]
+    if unread:
+        shown = ", ".join(_with_hint(key) for key in unread[:12])
+        named.warn(f"keys that mean nothing in a pose: {shown}", unread[0])
+
+
+def _with_hint(key: str) -> str:
+    """Return a key that nobody reads, with the one that was probably meant."""
+    near = [] if key in KEYS else near_names(key, (*_KNOWN, *KEYS))[:1]
+    return printable(key, 40) + (f" ({question(near)})" if near else "")
+
+
+def _flag(named: NamedValues, key: str) -> bool | None:
+    if named.values.get(key) is None:
         return None
-    return bool(_checked(source, key, values[key], "bi", "true or false").all())
+    return bool(named.array(key, "bi", "true or false").all())
 
 
-def _single(source: Source, key: str, values: Floats) -> float:
-    if len(values) != 1:
-        raise source.error(f"{key}: expected one number, found {len(values)}")
-    return float(values[0])
+def _single(named: NamedValues, key: str) -> float | None:
+    values = _numbers(named, key)
+    if values is not None and len(values) != 1:
+        raise named.error(f"{key}: expected one number, found {len(values)}", key)
+    return None if values is None else float(values[0])
 
 
-def _first(source: Source, values: Mapping[str, Any], keys: tuple[str, ...]) -> Floats | None:
-    arrays = (_array(source, values, key) for key in keys)
-    return next((array for array in arrays if array is not None), None)
+def _first(named: NamedValues, keys: tuple[str, ...]) -> str:
+    """Return the key that has a value, the first of all if none has."""
+    return next((key for key in keys if named.values.get(key) is not None), keys[0])
 
 
-def _array(source: Source, values: Mapping[str, Any], key: str) -> Floats | None:
+def _numbers(named: NamedValues, key: str) -> Floats | None:
     """Return the numbers of a key in one row; several frames are refused."""
-    if values.get(key) is None:
+    if named.values.get(key) is None:
         return None
-    array = _checked(source, key, values[key], "iuf", "numbers").astype(np.float64)
-    wrong = array[~(np.abs(array) <= LARGEST)]
-    if len(wrong):
-        raise source.error(f"{key}: expected finite numbers, found {wrong[0]:g}")
+    array = named.numbers(key)
     is_per_joint = key in _PER_JOINT and array.shape[-1:] == (3,)
     frames = math.prod(array.shape[: -2 if is_per_joint else -1])
     if frames > 1:
-        raise source.error(f"{key}: expected one pose, found {frames} frames")
+        raise named.error(f"{key}: expected one pose, found {frames} frames", key)
     return array.ravel()
 
 
-def _checked(source: Source, key: str, value: Any, kinds: str, what: str) -> NDArray[Any]:
-    """Return an array of some kinds of values, written as an array or as lists."""
-    try:
-        array = np.asarray(value)
-    except ValueError:  # lists of different lengths, or more deeply nested than arrays can be
-        array = np.zeros(0, dtype=object)
-    if array.dtype.kind in kinds or (array.size == 0 and array.dtype.kind == "f"):
-        return array
-    found = "a list of other things" if isinstance(value, list | tuple) else _described(value)
-    raise source.error(f"{key}: expected {what}, found {found}")
-
-
-def _described(value: Any) -> str:
-    is_array = isinstance(value, np.ndarray)
-    return describe(Deferred(value.shape, value.dtype, lambda: value) if is_array else value)
-
-
-def _dofs(source: Source, given: Any) -> dict[str, float]:
+def _dofs(named: NamedValues) -> dict[str, float]:
+    given = named.values.get("dofs")
     if given is None:
         return {}
     if not isinstance(given, Mapping):
-        raise source.error(f"dofs: expected names with numbers, found {_described(given)}")
+        found = described(given)
+        raise named.error(f"dofs: expected names with numbers, found {found}", "dofs")
     dofs: dict[str, float] = {}
     for name, value in given.items():
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
         if not is_number or not abs(value) < 1e9:
-            raise source.error(
-                f"dofs: {printable(name, 60)}: expected a number, found {describe(value)}"
-            )
+            found = f"dofs: {printable(name, 60)}: expected a number, found {describe(value)}"
+            raise named.error(found, "dofs", name)
         dofs[str(name)] = float(value)
     return dofs
+
+
+def pose_error(path: Path, record: PoseRecord, problem: RigError) -> FormatError:
+    """Return an error on what a figure does not take of a file's pose, with its line if known."""
+    line = None
+    if isinstance(problem, PosePartError) and record.line_of is not None:
+        line = record.line_of(problem.part, problem.name)
+    return FormatError(path, str(problem), line)
 
 
 def pose_text(record: PoseRecord) -> str:

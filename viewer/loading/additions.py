@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from viewer.errors import RigError, printable
+from viewer.formats.pose import pose_error
 from viewer.loading.contents import Contents
 from viewer.rig.arrays import Bytes
 from viewer.rig.figure import Figure
@@ -38,8 +39,10 @@ def add_to_actor(contents: Contents, actor: Actor) -> tuple[Actor, list[str]]:
 
     Raises
     ------
+    FormatError
+        If a pose does not fit; the actor is then as it was.
     RigError
-        If a pose or picture does not fit; the actor is then as it was.
+        If a picture does not, or there is nothing to pose.
     """
     notes: list[str] = []
     trial = actor.copy()
@@ -79,11 +82,17 @@ def with_texture(figure: Figure, path: Path, pixels: Bytes) -> Figure:
 
 
 def apply_pose(path: Path, record: PoseRecord, actor: Actor) -> list[str]:
-    """Pose an actor by a record that came from a file; return what could not be taken over."""
+    """Pose an actor by a record that came from a file; return what could not be taken over.
+
+    Raises
+    ------
+    FormatError
+        If it does not fit; the actor is then as it was.
+    """
     assert actor.pose is not None  # the callers looked
     shown = printable(path, 300)
     try:
         notes = apply_record(record, actor.figure, actor.pose, cut=True)
         return [f"{shown}: {note}" for note in notes]
     except RigError as problem:
-        raise RigError(f"{shown}: {problem}") from None
+        raise pose_error(path, record, problem) from None

@@ -152,12 +152,12 @@ def _give_morphs(contents: Contents, cast: Cast) -> None:
 
 def _assign_pose(path: Path, record: PoseRecord, actors: list[Actor]) -> list[str]:
     """Pose the first actor that a record fits."""
-    problem: RigError | None = None
+    problem: FormatError | None = None
     for actor in actors:
         if actor.pose is not None:
             try:
                 return apply_pose(path, record, actor)
-            except RigError as found:
+            except FormatError as found:
                 problem = problem or found
     raise problem or RigError(f"{printable(path, 300)} is a pose: open it together with a figure")
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from viewer.errors import RigError
+from viewer.near_names import did_you_mean, name_hint
 from viewer.rendering.camera import Camera, fit
 from viewer.rendering.recorder import Follow, Recording, copied, pose_scene
 from viewer.rig.arrays import Floats
@@ -162,8 +164,7 @@ def find_follow(scene: Scene, name: str) -> Follow:
     """
     for index, joint in follow_candidates(scene, name):
         return _followed(scene, index, joint)
-    names = ", ".join(actor.name for actor in scene.actors)
-    raise RigError(f'no actor, joint or point is called "{name}"; actors: {names}')
+    raise RigError(f'no actor, joint or point is called "{name}"; {_hint(scene, name)}')
 
 
 def follow_candidates(scene: Scene, name: str) -> list[tuple[int, int]]:
@@ -178,8 +179,7 @@ def follow_candidates(scene: Scene, name: str) -> list[tuple[int, int]]:
         point; or a person's number; or somebody's joint, as ``fox/head`` or ``1:pelvis``.
     """
     wanted = name.lower()
-    numbers = [() if actor.person is None else (str(actor.person),) for actor in scene.actors]
-    called = [(actor.name.lower(), *own) for actor, own in zip(scene.actors, numbers, strict=True)]
+    called = _called(scene)
     roots = [_root(actor) for actor in scene.actors]
     found = [(index, roots[index]) for index, who in enumerate(called) if who[0] == wanted]
     found = found or _with_joint(scene, range(len(called)), wanted)
@@ -192,9 +192,31 @@ def follow_candidates(scene: Scene, name: str) -> list[tuple[int, int]]:
     return found
 
 
+def _called(scene: Scene) -> list[tuple[str, ...]]:
+    """Return by what each actor is called: its name in small letters, and its person's number."""
+    numbers = [() if actor.person is None else (str(actor.person),) for actor in scene.actors]
+    return [(actor.name.lower(), *own) for actor, own in zip(scene.actors, numbers, strict=True)]
+
+
 def _with_joint(scene: Scene, actors: Iterable[int], name: str) -> list[tuple[int, int]]:
     found = [(index, _joint(scene.actors[index], name)) for index in actors]
     return [(index, joint) for index, joint in found if joint >= 0]
+
+
+def _hint(scene: Scene, name: str) -> str:
+    """Return the names that resemble one that was not found, or else all actors."""
+    called = _called(scene)
+    for place, sign in enumerate(name):
+        whose = [i for i, who in enumerate(called) if sign in "/:" and name[:place].lower() in who]
+        if whose:
+            joints = [joint for i in whose for joint in _part_names(scene.actors[i])]
+            return name_hint(name[place + 1 :], dict.fromkeys(joints))
+    actors = [actor.name for actor in scene.actors]
+    known = [*actors, *(joint for actor in scene.actors for joint in _part_names(actor))]
+    # Of somebody who is not there nobody's joint is meant, but joints may have a colon themselves.
+    if re.search("[/:]", name):
+        known = [one for one in known if re.search("[/:]", one)]
+    return did_you_mean(name, known) or f"actors: {', '.join(actors)}"
 
 
 def _followed(scene: Scene, actor: int, joint: int) -> Follow:
@@ -209,6 +231,11 @@ def _root(actor: Actor) -> int:
 
 def _joint(actor: Actor, name: str) -> int:
     """Return the index of a joint or captured point, -1 if it has none of that name."""
-    parts = actor.figure.skeleton or actor.figure.points
-    names = [] if parts is None else [each.lower() for each in parts.names]
+    names = [each.lower() for each in _part_names(actor)]
     return names.index(name) if name in names else -1
+
+
+def _part_names(actor: Actor) -> Sequence[str]:
+    """Return the names of an actor's joints or captured points."""
+    parts = actor.figure.skeleton or actor.figure.points
+    return () if parts is None else parts.names

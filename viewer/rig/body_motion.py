@@ -8,9 +8,9 @@ import numpy as np
 
 from viewer.errors import RigError, counted
 from viewer.rig.arrays import Floats, frozen
+from viewer.rig.coefficients import unused_coefficients
 from viewer.rig.figure import Figure
 from viewer.rig.hands import Hand
-from viewer.rig.pose_record import unused_coefficients
 from viewer.rig.quaternion import multiply, rotation_vector_to_quaternion
 from viewer.rig.rotation import quaternion_to_matrix
 from viewer.rig.sampled_clip import SampledClip

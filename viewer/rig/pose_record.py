@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from viewer.errors import RigError, counted
 from viewer.rig.arrays import Floats, Ints
+from viewer.rig.coefficients import apply_coefficients
 from viewer.rig.figure import Figure
 from viewer.rig.hands import Hand, hand_vectors
 from viewer.rig.pose import Pose
@@ -24,7 +26,7 @@ from viewer.rig.rotation import rotation_vector_to_matrix
 from viewer.rig.skeleton import DOF_KINDS, Skeleton, clamp_dofs, dof_labels, find_dof
 from viewer.rig.smpl_family import members_by_numbers
 
-__all__ = ["PARTS", "PoseRecord", "apply_record", "record_of", "unused_coefficients"]
+__all__ = ["PARTS", "PosePartError", "PoseRecord", "apply_record", "record_of"]
 
 PARTS = {
     "global_orient": ("pelvis", "wrist", "global"),
@@ -39,7 +41,6 @@ _BODY = 21  # joints of body_pose in models with fingers or a face; SMPL alone h
 _LONGEST_BODY = 23
 _SMALLEST, _LARGEST = 1e-6, 1e6  # scales that float32 can draw
 _FARTHEST = 1e9  # figure units
-_MOST_SIGMA = 1e6  # of a shape coefficient: beyond it the mesh has no shape
 _HAND_PARTS = {"left_hand_pose": "left", "right_hand_pose": "right", "hand_pose": ""}
 
 
@@ -70,6 +71,9 @@ class PoseRecord:
         What a figure with other DOFs takes in place of the numbers: its joints of the same names
         turn as much, and its place, size and shape stay. Figures with the same DOFs take all else,
         and the shapes that they have.
+    line_of : callable or None
+        Given a part and the name of a DOF in it, as ``PosePartError`` has them, returns the line of
+        the file that the record comes from.
     """
 
     dofs: Mapping[str, float] = field(default_factory=dict)
@@ -82,6 +86,34 @@ class PoseRecord:
     flat_hands: bool | None = None
     hand_coefficients: bool | None = None
     turns: JointTurns | None = None
+    line_of: Callable[[str, str], int | None] | None = None
+
+
+class PosePartError(RigError):
+    """A part of a pose that a figure does not take.
+
+    Parameters
+    ----------
+    message : object
+        What is wrong.
+    part : str
+        ``"dofs"``, ``"vector"``, ``"shape"``, ``"expression"`` or a name in ``parts``.
+    name : str
+        Of the DOF, empty for other parts.
+    """
+
+    def __init__(self, message: object, part: str, name: str = "") -> None:
+        self.part, self.name = part, name
+        super().__init__(str(message))
+
+
+@contextmanager
+def _part(part: str, name: str = "") -> Iterator[None]:
+    """Note which part of a record it is that a figure does not take."""
+    try:
+        yield
+    except RigError as problem:
+        raise PosePartError(problem, part, name) from None
 
 
 def record_of(figure: Figure, pose: Pose) -> PoseRecord:
@@ -133,9 +165,11 @@ def apply_record(record: PoseRecord, figure: Figure, pose: Pose, cut: bool = Fal
 
     Raises
     ------
+    PosePartError
+        If a part of the record does not fit this figure and it does not say how the joints are
+        turned; the pose is then as it was.
     RigError
-        If the record is for another figure and does not say how the joints are turned, or if that
-        figure has no joint with such a name; the pose is then as it was.
+        If no joint of one figure is called as one of the other.
     """
     skeleton = figure.skeleton
     if skeleton is None:
@@ -148,14 +182,18 @@ def apply_record(record: PoseRecord, figure: Figure, pose: Pose, cut: bool = Fal
     if record.dofs:
         notes += _apply_dofs(record, figure, work)
     elif record.vector is not None:
-        notes += _apply_vector(record.vector, figure, work)
+        with _part("vector"):
+            notes += _apply_vector(record.vector, figure, work)
     for name, values in record.parts.items():
-        notes += _apply_part(name, values, record, figure, work)
+        with _part(name):
+            notes += _apply_part(name, values, record, figure, work)
     has_shapes = figure.blend_shapes is not None and "shape" in figure.blend_shapes.groups
     # A pose that was made by a figure of the same skeleton is taken as far as it goes.
     cut = record.turns is not None or (cut and has_shapes)
-    notes += _apply_weights("shape", record.shape, figure, work, cut)
-    notes += _apply_weights("expression", record.expression, figure, work, cut)
+    with _part("shape"):
+        notes += apply_coefficients("shape", record.shape, figure, work, cut)
+    with _part("expression"):
+        notes += apply_coefficients("expression", record.expression, figure, work, cut)
     if record.translation is not None:
         work.figure_translation = np.array(record.translation, dtype=np.float64)
     if record.scale is not None:
@@ -210,13 +248,22 @@ def _apply_dofs(record: PoseRecord, figure: Figure, pose: Pose) -> list[str]:
     skeleton = figure.skeleton
     assert skeleton is not None
     for label, value in record.dofs.items():
-        pose.dofs[find_dof(skeleton, label)] = value
+        with _part("dofs", label):
+            pose.dofs[_dof(figure, label)] = value
     if record.turns is not None:
         is_whole = len(record.dofs) == skeleton.n_dofs
         restore_beneath(skeleton, pose, record.turns, is_whole)
     notes = _beyond_limits(skeleton, pose.dofs)
     pose.dofs[:] = clamp_dofs(skeleton, pose.dofs)
     return notes
+
+
+def _dof(figure: Figure, label: str) -> int:
+    assert figure.skeleton is not None
+    try:
+        return find_dof(figure.skeleton, label)
+    except RigError as problem:
+        raise RigError(f'expected a DOF of {figure.name}, found "{label}": {problem}') from None
 
 
 def _beyond_limits(skeleton: Skeleton, dofs: Floats) -> list[str]:
@@ -341,54 +388,3 @@ def _turn(figure: Figure, pose: Pose, joints: Ints, numbers: Floats) -> None:
     assert figure.skeleton is not None  # the callers looked
     rotations = rotation_vector_to_matrix(numbers.reshape(-1, 3))
     set_joint_rotations(figure.skeleton, pose, joints, rotations)
-
-
-def unused_coefficients(group: str, values: Floats, used: int, name: str) -> list[str]:
-    """Return a line on coefficients that a figure does not have; none if all of those are 0.
-
-    Parameters
-    ----------
-    group : str
-        ``"shape"`` or ``"expression"``.
-    values : (..., S)
-        All that are given.
-    used : int
-        How many the figure has.
-    name : str
-        Of the figure.
-    """
-    rest, count = values[..., used:], values.shape[-1]
-    if not rest.any():
-        return []
-    lost = (
-        f"coefficients {used + 1} to {count} were"
-        if count > used + 1
-        else f"coefficient {count} was"
-    )
-    return [f"{group} {lost} left out, as {name} has {used} (largest {np.abs(rest).max():.3g})"]
-
-
-def _apply_weights(
-    group: str, values: Floats | None, figure: Figure, pose: Pose, cut: bool
-) -> list[str]:
-    if values is None or len(values) == 0:
-        return []
-    groups = figure.blend_shapes.groups if figure.blend_shapes else ()
-    # Whatever is no shape was recorded as an expression, morphs among them.
-    rows = [index for index, name in enumerate(groups) if (name == "shape") == (group == "shape")]
-    values = np.asarray(values, dtype=np.float64).ravel()
-    notes = unused_coefficients(group, values, len(rows), figure.name)
-    if notes and not cut:
-        raise RigError(f"{figure.name} has {len(rows)} {group} coefficients, found {len(values)}")
-    if np.abs(values).max() > _MOST_SIGMA:
-        raise RigError(
-            f"{group} coefficients: expected at most {_MOST_SIGMA:g}, "
-            f"found {np.abs(values).max():g}"
-        )
-    weights = np.zeros(len(groups))
-    weights[: len(pose.shape_weights)] = pose.shape_weights
-    count = min(len(rows), len(values))
-    weights[rows] = 0.0
-    weights[rows[:count]] = values[:count]
-    pose.shape_weights = weights
-    return notes

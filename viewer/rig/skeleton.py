@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from viewer.errors import RigError
+from viewer.near_names import name_hint
 from viewer.rig.arrays import Bools, Floats, Ints, frozen
 
 __all__ = [
@@ -257,7 +258,9 @@ def find_dof(skeleton: Skeleton, label: str) -> int:
     code = DOF_KINDS.index(kind.lower())
     rows = np.flatnonzero((skeleton.dof_joints == joint) & (skeleton.dof_kinds == code))
     if len(rows) == 0:
-        raise RigError(f"joint {joint_label(skeleton, joint)} has no DOF {kind.lower()}")
+        own = [DOF_KINDS[code] for code in skeleton.dof_kinds[skeleton.dof_joints == joint]]
+        has = f"it has {', '.join(own)}" if own else "it has none"
+        raise RigError(f"joint {joint_label(skeleton, joint)} has no DOF {kind.lower()}; {has}")
     return int(rows[0])
 
 
@@ -288,8 +291,4 @@ def find_joint(skeleton: Skeleton, text: str) -> int:
     if found:
         labels = ", ".join(joint_label(skeleton, joint) for joint in found[:4])
         raise RigError(f'"{text}" names {len(found)} joints: say which one, {labels}')
-    first = [joint_label(skeleton, joint) for joint in range(min(6, skeleton.n_joints))]
-    more = ["…"] if skeleton.n_joints > len(first) else []
-    raise RigError(
-        f'no joint is called "{text}"; there are {skeleton.n_joints}: {", ".join(first + more)}'
-    )
+    raise RigError(f'no joint is called "{text}"; {name_hint(text, joint_labels(skeleton))}')

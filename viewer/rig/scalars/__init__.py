@@ -13,6 +13,7 @@ from keyword import iskeyword
 import numpy as np
 
 from viewer.errors import RigError
+from viewer.near_names import name_hint
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import bounding_box, box_size
@@ -148,7 +149,7 @@ def split_name(name: str) -> tuple[str, str]:
     """
     key, colon, about = name.partition(":")
     if key not in SCALARS:
-        raise RigError(f'no scalar view "{key}"; there are: {", ".join(SCALARS)}')
+        raise RigError(f'no scalar view "{key}"; {name_hint(key, SCALARS)}')
     if colon and not SCALARS[key].about:
         raise RigError(f'scalar view "{key}": expected no joint, found "{about}"')
     return key, about

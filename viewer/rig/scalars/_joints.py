@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from viewer.errors import RigError
+from viewer.near_names import name_hint
 from viewer.rig.figure import Figure
-from viewer.rig.skeleton import find_joint, joint_label
+from viewer.rig.skeleton import find_joint, joint_label, joint_labels
 
 __all__ = ["joint_of", "joint_text"]
-
-_MOST_NAMES = 5
 
 
 def joint_of(figure: Figure, text: str) -> int:
@@ -38,27 +37,11 @@ def joint_of(figure: Figure, text: str) -> int:
     if is_index and text not in names:
         return int(index)
     if text.lower() not in names and "#" not in text:
-        raise RigError(f'no joint is called "{text}"; {_close(figure, text)}')
+        hint = name_hint(text, joint_labels(skeleton))
+        raise RigError(f'no joint is called "{text}"; {hint}')
     return find_joint(skeleton, text)
 
 
 def joint_text(figure: Figure, joint: int) -> str:
     """Return what a joint is called, ``"#4"`` without a name."""
     return f"#{joint}" if figure.skeleton is None else joint_label(figure.skeleton, joint)
-
-
-def _close(figure: Figure, text: str) -> str:
-    """Return which joints may have been meant, or the first ones."""
-    from difflib import get_close_matches
-
-    skeleton = figure.skeleton
-    assert skeleton is not None  # the caller looked
-    names = list(dict.fromkeys(name for name in skeleton.names if name))
-    by_letters = {name.lower(): name for name in names}
-    found = [key for key in by_letters if text and text.lower() in key]
-    close = get_close_matches(text.lower(), by_letters, _MOST_NAMES, 0.6)
-    found += [key for key in close if key not in found]
-    if found:
-        return f"close to it: {', '.join(by_letters[key] for key in found[:_MOST_NAMES])}"
-    more = ", …" if len(names) > _MOST_NAMES else ""
-    return f"there are {skeleton.n_joints}: {', '.join(names[:_MOST_NAMES])}{more}"

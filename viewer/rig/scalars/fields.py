@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from viewer.errors import RigError
+from viewer.near_names import name_hint
 from viewer.rig.arrays import Floats
 from viewer.rig.scalars._asked import Asked
 from viewer.rig.scalars._fields import field_of
@@ -23,6 +24,6 @@ def class_(asked: Asked) -> Floats:
 def _values(asked: Asked, is_class: bool) -> Floats:
     found = field_of(asked.figure, asked.about, is_class)
     if found is None:
-        names = ", ".join(one.name for one in asked.figure.fields if bool(one.names) == is_class)
-        raise RigError(f'no field is called "{asked.about}"; there are: {names}')
+        names = [one.name for one in asked.figure.fields if bool(one.names) == is_class]
+        raise RigError(f'no field is called "{asked.about}"; {name_hint(asked.about, names)}')
     return found.values.copy()

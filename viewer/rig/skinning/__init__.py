@@ -9,6 +9,7 @@ from importlib import import_module
 import numpy as np
 
 from viewer.errors import RigError
+from viewer.near_names import name_hint
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.kinematics import skinning_matrices, world_matrices
@@ -91,7 +92,7 @@ def deform(
     if figure.mesh is None:
         raise RigError(f"figure {figure.name} has no mesh to deform")
     if how.method not in METHODS:
-        raise RigError(f'no skinning method "{how.method}"; there are: {", ".join(METHODS)}')
+        raise RigError(f'no skinning method "{how.method}"; {name_hint(how.method, METHODS)}')
     if pose is not None:
         figure = shaped(figure, pose.shape_weights)
     mesh = figure.mesh

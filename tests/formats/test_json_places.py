@@ -1,0 +1,62 @@
+"""Places in JSON texts, counted by hand or by another way through the same text."""
+
+import json
+
+import pytest
+
+from viewer.formats._json_places import (
+    constant_place,
+    nesting_place,
+    repeated_key,
+    value_place,
+)
+
+TEXT = r'{"a": [1, {"b": "x,]}\"", "c": []}, -2e5], "": {}, "d\u00e9": {"a": null}, "e": true}'
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        ((), TEXT),
+        (("a",), r'[1, {"b": "x,]}\"", "c": []}, -2e5]'),
+        (("a", 0), "1"),
+        (("a", 1, "b"), r'"x,]}\""'),
+        (("a", 1, "c"), "[]"),
+        (("a", 2), "-2e5"),
+        (("",), "{}"),
+        (("dé", "a"), "null"),
+        (("e",), "true"),
+    ],
+)
+def test_value_is_found_by_what_leads_to_it(path, value):
+    place = value_place(TEXT, path)
+    assert TEXT[place:].startswith(value)
+    # Python's parser, set down there, reads the same value.
+    found = json.loads(TEXT)
+    for key in path:
+        found = found[key]
+    assert json.JSONDecoder().raw_decode(TEXT, place)[0] == found
+
+
+@pytest.mark.parametrize("path", [("b",), ("a", 3), ("a", "0"), ("a", 1, "b", 0), (0,)])
+def test_what_is_not_there_has_no_place(path):
+    assert value_place(TEXT, path) is None
+
+
+def test_the_last_of_several_keys_counts_and_the_second_is_named():
+    text = '{"a": 1, "b": {"a": 2}, "c": [{"a": 3}, {"a": 4}], "a": 5}'
+    assert text[value_place(text, ("a",))] == "5"
+    assert repeated_key(text) == ("a", text.rindex('"a"'))
+    assert repeated_key('[{"a": 1}, {"a": 2}, {"b": {"a": 1}, "a": 2}]') is None
+    assert repeated_key(r'{"a": 1, "\u0061": 2}') == ("a", 9)
+
+
+def test_words_for_infinite_numbers_are_found_outside_of_texts():
+    assert constant_place('{"NaN": "a NaN", "b": [1, -Infinity, NaN]}') == ("-Infinity", 26)
+    assert constant_place('{"NaN": "Infinity"}') is None
+
+
+def test_nesting_is_found_by_its_depth():
+    assert nesting_place('["[[", [[1]]]', 2) == 8
+    assert nesting_place("[{}, {}, []]", 2) == 12
+    assert nesting_place("[[[", 0) == 0

@@ -1,0 +1,115 @@
+"""Usage errors: one line each, unknown names first and with the nearest one that exists."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import sys
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from viewer.commands import COMMANDS
+from viewer.errors import ViewerError, printable
+from viewer.models import resolve
+from viewer.near_names import did_you_mean, near_names, question
+
+if TYPE_CHECKING:
+    from _typeshed import SupportsWrite
+
+__all__ = ["Parser", "check_command", "require_files"]
+
+_NUMBER = re.compile(r"-\.?\d")  # begins a value or the name of a file, not an option
+_WORD = re.compile(r"[^\W\d_]+")  # as commands are; files mostly have a suffix or a folder
+_LONGEST = 60  # letters of a word in a message
+
+
+class Parser(argparse.ArgumentParser):
+    """Reports a usage error in one line, like every other error."""
+
+    def error(self, message: str) -> NoReturn:
+        """Raise instead of leaving the program; see ``argparse``."""
+        raise ViewerError(f"{message} ({self.prog} --help lists the options)")
+
+    def print_help(self, file: SupportsWrite[str] | None = None) -> None:
+        """Print the help, or raise where ``argparse`` ignores that it cannot be printed.
+
+        It would also print it as an error instead of into an output that is closed.
+        """
+        print(self.format_help(), end="", file=file)
+        if sys.stdout is not None:
+            sys.stdout.flush()  # argparse leaves the program next
+
+    def check_options(self, arguments: Iterable[str]) -> None:
+        """Refuse an unknown option.
+
+        ``argparse`` would first ask for what is missing, which may well be what was mistyped.
+
+        Parameters
+        ----------
+        arguments : iterable of str
+            Those before ``--``.
+
+        Raises
+        ------
+        ViewerError
+            With the nearest options.
+        """
+        known = self._option_string_actions  # it has no public name
+        for argument in arguments:
+            name = argument.partition("=")[0]
+            # To argparse, words with blanks are no options, and "-" is a file.
+            if len(name) < 2 or name[0] != "-" or " " in argument or _NUMBER.match(name):
+                continue
+            if name[:2] in known or any(option.startswith(name) for option in known):
+                continue
+            # Dashes make all options alike.
+            bare = {option.lstrip("-"): option for option in known}
+            near = question([bare[one] for one in near_names(name.lstrip("-"), bare)])
+            self.error(f"unknown option {printable(name, _LONGEST)}{f'; {near}' if near else ''}")
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        """Refuse a value that is none of an option's choices, with the nearest one."""
+        if action.choices is None or value in action.choices:
+            return
+        choices = [str(choice) for choice in action.choices]
+        near = did_you_mean(str(value), choices)
+        wrong = f'expected one of {", ".join(choices)}, found "{printable(value, _LONGEST)}"'
+        raise argparse.ArgumentError(action, f"{wrong}; {near}" if near else wrong)
+
+
+def check_command(word: str) -> None:
+    """Refuse a word that is no file and nearly a command.
+
+    Parameters
+    ----------
+    word : str
+        The first argument, where commands are.
+
+    Raises
+    ------
+    ViewerError
+        With the nearest command.
+    """
+    if not _WORD.fullmatch(word) or os.path.lexists(resolve(word)):
+        return
+    near = did_you_mean(word, COMMANDS)
+    if near:
+        raise ViewerError(
+            f'no command and no file is called "{printable(word, _LONGEST)}"; {near} '
+            "(viewer --help lists the commands)"
+        )
+
+
+def require_files(arguments: argparse.Namespace, command: str) -> None:
+    """Refuse a command without files where nobody can mean the bundled figure.
+
+    Raises
+    ------
+    ViewerError
+        If there are neither files nor ``--body``.
+    """
+    if not arguments.files and not arguments.body:
+        raise ViewerError(
+            f"expected FILES, found none (viewer {command} --help lists what can be opened)"
+        )

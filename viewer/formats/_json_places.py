@@ -1,0 +1,96 @@
+"""Places in a JSON text: looked for only when an error needs one.
+
+Reading is left to Python's own parser, which is fast and keeps no places. The text is gone through
+a second time, token by token, once something in it is known to be wrong. All of it but nesting is
+then known to be valid JSON, except that NaN and infinities may stand for numbers.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Sequence
+
+__all__ = ["Keys", "constant_place", "nesting_place", "repeated_key", "value_place"]
+
+Keys = tuple[str | int, ...]
+"""Keys and indices that lead from the whole to a value."""
+
+_TOKEN = re.compile(r'"(?:[^"\\]|\\.)*"|[\[\]{},:]|[^\s\[\]{},:"]+')
+_CONSTANTS = ("NaN", "Infinity", "-Infinity")
+
+
+def value_place(text: str, path: Sequence[str | int]) -> int | None:
+    """Return the offset of a value, in characters; None if there is no such value.
+
+    Of several keys of one name the last one counts, as in Python.
+
+    >>> value_place('{"a": [1, 22]}', ("a", 1))
+    10
+    """
+    wanted = tuple(path)
+    found = None
+    for path, offset, is_key in _places(text):
+        if not is_key and path == wanted:
+            found = offset
+    return found
+
+
+def repeated_key(text: str) -> tuple[str, int] | None:
+    """Return the first key that an object has twice, and the offset of the second one."""
+    seen: set[Keys] = set()
+    for path, offset, is_key in _places(text):
+        if is_key and path in seen:
+            return str(path[-1]), offset
+        if is_key:
+            seen.add(path)
+    return None
+
+
+def constant_place(text: str) -> tuple[str, int] | None:
+    """Return the first NaN or infinity that is written as a word, and its offset."""
+    words = ((token.group(), token.start()) for token in _TOKEN.finditer(text))
+    return next(((word, offset) for word, offset in words if word in _CONSTANTS), None)
+
+
+def nesting_place(text: str, depth: int) -> int:
+    """Return the offset of the first bracket below so many others; the text's end if there is none.
+
+    The text need not be valid JSON.
+    """
+    open_brackets = 0
+    for token in _TOKEN.finditer(text):
+        if token.group() in ("[", "{"):
+            open_brackets += 1
+            if open_brackets > depth:
+                return token.start()
+        elif token.group() in ("]", "}"):
+            open_brackets -= 1
+    return len(text)
+
+
+def _places(text: str) -> Iterator[tuple[Keys, int, bool]]:
+    """Yield the path and offset of every value and key, and whether it is a key."""
+    path: list[str | int] = []
+    objects: list[bool] = []  # whether each open bracket is that of an object
+    expects_key = False
+    for token in _TOKEN.finditer(text):
+        word = token.group()
+        if word in ("}", "]"):
+            objects.pop()
+            path.pop()
+            expects_key = False
+        elif word == ",":
+            expects_key = objects[-1]
+            if not expects_key:
+                path[-1] = int(path[-1]) + 1
+        elif expects_key:
+            path[-1] = json.loads(word)
+            expects_key = False
+            yield tuple(path), token.start(), True
+        elif word != ":":
+            yield tuple(path), token.start(), False
+            if word in ("{", "["):
+                expects_key = word == "{"
+                objects.append(expects_key)
+                path.append("" if expects_key else 0)

@@ -1,0 +1,190 @@
+"""Values by name, from a JSON text or an archive, with the place of whatever is wrong in them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.errors import FormatError, printable
+from viewer.formats._archive import describe
+from viewer.formats._json_places import (
+    constant_place,
+    nesting_place,
+    repeated_key,
+    value_place,
+)
+from viewer.formats._numbers import LARGEST
+from viewer.formats._source import Source
+from viewer.rig.arrays import Deferred, Floats
+
+__all__ = ["NamedValues", "described", "parse_json"]
+
+_DEEPEST = 500  # brackets: where a text that is too deeply nested for Python is taken to be so
+_MOST_DIGITS = 18  # of whole numbers that surely fit 64 bits; longer ones are taken for floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NamedValues:
+    """What a file holds by name.
+
+    Attributes
+    ----------
+    source : Source
+        The file.
+    values : mapping of str to object
+        Numbers, texts, lists and dicts, or arrays.
+    text : str or None
+        The JSON text that they come from; None for archives, which have no lines.
+    """
+
+    source: Source
+    values: Mapping[str, Any]
+    text: str | None = None
+
+    def offset(self, *path: str | int) -> int | None:
+        """Return the offset of a value by the keys and indices that lead to it.
+
+        Without that value it is that of the nearest one around it; None for archives.
+        """
+        if self.text is None:
+            return None
+        while (place := value_place(self.text, path)) is None:
+            path = path[:-1]
+        return _byte_offset(self.text, place)
+
+    def error(self, message: str, *path: str | int) -> FormatError:
+        """Return an error that names the file, and the line of a value if it has lines."""
+        return self.source.error(message, self.offset(*path))
+
+    def warn(self, message: str, *path: str | int) -> None:
+        """Add a warning that names the file, and the line of a value if it has lines."""
+        self.source.warn(message, self.offset(*path))
+
+    def array(self, key: str, kinds: str, what: str) -> NDArray[Any]:
+        """Return an array of some kinds of values, written as an array or as lists.
+
+        Parameters
+        ----------
+        key : str
+            Of the value.
+        kinds : str
+            Of numpy: ``"iuf"``, ``"bi"`` or ``"U"``.
+        what : str
+            What is expected, for the message.
+
+        Raises
+        ------
+        FormatError
+            With the line of the first value that is none of these.
+        """
+        value = self.values.get(key)
+        try:
+            array = np.asarray(value)
+        except ValueError:  # lists of different lengths, or more deeply nested than arrays can be
+            array = np.zeros(0, dtype=object)
+        if array.dtype.kind in kinds or (array.size == 0 and array.dtype.kind == "f"):
+            return array
+        path, odd = _odd_value(value, kinds)
+        found = "lists of different lengths or depths" if path is None else described(odd)
+        raise self.error(f"{key}: expected {what}, found {found}", key, *(path or ()))
+
+    def numbers(self, key: str) -> Floats:
+        """Return an array of finite numbers; see ``array``."""
+        array = self.array(key, "iuf", "numbers").astype(np.float64)
+        wrong = np.argwhere(~(np.abs(array) <= LARGEST))
+        if len(wrong):
+            place = wrong[0].tolist()
+            found = f"{array[tuple(place)]:g}"
+            raise self.error(f"{key}: expected finite numbers, found {found}", key, *place)
+        return array
+
+
+def parse_json(source: Source) -> NamedValues:
+    """Return the object in a JSON file.
+
+    Raises
+    ------
+    FormatError
+        With the line of what is no JSON, of a number like NaN, or of a key that comes twice.
+    """
+    text = source.data.decode("utf-8", "surrogateescape")
+    odd: set[str] = set()  # what Python takes and JSON does not
+
+    def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        values = dict(pairs)
+        odd.update(["a key twice"] if len(values) != len(pairs) else ())
+        return values
+
+    try:
+        values = json.loads(
+            text, object_pairs_hook=unique, parse_int=_whole, parse_constant=odd.add
+        )
+    except json.JSONDecodeError as problem:
+        what = f"expected JSON, found a mistake: {printable(problem.msg, 100)}"
+        raise source.error(what, _byte_offset(text, problem.pos)) from None
+    except RecursionError:
+        place = _byte_offset(text, nesting_place(text, _DEEPEST))
+        raise source.error("expected JSON, found too deep a nesting", place) from None
+    if odd:
+        raise _odd_json(source, text)
+    named = NamedValues(source, values if isinstance(values, dict) else {}, text)
+    if not isinstance(values, dict):
+        raise named.error(f"expected an object with names, found a {type(values).__name__}")
+    return named
+
+
+def _whole(digits: str) -> int | float:
+    # Python refuses to read very long ones at all. As infinite floats they are found in their line.
+    return int(digits) if len(digits) <= _MOST_DIGITS else float(digits)
+
+
+def _odd_json(source: Source, text: str) -> FormatError:
+    """Return an error on NaN, an infinity, or a key that comes twice."""
+    constant, repeated = constant_place(text), repeated_key(text)
+    if constant is not None:
+        found = f"expected a finite number, found {constant[0]}"
+        return source.error(found, _byte_offset(text, constant[1]))
+    assert repeated is not None  # one of the two was noticed
+    found = f'expected every key once, found "{printable(repeated[0], 40)}" twice'
+    return source.error(found, _byte_offset(text, repeated[1]))
+
+
+def _byte_offset(text: str, place: int) -> int:
+    return len(text[:place].encode("utf-8", "surrogateescape"))
+
+
+def _odd_value(value: Any, kinds: str) -> tuple[tuple[int, ...] | None, Any]:
+    """Return the indices of the first value in lists that is of no such kind, and the value.
+
+    None instead of the indices if there is none: then the lists do not make an array.
+    """
+    if not isinstance(value, list | tuple):
+        return (), value
+    waiting: list[tuple[tuple[int, ...], Any]] = [((), value)]
+    while waiting:
+        path, one = waiting.pop()
+        if isinstance(one, list | tuple):
+            waiting += [((*path, index), part) for index, part in reversed([*enumerate(one)])]
+        elif not _is_of(one, kinds):
+            return path, one
+    return None, value
+
+
+def _is_of(one: Any, kinds: str) -> bool:
+    """Return whether a single value is of a kind, by numpy's letters."""
+    if kinds == "U":
+        return isinstance(one, str)
+    if kinds == "bi":
+        return isinstance(one, int)
+    return isinstance(one, int | float) and not isinstance(one, bool)
+
+
+def described(value: Any) -> str:
+    """Return what a value is, for a message: an array by its shape and type."""
+    is_array = isinstance(value, np.ndarray)
+    return describe(Deferred(value.shape, value.dtype, lambda: value) if is_array else value)

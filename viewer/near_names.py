@@ -1,0 +1,92 @@
+"""Suggestions for a name that does not exist: the names that were probably meant."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from viewer.errors import printable
+
+__all__ = ["did_you_mean", "name_hint", "near_names", "question"]
+
+_MOST_NEAR = 5
+_MOST_LISTED = 20  # a list that is not longer is shown whole
+_BEGINNING = 6  # names of a longer list
+_MARGIN = 0.15  # of the ratio, below the best: the others are less likely by far
+_LONGEST = 80  # characters of a name
+
+
+def near_names(text: str, names: Iterable[str], alike: float = 0.6) -> list[str]:
+    """Return the names that resemble a text, the most likely first.
+
+    Parameters
+    ----------
+    text : str
+        What was typed. The case of letters does not count.
+    names : iterable of str
+        Those there are. Empty names are skipped, repeated ones count once.
+    alike : float
+        Smallest ratio of equal letters, as difflib measures it: 1 for equal names. Names that
+        contain the text, if it is no single letter, count as just alike enough.
+
+    >>> near_names("left_kne", ["right_knee", "left_knee", "head"])
+    ['left_knee']
+    >>> near_names("knee", ["head", "L_Knee"])
+    ['L_Knee']
+    """
+    # Only needed once something is wrong.
+    from difflib import SequenceMatcher
+
+    wanted = text.lower()[:_LONGEST]
+    matcher = SequenceMatcher(b=wanted)
+    scores: dict[str, float] = {}
+    for name in names:
+        if name and name not in scores:
+            matcher.set_seq1(name.lower())
+            is_part = len(wanted) > 1 and wanted in name.lower()
+            scores[name] = max(matcher.ratio(), alike * is_part)
+    least = max(alike, max(scores.values(), default=0.0) - _MARGIN)
+    near = [name for name, score in scores.items() if score >= least]
+    return sorted(near, key=lambda name: -scores[name])[:_MOST_NEAR]
+
+
+def did_you_mean(text: str, names: Iterable[str], alike: float = 0.6) -> str:
+    """Return a question that offers the nearest names, "" if none is near; see ``near_names``.
+
+    >>> did_you_mean("rendr", ["render", "rig"])
+    'did you mean render?'
+    """
+    return question(near_names(text, names, alike))
+
+
+def question(names: Sequence[str]) -> str:
+    """Return the question whether one of some names was meant, "" if there are none.
+
+    >>> question(["--size", "--speed", "--scale"])
+    'did you mean --size, --speed or --scale?'
+    """
+    shown = [printable(name, _LONGEST) for name in names]
+    head = ", ".join(shown[:-1])
+    return f"did you mean {f'{head} or ' if head else ''}{shown[-1]}?" if shown else ""
+
+
+def name_hint(text: str, names: Iterable[str]) -> str:
+    """Return the clause that follows ``no joint is called "x";`` in a message.
+
+    Returns
+    -------
+    str
+        The nearest names; if none is near, all of a short list or the beginning of a long one.
+
+    >>> name_hint("tail", ["hip", "knee"])
+    'there are 2: hip, knee'
+    """
+    all_names = [*names]
+    near = did_you_mean(text, all_names)
+    if near:
+        return near
+    if not all_names:
+        return "there are none"
+    count = len(all_names)
+    first = all_names if count <= _MOST_LISTED else all_names[:_BEGINNING]
+    listed = ", ".join(printable(name, _LONGEST) for name in first)
+    return f"there are {count}: {listed}{', …' if len(first) < count else ''}"

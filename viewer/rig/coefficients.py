@@ -1,0 +1,90 @@
+"""Coefficients of blend shapes in a pose record, as far as a figure has them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.rig.arrays import Floats
+from viewer.rig.figure import Figure
+from viewer.rig.pose import Pose
+
+__all__ = ["apply_coefficients", "unused_coefficients"]
+
+_MOST_SIGMA = 1e6  # of a shape coefficient: beyond it the mesh has no shape
+
+
+def unused_coefficients(group: str, values: Floats, used: int, name: str) -> list[str]:
+    """Return a line on coefficients that a figure does not have; none if all of those are 0.
+
+    Parameters
+    ----------
+    group : str
+        ``"shape"`` or ``"expression"``.
+    values : (..., S)
+        All that are given.
+    used : int
+        How many the figure has.
+    name : str
+        Of the figure.
+    """
+    rest, count = values[..., used:], values.shape[-1]
+    if not rest.any():
+        return []
+    lost = (
+        f"coefficients {used + 1} to {count} were"
+        if count > used + 1
+        else f"coefficient {count} was"
+    )
+    return [f"{group} {lost} left out, as {name} has {used} (largest {np.abs(rest).max():.3g})"]
+
+
+def apply_coefficients(
+    group: str, values: Floats | None, figure: Figure, pose: Pose, cut: bool
+) -> list[str]:
+    """Set the weights of one group of blend shapes, in place; the others of the group become 0.
+
+    Parameters
+    ----------
+    group : str
+        ``"shape"`` or ``"expression"``.
+    values : (N,) or None
+        Of the first shapes of the group; None leaves all as they are.
+    figure : Figure
+        With any shapes.
+    pose : Pose
+        Changed.
+    cut : bool
+        Leave out those that the figure does not have, instead of refusing them.
+
+    Returns
+    -------
+    list of str
+        What was left out, in a line.
+
+    Raises
+    ------
+    RigError
+        If there are too many, or one is too large for the mesh to have a shape.
+    """
+    if values is None or len(values) == 0:
+        return []
+    groups = figure.blend_shapes.groups if figure.blend_shapes else ()
+    # Whatever is no shape was recorded as an expression, morphs among them.
+    rows = [index for index, name in enumerate(groups) if (name == "shape") == (group == "shape")]
+    values = np.asarray(values, dtype=np.float64).ravel()
+    notes = unused_coefficients(group, values, len(rows), figure.name)
+    if notes and not cut:
+        raise RigError(f"{figure.name} has {len(rows)} {group} coefficients, found {len(values)}")
+    if np.abs(values).max() > _MOST_SIGMA:
+        raise RigError(
+            f"{group} coefficients: expected at most {_MOST_SIGMA:g}, "
+            f"found {np.abs(values).max():g}"
+        )
+    weights = np.zeros(len(groups))
+    weights[: len(pose.shape_weights)] = pose.shape_weights
+    count = min(len(rows), len(values))
+    weights[rows] = 0.0
+    weights[rows[:count]] = values[:count]
+    pose.shape_weights = weights
+    return notes
