@@ -43,6 +43,7 @@ def load_image(source: Source, name: str, offset: int) -> Bytes | None:
         sRGB with alpha, first row at the top.
     """
     path = source.path.parent / name.replace("\\", "/")
+    source.also_read.append(path)
     try:
         return _decode(path, read_bytes(path))
     except FormatError as problem:
