@@ -287,6 +287,17 @@ def test_save_button_says_what_it_replaces(box, tmp_path):
     assert json.loads((tmp_path / "old.json").read_text())["viewer_pose"] == 1
 
 
+@pytest.mark.parametrize(("name", "beside"), [("out.skel", "out.skin"), ("out.gltf", "out.bin")])
+def test_save_button_counts_files_beside_the_one_that_is_named(box, tmp_path, name, beside):
+    (tmp_path / beside).write_text("old")
+    box.menu("menu File", "Export…")
+    box.step(3)
+    _name(box, name)
+    assert "Replace###Save" in box.state.item_rects
+    _name(box, "new.obj")
+    assert "Save###Save" in box.state.item_rects
+
+
 def test_click_on_a_file_takes_its_name(box, tmp_path):
     (tmp_path / "old.json").write_text("old")
     box.menu("menu File", "Save pose…")
@@ -340,10 +351,15 @@ def test_what_is_open_is_never_written_over(drive_body, tmp_path):
     model = tmp_path / "open.npz"
     model.write_bytes(b"precious")
     hand.state.paths = (model,)
-    for save in (save_export, save_pose):
-        hand.state.error = ""
-        save(hand.state, model)
-        assert hand.state.error == f"{model}: is an input file, which is never replaced"
+    read_with_it = tmp_path / "beside.json"
+    read_with_it.symlink_to(model)
+    hand.state.scene.files = (read_with_it,)
+    for opened in (hand.state.paths, ()):
+        hand.state.paths = opened
+        for save in (save_export, save_pose):
+            hand.state.error = ""
+            save(hand.state, model)
+            assert hand.state.error == f"{model}: is an input file, which is never replaced"
     assert model.read_bytes() == b"precious"
 
 

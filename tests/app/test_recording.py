@@ -215,5 +215,16 @@ def test_pictures_that_exist_are_not_replaced(moving, tmp_path):
     (tmp_path / "f_2.png").write_bytes(b"precious")
     start(moving, tmp_path / "f_{frame}.png", kind="pictures", rate=4.0)
     moving.step(2)
-    assert moving.state.error == f"{tmp_path / 'f_2.png'}: exists already; choose another name"
+    assert moving.state.error.startswith(f"{tmp_path / 'f_2.png'}: exists already")
     assert (tmp_path / "f_2.png").read_bytes() == b"precious"
+
+
+def test_picture_that_the_scene_was_read_from_is_not_replaced(moving, tmp_path):
+    """Nobody opened it: the figure's own file names it."""
+    texture = tmp_path / "cloth.png"
+    texture.write_bytes(b"precious")
+    moving.state.scene.files = (texture,)
+    start(moving, texture, kind="sheet")
+    moving.step(2)
+    assert moving.state.error == f"{texture}: is an input file, which is never replaced"
+    assert texture.read_bytes() == b"precious" and moving.state.job is None

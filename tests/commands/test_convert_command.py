@@ -314,9 +314,17 @@ def test_actor_that_cannot_be_written_takes_the_others_back(tmp_path, capsys):
     [
         ("x.fbx", 2, f'no exporter for ".fbx"; there are: {SUFFIXES}'),
         ("x", 2, NO_MEMBER),
-        ("missing/x.obj", 5, "{folder}/missing/x.obj: the folder does not exist"),
-        ("missing/x.skel", 5, "{folder}/missing/x.skel: the folder does not exist"),
-        ("twist.skel/x.obj", 5, "{folder}/twist.skel/x.obj: the folder does not exist"),
+        ("missing/x.obj", 5, "{folder}/missing/x.obj: the folder {folder}/missing does not exist"),
+        (
+            "missing/x.skel",
+            5,
+            "{folder}/missing/x.skel: the folder {folder}/missing does not exist",
+        ),
+        (
+            "twist.skel/x.obj",
+            5,
+            "{folder}/twist.skel/x.obj: the folder {folder}/twist.skel does not exist",
+        ),
     ],
 )
 def test_impossible_output_is_one_line(tmp_path, capsys, out, code, message):

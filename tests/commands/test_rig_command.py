@@ -204,7 +204,11 @@ REFUSED = {
         'viewer: a rigged mesh cannot be written as ".glb"; there are: .skel (with .skin, .obj and '
         "the target's pose as .json), .npz",
     ),
-    "folder": (["-o", "{tmp}/no/x.npz"], 5, "viewer: {tmp}/no/x.npz: the folder does not exist"),
+    "folder": (
+        ["-o", "{tmp}/no/x.npz"],
+        5,
+        "viewer: {tmp}/no/x.npz: the folder {tmp}/no does not exist",
+    ),
     "angle": (["--max-angle", "200"], 2, "viewer: --max-angle: expected 0 to 180, found 200"),
     "no rig": (
         ["--from", "{scan}"],

@@ -238,6 +238,24 @@ def test_all_or_none_leaves_no_copies(tmp_path):
     assert contents(tmp_path) == {"old": b"changed"}
 
 
+def test_outer_block_that_fails_puts_back_what_an_inner_one_wrote(tmp_path):
+    old, new, twice = tmp_path / "old", tmp_path / "new", tmp_path / "twice"
+    old.write_text("old")
+    twice.write_text("twice")
+    with pytest.raises(OutputError, match="full"), all_or_none([twice]):
+        save_text(twice, "once")
+        with all_or_none([old, new, twice]):
+            save_text(old, "changed")
+            save_text(new, "written")
+            save_text(twice, "again")
+        raise OutputError("full")
+    assert contents(tmp_path) == {"old": b"old", "twice": b"twice"}
+    with all_or_none([twice]), all_or_none([old, new, twice]):
+        save_text(old, "changed")
+        save_text(new, "written")
+    assert contents(tmp_path) == {"old": b"changed", "new": b"written", "twice": b"twice"}
+
+
 def test_all_or_none_refuses_before_anything_changes(tmp_path, monkeypatch):
     old = tmp_path / "old"
     old.write_text("old")

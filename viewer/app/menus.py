@@ -35,7 +35,7 @@ from viewer.app.state import AppState
 from viewer.app.view_menu import draw_view_menu
 from viewer.app.widgets import begin_menu, menu_item, note_item
 from viewer.errors import ViewerError, printable
-from viewer.export import EXPORTERS
+from viewer.export import EXPORTERS, files_written
 from viewer.formats import FORMATS
 from viewer.models import known_models, load_model_folder, save_model_folder
 
@@ -164,6 +164,7 @@ def _ask_for_export(state: AppState) -> None:
         f"Export: {', '.join(suffixes)}",
         suffixes,
         f"{printable(state.actor.figure.name, 60)}.obj",
+        written=lambda path: files_written(path) if path.suffix.lower() in suffixes else [path],
     )
 
 

@@ -8,18 +8,16 @@ from pathlib import Path
 
 from viewer.app.jobs import ThreadJob
 from viewer.app.state import AppState
-from viewer.errors import OutputError, RigError, ViewerError, printable
+from viewer.errors import RigError, ViewerError, printable
 from viewer.export import (
     EXPORTERS,
     MotionOptions,
     export_take,
-    refuse_inputs,
     suited_exporter,
     take_for,
 )
 from viewer.export._motion_paths import motion_paths
-from viewer.formats import all_or_none
-from viewer.formats._save import require_folder
+from viewer.formats import all_or_none, check_folder_target, check_targets
 from viewer.rig.clip import Clip
 from viewer.rig.points import PointClip
 from viewer.rig.sampled_clip import SampledClip
@@ -101,7 +99,11 @@ def save_motion(state: AppState, path: Path, everyone: bool = False) -> None:
         parts, lines = _parts(state, path, everyone)
         key = suited_exporter(path, parts[0].actor.figure)
         files = motion_files(state, path, everyone)
-        _refuse(path, files, state.paths)
+        # The dialog has asked what becomes of files that are there.
+        if path.suffix:
+            check_targets(files, state.inputs, force=True)
+        else:
+            check_folder_target(files[0], state.inputs, force=True)
     except ViewerError as problem:
         state.error = str(problem)
         return
@@ -165,23 +167,6 @@ def _write_capture(
     people = [part.number if part.actor.person is None else part.actor.person for part in parts]
     takes = [take for take, _ in found]
     return export_takes(takes, path, replace(options, world_up=ups[0]), people)
-
-
-def _refuse(path: Path, files: Sequence[Path], inputs: Sequence[Path]) -> None:
-    """Refuse what cannot be written, or was opened."""
-    require_folder(path)
-    if path.suffix:
-        refuse_inputs(files, inputs)
-        return
-    try:
-        frames, folder = files[0].resolve(), path.resolve()
-        for opened in inputs:
-            place = opened.resolve()
-            if place in (folder, frames) or frames in place.parents:
-                raise OutputError(f"{printable(path, 300)}: was opened, and is never replaced")
-    except (OSError, ValueError, RuntimeError) as problem:
-        reason = getattr(problem, "strerror", None) or problem
-        raise OutputError(f"{printable(path, 300)}: {reason}") from None
 
 
 def _range(state: AppState, actor: Actor) -> tuple[int, int] | None:

@@ -12,8 +12,8 @@ from imgui_bundle import imgui
 from viewer.app.clip_pause import pause_for_edit
 from viewer.app.state import AppState
 from viewer.errors import ViewerError, printable
-from viewer.export import export, files_written, refuse_inputs
-from viewer.formats import Source, write
+from viewer.export import export, files_written
+from viewer.formats import Source, check_targets, write
 from viewer.rig.mirror import mirror_pose
 from viewer.rig.pose_record import PosePartError, PoseRecord, apply_record, record_of
 from viewer.rig.pose_vector import write_vector
@@ -112,7 +112,8 @@ def save_export(state: AppState, path: Path) -> None:
 def save_files(state: AppState, act: Callable[[], None], files: list[Path]) -> None:
     """Write files unless one of them was opened, and say which, or why not."""
     try:
-        refuse_inputs(files, state.paths)
+        # The dialog has asked what becomes of files that are there.
+        check_targets(files, state.inputs, force=True)
         act()
         state.say(f"Saved {', '.join(printable(file, 200) for file in files)}")
     except ViewerError as problem:

@@ -16,7 +16,7 @@ from viewer.app.record_dialog import RecordSettings
 from viewer.app.recorded_marks import RecordedMarks
 from viewer.app.state import AppState
 from viewer.errors import OutputError, printable
-from viewer.export import refuse_inputs
+from viewer.formats import check_targets
 from viewer.formats._video_kinds import MOST_GIF_RATE
 from viewer.rendering.ghost_pass import Ghost
 from viewer.rendering.recorder import Follow, Recording, Sink, record
@@ -71,10 +71,9 @@ def recording_steps(
     files = [path]
     if settings.kind == "pictures":
         files = _numbered(path, numbers)
-        taken = [file for file in files if file.exists()]
-        if taken:  # the dialog asks only for files that it can see
-            raise OutputError(f"{printable(taken[0], 300)}: exists already; choose another name")
-    refuse_inputs(files, state.paths)
+    # The dialog asks only about a file that it can see.
+    is_asked = settings.kind != "pictures"
+    check_targets(files, state.inputs, is_asked, hint="choose another name")
     sink, size = _sink(settings, files, size, rate, numbers)
     recording = _recording(state, settings, times, size)
     renderer = Renderer(context)

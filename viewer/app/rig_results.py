@@ -12,9 +12,8 @@ from viewer.app.rig_placing import target_place
 from viewer.app.rig_view import Comparison, Result
 from viewer.app.state import AppState
 from viewer.errors import RigError, ViewerError, printable
-from viewer.export import refuse_inputs
 from viewer.export._rigged_files import files_of, write_rigged
-from viewer.formats._save import require_folder
+from viewer.formats import check_targets
 from viewer.rig.annotations import VertexField
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.clip import Clip
@@ -248,8 +247,8 @@ def save_rigged(state: AppState, result: Result, path: Path) -> None:
     """Write a result beside the frame loop, all of its files or none."""
     try:
         files = files_of(path)
-        refuse_inputs(files, [*state.paths, *result.template.paths])
-        require_folder(path)
+        # The dialog has asked what becomes of files that are there.
+        check_targets(files, [*state.inputs, *result.template.paths], force=True)
     except ViewerError as problem:
         state.error = str(problem)
         return

@@ -230,6 +230,11 @@ class AppState:
         _, _, width, height = self.view_rect
         return max(width, 1.0) / max(height, 1.0)
 
+    @property
+    def inputs(self) -> tuple[Path, ...]:
+        """All that was read for the scene, which no result replaces."""
+        return (*self.paths, *self.scene.files)
+
     def show_scene(self, scene: Scene, paths: Sequence[Path]) -> None:
         """Replace the scene; the camera sees its front from where it saw the last one's."""
         points = scene_points(scene, self.options.show)

@@ -6,7 +6,6 @@ import argparse
 from dataclasses import dataclass
 from pathlib import Path
 
-from viewer.commands._output import check_output
 from viewer.commands._scene import print_warnings
 from viewer.errors import RigError, ViewerError, printable
 from viewer.export import MotionOptions, export_take, take_for
@@ -51,7 +50,7 @@ def add_clip_argument(parser: argparse.ArgumentParser) -> None:
 
 
 def read_clips(
-    arguments: argparse.Namespace, template: list[Path], figure: Figure, inputs: list[Path]
+    arguments: argparse.Namespace, template: list[Path], figure: Figure
 ) -> list[CarriedClip]:
     """Return the motions that ``--clip`` asks for, before any work is done.
 
@@ -63,16 +62,12 @@ def read_clips(
         The template's files.
     figure : Figure
         The template.
-    inputs : list of Path
-        Files that must not be replaced.
 
     Raises
     ------
     ViewerError
         If there is no output to write beside, a file holds no motion of the template, or two
         would have one name.
-    OutputError
-        If a file is there that may not be replaced.
     """
     if not arguments.clips:
         return []
@@ -86,7 +81,6 @@ def read_clips(
         path = output.with_name(f"{output.stem}-{Path(name).stem}{suffix}")
         if any(each.path == path for each in found):
             raise ViewerError(f"--clip: expected names that differ, found {path.stem} twice")
-        check_output(path, inputs, arguments.force)
         found.append(CarriedClip(_clip_of(name, template, arguments.fps), path))
     return found
 

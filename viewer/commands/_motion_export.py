@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,9 +19,10 @@ from viewer.export import (
     suited_exporter,
     take_for,
 )
-from viewer.export._motion_paths import motion_paths
+from viewer.export._motion_paths import motion_paths, take_files
 from viewer.export._options import GAPS, ROTATION_ORDERS
-from viewer.interrupts import hold, raising
+from viewer.formats import all_or_none
+from viewer.interrupts import raising
 from viewer.rig.arrays import Bools
 from viewer.rig.clip import Clip
 from viewer.rig.person import is_tracked, person_label
@@ -115,12 +117,17 @@ def motion_options(arguments: argparse.Namespace, skinning: Skinning) -> MotionO
 
 
 def write_motions(
-    arguments: argparse.Namespace, scene: Scene, output: Path, skinning: Skinning
+    arguments: argparse.Namespace,
+    scene: Scene,
+    output: Path,
+    skinning: Skinning,
+    check: Callable[[list[Path]], None],
 ) -> list[str]:
     """Write every actor's motion; return lines that say what was written and what was lost.
 
     Where one pose is asked for, or nothing moves, a motion of one frame is written. People who are
-    in none of the frames are left out, and the others keep the names of their files.
+    in none of the frames are left out, and the others keep the names of their files. ``check`` is
+    called with all files before the first is written, and raises if one of them may not be.
 
     Raises
     ------
@@ -143,7 +150,7 @@ def write_motions(
     there = [part for part in parts if part.present.any()]
     if not there:
         raise RigError(f"nobody is there in {parts[0].span}: there is nothing to write")
-    lines = _write(there, output, key, options) + _untracked_lines(there, key)
+    lines = _write(there, output, key, options, check) + _untracked_lines(there, key)
     away = [part for part in parts if not part.present.any()]
     lines += [f"{printable(p.take.name)}: not there in {p.span}, and not written" for p in away]
     return [*lines, *[pose_line(arguments)] * is_pose, *left_out_lines(scene, actors)]
@@ -183,16 +190,24 @@ class _Part:
         return f"frame {first}" if first == last else f"frames {first} to {last}"
 
 
-def _write(parts: list[_Part], output: Path, key: str, options: MotionOptions) -> list[str]:
+def _write(
+    parts: list[_Part],
+    output: Path,
+    key: str,
+    options: MotionOptions,
+    check: Callable[[list[Path]], None],
+) -> list[str]:
     """Write the motions of whoever is there; return what the exporters say."""
     if key == "easymocap":
         return _write_capture(parts, output, options)
+    files = [file for part in parts for file in take_files(part.take, part.path, key, options)]
+    check(files)
     lines: list[str] = []
-    hold()
-    for part in parts:
-        options.world_up = part.up
-        with raising():  # until it is written
-            lines += _write_one(part, key, options)
+    with all_or_none(files):
+        for part in parts:
+            options.world_up = part.up
+            with raising():  # until it is written
+                lines += _write_one(part, key, options)
     return lines
 
 

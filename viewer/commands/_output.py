@@ -1,35 +1,31 @@
-"""Where results go: checked before any work is done."""
+"""Where results go: suffixes, and what must never be replaced."""
 
 from __future__ import annotations
 
+import argparse
 from pathlib import Path
 
-from viewer.errors import OutputError, printable
-from viewer.formats._save import refuse_inputs
-from viewer.streams import is_stdout, require_stdout
+from viewer.commands._pose import pose_files
+from viewer.commands._scene import scene_files
+from viewer.models import resolve
+from viewer.rig.scene import Scene
 
-__all__ = ["PICTURES", "check_output"]
+__all__ = ["PICTURES", "inputs_of"]
 
 PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".ppm", ".tga", ".tif", ".tiff", ".webp")
 """Suffixes of pictures that can be written."""
 
 
-def check_output(output: Path, inputs: list[Path], force: bool) -> None:
-    """Refuse, before anything is done, to replace a file nobody said may be replaced.
+def inputs_of(arguments: argparse.Namespace, scene: Scene | None = None) -> list[Path]:
+    """Return all files that are read: those that are named, and what reading them led to.
 
-    Raises
-    ------
-    OutputError
-        If the output is one of the inputs, a folder, or exists without ``--force``.
+    Parameters
+    ----------
+    arguments : argparse.Namespace
+        Of a command that opens a scene.
+    scene : Scene, optional
+        What was opened; before that, only the names are known.
     """
-    shown = printable(output, 300)
-    require_stdout(output)
-    try:
-        if output.is_dir():
-            raise OutputError(f"{shown}: is a folder")
-        refuse_inputs([output], inputs)
-        if output.is_file() and not force and not is_stdout(output):
-            raise OutputError(f"{shown}: exists already (--force replaces it)")
-    except (OSError, ValueError) as problem:
-        reason = getattr(problem, "strerror", None) or problem
-        raise OutputError(f"{shown}: {reason}") from None
+    model = [] if arguments.model is None else [resolve(arguments.model)]
+    named = [Path(file) for file in (*scene_files(arguments), *pose_files(arguments), *model)]
+    return named if scene is None else [*named, *scene.files]

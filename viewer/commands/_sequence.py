@@ -6,20 +6,19 @@ import argparse
 import contextlib
 import re
 import string
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from viewer.commands._frame_numbers import Range, parse_range
 from viewer.commands._numbers import number
-from viewer.commands._output import PICTURES, check_output
-from viewer.commands._pose import pose_files
+from viewer.commands._output import PICTURES, inputs_of
 from viewer.commands._progress import Progress
 from viewer.commands._scene import print_warnings
 from viewer.commands._shots import Shots, Turntable, parse_turntable, shots_of
 from viewer.commands._view import camera_of
-from viewer.errors import OutputError, UnsupportedFormatError, ViewerError, printable
+from viewer.errors import UnsupportedFormatError, ViewerError, printable
+from viewer.formats import check_targets
 from viewer.formats._video_kinds import VIDEOS
 from viewer.interrupts import hold, poll
 from viewer.rig.scene import Scene
@@ -199,8 +198,7 @@ def draw_sequence(
 
     shots = shots_of(request, arguments, scene)
     outputs = _outputs(request, shots)
-    inputs = [Path(file) for file in [*arguments.files, *pose_files(arguments)]]
-    _check_outputs(outputs, inputs, arguments.force)
+    check_targets(outputs, inputs_of(arguments, scene), arguments.force)
     sink = _sink(request, arguments, options, shots, outputs, size)
     print_warnings([*shots.notes, *_follow_notes(scene, arguments), *getattr(sink, "notes", [])])
     frame_size = getattr(sink, "cell", size)
@@ -224,16 +222,6 @@ def _outputs(request: Request, shots: Shots) -> list[Path]:
         return [request.output]
     pattern = str(request.output)
     return [Path(pattern.format(frame=number)) for number in shots.numbers]
-
-
-def _check_outputs(outputs: Sequence[Path], inputs: list[Path], force: bool) -> None:
-    """Refuse the whole sequence, before anything is drawn, if one of its files may not be."""
-    for folder in dict.fromkeys(output.parent for output in outputs):
-        if not folder.is_dir():
-            shown = printable(folder, 300)
-            raise OutputError(f"{printable(outputs[0], 300)}: the folder {shown} does not exist")
-    for output in outputs:
-        check_output(output, inputs, force)
 
 
 def _sink(

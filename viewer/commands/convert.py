@@ -16,26 +16,22 @@ from viewer.commands._motion_export import (
     motion_paths,
     pose_or_point_actors,
     write_motions,
-    written_actors,
 )
 from viewer.commands._one_pose import check_frame_options
-from viewer.commands._output import check_output
+from viewer.commands._output import inputs_of
 from viewer.commands._pose import (
     add_pose_arguments,
     add_skinning_arguments,
-    pose_files,
     skinning_of,
 )
 from viewer.commands._scene import (
     add_capture_arguments,
     add_file_arguments,
     open_scene,
-    scene_files,
 )
-from viewer.errors import OutputError, RigError, UnsupportedFormatError, printable
+from viewer.errors import RigError, UnsupportedFormatError, printable
 from viewer.export import EXPORTERS, export, files_written
-from viewer.formats import all_or_none
-from viewer.formats._save import require_folder
+from viewer.formats import all_or_none, check_folder_target, check_targets
 from viewer.interrupts import raising
 from viewer.rig.scene import Scene
 from viewer.rig.skinning import Skinning
@@ -97,26 +93,23 @@ def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:
         raise UnsupportedFormatError(f'no exporter for "{suffix}"; there are: {_known_suffixes()}')
     check_kind(arguments, output)
     check_numbered(arguments, output)
-    if all(kind.writes_pose for kind in kinds) and "{frame" not in output.name:
-        for path in _written(output):
-            check_output(path, _inputs(arguments), arguments.force)
-    elif suffix != "/" and "{frame" not in output.name:
-        require_folder(output)
-        check_output(output, _inputs(arguments), arguments.force)
+    if suffix == "/" or "{frame" in output.name:
+        return  # which files these are shows when the motion has been read
+    is_pose = all(kind.writes_pose for kind in kinds)
+    files = files_written(output) if is_pose else [output]
+    check_targets(files, inputs_of(arguments), arguments.force)
 
 
 def _write_poses(
     arguments: argparse.Namespace, scene: Scene, output: Path, skinning: Skinning
 ) -> list[str]:
-    inputs = _inputs(arguments)  # --model-path counts from now on
     shown = pose_or_point_actors(scene)
     places = dict(zip(shown, motion_paths(output, shown), strict=True))
     actors = [actor for actor in shown if actor.is_present]
     if not actors:
         raise RigError("nobody is there at that time: there is nothing to write")
-    files = [file for actor in actors for file in _written(places[actor])]
-    for file in files:
-        check_output(file, inputs, arguments.force)
+    files = [file for actor in actors for file in files_written(places[actor])]
+    check_targets(files, inputs_of(arguments, scene), arguments.force)
     lines = []
     with all_or_none(files):
         for actor in actors:
@@ -130,40 +123,11 @@ def _write_poses(
 def _write_motions(
     arguments: argparse.Namespace, scene: Scene, output: Path, skinning: Skinning
 ) -> list[str]:
-    inputs = _inputs(arguments)
-    actors = written_actors(arguments, output, scene)
+    inputs, force = inputs_of(arguments, scene), arguments.force
     if "{frame" in output.name or (arguments.frames and output.suffix.lower() == ".obj"):
         check_frame_field(output)
     elif not output.suffix:
-        _check_capture_folder(output, inputs, arguments.force)
-    else:
-        for path in motion_paths(output, actors):
-            require_folder(path)
-            check_output(path, inputs, arguments.force)
-    return write_motions(arguments, scene, output, skinning)
-
-
-def _check_capture_folder(output: Path, inputs: list[Path], force: bool) -> None:
-    """Refuse to replace frames that were opened, or that exist without ``--force``."""
-    frames = output / "smpl"
-    shown = printable(frames, 300)
-    try:
-        for opened in inputs:
-            place = opened.resolve()
-            if place in (output.resolve(), frames.resolve()) or frames.resolve() in place.parents:
-                raise OutputError(f"{shown}: is an input folder, which is never replaced")
-        if frames.exists() and not force:
-            raise OutputError(f"{shown}: exists already (--force replaces it)")
-    except (OSError, ValueError, RuntimeError) as problem:
-        reason = getattr(problem, "strerror", None) or problem
-        raise OutputError(f"{shown}: {reason}") from None
-
-
-def _inputs(arguments: argparse.Namespace) -> list[Path]:
-    return [Path(file) for file in (*scene_files(arguments), *pose_files(arguments))]
-
-
-def _written(path: Path) -> list[Path]:
-    """Return all that is written for one output, in a folder that exists."""
-    require_folder(path)
-    return files_written(path)
+        check_folder_target(output / "smpl", inputs, force)
+    return write_motions(
+        arguments, scene, output, skinning, lambda files: check_targets(files, inputs, force)
+    )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import math
 import sys
 from collections.abc import Callable, Sequence
@@ -15,12 +16,12 @@ from viewer.commands._diff_pairs import Pairing, pair_actors
 from viewer.commands._diff_picture import Heat, heat_of, save_heat
 from viewer.commands._diff_report import Compared, json_text, lines_of, table_of
 from viewer.commands._frame_numbers import parse_range
-from viewer.commands._output import PICTURES, check_output
+from viewer.commands._output import PICTURES
 from viewer.commands._pose import add_skinning_arguments, skinning_of
 from viewer.commands._progress import Progress
 from viewer.commands._scene import print_warnings
 from viewer.errors import UnsupportedFormatError, ViewerError, printable
-from viewer.formats._save import require_folder
+from viewer.formats import check_targets
 from viewer.loading import MotionSettings, load
 from viewer.rig.comparison import Difference, compare
 from viewer.rig.comparison.steps import FrameRange
@@ -110,16 +111,19 @@ def run(arguments: argparse.Namespace) -> int:
     skinning = skinning_of(arguments)
     rows: list[Compared] = []
     heats: list[Heat] = []
+    inputs = [*_inputs(arguments), *reference.files]
     for name in arguments.files:
         try:
-            row, heat = _compared(
-                name, reference, open_one(name), skinning, arguments.poses, frames
-            )
+            other = open_one(name)
+            inputs += other.files
+            row, heat = _compared(name, reference, other, skinning, arguments.poses, frames)
         except ViewerError as problem:
             row, heat = Compared(name, error=printable(problem, 500)), None
         rows.append(row)
         heats += [] if heat is None else [heat]
     stream = sys.stdout if output is None else summary_stream(output)
+    if output is not None:
+        check_targets([output], inputs, arguments.force)
     _print(arguments, rows, stream)
     if output is not None:
         said = save_heat(heats, output, skinning)
@@ -141,19 +145,17 @@ def _checked_output(arguments: argparse.Namespace) -> Path | None:
             f"{printable(output, 300)}: expected a picture ({', '.join(PICTURES)}), "
             f'found "{output.suffix}"'
         )
-    require_folder(output)
-    asked = [arguments.reference, *arguments.files]
-    inputs = [file for text in asked for file in _inputs(text)]
-    check_output(output, [*inputs, *map(Path, arguments.common)], arguments.force)
+    check_targets([output], _inputs(arguments), arguments.force)
     return output
 
 
-def _inputs(text: str) -> list[Path]:
-    """Return what an argument stands for, if it is there; opening it will say what is wrong."""
-    try:
-        return input_files(text)
-    except ViewerError:
-        return []
+def _inputs(arguments: argparse.Namespace) -> list[Path]:
+    """Return the files that are named; what is not there is refused when it is opened."""
+    found = [Path(file) for file in arguments.common]
+    for text in (arguments.reference, *arguments.files):
+        with contextlib.suppress(ViewerError):
+            found += input_files(text)
+    return found
 
 
 def _frames(text: str | None) -> FrameRange | None:

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from viewer.commands._frame_numbers import add_frame_arguments
-from viewer.commands._output import PICTURES, check_output
+from viewer.commands._output import PICTURES, inputs_of
 from viewer.commands._pose import add_pose_arguments, add_skinning_arguments
 from viewer.commands._scalar import choose_subject, scalar_text
 from viewer.commands._scene import (
@@ -27,6 +27,7 @@ from viewer.commands._view import (
     warn_of_missing,
 )
 from viewer.errors import UnsupportedFormatError, ViewerError, printable
+from viewer.formats import check_targets
 from viewer.formats._video_kinds import VIDEOS
 from viewer.interrupts import deferred
 from viewer.rendering.camera import Camera
@@ -80,7 +81,7 @@ def run(arguments: argparse.Namespace) -> int:
     _check_suffix(arguments, output)
     request = request_of(arguments, output)
     if request is None or request.kind != "pictures":
-        check_output(output, [Path(file) for file in arguments.files], arguments.force)
+        check_targets([output], inputs_of(arguments), arguments.force)
     options = display_of(arguments)
     if options.background == "transparent" and output.suffix.lower() in _OPAQUE:
         print_warnings([f"{printable(output)}: this format knows no transparency"])
@@ -102,6 +103,7 @@ def _draw_still(
     from viewer.formats import save_image
 
     output = Path(arguments.output)
+    check_targets([output], inputs_of(arguments, scene), arguments.force)
     points = scene_points(scene, options.show)
     camera = camera_of(arguments, scene, points, size)
     box = bounding_box(points)
@@ -123,10 +125,10 @@ def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:
     try:
         is_ours = output.is_file() or not output.exists()
     except (OSError, ValueError):
-        return  # check_output says what is wrong
+        return  # check_targets says what is wrong
     if suffix not in ("", *PICTURES, *VIDEOS) and is_ours:
         # That it is an input is worse, and said first.
-        check_output(output, [Path(file) for file in arguments.files], force=True)
+        check_targets([output], inputs_of(arguments), force=True)
         raise UnsupportedFormatError(
             f"{printable(output, 300)}: expected a picture ({', '.join(PICTURES)}) or a video "
             f"({', '.join(VIDEOS)}), found {suffix}"

@@ -17,11 +17,10 @@ from viewer.commands._landmarks import read_landmarks
 from viewer.commands._numbers import number
 from viewer.commands._pose import add_pose_arguments, apply_pose, pose_files
 from viewer.commands._progress import Progress
-from viewer.commands._rig_output import check_files
 from viewer.commands._scene import print_warnings
 from viewer.errors import RigError, ViewerError, printable
-from viewer.export._rigged_files import write_rigged
-from viewer.formats import Source
+from viewer.export._rigged_files import files_of, write_rigged
+from viewer.formats import Source, all_or_none, check_targets
 from viewer.loading import MotionSettings, bundled_body, bundled_files, load
 from viewer.models import resolve
 from viewer.rig.figure import Figure
@@ -34,7 +33,7 @@ from viewer.rig.transfer.pipeline import transfer
 from viewer.rig.transfer.rigged import Rigged
 from viewer.rig.transfer.settings import JOINTS, METHODS, TransferSettings
 from viewer.rig.transfer.weights import WeightSettings
-from viewer.streams import summary_stream
+from viewer.streams import require_stdout, summary_stream
 
 __all__ = ["add_arguments", "run"]
 
@@ -152,12 +151,16 @@ def _add_alignment_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Rig the mesh, say how it went, write it, and show it if asked."""
     output = None if arguments.output is None else Path(arguments.output)
+    inputs = _inputs(arguments)
     if output is not None:
-        check_files(output, _inputs(arguments), arguments.force)
-    target = _target(arguments)
-    template = _template(arguments)
+        require_stdout(output)
+        check_targets(files_of(output), inputs, arguments.force)
+    target = _target(arguments, inputs)
+    template = _template(arguments, inputs)
     settings = _settings(arguments, template, output)
-    clips = read_clips(arguments, _files(arguments), template.figure, _inputs(arguments))
+    clips = read_clips(arguments, _files(arguments), template.figure)
+    files = [] if output is None else [*files_of(output), *(clip.path for clip in clips)]
+    check_targets(files, inputs, arguments.force)
     assert target.mesh is not None and template.pose is not None  # both looked
     title = f"rigging {printable(target.name, 40)}"
     with Progress(title, 100) as progress:
@@ -172,7 +175,8 @@ def run(arguments: argparse.Namespace) -> int:
     stream = sys.stdout if output is None else summary_stream(output)
     _tell(rigged, stream)
     if output is not None:
-        lines = [*write_rigged(rigged, output), *write_clips(rigged, clips)]
+        with all_or_none(files):
+            lines = [*write_rigged(rigged, output), *write_clips(rigged, clips)]
         print("\n".join(lines), file=stream)
     if arguments.view:
         _show(rigged, target)
@@ -186,9 +190,10 @@ def _inputs(arguments: argparse.Namespace) -> list[Path]:
     return [Path(file) for file in (*map(resolve, named), bundled_body(), *bundled_files())]
 
 
-def _target(arguments: argparse.Namespace) -> Figure:
+def _target(arguments: argparse.Namespace, inputs: list[Path]) -> Figure:
     """Return the mesh that is to be rigged; one that has a rig already as it is posed."""
     scene = load(*map(resolve, arguments.files))
+    inputs += scene.files
     print_warnings(scene.warnings)
     meshes = [actor for actor in scene.actors if actor.figure.mesh is not None]
     if len(meshes) != 1:
@@ -203,9 +208,10 @@ def _target(arguments: argparse.Namespace) -> Figure:
     return Figure(figure.name, replace(figure.mesh, positions=positions, normals=normals))
 
 
-def _template(arguments: argparse.Namespace) -> Actor:
+def _template(arguments: argparse.Namespace, inputs: list[Path]) -> Actor:
     """Return the figure whose rig is carried over, posed and shaped as asked."""
     scene = load(*_files(arguments), motion=MotionSettings(frame_rate=arguments.fps))
+    inputs += scene.files
     _check_frame(scene, arguments)
     print_warnings([*scene.warnings, *apply_pose(scene, arguments)])
     attached = [actor for actor in scene.actors if actor.figure.is_attached]

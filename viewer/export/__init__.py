@@ -10,7 +10,6 @@ from types import ModuleType
 
 from viewer.errors import RigError, UnsupportedFormatError
 from viewer.export._options import MotionOptions
-from viewer.formats._save import refuse_inputs
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import Skinning
@@ -26,7 +25,6 @@ __all__ = [
     "exporter_for",
     "files_written",
     "motion_exporters",
-    "refuse_inputs",
     "suited_exporter",
     "take_for",
 ]

@@ -1,14 +1,23 @@
-"""What files are called that hold the motions of several actors."""
+"""Names of the files that hold motions: of several actors, of parts, of single frames."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from viewer.rig.person import person_name
-from viewer.rig.scene import Actor
+import numpy as np
 
-__all__ = ["motion_paths"]
+from viewer.errors import OutputError, printable
+from viewer.export._gaps import runs
+from viewer.export._options import MotionOptions
+from viewer.rig.person import person_name
+from viewer.rig.point_take import PointTake
+from viewer.rig.scene import Actor
+from viewer.rig.take import Take
+
+__all__ = ["motion_paths", "numbered_paths", "split_paths", "take_files"]
+
+_WITHOUT_SPLITS = ("npz",)  # exporters that write one file, gaps or not
 
 
 def motion_paths(output: Path, actors: Sequence[Actor]) -> list[Path]:
@@ -35,3 +44,55 @@ def motion_paths(output: Path, actors: Sequence[Actor]) -> list[Path]:
     else:
         names = [f"-{number}" if number > 1 else "" for number, _ in enumerate(persons, 1)]
     return [output.with_name(f"{output.stem}{name}{output.suffix}") for name in names]
+
+
+def split_paths(path: Path, count: int) -> list[Path]:
+    """Return the files of a motion that is cut at its gaps: ``name-1.bvh``, ``name-2.bvh`` ….
+
+    >>> [file.name for file in split_paths(Path("walk.bvh"), 2)]
+    ['walk-1.bvh', 'walk-2.bvh']
+    """
+    if count == 1:
+        return [path]
+    return [path.with_name(f"{path.stem}-{number}{path.suffix}") for number in range(1, count + 1)]
+
+
+def numbered_paths(path: Path, frames: Iterable[int]) -> list[Path]:
+    """Return the file of each frame, whose number replaces ``{frame}`` in the name.
+
+    Raises
+    ------
+    OutputError
+        If two frames would have one file.
+    """
+    files = [path.with_name(path.name.format(frame=int(frame))) for frame in frames]
+    if len(set(files)) < len(files):
+        raise OutputError(f"{printable(path, 300)}: expected a name with {{frame}}")
+    return files
+
+
+def take_files(take: Take | PointTake, path: Path, key: str, options: MotionOptions) -> list[Path]:
+    """Return all files that ``export_take`` writes under names that were asked for.
+
+    Parameters
+    ----------
+    take : Take or PointTake
+        A motion.
+    path : Path
+        A file, for numbered ones with ``{frame}``.
+    key : str
+        Of ``EXPORTERS``, but not of one that writes a folder.
+    options : MotionOptions
+        How.
+    """
+    if isinstance(take, PointTake) or key in _WITHOUT_SPLITS:
+        return [path]
+    present = take.frames.present
+    if key == "obj":
+        is_whole = options.gaps in ("hold", "interpolate")
+        frames = np.arange(len(present)) if is_whole else np.flatnonzero(present)
+        return numbered_paths(path, take.first_frame + frames)
+    is_split = options.closing == "split" and not present.all()
+    files = split_paths(path, len(runs(present)) if is_split else 1)
+    beside = [file.with_suffix(".bin") for file in files if file.suffix.lower() == ".gltf"]
+    return files + beside

@@ -26,6 +26,7 @@ from viewer.export._family_frames import (
     up_axis,
 )
 from viewer.export._gaps import filled, gaps_text, runs
+from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, MotionOptions
 from viewer.formats import all_or_none, save_arrays
 from viewer.rig.arrays import Bools, Floats
@@ -73,10 +74,7 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
     body, notes = family_frames(take, frames, member, options)
     is_split = options.closing == "split" and not present.all()
     spans = runs(present) if is_split else [(0, len(present))]
-    paths = [path]
-    if len(spans) > 1:
-        count = len(spans)
-        paths = [path.with_name(f"{path.stem}-{i + 1}{path.suffix}") for i in range(count)]
+    paths = split_paths(path, len(spans))
     up = up_axis(options)
     written = []
     with all_or_none(paths):

@@ -10,6 +10,7 @@ import numpy as np
 from viewer.errors import RigError, printable
 from viewer.export._bvh_angles import euler_angles, unrolled
 from viewer.export._gaps import filled, gaps_text, runs
+from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, MotionOptions
 from viewer.formats import all_or_none, write
 from viewer.rig.arrays import Floats
@@ -101,10 +102,7 @@ def _export_frames(take: Take, skeleton: Skeleton, path: Path, options: MotionOp
         best = int(np.argmin([between for _, between in measured]))
         clips.append(trials[best])
         errors.append((*measured[best], _RULES[best]))
-    paths = [path]
-    if len(clips) > 1:
-        numbers = range(1, len(clips) + 1)
-        paths = [path.with_name(f"{path.stem}-{number}{path.suffix}") for number in numbers]
+    paths = split_paths(path, len(clips))
     with all_or_none(paths):
         for file, clip in zip(paths, clips, strict=True):
             write(clip, file)

@@ -13,6 +13,7 @@ from viewer.export._bvh_body import Body, Space, body_of, rest_matrices, shape_a
 from viewer.export._bvh_ends import end_offsets
 from viewer.export._bvh_text import bvh_text
 from viewer.export._gaps import filled, gaps_text, runs
+from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, ROTATION_ORDERS, MotionOptions
 from viewer.formats import Source, all_or_none, bvh, save_bytes
 from viewer.rig.arrays import Floats, Ints
@@ -78,14 +79,7 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
         raise RigError(f"{take.name}: expected finite numbers in every frame")
     writer = _Writer(take, figure, body, _ends(take, figure, space, reference), space, options)
     spans = runs(take.frames.present) if is_split else [(0, frames.n_frames)]
-    paths = (
-        [path]
-        if len(spans) == 1
-        else [
-            path.with_name(f"{path.stem}-{number}{path.suffix}")
-            for number in range(1, len(spans) + 1)
-        ]
-    )
+    paths = split_paths(path, len(spans))
     texts = [writer.text(*span) for span in spans]
     errors = [
         writer.error(file, text, *span)

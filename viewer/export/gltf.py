@@ -22,6 +22,7 @@ from viewer.export._gltf_motion import add_animation, moving, still_locals
 from viewer.export._gltf_nodes import Locals, Tree, add_nodes, locals_of
 from viewer.export._gltf_shape import Shape, shape_of
 from viewer.export._gltf_skin import Influences, influences_of, inverse_bind_matrices
+from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, MotionOptions
 from viewer.formats import all_or_none, save_bytes
 from viewer.rig.figure import Figure
@@ -90,12 +91,9 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
     shape = shape_of(take.figure, frames.shape_weights, reference)
     body = _body_of(take.figure, shape, options.skinning)
     spans = [(0, frames.n_frames)]
-    paths = [path]
     if options.closing == "split" and not present.all():
         spans = runs(present)
-        if len(spans) > 1:
-            names = [f"{path.stem}-{number}{path.suffix}" for number in range(1, len(spans) + 1)]
-            paths = [path.with_name(name) for name in names]
+    paths = split_paths(path, len(spans))
     documents, counts = [], ""
     for start, stop in spans:
         document = Document(take.name)

@@ -5,13 +5,15 @@ Vertices keep the file's numbering: along seams a face refers to several ``vt`` 
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
 
-from viewer.errors import OutputError, printable
+from viewer.errors import printable
 from viewer.export import MotionOptions, require_mesh
 from viewer.export._gaps import kept_gaps
+from viewer.export._motion_paths import numbered_paths
 from viewer.formats import all_or_none, free_path, save_bytes, save_text
 from viewer.formats._image import encode_png
 from viewer.rig.arrays import Floats, Ints
@@ -44,7 +46,8 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
         parts.append(_rows("vt", mesh.uvs))
     parts.append(_rows("vn", normals))
     parts += _faces(mesh, bool(beside))
-    missing = [file for file in beside if not file.exists()]  # others hold the same already
+    # Others hold the same already.
+    missing = [file for file in beside if not os.path.lexists(file)]
     with all_or_none(missing):
         for file in missing:
             save_bytes(file, beside[file])
@@ -62,11 +65,7 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
     """
     poses, filling = kept_gaps(take.frames, options.gaps, take.first_frame)
     frames = np.flatnonzero(poses.present)
-    files = [
-        path.with_name(path.name.format(frame=int(frame) + take.first_frame)) for frame in frames
-    ]
-    if len(set(files)) < len(files):
-        raise OutputError(f"{printable(path, 300)}: expected a name with {{frame}}")
+    files = numbered_paths(path, take.first_frame + frames)
     written: list[str] = []
     with all_or_none(files):
         for frame, file in zip(frames, files, strict=True):

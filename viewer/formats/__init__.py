@@ -15,6 +15,7 @@ from viewer.formats._image import is_picture, read_picture, save_image
 from viewer.formats._references import referenced_path
 from viewer.formats._save import all_or_none, free_path, save_arrays, save_bytes, save_text
 from viewer.formats._source import MAX_SIZE, Source
+from viewer.formats._targets import check_folder_target, check_targets
 
 if TYPE_CHECKING:
     from viewer.formats._archive import Archive
@@ -46,6 +47,8 @@ __all__ = [
     "Format",
     "Source",
     "all_or_none",
+    "check_folder_target",
+    "check_targets",
     "claims",
     "detect",
     "free_path",

@@ -91,6 +91,8 @@ def find_frames(source: Source) -> FrameFiles:
         raise source.error(
             f"expected frame files ({', '.join((*BODIES, POINTS))}: 000000{_SUFFIX} …), found none"
         )
+    first = ((folder.path, names[0]) for folder, names in zip(folders, found, strict=True) if names)
+    source.also_read += [(path / name).parent for path, name in first]
     return _on_timeline(source, folders, found)
 
 

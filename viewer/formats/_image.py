@@ -47,6 +47,7 @@ def load_image(source: Source, name: str, offset: int) -> Bytes | None:
     if path is None:
         source.warn(f"texture {printable(name)} lies outside the folder: not read", offset)
         return None
+    source.also_read.append(path)
     try:
         return _decode(path, read_bytes(path))
     except FormatError as problem:

@@ -9,7 +9,8 @@ import shutil
 import stat
 import tempfile
 import zipfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
 
@@ -25,8 +26,6 @@ __all__ = [
     "all_or_none",
     "as_words",
     "free_path",
-    "refuse_inputs",
-    "require_folder",
     "save_arrays",
     "save_bytes",
     "save_text",
@@ -62,7 +61,8 @@ def free_path(folder: Path, stem: str, suffix: str, data: bytes | None = None) -
     """
     safe = "".join(letter if letter.isalnum() or letter in "-_." else "_" for letter in stem)[:100]
     path, number = folder / f"{safe or 'picture'}{suffix}", 1
-    while path.exists() and not _holds(path, data):
+    # A link to nothing counts: writing to it would make a file elsewhere.
+    while os.path.lexists(path) and not _holds(path, data):
         number += 1
         path = folder / f"{safe or 'picture'}-{number}{suffix}"
     return path
@@ -200,9 +200,17 @@ class Replacement:
             self.temporary = None
 
 
+_Copies = dict[Path, Path | None]  # of resolved files; None where there was none
+_outer: ContextVar[_Copies | None] = ContextVar(
+    "what the innermost all_or_none keeps", default=None
+)
+
+
 @contextlib.contextmanager
 def all_or_none(paths: Iterable[Path]) -> Iterator[None]:
     """Put several files that belong together back as they were if writing one of them fails.
+
+    A block within another that succeeds hands what it kept to the outer one, which may still fail.
 
     Parameters
     ----------
@@ -216,11 +224,16 @@ def all_or_none(paths: Iterable[Path]) -> Iterator[None]:
     """
     hold()  # also for the copies, none of which may stay behind
     poll()
-    copies: dict[Path, Path | None] = {}
+    copies: _Copies = {}
+    outer = _outer.get()
+    token = _outer.set(copies)
     try:
         for path in paths:
             _keep_copy(path, copies)
         yield
+        if outer is not None:
+            for target in copies.keys() - outer.keys():
+                outer[target] = copies.pop(target)
     except BaseException:
         for target, copy in copies.items():
             with contextlib.suppress(OSError):
@@ -230,12 +243,13 @@ def all_or_none(paths: Iterable[Path]) -> Iterator[None]:
                     copy.replace(target)
         raise
     finally:
+        _outer.reset(token)
         for copy in filter(None, copies.values()):
             with contextlib.suppress(OSError):
                 copy.unlink(missing_ok=True)
 
 
-def _keep_copy(path: Path, copies: dict[Path, Path | None]) -> None:
+def _keep_copy(path: Path, copies: _Copies) -> None:
     """Copy what a path leads to; None stands for no file. Devices and the like are left alone."""
     if is_stdout(path):
         return
@@ -299,36 +313,3 @@ def _replace(target: Path, data: bytes, permissions: int) -> None:
 def _require_folder(target: Path) -> None:
     if not target.parent.is_dir():
         raise FileNotFoundError(None, f"the folder {printable(target.parent, 300)} does not exist")
-
-
-def require_folder(file: Path) -> None:
-    """Refuse a file whose folder is not there.
-
-    Raises
-    ------
-    OutputError
-        With the file's name.
-    """
-    if not file.parent.is_dir():
-        raise OutputError(f"{printable(file, 300)}: the folder does not exist")
-
-
-def refuse_inputs(files: Sequence[Path], inputs: Sequence[Path]) -> None:
-    """Refuse to replace what was opened, or a file inside an opened folder.
-
-    Raises
-    ------
-    OutputError
-        With the file's name.
-    """
-    for file in files:
-        for opened in inputs:
-            try:
-                inside = opened.is_dir() and file.exists() and file.parent.samefile(opened)
-                same = opened.exists() and file.exists() and file.samefile(opened)
-            except (OSError, ValueError):
-                continue  # what cannot be looked at cannot be replaced either
-            if same or inside:
-                raise OutputError(
-                    f"{printable(file, 300)}: is an input file, which is never replaced"
-                )

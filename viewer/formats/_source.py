@@ -134,6 +134,8 @@ class Source:
         Largest size of a file, in bytes, also of those inside a folder or archive.
     warnings : list of str
         One line each, none twice.
+    also_read : list of Path
+        Other files that its reader was led to: pictures, material libraries.
     faults : list of Fault or None
         None where the first fault ends the reading; a list takes in all that can be gone on from.
     """
@@ -145,6 +147,7 @@ class Source:
         self.is_folder = False
         self.max_size = max_size
         self.warnings: list[str] = []
+        self.also_read: list[Path] = []
         self.faults: list[Fault] | None = None
         self.archive: Archive | None = None  # opened once, by whoever asks first
         self._data = None if data is None else _without_marks(data)
@@ -184,6 +187,8 @@ class Source:
     def _related(self, path: Path) -> Source:
         source = Source(path, max_size=self.max_size)
         source.warnings, source._warned = self.warnings, self._warned
+        source.also_read = self.also_read
+        self.also_read.append(path)
         source.faults, source._offsets = self.faults, self._offsets
         return source
 

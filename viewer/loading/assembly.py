@@ -90,6 +90,9 @@ def begin(
     _place_side_by_side(cast)
     warnings = (*contents.warnings, *cast.notes)
     scene = Scene(cast.actors, warnings, "z" if world_up == "z" else "y", tuple(cast.views))
+    scene.files = contents.files
+    if settings is not None and settings.model is not None:
+        scene.files += (settings.model,)
     return scene, cast.builders
 
 

@@ -40,7 +40,7 @@ _PEEK = 16  # bytes that tell a picture
 
 @dataclass(slots=True)
 class Contents:
-    """What several files hold, by kind, with the path of each."""
+    """What several files hold, by kind, with the path of each; ``files`` are all that was read."""
 
     figures: list[tuple[Path, Figure]] = field(default_factory=list)
     clips: list[tuple[Path, Clip]] = field(default_factory=list)
@@ -51,6 +51,7 @@ class Contents:
     captures: list[tuple[Path, Capture]] = field(default_factory=list)
     morphs: list[tuple[Path, MorphTarget]] = field(default_factory=list)
     warnings: tuple[str, ...] = ()
+    files: tuple[Path, ...] = ()
 
     @property
     def has_motion(self) -> bool:
@@ -89,6 +90,8 @@ def read_files(
                 known.add(path.resolve())
                 sources.append(Source.open(path, max_size))
     contents.warnings = tuple(text for source in sources for text in source.warnings)
+    read = (path for source in sources for path in (source.path, *source.also_read))
+    contents.files = tuple(dict.fromkeys(read))
     return contents
 
 

@@ -19,6 +19,8 @@ from viewer.rig.transform import apply_transform
 __all__ = ["Actor", "Motion", "Scene", "actor_points", "figure_pose", "scene_box", "scene_points"]
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from viewer.rig.camera_view import CameraView
     from viewer.rig.clip import Clip
     from viewer.rig.points import PointClip
@@ -119,6 +121,8 @@ class Scene:
         Calibrated cameras of a capture.
     time : float or None
         Seconds at which its motions are shown; None for their start.
+    files : tuple of Path
+        All that it was read from, pictures too: never to be replaced by a result.
     """
 
     actors: list[Actor]
@@ -126,6 +130,7 @@ class Scene:
     world_up: Literal["y", "z"] | None = None
     views: tuple[CameraView, ...] = ()
     time: float | None = None
+    files: tuple[Path, ...] = ()
 
     @property
     def up(self) -> Literal["y", "z"]:

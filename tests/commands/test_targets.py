@@ -1,0 +1,172 @@
+"""No way of writing replaces a file that nobody said may be replaced, nor ever an input."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from commands.writing_runs import (
+    FREE,
+    Inputs,
+    contents,
+    converting,
+    drawing,
+    into,
+    write_inputs,
+)
+
+from viewer.cli import run
+
+CONVERTING, DRAWING = [*converting(Inputs())], [*drawing(Inputs())]
+
+
+@pytest.fixture(scope="module")
+def inputs(tmp_path_factory):
+    return write_inputs(tmp_path_factory.mktemp("inputs"))
+
+
+@pytest.fixture
+def folder(tmp_path):
+    folder = tmp_path / "out"
+    folder.mkdir()
+    return folder
+
+
+@pytest.fixture
+def refuse(capsys):
+    """Run a command that must refuse its output in one line, before it writes anything."""
+
+    def run_it(command: list[str], *words: str) -> None:
+        capsys.readouterr()
+        assert run(command) == 5
+        captured = capsys.readouterr()
+        lines = [one for one in captured.err.splitlines() if not one.startswith("warning: ")]
+        assert captured.out == "" and len(lines) == 1, captured
+        assert all(word in lines[0] for word in words), lines
+
+    return run_it
+
+
+def written_by(command: list[str], folder: Path) -> list[str]:
+    """Run a command; return the files whose names were asked for, and remove them all."""
+    assert run(into(folder, command)) == 0
+    names = list(contents(folder))
+    for name in names:
+        (folder / name).unlink()
+    has_companions = any(name.endswith((".obj", ".skel")) for name in names)
+    named = [name for name in names if not (has_companions and Path(name).suffix in FREE)]
+    assert named
+    return named
+
+
+def check_command(command: list[str], inputs: Inputs, folder: Path, refuse) -> None:
+    """Put something in the way of each file that a command writes."""
+    before = {path: path.read_bytes() for path in inputs.all}
+    command = into(folder, command)
+    for name in written_by(command, folder):
+        target = folder / name
+        target.write_bytes(b"precious")
+        refuse(command, f"{target}: exists already")
+        assert contents(folder) == {name: b"precious"}
+        target.unlink()
+        target.mkdir()
+        refuse([*command, "--force"], f"{target}: is a folder")
+        assert [path.name for path in folder.iterdir()] == [name]
+        target.rmdir()
+        for path in inputs.read_by(command):
+            target.symlink_to(path)
+            refuse([*command, "--force"], f"{target}: is an input file")
+            target.unlink()
+        target.hardlink_to(inputs.read_by(command)[0])
+        refuse([*command, "--force"], f"{target}: is an input file")
+        target.unlink()
+    assert not contents(folder)
+    assert {path: path.read_bytes() for path in inputs.all} == before
+
+
+@pytest.mark.parametrize("case", CONVERTING)
+def test_convert_checks_all_of_its_files(inputs, folder, refuse, case):
+    check_command(converting(inputs)[case], inputs, folder, refuse)
+
+
+@pytest.mark.parametrize("case", DRAWING)
+def test_pictures_and_videos_are_checked(inputs, folder, refuse, case):
+    if case.startswith("v."):
+        pytest.importorskip("av")
+    check_command(drawing(inputs)[case], inputs, folder, refuse)
+
+
+def test_files_of_a_rigged_mesh_are_checked(inputs, folder, refuse):
+    pytest.importorskip("scipy")
+    mesh = folder.parent / "mesh.obj"
+    assert run(["convert", *inputs.roof, "-o", str(mesh)]) == 0
+    command = ["rig", str(mesh), "--from", inputs.roof[0], "--from", inputs.roof[1]]
+    command += ["-o", f"{folder}/r.skel"]
+    for suffix in (".skel", ".skin", ".obj", ".json"):
+        target = folder / f"r{suffix}"
+        target.write_bytes(b"precious")
+        refuse(command, f"{target}: exists already")
+        assert contents(folder) == {target.name: b"precious"}
+        target.unlink()
+        # The mesh's own picture is read, though nobody named it.
+        for path in (*inputs.of_roof[:2], mesh.with_name("mesh_0.png")):
+            target.symlink_to(path)
+            refuse([*command, "--force"], f"{target}: is an input file")
+            target.unlink()
+
+
+def test_old_files_stay_where_companions_find_other_names(inputs, folder):
+    for name in ("p.mtl", "p_0.png", "p_1.png"):
+        (folder / name).write_bytes(b"precious")
+    (folder / "p-2.mtl").symlink_to(folder / "elsewhere.mtl")
+    assert run(["convert", *inputs.roof, "-o", f"{folder}/p.obj"]) == 0
+    found = contents(folder)
+    assert [found[name] for name in ("p.mtl", "p_0.png", "p_1.png")] == [b"precious"] * 3
+    assert found["p_0-2.png"].startswith(b"\x89PNG") and "p-3.mtl" in found
+    assert not (folder / "elsewhere.mtl").exists()
+
+
+def test_two_files_of_one_run_that_are_the_same_are_refused(inputs, folder, refuse):
+    command = ["convert", *inputs.take, "-o", f"{folder}/m.bvh", "--force"]
+    (folder / "m-7.bvh").symlink_to("m-0.bvh")
+    refuse(command, f"{folder}/m-7.bvh: is the same file as {folder}/m-0.bvh")
+    (folder / "m-0.bvh").write_bytes(b"precious")
+    refuse(command, f"{folder}/m-7.bvh: is the same file as {folder}/m-0.bvh")
+    assert contents(folder) == {"m-0.bvh": b"precious", "m-7.bvh": b"precious"}
+
+
+def test_missing_folder_is_refused_before_anything(inputs, folder, refuse):
+    for case in ("a motion as w_{frame:03}.obj", "a pose as p.skel", "a motion as w.gltf"):
+        command = [word.replace("OUT/", f"{folder}/no/") for word in converting(inputs)[case]]
+        refuse(command, f"the folder {folder}/no does not exist")
+    assert not contents(folder)
+
+
+def test_one_old_frame_among_many_keeps_them_all(inputs, folder, refuse):
+    (folder / "w_002.obj").write_bytes(b"precious")
+    command = into(folder, converting(inputs)["a motion as w_{frame:03}.obj"])
+    refuse(command, f"{folder}/w_002.obj: exists already")
+    assert contents(folder) == {"w_002.obj": b"precious"}
+    assert run([*command, "--force"]) == 0
+    assert sorted(contents(folder)) == [f"w_00{frame}.obj" for frame in range(3)]
+
+
+def test_folder_of_frames_is_an_input(inputs, folder, refuse):
+    take = Path(inputs.take[0])
+    command = ["convert", *inputs.take, "-o"]
+    refuse([*command, str(take), "--force"], "is an input folder")
+    refuse(["convert", str(take / "smpl"), *inputs.take[1:], "-o", str(take), "--force"], "input")
+    (folder / "link").symlink_to(take)
+    refuse([*command, f"{folder}/link", "--force"], "is an input folder")
+    (folder / "file").write_bytes(b"precious")
+    refuse([*command, f"{folder}/file"], f"{folder}/file: expected a folder")
+    assert run([*command, f"{folder}/new"]) == 0
+    refuse([*command, f"{folder}/new"], f"{folder}/new/smpl: exists already")
+
+
+def test_another_picture_of_a_skin_stays(inputs, folder, refuse):
+    """A ``.skin`` names its pictures, so another one cannot give way."""
+    (folder / "cloth1.png").write_bytes(b"precious")
+    for more in ([], ["--force"]):
+        refuse(into(folder, converting(inputs)["a pose as p.skel"]) + more, "cloth1.png: another")
+        assert contents(folder) == {"cloth1.png": b"precious"}

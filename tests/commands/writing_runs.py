@@ -1,0 +1,119 @@
+"""Commands that write files, one for each way of writing, and what they read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from export.seamed import OTHER_PICTURE, PICTURE, seamed_actor, seamed_mesh
+from export.small_rigs import clip_text, write_twist
+from formats.capture_files import body, write_frames
+from formats.synthetic_smpl import model
+
+from viewer.export import export
+
+FREE = (".mtl", ".png")
+"""Suffixes of companions: an ``.obj``'s take a name that no file has."""
+
+
+@dataclass(frozen=True, slots=True)
+class Inputs:
+    """Files that the commands read: of a rig with pictures, of one with a clip, of a capture."""
+
+    roof: tuple[str, ...] = ()
+    twist: tuple[str, ...] = ()
+    take: tuple[str, ...] = ()
+    of_roof: tuple[Path, ...] = ()
+    of_twist: tuple[Path, ...] = ()
+    of_take: tuple[Path, ...] = ()
+
+    @property
+    def all(self) -> tuple[Path, ...]:
+        return self.of_roof + self.of_twist + self.of_take
+
+    def read_by(self, command: list[str]) -> tuple[Path, ...]:
+        """Return all that a command reads, pictures and the frames of a folder too."""
+        if any(word in command for word in self.take[:1]):
+            return self.of_take
+        return self.of_roof if self.roof[1] in command else self.of_twist
+
+
+def write_inputs(folder: Path) -> Inputs:
+    """Write a rig with pictures, one with a clip, and a capture of two people and its model.
+
+    Person 0 is in frames 20 to 23, person 7 in all of them but 22.
+    """
+    mesh = seamed_mesh(pictures=(PICTURE, OTHER_PICTURE), of_triangle=np.array([0, 0, 1]))
+    export(seamed_actor(mesh=mesh), folder / "roof.skel")
+    roof = [folder / "roof.skel", folder / "roof.skin", *sorted(folder.glob("cloth*.png"))]
+    clip = folder / "walk.anim"
+    clip.write_text(clip_text())
+    twist = [*map(Path, write_twist(folder)), clip]
+    smpl = folder / "SMPL.npz"
+    np.savez(smpl, **model("smpl"))
+    people = {frame: [body(0), body(7)] if frame != 22 else [body(0)] for frame in range(20, 24)}
+    frames = write_frames(folder / "take" / "smpl", people)
+    return Inputs(
+        (*map(str, roof[:2]),),
+        (*map(str, twist),),
+        (str(folder / "take"), "--model", str(smpl)),
+        (*roof,),
+        (*twist,),
+        (smpl, *sorted(frames.iterdir())),
+    )
+
+
+def converting(inputs: Inputs) -> dict[str, list[str]]:
+    """Return commands by what they write, ``OUT/`` for the folder; quick, and without OpenGL."""
+    poses = {
+        f"a pose as {name}": ["convert", *inputs.roof, "-o", f"OUT/{name}"]
+        for name in ("p.obj", "p.ply", "p.npz", "p.json", "p.skel", "p.glb", "p.gltf")
+    }
+    motions = {
+        f"a motion as {name}": ["convert", *inputs.twist, "-o", f"OUT/{name}", "--frames", "0:3"]
+        for name in ("w_{frame:03}.obj", "w.bvh", "w.anim", "w.glb", "w.gltf", "w.npz")
+    }
+    people = {
+        f"people as {name} {' '.join(more)}": ["convert", *inputs.take, "-o", f"OUT/{name}", *more]
+        for name, *more in (
+            ("m.bvh",),
+            ("m.bvh", "--gaps", "split"),
+            ("m.gltf", "--gaps", "split"),
+            ("m.npz",),
+            ("m.npz", "--gaps", "split"),
+            ("m.npz", "--as", "npz"),
+            ("m_{frame}.obj", "--frames", "20:24"),
+            ("m.ply", "--frame", "20"),
+        )
+    }
+    return poses | motions | people
+
+
+def drawing(inputs: Inputs) -> dict[str, list[str]]:
+    """Return commands that draw first."""
+    motion = [*inputs.twist, "--size", "64x48", "--frames", "0:3"]
+    return {
+        f"{name} {' '.join(more)}": ["render", *motion, "-o", f"OUT/{name}", *more]
+        for name, *more in (
+            ("f_{frame}.png",),
+            ("v.mp4",),
+            ("v.webm",),
+            ("v.gif",),
+            ("s.png", "--contact-sheet", "2"),
+        )
+    } | {
+        "x.jpg": ["render", *inputs.roof, "-o", "OUT/x.jpg", "--size", "64x48"],
+        "d.png": ["diff", "+".join(inputs.roof), *inputs.roof[1:], "-o", "OUT/d.png"],
+    }
+
+
+def into(folder: Path, command: list[str], *more: str) -> list[str]:
+    """Return a command that writes into a folder."""
+    return [word.replace("OUT/", f"{folder}/") for word in command] + list(more)
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    """Return what is in a folder, and in those in it."""
+    found = (path for path in folder.rglob("*") if path.is_file() or path.is_symlink())
+    return {str(path.relative_to(folder)): path.read_bytes() for path in found if path.exists()}

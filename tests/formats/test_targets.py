@@ -1,0 +1,113 @@
+"""The gate of results: what it refuses, and what it takes for the same file."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from viewer.errors import OutputError
+from viewer.formats import check_folder_target, check_targets
+from viewer.formats._save import free_path
+
+
+def refused(files, inputs=(), force=False, check=check_targets) -> str:
+    with pytest.raises(OutputError) as caught:
+        check(files, inputs, force)
+    assert caught.value.exit_code == 5
+    return str(caught.value)
+
+
+@pytest.fixture
+def old(tmp_path):
+    path = tmp_path / "old"
+    path.write_bytes(b"old")
+    return path
+
+
+def test_files_that_are_not_there_pass(tmp_path, old):
+    check_targets([tmp_path / "a", tmp_path / "b"], [old, tmp_path / "missing"], False)
+    check_targets([old], [], True)
+    check_targets([], [old], False)
+
+
+def test_old_file_is_refused_also_through_a_link(tmp_path, old):
+    (tmp_path / "link").symlink_to("old")
+    assert refused([tmp_path / "a", old]).startswith(f"{old}: exists already")
+    assert refused([tmp_path / "link"]).startswith(f"{tmp_path / 'link'}: exists already")
+
+
+@pytest.mark.parametrize("make", [Path.symlink_to, Path.hardlink_to])
+def test_input_is_refused_under_any_name(tmp_path, old, make):
+    other = tmp_path / "other"
+    make(other, old)
+    for target, read in ((old, old), (other, old), (old, other)):
+        assert refused([target], [read], True) == (
+            f"{target}: is an input file, which is never replaced"
+        )
+
+
+def test_files_in_an_opened_folder_are_inputs(tmp_path):
+    folder = tmp_path / "in"
+    (folder / "out").mkdir(parents=True)
+    (folder / "a").write_bytes(b"a")
+    (folder / "out" / "a").write_bytes(b"a")
+    (tmp_path / "link").symlink_to("in")
+    assert "input" in refused([folder / "a"], [tmp_path / "link"], True)
+    assert "input" in refused([tmp_path / "link" / "a"], [folder], True)
+    check_targets([folder / "new", folder / "out" / "a"], [folder], True)
+
+
+def test_one_file_under_two_names_is_refused(tmp_path, old):
+    (tmp_path / "link").symlink_to("old")
+    (tmp_path / "nothing").symlink_to("new")
+    os.link(old, tmp_path / "hard")
+    for pair in (("old", "link"), ("old", "hard"), ("new", "nothing"), ("new", "new")):
+        first, second = (tmp_path / name for name in pair)
+        words = f"{second}: is the same file as {first}"
+        assert refused([tmp_path / "a", first, second], force=True) == words
+
+
+def test_folders_are_looked_at(tmp_path, old):
+    assert refused([tmp_path]) == f"{tmp_path}: is a folder"
+    for folder in (tmp_path / "no", old):
+        assert refused([folder / "x"]) == f"{folder / 'x'}: the folder {folder} does not exist"
+    (tmp_path / "loop").symlink_to("loop")
+    assert refused([tmp_path / "loop"]).startswith(f"{tmp_path / 'loop'}: ")
+    assert refused([Path("a\0b")]).startswith("a\\x00b: ")
+
+
+def test_locked_folder_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(os, "access", lambda path, mode: False)  # root may write anywhere
+    target = tmp_path / "x"
+    assert refused([target]) == f"{target}: the folder {tmp_path} cannot be written to"
+
+
+def test_devices_are_never_replaced_and_need_no_force(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    check_targets([Path("/dev/null"), Path("/dev/null"), tmp_path / "pipe"], [], False)
+
+
+@pytest.mark.parametrize("name", ["in", "in/smpl", "link"])
+def test_folder_that_was_read_is_not_replaced(tmp_path, name):
+    (tmp_path / "in" / "smpl").mkdir(parents=True)
+    (tmp_path / "link").symlink_to("in")
+    target = tmp_path / "in" / "smpl"
+    words = refused(target, [tmp_path / name], True, check_folder_target)
+    assert words.startswith(f"{target}: is an input folder")
+    assert "input" in refused(tmp_path / "link" / "smpl", [target], True, check_folder_target)
+
+
+def test_folder_that_is_there_needs_force(tmp_path, old):
+    target = tmp_path / "out" / "smpl"
+    check_folder_target(target, [old], False)
+    target.mkdir(parents=True)
+    assert "exists already" in refused(target, [], False, check_folder_target)
+    check_folder_target(target, [old], True)
+    assert refused(old / "smpl", [], True, check_folder_target).startswith(f"{old}: ")
+
+
+def test_free_path_takes_no_link_to_nothing(tmp_path):
+    (tmp_path / "fox.png").symlink_to("elsewhere.png")
+    assert free_path(tmp_path, "fox", ".png") == tmp_path / "fox-2.png"
