@@ -20,6 +20,7 @@ second signal that comes a while after the first is for a program that does not 
 from __future__ import annotations
 
 import _thread
+import atexit
 import os
 import signal
 import sys
@@ -30,12 +31,12 @@ from contextlib import contextmanager
 # As in ``viewer/__init__.py``: what is imported here delays the moment of looking after signals.
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
     from sys import UnraisableHookArgs
     from types import FrameType
     from typing import Any
 
-__all__ = ["Interrupted", "deferred", "hold", "poll", "program", "raising", "watched"]
+__all__ = ["Interrupted", "deferred", "hold", "poll", "raising", "watch_program", "watched"]
 
 _WORDS = {"SIGINT": "interrupted", "SIGTERM": "terminated", "SIGHUP": "hung up"}
 _SIGNALS = {getattr(signal, name): word for name, word in _WORDS.items() if hasattr(signal, name)}
@@ -164,7 +165,7 @@ def watched() -> Iterator[None]:
     Raises
     ------
     Interrupted
-        In the block, or at its beginning if ``program`` has noted a signal.
+        In the block, or at its beginning if ``watch_program`` has noted a signal.
     """
     global _current
     outer = _mine()
@@ -182,16 +183,13 @@ def watched() -> Iterator[None]:
         _current = None
 
 
-def program(run: Callable[[], int]) -> int:
-    """Run the whole of a process: signals are noted from now on, and only raised if ``watched``."""
+def watch_program() -> None:
+    """Note signals until the process is gone; they raise where they are ``watched``."""
     global _current
-    import atexit
-
     watch = _current = _Watch(is_held=True, owns_process=True)
-    watch.start()
     # First in, last out: Python resets handlers soon after, and must not be killed meanwhile.
     atexit.register(watch.ignore)
-    return run()
+    watch.start()
 
 
 @contextmanager
