@@ -9,7 +9,7 @@
 Importing this module imports nothing heavy: each name loads its own module on first use.
 """
 
-# Not imported from ``typing``: while anything is imported here, nobody looks after signals yet.
+# Not imported from ``typing``: no signal handler is installed yet, so imports here must be quick.
 # Type checkers know the name.
 TYPE_CHECKING = False
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ def main() -> int:
         from viewer.interrupts import watch_program
 
         watch_program()
-    except KeyboardInterrupt:  # a few milliseconds in which nobody else looks after signals
+    except KeyboardInterrupt:  # the handlers are not installed yet
         sys.stderr.write("viewer: interrupted\n")
         return 130
     from viewer.cli import run
