@@ -209,6 +209,13 @@ def test_signal_after_the_work_is_done_changes_nothing(end, number, moment, kind
             assert picture.size == (40, 30)
 
 
+def test_closed_terminal_ends_a_run_as_well(end):
+    command, places = PNG
+    moment = "import viewer.rendering.renderer as m\nbefore(m.Renderer, 'draw')"
+    wanted = (129, b"viewer: hung up\n", OLD)
+    assert end(moment, signal.SIGHUP, *command, **places) == wanted
+
+
 def test_signal_that_python_drops_is_raised_again(end):
     # What a destructor raises is only reported; so is what a weak reference's callback raises.
     moment = (

@@ -9,10 +9,8 @@
 Importing this module imports nothing heavy: each name loads its own module on first use.
 """
 
-from __future__ import annotations
-
-# Not imported from ``typing``: that takes longer than all else here, while nobody yet looks after
-# signals. Type checkers know the name.
+# Not imported from ``typing``: no signal handler is installed yet, so imports here must be quick.
+# Type checkers know the name.
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
@@ -115,7 +113,7 @@ _HOMES = {
 }
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> "Any":
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module

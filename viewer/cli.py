@@ -52,6 +52,8 @@ def run(arguments: Sequence[str]) -> int:
             return _attempt(list(arguments))
     except Interrupted as stop:
         return _fail(str(stop), stop.exit_code)
+    except KeyboardInterrupt:  # raised by somebody else, no signal of ours
+        return _fail("interrupted", 130)
 
 
 def _attempt(arguments: list[str]) -> int:

@@ -1,25 +1,26 @@
-"""Ctrl-C, SIGTERM and SIGHUP: noted at once, acted on only where nothing can break.
+"""Deferred handling of Ctrl-C, SIGTERM and SIGHUP.
 
-A handler that raises does so between any two steps of Python: inside a callback of a C library that
-does not expect it (``moderngl.Context.program`` then dereferences NULL), inside an import, inside
-clean-up. So the handler notes the signal, and raises ``Interrupted`` only while Python alone is at
-work::
+A handler that raises may do so anywhere in Python: inside a callback of a C library that does not
+expect it (``moderngl.Context.program`` then dereferences NULL), inside an import, inside clean-up.
+So the handler records the signal, and raises ``Interrupted`` at once only while pure Python or
+numpy code runs::
 
     with watched():            # the command: reading files, arrays; signals raise within it
-        with deferred():       # OpenGL: noted, raised at the end of the block
+        with deferred():       # OpenGL: recorded, raised at the end of the block
             draw()
         hold()                 # results are written: from now on only poll() raises
         for file in files:
             poll()             # nothing is half done here
             write(file)
 
-What is signalled after the last ``poll`` comes too late: the work is done, and that is success. A
-second signal that comes a while after the first is for a program that does not react: it ends it.
+A signal after the last ``poll`` is too late: the work is done, and the result is success. A second
+signal, a second or more after the first, ends a program that does not respond.
 """
 
 from __future__ import annotations
 
 import _thread
+import atexit
 import os
 import signal
 import sys
@@ -30,17 +31,17 @@ from contextlib import contextmanager
 # As in ``viewer/__init__.py``: what is imported here delays the moment of looking after signals.
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
     from sys import UnraisableHookArgs
     from types import FrameType
     from typing import Any
 
-__all__ = ["Interrupted", "deferred", "hold", "poll", "program", "raising", "watched"]
+__all__ = ["Interrupted", "deferred", "hold", "poll", "raising", "watch_program", "watched"]
 
 _WORDS = {"SIGINT": "interrupted", "SIGTERM": "terminated", "SIGHUP": "hung up"}
 _SIGNALS = {getattr(signal, name): word for name, word in _WORDS.items() if hasattr(signal, name)}
-_SAME = 1.0  # seconds in which further signals count as one: a nervous finger, a group of processes
-_PAUSE = 0.02  # seconds until it is tried again to raise
+_SAME = 1.0  # seconds during which further signals count as the same request
+_PAUSE = 0.02  # seconds before raising is tried again
 
 
 class Interrupted(BaseException):
@@ -94,7 +95,7 @@ class _Watch:
             signal.signal(number, other)
 
     def ignore(self) -> None:
-        """Let signals pass for good: the result stands, and Python is taking itself apart."""
+        """Ignore signals for good: the result stands, and the interpreter shuts down."""
         for number in self._others:
             signal.signal(number, signal.SIG_IGN)
 
@@ -118,7 +119,7 @@ class _Watch:
             raise Interrupted(self.number)
 
     def _force(self, number: int) -> None:
-        """End a program that does not react; whoever calls it as a library decides on its own."""
+        """End a program that does not respond; a library's caller decides for itself."""
         if self._owns_process:
             os.write(2, f"viewer: {_SIGNALS[number]}\n".encode())
             os._exit(128 + number)
@@ -126,7 +127,7 @@ class _Watch:
         signal.raise_signal(number)
 
     def _on_unraisable(self, problem: UnraisableHookArgs, /) -> None:
-        """Notice that the signal was raised where Python drops exceptions, as in ``__del__``."""
+        """Raise again what was raised where Python drops exceptions, as in ``__del__``."""
         if isinstance(problem.exc_value, Interrupted):
             self._ring_again()
         else:
@@ -149,22 +150,22 @@ _current: _Watch | None = None
 
 
 def _mine() -> _Watch | None:
-    """Return the watch if this is its thread: others are told by it to end."""
+    """Return the watch in the main thread, which is the only one that handles signals."""
     is_main = threading.current_thread() is threading.main_thread()
     return _current if is_main else None
 
 
 @contextmanager
 def watched() -> Iterator[None]:
-    """Raise signals within the block, but for the places that say otherwise.
+    """Raise signals within the block, except where they are deferred or held.
 
-    Handlers are as before afterwards. In other threads than the main one, to which Python hands
-    signals, this does nothing.
+    The previous handlers are restored afterwards. Outside the main thread this does nothing,
+    because Python handles signals in the main thread only.
 
     Raises
     ------
     Interrupted
-        In the block, or at its beginning if ``program`` has noted a signal.
+        In the block, or at its beginning if ``watch_program`` has noted a signal.
     """
     global _current
     outer = _mine()
@@ -182,24 +183,22 @@ def watched() -> Iterator[None]:
         _current = None
 
 
-def program(run: Callable[[], int]) -> int:
-    """Run the whole of a process: signals are noted from now on, and only raised if ``watched``."""
+def watch_program() -> None:
+    """Record signals until the process ends; they raise where they are ``watched``."""
     global _current
-    import atexit
-
     watch = _current = _Watch(is_held=True, owns_process=True)
-    watch.start()
-    # First in, last out: Python resets handlers soon after, and must not be killed meanwhile.
+    # Registered first, so it runs last: Python resets handlers soon after, which would let a signal
+    # kill a process whose work is done.
     atexit.register(watch.ignore)
-    return run()
+    watch.start()
 
 
 @contextmanager
 def deferred() -> Iterator[None]:
-    """Put signals off until the end of the block, for work of C libraries.
+    """Put signals off until the end of the block, for calls into C libraries.
 
-    Where nobody watches, as in programs that use the package as a library, their own handlers
-    are called then.
+    If no watch is active, because another program uses the package as a library, that program's
+    own handlers are called at the end.
     """
     watch = _mine()
     if watch is not None:
@@ -222,7 +221,7 @@ def deferred() -> Iterator[None]:
 
 @contextmanager
 def raising() -> Iterator[None]:
-    """Let signals raise in the block, even after ``hold``: it takes long, or waits for others."""
+    """Let signals raise in the block even after ``hold``, for long or blocking work."""
     with _held(_mine(), False):
         yield
 
@@ -249,13 +248,13 @@ def hold() -> None:
 
 
 def poll(in_any_thread: bool = False) -> None:
-    """Raise a signal that was put off, for which this is a good moment.
+    """Raise a signal that was put off, at a point where nothing is half done.
 
     Parameters
     ----------
     in_any_thread : bool
-        Raise in this thread, even if it is not the one that was interrupted: for the last step of
-        work that the other one waits for.
+        Raise outside the main thread too: for the last step of work that the main thread waits
+        for.
 
     Raises
     ------
@@ -268,7 +267,7 @@ def poll(in_any_thread: bool = False) -> None:
 
 
 def _is_importing(frame: FrameType | None) -> bool:
-    """Return whether a module is being imported: whatever is raised there may become anything."""
+    """Return whether a module is being imported; importers turn exceptions into others."""
     while frame is not None:
         if frame.f_code.co_filename.startswith("<frozen importlib"):
             return True
