@@ -10,6 +10,7 @@ from capture_files import body, opened, points, rows_of, write_frames
 
 from viewer.errors import FormatError
 from viewer.formats import Source, easymocap
+from viewer.formats._json_places import line_at, nearest_place
 
 
 def refusal(path, **options):
@@ -39,14 +40,14 @@ def gap(tmp_path, content, kind="smpl"):
         ("[\n{\n", ":3: expected JSON, found a mistake: "
          "Expecting property name enclosed in double quotes"),
         ("[1, 2", ":1: expected JSON, found a mistake: Expecting ',' delimiter"),
-        ("null", ": expected a list of people, found nothing"),
-        ("17", ": expected a list of people, found 17"),
-        ('{"id": 0}', ": expected a list of people, found a dict of 1"),
-        ('{"annots": 3}', ": expected a list of people, found 3"),
-        ("[" * 100_000, ": expected JSON, found too deep a nesting"),
-        (f"[1{'0' * 5000}]", ": Exceeds the limit (4300 digits) for integer string conversion"),
-        ('[{"id": 0, "poses": [1], "poses": [2]}]',
-         ': expected every key once, found "poses" twice'),
+        ("null", ":1: expected a list of people, found nothing"),
+        ("17", ":1: expected a list of people, found 17"),
+        ('{"id": 0}', ":1: expected a list of people, found a dict of 1"),
+        ('{"annots":\n 3}', ":1: expected a list of people, found 3"),
+        ("\n[" * 100_000, ":100001: expected JSON, found too deep a nesting"),
+        (f"[\n1{'0' * 5000}]", ":2: expected numbers of up to 4300 digits, found a longer one"),
+        ('[{"id": 0, "poses": [1],\n"poses": [2]}]',
+         ':2: expected every key once, found "poses" twice'),
     ],
 )  # fmt: skip
 def test_broken_file_is_a_gap_for_all(tmp_path, content, message):
@@ -57,10 +58,10 @@ def test_broken_file_is_a_gap_for_all(tmp_path, content, message):
 
 def test_file_that_is_no_text_is_a_gap(tmp_path):
     folder = write_frames(tmp_path / "smpl", {0: [body(0)]})
-    (folder / "000001.json").write_bytes(b"[\xff\xfe]")
+    (folder / "000001.json").write_bytes(b"[\n\xff\xfe]")
     (folder / "000002.json").write_bytes(b"\xef\xbb\xbf[]")  # a mark is fine
     _, parts, _ = opened(tmp_path)
-    warning = f"{folder}/000001.json: expected text in UTF-8, found other bytes"
+    warning = f"{folder}/000001.json:2: expected text in UTF-8, found other bytes"
     assert [text for part in parts for text in part.warnings] == [warning]
 
 
@@ -128,7 +129,7 @@ def test_broken_record_is_a_gap_for_one_person(tmp_path, changes, message):
     _, parts, _ = opened(tmp_path)
     assert (rows_of(parts, 0), rows_of(parts, 1)) == ([0, 2], [0, 1, 2])
     warnings = [text for part in parts for text in part.warnings]
-    assert warnings == [f"{folder}/000001.json: person 0: {message}"]
+    assert warnings == [f"{folder}/000001.json:1: person 0: {message}"]
     assert parts[1].bodies[0].n_rows == 1
     assert np.isfinite(parts[1].bodies[0].vectors).all()
 
@@ -145,7 +146,7 @@ def test_broken_record_is_a_gap_for_one_person(tmp_path, changes, message):
 )
 def test_person_without_a_number_is_left_out(tmp_path, person, message):
     warnings, _ = gap(tmp_path, [body(0, id=person)])
-    assert warnings == [f": {message}"]
+    assert warnings == [f":1: {message}"]
 
 
 def test_whole_numbers_may_be_written_as_fractions(tmp_path):
@@ -156,15 +157,15 @@ def test_whole_numbers_may_be_written_as_fractions(tmp_path):
 def test_record_that_is_none_is_left_out(tmp_path):
     warnings, parts = gap(tmp_path, [None, 3, body(0)])
     assert warnings == [
-        ": expected a person with names and values, found nothing",
-        ": expected a person with names and values, found 3",
+        ":1: expected a person with names and values, found nothing",
+        ":1: expected a person with names and values, found 3",
     ]
     assert rows_of(parts, 0) == [0, 1, 2]
 
 
 def test_first_of_two_with_one_number_counts(tmp_path):
     warnings, parts = gap(tmp_path, [body(0, seed=1.0), body(0, seed=2.0)])
-    assert warnings == [": person 0 is there twice: the first counts"]
+    assert warnings == [":1: person 0 is there twice: the first counts"]
     assert parts[1].bodies[0].translations[0, 0] == body(0, seed=1.0)["Th"][0][0]
 
 
@@ -173,7 +174,7 @@ def test_untracked_people_are_named_in_messages(tmp_path):
     assert warnings == [
         ': people without a track (id -1) are called "untracked" and numbered within each frame: '
         "nobody says who of them is who in the next",
-        ": untracked 2: Th: expected finite numbers, found nan",
+        ":1: untracked 2: Th: expected finite numbers, found nan",
     ]
 
 
@@ -191,7 +192,7 @@ def test_keypoints_that_are_no_numbers_are_not_seen(tmp_path):
     folder = write_frames(tmp_path / "keypoints3d", {0: [record]})
     _, parts, _ = opened(tmp_path)
     assert parts[0].warnings == (
-        f"{folder}/000000.json: person 0: 3 keypoints without finite numbers, or of a confidence "
+        f"{folder}/000000.json:1: person 0: 3 keypoints without finite numbers, or of a confidence "
         "below 0, count as not seen",
     )
     found = parts[0].points[0][1].points[0]
@@ -212,7 +213,7 @@ def test_keypoints_that_are_no_numbers_are_not_seen(tmp_path):
 )  # fmt: skip
 def test_broken_keypoints_are_a_gap(tmp_path, rows, message):
     warnings, parts = gap(tmp_path, [{"id": 0, "keypoints3d": rows}], "keypoints3d")
-    assert warnings == [f": person 0: {message}"]
+    assert warnings == [f":1: person 0: {message}"]
     assert len(parts[1].points[0][1].points) == 1
 
 
@@ -251,7 +252,7 @@ def test_only_broken_files_are_refused(tmp_path):
 def test_code_of_vposer_is_refused(tmp_path):
     write_frames(tmp_path / "smpl", {0: [body(0, 32)]})
     assert refusal(tmp_path / "smpl" / "000000.json") == (
-        f"{tmp_path}/smpl/000000.json: person 0: poses: expected rotations, found 32 numbers, a "
+        f"{tmp_path}/smpl/000000.json:1: person 0: poses: expected rotations, found 32 numbers, a "
         "code of VPoser that only its network can decode: write full poses in EasyMocap"
     )
 
@@ -320,3 +321,53 @@ def test_mutations_are_read_or_refused_in_one_line(tmp_path):
             list(easymocap.read(Source.open(path)).parts())
         except FormatError as problem:
             assert str(problem).isprintable()
+
+
+# Lines
+
+
+PEOPLE = [body(3, 9), body(4, 9)]
+
+
+@pytest.mark.parametrize("wrapper", ["", "annots"])
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("poses", [1.0]), ("Th", [[1.0, float("nan"), 0.0]]), ("shapes", "x"), ("Rh", None)],
+)
+def test_the_line_of_the_key_at_fault_is_named(tmp_path, wrapper, key, value):
+    people = [PEOPLE[0], {**PEOPLE[1], key: value}]
+    content = {"note": [{"poses": 1}], wrapper: people} if wrapper else people
+    text = json.dumps(content, indent=1)
+    # The second of the keys that is written so, as both people have it.
+    rows = [number for number, row in enumerate(text.splitlines(), 1) if f'"{key}":' in row]
+    write_frames(tmp_path / "smpl", {0: PEOPLE, 1: text})
+    _, parts, _ = opened(tmp_path / "smpl")
+    (warning,) = [text for part in parts for text in part.warnings]
+    assert warning.startswith(f"{tmp_path}/smpl/000001.json:{rows[-1]}: person 4: {key}: ")
+
+
+def test_the_line_of_a_record_is_named_where_a_key_is_missing(tmp_path):
+    people = [PEOPLE[0], {key: value for key, value in PEOPLE[1].items() if key != "Th"}]
+    text = json.dumps(people, indent=1)
+    begins = [number for number, row in enumerate(text.splitlines(), 1) if row == " {"]
+    write_frames(tmp_path / "smpl", {0: PEOPLE, 1: text})
+    _, parts, _ = opened(tmp_path / "smpl")
+    (warning,) = [text for part in parts for text in part.warnings]
+    assert warning.startswith(f"{tmp_path}/smpl/000001.json:{begins[1]}: person 4: Th: ")
+
+
+@pytest.mark.parametrize(
+    ("text", "place", "line"),
+    [
+        ('{"a": 1,\n"b": 2}', ("b",), 2),
+        ('{"a": {"b": 1},\n"b": 2}', ("b",), 2),  # not the one inside
+        ('{"a": "b",\n"b": 2}', ("b",), 2),  # nor a value of that name
+        ("[[1,\n2],\n[3]]", (1, 0), 3),
+        ('["}",\n"\\"]",\n3]', (2,), 3),  # brackets and quotes in texts
+        ('[{"a": []},\n{"a": 1}]', (1, "b"), 2),  # its record
+        ("[]", (0,), None),
+    ],
+)
+def test_places_in_a_text_have_a_line(text, place, line):
+    offset = nearest_place(text, place)
+    assert (None if offset is None else line_at(text, offset)) == line

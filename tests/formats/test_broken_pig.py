@@ -69,11 +69,11 @@ def folder(tmp_path):
          "pig/faces_tex.txt:2: expected a texture coordinate from 0 to 2, found 3: "
          "textures.txt has 3 rows"),
         ({"faces_tex": "0 1 2\n"},
-         "pig/faces_tex.txt: expected 2 rows as in faces_vert.txt, found 1"),
+         "pig/faces_tex.txt:1: expected 2 rows as in faces_vert.txt, found 1"),
         ({"faces_vert": "0 1 2\n"},
-         "pig/faces_tex.txt: expected 1 rows as in faces_vert.txt, found 2"),
+         "pig/faces_tex.txt:2: expected 1 rows as in faces_vert.txt, found 2"),
         ({"parents": "-1\n0\n"},
-         "pig/parents.txt: expected 3 rows as in t_pose_joints.txt, found 2"),
+         "pig/parents.txt:2: expected 3 rows as in t_pose_joints.txt, found 2"),
         ({"t_pose_joints": "0 0 0\n1 0 0", "parents": "-1\n0\n"},
          "pig/skinning_weights.txt:5: expected a joint from 0 to 1, found 2: "
          "t_pose_joints.txt has 2 rows"),
@@ -125,8 +125,8 @@ def folder(tmp_path):
         # Optional files
         ({"body_parts": "1\n1\n1\n3\n2\n"},
          "pig/body_parts.txt:4: expected a body part from 0 to 2, found 3"),
-        ({"body_parts": "1\n1\n"}, "pig/body_parts.txt: expected 5 rows, found 2"),
-        ({"sym": "0\n2\n1\n3\n"}, "pig/sym.txt: expected 5 rows, found 4"),
+        ({"body_parts": "1\n1\n"}, "pig/body_parts.txt:2: expected 5 rows, found 2"),
+        ({"sym": "0\n2\n1\n3\n"}, "pig/sym.txt:4: expected 5 rows, found 4"),
         ({"sym": "0\n2\n1\n3\n5\n"}, "pig/sym.txt:5: expected a vertex from 0 to 4, found 5"),
         ({"sym": "0\n2\n3\n1\n4\n"},
          "pig/sym.txt:2: expected partners in pairs, found 1 -> 2 -> 3"),

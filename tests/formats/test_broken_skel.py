@@ -14,7 +14,7 @@ from viewer.formats import Source, skel
     [
         ("", "a.skel: expected a skeleton, found no balljoint (an empty file)"),
         (" \n ", "a.skel: expected a skeleton, found no balljoint (only white space)"),
-        ("offset 1 2 3", "a.skel: expected a skeleton, found no balljoint"),
+        ("offset 1 2 3", "a.skel:1: expected a skeleton, found no balljoint"),
         ("\0\0\0\0", "a.skel: expected a skeleton, found no balljoint (zeros)"),
         ("balljoint", 'a.skel:1: joint without a name: expected "{", found the end of the file'),
         ("\nballjoint a b\n", 'a.skel:2: joint a b: expected "{", found the end of the file'),

@@ -28,8 +28,8 @@ from viewer.formats import Source, skin
         ("", "a.skin: expected a skin, found no `positions` section (an empty file)"),
         (" \n\n", "a.skin: expected a skin, found no `positions` section (only white space)"),
         ("\0" * 9, "a.skin: expected a skin, found no `positions` section (zeros)"),
-        (NORMALS + TRIANGLES, "a.skin: expected a skin, found no `positions` section"),
-        (POSITIONS + NORMALS, "a.skin: expected triangles, found no `triangles` section"),
+        (NORMALS + TRIANGLES, "a.skin:8: expected a skin, found no `positions` section"),
+        (POSITIONS + NORMALS, "a.skin:10: expected triangles, found no `triangles` section"),
         (
             POSITIONS + NORMALS + "triangles 0 {\n}",
             "a.skin:11: expected at least one triangle, found none",
@@ -67,11 +67,11 @@ from viewer.formats import Source, skin
         (GOOD.replace("2 0 0", "2 0", 1), "a.skin:3: expected 3 numbers, found 2 (positions)"),
         (GOOD.replace("2 0 0", "2 0 0 0", 1), "a.skin:3: expected 3 numbers, found 4 (positions)"),
         (GOOD.replace("  2 0 0\n", "", 1),
-         "a.skin:4: positions: expected 3 rows of 3 numbers, found 2 (from line 1)"),
+         "a.skin:1: positions: expected 3 rows of 3 numbers, found 2 (to line 4)"),
         (GOOD.replace("  2 0 0\n", "  2 0 0\n" * 2, 1),
-         "a.skin:6: positions: expected 3 rows of 3 numbers, found 4 (from line 1)"),
+         "a.skin:1: positions: expected 3 rows of 3 numbers, found 4 (to line 6)"),
         ("positions 3 { 0 0 0 1 1 1 2 2 }\n" + NORMALS,
-         "a.skin:1: positions: expected 3 rows of 3 numbers, found 2 and 2 numbers (from line 1)"),
+         "a.skin:1: positions: expected 3 rows of 3 numbers, found 2 and 2 numbers (to line 1)"),
         ("positions 3 {\n 0 0 0\n 1 1 1\n 2",
          'a.skin:4: expected "}" to close positions (line 1), found the end of the file '
          "after 2 of 3 rows"),
@@ -108,26 +108,28 @@ from viewer.formats import Source, skin
         (GOOD.replace("2 0 0.25", "1.5 0 0.25"),
          'a.skin:13: skinweights of vertex 1: expected a number of influences, found "1.5"'),
         (GOOD.replace("1 1 1\n}", "2 1 1\n}"),
-         "a.skin:14: skinweights of vertex 2, the last: expected 2 pairs of joint and weight, "
-         "found 2 numbers up to the closing brace"),
+         "a.skin:14: skinweights of vertex 2: expected 2 pairs of joint and weight, "
+         "found 2 numbers in the line"),
         (GOOD.replace("1 1 1\n}", "1 1 1\n1 1 1\n}"),
-         "a.skin:14: skinweights of vertex 2, the last: expected 1 pairs of joint and weight, "
-         "found 5 numbers up to the closing brace"),
+         "a.skin:11: skinweights: expected 3 vertices, found 4 (to line 16)"),
         (GOOD.replace("  1 1 1\n}", "}"),
-         "a.skin:14: skinweights: expected 3 vertices, found 2 (from line 11)"),
+         "a.skin:11: skinweights: expected 3 vertices, found 2 (to line 14)"),
         (GOOD.replace("skinweights 3", "skinweights 0"),
-         "a.skin:11: skinweights: expected no vertices, found 11 numbers"),
+         "a.skin:11: skinweights: expected 0 vertices, found 3 (to line 15)"),
         (POSITIONS + "skinweights 3 {\n 1 0 1\n 1 0",
          'a.skin:8: expected "}" to close skinweights (line 6), found the end of the file '
          "after 2 of 3 vertices"),
-        (BARE + WEIGHTS, "a.skin: expected a `bindings` section beside `skinweights`, found none"),
-        (BARE + BINDINGS, "a.skin: expected a `skinweights` section beside `bindings`, found none"),
+        (BARE + WEIGHTS,
+         "a.skin:14: expected a `bindings` section beside `skinweights`, found none"),
+        (BARE + BINDINGS,
+         "a.skin:14: expected a `skinweights` section beside `bindings`, found none"),
         (GOOD.replace("bindings 2", "bindings 3"),
-         'a.skin:32: bindings (line 19): expected 3 matrices, found 2 matrices, then "}"'),
+         'a.skin:19: bindings (to line 32): expected 3 matrices, found 2 matrices, then "}"'),
         (GOOD.replace("bindings 2", "bindings 1"),
-         'a.skin:32: bindings (line 19): expected 1 matrix, found 2 matrices, then "}"'),
+         'a.skin:19: bindings (to line 32): expected 1 matrix, found 2 matrices, then "}"'),
         (GOOD.replace("matrix", "matrices", 1),
-         'a.skin:20: bindings (line 19): expected 2 matrices, found 0 matrices, then "matrices"'),
+         "a.skin:20: bindings (from line 19): expected 2 matrices, found 0 matrices, then "
+         '"matrices"'),
         (GOOD.replace("  8 9 10\n", ""),
          "a.skin:26: matrix 1 of bindings: expected 12 numbers, found 9"),
         (GOOD.replace("8 9 10", "8 9 10 11"),
@@ -140,7 +142,7 @@ from viewer.formats import Source, skin
          'a.skin:29: expected "}" to close matrix 1 of bindings (line 26), '
          "found the end of the file"),
         (GOOD[: GOOD.index("matrix {\n  1 0 0\n  0 1 0\n  0 0 1\n  8")],
-         "a.skin:25: bindings (line 19): expected 2 matrices, found 1 matrix, "
+         "a.skin:25: bindings (from line 19): expected 2 matrices, found 1 matrix, "
          "then the end of the file"),
         (GOOD.replace("0 0 1\n  8", "0 1 0\n  8"),
          "a.skin:26: bindings: expected matrices that can be inverted, found matrix 1 "
@@ -209,8 +211,8 @@ def test_absurd_number_of_influences_is_refused_without_memory():
     finally:
         tracemalloc.stop()
     assert message == (
-        "a.skin:14: skinweights of vertex 2, the last: expected 1e38 pairs of joint and weight, "
-        "found 2 numbers up to the closing brace"
+        "a.skin:14: skinweights of vertex 2: expected 1e38 pairs of joint and weight, "
+        "found 2 numbers in the line"
     )
     assert peak < 200_000
 

@@ -150,7 +150,7 @@ def test_one_broken_camera_is_left_out(tmp_path, file, old, new, message):
         ("K: !!opencv-matrix\n  rows: 1e99\n", 4, 'expected a size, found "1e99"'),
         ("K: !!opencv-matrix\n  rows: 1\n  cols: 2\n  data: 1, 2\n", 6,
          'expected [ numbers ], found "1, 2"'),
-        ("K: !!opencv-matrix\n  rows: 1\n  cols: 2\n  data: [ 1, .Nan ]\n", 3,
+        ("K: !!opencv-matrix\n  rows: 1\n  cols: 2\n  data: [ 1, .Nan ]\n", 6,
          'K: expected numbers, found ".Nan"'),
         ("K: !!opencv-matrix\n  rows: 1\n  cols: 2\n  data: [ 1 ]\n", 3,
          "K: expected 1 x 2 numbers, found 1"),

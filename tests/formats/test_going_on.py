@@ -100,9 +100,10 @@ ONE: list[tuple[Any, str, str, str, str, str, str, list[int]]] = [
     (skin, "a.skin", SKIN, "8 9 10", "8 9",
      "a.skin:26: matrix 1 of bindings: expected 12 numbers, found 11", "bindings", [1]),
     (skin, "a.skin", SKIN, BINDINGS, "",
-     "a.skin: expected a `bindings` section beside `skinweights`, found none", "bindings", [0, 1]),
+     "a.skin:11: expected a `bindings` section beside `skinweights`, found none", "bindings",
+     [0, 1]),
     (skin, "a.skin", SKIN, "bindings 2", "bindings 3",
-     'a.skin:32: bindings (line 19): expected 3 matrices, found 2 matrices, then "}"', "", []),
+     'a.skin:19: bindings (to line 32): expected 3 matrices, found 2 matrices, then "}"', "", []),
     (obj, "a.obj", OBJ, "v 1 0 0", "v 1 nan 0",
      'a.obj:2: v of vertex 1: expected a number, found "nan"', "positions", [1]),
     (obj, "a.obj", OBJ, "v 1 0 0", "v 1 0",
@@ -134,9 +135,9 @@ ONE: list[tuple[Any, str, str, str, str, str, str, list[int]]] = [
     (anim, "a.anim", ANIM, "0.5 1", "0.5 nan",
      'a.anim:6: channel 0, key 1: value: expected a number, found "nan"', "", []),
     (anim, "a.anim", ANIM, "keys 3", "keys 4",
-     "a.anim:7: channel 0: expected 4 keys, found 3", "", []),
+     "a.anim:4: channel 0: expected 4 keys, found 3", "", []),
     (anim, "a.anim", ANIM, "channels 1", "channels 2",
-     "a.anim:8: animation: expected 2 channels as numchannels says, found 1", "", []),
+     "a.anim:3: animation: expected 2 channels as numchannels says, found 1", "", []),
 ]  # fmt: skip
 
 

@@ -65,7 +65,7 @@ def test_empty_target_warns():
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (NORMALS, "smile.morph: no positions section"),
+        (NORMALS, "smile.morph:4: no positions section"),
         ("", "smile.morph: expected a .morph file, found an empty file"),
         (
             GOOD.replace("-1", "up"),
@@ -98,7 +98,7 @@ def test_empty_target_warns():
         ),
         (
             GOOD.replace("positions 2", "positions 3"),
-            "smile.morph:4: positions: expected 3 rows of 4 numbers, found 2 (from line 1)",
+            "smile.morph:1: positions: expected 3 rows of 4 numbers, found 2 (to line 4)",
         ),
         (
             GOOD.replace("positions 2", "positions 2000000000"),

@@ -273,7 +273,7 @@ def test_points_alone_are_a_warning() -> None:
     [
         ("", "a.obj: expected a mesh, found no `v` line (an empty file)"),
         ("\0" * 9, "a.obj: expected a mesh, found no `v` line (zeros)"),
-        ("vt 0 0\n", "a.obj: expected a mesh, found no `v` line"),
+        ("vt 0 0\n", "a.obj:1: expected a mesh, found no `v` line"),
         ("v 0 0\n", "a.obj:1: v: expected 3 numbers, found 2"),
         ("v 0 0 0\nv\n", "a.obj:2: v: expected 3 numbers, found 0"),
         ("v 0 0 0 0 0\n",

@@ -55,11 +55,11 @@ def test_odd_ends_warn(text, warning):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("rig a { }", "expected a skeleton or a skin, found no name of a file"),
+        ("rig a { }", "1: expected a skeleton or a skin, found no name of a file"),
         (GOOD.replace("skin wasp.skin", "mesh wasp.skin"), "3: expected skeleton, skin or morphs, "
          'found "mesh"'),
         (GOOD.replace("skin wasp.skin", "skin"), '4: expected skeleton, skin or morphs, found "0"'),
-        (GOOD.replace("0 {", "1 {"), "5: morphs: expected 1 files, found 0"),
+        (GOOD.replace("0 {", "1 {"), "4: morphs: expected 1 files, found 0"),
         (GOOD.replace("0 {", "-1 {"), '4: morphs: expected a count, found "-1"'),
         (GOOD.replace("0 {", "many {"), '4: morphs: expected a count, found "many"'),
         (GOOD.replace("0 {", "0"), '5: expected "{", found "}"'),

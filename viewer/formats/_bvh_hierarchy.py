@@ -203,6 +203,7 @@ class _Parser:
             raise self._error(
                 f"CHANNELS of {_called(joint)}: expected a count, found {self._shown()}"
             )
+        stated = self.word
         self._advance()
         codes: list[int] = []
         while self.word is not None and self.keyword not in (b"{", b"}", *_ITEMS):
@@ -223,7 +224,7 @@ class _Parser:
             raise self.source.error(
                 f"CHANNELS of {_called(joint)}: expected {count:.0f} channel names, "
                 f"found {len(codes)}",
-                keyword.start(),
+                stated.start() if stated else keyword.start(),
             )
         joint.channels = codes
 

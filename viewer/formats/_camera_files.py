@@ -68,8 +68,9 @@ class Storage:
     lines: dict[str, int] = field(default_factory=dict)
 
     def error(self, key: str, message: str) -> FormatError:
-        """Return an error at the line of a key; at that of the cameras' names if it is missing."""
-        line = self.lines.get(key, self.lines.get("names"))
+        """Return an error at the line of a key; of one that is missing, at the cameras' names."""
+        end = self.source.line(self.source.end)
+        line = self.lines.get(key, self.lines.get("names", end))
         return FormatError(self.source.path, f"{printable(key, 40)}: {message}", line)
 
 
@@ -197,6 +198,7 @@ class _Matrix:
     rows: int = -1
     columns: int = -1
     data: list[bytes] = field(default_factory=list)
+    lines: list[int] = field(default_factory=list)  # of each number
     is_open: bool = False  # whether the list of numbers goes on
 
 
@@ -282,7 +284,9 @@ def _continue(source: Source, matrix: _Matrix, line: bytes, number: int) -> None
         text, matrix.is_open = text[1:], True
     numbers, bracket, _ = text.partition(b"]")
     matrix.is_open = not bracket
-    matrix.data += numbers.replace(b",", b" ").split()
+    words = numbers.replace(b",", b" ").split()
+    matrix.data += words
+    matrix.lines += [number] * len(words)
 
 
 def _close(source: Source, matrix: _Matrix | None, values: dict[str, Value]) -> None:
@@ -298,10 +302,9 @@ def _close(source: Source, matrix: _Matrix | None, values: dict[str, Value]) -> 
         )
     numbers = [to_number(word) for word in matrix.data]
     if None in numbers:
-        odd = matrix.data[numbers.index(None)]
-        raise FormatError(
-            source.path, f"{matrix.key}: expected numbers, found {shown(odd)}", matrix.line
-        )
+        at = numbers.index(None)
+        found = f"expected numbers, found {shown(matrix.data[at])}"
+        raise FormatError(source.path, f"{matrix.key}: {found}", matrix.lines[at])
     if matrix.is_open or matrix.rows * matrix.columns != len(numbers):
         raise FormatError(
             source.path,

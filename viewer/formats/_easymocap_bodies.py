@@ -22,7 +22,7 @@ from viewer.rig.body_motion import BodyMotion
 from viewer.rig.smpl_family import FAMILY, members_by_numbers
 from viewer.rig.timing import Timing
 
-__all__ = ["BodyLayout", "BodyRows", "Rows", "body_layout", "with_coefficients"]
+__all__ = ["BodyLayout", "BodyRows", "RowFault", "Rows", "body_layout", "with_coefficients"]
 
 _SMPL, _SMPLH, _SMPLX, _MANO = FAMILY[24], FAMILY[52], FAMILY[55], FAMILY[16]
 _BODY = members_by_numbers()[66]
@@ -96,13 +96,14 @@ def body_layout(record: dict[str, Any]) -> BodyLayout:
     count = len(row_of(record, "poses"))
     if count == _VPOSER:
         raise MisfitError(
-            f"poses: expected rotations, found {count} numbers, a code of VPoser that only its "
-            "network can decode: write full poses in EasyMocap"
+            "poses",
+            f"expected rotations, found {count} numbers, a code of VPoser that only its "
+            "network can decode: write full poses in EasyMocap",
         )
     layout = _LAYOUTS.get(count)
     if layout is None:
         known = ", ".join(str(number) for number in sorted(_LAYOUTS))
-        raise MisfitError(f"poses: expected {known} numbers, found {count}")
+        raise MisfitError("poses", f"expected {known} numbers, found {count}")
     widths = [("Rh", 3), ("Th", 3), ("poses", count)]
     widths += [(key, len(row_of(record, key))) for key in COEFFICIENTS if has_numbers(record, key)]
     hands = layout.hands
@@ -134,12 +135,23 @@ def with_coefficients(layout: BodyLayout, record: dict[str, Any]) -> BodyLayout:
     return replace(layout, widths=(*layout.widths, *more))
 
 
+RowFault = tuple[int, str, str]
+"""A record that cannot be used: its row, the key at fault, and what is wrong."""
+
+
 @dataclass(slots=True)
 class Rows:
     """What one person has in some frames: numbers as they come, and where they come from."""
 
     frames: list[int] = field(default_factory=list)
     paths: list[str] = field(default_factory=list)
+    places: list[int] = field(default_factory=list)  # in the files' lists of people
+
+    def keep_origin(self, frame: int, path: str, place: int) -> None:
+        """Note where a record comes from that was taken in."""
+        self.frames.append(frame)
+        self.paths.append(path)
+        self.places.append(place)
 
     def timing(
         self, n_frames: int, rate: float, first_frame: int, keep: Bools | None = None
@@ -187,7 +199,7 @@ class BodyRows(Rows):
             self._lacking[key] = [*range(len(self.frames))]
         self._plan = [(key, count, buffer.fromlist) for (key, count), buffer in self._buffers()]
 
-    def add(self, record: dict[str, Any], frame: int, path: str) -> None:
+    def add(self, record: dict[str, Any], frame: int, path: str, place: int) -> None:
         """Take in one record.
 
         Raises
@@ -208,8 +220,7 @@ class BodyRows(Rows):
                 put(values)
         except (KeyError, TypeError, ValueError, OverflowError):
             self._take_slowly(record)
-        self.frames.append(frame)
-        self.paths.append(path)
+        self.keep_origin(frame, path, place)
 
     def _take_slowly(self, record: dict[str, Any]) -> None:
         """Take in what may be odd, and say what is wrong with it."""
@@ -242,7 +253,7 @@ class BodyRows(Rows):
     def _buffers(self) -> Iterator[tuple[tuple[str, int], array[float]]]:
         return zip(self.layout.widths, self.buffers, strict=True)
 
-    def values(self) -> tuple[dict[str, Floats], Bools, list[tuple[str, str]]]:
+    def values(self) -> tuple[dict[str, Floats], Bools, list[RowFault]]:
         """Return the numbers by key, which rows are finite, and the faults of the others.
 
         Returns
@@ -251,11 +262,12 @@ class BodyRows(Rows):
             Of the finite rows.
         keep : (rows,) bool
             Which ones those are.
-        faults : list of (str, str)
-            File and text for each of the others.
+        faults : list of (int, str, str)
+            Row, key and text for each of the others.
         """
         keep: Bools = np.ones(len(self.frames), dtype=np.bool_)
-        values, faults = {}, []
+        values: dict[str, Floats] = {}
+        faults: list[RowFault] = []
         for (key, count), buffer in self._buffers():
             rows = np.frombuffer(buffer, dtype=np.float64).reshape(-1, count)
             if key in COEFFICIENTS:
@@ -267,7 +279,7 @@ class BodyRows(Rows):
                 for row in np.flatnonzero(~is_good & keep):
                     odd = rows[row][~(np.abs(rows[row]) <= LARGEST)][0]
                     text = f"{key}: expected finite numbers, found {odd:g}"
-                    faults.append((self.paths[row], text))
+                    faults.append((int(row), key, text))
                 keep &= is_good
         if faults:
             values = {key: rows[keep] for key, rows in values.items()}

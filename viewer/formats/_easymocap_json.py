@@ -9,14 +9,46 @@ from typing import Any
 
 from viewer.errors import FormatError, printable
 from viewer.formats._archive import describe
+from viewer.formats._json_places import (
+    MOST_DIGITS,
+    Keys,
+    deepest_place,
+    line_at,
+    long_number_place,
+    nearest_place,
+    repeated_key,
+)
 
-__all__ = ["MisfitError", "has_numbers", "load_people", "person_of", "row_of", "take_row"]
+__all__ = [
+    "MisfitError",
+    "has_numbers",
+    "load_people",
+    "person_of",
+    "record_line",
+    "row_of",
+    "take_row",
+]
 
 Record = dict[str, Any]
+_WRAPPER = "annots"  # key of the people, in files that hold more
 
 
 class MisfitError(ValueError):
-    """A person's record that cannot be used; the text says ``key: expected …, found …``."""
+    """A person's record that cannot be used; the text says ``key: expected …, found …``.
+
+    Attributes
+    ----------
+    key : str
+        What is at fault; empty for the record itself.
+    """
+
+    def __init__(self, key: str, message: str) -> None:
+        self.key = key
+        super().__init__(f"{key}: {message}" if key else message)
+
+
+class _RepeatedKeyError(ValueError):
+    """An object that has a key twice."""
 
 
 def _unique(pairs: list[tuple[str, Any]]) -> Record:
@@ -24,7 +56,7 @@ def _unique(pairs: list[tuple[str, Any]]) -> Record:
     if len(values) != len(pairs):
         counts = Counter(key for key, _ in pairs)
         twice = next(key for key, count in counts.items() if count > 1)
-        raise MisfitError(f'expected every key once, found "{printable(twice, 40)}" twice')
+        raise _RepeatedKeyError(f'expected every key once, found "{printable(twice, 40)}" twice')
     return values
 
 
@@ -46,25 +78,66 @@ def load_people(path: str, max_size: int) -> list[Any]:
     FormatError
         If it cannot be read, is no JSON, or holds no list of people.
     """
+    text = _text(path, max_size)
     try:
-        text = _read(path, max_size).decode()
-        content = _decode(text.removeprefix("\ufeff"))
-    except OSError as problem:
-        raise FormatError(path, f"cannot be read: {problem.strerror or problem}") from None
+        content = _decode(text)
     except json.JSONDecodeError as problem:
         what = f"expected JSON, found a mistake: {printable(problem.msg, 100)}"
         raise FormatError(path, what, problem.lineno) from None
-    except UnicodeDecodeError:
-        raise FormatError(path, "expected text in UTF-8, found other bytes") from None
     except RecursionError:
-        raise FormatError(path, "expected JSON, found too deep a nesting") from None
-    except ValueError as problem:  # numbers of thousands of digits, and keys that come twice
-        raise FormatError(path, printable(problem)) from None
-    if isinstance(content, dict) and "annots" in content:
-        content = content["annots"]
+        what = "expected JSON, found too deep a nesting"
+        raise FormatError(path, what, line_at(text, deepest_place(text))) from None
+    except _RepeatedKeyError as problem:
+        found = repeated_key(text)
+        line = _line(text, found[1] if found else None)
+        raise FormatError(path, str(problem), line) from None
+    except ValueError:  # the only other one that decoding raises
+        what = f"expected numbers of up to {MOST_DIGITS} digits, found a longer one"
+        raise FormatError(path, what, _line(text, long_number_place(text))) from None
+    if isinstance(content, dict) and _WRAPPER in content:
+        content = content[_WRAPPER]
     if not isinstance(content, list):
-        raise FormatError(path, f"expected a list of people, found {describe(content)}")
+        what = f"expected a list of people, found {describe(content)}"
+        raise FormatError(path, what, _line(text, nearest_place(text, (_WRAPPER,))) or 1)
     return content
+
+
+def record_line(path: str, max_size: int, place: int, key: str) -> int | None:
+    """Return the line of a person's record in a frame file, or of a key in it; slow, for errors.
+
+    Parameters
+    ----------
+    path, max_size
+        As for ``load_people``, which has read the file.
+    place : int
+        Which of the people.
+    key : str
+        Empty for the record itself.
+    """
+    try:
+        text = _text(path, max_size)
+    except FormatError:  # it changed since
+        return None
+    where: Keys = (place, key) if key else (place,)
+    if text.lstrip().startswith("{"):
+        where = (_WRAPPER, *where)
+    return _line(text, nearest_place(text, where))
+
+
+def _line(text: str, place: int | None) -> int | None:
+    return None if place is None else line_at(text, place)
+
+
+def _text(path: str, max_size: int) -> str:
+    try:
+        data = _read(path, max_size)
+    except OSError as problem:
+        raise FormatError(path, f"cannot be read: {problem.strerror or problem}") from None
+    try:
+        return data.decode().removeprefix("\ufeff")
+    except UnicodeDecodeError as problem:
+        line = 1 + data.count(b"\n", 0, problem.start)
+        raise FormatError(path, "expected text in UTF-8, found other bytes", line) from None
 
 
 def _read(path: str, max_size: int) -> bytes:
@@ -93,14 +166,14 @@ def person_of(record: Any, place: int) -> int:
     if type(record) is dict and type(person := record.get("id")) is int and -1 <= person < 1 << 31:
         return person
     if not isinstance(record, dict):
-        raise MisfitError(f"expected a person with names and values, found {describe(record)}")
+        raise MisfitError("", f"expected a person with names and values, found {describe(record)}")
     person = record.get("id", record.get("personID", place))
     if isinstance(person, float) and person.is_integer():
         person = int(person)
     if isinstance(person, bool) or not isinstance(person, int):
-        raise MisfitError(f"id: expected a whole number, found {describe(person)}")
+        raise MisfitError("id", f"expected a whole number, found {describe(person)}")
     if abs(person) >= 1 << 31:
-        raise MisfitError(f"id: expected less than 2147483648, found {describe(person)}")
+        raise MisfitError("id", f"expected less than 2147483648, found {describe(person)}")
     return person
 
 
@@ -122,7 +195,7 @@ def row_of(record: Record, key: str) -> list[Any]:
         values = values[0]
     if not isinstance(values, list):
         found = "no such key" if key not in record else describe(record[key])
-        raise MisfitError(f"{key}: expected numbers, found {found}")
+        raise MisfitError(key, f"expected numbers, found {found}")
     return values
 
 
@@ -145,9 +218,9 @@ def take_row(record: Record, key: str, count: int, put: Any) -> None:
         pass  # looked at below
     values = row_of(record, key)
     if len(values) != count:
-        raise MisfitError(f"{key}: expected {count} numbers, found {len(values)}")
+        raise MisfitError(key, f"expected {count} numbers, found {len(values)}")
     raise MisfitError(
-        f"{key}: expected {count} numbers, found {describe(_odd_one(values))} among them"
+        key, f"expected {count} numbers, found {describe(_odd_one(values))} among them"
     )
 
 

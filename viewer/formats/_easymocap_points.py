@@ -15,7 +15,7 @@ import numpy as np
 
 from viewer.errors import counted
 from viewer.formats._archive import describe
-from viewer.formats._easymocap_bodies import Rows
+from viewer.formats._easymocap_bodies import RowFault, Rows
 from viewer.formats._easymocap_json import MisfitError
 from viewer.formats._numbers import LARGEST
 from viewer.rig.arrays import Floats
@@ -75,9 +75,9 @@ def _one_hand(side: int) -> PointLayout:
 def _count(record: dict[str, Any], key: str) -> int:
     rows = record[key]
     if not isinstance(rows, list) or not rows or not all(isinstance(row, list) for row in rows):
-        raise MisfitError(f"{key}: expected rows of 3 or 4 numbers, found {describe(rows)}")
+        raise MisfitError(key, f"expected rows of 3 or 4 numbers, found {describe(rows)}")
     if len(rows) > _MOST:
-        raise MisfitError(f"{key}: expected at most {_MOST} keypoints, found {len(rows)}")
+        raise MisfitError(key, f"expected at most {_MOST} keypoints, found {len(rows)}")
     return len(rows)
 
 
@@ -99,7 +99,7 @@ class PointRows(Rows):
     parts: Parts
     buffer: array[float] = field(default_factory=lambda: array("d"))
 
-    def add(self, record: dict[str, Any], frame: int, path: str) -> None:
+    def add(self, record: dict[str, Any], frame: int, path: str, place: int) -> None:
         """Take in one record.
 
         Raises
@@ -114,8 +114,7 @@ class PointRows(Rows):
         except MisfitError:
             del self.buffer[before:]
             raise
-        self.frames.append(frame)
-        self.paths.append(path)
+        self.keep_origin(frame, path, place)
 
     def _take(self, rows: Any, key: str, count: int) -> None:
         try:
@@ -131,13 +130,13 @@ class PointRows(Rows):
         except (TypeError, ValueError, OverflowError):
             pass  # said below
         if not isinstance(rows, list):
-            raise MisfitError(f"{key}: expected {count} keypoints, found {describe(rows)}")
+            raise MisfitError(key, f"expected {count} keypoints, found {describe(rows)}")
         if len(rows) != count:
-            raise MisfitError(f"{key}: expected {count} keypoints, found {len(rows)}")
-        raise MisfitError(f"{key}: expected rows of 3 or 4 numbers, found others")
+            raise MisfitError(key, f"expected {count} keypoints, found {len(rows)}")
+        raise MisfitError(key, "expected rows of 3 or 4 numbers, found others")
 
-    def points(self) -> tuple[Floats, list[tuple[str, str]]]:
-        """Return the points (N, K, 4), and what was wrong with some: file and text."""
+    def points(self) -> tuple[Floats, list[RowFault]]:
+        """Return the points (N, K, 4), and what was wrong with some."""
         count = sum(size for _, size in self.parts)
         points = np.frombuffer(self.buffer, dtype=np.float64).reshape(-1, count, 4).copy()
         confidence = points[..., 3]
@@ -145,7 +144,7 @@ class PointRows(Rows):
         is_odd = ~((np.abs(points) <= LARGEST).all(axis=-1) & (confidence >= 0.0)) & ~is_unseen
         points[is_odd | is_unseen] = 0.0
         faults = [
-            (self.paths[row], _unseen_text(int(is_odd[row].sum())))
+            (int(row), KEY, _unseen_text(int(is_odd[row].sum())))
             for row in np.flatnonzero(is_odd.any(axis=1))
         ]
         points.flags.writeable = False  # so that it is not copied again

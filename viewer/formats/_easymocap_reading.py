@@ -11,11 +11,19 @@ from viewer.errors import FormatError, printable
 from viewer.formats._easymocap_bodies import (
     BodyLayout,
     BodyRows,
+    RowFault,
+    Rows,
     body_layout,
     with_coefficients,
 )
 from viewer.formats._easymocap_files import FrameFiles, FrameFolder
-from viewer.formats._easymocap_json import MisfitError, has_numbers, load_people, person_of
+from viewer.formats._easymocap_json import (
+    MisfitError,
+    has_numbers,
+    load_people,
+    person_of,
+    record_line,
+)
 from viewer.formats._easymocap_points import KEY, Parts, PointRows, point_layout
 from viewer.formats._easymocap_shapes import COEFFICIENTS
 from viewer.rig.arrays import Floats
@@ -120,18 +128,19 @@ class Reading:
             try:
                 person = person_of(record, place)
             except MisfitError as problem:
-                self._fault(FormatError(path, str(problem)))
+                self._fault_of(path, place, problem.key, str(problem))
                 continue
             if person < 0:  # nobody knows who: told apart within the frame
                 person = min(seen) - 1 if -1 in seen else -1
                 self._say_once(path, _UNTRACKED)
             if person in seen:
-                self._fault(FormatError(path, f"person {person} is there twice: the first counts"))
+                twice = f"person {person} is there twice: the first counts"
+                self._fault_of(path, place, "", twice)
                 continue
             if "id" not in record or "personID" in record:
                 self._say_of_ids(path, record)
             seen.add(person)
-            self._take_person(person, record, folder, frame, path, part)
+            self._take_person(person, record, folder, frame, (path, place), part)
 
     def _say_of_ids(self, path: str, record: dict[str, Any]) -> None:
         """Say whose number is used where there is none, or two that differ."""
@@ -146,28 +155,31 @@ class Reading:
         record: dict[str, Any],
         folder: FrameFolder,
         frame: int,
-        path: str,
+        origin: tuple[str, int],
         part: _Part,
     ) -> None:
+        path, place = origin
         has_body = folder.has_bodies and "poses" in record
         has_points = folder.has_points and KEY in record
         try:
             if has_points:
-                self._add_points(part, person, record, frame, path)
+                self._add_points(part, person, record, frame, origin)
             if has_body:
-                self._add_body(part, person, record, frame, path)
+                self._add_body(part, person, record, frame, origin)
             elif not has_points:
-                raise MisfitError(_lacks(record, folder))
+                raise MisfitError("", _lacks(record, folder))
         except MisfitError as problem:
-            self._fault(FormatError(path, f"{person_label(person)}: {problem}"))
+            text = f"{person_label(person)}: {problem}"
+            self._fault_of(path, place, problem.key, text)
         if has_body and KEY in record and not has_points:
             self._say_once(path, f"{KEY} in it and beside it: those in the folder {KEY} count")
         elif has_points and "poses" in record and not has_body:
             self._say_once(path, "poses in it and beside it: those beside it count")
 
     def _add_body(
-        self, part: _Part, person: int, record: dict[str, Any], frame: int, path: str
+        self, part: _Part, person: int, record: dict[str, Any], frame: int, origin: tuple[str, int]
     ) -> None:
+        path, place = origin
         layout = self._layout_of(record, path)
         rows = part.bodies.get(person)
         if rows is None:
@@ -175,7 +187,7 @@ class Reading:
             rows = BodyRows(layout=layout, known=known)
         elif rows.layout is not layout:
             rows.widen(layout)
-        rows.add(record, frame, path)
+        rows.add(record, frame, path, place)
         part.bodies[person] = rows
         if "vertices" in record:
             self._say_once(path, "vertices are not needed, and left out everywhere")
@@ -195,7 +207,7 @@ class Reading:
         return layout
 
     def _add_points(
-        self, part: _Part, person: int, record: dict[str, Any], frame: int, path: str
+        self, part: _Part, person: int, record: dict[str, Any], frame: int, origin: tuple[str, int]
     ) -> None:
         rows = part.points.get(person)
         if rows is None:
@@ -203,7 +215,7 @@ class Reading:
                 self.point_layout = point_layout(record, self.options.layout)
             layout, parts = self.point_layout
             rows = PointRows(layout=layout, parts=parts)
-        rows.add(record, frame, path)
+        rows.add(record, frame, *origin)
         part.points[person] = rows
 
     def _finished(self, part: _Part, stop: int) -> CapturePart:
@@ -214,7 +226,7 @@ class Reading:
         where = (files.n_frames, options.frame_rate, files.first_frame)
         for person, rows in part.bodies.items():
             values, keep, faults = rows.values()
-            self._faults(person, faults)
+            self._faults(person, rows, faults)
             for path, text in rows.remarks:
                 self._say_once(path, text)
             if keep.any():
@@ -228,7 +240,7 @@ class Reading:
                 )
         for person, seen in part.points.items():
             places, faults = seen.points()
-            self._faults(person, faults)
+            self._faults(person, seen, faults)
             is_seen = bool(places[..., 3].any())
             self._has_seen[person] = self._has_seen.get(person, False) or is_seen
             clip = PointClip(options.name, seen.timing(*where), places)
@@ -251,9 +263,17 @@ class Reading:
             texts.append(f"{name}: {more} in frame files")
         return texts
 
-    def _faults(self, person: int, faults: list[tuple[str, str]]) -> None:
-        for path, text in faults:
-            self._fault(FormatError(path, f"{person_label(person)}: {text}"))
+    def _faults(self, person: int, rows: Rows, faults: list[RowFault]) -> None:
+        for row, key, text in faults:
+            label = person_label(person)
+            self._fault_of(rows.paths[row], rows.places[row], key, f"{label}: {text}")
+
+    def _fault_of(self, path: str, place: int, key: str, text: str) -> None:
+        """Note what is wrong with a person's record, or a key of it."""
+        # Finding the line reads the file again, which is not done for faults that nobody sees.
+        is_said = self._n_faults < _MOST_WARNINGS
+        line = record_line(path, self.options.max_size, place, key) if is_said else None
+        self._fault(FormatError(path, text, line))
 
     def _fault(self, fault: FormatError) -> None:
         self.first_fault = self.first_fault or fault

@@ -11,13 +11,33 @@ import json
 import re
 from collections.abc import Iterator, Sequence
 
-__all__ = ["Keys", "constant_place", "nesting_place", "repeated_key", "value_place"]
+__all__ = [
+    "MOST_DIGITS",
+    "Keys",
+    "constant_place",
+    "deepest_place",
+    "line_at",
+    "long_number_place",
+    "nearest_place",
+    "nesting_place",
+    "repeated_key",
+    "value_place",
+]
+
+MOST_DIGITS = 4300
+"""Of a whole number that Python converts."""
 
 Keys = tuple[str | int, ...]
 """Keys and indices that lead from the whole to a value."""
 
 _TOKEN = re.compile(r'"(?:[^"\\]|\\.)*"|[\[\]{},:]|[^\s\[\]{},:"]+')
 _CONSTANTS = ("NaN", "Infinity", "-Infinity")
+_LONG_NUMBER = re.compile(rf"[0-9]{{{MOST_DIGITS + 1}}}")
+
+
+def line_at(text: str, offset: int) -> int:
+    """Return the number of the line, from 1, that an offset is in."""
+    return 1 + text.count("\n", 0, offset)
 
 
 def value_place(text: str, path: Sequence[str | int]) -> int | None:
@@ -33,6 +53,25 @@ def value_place(text: str, path: Sequence[str | int]) -> int | None:
     for path, offset, is_key in _places(text):
         if not is_key and path == wanted:
             found = offset
+    return found
+
+
+def nearest_place(text: str, path: Sequence[str | int]) -> int | None:
+    r"""Return the offset of a key or list item, or of what holds it if it is not there.
+
+    None if not even the outermost is there.
+
+    >>> nearest_place('[{"id": 0, "poses": []}]', (0, "poses"))
+    11
+    >>> nearest_place('[{"id": 0}]', (0, "poses"))
+    1
+    """
+    wanted = tuple(path)
+    deepest, found = 0, None
+    for path, offset, _ in _places(text):
+        # A key comes before its value, which has the same path.
+        if len(path) > deepest and path == wanted[: len(path)]:
+            deepest, found = len(path), offset
     return found
 
 
@@ -67,6 +106,22 @@ def nesting_place(text: str, depth: int) -> int:
         elif token.group() in ("]", "}"):
             open_brackets -= 1
     return len(text)
+
+
+def deepest_place(text: str) -> int:
+    """Return the offset of the bracket that is nested deepest; the text need not be valid JSON."""
+    depth = deepest = place = 0
+    for token in _TOKEN.finditer(text):
+        depth += {"{": 1, "[": 1, "}": -1, "]": -1}.get(token.group(), 0)
+        if depth > deepest:
+            deepest, place = depth, token.start()
+    return place
+
+
+def long_number_place(text: str) -> int | None:
+    """Return the offset of the first number with more digits than Python converts."""
+    found = _LONG_NUMBER.search(text)
+    return None if found is None else found.start()
 
 
 def _places(text: str) -> Iterator[tuple[Keys, int, bool]]:

@@ -65,6 +65,8 @@ class Part:
         Takes faults.
     offsets : (N,) or None
         Where each row is in a text that was read to its end in spite of faults.
+    has_lines : bool
+        Whether it is a text.
     """
 
     name: str
@@ -72,6 +74,12 @@ class Part:
     error: Callable[[str, int | None], FormatError]
     source: Source
     offsets: NDArray[np.int64] | None = None
+    has_lines: bool = False
+
+    def count_error(self, message: str, wanted: int) -> FormatError:
+        """Return an error at the first row too many, or at the last row where some are missing."""
+        row = min(wanted, len(self.values) - 1)
+        return self.error(message, row if self.has_lines and row >= 0 else None)
 
     def remember(self, kind: str, row_of: Callable[[int], int]) -> None:
         """Let the source remember in which row a thing of a kind is, see ``Source.remember``."""
@@ -126,7 +134,7 @@ def _text_part(source: Source, name: str, columns: int) -> Part:
         return source.error(message) if row is None else row_error(source, row, columns, message)
 
     if source.faults is None:
-        return Part(f"{name}.txt", read_table(source, columns), error, source)
+        return Part(f"{name}.txt", read_table(source, columns), error, source, has_lines=True)
     rows, offsets = read_broken_table(source, columns, _PARTS.get(name, ""))
 
     def error_at(message: str, row: int | None) -> FormatError:
@@ -134,7 +142,7 @@ def _text_part(source: Source, name: str, columns: int) -> Part:
 
     if name not in CORE and np.isnan(rows).any():
         rows, offsets = rows[:0], offsets[:0]  # nobody needs a part of it
-    return Part(f"{name}.txt", rows, error_at, source, offsets)
+    return Part(f"{name}.txt", rows, error_at, source, offsets, has_lines=True)
 
 
 def _from_archive(source: Source) -> PigFiles:

@@ -19,8 +19,9 @@ _NEUTRAL: Floats = np.eye(4, 3).ravel()  # as the file has it, row by row
 Word = re.Match[bytes]
 
 
-def read_bindings(source: Source, count: int, header: Word, position: int) -> tuple[Floats, int]:
+def read_bindings(source: Source, count: int, position: int) -> tuple[Floats, int]:
     """Return B = [a b c d; 0 0 0 1] for each binding, (count, 4, 4), and the offset behind."""
+    stated = position - 1
     word = source.next_word(position)
     if word is not None and word.group() == b"{":
         position = word.end()
@@ -32,17 +33,17 @@ def read_bindings(source: Source, count: int, header: Word, position: int) -> tu
         offsets.append(word.start())
     source.remember("bindings", offsets.__getitem__)
     if len(matrices) != count:
-        found = f"{counted(len(matrices), 'matrix')}, then " + (
-            "the end of the file" if word is None else shown(word.group())
-        )
-        where = len(source.data.rstrip()) if word is None else word.start()
+        is_whole = word is not None and word.group() == b"}"
+        there = "the end of the file" if word is None else shown(word.group())
+        end = source.end if word is None else word.start()
+        # A count that is wrong is the fault; if the text breaks off, the end of it is.
+        where, other = (stated, end) if is_whole else (end, stated)
         error = source.error(
-            f"bindings (line {source.line(header.start())}): expected "
-            f"{counted(count, 'matrix')}, "
-            f"found {found}",
+            f"bindings ({'to' if is_whole else 'from'} line {source.line(other)}): expected "
+            f"{counted(count, 'matrix')}, found {counted(len(matrices), 'matrix')}, then {there}",
             where,
         )
-        if word is None or word.group() != b"}":
+        if not is_whole:
             error.code = "F002"  # the text is broken, whatever was bound
             raise error
         source.refuse(error)

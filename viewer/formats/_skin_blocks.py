@@ -37,17 +37,34 @@ Word = re.Match[bytes]
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """Where the numbers of a section are, to find a word again when an error needs its line."""
+    """Where the numbers of a section are, to find a word again when an error needs its line.
+
+    Attributes
+    ----------
+    name : str
+        The section's.
+    header, count : int
+        Where its keyword and the number of its entries are.
+    start, end : int
+        Of the numbers.
+    closed : bool
+        Whether a brace follows them.
+    """
 
     name: str
     header: int
+    count: int
     start: int
     end: int
     closed: bool
 
 
 def find_block(source: Source, name: str, header: Word, position: int) -> Block:
-    """Return where a section's numbers are; only weights may leave out the opening brace."""
+    """Return where a section's numbers are; only weights may leave out the opening brace.
+
+    ``position`` is behind the section's count, or behind its keyword if it has none.
+    """
+    stated = position - 1
     brace = source.next_word(position)
     if brace is not None and brace.group() == b"{":
         position = brace.end()
@@ -57,7 +74,9 @@ def find_block(source: Source, name: str, header: Word, position: int) -> Block:
         raise source.error(f'{name}: expected "{{", found {found}', where)
     end = source.data.find(b"}", position)
     closed = end >= 0
-    return Block(name, header.start(), position, end if closed else len(source.data), closed)
+    return Block(
+        name, header.start(), stated, position, end if closed else len(source.data), closed
+    )
 
 
 def block_numbers(source: Source, block: Block) -> Floats:
@@ -107,8 +126,8 @@ def block_rows(source: Source, block: Block, count: int, width: int) -> Floats:
         f"{block.name}: expected {count} rows of {width} numbers, "
         f"found {len(values) // width}"
         + (f" and {len(values) % width} numbers" if len(values) % width else "")
-        + f" (from line {source.line(block.header)})",
-        block.end,
+        + f" (to line {source.line(block.end)})",
+        block.count,
     )
 
 

@@ -124,7 +124,7 @@ def _read_section(source: Source, sections: Sections, word: Word) -> int:
         return position
     count, position = _count(source, name, word)
     if name == "bindings":
-        sections.bindings, position = read_bindings(source, count, word, position)
+        sections.bindings, position = read_bindings(source, count, position)
         return position
     block = find_block(source, name, word, position)
     sections.blocks[name], sections.counts[name] = block, count

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from viewer.errors import FormatError
 from viewer.formats._skin_blocks import Block, block_numbers, opened, to_whole, word_at
 from viewer.formats._source import Source, shown
+from viewer.formats._tolerant import read_words
 from viewer.rig.arrays import Floats, Ints
 
 __all__ = ["find_heads", "read_weights"]
@@ -88,6 +89,9 @@ def find_heads(values: Floats, count: int) -> NDArray[np.integer] | None:
 
 def _explain(source: Source, block: Block, values: Floats, count: int) -> FormatError:
     """Follow the counts once more, slowly, to where they go wrong."""
+    misstated = _misstated(source, block, count)
+    if misstated is not None:
+        return misstated
     numbers = values.tolist()
     heads: list[int] = []
     position = 0
@@ -98,6 +102,36 @@ def _explain(source: Source, block: Block, values: Floats, count: int) -> Format
             return _error(source, block, len(heads) - 1, position, "a number of influences")
         position += 1 + 2 * int(length)
     return _count_error(source, block, count, heads, len(numbers))
+
+
+def _misstated(source: Source, block: Block, count: int) -> FormatError | None:
+    """Return the error of a line whose count is not that of its pairs, or of too many lines.
+
+    Lines mean nothing to the format. Only where most are a vertex each do they tell more than the
+    counts, which all shift behind one that is wrong; None for other files.
+    """
+    words = read_words(source.data, block.start, block.end)
+    heads, sizes = words.rows()
+    fits = words.values[heads] * 2 + 1 == sizes
+    if not block.closed or fits.sum() * 2 <= len(fits):
+        return None
+    wrong = np.flatnonzero(~fits)
+    if len(wrong) == 0:
+        return source.error(
+            f"skinweights: expected {count} vertices, found {len(heads)} "
+            f"(to line {source.line(block.end)})",
+            block.count,
+        )
+    vertex = int(wrong[0])
+    head = int(heads[vertex])
+    stated = words.values[head]
+    if stated < 0 or stated % 1:
+        return _error(source, block, vertex, head, "a number of influences")
+    return source.error(
+        f"skinweights of vertex {vertex}: expected {shown(words.word(head))[1:-1]} pairs of joint "
+        f"and weight, found {int(sizes[vertex]) - 1} numbers in the line",
+        int(words.offsets[head]),
+    )
 
 
 def _error(source: Source, block: Block, vertex: int, place: int, wanted: str) -> FormatError:
@@ -119,12 +153,12 @@ def _count_error(
     if len(heads) < count:
         return source.error(
             f"skinweights: expected {count} vertices, found {len(heads)} "
-            f"(from line {source.line(block.header)})",
-            block.end,
+            f"(to line {source.line(block.end)})",
+            block.count,
         )
     if count == 0:
         return source.error(
-            f"skinweights: expected no vertices, found {n_numbers} numbers", block.start
+            f"skinweights: expected no vertices, found {n_numbers} numbers", block.count
         )
     offset, word = word_at(source, block, heads[-1])
     return source.error(

@@ -228,6 +228,11 @@ class Source:
         self._counted = offset, line
         return line
 
+    @property
+    def end(self) -> int:
+        """Offset behind the last word: where a file lacks something."""
+        return len(self.data.rstrip())
+
     def error(self, message: str, offset: int | None = None) -> FormatError:
         """Return an error that names the file, and the line of ``offset``."""
         return FormatError(self.path, message, None if offset is None else self.line(offset))

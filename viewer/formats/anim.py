@@ -77,6 +77,7 @@ class _Parser:
         self._expect(b"{")
         span: tuple[float, float] | None = None
         count: int | None = None
+        stated: Word | None = None
         channels: list[Channel] = []
         while self.word is not None and self.word.group() != b"}":
             text = self.word.group()
@@ -85,12 +86,12 @@ class _Parser:
                 span = self._range()
             elif text == b"numchannels":
                 self._advance()
-                count = self._count("numchannels")
+                stated, count = self.word, self._count("numchannels")
             elif text == b"channel":
                 channels.append(self._channel(len(channels)))
             else:
                 raise self._error(f"expected a channel, found {shown(text)}")
-        self._finish(count, len(channels))
+        self._finish(count, stated, len(channels))
         self.source.remember("channels", self.starts.__getitem__)
         return Clip(self.source.path.stem, tuple(channels), *(span or self._key_span(channels)))
 
@@ -109,13 +110,13 @@ class _Parser:
         self.source.warn(f"no range: that of the keys is played, {shown_span}")
         return span
 
-    def _finish(self, count: int | None, found: int) -> None:
+    def _finish(self, count: int | None, stated: Word | None, found: int) -> None:
         self.what, self.began = "animation", 0
         if self.word is None:
             self.source.warn('the last "}" is missing')
         if count != found:
             wanted = "numchannels" if count is None else f"{count} channels as numchannels says"
-            self.source.refuse(self._error(f"expected {wanted}, found {found}"))
+            self.source.refuse(self._error(f"expected {wanted}, found {found}", stated))
         self._advance()
         if self.word is not None:
             self.source.warn(
@@ -173,7 +174,7 @@ class _Parser:
         )
 
     def _keys(self) -> list[_Key]:
-        count = self._count("keys")
+        stated, count = self.word, self._count("keys")
         self._expect(b"{")
         rows: list[_Key] = []
         lost = 0
@@ -188,16 +189,19 @@ class _Parser:
                 rows.append(row)
         self.what = self.what.split(",")[0]
         if len(rows) + lost != count:
-            self.source.refuse(self._error(f"expected {count} keys, found {len(rows) + lost}"))
+            found = f"expected {count} keys, found {len(rows) + lost}"
+            self.source.refuse(self._error(found, stated))
         self._expect(b"}")
         return rows
 
     def _advance(self) -> None:
         self.word = next(self.words, None)
 
-    def _error(self, message: str) -> FormatError:
-        if self.word is not None:
-            return self.source.error(f"{self.what}: {message}", self.word.start())
+    def _error(self, message: str, word: Word | None = None) -> FormatError:
+        """Return an error at a word, or else at the current one."""
+        word = self.word if word is None else word
+        if word is not None:
+            return self.source.error(f"{self.what}: {message}", word.start())
         first = self.source.line(self.began)
         return self.source.error(
             f"{self.what}: {message} ({self.what.split(',')[0]} begins in line {first})",

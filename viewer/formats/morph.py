@@ -64,7 +64,8 @@ def read(source: Source) -> MorphTarget:
         sections[name], position = _section(source, name.decode(), word)
     if b"positions" not in sections:
         looks = source.looks_like()
-        raise source.error("no positions section" + (f" ({looks})" if looks else ""))
+        hint = f" ({looks})" if looks else ""
+        raise source.error(f"no positions section{hint}", None if looks else source.end)
     vertices, positions, _ = sections[b"positions"]
     if not len(vertices):
         source.warn("moves no vertex")

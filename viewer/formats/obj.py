@@ -57,7 +57,8 @@ def read(source: Source) -> Figure:
     parts = read_parts(source)
     if len(parts.positions) == 0:
         looks = source.looks_like()
-        raise source.error(f"expected a mesh, found no `v` line{f' ({looks})' * bool(looks)}")
+        found = f"no `v` line{f' ({looks})' * bool(looks)}"
+        raise source.error(f"expected a mesh, found {found}", None if looks else source.end)
     rough = mended_positions(parts.positions, np.zeros((0, 3), np.int32))
     picks, owners = triangulate(rough, parts.corners[:, 0], parts.counts)
     triangles = parts.corners[picks, 0].astype(np.int32)

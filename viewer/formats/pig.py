@@ -66,10 +66,10 @@ def read(source: Source) -> Figure:
     positions = _mended_mesh(parts)
     n_vertices, n_joints = len(positions), len(parts["t_pose_joints"].values)
     if len(parts["parents"].values) != n_joints:
-        raise parts["parents"].error(
+        raise parts["parents"].count_error(
             f"expected {n_joints} rows as in {parts['t_pose_joints'].name}, "
             f"found {len(parts['parents'].values)}",
-            None,
+            n_joints,
         )
     parents = _parents(parts["parents"])
     joints = np.nan_to_num(parts["t_pose_joints"].values)
@@ -178,10 +178,10 @@ def _mesh(source: Source, parts: dict[str, Part], positions: Floats) -> Mesh:
         uvs = parts["textures"].values
         uv_triangles = _corners(parts["faces_tex"], "texture coordinate", parts["textures"])
         if len(uv_triangles) != len(triangles):
-            raise parts["faces_tex"].error(
+            raise parts["faces_tex"].count_error(
                 f"expected {len(triangles)} rows as in {parts['faces_vert'].name}, "
                 f"found {len(uv_triangles)}",
-                None,
+                len(triangles),
             )
     else:
         source.warn("no textures or faces_tex: shown without texture")
@@ -270,7 +270,7 @@ def _column(parts: dict[str, Part], name: str, rows: int, end: int, what: str) -
         return None
     part = parts[name]
     if len(part.values) != rows:
-        raise part.error(f"expected {rows} rows, found {len(part.values)}", None)
+        raise part.count_error(f"expected {rows} rows, found {len(part.values)}", rows)
     return _indices(part, 0, end, what)
 
 

@@ -59,7 +59,7 @@ def read(source: Source) -> Figure:
     """
     header = read_header(source)
     tables = read_tables(source, header)
-    vertices, positions = _vertices(source, tables)
+    vertices, positions = _vertices(source, header, tables)
     counts, corners, uv_corners = _faces(source, tables, len(positions))
     rough = mended_positions(positions, np.zeros((0, 3), np.int32))
     picks, owners = triangulate(rough, corners, counts)
@@ -105,11 +105,11 @@ def _remember(source: Source, tables: dict[str, Table], owners: Indices) -> None
         source.remember("triangles", lambda triangle: int(faces[owners[triangle]]))
 
 
-def _vertices(source: Source, tables: dict[str, Table]) -> tuple[Table, Floats]:
+def _vertices(source: Source, header: Header, tables: dict[str, Table]) -> tuple[Table, Floats]:
     """Return the element of the vertices, and where they are."""
     if "vertex" not in tables:
         names = ", ".join(printable(name, 40) for name in list(tables)[:_SHOWN]) or "none"
-        raise source.error(f"expected an element vertex, found {names}")
+        raise source.error(f"expected an element vertex, found {names}", header.end - 1)
     vertices = tables["vertex"]
     positions = _columns(source, vertices, ("x", "y", "z"))
     if positions is None or len(positions) == 0:

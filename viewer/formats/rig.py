@@ -71,7 +71,8 @@ def read(source: Source) -> NamedFiles:
     elif len(words) > 1:
         source.warn(f"ignored what follows the rig, {shown(words[-2].group())}", words[-2].start())
     if not files:
-        raise source.error("expected a skeleton or a skin, found no name of a file")
+        where = words[-1].start() if words else source.end
+        raise source.error("expected a skeleton or a skin, found no name of a file", where)
     return NamedFiles(" ".join(name) or source.path.stem, tuple(files))
 
 
@@ -86,13 +87,13 @@ def _item(source: Source, words: Words) -> list[Path]:
     count = to_number(words[-1].group()) if words else None
     if count is None or count != int(count) or count < 0:
         raise _wrong(source, words, "morphs: expected a count")
-    words.pop()
+    stated = words.pop()
     _expect(source, words, b"{")
     files = []
     while words and words[-1].group() != b"}":
         files.append(_file(source, words, "morphs"))
     if len(files) != count:
-        raise _wrong(source, words, f"morphs: expected {count:g} files", f"{len(files)}")
+        raise source.error(f"morphs: expected {count:g} files, found {len(files)}", stated.start())
     _expect(source, words, b"}")
     return files
 
@@ -120,8 +121,8 @@ def _expect(source: Source, words: Words, text: bytes) -> None:
     words.pop()
 
 
-def _wrong(source: Source, words: Words, expected: str, found: str = "") -> FormatError:
+def _wrong(source: Source, words: Words, expected: str) -> FormatError:
     """Return an error at the next word."""
     there = shown(words[-1].group()) if words else "the end of the file"
-    where = words[-1].start() if words else len(source.data.rstrip())
-    return source.error(f"{expected}, found {found or there}", where)
+    where = words[-1].start() if words else source.end
+    return source.error(f"{expected}, found {there}", where)

@@ -75,7 +75,8 @@ def read(source: Source) -> Figure:
     joints = _Parser(source).joints()
     if not joints:
         looks = source.looks_like()
-        raise source.error(f"expected a skeleton, found no balljoint{f' ({looks})' * bool(looks)}")
+        found = f"no balljoint{f' ({looks})' * bool(looks)}"
+        raise source.error(f"expected a skeleton, found {found}", None if looks else source.end)
     source.remember("joints", lambda joint: joints[joint].start)
     skeleton, dofs = _skeleton(source, joints)
     return Figure(name=source.path.stem, skeleton=skeleton, facts=_facts(skeleton, dofs))

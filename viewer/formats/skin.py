@@ -78,7 +78,7 @@ def _mesh(source: Source, sections: Sections) -> Mesh:
     _require_positions(source, sections)
     even_counts(source, sections)
     if not sections.triangles:
-        raise source.error("expected triangles, found no `triangles` section")
+        raise source.error("expected triangles, found no `triangles` section", source.end)
     triangles = checked_triangles(source, sections, len(sections.tables["positions"]))
     if len(triangles) == 0:
         raise source.error(
@@ -106,7 +106,8 @@ def _require_positions(source: Source, sections: Sections) -> None:
     if table is None:
         looks = source.looks_like()
         raise source.error(
-            f"expected a skin, found no `positions` section{f' ({looks})' * bool(looks)}"
+            f"expected a skin, found no `positions` section{f' ({looks})' * bool(looks)}",
+            None if looks else source.end,
         )
     if len(table) == 0:
         raise source.error(
@@ -145,7 +146,10 @@ def _skin(source: Source, sections: Sections) -> Skin | None:
         present = "bindings" if sections.starts is None else "skinweights"
         skin = None if sections.starts is None else unbound_skin(sections)
         source.refuse(
-            source.error(f"expected a `{missing}` section beside `{present}`, found none"),
+            source.error(
+                f"expected a `{missing}` section beside `{present}`, found none",
+                sections.offsets[present],
+            ),
             1,
             "bindings",
             np.arange(0 if skin is None else skin.n_joints),

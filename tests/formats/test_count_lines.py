@@ -1,0 +1,96 @@
+"""A count that is wrong is refused at the line that states it, with both numbers."""
+
+import re
+
+import pytest
+from bvh_text import GOOD as BVH
+from skin_text import GOOD as SKIN
+
+from viewer.errors import FormatError
+from viewer.formats import Source, read
+
+ANIM = """animation {
+ range 0 1
+ numchannels 1
+ channel {
+  extrapolate constant constant
+  keys 2 {
+   0 0.5 flat flat
+   1 1.5 flat flat
+  }
+ }
+}
+"""
+MORPH = "positions 2 {\n 0 1 2 3\n 4 0 0 1\n}\nnormals 2 {\n 0 0 0 1\n 4 0 1 0\n}\n"
+RIG = "rig a {\n skeleton a.skel\n morphs\n 2\n {\n x.morph\n y.morph\n }\n}\n"
+PLY = """ply
+format ascii 1.0
+element vertex 3
+property float x
+property float y
+property float z
+element face 1
+property list uchar int vertex_indices
+end_header
+0 0 0
+1 0 0
+0 1 0
+3 0 1 2
+"""
+FILES = {
+    "a.skin": SKIN, "a.anim": ANIM, "a.morph": MORPH, "a.rig": RIG, "a.bvh": BVH, "a.ply": PLY,
+}  # fmt: skip
+
+
+def refusal(name, text):
+    with pytest.raises(FormatError) as caught:
+        read(Source(name, text.encode()))
+    return caught.value
+
+
+# File, what stands before a count, the count, and what the file has instead of each wrong one.
+COUNTS = [
+    ("a.skin", "positions ", 3),
+    ("a.skin", "normals ", 3),
+    ("a.skin", "skinweights ", 3),
+    ("a.skin", "triangles ", 1),
+    ("a.skin", "bindings ", 2),
+    ("a.anim", "numchannels ", 1),
+    ("a.anim", "keys ", 2),
+    ("a.morph", "positions ", 2),
+    ("a.morph", "normals ", 2),
+    ("a.rig", "morphs\n ", 2),
+    ("a.bvh", "CHANNELS ", 6),
+]
+
+
+@pytest.mark.parametrize("step", [-1, 1])
+@pytest.mark.parametrize(("name", "head", "count"), COUNTS)
+def test_a_wrong_count_is_refused_where_it_stands(name, head, count, step):
+    text = FILES[name]
+    assert f"{head}{count}" in text
+    before, _, after = text.partition(f"{head}{count}")
+    problem = refusal(name, f"{before}{head}{count + step}{after}")
+    assert problem.line == 1 + f"{before}{head}".count("\n")
+    wanted, found = re.search(r"expected (\d+) .*found (\d+)", str(problem)).groups()
+    assert (int(wanted), int(found)) == (count + step, count)
+
+
+@pytest.mark.parametrize(("element", "count", "line"), [("vertex", 3, 3), ("face", 1, 7)])
+def test_too_many_rows_of_a_table_are_refused_at_its_element(element, count, line):
+    problem = refusal("a.ply", PLY.replace(f"{element} {count}", f"{element} {count + 9}"))
+    assert problem.line == line and f"expected {count + 9} lines" in str(problem)
+
+
+@pytest.mark.parametrize(("stated", "line"), [("1 0 0.25 1 0.75", 13), ("3 0 0.25 1 0.75", 13)])
+def test_a_vertex_that_misstates_its_influences_is_refused_at_its_line(stated, line):
+    """Behind it, the counts of all others seem to shift."""
+    problem = refusal("a.skin", SKIN.replace("2 0 0.25 1 0.75", stated))
+    assert problem.line == line
+    assert f"vertex 1: expected {stated[0]} pairs" in str(problem)
+    assert "found 4 numbers" in str(problem)
+
+
+def test_counts_of_a_file_in_one_line_are_followed_as_they_are():
+    text = " ".join(SKIN.replace("1 1 1\n}", "2 1 1\n}").split())
+    assert "vertex 2, the last: expected 2 pairs" in str(refusal("a.skin", text))

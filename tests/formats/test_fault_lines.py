@@ -1,0 +1,128 @@
+"""Refusals of text formats say in which line: counted over mutations of tiny files by seed.
+
+Only a file as a whole has no line: one that is empty, or that no format knows.
+"""
+
+import json
+import random
+import re
+
+import pytest
+from bvh_text import GOOD as BVH
+from capture_files import body, points
+from pig_text import GOOD as PIG
+from pig_text import write as write_pig
+from test_camera_files import EXTRINSIC, INTRINSIC, cameras
+from test_count_lines import ANIM, MORPH, PLY, RIG
+from test_mutations import SKEL, SKIN, mutate
+
+from viewer.errors import FormatError
+from viewer.formats import Source, detect, read
+
+OBJ = """# four corners
+mtllib a.mtl
+v 0 0 0
+v 1 0 0
+v 1 1 0 0.5 0.5 0.5
+v 0 1 0
+vt 0 0
+vt 1 1
+vn 0 0 1
+usemtl m
+f 1/1/1 2/2/1 3/1/1
+f -4//-1 -2//-1 -1//-1
+"""
+TEXTS = {
+    "a.skel": SKEL,
+    "a.skin": SKIN,
+    "a.anim": ANIM.encode(),
+    "a.morph": MORPH.encode(),
+    "a.rig": RIG.encode(),
+    "a.bvh": BVH.encode(),
+    "a.obj": OBJ.encode(),
+    "a.ply": PLY.encode(),
+}
+FRAMES = {
+    "bodies.json": json.dumps([body(0, 9), body(1, 9)], indent=1).encode(),
+    "points.json": json.dumps({"annots": [points(0, 3), points(1, 3)]}, indent=1).encode(),
+}
+SEEDS = range(3)
+TRIES = 50
+SHARE = 0.99
+
+
+def refusal(source):
+    """Return how a file of a known kind is refused; None if it is not, or is not known."""
+    try:
+        detect(source)
+    except FormatError:
+        return None
+    try:
+        read(source)
+    except FormatError as problem:
+        return problem
+    return None
+
+
+def assert_lines(problems, fewest):
+    """Hold refusals, each with the bytes that are refused, to the share that has a line."""
+    told = [(problem, data) for problem, data in problems if data.strip()]
+    assert len(told) >= fewest
+    without = [str(problem) for problem, _ in told if problem.line is None]
+    assert len(without) <= (1.0 - SHARE) * len(told), without
+    for problem, data in told:
+        # A line end may be CR, LF or both; one more for the end of the file.
+        assert problem.line is None or 1 <= problem.line <= 1 + len(re.findall(rb"[\r\n]", data))
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_texts(name):
+    problems = []
+    for seed in SEEDS:
+        rng = random.Random(seed)
+        for data in (mutate(TEXTS[name], rng) for _ in range(TRIES)):
+            problem = refusal(Source(name, data))
+            problems += [(problem, data)] if problem else []
+    assert_lines(problems, TRIES)
+
+
+@pytest.mark.parametrize("name", FRAMES)
+def test_frames_of_easymocap(tmp_path, name):
+    problems = []
+    for seed in SEEDS:
+        rng = random.Random(seed)
+        for data in (mutate(FRAMES[name], rng) for _ in range(TRIES)):
+            (tmp_path / name).write_bytes(data)
+            problem = refusal(Source.open(tmp_path / name))
+            # A frame without the key "annots" is read as a pose, which is not looked at here.
+            problems += (
+                [(problem, data)] if problem and "expected a pose" not in str(problem) else []
+            )
+    assert_lines(problems, TRIES)
+
+
+def test_tables_of_a_pig(tmp_path):
+    folder = write_pig(tmp_path / "pig")
+    problems = []
+    for seed in SEEDS:
+        rng = random.Random(seed)
+        for _ in range(TRIES):
+            name = rng.choice(list(PIG))
+            (folder / name).write_bytes(mutate(PIG[name].encode(), rng))
+            problem = refusal(Source.open(folder))
+            # Another file may be at fault: what one says decides what others may say.
+            problems += [(problem, problem.path.read_bytes())] if problem else []
+            (folder / name).write_text(PIG[name])
+    assert_lines(problems, TRIES)
+
+
+def test_cameras(tmp_path):
+    notes = []
+    for seed in SEEDS:
+        rng = random.Random(seed)
+        for _ in range(TRIES):
+            texts = [mutate(text.encode(), rng) for text in (INTRINSIC, EXTRINSIC)]
+            decoded = [text.decode("latin-1") for text in texts]
+            notes += cameras(tmp_path, *decoded)[1]
+    without = [note for note in notes if not re.match(r"\S+/(in|ex)tri\.yml:[1-9]\d*: ", note)]
+    assert len(notes) >= TRIES and len(without) <= (1.0 - SHARE) * len(notes), without
