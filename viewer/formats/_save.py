@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.errors import OutputError, printable
+from viewer.formats._opened_names import file_stem
 
 __all__ = [
     "Replacement",
@@ -58,11 +59,11 @@ def free_path(folder: Path, stem: str, suffix: str, data: bytes | None = None) -
     data : bytes, optional
         A file that holds just these is as good as none.
     """
-    safe = "".join(letter if letter.isalnum() or letter in "-_." else "_" for letter in stem)[:100]
-    path, number = folder / f"{safe or 'picture'}{suffix}", 1
+    safe = file_stem(stem)
+    path, number = folder / f"{safe}{suffix}", 1
     while path.exists() and not _holds(path, data):
         number += 1
-        path = folder / f"{safe or 'picture'}-{number}{suffix}"
+        path = folder / f"{safe}-{number}{suffix}"
     return path
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 
@@ -160,8 +161,7 @@ def follow_candidates(scene: Scene, name: str) -> list[tuple[int, int]]:
         point; or a person's number; or somebody's joint, as ``fox/head`` or ``1:pelvis``.
     """
     wanted = name.lower()
-    numbers = [() if actor.person is None else (str(actor.person),) for actor in scene.actors]
-    called = [(actor.name.lower(), *own) for actor, own in zip(scene.actors, numbers, strict=True)]
+    called = [_called(actor) for actor in scene.actors]
     roots = [_root(actor) for actor in scene.actors]
     found = [(index, roots[index]) for index, who in enumerate(called) if who[0] == wanted]
     found = found or _with_joint(scene, range(len(called)), wanted)
@@ -172,6 +172,13 @@ def follow_candidates(scene: Scene, name: str) -> list[tuple[int, int]]:
             whose = [index for index, who in enumerate(called) if wanted[:place] in who]
             found = _with_joint(scene, whose, wanted[place + 1 :])
     return found
+
+
+def _called(actor: Actor) -> tuple[str, ...]:
+    """Return what an actor may be called: by what was opened, its figure, its person's number."""
+    by_figure = replace(actor, called="").name
+    number = () if actor.person is None else (str(actor.person),)
+    return actor.name.lower(), by_figure.lower(), *number
 
 
 def _with_joint(scene: Scene, actors: Iterable[int], name: str) -> list[tuple[int, int]]:
