@@ -50,7 +50,7 @@ def test_keypoints_are_written_person_by_person(keypoints, tmp_path, capsys):
     assert lines[0].startswith(f"{tmp_path}/m-0.npz: 3 frames at 30 a second, z up: name, up, ")
     assert lines[1].startswith(f"{tmp_path}/m-4.npz: 3 frames at 30 a second; 2 of them missing")
     with np.load(tmp_path / "m-4.npz") as arrays:
-        assert (str(arrays["name"]), str(arrays["up"])) == ("body25 4", "z")
+        assert (str(arrays["name"]), str(arrays["up"])) == ("kp body25 4", "z")
         assert arrays["frames"].tolist() == [10, 11, 12]
         assert arrays["present"].tolist() == [False, False, True]
         assert arrays["joint_names"][[0, 8]].tolist() == ["nose", "mid_hip"]
@@ -69,7 +69,7 @@ def test_keypoints_that_hang_are_written_upright(keypoints, tmp_path):
 def test_keypoints_at_one_frame_keep_their_numbers(keypoints, tmp_path, capsys):
     assert convert(keypoints, "-o", tmp_path / "m.npz", "--frame", 11) == 0
     assert capsys.readouterr().out.splitlines()[1:] == [
-        "body25 4: not there at that time, and not written"
+        "kp body25 4: not there at that time, and not written"
     ]
     assert [path.name for path in tmp_path.glob("*.npz")] == ["m-0.npz"]
     with np.load(tmp_path / "m-0.npz") as arrays:
@@ -92,7 +92,7 @@ def test_keypoints_beside_bodies_are_said_to_be_left_out(recording, tmp_path, ca
     write_frames(tmp_path / "take" / "keypoints3d", {20: [points(0)]})
     assert convert(*recording, "-o", tmp_path / "w.bvh") == 0
     assert capsys.readouterr().out.splitlines()[-1] == (
-        "keypoints beside bodies are not written (body25 0): open the keypoints3d folder alone"
+        "keypoints beside bodies are not written (take body25 0): open the keypoints3d folder alone"
     )
 
 
@@ -102,13 +102,13 @@ def test_who_is_away_is_left_out_and_the_others_keep_their_names(recording, tmp_
     stem, _, suffix = name.partition(".")
     assert [path.name for path in tmp_path.glob("w*")] == [f"{stem}-0.{suffix}"]
     lines = capsys.readouterr().out.splitlines()
-    assert lines[-1] == "SMPL 7: not there in frames 22 to 23, and not written"
+    assert lines[-1] == "take 7: not there in frames 22 to 23, and not written"
 
 
 def test_who_is_away_is_left_out_of_folders(recording, tmp_path, capsys):
     assert convert(*recording, "-o", tmp_path / "w", "--frames", "23:24") == 0
     text = capsys.readouterr().out
-    assert "1 frame of 1 person" in text and "SMPL 7: not there in frame 23, and not" in text
+    assert "1 frame of 1 person" in text and "take 7: not there in frame 23, and not" in text
     (frame,) = (tmp_path / "w" / "smpl").iterdir()
     assert [record["id"] for record in json.loads(frame.read_text())] == [0]
 

@@ -18,7 +18,9 @@ from numpy.testing import assert_allclose
 from viewer.cli import run
 
 STILL = "one frame: nothing moves, so the present pose was written"
-POINTS = "keypoints beside bodies are not written (body25 0): open the keypoints3d folder alone"
+POINTS = (
+    "keypoints beside bodies are not written (take body25 0): open the keypoints3d folder alone"
+)
 PRINTED = 1e-5  # units: six decimals, summed along an arm
 
 
@@ -236,7 +238,7 @@ def test_who_is_away_at_that_frame_is_left_out(recording, tmp_path, capsys, name
     else:
         assert written(tmp_path, "w*") == [name.replace(".", "-0.")]
     text = capsys.readouterr().out
-    assert "SMPL 7: not there " in text and text.splitlines()[-1] == POINTS
+    assert "take 7: not there " in text and text.splitlines()[-1] == POINTS
 
 
 @pytest.mark.parametrize("option", ["frame", "time"])

@@ -29,7 +29,8 @@ def test_up_is_that_of_the_scene(info, tmp_path):
     np.savez(tmp_path / "SMPL.npz", **model("smpl"))
     folder = write_frames(tmp_path / "take" / "smpl", {0: [body(0)]})
     lines, found, _ = info(folder, "--model", tmp_path / "SMPL.npz", "--up", "z")
-    assert lines[0] == "SMPL 0" and lines[1].endswith(", z up")
+    assert lines[0] == "take 0" and lines[1].endswith(", z up")
+    assert lines[2] == "  figure     SMPL" and found["actors"][0]["figure"] == "SMPL"
     assert found["actors"][0]["up"] == "z"
 
 
@@ -38,12 +39,12 @@ def test_boxes_are_only_of_what_is_there(info, tmp_path):
     folder = write_frames(tmp_path / "kp" / "keypoints3d", {**frames, 5: [standing(4, 2.0)]})
     lines, found, _ = info(folder)
     assert lines[:4] == [
-        "body25 0",
+        "kp body25 0",
         "  box        (0, 0, 1) to (0, 0, 1.6), size 0.6, z up",
         "  clip       kp: 0 to 0.0666667 s, 3 frames at 30 a second, 25 points, 8.0 % of them seen",
         "    1 frame is missing: 5",
     ]
-    assert lines[4:6] == ["body25 4", "  box        none: not there at this time, z up"]
+    assert lines[4:6] == ["kp body25 4", "  box        none: not there at this time, z up"]
     assert lines[7] == "    1 frame is missing: 3"
     away = found["actors"][1]
     assert (away["box"], away["size"], away["present"]) == (None, None, False)

@@ -118,7 +118,7 @@ def test_people_of_one_file_are_told_apart(shared_data: Path, capsys) -> None:
     assert run(["lint", str(points)]) == 0
     lines = [line for line in capsys.readouterr().out.splitlines() if " C012: " in line]
     what = "1 of 25 keypoints is never seen: right_ear"
-    assert lines == [f"{points}: note C012: body25 {person}: {what}" for person in (0, 1)]
+    assert lines == [f"{points}: note C012: easymocap body25 {person}: {what}" for person in (0, 1)]
 
 
 def test_the_ground_is_an_option(tmp_path: Path, capsys) -> None:
@@ -129,7 +129,7 @@ def test_the_ground_is_an_option(tmp_path: Path, capsys) -> None:
     files = ["lint", str(motion), "--up", "y"]
     assert run(files) == 0 and " C008: " not in capsys.readouterr().out
     assert run([*files, "--ground", "2.5"]) == 0
-    assert " C008: body: 20 of 20 frames: left_foot is " in capsys.readouterr().out
+    assert " C008: 20 of 20 frames: left_foot is " in capsys.readouterr().out
     assert run([*files, "--ground", "none"]) == 0 and " C008: " not in capsys.readouterr().out
     assert run([*files, "--ground", "low"]) == 2
     assert "--ground" in capsys.readouterr().err

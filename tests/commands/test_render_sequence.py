@@ -350,14 +350,14 @@ def test_follow_says_whom_where_two_have_the_joint(draw, pair):
     size = "16x16"
     said = draw(pair, "a.mp4", "--follow", "pelvis", size=size)
     assert said.err == (
-        "warning: --follow pelvis: 2 have it; the first, SMPL 3, is followed "
+        "warning: --follow pelvis: 2 have it; the first, take 3, is followed "
         "(--follow 5:pelvis follows another)\n"
     )
-    for index, name in enumerate(("5:pelvis", "SMPL 3:head", "smpl 5/left_foot", "5", "SMPL 3")):
+    for index, name in enumerate(("5:pelvis", "take 3:head", "smpl 5/left_foot", "5", "Take 3")):
         assert draw(pair, f"{index}.mp4", "--follow", name, size=size).err == ""
     said = draw(pair, "x.mp4", "--follow", "4:pelvis", size=size, code=2)
     assert said.err == (
-        'viewer: no actor, joint or point is called "4:pelvis"; actors: SMPL 3, SMPL 5\n'
+        'viewer: no actor, joint or point is called "4:pelvis"; actors: take 3, take 5\n'
     )
 
 

@@ -7,8 +7,7 @@ from pathlib import Path
 from viewer.app.file_dialog import FileDialog, folder_of
 from viewer.app.pose_actions import save_files
 from viewer.app.state import AppState
-from viewer.errors import printable
-from viewer.formats import FORMATS, write
+from viewer.formats import FORMATS, file_stem, write
 from viewer.rig.clip import Clip
 from viewer.rig.clip_edit import clip_from_pose, key_pose
 from viewer.rig.number_text import number_text
@@ -28,7 +27,7 @@ def new_clip(state: AppState) -> None:
     actor = state.actor
     if actor.pose is None or actor.figure.skeleton is None or actor.clip is not None:
         return
-    actor.clip = clip_from_pose(actor.figure.skeleton, actor.pose, actor.figure.name, 0.0, _SECONDS)
+    actor.clip = clip_from_pose(actor.figure.skeleton, actor.pose, actor.title, 0.0, _SECONDS)
     state.say_status("New clip: two seconds that hold this pose")
 
 
@@ -52,7 +51,7 @@ def ask_for_clip(state: AppState) -> None:
         "save",
         "Save clip: .anim",
         FORMATS["anim"].suffixes,
-        f"{printable(state.actor.name, 60)}_edited.anim",
+        f"{file_stem(state.actor.name)}_edited.anim",
     )
 
 

@@ -296,7 +296,7 @@ class Frame:
     def _save_screenshot(self) -> None:
         """Save the scene, without panels, under a new name in the current folder."""
         try:
-            path = free_path(Path.cwd(), self.state.scene.actors[0].figure.name, ".png")
+            path = free_path(Path.cwd(), self.state.scene.title, ".png")
             save_image(path, self.scene_picture())
             self.state.say(f"Saved {printable(path, 200)}")
             if "##legend" in self.state.item_rects:  # over the picture, not in it

@@ -36,7 +36,7 @@ from viewer.app.view_menu import draw_view_menu
 from viewer.app.widgets import begin_menu, menu_item, note_item
 from viewer.errors import ViewerError, printable
 from viewer.export import EXPORTERS, files_written
-from viewer.formats import FORMATS
+from viewer.formats import FORMATS, file_stem, opened_text
 from viewer.models import known_models, load_model_folder, save_model_folder
 
 __all__ = ["draw_menus"]
@@ -80,7 +80,7 @@ def _draw_file_menu(state: AppState) -> list[Path]:
         state.wants.add("open dialog")
     if begin_menu(state, "Open recent", bool(state.recent)):
         for number, group in enumerate(state.recent):
-            text = printable(" + ".join(Path(path).name for path in group), 80)
+            text = printable(" + ".join(opened_text(Path(path)) for path in group), 80)
             if imgui.menu_item(f"{text}##recent{number}", "", False)[0]:
                 chosen = [Path(path) for path in group]
             note_item(state, f"recent {number}")
@@ -142,7 +142,7 @@ def _set_model_folder(state: AppState, paths: list[Path]) -> None:
 
 
 def _ask_for_pose(state: AppState) -> None:
-    name = f"{printable(state.actor.figure.name, 60)}_pose.json"
+    name = f"{file_stem(state.actor.name)}_pose.json"
     suffixes = FORMATS["pose"].suffixes
     state.dialog = FileDialog(
         folder_of(state.paths),
@@ -163,7 +163,7 @@ def _ask_for_export(state: AppState) -> None:
         "save",
         f"Export: {', '.join(suffixes)}",
         suffixes,
-        f"{printable(state.actor.figure.name, 60)}.obj",
+        f"{file_stem(state.actor.name)}.obj",
         written=lambda path: files_written(path) if path.suffix.lower() in suffixes else [path],
     )
 

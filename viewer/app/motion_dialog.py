@@ -19,6 +19,7 @@ from viewer.app.state import AppState
 from viewer.app.widgets import choice, explain
 from viewer.errors import printable
 from viewer.export import EXPORTERS
+from viewer.formats import file_stem
 
 __all__ = ["ask_for_motion"]
 
@@ -36,7 +37,7 @@ def ask_for_motion(state: AppState) -> None:
     wish = _Wish(len(moving) > 1 or state.actor not in moving)
     first = moving[0] if wish.everyone else state.actor
     # People's numbers are put behind the name when there are several files.
-    stem = printable(first.figure.name if len(moving) > 1 else first.name, 60)
+    stem = file_stem(first.title if len(moving) > 1 else first.name)
     suffixes = motion_suffixes()
     state.dialog = FileDialog(
         folder_of(state.paths),
@@ -44,7 +45,7 @@ def ask_for_motion(state: AppState) -> None:
         "save",
         "Export motion",
         suffixes,
-        f"{stem.replace(' ', '_')}{suffixes[0]}",
+        f"{stem}{suffixes[0]}",
         more=lambda state, dialog: _draw_more(state, dialog, wish),
         written=lambda path: motion_files(state, path, wish.everyone),
     )

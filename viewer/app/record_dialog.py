@@ -10,7 +10,7 @@ from imgui_bundle import imgui
 from viewer.app.file_dialog import FileDialog, folder_of
 from viewer.app.state import AppState
 from viewer.app.widgets import button, checkbox, choice, note_item
-from viewer.errors import printable
+from viewer.formats import file_stem
 from viewer.rig.number_text import number_text
 
 __all__ = ["KINDS", "RecordSettings", "draw_record_dialog"]
@@ -151,7 +151,7 @@ def _span_text(state: AppState, settings: RecordSettings) -> str:
 
 
 def _ask_where(state: AppState, settings: RecordSettings) -> None:
-    stem = printable(state.actor.figure.name, 60).replace(" ", "_")
+    stem = file_stem(state.scene.title)
     names = {"pictures": f"{stem}_{{frame:05}}.png", "sheet": f"{stem}_sheet.png"}
     name = names.get(settings.kind, f"{stem}{settings.kind}")
     state.dialog = FileDialog(

@@ -35,7 +35,7 @@ from viewer.loading import load
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import Mesh
 from viewer.rig.ray_hit import surface_point
-from viewer.rig.scene import Actor
+from viewer.rig.scene import Actor, free_title
 from viewer.rig.transfer.alignment import AlignmentSettings
 from viewer.rig.transfer.pipeline import transfer
 from viewer.rig.transfer.settings import METHODS
@@ -104,6 +104,7 @@ def start_adding(state: AppState, path: Path) -> None:
             )
 
         def finish(state: AppState) -> None:
+            actor.called = free_title(state.scene.actors, actor.title)
             state.scene.actors.append(actor)
             state.paths = (*state.paths, path)
             state.rig.target = None  # so that the panel chooses anew
@@ -286,7 +287,7 @@ def start_run(state: AppState, methods: tuple[str, ...]) -> None:
     target, choices, placing = state.rig.target, replace(state.rig.choices), placing_now(state)
     if target is None:
         return
-    take, mesh, name = _snapshot(state, laid=True), target_mesh(state), target.figure.name
+    take, mesh, name = _snapshot(state, laid=True), target_mesh(state), target.title
     place, own = target_place(target), current_template(state)
 
     def act(report: Report) -> _Finish:

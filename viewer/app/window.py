@@ -28,6 +28,7 @@ from viewer.app.theme import apply_theme, change_scale  # noqa: E402
 from viewer.app.typed_keys import TypedKeys  # noqa: E402
 from viewer.app.weights_actions import start_heat_map  # noqa: E402
 from viewer.errors import RenderError, printable  # noqa: E402
+from viewer.formats import opened_text  # noqa: E402
 from viewer.interrupts import hold, poll  # noqa: E402
 from viewer.loading import MotionSettings  # noqa: E402
 from viewer.loading.capturing import Builder  # noqa: E402
@@ -305,7 +306,7 @@ def _awaits_tooltip(context: Any) -> bool:
 
 
 def _title(state: AppState) -> str:
-    names = [path.name for path in state.paths] or [state.scene.actors[0].figure.name]
+    names = [opened_text(path) for path in state.paths] or [state.scene.title]
     return f"{printable(' + '.join(names), 100)} - viewer"
 
 

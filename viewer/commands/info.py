@@ -74,6 +74,7 @@ def _describe_actor(actor: Actor, up: str) -> dict[str, Any]:
     points = actor_points(actor) if actor.is_present else np.zeros((0, 3))
     box = bounding_box(points) if len(points) else None
     parts: dict[str, Any] = {"name": actor.name, "up": up, "present": actor.is_present}
+    parts["figure"] = figure.name
     parts |= {"box": None if box is None else box.tolist()}
     parts |= {"size": None if box is None else box_size(box), "attached": figure.is_attached}
     if figure.skeleton is not None and actor.pose is not None:
@@ -175,6 +176,8 @@ def _describe_morphs(shapes: BlendShapes) -> list[dict[str, Any]]:
 
 def _lines(actor: dict[str, Any]) -> list[str]:
     lines = [f"{printable(actor['name'])}", f"  box        {_box_text(actor)}, {actor['up']} up"]
+    if actor["figure"] not in actor["name"]:
+        lines.append(f"  figure     {printable(actor['figure'])}")
     if "skeleton" in actor:
         lines += _skeleton_lines(actor["skeleton"])
     if "mesh" in actor:

@@ -105,7 +105,7 @@ def _draw_instead(
     from viewer.formats import save_image
 
     print_warnings(choose_subject(scene, options))
-    path = free_path(Path.cwd(), scene.actors[0].figure.name, ".png")
+    path = free_path(Path.cwd(), scene.title, ".png")
     save_image(path, draw_scene(scene, SIZE, camera, options, box))
     print(f"{reason}; drew {printable(path, 300)} instead")
     return 0

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from viewer.errors import FormatError, UnsupportedFormatError, printable
 from viewer.formats._faults import Fault
 from viewer.formats._image import is_picture, read_picture, save_image
+from viewer.formats._opened_names import file_stem, folder_name, opened_text
 from viewer.formats._references import referenced_path
 from viewer.formats._save import all_or_none, free_path, save_arrays, save_bytes, save_text
 from viewer.formats._source import MAX_SIZE, Source
@@ -51,8 +52,11 @@ __all__ = [
     "check_targets",
     "claims",
     "detect",
+    "file_stem",
+    "folder_name",
     "free_path",
     "is_picture",
+    "opened_text",
     "read",
     "read_picture",
     "referenced_path",

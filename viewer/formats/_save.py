@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.errors import OutputError, printable
+from viewer.formats._opened_names import file_stem
 from viewer.interrupts import hold, poll, raising
 from viewer.streams import is_stdout, write_stdout
 
@@ -59,12 +60,12 @@ def free_path(folder: Path, stem: str, suffix: str, data: bytes | None = None) -
     data : bytes, optional
         A file that holds just these is as good as none.
     """
-    safe = "".join(letter if letter.isalnum() or letter in "-_." else "_" for letter in stem)[:100]
-    path, number = folder / f"{safe or 'picture'}{suffix}", 1
+    safe = file_stem(stem)
+    path, number = folder / f"{safe}{suffix}", 1
     # A link to nothing counts: writing to it would make a file elsewhere.
     while os.path.lexists(path) and not _holds(path, data):
         number += 1
-        path = folder / f"{safe or 'picture'}-{number}{suffix}"
+        path = folder / f"{safe}-{number}{suffix}"
     return path
 
 

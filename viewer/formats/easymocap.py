@@ -18,12 +18,11 @@ V = R(Rh) X(poses, shapes) + Th, turned about the model's origin. There is no fr
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from viewer.errors import FormatError
 from viewer.formats._camera_files import find_cameras
-from viewer.formats._easymocap_files import BODIES, POINTS, find_frames
+from viewer.formats._easymocap_files import find_frames
 from viewer.formats._easymocap_reading import Options, Reading
+from viewer.formats._opened_names import folder_name
 from viewer.formats._source import Source
 from viewer.rig.capture import Capture
 
@@ -115,9 +114,7 @@ def open_capture(
 
 def _name(source: Source) -> str:
     """Return what a recording is called: not ``smpl``, as all are."""
-    path = source.path.absolute()
-    is_inside = source.is_folder and path.name in (*BODIES, POINTS)
-    return (path.parent if is_inside else Path(path.stem)).name or "capture"
+    return folder_name(source.path) if source.is_folder else source.path.stem
 
 
 def _refusal(source: Source, count: int, fault: FormatError | None) -> FormatError:

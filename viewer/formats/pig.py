@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.errors import FormatError, counted
+from viewer.formats._opened_names import folder_name
 from viewer.formats._pig_names import JOINTS, KEYPOINTS
 from viewer.formats._pig_parts import Part, PigFiles, open_parts
 from viewer.formats._source import Source
@@ -84,7 +85,7 @@ def read(source: Source) -> Figure:
     skin = _skin(source, parts, joints, n_vertices)
     regressor = _regressor(parts, n_joints, n_vertices)
     return Figure(
-        name=source.path.name if source.is_folder else source.path.stem,
+        name=folder_name(source.path) if source.is_folder else source.path.stem,
         mesh=mesh,
         skeleton=ball_skeleton(names, parents, joints),
         skin=skin,

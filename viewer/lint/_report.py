@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from viewer.errors import counted, printable
+from viewer.formats import folder_name
 from viewer.lint._codes import SEVERITIES
 from viewer.lint._finding import Finding
 from viewer.rig.scene import Scene
@@ -33,7 +34,8 @@ def finding_text(finding: Finding) -> str:
         place = printable(finding.file, 300)
         place += f":{finding.line}" if finding.line is not None else ""
         # A folder's figure is called like the folder, its findings name the file inside.
-        known = (finding.file.stem, finding.file.name, finding.file.parent.name, "")
+        folders = finding.file.parent.name, folder_name(finding.file.parent)
+        known = (finding.file.stem, finding.file.name, *folders, "")
         who = "" if finding.name in known else f"{printable(finding.name, 100)}: "
     elif finding.name:
         place = printable(finding.name, 100)

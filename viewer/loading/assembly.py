@@ -70,7 +70,8 @@ def begin(
     cast = Cast([])
     for pair in pairs:
         figure = _join([figures[index] for index in pair])
-        cast.add(Actor(figure), figure.up, placed=False)
+        called = contents.called.get(figures[pair[-1]][0].resolve(), figure.name)
+        cast.add(Actor(figure, called=cast.free_title(called)), figure.up, placed=False)
     _give_morphs(contents, cast)
     if contents.has_motion:
         from viewer.loading.driving import drive
@@ -142,7 +143,7 @@ def _give_morphs(contents: Contents, cast: Cast) -> None:
                     cast.notes.append(
                         f"{printable(figure.name, 60)}: without its .skel only the morphs move it"
                     )
-                actors[index] = Actor(with_morphs(figure, [target]))
+                actors[index] = Actor(with_morphs(figure, [target]), called=actor.called)
                 break
             except RigError as refused:
                 problem = problem or refused

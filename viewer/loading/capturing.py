@@ -46,6 +46,8 @@ class Builder:
         What is read.
     model : Figure
         What its bodies are drawn with.
+    called : str
+        What all people of it are called; after the capture if empty.
     keeps_shape : bool
         Whether the capture's shape coefficients mean something to the model.
     placement : (4, 4)
@@ -62,6 +64,7 @@ class Builder:
 
     capture: Capture
     model: Figure
+    called: str = ""
     keeps_shape: bool = True
     placement: Floats = field(default_factory=lambda: np.eye(4))
     up: Literal["y", "z"] = "y"
@@ -139,7 +142,7 @@ class Builder:
         clip, notes = body_clip(motion, self.model)
         actor = self._bodies.get(person)
         if actor is None:
-            actor = Actor(self.model, clip=clip, placement=self.placement.copy(), person=person)
+            actor = self._actor(self.model, clip, person)
             actor.color = _COLORS[len(self._bodies) % len(_COLORS)]
             self._bodies[person] = actor
             new.append(actor)
@@ -155,7 +158,7 @@ class Builder:
         actor = self._points.get(person)
         if actor is None:
             figure = Figure(layout.title, points=layout, up=self.up)
-            actor = Actor(figure, clip=clip, placement=self.placement.copy(), person=person)
+            actor = self._actor(figure, clip, person)
             self._points[person] = actor
             new.append(actor)
             return []
@@ -169,6 +172,11 @@ class Builder:
             ]
         actor.clip = joined_points(actor.clip, clip)
         return []
+
+    def _actor(self, figure: Figure, clip: SampledClip | PointClip, person: int) -> Actor:
+        called = self.called or self.capture.name
+        placement = self.placement.copy()
+        return Actor(figure, clip=clip, placement=placement, person=person, called=called)
 
     @property
     def actors(self) -> list[Actor]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from viewer.rig.scene import Actor
+from viewer.rig.scene import Actor, free_title
 
 if TYPE_CHECKING:
     from viewer.loading.capturing import Builder
@@ -40,6 +40,10 @@ class Cast:
     builders: list[Builder] = field(default_factory=list)
     views: list[CameraView] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+
+    def free_title(self, title: str) -> str:
+        """Return a title for one more actor, or all people of one more capture."""
+        return free_title(self.actors, title)
 
     def add(self, actor: Actor, up: str, placed: bool) -> None:
         """Add one actor at the end."""

@@ -40,7 +40,17 @@ _PEEK = 16  # bytes that tell a picture
 
 @dataclass(slots=True)
 class Contents:
-    """What several files hold, by kind, with the path of each; ``files`` are all that was read."""
+    """What several files hold, by kind, with the path of each.
+
+    Attributes
+    ----------
+    called : dict
+        What a figure is called whose file, resolved, was named by one that was opened.
+    warnings : tuple of str
+        What the readers noticed.
+    files : tuple of Path
+        All that was read.
+    """
 
     figures: list[tuple[Path, Figure]] = field(default_factory=list)
     clips: list[tuple[Path, Clip]] = field(default_factory=list)
@@ -50,6 +60,7 @@ class Contents:
     skeleton_motions: list[tuple[Path, SkeletonMotion]] = field(default_factory=list)
     captures: list[tuple[Path, Capture]] = field(default_factory=list)
     morphs: list[tuple[Path, MorphTarget]] = field(default_factory=list)
+    called: dict[Path, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     files: tuple[Path, ...] = ()
 
@@ -88,6 +99,8 @@ def read_files(
         for path in read_source(source, contents, settings or MotionSettings()):
             if path.resolve() not in known:  # a .rig may name another, or itself
                 known.add(path.resolve())
+                called = contents.called.get(source.path.resolve(), source.path.stem)
+                contents.called[path.resolve()] = called
                 sources.append(Source.open(path, max_size))
     contents.warnings = tuple(text for source in sources for text in source.warnings)
     read = (path for source in sources for path in (source.path, *source.also_read))

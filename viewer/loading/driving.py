@@ -166,7 +166,7 @@ def _give_body_motion(
     except RigError as problem:
         raise RigError(f"{printable(path, 300)}: {problem} (--model names the model)") from None
     cast.notes += [f"{printable(path, 300)}: {note}" for note in notes]
-    actor = Actor(model, clip=clip)
+    actor = Actor(model, clip=clip, called=cast.free_title(motion.name))
     up = settings.up or motion.up
     if not up:
         up = _judged_up(path, [actor], cast)
@@ -196,7 +196,8 @@ def _begin_capture(
     is_bundled: bool,
 ) -> None:
     """Read a capture until somebody is seen; the rest is read later."""
-    builder = Builder(capture, model, keeps_shape=not is_bundled)
+    called = cast.free_title(capture.name)
+    builder = Builder(capture, model, called=called, keeps_shape=not is_bundled)
     cast.notes += capture.warnings
     while not builder.actors and not builder.is_done:
         try:

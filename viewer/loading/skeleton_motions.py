@@ -82,11 +82,13 @@ def give_skeleton_motion(
         except RigError as problem:
             raise RigError(f"{shown}: {problem} (--model names the model)") from None
         cast.notes += [f"{shown}: {note}" for note in notes]
-        cast.add(Actor(model, clip=clip, placement=turn), model.up, placed=False)
+        called = cast.free_title(motion.figure.name)
+        cast.add(Actor(model, clip=clip, placement=turn, called=called), model.up, placed=False)
         return None
     if settings.drives and _drives_somebody(shown, motion, cast, turn):
         return None
-    actor = Actor(motion.figure, clip=motion.clip, placement=turn)
+    called = cast.free_title(motion.figure.name)
+    actor = Actor(motion.figure, clip=motion.clip, placement=turn, called=called)
     cast.add(actor, motion.figure.up, placed=False)
     return Lone(path, motion, actor)
 

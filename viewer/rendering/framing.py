@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -193,9 +194,13 @@ def follow_candidates(scene: Scene, name: str) -> list[tuple[int, int]]:
 
 
 def _called(scene: Scene) -> list[tuple[str, ...]]:
-    """Return by what each actor is called: its name in small letters, and its person's number."""
-    numbers = [() if actor.person is None else (str(actor.person),) for actor in scene.actors]
-    return [(actor.name.lower(), *own) for actor, own in zip(scene.actors, numbers, strict=True)]
+    """Return the names of each actor: of what was opened, of its figure, its person's number."""
+    names = []
+    for actor in scene.actors:
+        by_figure = replace(actor, called="").name
+        number = () if actor.person is None else (str(actor.person),)
+        names.append((actor.name.lower(), by_figure.lower(), *number))
+    return names
 
 
 def _with_joint(scene: Scene, actors: Iterable[int], name: str) -> list[tuple[int, int]]:

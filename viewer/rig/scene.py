@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
@@ -16,7 +17,16 @@ from viewer.rig.shape import shaped
 from viewer.rig.skinning import deform
 from viewer.rig.transform import apply_transform
 
-__all__ = ["Actor", "Motion", "Scene", "actor_points", "figure_pose", "scene_box", "scene_points"]
+__all__ = [
+    "Actor",
+    "Motion",
+    "Scene",
+    "actor_points",
+    "figure_pose",
+    "free_title",
+    "scene_box",
+    "scene_points",
+]
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -59,6 +69,8 @@ class Actor:
         Of figures that are captured points: x, y, z and confidence, right now.
     is_present : bool
         Whether its clip has it at the time that is shown.
+    called : str
+        What was opened for it, a recording, if it is not called after its figure.
     """
 
     figure: Figure
@@ -71,11 +83,18 @@ class Actor:
     color: tuple[float, float, float] | None = None
     points: Floats | None = None
     is_present: bool = True
+    called: str = ""
+
+    @property
+    def title(self) -> str:
+        """What was opened for it: a recording, else its figure; all people of one share it."""
+        return self.called or self.figure.name
 
     @property
     def name(self) -> str:
-        """What menus and files call it: its figure's name, and the person's."""
-        name = self.figure.name
+        """What menus and files call it: what was opened, and which part of that it is."""
+        is_part = self.called and self.figure.points is not None
+        name = f"{self.title} {self.figure.name}" if is_part else self.title
         return name if self.person is None else f"{name} {person_name(self.person)}"
 
     @property
@@ -95,6 +114,15 @@ class Actor:
             placement=self.placement.copy(),
             points=None if self.points is None else self.points.copy(),
         )
+
+
+def free_title(actors: Iterable[Actor], title: str) -> str:
+    """Return a title that no actor has: ``walk``, then ``walk-2``, and so on."""
+    taken, number, free = {actor.title for actor in actors}, 1, title
+    while free in taken:
+        number += 1
+        free = f"{title}-{number}"
+    return free
 
 
 def figure_pose(figure: Figure) -> Pose:
@@ -131,6 +159,11 @@ class Scene:
     views: tuple[CameraView, ...] = ()
     time: float | None = None
     files: tuple[Path, ...] = ()
+
+    @property
+    def title(self) -> str:
+        """What pictures and videos of it are called: the title of its first actor."""
+        return self.actors[0].title if self.actors else ""
 
     @property
     def up(self) -> Literal["y", "z"]:

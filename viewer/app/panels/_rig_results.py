@@ -27,6 +27,7 @@ from viewer.app.state import AppState
 from viewer.app.widgets import button, checkbox, explain, note_item, same_line_if_room
 from viewer.errors import printable
 from viewer.export._rigged_files import RIGGED_SUFFIXES, files_of
+from viewer.formats import file_stem
 
 __all__ = ["draw_results"]
 
@@ -146,7 +147,7 @@ def _draw_lines(state: AppState, result: Result) -> None:
 
 
 def _ask_where(state: AppState, result: Result) -> None:
-    name = f"{printable(result.target.name, 60).replace(' ', '_')}_rigged.npz"
+    name = f"{file_stem(result.target.name)}_rigged.npz"
     state.dialog = FileDialog(
         folder_of(state.paths),
         lambda state, paths: save_rigged(state, result, paths[0]),

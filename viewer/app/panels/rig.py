@@ -37,7 +37,7 @@ from viewer.app.widgets import (
 )
 from viewer.errors import printable
 from viewer.rig.mesh import bounding_box
-from viewer.rig.scene import Actor, actor_points
+from viewer.rig.scene import Actor, actor_points, free_title
 from viewer.rig.transfer.settings import JOINTS, METHODS
 from viewer.rig.transform import translation_matrix
 
@@ -149,6 +149,7 @@ def _add_template(state: AppState) -> None:
     template = current_template(state)
     assert template is not None  # it was read
     actor = Actor(template.figure, template.pose.copy(), template.clip)
+    actor.called = free_title(state.scene.actors, actor.title)
     span = bounding_box(actor_points(actor))[:, 0]
     edge = max(
         (actor_points(one)[:, 0].max() for one in state.scene.actors if one.is_drawn), default=0.0

@@ -1,0 +1,66 @@
+"""Names that the window offers for files: recordings, screenshots, poses, clips, exports."""
+
+from __future__ import annotations
+
+import pytest
+from formats.capture_files import body, write_frames
+
+from viewer.app.clip_actions import ask_for_clip, new_clip
+from viewer.app.menus import _ask_for_export, _ask_for_pose
+from viewer.app.motion_dialog import ask_for_motion
+from viewer.app.record_dialog import KINDS, RecordSettings, _ask_where
+
+
+@pytest.fixture
+def recorded(drive, tmp_path):
+    """A hand on a recording of two people, drawn with the bundled body."""
+    folder = write_frames(tmp_path / "seq_smpl" / "smpl", {0: [body(0), body(7)], 1: [body(0)]})
+    return drive(folder, samples=1, size=(1000, 700))
+
+
+def test_recordings_are_called_after_the_sequence(recorded):
+    offered = {}
+    for kind in KINDS:
+        _ask_where(recorded.state, RecordSettings(kind=kind))
+        offered[kind] = recorded.state.dialog.name
+    assert offered.pop("pictures") == "seq_smpl_{frame:05}.png"
+    assert offered.pop("sheet") == "seq_smpl_sheet.png"
+    assert offered and offered == {kind: f"seq_smpl{kind}" for kind in offered}
+
+
+def test_what_one_person_gives_is_called_after_that_person(recorded):
+    state = recorded.state
+    state.choose_actor(1)
+    _ask_for_pose(state)
+    assert state.dialog.name == "seq_smpl_7_pose.json"
+    _ask_for_export(state)
+    assert state.dialog.name == "seq_smpl_7.obj"
+
+
+def test_motions_of_all_are_called_after_the_sequence(recorded):
+    ask_for_motion(recorded.state)
+    assert recorded.state.dialog.name.startswith("seq_smpl.")
+
+
+def test_screenshot_is_called_after_the_sequence(recorded, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    recorded.key("f12")
+    recorded.step(2)
+    assert (tmp_path / "seq_smpl.png").is_file()
+
+
+def test_figure_and_its_clip_are_called_after_the_figure(hand):
+    state = hand.state
+    new_clip(state)
+    hand.step(2)
+    assert state.actor.clip.name == "tiny"
+    ask_for_clip(state)
+    assert state.dialog.name == "tiny_edited.anim"
+    _ask_where(state, RecordSettings(kind="sheet"))
+    assert state.dialog.name == "tiny_sheet.png"
+
+
+def test_name_with_a_slash_offers_no_folder(hand):
+    hand.state.actor.called = "../a b"
+    _ask_for_export(hand.state)
+    assert hand.state.dialog.name == ".._a_b.obj"
