@@ -135,6 +135,8 @@ class MotionExtent:
             if not any(actor.is_drawn for actor in seen.actors):
                 return np.zeros((0, 3))
         points = scene_points(seen, show)
+        if not playback.has_motion:
+            return points  # one frame: to keep all takes less time than to choose
         low, high = _N_DIRECTIONS
         return outermost(points, min(max(_MOST_PRODUCTS // len(points), low), high))
 

@@ -30,7 +30,7 @@ Front: TypeAlias = str
 FRONTS = ("+x", "-x", "+y", "-y", "+z", "-z")
 """All there are; which two do not apply depends on the up axis."""
 
-_MOST_ACTORS, _MOST_JOINTS = 16, 2000
+_MOST_ACTORS, _MOST_JOINTS, _MOST_VERTICES = 16, 2000, 100_000
 _N_TIMES = 9  # at which a motion is looked at
 _SURE = 0.5  # of a vote for one axis: less is no answer
 _WEIGHTS = {"sides": 3.0, "toes": 2.0, "face": 2.0, "ends": 2.0, "travel": 1.0}
@@ -88,7 +88,8 @@ def _vote(actor: Actor, up: Floats) -> Floats:
         mesh = actor.figure.mesh
         way = np.zeros(3)
         if mesh is not None and actor.figure.skeleton is None:
-            way = from_soles(apply_transform(actor.placement, mesh.positions), up)
+            some = mesh.positions[:: max(mesh.n_vertices // _MOST_VERTICES, 1)]
+            way = from_soles(apply_transform(actor.placement, some), up)
         return _unit(way, _SURE)
     found = {
         "sides": from_sides(names, places, up),
