@@ -9,7 +9,7 @@ from typing import Any
 
 from viewer.errors import ViewerError
 
-__all__ = ["NoDisplay", "find_display", "import_glfw"]
+__all__ = ["NoDisplay", "find_display", "import_glfw", "is_on_x11"]
 
 
 class NoDisplay(ViewerError):  # noqa: N818  a state of the machine, not a fault
@@ -29,6 +29,13 @@ def import_glfw() -> Any:
     # GLFW reports errors as Python warnings; here they are asked for and raised instead.
     glfw.ERROR_REPORTING = "ignore"
     return glfw
+
+
+def is_on_x11() -> bool:
+    """Return whether GLFW, once it has started, talks to an X server."""
+    glfw = import_glfw()
+    has_name = sys.platform.startswith("linux") and hasattr(glfw, "get_x11_display")
+    return has_name and bool(glfw.get_x11_display())
 
 
 def find_display() -> None:

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.errors import OutputError, printable
+from viewer.formats._unfinished import note_unfinished
 
 __all__ = [
     "Replacement",
@@ -167,6 +168,7 @@ class Replacement:
             raise self.error(problem) from None
         os.close(handle)
         self.temporary = Path(name)
+        note_unfinished(self.temporary)
         return self.temporary
 
     def commit(self) -> int:
@@ -269,6 +271,7 @@ def _write_through(target: Path, data: bytes) -> None:
 def _replace(target: Path, data: bytes, permissions: int) -> None:
     _require_folder(target)
     handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name[:40]}.")
+    note_unfinished(Path(name))
     try:
         with os.fdopen(handle, "wb") as stream:
             stream.write(data)
