@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from viewer.app.actions import fit_view
-from viewer.app.display import find_display, import_glfw, is_on_x11
+from viewer.app.display import find_display, import_glfw, is_on_x11, window_error
 
 glfw = import_glfw()
 
@@ -317,7 +317,7 @@ def _create_window(title: str, is_visible: bool = True) -> Any:
     if not handle:
         code, text = glfw.get_error()
         words = text.decode() if isinstance(text, bytes) else text or f"GLFW error {code}"
-        raise RenderError(explain(words))
+        raise window_error(words)
     glfw.set_window_size_limits(handle, 320, 240, glfw.DONT_CARE, glfw.DONT_CARE)
     return handle
 
