@@ -206,6 +206,7 @@ REFUSED = {
     ),
     "folder": (["-o", "{tmp}/no/x.npz"], 5, "viewer: {tmp}/no/x.npz: the folder does not exist"),
     "angle": (["--max-angle", "200"], 2, "viewer: --max-angle: expected 0 to 180, found 200"),
+    "mistyped template": (["--from", "foxx"], 2, "foxx: no such file; did you mean fox?"),
     "no rig": (
         ["--from", "{scan}"],
         2,
