@@ -14,8 +14,10 @@ from viewer.rig.arrays import Bytes
 __all__ = ["Target", "check_size", "picture_rows", "straight", "target_bytes"]
 
 
-def check_size(context: moderngl.Context, size: tuple[int, int]) -> None:
-    """Refuse a picture that the driver cannot draw.
+def check_size(
+    context: moderngl.Context, size: tuple[int, int], what: str = "picture size"
+) -> None:
+    """Refuse a picture that the driver cannot draw; ``what`` begins the message.
 
     Raises
     ------
@@ -25,7 +27,7 @@ def check_size(context: moderngl.Context, size: tuple[int, int]) -> None:
     limit = min(*context.info["GL_MAX_VIEWPORT_DIMS"], context.info["GL_MAX_RENDERBUFFER_SIZE"])
     if not all(1 <= side <= limit for side in size):
         raise ViewerError(
-            f"picture size: expected 1 to {limit} pixels a side, found {size[0]} x {size[1]}"
+            f"{what}: expected 1 to {limit} pixels a side, found {size[0]} x {size[1]}"
         )
 
 
