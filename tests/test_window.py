@@ -427,3 +427,22 @@ def test_bad_file_opens_no_window(display, tmp_path):
     )  # fmt: skip
     assert done.returncode == 2 and done.stdout == b""
     assert b"bad.skel:2: " in done.stderr and done.stderr.count(b"\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("MESA_GLSL_VERSION_OVERRIDE", "130", (b"GLSL 3.30 is needed", b"offers GLSL 1.30")),
+        ("MESA_GL_VERSION_OVERRIDE", "3.1", (b"OpenGL 3.3 is needed", b"offers 3.1")),
+    ],
+)
+def test_old_opengl_opens_no_window(display, tmp_path, name, value, words):
+    environment = {**os.environ, "DISPLAY": display, "PYTHONPATH": str(ROOT), name: value}
+    environment |= {"XDG_STATE_HOME": str(tmp_path), "LIBGL_ALWAYS_SOFTWARE": "1"}
+    done = subprocess.run(
+        [sys.executable, "-m", "viewer", *write_rig(tmp_path)],
+        env=environment, capture_output=True, timeout=60, check=False,
+    )  # fmt: skip
+    assert done.returncode == 4 and done.stdout == b"" and done.stderr.count(b"\n") == 1
+    for word in (*words, b"renderer ", f"{name}={value}".encode()):
+        assert word in done.stderr

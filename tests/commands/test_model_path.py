@@ -232,3 +232,18 @@ def test_body_stands_beside_other_files(folder, capsys):
     assert run(["info", *arguments]) == 0
     actors = json.loads(capsys.readouterr().out)["actors"]
     assert [actor["name"] for actor in actors] == ["MANO_LEFT", "body"]
+
+
+def test_unknown_name_among_many_comes_with_the_nearest(folder, capsys, monkeypatch):
+    monkeypatch.setattr("viewer.commands._scene._MOST_MODELS", 2)
+    line = refused(capsys, "info", "smplx:femal", "--model-path", str(folder))
+    assert "; did you mean smplx:female" in line and "models there" not in line
+
+
+def test_unknown_name_of_a_model_that_draws_captures_lists_what_is_there(
+    folder, tmp_path, capsys, monkeypatch
+):
+    motion = tmp_path / "motion.npz"
+    np.savez(motion, poses=np.zeros((2, 156)), trans=np.zeros((2, 3)), mocap_framerate=30.0)
+    line = refused(capsys, "info", str(motion), "--model", "smplx:mal", "--model-path", str(folder))
+    assert "models there: " in line and "smplx:neutral" in line

@@ -572,3 +572,12 @@ def test_numbered_files_are_pictures(tmp_path, monkeypatch, capsys, suffix):
     assert run(["render", "missing.skel", "-o", f"f_{{frame}}{suffix}", "--frames", "0:2"]) == 2
     error = capsys.readouterr().err
     assert ".png" in error and f"found {suffix}" in error and "missing" not in error
+
+
+def test_cells_that_cannot_be_drawn_come_with_the_size_of_the_sheet(walk, monkeypatch, capsys):
+    monkeypatch.chdir(Path(walk[0]).parent)
+    arguments = ["-o", "s.png", "--contact-sheet", "4", "--size", "300000x300000"]
+    assert run(["render", *map(str, walk), *arguments]) == 2
+    error = capsys.readouterr().err
+    # Two cells across and two down.
+    assert "300000 x 300000" in error and "found 150000 x 150000" in error

@@ -210,6 +210,7 @@ REFUSED = {
         "viewer: {tmp}/no/x.npz: the folder {tmp}/no does not exist",
     ),
     "angle": (["--max-angle", "200"], 2, "viewer: --max-angle: expected 0 to 180, found 200"),
+    "mistyped template": (["--from", "foxx"], 2, "foxx: no such file; did you mean fox?"),
     "no rig": (
         ["--from", "{scan}"],
         2,

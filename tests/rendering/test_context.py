@@ -11,8 +11,9 @@ import moderngl
 import numpy as np
 import pytest
 
-from viewer.errors import RenderError
-from viewer.rendering.context import check_errors, explain, headless_context
+from viewer.cli import run
+from viewer.errors import RenderError, ViewerError
+from viewer.rendering.context import check_errors, device_count, explain, headless_context
 from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.upload import buffer
 
@@ -84,8 +85,52 @@ def test_an_old_opengl_is_named_with_its_version_and_renderer(tmp_path):
     assert result.stderr.startswith(
         "viewer: OpenGL 3.3 is needed; this machine offers 3.1 (renderer "
     )
+    assert "MESA_GL_VERSION_OVERRIDE=3.1" in result.stderr
     assert result.stderr.count("\n") == 1
     assert not output.exists()
+
+
+@LINUX
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("MESA_GLSL_VERSION_OVERRIDE", "130", ("GLSL 3.30 is needed", "offers GLSL 1.30")),
+        ("MESA_GLSL_VERSION_OVERRIDE", "150", ("OpenGL 3.3 is needed", "3.2 with GLSL 1.50")),
+        ("MESA_GL_VERSION_OVERRIDE", "2.1", ("OpenGL 3.3 is needed", "offers 2.1")),
+    ],
+)
+def test_an_old_shading_language_is_told_apart_from_an_old_opengl(tmp_path, name, value, words):
+    result, output = viewer_render(tmp_path, **{name: value})
+    assert result.returncode == 4 and result.stderr.count("\n") == 1, result.stderr
+    for word in (*words, "renderer ", f"{name}={value}"):
+        assert word in result.stderr
+    assert not output.exists()
+
+
+@LINUX
+@pytest.mark.parametrize(
+    ("environment", "code", "words"),
+    [
+        ({"DISPLAY": ""}, 0, ("note    display", "DISPLAY is not set")),
+        ({"MESA_GLSL_VERSION_OVERRIDE": "130", "DISPLAY": ""}, 4, ("missing drawing", "GLSL 1.30")),
+        ({"MESA_GL_VERSION_OVERRIDE": "3.1", "DISPLAY": ""}, 4, ("missing drawing", "offers 3.1")),
+        (
+            {"__EGL_VENDOR_LIBRARY_FILENAMES": "/nonexistent", "DISPLAY": ""},
+            4,
+            ("missing drawing", "EGL found 0 devices"),
+        ),
+        # No server has this number.
+        ({"DISPLAY": ":654321"}, 0, ("note    display", ":654321", "-> ")),
+    ],
+)
+def test_doctor_says_the_same(environment, code, words):
+    variables = {**os.environ, "WAYLAND_DISPLAY": "", **environment}
+    done = subprocess.run(
+        [sys.executable, "-m", "viewer", "doctor"],
+        cwd=ROOT, env=variables, capture_output=True, text=True, timeout=60, check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (code, "")
+    assert all(word in done.stdout for word in words)
 
 
 @LINUX
@@ -104,11 +149,29 @@ def test_a_missing_libgl_names_its_package(tmp_path):
 
 @LINUX
 def test_a_device_that_is_not_there_gives_the_number_of_devices(tmp_path):
-    result, output = viewer_render(tmp_path, "--gpu", "99")
-    assert result.returncode == 4
-    assert result.stderr.startswith("viewer: there is no graphics device 99: EGL found ")
-    assert result.stderr.endswith(", counted from 0\n")
-    assert not output.exists()
+    count = device_count()
+    known = "0, the only one," if count == 1 else f"0 to {count - 1},"
+    for number in ("99", "-1"):
+        result, output = viewer_render(tmp_path, "--gpu", number)
+        assert result.returncode == 2 and result.stderr.count("\n") == 1
+        for word in ("--gpu", f"expected {known}", f"found {number} "):
+            assert word in result.stderr
+        assert not output.exists()
+
+
+@LINUX
+def test_a_device_that_is_not_there_is_said_before_anything_is_read(tmp_path, capsys):
+    assert run(["render", "missing.skel", "-o", str(tmp_path / "x.png"), "--gpu", "-1"]) == 2
+    assert "found -1" in capsys.readouterr().err
+
+
+@LINUX
+def test_no_device_at_all_is_no_usage_error_but_a_negative_number_is(tmp_path):
+    for number, code, word in (("0", 4, "EGL found 0 devices"), ("-1", 2, "expected 0 or more")):
+        result, _ = viewer_render(
+            tmp_path, "--gpu", number, __EGL_VENDOR_LIBRARY_FILENAMES="/nonexistent"
+        )
+        assert result.returncode == code and word in result.stderr
 
 
 @LINUX
@@ -182,8 +245,10 @@ def test_library_messages_are_explained(text, start):
 
 @LINUX
 def test_an_impossible_device_is_an_error_in_process_too():
-    with pytest.raises(RenderError, match="there is no graphics device 99"):
-        headless_context(99)
+    for number in (99, -1):
+        with pytest.raises(ViewerError, match=f"found {number} ") as caught:
+            headless_context(number)
+        assert caught.value.exit_code == 2
 
 
 def test_errors_of_opengl_are_raised_with_what_was_done(ctx):

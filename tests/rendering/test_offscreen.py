@@ -7,6 +7,7 @@ import sys
 import threading
 from pathlib import Path
 
+import moderngl
 import numpy as np
 import pytest
 from drawn_figures import arm, bent, checker, scene_of, square
@@ -18,7 +19,7 @@ from viewer.rendering.camera import Camera
 from viewer.rendering.context import headless_context
 from viewer.rendering.offscreen import Offscreen, default_camera
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.target import Target
+from viewer.rendering.target import Target, target_bytes
 from viewer.rendering.upload import matrix_texture, picture_texture
 from viewer.rig.scene import Scene, scene_box
 
@@ -247,13 +248,62 @@ def test_more_joints_than_a_texture_holds_are_refused(ctx):
         matrix_texture(ctx, 256 * (limit + 1))
 
 
-def test_a_picture_without_room_is_an_error_with_its_size(ctx, monkeypatch):
-    def refuse(context, doing):
+@pytest.mark.parametrize(
+    ("samples", "words"),
+    [
+        # 64 x 48 pixels: 4 samples of colour and depth and the picture, 36 bytes a pixel.
+        (4, ("64 x 48", "4 samples", "needs 0.111 MB", "--samples 1) needs 0.0246 MB", "smaller")),
+        # Without multisampling, 4 bytes of colour and 4 of depth.
+        (1, ("64 x 48", "needs 0.0246 MB", "smaller")),
+    ],
+)
+@pytest.mark.parametrize("how", ["refused", "out of memory"])
+def test_a_picture_without_room_says_how_much_it_needs(ctx, monkeypatch, samples, words, how):
+    made = []
+
+    def no_room(context, doing):
         raise RenderError(f"{doing}: not enough graphics memory")
 
-    monkeypatch.setattr(target_module, "check_errors", refuse)
-    with pytest.raises(RenderError, match=r"^a picture of 64 x 48 pixels: not enough"):
-        Target(ctx, (64, 48), 4)
+    def incomplete(*_):
+        raise moderngl.Error("the framebuffer is not complete (INCOMPLETE_ATTACHMENT)")
+
+    class Lavish:
+        """A context that makes everything but has no room for a framebuffer."""
+
+        def __getattr__(self, name):
+            if name == "framebuffer" and how == "refused" and made[1 if samples > 1 else 0 :]:
+                return incomplete
+            found = getattr(ctx, name)
+            if name not in ("texture", "renderbuffer", "depth_renderbuffer", "framebuffer"):
+                return found
+            return lambda *args, **options: made.append(found(*args, **options)) or made[-1]
+
+    if how == "out of memory":
+        monkeypatch.setattr(target_module, "check_errors", no_room)
+    with pytest.raises(RenderError) as caught:
+        Target(Lavish(), (64, 48), samples)
+    text = str(caught.value)
+    assert all(word in text for word in words) and ctx.info["GL_RENDERER"] in text
+    assert ("--samples" in text) == (samples > 1)
+    assert made and all(isinstance(one.mglo, moderngl.InvalidObject) for one in made)
+
+
+@pytest.mark.parametrize(
+    ("size", "samples", "n_bytes"),
+    [((16384, 16384), 4, 9_663_676_416), ((16384, 16384), 0, 2_147_483_648), ((1, 1), 8, 68)],
+)
+def test_memory_is_that_of_samples_depth_and_picture(size, samples, n_bytes):
+    assert target_bytes(size, samples) == n_bytes
+
+
+def test_the_largest_picture_with_samples_is_refused_with_its_memory(ctx):
+    """16384 x 16384 pixels are within llvmpipe's limits, four samples of each are not."""
+    if "llvmpipe" not in ctx.info["GL_RENDERER"] or ctx.info["GL_MAX_RENDERBUFFER_SIZE"] != 16384:
+        pytest.skip("other limits")
+    with pytest.raises(RenderError) as caught:
+        Target(ctx, (16384, 16384), 4)
+    assert "needs 9.7 GB" in str(caught.value) and "(--samples 1) needs 2.1 GB" in str(caught.value)
+    assert ctx.error == "GL_NO_ERROR"
 
 
 def test_a_target_is_kept_while_its_size_and_samples_are(scene):

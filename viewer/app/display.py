@@ -7,9 +7,11 @@ import sys
 import warnings
 from typing import Any
 
-from viewer.errors import ViewerError
+from viewer.errors import RenderError, ViewerError
+from viewer.rendering.context import explain
+from viewer.rendering.offer import offer_of, offer_text
 
-__all__ = ["NoDisplay", "find_display", "import_glfw"]
+__all__ = ["NoDisplay", "find_display", "import_glfw", "is_on_x11", "window_error"]
 
 
 class NoDisplay(ViewerError):  # noqa: N818  a state of the machine, not a fault
@@ -29,6 +31,36 @@ def import_glfw() -> Any:
     # GLFW reports errors as Python warnings; here they are asked for and raised instead.
     glfw.ERROR_REPORTING = "ignore"
     return glfw
+
+
+def is_on_x11() -> bool:
+    """Return whether GLFW, once it has started, talks to an X server."""
+    glfw = import_glfw()
+    has_name = sys.platform.startswith("linux") and hasattr(glfw, "get_x11_display")
+    return has_name and bool(glfw.get_x11_display())
+
+
+def window_error(words: str) -> RenderError:
+    """Return an error that says what OpenGL this display offers, where a window was refused.
+
+    Parameters
+    ----------
+    words : str
+        Those of GLFW; told if the display offers nothing at all.
+    """
+    glfw = import_glfw()
+    glfw.default_window_hints()
+    glfw.window_hint(glfw.VISIBLE, False)
+    # Any version: the newest compatibility profile, or what there is.
+    handle = glfw.create_window(64, 64, "viewer", None, None)
+    if not handle:
+        return RenderError(explain(words))
+    try:
+        glfw.make_context_current(handle)
+        address = glfw.get_proc_address("glGetString")
+        return RenderError(offer_text(offer_of(address)) if address else explain(words))
+    finally:
+        glfw.destroy_window(handle)
 
 
 def find_display() -> None:

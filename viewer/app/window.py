@@ -7,13 +7,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from viewer.app.display import find_display, import_glfw
+from viewer.app.display import find_display, import_glfw, is_on_x11, window_error
 
 glfw = import_glfw()
 
 import moderngl  # noqa: E402  after glfw, whose library imgui-bundle chooses
 from imgui_bundle import imgui, implot  # noqa: E402
 
+from viewer.app.display_loss import DisplayLoss  # noqa: E402
 from viewer.app.frame import Frame  # noqa: E402
 from viewer.app.jobs import FrameJob  # noqa: E402
 from viewer.app.recent import (  # noqa: E402
@@ -131,12 +132,14 @@ class _Window:
     def __init__(self, state: AppState, scale: float | None) -> None:
         self.state = state
         self.handle = _create_window(_title(state))
+        self._loss = DisplayLoss(is_on_x11())
         try:
             glfw.make_context_current(self.handle)
             glfw.swap_interval(1)
             self.context = _context()
         except BaseException:
             glfw.destroy_window(self.handle)
+            self._loss.release()
             raise
         self._dropped: list[Path] = []
         self._is_dirty = True
@@ -272,6 +275,7 @@ class _Window:
         self.frame.release()
         self.context.release()
         glfw.destroy_window(self.handle)
+        self._loss.release()
 
 
 class _Rest:
@@ -324,7 +328,7 @@ def _create_window(title: str, is_visible: bool = True) -> Any:
     if not handle:
         code, text = glfw.get_error()
         words = text.decode() if isinstance(text, bytes) else text or f"GLFW error {code}"
-        raise RenderError(explain(words))
+        raise window_error(words)
     glfw.set_window_size_limits(handle, 320, 240, glfw.DONT_CARE, glfw.DONT_CARE)
     return handle
 

@@ -16,6 +16,7 @@ from viewer.commands._progress import Progress
 from viewer.errors import FormatError, ViewerError, printable
 from viewer.loading import MotionSettings, begin, bundled_body, bundled_files, read_files
 from viewer.models import known_models, load_model_folder, resolve, save_model_folder
+from viewer.near_names import did_you_mean
 from viewer.rig.scene import Scene
 from viewer.rig.units import METRES
 
@@ -39,6 +40,7 @@ LAYOUTS = ("body19", "panoptic", "coco", "h36m")
 """Keypoint layouts that share their number of points with another."""
 
 _DEFAULT = "the bundled figure"
+_MOST_MODELS = 12  # names in a message
 _SLOW_BYTES = 60e6  # about a second of reading
 _UNITS = {"k": 1 << 10, "m": 1 << 20, "g": 1 << 30}
 
@@ -182,7 +184,8 @@ def begin_scene(arguments: argparse.Namespace) -> tuple[Scene, list[Builder]]:
         contents = read_files(files or bundled_files(), _parse_bytes(arguments.max_size), settings)
         scene, builders = begin(contents, settings)
     except FormatError as problem:
-        raise _with_models(problem, arguments.files) from None
+        named = [*arguments.files, *filter(None, [arguments.model])]
+        raise _with_models(problem, named) from None
     print_warnings(scene.warnings)
     return scene, builders
 
@@ -193,10 +196,13 @@ def _with_models(problem: FormatError, files: Sequence[str]) -> ViewerError:
     missing = [file for file in files if Path(file) == problem.path and not problem.path.exists()]
     if not missing or folder is None or len(problem.path.parts) != 1:
         return problem
-    names = ", ".join(list(known_models(folder))[:12]) or "none"
+    models = [*known_models(folder)]
+    near = did_you_mean(str(problem.path), models) if len(models) > _MOST_MODELS else ""
+    names = ", ".join(models[:_MOST_MODELS]) or "none"
     return FormatError(
         problem.path,
-        f"no such file, and no such model in {printable(folder, 200)}; models there: {names}",
+        f"no such file, and no such model in {printable(folder, 200)}; "
+        + (near or f"models there: {names}"),
     )
 
 

@@ -195,6 +195,7 @@ def draw_sequence(
     """
     from viewer.rendering.offscreen import Offscreen
     from viewer.rendering.recorder import record
+    from viewer.rendering.target import check_size
 
     shots = shots_of(request, arguments, scene)
     outputs = _outputs(request, shots)
@@ -206,6 +207,9 @@ def draw_sequence(
     title = f"drawing {printable(outputs[0].name)}"
     hold()
     with Offscreen(arguments.gpu) as offscreen, offscreen.context:
+        if request.kind == "sheet":
+            cells = f"cells of a contact sheet of {size[0]} x {size[1]} pixels"
+            check_size(offscreen.context, frame_size, cells)
         steps = record(recording, offscreen.renderer, sink)
         # Closed while the context is still there, whatever happens.
         with Progress(title, recording.n_frames) as line, contextlib.closing(steps):

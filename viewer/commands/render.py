@@ -83,6 +83,7 @@ def run(arguments: argparse.Namespace) -> int:
     if request is None or request.kind != "pictures":
         check_targets([output], inputs_of(arguments), arguments.force)
     options = display_of(arguments)
+    _check_device(arguments.gpu)
     if options.background == "transparent" and output.suffix.lower() in _OPAQUE:
         print_warnings([f"{printable(output)}: this format knows no transparency"])
     scene = open_scene(arguments)
@@ -95,6 +96,14 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         _draw_still(arguments, scene, options, size)
     return 0
+
+
+def _check_device(device: int | None) -> None:
+    """Refuse a graphics device that is not there, before anything is read."""
+    if device is not None:
+        from viewer.rendering.context import check_device
+
+        check_device(device)
 
 
 def _draw_still(

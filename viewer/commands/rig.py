@@ -18,11 +18,12 @@ from viewer.commands._numbers import number
 from viewer.commands._pose import add_pose_arguments, apply_pose, pose_files
 from viewer.commands._progress import Progress
 from viewer.commands._scene import print_warnings
-from viewer.errors import RigError, ViewerError, printable
+from viewer.errors import FormatError, RigError, ViewerError, printable
 from viewer.export._rigged_files import files_of, write_rigged
 from viewer.formats import Source, all_or_none, check_targets
 from viewer.loading import MotionSettings, bundled_body, bundled_files, load
 from viewer.models import resolve
+from viewer.near_names import did_you_mean
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import deform
@@ -254,7 +255,11 @@ def _files(arguments: argparse.Namespace) -> list[Path]:
 def _template_files(name: str) -> list[Path]:
     if name in _BUNDLED and not Path(name).exists():
         return [bundled_body()] if name == "body" else list(bundled_files())
-    return [resolve(name)]
+    path = resolve(name)
+    near = "" if path.exists() or len(path.parts) != 1 else did_you_mean(name, _BUNDLED)
+    if near:
+        raise FormatError(path, f"no such file; {near}")
+    return [path]
 
 
 def _check_numbers(arguments: argparse.Namespace) -> None:

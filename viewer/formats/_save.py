@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from viewer.errors import OutputError, printable
 from viewer.formats._opened_names import file_stem
+from viewer.formats._unfinished import note_unfinished
 from viewer.interrupts import hold, poll, raising
 from viewer.streams import is_stdout, write_stdout
 
@@ -175,6 +176,7 @@ class Replacement:
             raise self.error(problem) from None
         os.close(handle)
         self.temporary = Path(name)
+        note_unfinished(self.temporary)
         return self.temporary
 
     def commit(self) -> int:
@@ -297,6 +299,7 @@ def _write_through(target: Path, data: bytes) -> None:
 def _replace(target: Path, data: bytes, permissions: int) -> None:
     _require_folder(target)
     handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name[:40]}.")
+    note_unfinished(Path(name))
     try:
         with os.fdopen(handle, "wb") as stream:
             stream.write(data)

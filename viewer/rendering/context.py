@@ -11,10 +11,12 @@ from typing import Any
 
 import moderngl
 
-from viewer.errors import RenderError
+from viewer.errors import RenderError, ViewerError
 from viewer.interrupts import deferred
+from viewer.rendering.offer import headless_offer, offer_text
 
 __all__ = [
+    "check_device",
     "check_errors",
     "device_count",
     "explain",
@@ -53,10 +55,13 @@ def headless_context(device: int | None = None) -> moderngl.Context:
     ------
     RenderError
         With the cause and the cure.
+    ViewerError
+        If there are devices, but none of this index.
     """
     if not sys.platform.startswith("linux"):
         return _create({})
     if device is not None:
+        check_device(device)
         return _create({"device_index": device})
     try:
         return _create({"device_index": 0})
@@ -81,21 +86,24 @@ def _create(options: Mapping[str, int]) -> moderngl.Context:
             return moderngl.create_context(**settings)
     except Exception as problem:  # glcontext raises nothing more special
         text = str(problem)
-        offer = _offered_version(settings) if "0x3009" in text or "version" in text else ""
-        raise RenderError(f"OpenGL 3.3 is needed; {offer}" if offer else explain(text)) from None
+        offer = headless_offer(settings) if "0x3009" in text or "version" in text else None
+        raise RenderError(explain(text) if offer is None else offer_text(offer)) from None
 
 
-def _offered_version(settings: dict[str, Any]) -> str:
-    """Return what a machine without OpenGL 3.3 has, "" if it has nothing at all."""
-    for version in (310, 210):
-        try:
-            context = moderngl.create_context(**{**settings, "require": version})
-        except Exception:  # as in _create
-            continue
-        number, renderer = context.version_code, context.info["GL_RENDERER"]
-        context.release()
-        return f"this machine offers {number // 100}.{number // 10 % 10} (renderer {renderer})"
-    return ""
+def check_device(device: int) -> None:
+    """Refuse a device that is not there; nothing if there are none at all, or not by number.
+
+    Raises
+    ------
+    ViewerError
+        With the numbers that there are.
+    """
+    count = device_count() if sys.platform.startswith("linux") else 0
+    if device < 0 or (count and device >= count):
+        known = {0: "0 or more", 1: "0, the only one"}.get(count, f"0 to {count - 1}")
+        raise ViewerError(
+            f"graphics device (--gpu): expected {known}, found {device} (viewer doctor lists them)"
+        )
 
 
 def device_count() -> int:

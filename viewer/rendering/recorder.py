@@ -31,6 +31,7 @@ from viewer.rendering.camera import Camera
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.renderer import Renderer
 from viewer.rendering.target import Target, picture_rows, straight
+from viewer.rendering.upload import checked
 from viewer.rendering.waiting import Waiter
 from viewer.rig.arrays import Bytes, Floats
 from viewer.rig.crowd import pose_actors
@@ -297,7 +298,9 @@ class _Drawer:
         self._waiter = Waiter(context)
         self._target = Target(context, recording.size, recording.options.samples)
         try:
-            self._buffer = context.buffer(reserve=4 * math.prod(recording.size))
+            n_bytes = 4 * math.prod(recording.size)
+            what = f"a buffer of {n_bytes / 1e6:.1f} MB for frames"
+            self._buffer = checked(context, context.buffer(reserve=n_bytes), what)
         except BaseException:
             self._release_target()
             raise

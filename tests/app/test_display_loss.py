@@ -1,0 +1,117 @@
+"""An X server that goes away while the window is open."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from app.tiny import write_rig
+
+ROOT = Path(__file__).resolve().parents[2]
+
+# Run in a process of its own: the window's own frames end the server at a known moment.
+PROGRAM = """
+import os, signal, sys
+from pathlib import Path
+from viewer.app import window
+from viewer.app.record_dialog import RecordSettings
+from viewer.cli import run
+
+server, folder = int(sys.argv[1]), sys.argv[2]
+draw, drawn = window._Window._draw, []
+
+def watched(self):
+    drawn.append(1)
+    if len(drawn) == 3 and folder:
+        self.state.record = RecordSettings(kind=".gif", turntable=True, seconds=60.0)
+        self.state.wants_recording = Path(folder, "turn.gif")
+    if len(drawn) >= 3 and (not folder or os.listdir(folder)):
+        os.kill(server, signal.SIGKILL)
+    return draw(self)
+
+window._Window._draw = watched
+sys.exit(run(sys.argv[3:]))
+"""
+
+
+@pytest.fixture
+def server():
+    """An Xvfb of the test's own: its process and the display's name."""
+    if shutil.which("Xvfb") is None:
+        text = "Xvfb not installed"
+        pytest.fail(text) if os.environ.get("CI") == "true" else pytest.skip(text)
+    reading, writing = os.pipe()
+    command = ["Xvfb", "-displayfd", str(writing), "-screen", "0", "800x600x24", "-nolisten", "tcp"]
+    process = subprocess.Popen(
+        command, pass_fds=[writing], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    os.close(writing)
+    with os.fdopen(reading) as stream:
+        number = stream.readline().strip()
+    yield process, f":{number}"
+    process.kill()
+    process.wait(10)
+
+
+def ended(server, tmp_path, folder=""):
+    """Return how the viewer ended whose display was taken away."""
+    process, display = server
+    environment = {
+        **os.environ,
+        "DISPLAY": display,
+        "LIBGL_ALWAYS_SOFTWARE": "1",
+        "PYTHONPATH": str(ROOT),
+        "XDG_STATE_HOME": str(tmp_path / "state"),
+    }
+    environment.pop("WAYLAND_DISPLAY", None)
+    rig = write_rig(tmp_path)
+    return subprocess.run(
+        [sys.executable, "-c", PROGRAM, str(process.pid), str(folder), *map(str, rig)],
+        env=environment, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False,
+    )  # fmt: skip
+
+
+def check_end(done, display):
+    lines = done.stderr.splitlines()
+    assert done.returncode == 4 and len(lines) == 1, done.stderr
+    assert lines[0].startswith("viewer: ") and "X server" in lines[0] and display in lines[0]
+
+
+def test_lost_display_is_one_line_and_exit_code_4(server, tmp_path):
+    check_end(ended(server, tmp_path), server[1])
+
+
+def test_lost_display_leaves_no_half_written_recording(server, tmp_path):
+    folder = tmp_path / "out"
+    folder.mkdir()
+    check_end(ended(server, tmp_path, folder), server[1])
+    assert list(folder.iterdir()) == []
+
+
+def test_handler_of_others_comes_back():
+    """Run in a process of its own, as Xlib has one handler for all."""
+    program = (
+        "import ctypes\n"
+        "from viewer.app.display_loss import DisplayLoss, _library\n"
+        "library = _library()\n"
+        "ask = ctypes.CDLL('libX11.so.6')['XSetIOErrorHandler']\n"
+        "ask.restype = ctypes.c_void_p\n"
+        "first = ask(None)\n"  # Xlib's own
+        "ask(ctypes.c_void_p(first))\n"
+        "loss = DisplayLoss(True)\n"
+        "held = ask(None)\n"
+        "ask(ctypes.c_void_p(held))\n"
+        "loss.release()\n"
+        "assert held != first and ask(None) == first\n"
+        "DisplayLoss(False).release()\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, timeout=60,
+        check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr

@@ -1,0 +1,110 @@
+"""What OpenGL a machine offers where it refuses the one that is needed."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import glcontext
+
+__all__ = ["Offer", "headless_offer", "offer_of", "offer_text"]
+
+_VERSION, _RENDERER, _LANGUAGE = 0x1F02, 0x1F01, 0x8B8C
+_NEEDED, _NEEDED_LANGUAGE = (3, 3), (3, 30)
+_TRIED = (320, 310, 210, 100)  # the newest first; from 3.1 on they are core profiles
+_OVERRIDES = ("MESA_GL_VERSION_OVERRIDE", "MESA_GLSL_VERSION_OVERRIDE")
+
+
+@dataclass(frozen=True, slots=True)
+class Offer:
+    """What a driver says of itself: ``"4.5 (Compatibility Profile) Mesa 22.3.6"`` and the like."""
+
+    version: str
+    language: str
+    renderer: str
+
+
+def headless_offer(options: Mapping[str, Any]) -> Offer | None:
+    """Return what a machine offers without a window, None if nothing at all.
+
+    Parameters
+    ----------
+    options : mapping
+        ``backend``, ``device_index``, ``libegl`` and ``libgl``, as moderngl takes them.
+    """
+    chosen = options.get("backend")
+    create = glcontext.get_backend_by_name(chosen) if chosen else glcontext.default_backend()
+    names = {key: options[key] for key in ("device_index", "libegl", "libgl") if key in options}
+    for version in _TRIED:
+        try:
+            context = create(mode="standalone", glversion=version, **names)
+        except Exception:  # glcontext raises nothing more special
+            continue
+        try:
+            return offer_of(context.load("glGetString"))
+        finally:
+            context.release()
+    return None
+
+
+def offer_of(address: int) -> Offer:
+    """Return what the current context's driver says.
+
+    Parameters
+    ----------
+    address : int
+        Of the function ``glGetString``.
+    """
+    get_string = ctypes.CFUNCTYPE(ctypes.c_char_p, ctypes.c_uint)(address)
+    words = [
+        (get_string(name) or b"").decode("utf-8", "replace")
+        for name in (_VERSION, _LANGUAGE, _RENDERER)
+    ]
+    return Offer(*words)
+
+
+def offer_text(offer: Offer, environment: Mapping[str, str] = os.environ) -> str:
+    """Return what is needed and what there is instead, in a line.
+
+    Parameters
+    ----------
+    offer : Offer
+        Of a context of an older version.
+    environment : mapping of str to str
+        Has the variables that make Mesa offer less than it could.
+    """
+    asked = [f"{name}={environment[name]}" for name in _OVERRIDES if environment.get(name)]
+    where = ", ".join([f"renderer {offer.renderer}", *(f"{one} is set" for one in asked)])
+    version, language = _numbers(offer.version), _numbers(offer.language)
+    forced = re.match(r"(\d)(\d\d)", environment.get(_OVERRIDES[1], ""))
+    if forced:
+        # It counts for core profiles alone, of which there may be none left to ask.
+        language = min(language, (int(forced[1]), int(forced[2])))
+    if version < _NEEDED:
+        beside = f" with GLSL {_dotted(language, 2)}" if language < _NEEDED_LANGUAGE else ""
+        return f"OpenGL 3.3 is needed; this machine offers {_dotted(version)}{beside} ({where})"
+    if language < _NEEDED_LANGUAGE:
+        return f"GLSL 3.30 is needed; this machine offers GLSL {_dotted(language, 2)} ({where})"
+    return (
+        "the core profile of OpenGL 3.3 is needed; this machine offers "
+        f"{_dotted(version)} without one ({where})"
+    )
+
+
+def _numbers(text: str) -> tuple[int, int]:
+    """Return the version that a text begins with; OpenGL ES has words before it.
+
+    >>> _numbers("4.5 (Core Profile) Mesa 22.3.6"), _numbers("OpenGL ES 3.2 Mesa"), _numbers("")
+    ((4, 5), (3, 2), (0, 0))
+    """
+    found = re.search(r"(\d+)\.(\d+)", text)
+    return (int(found[1]), int(found[2])) if found else (0, 0)
+
+
+def _dotted(version: Iterable[int], digits: int = 1) -> str:
+    major, minor = version
+    return f"{major}.{minor:0{digits}}"
