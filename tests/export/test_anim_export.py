@@ -99,7 +99,7 @@ def test_part_of_a_clip_becomes_keys_on_its_frames(tmp_path):
     # Channels that stay still need one key each.
     assert [len(channel.times) for channel in again.channels] == [6, 1, 1, 1, 1, 6, 1, 1, 1]
     assert notes[0] == f"{path}: 9 channels with 19 keys, 0.2 to 0.7 s, smooth tangents"
-    assert len(notes) == 2 and "differ from the motion half-way between frames" in notes[1]
+    assert len(notes) == 2 and "differ from the motion between frames" in notes[1]
 
 
 def test_error_between_frames_is_the_one_by_hand(tmp_path):
@@ -118,8 +118,7 @@ def test_error_between_frames_is_the_one_by_hand(tmp_path):
     _, notes = written(Actor(rig(), clip=clip), tmp_path / "a.anim", rate=1.0, frames=(0, 2))
     assert notes[0].endswith(", linear tangents")
     assert notes[1:] == [
-        f"{tmp_path}/a.anim: joints differ from the motion half-way between frames by up to 2 "
-        "units (j0)"
+        f"{tmp_path}/a.anim: joints differ from the motion between frames by up to 2 units (j0)"
     ]
 
 

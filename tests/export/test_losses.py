@@ -24,11 +24,11 @@ from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh
 from viewer.rig.motion import pose_of
 from viewer.rig.sampled_clip import SampledClip
-from viewer.rig.scene import Actor
+from viewer.rig.scene import Actor, Scene
 from viewer.rig.skeleton import ball_skeleton
 from viewer.rig.skin import skin_from_lists
 from viewer.rig.skinning import Skinning, deform
-from viewer.rig.take import Take, take_of
+from viewer.rig.take import Take, take_of, upright_take
 from viewer.rig.timing import Timing
 from viewer.rig.transform import translation_matrix
 
@@ -282,3 +282,64 @@ def test_correctives_count_in_the_worst_of_many_frames(tmp_path):
     frame, vertex = np.unravel_index(np.argmax(off), np.shape(off))
     size = pytest.approx(1000 * np.max(off), rel=TOLD)
     assert said(notes) == {"vertices": (size, f"vertex {vertex}, frame {frame}")}
+
+
+# Between frames
+
+
+def spike(at: float) -> Take:
+    """Return the chain moved along x, by 3 m at one key and back, a frame a second."""
+    rows = [(0, kind, 0.0) for kind in ("tx", "ty", "tz", "x", "y", "z")]
+    skeleton = hand_made.skeleton([-1], rows, None, [[0.0] * 3])
+    mesh = Mesh(np.eye(3), np.eye(3), np.array([[0, 1, 2]]))
+    skin = skin_from_lists([[(0, 1.0)]] * 3, np.eye(4)[None])
+    times, values = np.array([0.0, at, 4.0]), np.array([0.0, 3.0, 0.0])
+    moves = Channel(0, times, values, (("linear", "linear"),) * 3)
+    still = [Channel(dof, np.zeros(0), np.zeros(0), ()) for dof in range(1, 6)]
+    figure = Figure("point", mesh, skeleton, skin, unit="m")
+    return take_of(Actor(figure, clip=Clip("spike", (moves, *still), 0.0, 4.0)), rate=1.0)
+
+
+@pytest.mark.parametrize("at", [1.25, 2.5])
+def test_a_peak_between_frames_is_told(tmp_path, at):
+    """Frames on both sides of the peak lie on its flanks; straight between them is lower."""
+    take = spike(at)
+    before, after = np.floor(at), np.ceil(at)
+    ends = 3.0 * before / at, 3.0 * (4.0 - after) / (4.0 - at)
+    low = ends[0] + (at - before) * (ends[1] - ends[0])
+    size = pytest.approx(1000 * (3.0 - low), rel=TOLD)
+    for kind, name in (("bvh", "a.bvh"), ("gltf", "a.glb")):
+        notes = write(take, tmp_path, kind, name)
+        (line,) = [note for note in notes if " differ from " in note]
+        assert line.endswith(": 1 a second are written") and " between frames by " in line
+        found = said([line])
+        assert found["joints"][0] == size and found["vertices"][0] == size
+
+
+def test_captures_at_another_rate_tell_what_is_left_out(tmp_path):
+    """Every second frame is written; the one between stands 2 m aside."""
+    moves = np.zeros((7, 3))
+    moves[3, 0] = 2.0
+    figure = chain_take().figure
+    turns = np.tile([0.0, 0, 0, 1], (7, 3, 1))
+    clip = SampledClip("jump", Timing(20.0, np.arange(7)), turns, figure_translations=moves)
+    for kind, name in (("bvh", "a.bvh"), ("gltf", "a.glb")):
+        for rate, size in ((10.0, 2000.0), (20.0, None)):
+            found = said(write(take_of(Actor(figure, clip=clip), rate), tmp_path, kind, name))
+            assert found.get("joints", (None,))[0] == (size and pytest.approx(size, rel=TOLD))
+
+
+def test_motions_that_hang_are_compared_as_they_are_written(tmp_path):
+    """Turned over, a capture at another rate still differs by what it leaves out alone."""
+    moves = np.zeros((7, 3))
+    moves[:, 1] = np.arange(7)
+    moves[3, 0] = 2.0
+    figure = chain_take().figure
+    turns = np.tile([1.0, 0, 0, 0], (7, 3, 1))
+    turns[:, 1:] = [0.0, 0.0, 0.0, 1.0]
+    clip = SampledClip("hang", Timing(20.0, np.arange(7)), turns, figure_translations=moves)
+    actor = Actor(figure, clip=clip, placement=np.diag([1.0, -1.0, -1.0, 1.0]))
+    take, _ = upright_take(Scene([actor], world_up="y"), actor, 10.0)
+    assert take.is_turned
+    found = said(write(take, tmp_path, "bvh", "a.bvh"))
+    assert found["joints"][0] == pytest.approx(2000.0, rel=TOLD)

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.errors import RigError, printable
+from viewer.export._between import resampling_losses
 from viewer.export._family_frames import (
     FamilyFrames,
     check_unit,
@@ -97,6 +98,7 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
     for file, span in zip(paths, spans, strict=True):
         again = read_frames(read(Source.open(file)), take, options)
         lost += frames_losses(file, take, again, options.skinning, span)
+    lost += resampling_losses(path, take, options.skinning)
     return [*written, *lost, *_remarks(body, take, present, options), *notes]
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from viewer.errors import RigError, printable
+from viewer.export._between import PLACES, own_times
 from viewer.export._bvh_angles import euler_angles, unrolled
 from viewer.export._gaps import filled, gaps_text, runs
 from viewer.export._losses import frames_losses
@@ -18,13 +19,11 @@ from viewer.rig.clip import Clip, Tangent, is_course_rig
 from viewer.rig.clip_edit import clip_from_frames
 from viewer.rig.clip_table import evaluate_all
 from viewer.rig.figure import Figure
-from viewer.rig.motion import Frames, frames_of, world_frames
-from viewer.rig.pose import Pose
+from viewer.rig.motion import Frames, frames_between, frames_of, world_frames
 from viewer.rig.rotation import quaternion_to_matrix
 from viewer.rig.scalars import length_text
-from viewer.rig.scene import figure_pose
 from viewer.rig.skeleton import Skeleton
-from viewer.rig.take import Take
+from viewer.rig.take import Take, frames_at
 
 __all__ = ["export_take"]
 
@@ -120,36 +119,30 @@ def _export_frames(take: Take, skeleton: Skeleton, path: Path, options: MotionOp
 
 
 def _losses(take: Take, path: Path, span: tuple[int, int], options: MotionOptions) -> list[str]:
-    """Read a file back, and say how far it is off on the frames, and half-way between them."""
+    """Read a file back, and say how far it is off on the frames, and between them.
+
+    Between them it is compared half-way, and where the motion has frames or keys of its own.
+    """
     clip = read(Source.open(path))
     assert isinstance(clip, Clip)  # as was written
     figure, how, part = take.figure, options.skinning, slice(*span)
     times = take.frames.times[part]
     on_frames = frames_of(figure, clip, times)
     notes = frames_losses(path, take, on_frames, how, span)
-    middles = _middles(times)
     there = take.frames.present[part]
-    middles = middles[there[1:] & there[:-1]]
-    if len(middles):
-        wanted = frames_of(figure, take.motion, middles, _base(take))
-        between = replace(take, frames=wanted)
-        found = frames_of(figure, clip, middles)
-        notes += frames_losses(path, between, found, how, places="half-way between frames")
+    middles = _middles(times)[there[1:] & there[:-1]]
+    between = np.union1d(
+        middles, own_times(replace(take, frames=frames_between(take.frames, part)))
+    )
+    if len(between):
+        wanted = replace(take, frames=frames_at(take, between))
+        found = frames_of(figure, clip, between)
+        notes += frames_losses(path, wanted, found, how, places=PLACES)
     return notes
 
 
 def _middles(times: Floats) -> Floats:
     return 0.5 * (times[1:] + times[:-1])
-
-
-def _base(take: Take) -> Pose:
-    """Return what a motion leaves alone: the place of the whole figure, and its shape."""
-    first, base = int(take.frames.present.argmax()), figure_pose(take.figure)
-    base.figure_translation = take.frames.figure_translations[first]
-    base.figure_scale = float(take.frames.figure_scales[first])
-    weights = take.frames.shape_weights
-    base.shape_weights = weights[min(first, len(weights) - 1)]
-    return base
 
 
 def _remarks(take: Take, options: MotionOptions) -> list[str]:
@@ -197,10 +190,10 @@ def _dofs(take: Take, skeleton: Skeleton, frames: Frames) -> Floats:
 
 def _distance(take: Take, clip: Clip, times: Floats) -> float:
     """Return how far joints are off at most, the figure's scale left out."""
-    figure, worst, base = take.figure, 0.0, _base(take)
+    figure, worst = take.figure, 0.0
     for start in range(0, len(times), _BLOCK):
         block = times[start : start + _BLOCK]
-        wanted = frames_of(figure, take.motion, block, base)
+        wanted = frames_at(take, block)
         found = frames_of(figure, clip, block)
         place = wanted.figure_translations / wanted.figure_scales[:, None]
         one = np.ones(len(block))

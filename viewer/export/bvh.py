@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from viewer.errors import RigError, printable
+from viewer.export._between import resampling_losses
 from viewer.export._bvh_angles import unrolled
 from viewer.export._bvh_body import Body, Space, body_of, rest_matrices, shape_at
 from viewer.export._bvh_ends import end_offsets
@@ -101,6 +102,7 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
         for file, text in zip(paths, texts, strict=True):
             save_bytes(file, text)
     notes = [writer.summary(file, *span) for file, span in zip(paths, spans, strict=True)]
+    lost += resampling_losses(path, take, options.skinning)
     return notes + lost + _remarks(take, figure, body, reference, options)
 
 

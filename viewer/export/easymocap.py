@@ -23,6 +23,7 @@ from pathlib import Path
 import numpy as np
 
 from viewer.errors import OutputError, RigError, printable
+from viewer.export._between import resampling_losses
 from viewer.export._family_frames import (
     FamilyFrames,
     check_unit,
@@ -145,7 +146,9 @@ class _Person:
         """Return a line with the largest differences, or none."""
         place = np.maximum(np.cumsum(self.take.frames.present) - 1, 0)
         found = read_frames(self.again.motion(self.take.frame_rate), self.meant, options)
-        return frames_losses(path, self.meant, frames_between(found, place), options.skinning)
+        how = options.skinning
+        lines = frames_losses(path, self.meant, frames_between(found, place), how)
+        return lines + resampling_losses(path, self.meant, how)
 
 
 def _check(takes: Sequence[Take], persons: Sequence[int]) -> None:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from viewer.errors import RigError, printable
+from viewer.export._between import resampling_losses
 from viewer.export._gaps import filled, gaps_text, runs
 from viewer.export._gltf_document import Document, text_of
 from viewer.export._gltf_losses import Written, gltf_losses, not_held, vertices_text
@@ -126,6 +127,7 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
             take.first_frame,
         )
     notes += _remarks(body, options.world_up) + _motion_remarks(take, body, frames, options)
+    lost += resampling_losses(path, take, options.skinning)
     return notes + lost + not_held(take.figure, shape)
 
 
