@@ -23,7 +23,8 @@ from viewer.rig.skeleton import joint_label
 __all__ = ["Apart", "Farthest", "apart", "apart_lines", "negligible", "shared_extent"]
 
 _BLOCK = 1024  # poses at a time, so that matrices of all frames never exist at once
-_CHUNK = 64  # poses looked at at once
+_CHUNK = 128  # poses looked at at once
+_LIKELY = 4  # of these, poses whose farthest vertex is measured before all others
 _SMALL = 0.05  # of what rest meshes are apart: joints that add less need not be skinned
 _MOST = 512  # poses compared one by one where vertices are not blended linearly
 _ROUNDING = 2e-6  # of the size: single precision through a chain of joints
@@ -154,10 +155,10 @@ class _Search:
             self._estimate(poses_of(first, rows), poses_of(second, rows), frames[rows])
 
     def _estimate(self, first: Poses, second: Poses, frames: Rows) -> None:
-        """Look at a few poses: at the vertex that may be farthest in each, then at who is left."""
+        """Look at some poses: first where vertices may be farthest of all, then at who is left."""
         most = self._most(first, second)
-        every = np.arange(len(frames))
-        self._measure(first, second, frames, every, np.unique(most.argmax(axis=1)))
+        likely = np.argsort(-most.max(axis=1), kind="stable")[:_LIKELY]
+        self._measure(first, second, frames, likely, np.unique(most[likely].argmax(axis=1)))
         hopeful = most > self.worst.distance
         rows, chosen = (np.flatnonzero(hopeful.any(axis=axis)) for axis in (1, 0))
         if len(rows):

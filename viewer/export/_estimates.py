@@ -33,7 +33,7 @@ class Estimator:
 
     def __init__(self, first: Body, second: Body) -> None:
         self._first, self._second = _Rest(first), _Rest(second)
-        self._gap = (first.positions - second.positions).ravel().astype(np.float32)
+        self._gap = (first.positions - second.positions).T.ravel().astype(np.float32)
         self._strayed = None
         if first.shapes is not None and second.shapes is not None:
             self._strayed = _rows(first.shapes - second.shapes)
@@ -53,8 +53,7 @@ class Estimator:
         off = self._first.moves(gap) + self._gap
         if self._strayed is not None:
             off = off + second.weights.astype(np.float32) @ self._strayed
-        off = off.reshape(len(off), -1, 3)
-        found = np.sqrt(np.einsum("fva,fva->fv", off, off))
+        found = _lengths(off.reshape(len(off), 3, -1))
         return np.broadcast_to(found * (1.0 + _STEPS), (len(first.palette), found.shape[1]))
 
     def of_skinned(self, first: Poses, second: Poses) -> Single:
@@ -80,7 +79,7 @@ class Estimator:
         for vectors, amounts in ((away, self._excess), (shift, self._left)):
             if amounts.any():
                 off += (vectors[:, :, None] * amounts).astype(np.float32)
-        found = np.sqrt(np.einsum("fav,fav->fv", off, off))
+        found = _lengths(off)
         return np.asarray(found + _doubts(palettes, rests)[:, None].astype(np.float32))
 
 
@@ -106,15 +105,24 @@ class _Rest:
     def of(self, poses: Poses) -> Single:
         """Return the mesh that each pose skins: (F, 3, V)."""
         moved = self.moves(poses)
-        moved = moved.reshape(len(moved), -1, 3).transpose(0, 2, 1)
-        rest = np.ascontiguousarray(moved) + self.positions
+        rest = moved.reshape(len(moved), 3, -1) + self.positions
         return np.broadcast_to(rest, (len(poses.palette), *self.positions.shape))
 
 
 def _rows(directions: Floats | None) -> Single | None:
+    """Return directions (S, V, 3) as rows in which all x come first: (S, 3 V)."""
     if directions is None:
         return None
-    return directions.reshape(len(directions), -1).astype(np.float32)
+    turned = directions.transpose(0, 2, 1).astype(np.float32, order="C")
+    return turned.reshape(len(directions), -1)
+
+
+def _lengths(vectors: Single) -> Single:
+    """Return the lengths of vectors (F, 3, V): (F, V)."""
+    squares = vectors[:, 0] * vectors[:, 0]
+    squares += vectors[:, 1] * vectors[:, 1]
+    squares += vectors[:, 2] * vectors[:, 2]
+    return np.sqrt(squares, out=squares)
 
 
 def _sums(body: Body) -> Floats:
