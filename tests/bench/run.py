@@ -17,6 +17,7 @@ NAMES = [
     "motion",
     "read",
     "captures",
+    "losses",
     "lint",
     "transfer",
     "video",

@@ -66,7 +66,7 @@ def test_still_figure_becomes_a_bvh_of_its_pose(arms, tmp_path, capsys):
     assert_allclose(places["right_hand"], [3, -2, 0], atol=PRINTED)
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].startswith(f"{out}: 5 joints, 1 frame (0) at 30 a second, ")
-    assert lines[1].endswith(" over 1 frame") and lines[2:] == [STILL]
+    assert lines[1:] == [STILL]
 
 
 def test_rest_frame_and_rate_are_as_asked(arms, tmp_path):
@@ -99,7 +99,7 @@ def test_several_figures_get_files_of_their_own(arms, tmp_path, capsys):
     assert written(tmp_path, "*.bvh") == ["x-2.bvh", "x.bvh"]
     assert PlainBvh(tmp_path / "x-2.bvh").names == ["low", "high"]
     lines = capsys.readouterr().out.splitlines()
-    assert len(lines) == 5 and lines[-1] == STILL
+    assert len(lines) == 3 and lines[-1] == STILL
 
 
 def test_figures_without_joints_are_said_to_be_left_out(tmp_path, capsys):

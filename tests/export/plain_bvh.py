@@ -71,6 +71,10 @@ class PlainBvh:
 
     def places(self, frame: int) -> dict[str, list[float]]:
         """Return where every joint is."""
+        return {name: place for name, (_, place) in self.joints(frame).items()}
+
+    def joints(self, frame: int) -> dict[str, tuple[list[list[float]], list[float]]]:
+        """Return how every joint is turned in the world, and where it is."""
         values = iter(self.frames[frame])
         matrices, places = [], []
         for joint, parent in enumerate(self.parents):
@@ -90,7 +94,7 @@ class PlainBvh:
                 matrices.append(product(above, turn))
                 moved = [sum(above[r][c] * offset[c] for c in range(3)) for r in range(3)]
                 places.append([a + b for a, b in zip(places[parent], moved, strict=True)])
-        return dict(zip(self.names, places, strict=True))
+        return dict(zip(self.names, zip(matrices, places, strict=True), strict=True))
 
 
 def about(axis: int, angle: float) -> list[list[float]]:

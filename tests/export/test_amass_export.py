@@ -209,14 +209,15 @@ def test_losses_are_told(family, tmp_path):
     figure = family("smpl")
     rotations = np.tile([0.0, 0, 0, 1], (2, 24, 1))
     moved = np.zeros((2, 24, 3))
-    moved[:, 0], moved[1, 5] = [1.0, 2.0, 3.0], [0.0, 0.25, 0.0]
+    moved[:, 0], moved[1, 5] = [1.0, 2.0, 3.0], [0.15, 0.2, 0.0]
     clip = SampledClip("a", Timing(30.0, np.arange(2)), rotations, moved,
                        np.array([[0.5, 0, 0]] * 2), np.array([1.0, 1.5]))  # fmt: skip
     arrays, notes = written(clip_take(figure, clip), tmp_path / "a.npz")
     # A root that moves within the figure is a body that moves.
     assert_array_equal(arrays["trans"], [[1.5, 2.0, 3.0]] * 2)
-    assert notes[1:] == [
-        "joints that move within their parents are left out (up to 0.25)",
+    assert notes[1].startswith(f"{tmp_path}/a.npz: joints differ from the motion by up to ")
+    assert notes[2:] == [
+        "joints that move within their parents are left out (up to 0.25 m)",
         "the figure's scale is left out (1 to 1.5)",
     ]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -67,8 +66,7 @@ def test_a_guessed_unit_counts_for_bvh_and_is_said_once(
     text, error = capsys.readouterr()
     assert error == f"warning: {walk}: {GUESS}\n"
     lines = text.splitlines()
-    assert len(lines) == 2 and f", {word}, y up" in lines[0]
-    assert re.search(r"error is 0\.00\d{4} mm \(\w+\) over 2 frames", lines[1])
+    assert len(lines) == 1 and f", {word}, y up" in lines[0]
 
 
 @pytest.mark.parametrize(
@@ -80,7 +78,7 @@ def test_a_unit_that_is_asked_for_counts_without_a_word(walk, tmp_path, capsys, 
     wanted = 100.0 * metres * np.array(PERSON_TURNED)
     assert_allclose(bvh_places(out), wanted, rtol=0, atol=2e-6)
     text, error = capsys.readouterr()
-    assert error == "" and " mm (" in text
+    assert error == "" and "differ" not in text
 
 
 def test_the_error_in_millimetres_is_that_of_the_file(tmp_path):
@@ -93,7 +91,7 @@ def test_the_error_in_millimetres_is_that_of_the_file(tmp_path):
         take = take_of(Actor(Figure("a", skeleton=skeleton, unit=unit), clip=clip))
         options = MotionOptions(unit=unit, digits=1)
         notes = export_take(take, tmp_path / "a.bvh", "bvh", options)
-        assert f"error is {0.04 * millimetres:.6f} mm" in notes[1]
+        assert f"joints differ from the motion by up to {0.04 * millimetres:.3g} mm (" in notes[1]
 
 
 def test_gltf_of_centimetres_is_in_metres(walk, tmp_path, capsys):

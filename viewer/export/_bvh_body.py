@@ -24,7 +24,7 @@ from viewer.rig.motion import Frames, frames_between, rest_translations_of, worl
 from viewer.rig.pose import rest_pose
 from viewer.rig.rotation import quaternion_to_matrix
 
-__all__ = ["Body", "Space", "body_of", "rest_matrices", "shape_at", "shape_changes"]
+__all__ = ["Body", "Space", "body_of", "rest_matrices", "shape_at"]
 
 _BLOCK = 4096  # frames at a time, so that matrices of all frames never exist at once
 _NOISE = 1e-9  # of the skeleton's size: what moves less does not move
@@ -183,38 +183,3 @@ def _fixed(offsets: Floats, positions: Floats, inner: Bools, noise: float) -> tu
     moves = inner & ((high - low) > noise).any(axis=1)
     shifted = inner & ~moves & (np.abs(low - offsets) > noise).any(axis=1)
     return np.where(shifted[:, None], low, offsets), moves
-
-
-def shape_changes(figure: Figure, frames: Frames, reference: int) -> tuple[float, int, int] | None:
-    """Return how much bones grow or shrink over time because the shape changes.
-
-    Parameters
-    ----------
-    figure : Figure
-        Unshaped.
-    frames : Frames
-        With a shape for all, or one for each.
-    reference : int
-        The frame to compare with.
-
-    Returns
-    -------
-    difference : float
-        Largest, figure units.
-    frame, joint : int
-        Where it is; the bone ends at the joint. None instead of all if the shape is one.
-    """
-    skeleton = figure.skeleton
-    if len(frames.shape_weights) < 2 or skeleton is None:
-        return None
-    first = rest_translations_of(figure, frames.shape_weights[reference : reference + 1])
-    worst = (0.0, reference, 0)
-    for start in range(0, frames.n_frames, _BLOCK):
-        moved = rest_translations_of(figure, frames.shape_weights[start : start + _BLOCK])
-        change = np.abs(np.linalg.norm(moved, axis=2) - np.linalg.norm(first, axis=2))
-        change[:, skeleton.parents < 0] = 0.0
-        change[~frames.present[start : start + _BLOCK]] = 0.0
-        row, joint = np.unravel_index(change.argmax(), change.shape)
-        if change[row, joint] > worst[0]:
-            worst = float(change[row, joint]), start + int(row), int(joint)
-    return worst

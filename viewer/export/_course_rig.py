@@ -10,7 +10,7 @@ from viewer.rig.pose import Pose
 from viewer.rig.rotation import quaternion_to_matrix
 from viewer.rig.skeleton import Skeleton, joint_label
 
-__all__ = ["course_skeleton"]
+__all__ = ["course_skeleton", "depth_first"]
 
 _CUBE = 0.01  # of the skeleton's size: half a side of boxes where a file has none
 

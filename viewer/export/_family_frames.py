@@ -231,9 +231,9 @@ def _bare_skeleton(figure: Figure, root: Floats) -> list[str]:
 def _losses(frames: Frames, moved: Floats) -> list[str]:
     notes = []
     present = frames.present
-    farthest = np.abs(moved[present]).max(initial=0.0)
+    farthest = np.linalg.norm(moved[present], axis=-1).max(initial=0.0)
     if farthest > _NEGLIGIBLE:
-        notes.append(f"joints that move within their parents are left out (up to {farthest:.3g})")
+        notes.append(f"joints that move within their parents are left out (up to {farthest:.3g} m)")
     scales = frames.figure_scales[present]
     if np.abs(scales - 1.0).max(initial=0.0) > _NEGLIGIBLE:
         low, high = scales.min(), scales.max()

@@ -1,121 +1,158 @@
-"""What glTF cannot hold of a figure, and by how much its vertices are off for it."""
+"""What glTF cannot hold of a figure, and by how much a file that was read back differs for it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from viewer.export._apart import apart, apart_lines, negligible, shared_extent
+from viewer.export._gltf_nodes import Tree
+from viewer.export._gltf_reading import GltfFile, read_back
 from viewer.export._gltf_shape import Shape
 from viewer.export._gltf_skin import PER_SET, Influences
-from viewer.rig.arrays import Floats
+from viewer.export._skinned import Rows, Side, body_rows, changing, figure_side
+from viewer.rig.arrays import Ints
 from viewer.rig.figure import Figure
-from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.pose import Pose
+from viewer.rig.mesh import split_seams
+from viewer.rig.motion import Frames
 from viewer.rig.scalars import length_text
-from viewer.rig.skinning import METHODS, Skinning, deform
+from viewer.rig.skinning import METHODS, Skinning
 
-__all__ = ["MOST_SAMPLES", "losses", "not_held", "sampled", "vertices_text"]
-
-MOST_SAMPLES = 32
-"""Poses that are compared at most."""
-
-_ROUNDING = 1e-6  # of the size: what single precision may cost without a word
-
-
-def sampled(rows: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return some of the rows, the first and the last among them, evenly spread."""
-    count = min(len(rows), MOST_SAMPLES)
-    return rows[np.linspace(0, len(rows) - 1, count).round().astype(int)]
+__all__ = ["Written", "gltf_losses", "not_held", "vertices_text"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Step:
-    """One thing less than the step before: ``text`` says what."""
+class Written:
+    """A file as it was written, and where things are in it.
 
-    text: str
-    figure: Figure
-    how: Skinning
-    weights: Floats | None  # the one shape of all poses
+    Attributes
+    ----------
+    path : Path
+        What it is called.
+    file : GltfFile
+        Its bytes, taken apart again.
+    tree : Tree
+        Indices of the nodes.
+    mesh_node : int or None
+        That of the mesh.
+    start : int
+        The figure's frame that comes first in it.
+    """
+
+    path: Path
+    file: GltfFile
+    tree: Tree
+    mesh_node: int | None
+    start: int = 0
 
 
-def losses(
+def gltf_losses(
+    written: Written,
     figure: Figure,
-    poses: Sequence[Pose],
+    frames: Frames,
+    rows: Rows,
     how: Skinning,
     shape: Shape,
     influences: Influences | None,
-    extent: str,
-    changes: bool,
+    first_frame: int | None,
 ) -> list[str]:
-    """Return lines, each with the largest distance between vertices as asked for and as written.
+    """Return lines with the largest distances between a figure as it is posed here and a file.
 
     Parameters
     ----------
+    written : Written
+        The file.
     figure : Figure
-        As it is, with a mesh.
-    poses : sequence of Pose
-        Where to look.
+        As it is, unshaped.
+    frames : Frames
+        Its poses.
+    rows : (F,)
+        Those of them to compare.
     how : Skinning
         As asked for.
     shape, influences : Shape, Influences or None
-        What is written.
-    extent : str
-        Which poses these are, in words; may be empty.
-    changes : bool
-        Whether the shape does.
+        What was to be written.
+    first_frame : int or None
+        What the first frame is called; None for a single pose.
     """
-    steps = _steps(figure, how, shape, influences, changes)
-    errors, total = [0.0] * len(steps), 0.0
-    for pose in poses if len(steps) > 1 else ():
-        first = before = _vertices(steps[0], pose)
-        for number, step in enumerate(steps[1:], 1):
-            after = _vertices(step, pose)
-            errors[number] = max(errors[number], _distance(before, after))
-            before = after
-        total = max(total, _distance(first, before))
-    notes = [
-        f"{step.text}{length_text(figure, error)}{extent}"
-        for step, error in zip(steps[1:], errors[1:], strict=True)
-    ]
-    if len(notes) > 1:
-        notes.append(f"all this together: up to {length_text(figure, total)}")
-    if influences is not None and influences.most > PER_SET:
-        whole = replace(steps[-1], how=Skinning(correctives=False))
-        cut = replace(whole, how=replace(whole.how, max_influences=PER_SET))
-        off = max(_distance(_vertices(cut, pose), _vertices(whole, pose)) for pose in poses)
-        notes.append(
-            f"up to {influences.most} influences a vertex, all of them written, strongest first: "
-            f"programs that read only JOINTS_0 are off by up to {length_text(figure, off)}{extent}"
+    weights = frames.shape_weights
+    still = weights[min(written.start, len(weights) - 1)] if shape.baked is None else shape.baked
+    columns = changing(frames, still)
+    meant = figure_side(figure, frames, how, still)
+    sources = None
+    if figure.mesh is not None and written.mesh_node is not None:
+        sources = split_seams(figure.mesh)[0]
+        meant = _split(meant, sources)
+    else:
+        meant = replace(meant, body=None, exact=None)
+    least = negligible(figure, frames, rows)
+    targets = np.flatnonzero(np.isin(shape.targets, columns))
+    place = (written.file, written.tree, written.mesh_node, targets, written.start)
+    found = apart(meant, read_back(*place), rows, least)
+    why = []
+    if found.vertices is not None:
+        why = _reasons(figure, frames, rows, how, shape, influences, least)
+    lines = apart_lines(written.path, figure, found, first_frame, sources)
+    lines = [line + f": {'; '.join(why)}" * bool(why) for line in lines]
+    if influences is not None and influences.most > PER_SET and sources is not None:
+        lines += _first_set(
+            read_back(*place), read_back(*place, 1), figure, rows, least, influences
         )
-    return notes + _rounding(figure, shape)
+    return lines
 
 
-def _steps(
-    figure: Figure, how: Skinning, shape: Shape, influences: Influences | None, changes: bool
-) -> list[_Step]:
-    """Return the way from what is asked for to what is written, one loss after the other."""
-    steps = [_Step("", figure, how, None)]
-    if influences is not None:
-        written = replace(figure, skin=influences.skin)
-        exact = replace(how, max_influences=0, normalize=False)
-        if influences.n_scaled or influences.n_negative:
-            steps.append(_Step(_weights_text(influences), written, exact, None))
-        else:
-            steps[0] = _Step("", written, exact, None)
-        if exact.method != "lbs":
-            text = f"{METHODS[how.method]} skinning cannot be held, glTF blends linearly: up to "
-            exact = replace(exact, method="lbs")
-            steps.append(_Step(text, written, exact, None))
-        if figure.correctives is not None and how.correctives:
-            text = "pose correctives cannot be held: vertices are off by up to "
-            steps.append(_Step(text, written, replace(exact, correctives=False), None))
-    if shape.baked is not None and changes:
-        text = "the shape changes over time, which cannot be held: vertices are off by up to "
-        steps.append(replace(steps[-1], text=text, weights=shape.baked))
-    return steps
+def _split(side: Side, sources: Ints) -> Side:
+    """Return a side with its vertices as often as a file has them."""
+    whole = side.exact
+    assert side.body is not None  # it has a mesh
+    body = body_rows(side.body, sources)
+    return replace(
+        side, body=body, exact=None if whole is None else lambda row: whole(row)[sources]
+    )
+
+
+def _first_set(
+    whole: Side, cut: Side, figure: Figure, rows: Rows, least: float, influences: Influences
+) -> list[str]:
+    """Say what programs make of the file that read four influences a vertex."""
+    found = apart(whole, cut, rows, least)
+    text = f"up to {influences.most} influences a vertex, all of them written, strongest first"
+    if found.vertices is None:
+        return [text]
+    off = length_text(figure, found.vertices.distance)
+    extent = shared_extent(found)
+    return [f"{text}: programs that read only JOINTS_0 are off by up to {off}{extent}"]
+
+
+def _reasons(
+    figure: Figure,
+    frames: Frames,
+    rows: Rows,
+    how: Skinning,
+    shape: Shape,
+    influences: Influences | None,
+    least: float,
+) -> list[str]:
+    """Return what vertices may be elsewhere for, in words."""
+    found = []
+    if influences is not None and (influences.n_scaled or influences.n_negative):
+        found.append(_weights_text(influences))
+    if influences is not None and how.method != "lbs":
+        found.append(f"{METHODS[how.method]} skinning cannot be held, glTF blends linearly")
+    if influences is not None and figure.correctives is not None and how.correctives:
+        found.append("pose correctives cannot be held")
+    weights = frames.shape_weights
+    weights = weights if len(weights) == 1 else weights[rows]
+    if shape.baked is not None and np.ptp(weights, axis=0).any():
+        found.append("the shape changes over time, which cannot be held")
+    mesh = shape.figure.mesh
+    assert mesh is not None  # vertices differ
+    coarse = np.abs(mesh.positions - mesh.positions.astype(np.float32)).max(initial=0.0)
+    if coarse > least:
+        found.append("the mesh is far from its origin for glTF's single precision")
+    return found
 
 
 def _weights_text(influences: Influences) -> str:
@@ -125,36 +162,12 @@ def _weights_text(influences: Influences) -> str:
     if influences.n_negative:
         parts.append(f"weights of {vertices_text(influences.n_negative)} are negative")
     done = "left out and the others scaled" if influences.n_negative else "scaled"
-    return f"{' and '.join(parts)}: {done}, as glTF demands, which moves vertices by up to "
+    return f"{' and '.join(parts)}: {done}, as glTF demands"
 
 
 def vertices_text(count: int) -> str:
     """Return a number of vertices in words."""
     return "1 vertex" if count == 1 else f"{count} vertices"
-
-
-def _vertices(step: _Step, pose: Pose) -> Floats:
-    if step.weights is not None:
-        pose = pose.copy()
-        pose.shape_weights = step.weights
-    return deform(step.figure, pose, step.how)[0]
-
-
-def _distance(first: Floats, second: Floats) -> float:
-    return float(np.linalg.norm(first - second, axis=1).max(initial=0.0))
-
-
-def _rounding(figure: Figure, shape: Shape) -> list[str]:
-    """Say how coarse single precision is, for meshes far from their origin."""
-    mesh = shape.figure.mesh
-    assert mesh is not None  # the caller looked
-    off = _distance(mesh.positions, mesh.positions.astype(np.float32).astype(np.float64))
-    if off <= _ROUNDING * box_size(bounding_box(mesh.positions)):
-        return []
-    return [
-        "the mesh is far from its origin for glTF's single precision: vertices are off by up to "
-        f"{length_text(figure, off)}"
-    ]
 
 
 def not_held(figure: Figure, shape: Shape) -> list[str]:
@@ -163,6 +176,7 @@ def not_held(figure: Figure, shape: Shape) -> list[str]:
     parts = {
         f"{unused} blend shapes": unused > 0 and shape.baked is None,
         f"{figure.n_shapes} blend shapes as such": shape.baked is not None,
+        "pose correctives": figure.correctives is not None,
         "body parts": figure.body_parts is not None,
         "keypoints": figure.keypoints is not None,
         "the symmetry map": figure.symmetry is not None,

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.errors import RigError, printable
+from viewer.export._between import resampling_losses
 from viewer.export._family_frames import (
     FamilyFrames,
     check_unit,
@@ -25,10 +26,13 @@ from viewer.export._family_frames import (
     member_of_figure,
     up_axis,
 )
+from viewer.export._family_reading import read_frames
 from viewer.export._gaps import filled, gaps_text, runs
+from viewer.export._losses import frames_losses
 from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, MotionOptions
-from viewer.formats import all_or_none, save_arrays
+from viewer.formats import Source, all_or_none, save_arrays
+from viewer.formats.amass import read
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.take import Take
 
@@ -88,7 +92,12 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
                 f"{printable(file, 300)}: {length} of {member.title} at "
                 f"{take.frame_rate:g} a second, {up} up"
             )
-    return [*written, *_remarks(body, take, present, options), *notes]
+    lost = []
+    for file, span in zip(paths, spans, strict=True):
+        again = read_frames(read(Source.open(file)), take, options)
+        lost += frames_losses(file, take, again, options.skinning, span)
+    lost += resampling_losses(path, take, options.skinning)
+    return [*written, *lost, *_remarks(body, take, present, options), *notes]
 
 
 def _arrays(body: FamilyFrames, part: slice, rate: float, up: str) -> dict[str, NDArray[Any]]:

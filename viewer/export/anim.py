@@ -8,23 +8,24 @@ from pathlib import Path
 import numpy as np
 
 from viewer.errors import RigError, printable
+from viewer.export._between import PLACES, own_times
 from viewer.export._bvh_angles import euler_angles, unrolled
 from viewer.export._gaps import filled, gaps_text, runs
+from viewer.export._losses import frames_losses
 from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, MotionOptions
-from viewer.formats import all_or_none, write
+from viewer.formats import Source, all_or_none, read, write
 from viewer.rig.arrays import Floats
 from viewer.rig.clip import Clip, Tangent, is_course_rig
 from viewer.rig.clip_edit import clip_from_frames
 from viewer.rig.clip_table import evaluate_all
 from viewer.rig.figure import Figure
-from viewer.rig.motion import Frames, frames_of, world_frames
+from viewer.rig.motion import Frames, frames_between, frames_of, world_frames
 from viewer.rig.number_text import number_text
 from viewer.rig.rotation import quaternion_to_matrix
 from viewer.rig.scalars import length_text
-from viewer.rig.scene import figure_pose
 from viewer.rig.skeleton import Skeleton
-from viewer.rig.take import Take
+from viewer.rig.take import Take, frames_at
 
 __all__ = ["export_take"]
 
@@ -78,6 +79,7 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
         write(take.motion, path)
         own = ", the clip's own" if take.motion.end > take.motion.start else ""
         notes = [f"{_summary(path, take.motion)}{own}"]
+        notes += _losses(take, path, (0, frames.n_frames), options)
         if frames.figure_translations.any():
             notes.append("the place of the whole figure is no part of its clip: it is left out")
         return notes + _left_out(figure, frames)
@@ -91,42 +93,66 @@ def _export_frames(take: Take, skeleton: Skeleton, path: Path, options: MotionOp
     dofs = _dofs(take, skeleton, whole)
     is_split = options.closing == "split" and not frames.present.all()
     spans = runs(frames.present) if is_split else [(0, frames.n_frames)]
-    clips, errors = [], []
+    clips, rules = [], []
     for start, stop in spans:
         part = slice(start, stop)
         trials = [
             clip_from_frames(take.motion.name, dofs[part], frames.times[part], rule)
             for rule in _RULES
         ]
-        measured = [_error(take, trial, part) for trial in trials]
-        best = int(np.argmin([between for _, between in measured]))
+        middles = _middles(frames.times[part])
+        best = int(np.argmin([_distance(take, trial, middles) for trial in trials]))
         clips.append(trials[best])
-        errors.append((*measured[best], _RULES[best]))
+        rules.append(_RULES[best])
     paths = split_paths(path, len(clips))
     with all_or_none(paths):
         for file, clip in zip(paths, clips, strict=True):
             write(clip, file)
-    notes = [_summary(file, clip) for file, clip in zip(paths, clips, strict=True)]
-    return notes + _remarks(take, errors, options)
-
-
-def _remarks(
-    take: Take, errors: list[tuple[float, float, Tangent]], options: MotionOptions
-) -> list[str]:
-    on_frames, between = max(error[0] for error in errors), max(error[1] for error in errors)
-    rules = " or ".join(dict.fromkeys(str(error[2]) for error in errors))
-    figure, frames = take.figure, take.frames
     notes = [
-        f"joints are off by up to {length_text(figure, on_frames)} on the frames, "
-        f"{length_text(figure, between)} between them ({rules} tangents)"
+        f"{_summary(file, clip)}, {rule} tangents"
+        for file, clip, rule in zip(paths, clips, rules, strict=True)
     ]
+    for file, span in zip(paths, spans, strict=True):
+        notes += _losses(take, file, span, options)
+    return notes + _remarks(take, options)
+
+
+def _losses(take: Take, path: Path, span: tuple[int, int], options: MotionOptions) -> list[str]:
+    """Read a file back, and say how far it is off on the frames, and between them.
+
+    Between them it is compared half-way, and where the motion has frames or keys of its own.
+    """
+    clip = read(Source.open(path))
+    assert isinstance(clip, Clip)  # as was written
+    figure, how, part = take.figure, options.skinning, slice(*span)
+    times = take.frames.times[part]
+    on_frames = frames_of(figure, clip, times)
+    notes = frames_losses(path, take, on_frames, how, span)
+    there = take.frames.present[part]
+    middles = _middles(times)[there[1:] & there[:-1]]
+    between = np.union1d(
+        middles, own_times(replace(take, frames=frames_between(take.frames, part)))
+    )
+    if len(between):
+        wanted = replace(take, frames=frames_at(take, between))
+        found = frames_of(figure, clip, between)
+        notes += frames_losses(path, wanted, found, how, places=PLACES)
+    return notes
+
+
+def _middles(times: Floats) -> Floats:
+    return 0.5 * (times[1:] + times[:-1])
+
+
+def _remarks(take: Take, options: MotionOptions) -> list[str]:
+    notes, frames = [], take.frames
     if not frames.present.all():
         done = {"hold": "the last pose is held", "interpolate": "interpolated"}
         text = gaps_text(frames.present, take.first_frame)
         notes.append(
             f"missing {text}: {done.get(options.closing, 'one file for each run of frames')}"
         )
-    return notes + _left_out(figure, frames)
+    return notes + _left_out(take.figure, frames)
 
 
 def _is_whole(take: Take, clip: Clip) -> bool:
@@ -161,23 +187,13 @@ def _dofs(take: Take, skeleton: Skeleton, frames: Frames) -> Floats:
     return dofs
 
 
-def _error(take: Take, clip: Clip, part: slice) -> tuple[float, float]:
-    """Return how far joints are off at most, on the frames and half-way between them."""
-    times = take.frames.times[part]
-    middles = 0.5 * (times[1:] + times[:-1])
-    return _distance(take, clip, times), _distance(take, clip, middles)
-
-
 def _distance(take: Take, clip: Clip, times: Floats) -> float:
+    """Return how far joints are off at most, the figure's scale left out."""
     figure, worst = take.figure, 0.0
-    first, base = int(take.frames.present.argmax()), figure_pose(figure)
-    base.figure_translation = take.frames.figure_translations[first]
-    base.figure_scale = float(take.frames.figure_scales[first])
     for start in range(0, len(times), _BLOCK):
         block = times[start : start + _BLOCK]
-        wanted = frames_of(figure, take.motion, block, base)
+        wanted = frames_at(take, block)
         found = frames_of(figure, clip, block)
-        # The scale is not part of the file: positions are compared as they are without.
         place = wanted.figure_translations / wanted.figure_scales[:, None]
         one = np.ones(len(block))
         wanted = replace(wanted, figure_scales=one, figure_translations=place)

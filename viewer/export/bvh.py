@@ -8,20 +8,22 @@ from pathlib import Path
 import numpy as np
 
 from viewer.errors import RigError, printable
+from viewer.export._between import resampling_losses
 from viewer.export._bvh_angles import unrolled
-from viewer.export._bvh_body import Body, Space, body_of, rest_matrices, shape_at, shape_changes
+from viewer.export._bvh_body import Body, Space, body_of, rest_matrices, shape_at
 from viewer.export._bvh_ends import end_offsets
+from viewer.export._bvh_reading import BvhFile, read_back
 from viewer.export._bvh_text import bvh_text
 from viewer.export._gaps import filled, gaps_text, runs
+from viewer.export._losses import driven_losses, shape_changes
 from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, ROTATION_ORDERS, MotionOptions
-from viewer.formats import Source, all_or_none, bvh, save_bytes
+from viewer.formats import all_or_none, save_bytes
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.joint_names import plain_names
-from viewer.rig.motion import Frames, frames_of, rest_translations_of, world_frames
+from viewer.rig.motion import Frames, rest_translations_of
 from viewer.rig.rotation import axis_rotations
-from viewer.rig.scalars import length_text
 from viewer.rig.shape import shaped
 from viewer.rig.skeleton import joint_label
 from viewer.rig.take import Take
@@ -30,18 +32,21 @@ from viewer.rig.units import METRES, WORDS
 __all__ = ["export_take"]
 
 _DEFAULT_UNIT = "cm"
-_BLOCK = 4096  # frames at a time, when the file is read back
 _SHORTEST_END = 2e-3  # Blender invents a direction for bones below 1e-3
 _MOST_DIGITS = 15
 _LISTED = 8  # joints in a note
 
 
 def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
-    """Write a motion, read it back, and say how far its joints are off.
+    """Write a motion, read it back, and say how far its joints and a skin on them are off.
 
     Offsets are those of the shape in the first frame that is present. The root has offset 0 and
     its place in its channels, so that readers that add and readers that replace offsets agree.
     Angles run on without jumps.
+
+    A file holds no mesh. What is said of vertices is how far those of the figure as it moves here
+    are from those of its own skin, in the shape of the bones, on the joints of the file; both are
+    blended linearly.
 
     Parameters
     ----------
@@ -56,7 +61,8 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
     Returns
     -------
     list of str
-        What was written, the largest error, and what the format cannot hold.
+        What was written, the largest differences where there are any, and what the format cannot
+        hold.
 
     Raises
     ------
@@ -81,21 +87,17 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
     spans = runs(take.frames.present) if is_split else [(0, frames.n_frames)]
     paths = split_paths(path, len(spans))
     texts = [writer.text(*span) for span in spans]
-    errors = [
-        writer.error(file, text, *span)
+    lost = [
+        line
         for file, text, span in zip(paths, texts, spans, strict=True)
+        for line in writer.losses(file, text, reference, span)
     ]
     with all_or_none(paths):
         for file, text in zip(paths, texts, strict=True):
             save_bytes(file, text)
     notes = [writer.summary(file, *span) for file, span in zip(paths, spans, strict=True)]
-    error, worst = max(errors)
-    present = int(take.frames.present.sum())
-    notes.append(
-        f"read back: the largest joint position error is {writer.length(error)} ({worst}) "
-        f"over {'1 frame' if present == 1 else f'{present} frames'}"
-    )
-    return notes + _remarks(take, figure, body, reference, options)
+    lost += resampling_losses(path, take, options.skinning)
+    return notes + lost + _remarks(take, figure, body, reference, options)
 
 
 def _check(options: MotionOptions) -> None:
@@ -217,30 +219,16 @@ class _Writer:
             self.options.digits,
         ).encode("ascii")
 
-    def error(self, path: Path, text: bytes, start: int, stop: int) -> tuple[float, str]:
-        """Return how far joints are off when the text is read back, and which is worst."""
-        motion = bvh.read(Source(path, text))
-        skeleton, clip = motion.figure.skeleton, motion.clip
-        assert skeleton is not None  # the reader gives one
-        numbers = {name: joint for joint, name in enumerate(skeleton.names)}
-        place = [numbers[name] for name in self.names]
-        first = int(self.options.rest_frame)
-        worst = (0.0, self.names[0])
-        for row in range(start, stop, _BLOCK):
-            rows = np.arange(row, min(row + _BLOCK, stop))
-            times = (rows - start + first) / clip.timing.frame_rate
-            found = world_frames(motion.figure, frames_of(motion.figure, clip, times))
-            off = np.linalg.norm(found[..., :3, 3][:, place] - self.body.places[rows], axis=2)
-            off[~self.take.frames.present[rows]] = 0.0
-            joint = int(off.max(axis=0).argmax())
-            worst = max(worst, (float(off[:, joint].max()), self.names[joint]))
-        return worst[0] / self.space.factor, worst[1]
-
-    def length(self, length: float) -> str:
-        """Return a small length of the figure in plain decimals."""
-        if self.figure.unit in METRES:
-            return f"{1000.0 * METRES[self.figure.unit] * length:.6f} mm"
-        return f"{length:.2g} in the figure's own unit"
+    def losses(self, path: Path, text: bytes, reference: int, span: tuple[int, int]) -> list[str]:
+        """Read a file's text back, and say how far joints and vertices are from the motion."""
+        take, how = self.take, self.options.skinning
+        assert take.figure.skeleton is not None  # whoever has frames has a skeleton
+        names = self.names[-take.figure.skeleton.n_joints :]
+        ahead = int(self.options.rest_frame) - span[0]
+        file = BvhFile(path, text, names, self.space, reference, ahead)
+        written = read_back(file, take.figure, take.frames, how)
+        shape = shape_at(take.frames, reference)[0]
+        return driven_losses(path, take, written, how, span, shape)
 
     def summary(self, path: Path, start: int, stop: int) -> str:
         """Return what a file holds."""
@@ -281,14 +269,9 @@ def _remarks(
             f"{len(moving)} joints below the root move within their parents and have position "
             f"channels: {', '.join(moving[:_LISTED])}{more}"
         )
-    changes = shape_changes(take.figure, frames, reference)
-    if changes is not None and changes[0] > 0.0:
-        difference, frame, joint = changes
-        notes.append(
-            f"the shape changes over time: bones are written as in frame "
-            f"{reference + take.first_frame}, off by up to {length_text(take.figure, difference)} "
-            f"({joint_label(take.figure.skeleton, joint)} in frame {frame + take.first_frame})"
-        )
+    if shape_changes(frames):
+        first = reference + take.first_frame
+        notes.append(f"the shape changes over time: bones are written as in frame {first}")
     scales = frames.figure_scales[frames.present]
     if np.ptp(scales) > 0.0:
         notes.append(

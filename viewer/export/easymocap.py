@@ -17,12 +17,13 @@ import re
 import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from viewer.errors import OutputError, RigError, printable
+from viewer.export._between import resampling_losses
 from viewer.export._family_frames import (
     FamilyFrames,
     check_unit,
@@ -30,10 +31,13 @@ from viewer.export._family_frames import (
     member_of_figure,
     up_axis,
 )
+from viewer.export._family_reading import Records, read_frames
 from viewer.export._gaps import gaps_text, kept_gaps
+from viewer.export._losses import frames_losses
 from viewer.export._options import MotionOptions
 from viewer.interrupts import hold, poll
 from viewer.rig.arrays import Floats
+from viewer.rig.motion import frames_between
 from viewer.rig.person import person_label
 from viewer.rig.take import Take
 
@@ -94,7 +98,7 @@ def export_takes(
         take = replace(taken, frames=frames)
         member = member_of_figure(take.figure, "an EasyMocap folder", ("pelvis", "wrist"))
         body, losses = family_frames(take, frames, member, options)
-        people.append((person, take, _Records(person, body)))
+        people.append(_Person(taken, take, _Records(person, body), Records(member)))
         who = f"{person_label(person)}: " if len(takes) > 1 else ""
         notes += [f"{who}{loss}" for loss in losses]
         if filling:
@@ -107,12 +111,7 @@ def export_takes(
     with _new_folder(path) as folder:
         for frame in range(first, stop):
             poll()
-            rows = [
-                records.text(frame - take.first_frame)
-                for _, take, records in people
-                if 0 <= frame - take.first_frame < take.frames.n_frames
-                and take.frames.present[frame - take.first_frame]
-            ]
+            rows = [person.text(frame) for person in people if person.is_there(frame)]
             text = "[\n" + ",\n".join(rows) + "\n]\n"
             (folder / f"{frame:06}.json").write_text(text, encoding="ascii", newline="\n")
     who = "1 person" if len(takes) == 1 else f"{len(takes)} people"
@@ -120,8 +119,38 @@ def export_takes(
     return [
         f"{printable(path / _FOLDER, 300)}: {count} of {who}, {up_axis(options)} up; "
         f"EasyMocap keeps no frame rate: it is {takes[0].frame_rate:g} a second",
+        *(line for person in people for line in person.losses(path / _FOLDER, options)),
         *notes,
     ]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Person:
+    """Somebody who is written: the motion, with its gaps closed as asked, as text, as text says."""
+
+    meant: Take
+    take: Take
+    records: _Records
+    again: Records
+
+    def is_there(self, frame: int) -> bool:
+        """Return whether a frame has a record of the person."""
+        row, present = frame - self.take.first_frame, self.take.frames.present
+        return 0 <= row < len(present) and bool(present[row])
+
+    def text(self, frame: int) -> str:
+        """Return the record of a frame, and keep what it says."""
+        text = self.records.text(frame - self.take.first_frame)
+        self.again.add(text)
+        return text
+
+    def losses(self, path: Path, options: MotionOptions) -> list[str]:
+        """Return a line with the largest differences, or none."""
+        place = np.maximum(np.cumsum(self.take.frames.present) - 1, 0)
+        found = read_frames(self.again.motion(self.take.frame_rate), self.meant, options)
+        how = options.skinning
+        lines = frames_losses(path, self.meant, frames_between(found, place), how)
+        return lines + resampling_losses(path, self.meant, how)
 
 
 def _check(takes: Sequence[Take], persons: Sequence[int]) -> None:

@@ -14,20 +14,23 @@ from typing import Any
 import numpy as np
 
 from viewer.errors import RigError, printable
+from viewer.export._between import resampling_losses
 from viewer.export._gaps import filled, gaps_text, runs
 from viewer.export._gltf_document import Document, text_of
-from viewer.export._gltf_losses import losses, not_held, sampled, vertices_text
+from viewer.export._gltf_losses import Written, gltf_losses, not_held, vertices_text
 from viewer.export._gltf_mesh import Color, add_mesh
 from viewer.export._gltf_motion import add_animation, moving, still_locals
 from viewer.export._gltf_nodes import Locals, Tree, add_nodes, locals_of
+from viewer.export._gltf_reading import parsed
 from viewer.export._gltf_shape import Shape, shape_of
 from viewer.export._gltf_skin import Influences, influences_of, inverse_bind_matrices
 from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, MotionOptions
 from viewer.formats import all_or_none, save_bytes
 from viewer.rig.figure import Figure
-from viewer.rig.motion import Frames, frames_between, pose_of
+from viewer.rig.motion import Frames, frames_between
 from viewer.rig.pose import Pose
+from viewer.rig.pose_take import pose_frames
 from viewer.rig.scene import Actor, figure_pose
 from viewer.rig.skeleton import joint_label
 from viewer.rig.skinning import Skinning, skin_used
@@ -50,11 +53,12 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
     document = Document(figure.name)
     built = _add_body(document, body, figure.up, pose, still, actor.color)
     (data,) = _files([(path, document)])
-    notes = [f"{printable(path, 300)}: {built.counts}, {data[path]}"]
+    notes = [f"{printable(path, 300)}: {built.counts}, {len(data[path])} bytes"]
     notes += _beside(data, path) + _remarks(body, figure.up)
-    if figure.mesh is not None:
-        poses = [] if pose is None else [pose]
-        notes += losses(figure, poses, skinning, body.shape, body.influences, "", False)
+    file = Written(path, parsed([*data.values()]), built.tree, built.mesh_node)
+    figure, frames = pose_frames(figure, pose)
+    rows = np.zeros(1, dtype=np.intp)
+    notes += gltf_losses(file, figure, frames, rows, skinning, body.shape, body.influences, None)
     return notes + not_held(figure, body.shape)
 
 
@@ -94,21 +98,35 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
     if options.closing == "split" and not present.all():
         spans = runs(present)
     paths = split_paths(path, len(spans))
-    documents, counts = [], ""
+    documents, built = [], []
     for start, stop in spans:
         document = Document(take.name)
-        counts = _add_take(document, take, body, frames, (start, stop), options.world_up)
+        built.append(_add_take(document, take, body, frames, (start, stop), options.world_up))
         documents.append(document)
-    notes = []
+    notes, lost = [], []
     saved = _files(list(zip(paths, documents, strict=True)))
-    for file, (start, stop), data in zip(paths, spans, saved, strict=True):
+    for file, (start, stop), data, made in zip(paths, spans, saved, built, strict=True):
         first = take.first_frame + start
         motion = f"{stop - start} frames ({first} to {first + stop - start - 1})"
         rate = f"at {take.frame_rate:g} a second"
-        notes += [f"{printable(file, 300)}: {counts}, {motion} {rate}, {data[file]}"]
+        size = f"{len(data[file])} bytes"
+        notes += [f"{printable(file, 300)}: {made.counts}, {motion} {rate}, {size}"]
         notes += _beside(data, file)
+        written = Written(file, parsed([*data.values()]), made.tree, made.mesh_node, start)
+        rows = start + np.flatnonzero(present[start:stop])
+        lost += gltf_losses(
+            written,
+            take.figure,
+            frames,
+            rows,
+            options.skinning,
+            shape,
+            body.influences,
+            take.first_frame,
+        )
     notes += _remarks(body, options.world_up) + _motion_remarks(take, body, frames, options)
-    return notes + _take_losses(take, body, options) + not_held(take.figure, shape)
+    lost += resampling_losses(path, take, options.skinning)
+    return notes + lost + not_held(take.figure, shape)
 
 
 def _check(take: Take, options: MotionOptions) -> None:
@@ -193,7 +211,7 @@ def _add_body(
 
 def _add_take(
     document: Document, take: Take, body: _Body, frames: Frames, span: tuple[int, int], up: str
-) -> str:
+) -> _Built:
     """Add a figure at rest, and some of the frames as an animation."""
     skeleton = body.figure.skeleton
     assert skeleton is not None  # whoever has a take has a skeleton
@@ -212,11 +230,11 @@ def _add_take(
         morph = built.mesh_node, weights
     name = take.motion.name or take.name
     add_animation(document, name, take.frame_rate, skeleton, part, built.tree, morph)
-    return built.counts
+    return built
 
 
-def _files(documents: list[tuple[Path, Document]]) -> list[dict[Path, str]]:
-    """Write all files, or none; return how long they are in words."""
+def _files(documents: list[tuple[Path, Document]]) -> list[dict[Path, bytes]]:
+    """Write all files, or none; return what is in them."""
     saved: list[dict[Path, bytes]] = []
     for path, document in documents:
         if path.suffix.lower() == ".gltf":
@@ -229,11 +247,12 @@ def _files(documents: list[tuple[Path, Document]]) -> list[dict[Path, str]]:
         for files in saved:
             for file, data in files.items():
                 save_bytes(file, data)
-    return [{file: f"{len(data)} bytes" for file, data in files.items()} for files in saved]
+    return saved
 
 
-def _beside(data: dict[Path, str], path: Path) -> list[str]:
-    return [f"{printable(file, 300)}: its arrays, {n}" for file, n in data.items() if file != path]
+def _beside(data: dict[Path, bytes], path: Path) -> list[str]:
+    others = {file: len(content) for file, content in data.items() if file != path}
+    return [f"{printable(file, 300)}: its arrays, {n} bytes" for file, n in others.items()]
 
 
 def _remarks(body: _Body, up: str) -> list[str]:
@@ -288,18 +307,3 @@ def _motion_remarks(take: Take, body: _Body, frames: Frames, options: MotionOpti
             f"{printable(names, 300)}{more}"
         )
     return notes
-
-
-def _take_losses(take: Take, body: _Body, options: MotionOptions) -> list[str]:
-    if take.figure.mesh is None:
-        return []
-    present = np.flatnonzero(take.frames.present)
-    rows = sampled(present)
-    poses = [pose_of(take.figure, take.frames, int(row)) for row in rows]
-    extent = f" in {len(rows)} of {len(present)} frames" if len(rows) < len(present) else ""
-    weights = take.frames.shape_weights
-    weights = weights if len(weights) == 1 else weights[present]
-    changes = bool(np.ptp(weights, axis=0).any())
-    return losses(
-        take.figure, poses, options.skinning, body.shape, body.influences, extent, changes
-    )

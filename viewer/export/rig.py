@@ -8,16 +8,18 @@ from pathlib import Path
 import numpy as np
 
 from viewer.errors import RigError, printable
-from viewer.export._course_rig import course_skeleton
+from viewer.export._apart import Apart, Farthest, apart_lines, negligible
+from viewer.export._course_rig import course_skeleton, depth_first
 from viewer.formats import Source, all_or_none, read, write
 from viewer.rig.figure import Figure
+from viewer.rig.kinematics import world_matrices
 from viewer.rig.mesh import Mesh, split_seams
 from viewer.rig.pose import Pose, rest_pose
-from viewer.rig.scalars import length_text
+from viewer.rig.pose_take import pose_frames
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
 from viewer.rig.skin import skin_rows
-from viewer.rig.skinning import Skinning, deform, skin_used
+from viewer.rig.skinning import Skinning, deform, joint_matrices, skin_used
 
 __all__ = ["export"]
 
@@ -123,15 +125,26 @@ def _lost(figure: Figure, pose: Pose) -> list[str]:
 def _error(
     actor: Actor, skel: Path, skin: Path, sources: np.ndarray | None, skinning: Skinning
 ) -> list[str]:
-    """Read the files back, pose them as they say, and compare with the figure's own vertices."""
+    """Read the files back, pose them as they say, and compare with the figure as it is posed."""
+    figure, pose = actor.figure, actor.pose
     skeleton = read(Source.open(skel))
     assert isinstance(skeleton, Figure) and skeleton.skeleton is not None
+    assert figure.skeleton is not None and pose is not None  # the caller looked
+    there = world_matrices(skeleton.skeleton, rest_pose(skeleton.skeleton))[:, :3, 3]
+    order = depth_first(figure.skeleton.parents)
+    off = np.linalg.norm(there - joint_matrices(figure, pose)[order, :3, 3], axis=1)
+    joint = int(off.argmax())
+    one, first = pose_frames(figure, pose)
+    least = negligible(one, first, np.zeros(1, dtype=np.intp))
+    joints = Farthest(float(off[joint]), int(order[joint]), 0) if off[joint] > least else None
     if sources is None:
-        return []
+        return apart_lines(skel, figure, Apart(joints, None, 1, 1), None)
     mesh = read(Source.open(skin))
     assert isinstance(mesh, Figure)
     again = Figure("again", mesh.mesh, skeleton.skeleton, mesh.skin)
     found = deform(again, rest_pose(skeleton.skeleton))[0]
-    wanted = deform(actor.figure, actor.pose, skinning)[0][sources]
-    worst = float(np.linalg.norm(found - wanted, axis=1).max())
-    return [f"largest error of this pose when read back: {length_text(actor.figure, worst)}"]
+    apart = np.linalg.norm(found - deform(figure, pose, skinning)[0][sources], axis=1)
+    vertex = int(apart.argmax()) if len(apart) else -1
+    far = len(apart) > 0 and apart[vertex] > least
+    vertices = Farthest(float(apart[vertex]), int(sources[vertex]), 0) if far else None
+    return apart_lines(skin, figure, Apart(joints, vertices, 1, 1), None)

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 
 from viewer.errors import RigError
-from viewer.rig.arrays import Floats
 from viewer.rig.clip import Clip, is_course_rig
 from viewer.rig.clip_edit import clip_from_pose
 from viewer.rig.figure import Figure
@@ -16,12 +15,11 @@ from viewer.rig.pose import Pose, joint_rotations, local_matrices
 from viewer.rig.rotation import matrix_to_quaternion
 from viewer.rig.sampled_clip import SampledClip
 from viewer.rig.scene import Actor, Scene
-from viewer.rig.skeleton import Skeleton
 from viewer.rig.take import Take
 from viewer.rig.timing import Timing
 from viewer.rig.upright import own_up, upright_actor
 
-__all__ = ["pose_take", "posed_take"]
+__all__ = ["pose_frames", "pose_take", "posed_take"]
 
 
 def pose_take(actor: Actor, rate: float = DEFAULT_RATE, number: int = 0, time: float = 0.0) -> Take:
@@ -51,12 +49,9 @@ def pose_take(actor: Actor, rate: float = DEFAULT_RATE, number: int = 0, time: f
     figure, pose = actor.figure, actor.pose
     if figure.skeleton is None or pose is None:
         raise RigError(f"figure {figure.name} has no joints to pose")
+    figure, frames = pose_frames(figure, pose, actor.is_present, time)
     skeleton = figure.skeleton
-    if (pose.scales != skeleton.rest_scales).any():
-        # Frames know no scales of joints: the skeleton says them.
-        skeleton = replace(skeleton, rest_scales=pose.scales)
-        figure = replace(figure, skeleton=skeleton)
-    frames = _frame(figure, skeleton, pose, actor.is_present, time)
+    assert skeleton is not None  # as above
     if is_course_rig(skeleton) and not isinstance(actor.clip, SampledClip):
         motion: Clip | SampledClip = clip_from_pose(skeleton, pose, actor.name, time, time)
     else:
@@ -105,16 +100,34 @@ def posed_take(
     return pose_take(standing, rate, number, time), up
 
 
-def _frame(figure: Figure, skeleton: Skeleton, pose: Pose, is_present: bool, time: float) -> Frames:
-    moved: Floats = local_matrices(skeleton, pose)[:, :3, 3] - skeleton.rest_translations
-    weights = np.zeros((1, figure.n_shapes))
-    weights[0, : len(pose.shape_weights)] = pose.shape_weights  # those that are missing count as 0
-    return Frames(
-        np.array([time]),
-        np.array([is_present]),
-        matrix_to_quaternion(joint_rotations(skeleton, pose))[None],
-        moved[None],
-        weights,
-        pose.figure_translation[None].copy(),
-        np.array([pose.figure_scale]),
-    )
+def pose_frames(
+    figure: Figure, pose: Pose | None, is_present: bool = True, time: float = 0.0
+) -> tuple[Figure, Frames]:
+    """Return one pose as frames, and the figure that these move.
+
+    Parameters
+    ----------
+    figure : Figure
+        With a skeleton or, as a whole, without.
+    pose : Pose or None
+        Its pose; None leaves a figure without a skeleton where it is.
+    is_present : bool
+        Whether the frame is there.
+    time : float
+        Seconds of the frame.
+    """
+    skeleton, weights = figure.skeleton, np.zeros((1, figure.n_shapes))
+    place, scale = np.zeros((1, 3)), np.ones(1)
+    turned, moved = np.zeros((1, 0, 4)), np.zeros((1, 0, 3))
+    if pose is not None:
+        weights[0, : len(pose.shape_weights)] = pose.shape_weights  # missing ones count as 0
+        place, scale = pose.figure_translation[None].copy(), np.array([pose.figure_scale])
+    if pose is not None and skeleton is not None:
+        if (pose.scales != skeleton.rest_scales).any():
+            # Frames know no scales of joints: the skeleton says them.
+            skeleton = replace(skeleton, rest_scales=pose.scales)
+            figure = replace(figure, skeleton=skeleton)
+        moved = (local_matrices(skeleton, pose)[:, :3, 3] - skeleton.rest_translations)[None]
+        turned = matrix_to_quaternion(joint_rotations(skeleton, pose))[None]
+    present, times = np.array([is_present]), np.array([time])
+    return figure, Frames(times, present, turned, moved, weights, place, scale)

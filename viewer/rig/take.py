@@ -12,12 +12,13 @@ from viewer.rig.clip import Clip
 from viewer.rig.figure import Figure
 from viewer.rig.motion import DEFAULT_RATE, Frames, frame_rate, frames_of, rest_translations_of
 from viewer.rig.points import PointClip
+from viewer.rig.pose import Pose
 from viewer.rig.quaternion import multiply
 from viewer.rig.sampled_clip import SampledClip
 from viewer.rig.scene import Actor, Motion, Scene
 from viewer.rig.upright import own_up
 
-__all__ = ["Take", "frame_range", "take_of", "upright_take"]
+__all__ = ["Take", "frame_range", "frames_at", "take_of", "upright_take"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,6 +39,10 @@ class Take:
         Poses, in time order; gaps are in ``frames.present``.
     motion : Clip or SampledClip
         What the frames were sampled from.
+    base : Pose or None
+        Gives what the motion leaves alone.
+    is_turned : bool
+        Whether the frames are turned over, see ``upright_take``; the motion never is.
     """
 
     name: str
@@ -46,6 +51,8 @@ class Take:
     first_frame: int
     frames: Frames
     motion: Clip | SampledClip
+    base: Pose | None = None
+    is_turned: bool = False
 
 
 def take_of(
@@ -82,7 +89,14 @@ def take_of(
     times: Floats = motion.start + np.arange(first, stop) / rate
     shift = motion.timing.first_frame if isinstance(motion, SampledClip) and rate == own else 0
     sampled = frames_of(figure, motion, times, actor.pose, fill)
-    return Take(actor.name, figure, rate, first + shift, sampled, motion)
+    base = None if actor.pose is None else actor.pose.copy()
+    return Take(actor.name, figure, rate, first + shift, sampled, motion, base)
+
+
+def frames_at(take: Take, times: Floats) -> Frames:
+    """Return the poses of a take's motion at any times, turned over if its frames are: (T,) s."""
+    found = frames_of(take.figure, take.motion, times, take.base)
+    return _turned_over(take.figure, found) if take.is_turned else found
 
 
 def frame_range(
@@ -136,21 +150,22 @@ def upright_take(
     up, hangs = own_up(scene, actor)
     if not hangs:
         return take, up
-    return (take, f"-{up}") if keeps_world else (replace(take, frames=_turned_over(take)), up)
+    if keeps_world:
+        return take, f"-{up}"
+    return replace(take, frames=_turned_over(take.figure, take.frames), is_turned=True), up
 
 
-def _turned_over(take: Take) -> Frames:
+def _turned_over(figure: Figure, frames: Frames) -> Frames:
     """Return the frames turned by half a turn about x: the root, and the way to it.
 
     With the root joint at p = s (rest + t) + T in the figure, R' = Q R and T' = Q p - s (rest + t).
     """
-    frames = take.frames
     half = np.array([1.0, 0.0, 0.0, 0.0])
     rotations = frames.rotations.copy()
-    assert take.figure.skeleton is not None  # whoever has a take has a skeleton
-    roots = np.flatnonzero(take.figure.skeleton.parents < 0)
+    assert figure.skeleton is not None  # whoever has a take has a skeleton
+    roots = np.flatnonzero(figure.skeleton.parents < 0)
     rotations[:, roots] = multiply(half, rotations[:, roots])
-    rest = rest_translations_of(take.figure, frames.shape_weights)[:, 0]
+    rest = rest_translations_of(figure, frames.shape_weights)[:, 0]
     inner = frames.figure_scales[:, None] * (rest + frames.translations[:, 0])
     place = (inner + frames.figure_translations) * np.array([1.0, -1.0, -1.0]) - inner
     return replace(frames, rotations=rotations, figure_translations=place)

@@ -1,0 +1,59 @@
+"""Exporting 1,000 frames of the bundled body: what it costs to read the file back and compare."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from unittest.mock import patch
+
+import numpy as np
+from measure import interleaved, report
+
+import viewer
+from viewer.export import MotionOptions, export_take
+from viewer.loading import bundled_body
+from viewer.rig.quaternion import rotation_vector_to_quaternion
+from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.scene import Actor
+from viewer.rig.take import Take, take_of
+from viewer.rig.timing import Timing
+
+FRAMES = 1000
+
+
+def walk() -> Take:
+    """Return every joint swinging at its own rate, by half a radian at most."""
+    figure = viewer.load(bundled_body()).actors[0].figure
+    assert figure.skeleton is not None
+    rng, count = np.random.default_rng(0), figure.skeleton.n_joints
+    phases, rates, sizes = (rng.uniform(*ends, (count, 3)) for ends in ((0, 6), (3, 12), (0, 0.5)))
+    times = np.arange(FRAMES)[:, None, None] / 30.0
+    turns = rotation_vector_to_quaternion(sizes * np.sin(rates * times + phases))
+    clip = SampledClip("walk", Timing(30.0, np.arange(FRAMES)), turns)
+    return take_of(Actor(figure, clip=clip))
+
+
+def main(rounds: int = 7) -> None:
+    """Print times with and without the comparison, and their ratios."""
+    take = walk()
+    with tempfile.TemporaryDirectory() as folder:
+        for key, name, lost in (
+            ("gltf", "a.glb", "gltf_losses"),
+            ("bvh", "a.bvh", "driven_losses"),
+        ):
+            path = Path(folder) / name
+
+            def export(key: str = key, path: Path = path) -> None:
+                export_take(take, path, key, MotionOptions())
+
+            def alone(key: str = key, path: Path = path, lost: str = lost) -> None:
+                with patch(f"viewer.export.{key}.{lost}", lambda *_: []):
+                    export_take(take, path, key, MotionOptions())
+
+            times = interleaved({"compared": export, "not compared": alone}, rounds)
+            shown = f"{key}: {FRAMES} frames of {take.figure.name}"
+            report(shown, times, ("compared", "not compared"))
+
+
+if __name__ == "__main__":
+    main()

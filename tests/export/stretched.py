@@ -1,0 +1,59 @@
+"""A chain of joints whose bones and mesh grow with a blend shape, by lengths that are plain."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.rig.blendshapes import BlendShapes, JointRegressor
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import Mesh
+from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.scene import Actor
+from viewer.rig.skeleton import ball_skeleton
+from viewer.rig.skin import skin_from_lists
+from viewer.rig.take import Take, take_of
+from viewer.rig.timing import Timing
+from viewer.rig.transform import translation_matrix
+
+NAMES = ("low", "middle", "high")
+JOINTS = np.array([[0.0, 0, 0], [0, 1, 0], [0, 2, 0]])
+POSITIONS = np.array([[0.0, 0, 0], [0, 1, 0], [0, 2, 0], [0, 3, 0]])
+GROWTH = np.array([[0.0, 0, 0], [0, 0.1, 0], [0, 0.2, 0], [0, 0.5, 0]])
+WEIGHTS = np.array([0.0, 0.5, -0.25, 1.0, 0.75])
+WORST = 3
+"""The frame whose shape is farthest from that of the first."""
+
+
+def chain(unit: str = "m") -> Figure:
+    """Return three joints upon each other, a metre apart; each bone grows by 0.1 m a weight.
+
+    A vertex lies at each joint, and follows it; the last lies a metre above the highest joint,
+    follows that, and moves by 0.5 m a weight.
+    """
+    every = np.arange(3, dtype=np.int32)
+    rows = [[(0, 1.0)], [(1, 1.0)], [(2, 1.0)], [(2, 1.0)]]
+    return Figure(
+        "chain",
+        Mesh(POSITIONS, np.tile([0.0, 0, 1], (4, 1)), np.array([[0, 1, 2], [1, 2, 3]])),
+        ball_skeleton(NAMES, np.array([-1, 0, 1]), JOINTS),
+        skin_from_lists(rows, translation_matrix(-JOINTS)),
+        blend_shapes=BlendShapes(("grow",), GROWTH[None]),
+        joint_regressor=JointRegressor(3, every, every, np.ones(3)),
+        unit=unit,
+    )
+
+
+def chain_take(unit: str = "m", weights=WEIGHTS, **tracks) -> Take:
+    """Return the chain, its root turned by a right angle about z in all frames."""
+    count = len(weights)
+    turns = np.zeros((count, 3, 4))
+    turns[..., 3] = 1.0
+    turns[:, 0] = [0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)]
+    clip = SampledClip(
+        "growing",
+        Timing(10.0, np.arange(count)),
+        turns,
+        shape_weights=np.asarray(weights, dtype=float)[:, None],
+        **tracks,
+    )
+    return take_of(Actor(chain(unit), clip=clip))

@@ -1,0 +1,139 @@
+"""The search for the farthest vertex: bounds that hold, and the result of looking at everything."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_less
+
+from viewer.export._apart import apart
+from viewer.export._bounds import Bounds
+from viewer.export._estimates import Estimator
+from viewer.export._skinned import Body, Poses, Side, poses_of
+from viewer.rig.rotation import rotation_vector_to_matrix
+from viewer.rig.skin import skin_from_entries
+
+JOINTS, VERTICES, FRAMES = 5, 700, 90  # more vertices than a block, more frames than a chunk
+
+
+def body(rng, shapes: int = 0, corrected: bool = False, raw: float = 0.0) -> Body:
+    owners = np.repeat(np.arange(VERTICES), 3)
+    joints = rng.integers(0, JOINTS + 1, len(owners))
+    weights = rng.uniform(0.1, 1.0, (VERTICES, 3))
+    weights *= rng.uniform(1 - raw, 1 + raw, (VERTICES, 1)) / weights.sum(axis=1, keepdims=True)
+    bound = np.tile(np.eye(4), (JOINTS + 1, 1, 1))
+    return Body(
+        rng.normal(size=(VERTICES, 3)),
+        skin_from_entries(VERTICES, owners, joints, weights.ravel(), bound),
+        rng.normal(size=(shapes, VERTICES, 3)) if shapes else None,
+        rng.normal(0, 0.02, (9 * (JOINTS - 1), VERTICES, 3)) if corrected else None,
+    )
+
+
+def poses(rng, of: Body, far: float = 0.0) -> Poses:
+    palette = np.zeros((FRAMES, JOINTS + 1, 4, 4))
+    palette[..., :3, :3] = 1.25 * rotation_vector_to_matrix(
+        rng.normal(0, 0.7, (FRAMES, JOINTS + 1, 3))
+    )
+    palette[..., :3, 3] = rng.normal(far, 0.5, (FRAMES, JOINTS + 1, 3))
+    palette[..., 3, 3] = 1.0
+    shapes = 0 if of.shapes is None else len(of.shapes)
+    turns = 0 if of.correctives is None else len(of.correctives)
+    return Poses(
+        palette[:, :JOINTS, :3, 3],
+        palette,
+        rng.normal(far, 1.0, (FRAMES, 3)),
+        rng.normal(0, 0.1, (FRAMES, shapes)),
+        rng.normal(0, 0.5, (FRAMES, turns)),
+    )
+
+
+def moved(of: Body, by: Poses) -> np.ndarray:
+    """Return the vertices by the formula itself, every weight in a full table: (F, V, 3)."""
+    dense = np.zeros((VERTICES, JOINTS + 1))
+    owners = np.repeat(np.arange(VERTICES), np.diff(of.skin.starts))
+    np.add.at(dense, (owners, of.skin.joints), of.skin.weights)
+    rest = np.broadcast_to(of.positions, (FRAMES, VERTICES, 3)).copy()
+    for directions, weights in ((of.shapes, by.weights), (of.correctives, by.turns)):
+        if directions is not None and weights.shape[1]:
+            rest += np.einsum("fs,sva->fva", weights, directions)
+    points = np.concatenate([rest, np.ones((FRAMES, VERTICES, 1))], axis=2)
+    return np.einsum("vj,fjab,fvb->fva", dense, by.palette[..., :3, :], points) + by.shifts[:, None]
+
+
+def changed(rng, by: Poses, amount: float) -> Poses:
+    palette = by.palette.copy()
+    palette[..., :3, :] += rng.normal(0, amount, palette[..., :3, :].shape)
+    return replace(by, palette=palette, places=by.places + rng.normal(0, amount, by.places.shape))
+
+
+def pairs():
+    """Yield what exporters compare: joints, weights, shapes, correctives that differ."""
+    rng = np.random.default_rng(3)
+    plain = body(rng)
+    own = poses(rng, plain)
+    yield "joints", plain, own, plain, changed(rng, own, 1e-3)
+    raw = body(rng, raw=0.01)
+    single = raw.skin.weights.astype(np.float32).astype(float)
+    scaled = replace(raw, skin=replace(raw.skin, weights=single * 0.99))
+    yield "weights", raw, own, scaled, own
+    yield "far away", raw, poses(rng, raw, 300.0), scaled, poses(rng, raw, 300.0)
+    full = body(rng, shapes=2, corrected=True)
+    all_of_it = poses(rng, full)
+    bare = Body(full.positions, full.skin)
+    still = replace(all_of_it, weights=np.zeros((1, 0)), turns=np.zeros((FRAMES, 0)))
+    yield "rest", full, all_of_it, bare, still
+    other = replace(all_of_it, turns=all_of_it.turns + 1e-3, weights=all_of_it.weights * 0.9)
+    yield "less", full, all_of_it, full, changed(rng, other, 0.02)
+    strayed = replace(full, shapes=full.shapes * 1.01, positions=full.positions + 1e-3)
+    yield "strayed", full, all_of_it, strayed, changed(rng, all_of_it, 1e-6)
+
+
+CASES = list(pairs())
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case[0])
+def test_bounds_hold_for_every_vertex(case):
+    _, first, one, second, other = case
+    off = np.linalg.norm(moved(first, one) - moved(second, other), axis=2)
+    bounds, estimator = Bounds(first, second), Estimator(first, second)
+    assert_array_less(off.max(axis=1), bounds.of(one, other) + 1e-12)
+    estimate = estimator.of_skinned(one, other)
+    assert_array_less(off, estimate + 1e-12)
+    reach = np.abs(one.palette[..., :3, 3]).max() + np.abs(one.shifts).max() + 20.0
+    assert (estimate - off).max() < 1e-4 * reach  # tight enough to tell vertices apart
+    by_rest = bounds.stretches(one)[:, None] * estimator.of_rest(one, other)
+    assert_array_less(off, by_rest + bounds.by_joints(one, other)[:, None] + 1e-12)
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case[0])
+@pytest.mark.parametrize("least", [0.0, 1e-4])
+def test_the_farthest_is_that_of_all_frames_and_vertices(case, least):
+    _, first, one, second, other = case
+    sides = [
+        Side(of, lambda rows, by=by: poses_of(by, rows))
+        for of, by in ((first, one), (second, other))
+    ]
+    found = apart(*sides, np.arange(FRAMES), least)
+    off = np.linalg.norm(moved(first, one) - moved(second, other), axis=2)
+    frame, vertex = np.unravel_index(off.argmax(), off.shape)
+    assert (found.vertices.frame, found.vertices.index) == (frame, vertex)
+    assert found.vertices.distance == pytest.approx(off.max(), rel=1e-9)
+    gaps = np.linalg.norm(one.places - other.places, axis=2)
+    if gaps.max() <= least:
+        assert found.joints is None
+    else:
+        assert found.joints.distance == pytest.approx(gaps.max(), rel=1e-12)
+    assert (found.looked, found.frames) == (FRAMES, FRAMES)
+
+
+def test_what_is_less_than_rounding_is_nothing():
+    rng = np.random.default_rng(1)
+    plain = body(rng)
+    own = poses(rng, plain)
+    near = changed(rng, own, 1e-9)
+    sides = [Side(plain, lambda rows, by=by: poses_of(by, rows)) for by in (own, near)]
+    found = apart(*sides, np.arange(FRAMES), 1e-6)
+    assert found.joints is None and found.vertices is None

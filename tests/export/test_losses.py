@@ -1,0 +1,345 @@
+"""What exporters say is lost: the true maximum over all frames, joints and vertices, or nothing."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from family_models import family_figure
+from family_takes import family_motion, family_take, waves
+from formats.synthetic_smpl import model
+from numpy.testing import assert_allclose
+from plain_bvh import PlainBvh
+from plain_gltf import Gltf
+from rig import hand_made
+from stretched import GROWTH, JOINTS, NAMES, POSITIONS, WEIGHTS, WORST, chain_take
+
+import viewer
+from viewer.export import MotionOptions, export, export_take
+from viewer.rig.clip import Channel, Clip
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import Mesh
+from viewer.rig.motion import pose_of
+from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.scene import Actor, Scene
+from viewer.rig.skeleton import ball_skeleton
+from viewer.rig.skin import skin_from_lists
+from viewer.rig.skinning import Skinning, deform
+from viewer.rig.take import Take, take_of, upright_take
+from viewer.rig.timing import Timing
+from viewer.rig.transform import translation_matrix
+
+TOLD = 5e-3  # three digits are told
+
+
+def said(notes: list[str]) -> dict[str, tuple[float, str]]:
+    """Return what the one line of differences says: by joints and vertices, size and place."""
+    lines = [note for note in notes if " differ from " in note]
+    assert len(lines) <= 1
+    if not lines:
+        return {}
+    found = re.findall(r"(joints|vertices)[^;]*? by up to (\S+) mm \(([^)]*)\)", lines[0])
+    return {what: (float(size), place) for what, size, place in found}
+
+
+def write(take: Take, folder: Path, kind: str, name: str, **options) -> list[str]:
+    return export_take(take, folder / name, kind, MotionOptions(**options))
+
+
+# A shape that changes
+
+
+@pytest.mark.parametrize("unit", ["m", "cm", "in"])
+def test_bvh_tells_how_far_joints_and_a_driven_skin_are_where_bones_grow(tmp_path, unit):
+    """Each bone grows by 0.1, so the highest joint is 0.2 away, and what it carries 0.5."""
+    take = chain_take(unit)
+    found = said(write(take, tmp_path, "bvh", "a.bvh", digits=9))
+    metres = {"m": 1.0, "cm": 0.01, "in": 0.0254}[unit]
+    assert found == {
+        "joints": (pytest.approx(200 * metres, rel=TOLD), f"high, frame {WORST}"),
+        "vertices": (pytest.approx(500 * metres, rel=TOLD), f"vertex 3, frame {WORST}"),
+    }
+    # So says a second reader: the file has the first frame's bones, turned by a right angle.
+    file = PlainBvh(tmp_path / "a.bvh")
+    scale = metres / 0.01
+    for joint, name in enumerate(NAMES):
+        place = np.array(file.places(WORST)[name]) / scale
+        assert_allclose(place, [-JOINTS[joint, 1], 0, 0], rtol=0, atol=1e-8 / scale)
+
+
+def test_frames_that_are_missing_are_not_compared(tmp_path):
+    rows = np.arange(len(WEIGHTS))
+    rows[WORST] = -1
+    whole = chain_take()
+    clip = replace(whole.motion, timing=Timing(10.0, rows))
+    take = take_of(Actor(whole.figure, clip=clip))
+    for kind, name in (("bvh", "a.bvh"), ("gltf", "a.glb")):
+        found = said(write(take, tmp_path, kind, name))
+        # The next one has three quarters of the weight.
+        assert found["joints"] == (pytest.approx(150, rel=TOLD), "high, frame 4")
+        assert found["vertices"] == (pytest.approx(375, rel=TOLD), "vertex 3, frame 4")
+
+
+def test_files_of_parts_tell_their_own_losses(tmp_path):
+    rows = np.array([0, 1, -1, 3, 4])
+    whole = chain_take()
+    clip = replace(whole.motion, timing=Timing(10.0, rows))
+    take = take_of(Actor(whole.figure, clip=clip))
+    for kind, suffix in (("bvh", "bvh"), ("gltf", "glb")):
+        notes = write(take, tmp_path, kind, f"a.{suffix}", gaps="split")
+        lines = [note for note in notes if " differ from " in note]
+        assert [line.split(":")[0] for line in lines] == [
+            str(tmp_path / f"a-{number}.{suffix}") for number in (1, 2)
+        ]
+        assert said(lines[:1])["joints"] == (pytest.approx(100, rel=TOLD), "high, frame 1")
+        assert said(lines[1:])["joints"] == (pytest.approx(200, rel=TOLD), "high, frame 3")
+
+
+def test_gltf_tells_the_same_of_the_shape_that_is_baked_in(tmp_path):
+    notes = write(chain_take(), tmp_path, "gltf", "a.glb")
+    assert said(notes) == {
+        "joints": (pytest.approx(200, rel=TOLD), f"high, frame {WORST}"),
+        "vertices": (pytest.approx(500, rel=TOLD), f"vertex 3, frame {WORST}"),
+    }
+    gltf = Gltf(tmp_path / "a.glb")
+    drawn = gltf.vertices(WORST / 10)[0]
+    wanted = (POSITIONS + GROWTH)[:, [1, 0, 2]] * [-1, 1, 1]  # turned by a right angle about z
+    assert_allclose(np.linalg.norm(drawn - wanted, axis=1), [0, 0.1, 0.2, 0.5], rtol=0, atol=1e-6)
+
+
+def test_expressions_are_no_part_of_a_bvh(tmp_path):
+    """SMPL-X, faces that move: what a skin on the file's joints lacks, by plain formulas."""
+    figure = replace(family_figure("smplx", tmp_path), correctives=None)
+    motion = family_motion(55, frames=12, expression=4.0 * waves(12, 10, seed=5.0))
+    take = family_take(figure, motion)
+    found = said(write(take, tmp_path, "bvh", "a.bvh", unit="m", digits=12))
+    file, names = PlainBvh(tmp_path / "a.bvh"), figure.skeleton.names
+    weights = take.frames.shape_weights
+    shaped = viewer.rig.shape.shaped(figure, weights[0])
+    rest = viewer.rig.shape.rest_joints(shaped)
+    dense = np.zeros((figure.mesh.n_vertices, len(names)))
+    owners = np.repeat(np.arange(len(dense)), np.diff(figure.skin.starts))
+    np.add.at(dense, (owners, figure.skin.joints), figure.skin.weights)
+    joints, vertices = [], []
+    for frame in range(12):
+        pose = pose_of(figure, take.frames, frame)
+        there = viewer.joint_matrices(figure, pose)[:, :3, 3]
+        turned, places = (
+            np.array([file.joints(frame)[name][part] for name in names]) for part in (0, 1)
+        )
+        joints.append(np.linalg.norm(there - places, axis=1))
+        carried = np.einsum("jab,vjb->vja", turned, shaped.mesh.positions[:, None] - rest) + places
+        driven = np.einsum("vj,vja->va", dense, carried)
+        vertices.append(np.linalg.norm(deform(figure, pose)[0] - driven, axis=1))
+    assert np.max(joints) > 0.001 and np.max(vertices) > np.max(joints)
+    for what, off in (("joints", joints), ("vertices", vertices)):
+        frame, index = np.unravel_index(np.argmax(off), np.shape(off))
+        label = names[index] if what == "joints" else f"vertex {index}"
+        size = pytest.approx(1000 * np.max(off), rel=TOLD)
+        assert found[what] == (size, f"{label}, frame {frame}")
+
+
+# Weights
+
+
+def weighted(weights, count: int, peak: int, far: float) -> Take:
+    """Return points at the origin of a joint each; the last joint jumps aside in one frame."""
+    n_joints = len(weights[0])
+    joints = np.zeros((n_joints, 3))
+    points = np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1]])
+    mesh = Mesh(points, np.tile([0.0, 0, 1], (3, 1)), np.array([[0, 1, 2]]))
+    rows = [[(j, w) for j, w in enumerate(row) if w] for row in weights]
+    skin = skin_from_lists(rows, translation_matrix(-joints))
+    parents = np.array([-1, *[0] * (n_joints - 1)])
+    skeleton = ball_skeleton(tuple(f"j{j}" for j in range(n_joints)), parents, joints)
+    turns = np.zeros((count, n_joints, 4))
+    turns[..., 3] = 1.0
+    moves = np.zeros((count, n_joints, 3))
+    moves[peak, -1, 0] = far
+    clip = SampledClip("jump", Timing(30.0, np.arange(count)), turns, translations=moves)
+    return take_of(Actor(Figure("points", mesh, skeleton, skin, unit="m"), clip=clip))
+
+
+@pytest.mark.parametrize("peak", [0, 7, 50, 101, 119])
+def test_raw_weights_tell_what_scaling_them_moves_in_the_worst_frame(tmp_path, peak):
+    """Vertex 2 is at (0, 0, 1), half on each joint, with a sum of 0.998.
+
+    Scaled, it goes to (1.5, 0, 1) where the second joint is at x = 3; as stored, to 0.998 of that.
+    """
+    weights = [(1.0, 0.0), (1.0, 0.0), (0.499, 0.499)]
+    notes = write(weighted(weights, 120, peak, 3.0), tmp_path, "gltf", "a.glb")
+    drawn = Gltf(tmp_path / "a.glb").vertices(peak / 30)[0]
+    assert_allclose(drawn[2], [1.5, 0, 1], rtol=0, atol=1e-5)  # times are in single precision
+    wanted = 1000 * 0.002 * np.hypot(1.5, 1.0)
+    assert said(notes) == {"vertices": (pytest.approx(wanted, rel=TOLD), f"vertex 2, frame {peak}")}
+    assert [note for note in notes if "do not add up to 1" in note] == [
+        note for note in notes if " differ from " in note
+    ]
+
+
+def test_weights_that_were_scaled_as_asked_lose_nothing(tmp_path):
+    weights = [(1.0, 0.0), (1.0, 0.0), (0.499, 0.499)]
+    take = weighted(weights, 5, 2, 3.0)
+    assert said(write(take, tmp_path, "gltf", "a.glb", skinning=Skinning(normalize=True))) == {}
+
+
+@pytest.mark.parametrize("peak", [13, 77])
+def test_programs_that_read_four_influences_are_told_of_the_worst_frame(tmp_path, peak):
+    """The weakest of five influences, 0.05, is cut; its joint jumps by 2 m."""
+    row = (0.3, 0.3, 0.2, 0.15, 0.05)
+    take = weighted([row, (1.0, 0, 0, 0, 0), (1.0, 0, 0, 0, 0)], 100, peak, 2.0)
+    notes = write(take, tmp_path, "gltf", "a.glb")
+    assert said(notes) == {}
+    (line,) = [note for note in notes if "JOINTS_0" in note]
+    assert line.startswith("up to 5 influences a vertex") and line.endswith("by up to 100 mm")
+    cut = write(take, tmp_path, "gltf", "b.glb", skinning=Skinning(max_influences=4))
+    assert said(cut) == {} and not [note for note in cut if "JOINTS_0" in note]
+
+
+def test_influences_that_never_matter_are_told_without_a_number(tmp_path):
+    take = weighted([(0.3, 0.3, 0.2, 0.15, 0.05)] * 3, 4, 1, 0.0)
+    notes = write(take, tmp_path, "gltf", "a.glb")
+    assert "up to 5 influences a vertex, all of them written, strongest first" in notes
+
+
+# Formats without a place for something
+
+
+def test_amass_and_easymocap_tell_what_they_leave_out(tmp_path):
+    """A knee that comes out of its joint by 0.25 m, with all below it, is not in the file."""
+    figure = family_figure("smpl", tmp_path)
+    knee = figure.skeleton.names.index("left_knee")
+    rotations = np.tile([0.0, 0, 0, 1], (40, 24, 1))
+    moved = np.zeros((40, 24, 3))
+    moved[17, knee] = [0.15, 0.2, 0.0]
+    clip = SampledClip("a", Timing(30.0, np.arange(40)), rotations, moved)
+    for kind, name in (("amass", "a.npz"), ("easymocap", "out")):
+        found = said(write(take_of(Actor(figure, clip=clip)), tmp_path, kind, name))
+        size, place = found["joints"]
+        assert size == pytest.approx(250, rel=TOLD) and place.endswith(", frame 17")
+        assert found["vertices"][0] <= 250 * (1 + TOLD)
+
+
+def test_anim_tells_of_the_mesh_too(tmp_path):
+    """A tip a metre long, turned by 1 radian where its limit is 0.5: 2 sin 0.25 away."""
+    rows = [(0, kind, 0.0) for kind in ("tx", "ty", "tz", "x", "y", "z")]
+    rows += [(1, "x", 0.0), (1, "y", 0.0), (1, "z", 0.0, -0.5, 0.5)]
+    offsets = np.array([[0.0] * 3, [0.0, 1.0, 0.0]])
+    skeleton = hand_made.skeleton([-1, 0], rows, None, offsets.tolist())
+    mesh = Mesh(np.array([[0.0, 0, 0], [0, 2, 0], [0, 1, 0]]), np.eye(3), np.array([[0, 1, 2]]))
+    skin = skin_from_lists([[(0, 1.0)], [(1, 1.0)], [(1, 1.0)]], translation_matrix(-offsets))
+    turns = np.zeros((3, 2, 4))
+    turns[..., 3] = 1.0
+    turns[1, 1] = [0.0, 0.0, np.sin(0.5), np.cos(0.5)]
+    clip = SampledClip("bend", Timing(10.0, np.arange(3)), turns)
+    take = take_of(Actor(Figure("arm", mesh, skeleton, skin, unit="m"), clip=clip))
+    notes = export_take(take, tmp_path / "a.anim", "anim", MotionOptions())
+    found = said([notes[1]])
+    assert found == {
+        "vertices": (pytest.approx(2000 * np.sin(0.25), rel=TOLD), "vertex 1, frame 1")
+    }
+
+
+# Nothing
+
+
+def test_nothing_is_said_where_nothing_is_lost(tmp_path):
+    figure = replace(family_figure("smpl", tmp_path), correctives=None)
+    take = family_take(figure, family_motion(24, frames=30))
+    for kind, name in (("bvh", "a.bvh"), ("gltf", "a.glb"), ("amass", "a.npz"), ("easymocap", "e")):
+        assert said(write(take, tmp_path, kind, name)) == {}
+    actor = viewer.load().actors[0]
+    still = tuple(Channel(d, np.zeros(0), np.zeros(0), ()) for d in range(len(actor.pose.dofs)))
+    actor.clip = Clip("still", still, 0.0, 1.0)
+    for kind, name in (("bvh", "f.bvh"), ("gltf", "f.glb"), ("anim", "f.anim")):
+        assert said(write(take_of(actor), tmp_path, kind, name)) == {}
+
+
+@pytest.mark.parametrize("suffix", ["glb", "gltf", "skel"])
+def test_bodies_at_rest_in_another_shape_lose_nothing(tmp_path, suffix):
+    """Correctives add nothing at rest, so nothing is off by 0 mm either."""
+    np.savez(tmp_path / "body.npz", **model("smplx"))
+    actor = viewer.load(tmp_path / "body.npz").actors[0]
+    actor.pose.shape_weights[:3] = 2.0, -1.0, 0.5
+    notes = export(actor, tmp_path / f"a.{suffix}")
+    assert said(notes) == {} and not [note for note in notes if " mm" in note]
+    assert any("pose correctives" in note for note in notes if note.startswith("not held by"))
+
+
+def test_correctives_count_in_the_worst_of_many_frames(tmp_path):
+    """More frames than are looked at at once, by all of them the slow way."""
+    figure = family_figure("smpl", tmp_path)
+    take = family_take(figure, family_motion(24, frames=150))
+    notes = write(take, tmp_path, "gltf", "a.glb")
+    off = []
+    for frame in range(150):
+        pose = pose_of(figure, take.frames, frame)
+        plain = deform(figure, pose, Skinning(correctives=False))[0]
+        off.append(np.linalg.norm(deform(figure, pose)[0] - plain, axis=1))
+    frame, vertex = np.unravel_index(np.argmax(off), np.shape(off))
+    size = pytest.approx(1000 * np.max(off), rel=TOLD)
+    assert said(notes) == {"vertices": (size, f"vertex {vertex}, frame {frame}")}
+
+
+# Between frames
+
+
+def spike(at: float) -> Take:
+    """Return the chain moved along x, by 3 m at one key and back, a frame a second."""
+    rows = [(0, kind, 0.0) for kind in ("tx", "ty", "tz", "x", "y", "z")]
+    skeleton = hand_made.skeleton([-1], rows, None, [[0.0] * 3])
+    mesh = Mesh(np.eye(3), np.eye(3), np.array([[0, 1, 2]]))
+    skin = skin_from_lists([[(0, 1.0)]] * 3, np.eye(4)[None])
+    times, values = np.array([0.0, at, 4.0]), np.array([0.0, 3.0, 0.0])
+    moves = Channel(0, times, values, (("linear", "linear"),) * 3)
+    still = [Channel(dof, np.zeros(0), np.zeros(0), ()) for dof in range(1, 6)]
+    figure = Figure("point", mesh, skeleton, skin, unit="m")
+    return take_of(Actor(figure, clip=Clip("spike", (moves, *still), 0.0, 4.0)), rate=1.0)
+
+
+@pytest.mark.parametrize("at", [1.25, 2.5])
+def test_a_peak_between_frames_is_told(tmp_path, at):
+    """Frames on both sides of the peak lie on its flanks; straight between them is lower."""
+    take = spike(at)
+    before, after = np.floor(at), np.ceil(at)
+    ends = 3.0 * before / at, 3.0 * (4.0 - after) / (4.0 - at)
+    low = ends[0] + (at - before) * (ends[1] - ends[0])
+    size = pytest.approx(1000 * (3.0 - low), rel=TOLD)
+    for kind, name in (("bvh", "a.bvh"), ("gltf", "a.glb")):
+        notes = write(take, tmp_path, kind, name)
+        (line,) = [note for note in notes if " differ from " in note]
+        assert line.endswith(": 1 a second are written") and " between frames by " in line
+        found = said([line])
+        assert found["joints"][0] == size and found["vertices"][0] == size
+
+
+def test_captures_at_another_rate_tell_what_is_left_out(tmp_path):
+    """Every second frame is written; the one between stands 2 m aside."""
+    moves = np.zeros((7, 3))
+    moves[3, 0] = 2.0
+    figure = chain_take().figure
+    turns = np.tile([0.0, 0, 0, 1], (7, 3, 1))
+    clip = SampledClip("jump", Timing(20.0, np.arange(7)), turns, figure_translations=moves)
+    for kind, name in (("bvh", "a.bvh"), ("gltf", "a.glb")):
+        for rate, size in ((10.0, 2000.0), (20.0, None)):
+            found = said(write(take_of(Actor(figure, clip=clip), rate), tmp_path, kind, name))
+            assert found.get("joints", (None,))[0] == (size and pytest.approx(size, rel=TOLD))
+
+
+def test_motions_that_hang_are_compared_as_they_are_written(tmp_path):
+    """Turned over, a capture at another rate still differs by what it leaves out alone."""
+    moves = np.zeros((7, 3))
+    moves[:, 1] = np.arange(7)
+    moves[3, 0] = 2.0
+    figure = chain_take().figure
+    turns = np.tile([1.0, 0, 0, 0], (7, 3, 1))
+    turns[:, 1:] = [0.0, 0.0, 0.0, 1.0]
+    clip = SampledClip("hang", Timing(20.0, np.arange(7)), turns, figure_translations=moves)
+    actor = Actor(figure, clip=clip, placement=np.diag([1.0, -1.0, -1.0, 1.0]))
+    take, _ = upright_take(Scene([actor], world_up="y"), actor, 10.0)
+    assert take.is_turned
+    found = said(write(take, tmp_path, "bvh", "a.bvh"))
+    assert found["joints"][0] == pytest.approx(2000.0, rel=TOLD)

@@ -1,0 +1,265 @@
+"""How far a figure as it moves here and what was written of it are apart, and how that is told."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.errors import printable
+from viewer.export._bounds import Bounds
+from viewer.export._estimates import Estimator
+from viewer.export._skinned import Body, Poses, Rows, Side, body_rows, poses_of, vertices
+from viewer.rig.arrays import Floats
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import bounding_box, box_size
+from viewer.rig.motion import Frames, frames_between, world_frames
+from viewer.rig.scalars import length_text
+from viewer.rig.skeleton import joint_label
+
+__all__ = ["Apart", "Farthest", "apart", "apart_lines", "negligible", "shared_extent"]
+
+_BLOCK = 1024  # poses at a time, so that matrices of all frames never exist at once
+_CHUNK = 128  # poses looked at at once
+_LIKELY = 4  # of these, poses whose farthest vertex is measured before all others
+_SMALL = 0.05  # of what rest meshes are apart: joints that add less need not be skinned
+_MOST = 512  # poses compared one by one where vertices are not blended linearly
+_ROUNDING = 2e-6  # of the size: single precision through a chain of joints
+_EPSILON = 2.0**-22  # of a coordinate: two steps of single precision
+_SIZED = 256  # frames whose joints say how far from the origin a motion is
+_FAR = 5.0  # times the rounding; what is farther away than that is told
+
+
+@dataclass(frozen=True, slots=True)
+class Farthest:
+    """The largest distance, and of which joint or vertex in which frame."""
+
+    distance: float
+    index: int
+    frame: int
+
+
+@dataclass(frozen=True, slots=True)
+class Apart:
+    """What is farther apart than rounding.
+
+    Attributes
+    ----------
+    joints, vertices : Farthest or None
+        The largest of all; None where nothing is lost, or there are none.
+    looked : int
+        Frames whose vertices were compared; less than all where that would take too long.
+    frames : int
+        All there are.
+    """
+
+    joints: Farthest | None
+    vertices: Farthest | None
+    looked: int
+    frames: int
+
+
+def negligible(figure: Figure, frames: Frames, rows: Rows) -> float:
+    """Return the distance, in figure units, that single precision may cost without a word.
+
+    Parameters
+    ----------
+    figure : Figure
+        Gives the size.
+    frames : Frames
+        Say how far from the origin its joints are. Numbers are coarser there, but not without
+        limit: what costs five times as much as usual is told.
+    rows : (F,)
+        Which of them count.
+    """
+    size, reach = 0.0, 0.0
+    if figure.mesh is not None and figure.mesh.n_vertices:
+        size = box_size(bounding_box(figure.mesh.positions))
+    elif figure.skeleton is not None:
+        size = float(np.linalg.norm(figure.skeleton.rest_translations, axis=1).sum())
+    if figure.skeleton is not None:
+        some = frames_between(frames, rows[:: max(1, len(rows) // _SIZED)])
+        reach = float(np.abs(world_frames(figure, some)[..., :3, 3]).max(initial=0.0))
+    return min(_FAR * _ROUNDING * size, max(_ROUNDING * size, _EPSILON * reach))
+
+
+def apart(first: Side, second: Side, rows: Rows, least: float, frames: Rows | None = None) -> Apart:
+    """Return the largest distances of joints and vertices over poses of two sides.
+
+    What cannot hold the farthest vertex is passed over, so that the result is exact, in double
+    precision, although few vertices are skinned so.
+
+    Parameters
+    ----------
+    first, second : Side
+        With the same joints and vertices, in the same space.
+    rows : (F,)
+        The first's frames.
+    least : float
+        Smaller distances count as none.
+    frames : (F,), optional
+        The second's frames; the same if omitted.
+    """
+    others = rows if frames is None else frames
+    if first.exact is not None or second.exact is not None:
+        return _apart_one_by_one(first, second, rows, others, least)
+    joints, search = Farthest(least, -1, -1), None
+    if first.body is not None and second.body is not None:
+        search = _Search(first.body, second.body, least)
+    for start in range(0, len(rows), _BLOCK):
+        part = rows[start : start + _BLOCK]
+        one, other = first.poses(part), second.poses(others[start : start + _BLOCK])
+        joints = _farther(joints, np.linalg.norm(one.places - other.places, axis=2), part)
+        if search is not None:
+            search.look(one, other, part)
+    worst = None if search is None else _told(search.worst)
+    return Apart(_told(joints), worst, len(rows), len(rows))
+
+
+def _farther(known: Farthest, off: NDArray[np.floating], frames: Rows) -> Farthest:
+    """Return what is farthest, known already or among the rows (F, N) of some frames."""
+    if off.size == 0 or not off.max() > known.distance:
+        return known
+    row, index = np.unravel_index(int(off.argmax()), off.shape)
+    return Farthest(float(off[row, index]), int(index), int(frames[row]))
+
+
+def _told(found: Farthest) -> Farthest | None:
+    return found if found.index >= 0 else None
+
+
+class _Search:
+    """Looks for the farthest vertex, with the least work that leaves no doubt.
+
+    Bounds say which poses may hold it, single precision which of their vertices.
+    """
+
+    def __init__(self, first: Body, second: Body, least: float) -> None:
+        self.worst = Farthest(least, -1, -1)
+        self._bodies = first, second
+        self._bounds = Bounds(first, second)
+        self._estimator: Estimator | None = None
+
+    def look(self, first: Poses, second: Poses, frames: Rows) -> None:
+        """Look at poses of both; ``frames`` is what they are called."""
+        bounds = self._bounds.of(first, second)
+        order = np.argsort(-bounds, kind="stable")
+        for start in range(0, len(order), _CHUNK):
+            rows = order[start : start + _CHUNK]
+            rows = rows[bounds[rows] > self.worst.distance]
+            if len(rows) == 0:
+                return
+            self._estimate(poses_of(first, rows), poses_of(second, rows), frames[rows])
+
+    def _estimate(self, first: Poses, second: Poses, frames: Rows) -> None:
+        """Look at some poses: first where vertices may be farthest of all, then at who is left."""
+        most = self._most(first, second)
+        likely = np.argsort(-most.max(axis=1), kind="stable")[:_LIKELY]
+        self._measure(first, second, frames, likely, np.unique(most[likely].argmax(axis=1)))
+        hopeful = most > self.worst.distance
+        rows, chosen = (np.flatnonzero(hopeful.any(axis=axis)) for axis in (1, 0))
+        if len(rows):
+            self._measure(first, second, frames, rows, chosen)
+
+    def _most(self, first: Poses, second: Poses) -> NDArray[np.float32]:
+        """Return how far vertices may be apart: (F, V)."""
+        if self._estimator is None:
+            self._estimator = Estimator(*self._bodies)
+        by_joints = self._bounds.by_joints(first, second)
+        most = self._estimator.of_rest(first, second)
+        if by_joints.max() > _SMALL * float(most.max(initial=0.0)):
+            return self._estimator.of_skinned(first, second)
+        bound = self._bounds.stretches(first)[:, None] * most + by_joints[:, None]
+        return np.asarray(bound, dtype=np.float32)
+
+    def _measure(self, first: Poses, second: Poses, frames: Rows, rows: Rows, chosen: Rows) -> None:
+        """Measure some vertices of some poses in double precision."""
+        moved = [
+            vertices(body_rows(body, chosen.astype(np.int32)), poses_of(poses, rows))
+            for body, poses in zip(self._bodies, (first, second), strict=True)
+        ]
+        off = np.linalg.norm(moved[0] - moved[1], axis=2)
+        worst = _farther(self.worst, off, frames[rows])
+        if worst is not self.worst:
+            self.worst = replace(worst, index=int(chosen[worst.index]))
+
+
+def _apart_one_by_one(first: Side, second: Side, rows: Rows, others: Rows, least: float) -> Apart:
+    """Compare sides of which one is not blended linearly, so that no bound is known."""
+    count = min(len(rows), _MOST)
+    chosen = np.linspace(0, len(rows) - 1, count).round().astype(int)
+    plain = [replace(side, body=None, exact=None) for side in (first, second)]
+    joints = apart(plain[0], plain[1], rows, least, others).joints
+    worst = Farthest(least, -1, -1)
+    for row, other in zip(rows[chosen].tolist(), others[chosen].tolist(), strict=True):
+        off = np.linalg.norm(_vertices(first, row) - _vertices(second, other), axis=1)
+        worst = _farther(worst, off[None], np.array([row]))
+    return Apart(joints, _told(worst), count, len(rows))
+
+
+def _vertices(side: Side, row: int) -> Floats:
+    if side.exact is not None:
+        return side.exact(row)
+    assert side.body is not None  # only meshes are compared so
+    poses = side.poses(np.array([row]))
+    return vertices(side.body, poses)[0]
+
+
+def shared_extent(found: Apart) -> str:
+    """Return how many frames were looked at, in words, if these are not all of them."""
+    if found.looked == found.frames:
+        return ""
+    return f" (vertices compared in {found.looked} of {found.frames} frames)"
+
+
+def apart_lines(
+    path: Path,
+    figure: Figure,
+    found: Apart,
+    first_frame: int | None,
+    sources: Sequence[int] | NDArray[np.integer] | None = None,
+    meshes: str = "vertices",
+    versus: str = "",
+) -> list[str]:
+    """Return a line that says by how much a file differs, or none if it does not.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    figure : Figure
+        As it is here.
+    found : Apart
+        What was measured.
+    first_frame : int or None
+        What the first frame is called; None for a single pose.
+    sources : (V,), optional
+        The figure's vertex for each that was compared.
+    meshes : str
+        Whose vertices these are, in words.
+    versus : str
+        What the file differs from; the motion or pose if empty.
+    """
+
+    def place(far: Farthest, label: str) -> str:
+        frame = "" if first_frame is None else f", frame {first_frame + far.frame}"
+        return f"up to {length_text(figure, far.distance)} ({label}{frame})"
+
+    parts = []
+    if found.joints is not None and figure.skeleton is not None:
+        name = printable(joint_label(figure.skeleton, found.joints.index), 60)
+        parts.append(("joints", place(found.joints, name)))
+    if found.vertices is not None:
+        index = found.vertices.index
+        vertex = index if sources is None else int(sources[index])
+        parts.append((meshes, place(found.vertices, f"vertex {vertex}")))
+    if not parts:
+        return []
+    versus = versus or ("the pose" if first_frame is None else "the motion")
+    (what, amount), *rest = parts
+    more = "".join(f"; {each} by {text}" for each, text in rest)
+    extent = shared_extent(found)
+    return [f"{printable(path, 300)}: {what} differ from {versus} by {amount}{more}{extent}"]

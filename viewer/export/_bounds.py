@@ -1,0 +1,161 @@
+"""Upper bounds of how far apart two bodies' vertices are, a number a pose at a small price.
+
+With palettes M and N, rest meshes a and b, weights v and w, T = max sum_j |v_j|::
+
+    |sum v_j M_j a - sum w_j N_j b| <= T max_j |(M_j - N_j) b| + T max_j |M_j| max |a - b|
+                                     + max_v sum_j |v_j - w_j| max_j |N_j b|
+
+A joint's vertices are taken as a sphere, so that a pose costs a few numbers a joint. Poses whose
+bound is below rounding, or below what was found elsewhere, need not be skinned.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.export._skinned import Body, Poses
+from viewer.rig.arrays import Floats
+from viewer.rig.skin import Skin, merged, owners, skin_from_entries
+
+__all__ = ["Bounds"]
+
+_NUMBERS = 9  # of a joint's rotation, which drive the correctives
+
+
+class Bounds:
+    """Of two bodies with the same vertices and joints.
+
+    Parameters
+    ----------
+    first, second : Body
+        Correctives are those of the first, or none.
+    """
+
+    def __init__(self, first: Body, second: Body) -> None:
+        same = first.skin is second.skin
+        both = first.skin if same else _joined(first.skin, second.skin, 1.0)
+        self._centers, self._radii = _spheres(second, both)
+        self._most = float(_sums(first.skin).max(initial=0.0))
+        self._change = 0.0
+        if not same:
+            self._change = float(_sums(_joined(first.skin, second.skin, -1.0)).max(initial=0.0))
+        off = np.linalg.norm(first.positions - second.positions, axis=1)
+        self._apart = float(off.max(initial=0.0))
+        self._shapes, self._other_shapes = first.shapes, second.shapes
+        self._lengths = _lengths(first.shapes)
+        self._strayed = np.zeros(0)
+        if first.shapes is not None and second.shapes is not None:
+            self._strayed = _lengths(first.shapes - second.shapes)
+        self._stretches = _stretches(first.correctives)
+
+    def of(self, first: Poses, second: Poses) -> Floats:
+        """Return a number for each pose that the distance of no vertex exceeds: (F,)."""
+        rest = self.stretches(first) * self._rest(first, second)
+        return self.by_joints(first, second) + rest
+
+    def stretches(self, first: Poses) -> Floats:
+        """Return by how much |a - b| may grow when it is skinned: (F,)."""
+        return self._most * _largest_stretch(first.palette)
+
+    def by_joints(self, first: Poses, second: Poses) -> Floats:
+        """Return the part of a bound that comes of joints and weights: (F,)."""
+        shift = first.shifts - second.shifts
+        other = second.palette.copy()
+        other[..., :3, 3] -= shift[:, None]
+        reach = self._radii + self._moved(second)[:, None]
+        found = self._most * self._farthest(first.palette - other, reach)
+        if self._change > 0.0:
+            far = self._farthest(other, reach) + np.linalg.norm(shift, axis=1)
+            found += self._change * far
+        return found
+
+    def _farthest(self, palette: Floats, reach: Floats) -> Floats:
+        """Return how far matrices carry any of their joints' vertices: (F,)."""
+        at_center = np.einsum("fjab,jb->fja", palette[..., :3, :3], self._centers)
+        at_center += palette[..., :3, 3]
+        sizes = np.linalg.norm(palette[..., :3, :3], axis=(2, 3))
+        far = np.linalg.norm(at_center, axis=2) + sizes * reach
+        return np.asarray(far.max(axis=1))
+
+    def _moved(self, poses: Poses) -> Floats:
+        """Return how far vertices of the second may be from its rest mesh: (F,)."""
+        far = np.zeros(len(poses.palette))
+        if self._other_shapes is not None:
+            far = far + np.abs(poses.weights) @ _lengths(self._other_shapes)
+        if poses.turns.shape[1]:
+            far = far + _norms(poses.turns) @ self._stretches
+        return far
+
+    def _rest(self, first: Poses, second: Poses) -> Floats:
+        """Return the bound of |a - b|: (F,)."""
+        found = np.full(len(first.palette), self._apart)
+        if self._shapes is not None:
+            both = self._other_shapes is not None
+            change = first.weights - second.weights if both else first.weights
+            found = found + np.abs(change) @ self._lengths
+            if both:
+                found = found + np.abs(second.weights) @ self._strayed
+        if first.turns.shape[1]:
+            turns = first.turns - second.turns if second.turns.shape[1] else first.turns
+            found = found + _norms(turns) @ self._stretches
+        return found
+
+
+def _spheres(body: Body, skin: Skin) -> tuple[Floats, Floats]:
+    """Return a sphere around the vertices of each joint: centres (J, 3) and radii (J,)."""
+    order = np.argsort(skin.joints, kind="stable")
+    joints, points = skin.joints[order], body.positions[owners(skin)[order]]
+    found, starts = np.unique(joints, return_index=True)
+    centers, radii = np.zeros((skin.n_joints, 3)), np.zeros(skin.n_joints)
+    if len(found):
+        low, high = np.minimum.reduceat(points, starts), np.maximum.reduceat(points, starts)
+        centers[found] = 0.5 * (low + high)
+        off = np.linalg.norm(points - centers[joints], axis=1)
+        radii[found] = np.maximum.reduceat(off, starts)
+    return centers, radii
+
+
+def _joined(first: Skin, second: Skin, factor: float) -> Skin:
+    """Return the first's weights plus so many times the second's."""
+    return merged(
+        skin_from_entries(
+            first.n_vertices,
+            np.concatenate([owners(first), owners(second)]),
+            np.concatenate([first.joints, second.joints]),
+            np.concatenate([first.weights, factor * second.weights]),
+            first.inverse_bind,
+        )
+    )
+
+
+def _sums(skin: Skin) -> Floats:
+    """Return each vertex's sum of the amounts of its weights: (V,)."""
+    return np.bincount(owners(skin), np.abs(skin.weights), skin.n_vertices).astype(np.float64)
+
+
+def _lengths(directions: Floats | None) -> Floats:
+    """Return how far each direction moves any vertex: (S,)."""
+    if directions is None:
+        return np.zeros(0)
+    return np.sqrt(np.einsum("sva,sva->sv", directions, directions).max(axis=1, initial=0.0))
+
+
+def _norms(turns: Floats) -> Floats:
+    """Return the length of each joint's nine numbers: (F, J)."""
+    return np.asarray(np.linalg.norm(turns.reshape(len(turns), -1, _NUMBERS), axis=2))
+
+
+def _stretches(correctives: Floats | None) -> Floats:
+    """Return how far nine numbers of length 1 move any vertex at most: (J,), from above."""
+    if correctives is None:
+        return np.zeros(0)
+    squares = np.einsum("pva,pva->pv", correctives, correctives)
+    of_joints = squares.reshape(len(squares) // _NUMBERS, _NUMBERS, -1).sum(axis=1)
+    return np.sqrt(of_joints.max(axis=1, initial=0.0))
+
+
+def _largest_stretch(palette: Floats) -> Floats:
+    """Return the most that any joint's matrix stretches lengths: (F,), exact where it rotates."""
+    linear = palette[..., :3, :3]
+    squares = np.swapaxes(linear, -1, -2) @ linear
+    return np.asarray(np.sqrt(np.abs(squares).sum(axis=-1).max(axis=(1, 2))))

@@ -1,0 +1,128 @@
+"""A ``.bvh`` file that was written, read back as poses of the figure it was made from.
+
+With D the product of a file's rotations down to a joint, p its place there, and x, e, s as in
+``_bvh_body``, a joint that rests with the matrix P is at::
+
+    linear part  s x^-1 D e P        place  x^-1 p / factor
+
+A file has no mesh. Its vertices are those of the figure's own skin, in the shape that the file's
+bones have, blended linearly and corrected by the file's rotations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.export._bvh_body import Space, rest_matrices
+from viewer.export._skinned import Poses, Side, anchored, figure_side
+from viewer.formats import Source, bvh
+from viewer.rig.arrays import Floats
+from viewer.rig.figure import Figure
+from viewer.rig.motion import Frames, frames_between, frames_of, rest_translations_of, world_frames
+from viewer.rig.shape import joint_directions
+from viewer.rig.skinning import Skinning
+
+__all__ = ["BvhFile", "read_back"]
+
+Rows = NDArray[np.intp]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BvhFile:
+    """A file as it was written.
+
+    Attributes
+    ----------
+    path : Path
+        For messages of the reader.
+    text : bytes
+        What is in it.
+    names : sequence of J str
+        What the figure's joints are called in it.
+    space : Space
+        From the figure to the file.
+    reference : int
+        The figure's frame whose shape and scale the file's bones have.
+    ahead : int
+        Index in the file of the figure's first frame; below 0 if the file begins later.
+    """
+
+    path: Path
+    text: bytes
+    names: Sequence[str]
+    space: Space
+    reference: int
+    ahead: int
+
+
+def read_back(file: BvhFile, figure: Figure, frames: Frames, how: Skinning) -> Side:
+    """Return what a file says of a figure.
+
+    Parameters
+    ----------
+    file : BvhFile
+        What was written.
+    figure : Figure
+        Unshaped, as it moves here.
+    frames : Frames
+        What was to be written. It gives the place of the whole figure, which comes after skinning
+        and is not weighted.
+    how : Skinning
+        Whether pose correctives count.
+    """
+    space = file.space
+    motion = bvh.read(Source(file.path, file.text))
+    skeleton, clip = motion.figure.skeleton, motion.clip
+    assert skeleton is not None and figure.skeleton is not None  # the reader gives one
+    order = [skeleton.names.index(name) for name in file.names]
+    weights = frames.shape_weights
+    still = weights[min(file.reference, len(weights) - 1)]
+    scale = float(frames.figure_scales[file.reference])
+    rest = rest_matrices(figure, rest_translations_of(figure, still[None])[0])[:, :3, :3]
+    own = space.rest @ rest * scale
+    held = replace(frames, shape_weights=still[None])
+    body = figure_side(figure, held, replace(how, method="lbs"), still).body
+    bound = _bound(figure, still)
+
+    def poses(rows: Rows) -> Poses:
+        times = (rows + file.ahead) / clip.timing.frame_rate
+        found = world_frames(motion.figure, frames_of(motion.figure, clip, times))[:, order]
+        world = np.zeros(found.shape)
+        world[..., 3, 3] = 1.0
+        world[..., :3, :3] = space.world.T @ found[..., :3, :3] @ own
+        world[..., :3, 3] = found[..., :3, 3] @ space.world / space.factor
+        places = world[..., :3, 3].copy()
+        shifts = frames_between(frames, rows).figure_translations
+        world[..., :3, 3] -= shifts[:, None]
+        turns = np.zeros((len(rows), 0))
+        if body is not None and body.correctives is not None:
+            turns = _turns(figure, world / scale)
+        palette = anchored(world @ bound, np.full(len(rows), scale))
+        return Poses(places, palette, shifts, np.zeros((1, 0)), turns)
+
+    return Side(body, poses)
+
+
+def _bound(figure: Figure, weights: Floats) -> Floats:
+    """Return the inverse bind matrices of a shape; identities without a skin."""
+    assert figure.skeleton is not None  # the caller looked
+    if figure.skin is None or not figure.is_attached:
+        return np.tile(np.eye(4), (figure.skeleton.n_joints, 1, 1))
+    bound = figure.skin.inverse_bind.copy()
+    moved = np.einsum("s,sjc->jc", weights, joint_directions(figure))
+    bound[:, :3, 3] -= np.einsum("jab,jb->ja", bound[:, :3, :3], moved)
+    return bound
+
+
+def _turns(figure: Figure, world: Floats) -> Floats:
+    """Return what drives the correctives: R - I of every joint within its parent, (F, P)."""
+    assert figure.skeleton is not None  # the caller looked
+    turned = world[:, 1:, :3, :3]
+    above = world[:, figure.skeleton.parents[1:], :3, :3]
+    local = np.swapaxes(above, -1, -2) @ turned - np.eye(3)
+    return local.reshape(len(world), -1)

@@ -1,0 +1,93 @@
+"""Motions of the SMPL family that were written, read back as poses of the figure they came from."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from viewer.export._family_frames import up_axis
+from viewer.export._options import MotionOptions
+from viewer.rig.arrays import Floats
+from viewer.rig.body_motion import BodyMotion, body_clip
+from viewer.rig.motion import Frames, frames_of, rest_translations_of
+from viewer.rig.quaternion import multiply, rotation_vector_to_quaternion
+from viewer.rig.rotation import rotation_vector_to_matrix
+from viewer.rig.smpl_family import Member
+from viewer.rig.take import Take
+from viewer.rig.timing import Timing
+from viewer.rig.units import METRES
+
+__all__ = ["Records", "read_frames"]
+
+
+def read_frames(motion: BodyMotion, take: Take, options: MotionOptions) -> Frames:
+    """Return the poses of a take's figure that a file holds, in the take's own world and unit.
+
+    Parameters
+    ----------
+    motion : BodyMotion
+        What was read, metres.
+    take : Take
+        What was written.
+    options : MotionOptions
+        Which axis is up in the take, and in the file.
+    """
+    figure, count = take.figure, motion.timing.n_frames
+    timing = Timing(motion.timing.frame_rate, np.arange(count, dtype=np.int32))
+    moved = motion.translations / METRES[figure.unit]
+    clip, _ = body_clip(replace(motion, timing=timing, translations=moved), figure)
+    found = frames_of(figure, clip, np.arange(count) / timing.frame_rate)
+    if up_axis(options) == options.world_up:
+        return found
+    angle = -np.pi / 2 if up_axis(options) == "z" else np.pi / 2
+    return _turned(found, take, np.array([angle, 0.0, 0.0]))
+
+
+def _turned(frames: Frames, take: Take, vector: Floats) -> Frames:
+    """Return frames with the world turned: R' = Q R, T' = Q (p + T) - p, the root at rest at p."""
+    rotations = frames.rotations.copy()
+    rotations[:, 0] = multiply(rotation_vector_to_quaternion(vector), rotations[:, 0])
+    root = rest_translations_of(take.figure, frames.shape_weights)[:, 0]
+    turned = np.round(rotation_vector_to_matrix(vector))  # a quarter turn has no fractions
+    places = (root + frames.figure_translations) @ turned.T - root
+    return replace(frames, rotations=rotations, figure_translations=places)
+
+
+class Records:
+    """The records of one person in EasyMocap's frames, taken from their text.
+
+    Parameters
+    ----------
+    member : Member
+        Whose joints they turn.
+    """
+
+    def __init__(self, member: Member) -> None:
+        self._member = member
+        self._rows: list[dict[str, Any]] = []
+
+    def motion(self, rate: float) -> BodyMotion:
+        """Return all frames that were added."""
+        turned = self._array("poses").reshape(len(self._rows), -1, 3)
+        turned[:, 0] = self._array("Rh")
+        has_expression = "expression" in self._rows[0]
+        return BodyMotion(
+            "again",
+            Timing(rate, np.arange(len(self._rows), dtype=np.int32)),
+            self._member.names,
+            turned,
+            self._array("Th"),
+            about_origin=True,
+            shape=self._array("shapes"),
+            expression=self._array("expression") if has_expression else None,
+        )
+
+    def add(self, text: str) -> None:
+        """Add the record of one more frame."""
+        self._rows.append(json.loads(text))
+
+    def _array(self, key: str) -> Floats:
+        return np.array([record[key][0] for record in self._rows], dtype=np.float64)

@@ -1,0 +1,90 @@
+"""What is said of a motion that was read back: by how much it differs, of joints and vertices."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from viewer.export._apart import apart, apart_lines, negligible
+from viewer.export._skinned import Side, changing, figure_side
+from viewer.rig.arrays import Floats
+from viewer.rig.motion import Frames
+from viewer.rig.skinning import Skinning
+from viewer.rig.take import Take
+
+__all__ = ["driven_losses", "frames_losses", "shape_changes"]
+
+
+def shape_changes(frames: Frames) -> bool:
+    """Return whether the shape of a figure changes over the frames that are present."""
+    weights = frames.shape_weights
+    weights = weights if len(weights) == 1 else weights[frames.present]
+    return bool(np.ptp(weights, axis=0).any())
+
+
+def driven_losses(
+    path: Path, take: Take, written: Side, how: Skinning, span: tuple[int, int], shape: Floats
+) -> list[str]:
+    """Return a line with the largest differences of a file without a mesh, or none.
+
+    Parameters
+    ----------
+    path : Path
+        What was written.
+    take : Take
+        What was to be written; frames that are missing are not compared.
+    written : Side
+        What the file says, by the take's frames.
+    how : Skinning
+        What moves the mesh here; blended linearly.
+    span : (int, int)
+        The frames that are in the file: the first, and the one behind the last.
+    shape : (S,)
+        Weights of the shape that the file's skeleton has.
+    """
+    rows = span[0] + np.flatnonzero(take.frames.present[slice(*span)])
+    meant = figure_side(take.figure, take.frames, replace(how, method="lbs"), shape)
+    found = apart(meant, written, rows, negligible(take.figure, take.frames, rows))
+    meshes = "vertices of a skin driven by it"
+    return apart_lines(path, take.figure, found, take.first_frame, meshes=meshes)
+
+
+def frames_losses(
+    path: Path,
+    take: Take,
+    written: Frames,
+    how: Skinning,
+    span: tuple[int, int] | None = None,
+    places: str = "",
+) -> list[str]:
+    """Return a line with the largest differences of poses that were read back, or none.
+
+    Parameters
+    ----------
+    path : Path
+        What was written.
+    take : Take
+        What was to be written; frames that are missing are not compared.
+    written : Frames
+        What the file says: poses of the take's figure, as many as the span has.
+    how : Skinning
+        What moves the mesh; blended linearly, by the motion here and the one that was read alike.
+    span : (int, int), optional
+        The frames that are in the file: the first, and the one behind the last; all if omitted.
+    places : str
+        Where these poses are, in words, if not on the frames.
+    """
+    figure, frames = take.figure, take.frames
+    first, stop = (0, frames.n_frames) if span is None else span
+    rows = first + np.flatnonzero(frames.present[first:stop])
+    still = written.shape_weights[0]
+    columns = np.union1d(changing(frames, still), changing(written, still))
+    linear = replace(how, method="lbs")
+    meant = figure_side(figure, frames, linear, still, columns)
+    found_side = figure_side(figure, written, linear, still, columns)
+    least = negligible(figure, frames, rows)
+    found = apart(meant, found_side, rows, least, rows - first)
+    versus = f"the motion {places}" if places else ""
+    return apart_lines(path, figure, found, None if places else take.first_frame, versus=versus)

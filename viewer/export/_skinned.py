@@ -1,0 +1,254 @@
+"""Bodies in many poses as plain arrays: joints, skinning matrices, changes of the rest mesh.
+
+With a palette M, a rest mesh v, changes of shape d and pose correctives p::
+
+    v'_f = sum_j w_j M_fj [v + sum_s b_fs d_s + sum_p c_fp d_p, 1] + t_f
+
+All of it is float64, whether it comes from a figure here or from a file that was read back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.figure import Figure
+from viewer.rig.motion import Frames, frames_between, pose_of, world_frames
+from viewer.rig.rotation import quaternion_to_matrix
+from viewer.rig.shape import joint_directions
+from viewer.rig.skin import Skin, has_influence, owners, skin_from_entries, skin_rows
+from viewer.rig.skinning import Skinning, deform, skin_used
+from viewer.rig.skinning.lbs import move
+
+__all__ = [
+    "Body",
+    "Poses",
+    "Rows",
+    "Side",
+    "anchored",
+    "body_rows",
+    "changing",
+    "figure_side",
+    "poses_of",
+    "vertices",
+]
+
+Rows = NDArray[np.intp]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Body:
+    """What is the same in all poses.
+
+    Attributes
+    ----------
+    positions : (V, 3)
+        The rest mesh in the shape of reference.
+    skin : Skin
+        Every vertex has an influence; the last joint is the figure as a whole.
+    shapes : (S, V, 3) or None
+        Directions in which the rest mesh changes over time.
+    correctives : (P, V, 3) or None
+        Pose correctives.
+    """
+
+    positions: Floats
+    skin: Skin
+    shapes: Floats | None = None
+    correctives: Floats | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Poses:
+    """What changes, F poses.
+
+    Attributes
+    ----------
+    places : (F, J, 3)
+        Joints.
+    palette : (F, J + 1, 4, 4)
+        Skinning matrices, that of the figure as a whole last.
+    shifts : (F, 3)
+        Added to the vertices afterwards, whatever their weights add up to.
+    weights : (F, S) or (1, S)
+        Of the shapes, less those of reference.
+    turns : (F, P)
+        Of the correctives; no columns where there are none.
+    """
+
+    places: Floats
+    palette: Floats
+    shifts: Floats
+    weights: Floats
+    turns: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Side:
+    """One of two things that are compared.
+
+    Attributes
+    ----------
+    body : Body or None
+        None without a mesh.
+    poses : callable
+        From indices of frames.
+    exact : callable or None
+        From the index of one frame to its vertices (V, 3), where they are not blended linearly.
+    """
+
+    body: Body | None
+    poses: Callable[[Rows], Poses]
+    exact: Callable[[int], Floats] | None = None
+
+
+def figure_side(
+    figure: Figure,
+    frames: Frames,
+    how: Skinning,
+    reference: Floats,
+    columns: Rows | None = None,
+) -> Side:
+    """Return a figure as it moves here.
+
+    Parameters
+    ----------
+    figure : Figure
+        Unshaped.
+    frames : Frames
+        Its poses.
+    how : Skinning
+        What moves the mesh.
+    reference : (S,)
+        Weights of the shape that changes count from.
+    columns : (M,), optional
+        The blend shapes that change; those that do in these frames if omitted.
+    """
+    chosen = changing(frames, reference) if columns is None else columns
+    body = None if figure.mesh is None else _body(figure, how, reference, chosen)
+    corrects = body is not None and body.correctives is not None
+
+    def poses(rows: Rows) -> Poses:
+        part = frames_between(frames, rows)
+        shifts = part.figure_translations
+        world = np.zeros((len(rows), 0, 4, 4))
+        if figure.skeleton is not None:
+            world = world_frames(figure, replace(part, figure_translations=np.zeros_like(shifts)))
+        weights = part.shape_weights[:, chosen] - reference[chosen]
+        turns = np.zeros((len(rows), 0))
+        if corrects:
+            turned = quaternion_to_matrix(part.rotations[:, 1:]) - np.eye(3)
+            turns = turned.reshape(len(rows), -1)
+        palette = anchored(_skinning(figure, part, world), part.figure_scales)
+        return Poses(world[..., :3, 3] + shifts[:, None], palette, shifts, weights, turns)
+
+    def exact(row: int) -> Floats:
+        return deform(figure, pose_of(figure, frames, row), how)[0]
+
+    is_linear = how.method == "lbs" or not figure.is_attached
+    return Side(body, poses, None if is_linear or body is None else exact)
+
+
+def changing(frames: Frames, still: Floats) -> Rows:
+    """Return which blend shapes ever have another weight than in the shape of reference."""
+    return np.flatnonzero((frames.shape_weights != still).any(axis=0))
+
+
+def anchored(palette: Floats, scales: Floats) -> Floats:
+    """Return skinning matrices (F, J, 4, 4) and, last, that of the figure as a whole."""
+    whole = np.zeros((len(palette), 1, 4, 4))
+    whole[:, 0, [0, 1, 2], [0, 1, 2]] = scales[:, None]
+    whole[..., 3, 3] = 1.0
+    return np.concatenate([palette, whole], axis=1)
+
+
+def _body(figure: Figure, how: Skinning, still: Floats, columns: Rows) -> Body:
+    mesh, shapes = figure.mesh, figure.blend_shapes
+    assert mesh is not None  # the caller looked
+    n_joints = 0 if figure.skeleton is None else figure.skeleton.n_joints
+    positions = mesh.positions
+    if shapes is not None and still.any():
+        positions = positions + shapes.displacement(still)
+    directions = None
+    if shapes is not None and len(columns):
+        directions = shapes.direction_values()[columns]
+    correctives = None
+    if figure.correctives is not None and how.correctives and figure.is_attached:
+        correctives = figure.correctives.values()
+    skin = None if figure.skin is None else skin_used(figure.skin, how)
+    return Body(
+        positions,
+        _held(skin if figure.is_attached else None, len(positions), n_joints),
+        directions,
+        correctives,
+    )
+
+
+def _held(skin: Skin | None, n_vertices: int, n_joints: int) -> Skin:
+    """Return a skin in which vertices that nothing moves follow the figure as a whole."""
+    if skin is None:
+        bound = np.tile(np.eye(4), (n_joints + 1, 1, 1))
+        rows = np.arange(n_vertices, dtype=np.int32)
+        return skin_from_entries(
+            n_vertices, rows, np.full(n_vertices, n_joints), np.ones(n_vertices), bound
+        )
+    free = np.flatnonzero(~has_influence(skin)).astype(np.int32)
+    return skin_from_entries(
+        n_vertices,
+        np.concatenate([owners(skin), free]),
+        np.concatenate([skin.joints, np.full(len(free), n_joints)]),
+        np.concatenate([skin.weights, np.ones(len(free))]),
+        np.concatenate([skin.inverse_bind, np.eye(4)[None]]),
+    )
+
+
+def _skinning(figure: Figure, frames: Frames, world: Floats) -> Floats:
+    """Return what carries a bound vertex with each joint, bindings in the frames' shapes."""
+    if figure.skin is None or not figure.is_attached:
+        return np.broadcast_to(np.eye(4), world.shape)
+    bound = figure.skin.inverse_bind
+    if not frames.shape_weights.any():
+        return world @ bound
+    moved = np.einsum("fs,sjc->fjc", frames.shape_weights, joint_directions(figure))
+    bound = np.tile(bound, (len(moved), 1, 1, 1))
+    bound[..., :3, 3] -= np.einsum("fjab,fjb->fja", bound[..., :3, :3], moved)
+    return world @ bound
+
+
+def body_rows(body: Body, rows: Ints) -> Body:
+    """Return some of a body's vertices, or copies of them."""
+    every = len(rows) == len(body.positions) and (rows == np.arange(len(rows))).all()
+    if every:
+        return body
+    return Body(
+        body.positions[rows],
+        skin_rows(body.skin, rows),
+        None if body.shapes is None else body.shapes[:, rows],
+        None if body.correctives is None else body.correctives[:, rows],
+    )
+
+
+def poses_of(poses: Poses, rows: Rows) -> Poses:
+    """Return some of the poses."""
+    weights = poses.weights if len(poses.weights) == 1 else poses.weights[rows]
+    return Poses(
+        poses.places[rows], poses.palette[rows], poses.shifts[rows], weights, poses.turns[rows]
+    )
+
+
+def vertices(body: Body, poses: Poses) -> Floats:
+    """Return the vertices of all poses: (F, V, 3)."""
+    count, shape = len(poses.palette), body.positions.shape
+    rest = np.broadcast_to(body.positions, (count, *shape))
+    for directions, weights in ((body.shapes, poses.weights), (body.correctives, poses.turns)):
+        if directions is not None and weights.any():
+            moved = weights @ directions.reshape(len(directions), -1)
+            rest = rest + moved.reshape(-1, *shape)
+    found = np.empty((count, *shape))
+    for row in range(count):
+        found[row] = move(rest[row], body.skin, poses.palette[row])[0] + poses.shifts[row]
+    return found
