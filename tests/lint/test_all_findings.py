@@ -117,7 +117,7 @@ def test_a_skin_without_bindings_is_looked_at_alone(tmp_path: Path) -> None:
     weights = section(lines, "skinweights")
     lines[weights] = "1 0 0.5"
     del lines[section(lines, "bindings") - 1 :]
-    assert heavy(linted(tmp_path, lines)) == [("B001", None), ("W001", weights + 1)]
+    assert heavy(linted(tmp_path, lines)) == [("B001", weights), ("W001", weights + 1)]
 
 
 def test_what_is_no_text_of_this_kind_says_that_nothing_else_was_checked(tmp_path: Path) -> None:

@@ -48,7 +48,7 @@ FAULTS: dict[str, tuple[dict[str, str], str, str, str, int | None]] = {
     "weight not finite": (skin("1 0 1.0", "1 0 nan"), "W003", "error", "a.skin", 12),
     "weight of no joint": (skin("1 1 1\n}", "1 2 1\n}"), "W010", "error", "a.skin", 14),
     "weights without bindings": (
-        {"a.skin": skin_text.GOOD.replace(skin_text.BINDINGS, "")}, "B001", "error", "a.skin", None
+        {"a.skin": skin_text.GOOD.replace(skin_text.BINDINGS, "")}, "B001", "error", "a.skin", 11
     ),
     "singular binding": (skin("0 1 0\n  0 0 1\n  5", "0 0 0\n  0 0 1\n  5"), "B002", "error",
                          "a.skin", 20),
