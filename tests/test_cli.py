@@ -7,7 +7,6 @@ import signal
 import stat
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -237,20 +236,21 @@ def test_signal_while_writing_leaves_no_file(rig, tmp_path, number, code):
 def test_sigterm_ends_a_program_that_waits(rig, tmp_path):
     pipe = tmp_path / "pipe.png"
     os.mkfifo(pipe)
-    process = subprocess.Popen(
-        listening("-m", "viewer", "render", *rig, "-o", pipe, "--size", "40x30"),
-        env=ENVIRONMENT, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    # It waits for a reader of the pipe, or is just about to.
+    program = (
+        "import os, sys, threading, viewer.formats._save as save, viewer.cli\n"
+        "write = save._write_through\n"
+        "def waiting(*given):\n"
+        "    threading.Timer(0.5, os.kill, [os.getpid(), 15]).start()\n"
+        "    write(*given)\n"
+        "save._write_through = waiting\n"
+        "sys.exit(viewer.cli.run(sys.argv[1:]))\n"
+    )
+    done = subprocess.run(
+        listening("-c", program, "render", *rig, "-o", pipe, "--size", "40x30"),
+        env=ENVIRONMENT, capture_output=True, timeout=100, check=False,
     )  # fmt: skip
-    deadline = time.monotonic() + 20
-    while time.monotonic() < deadline:  # it waits for a reader of the pipe
-        if Path(f"/proc/{process.pid}/wchan").read_text() in ("wait_for_partner", "fifo_open"):
-            break
-        time.sleep(0.05)
-        if time.monotonic() > deadline - 18:
-            break
-    process.terminate()
-    out, err = process.communicate(timeout=20)
-    assert process.returncode == 143 and err == b"viewer: terminated\n" and out == b""
+    assert (done.returncode, done.stderr, done.stdout) == (143, b"viewer: terminated\n", b"")
     assert stat.S_ISFIFO(pipe.stat().st_mode)
 
 

@@ -151,7 +151,14 @@ def test_signal_while_moderngl_calls_python_is_no_crash(end, number, helper, kin
         "import viewer.rendering.recorder as r\nbefore(r._Drawer, 'release')\n"
         "def fail(*_): strike()\nr.pose_scene = fail",
         "import viewer.formats._video as v\nafter(v.VideoSink, 'write')",
-        "import viewer.formats._video as v\nbefore(v.VideoSink, 'close')",
+        # In the encoder's thread; the handler runs in the main one, which must have its turn.
+        "import viewer.formats._video as v, viewer.interrupts as i\n"
+        "old = v.VideoSink.close\n"
+        "def close(sink):\n"
+        "    strike()\n"
+        "    while not i._current.number: pass\n"
+        "    old(sink)\n"
+        "v.VideoSink.close = close",
     ],
     ids=["frame", "pose", "encoding", "finishing"],
 )
