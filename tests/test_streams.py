@@ -196,3 +196,14 @@ def test_reserved_descriptors_are_given_back():
     )
     line = f'exec {sys.executable} -c "$1" <&- >&- 2>&-'
     assert shell(line, program).returncode == 0
+
+
+@pytest.mark.parametrize("suffix", [".anim", ".skel", ".bvh"])
+def test_results_are_compared_with_what_went_into_a_pipe(rig, tmp_path, suffix):
+    """Such a file cannot be opened again to be read back."""
+    (tmp_path / f"link{suffix}").symlink_to("/dev/stdout")
+    done = shell(
+        f'set -o pipefail; viewer convert "$1" -o link{suffix} | cat', rig[0], folder=tmp_path
+    )
+    assert done.returncode == 0 and done.stdout
+    assert b"expected a file" not in done.stderr and b"link" in done.stderr

@@ -79,7 +79,8 @@ def read_back(file: BvhFile, figure: Figure, frames: Frames, how: Skinning) -> S
     motion = bvh.read(Source(file.path, file.text))
     skeleton, clip = motion.figure.skeleton, motion.clip
     assert skeleton is not None and figure.skeleton is not None  # the reader gives one
-    order = [skeleton.names.index(name) for name in file.names]
+    numbers = {name: joint for joint, name in enumerate(skeleton.names)}
+    order = [numbers[name] for name in file.names]
     weights = frames.shape_weights
     still = weights[min(file.reference, len(weights) - 1)]
     scale = float(frames.figure_scales[file.reference])

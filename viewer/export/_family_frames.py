@@ -159,7 +159,8 @@ def family_frames(
     """
     figure, skeleton = take.figure, take.figure.skeleton
     assert skeleton is not None  # whoever has a member has a skeleton
-    order = [skeleton.names.index(name) for name in member.names]
+    numbers = {name: joint for joint, name in enumerate(skeleton.names)}
+    order = [numbers[name] for name in member.names]
     rotations = frames.rotations[:, order]
     metres = METRES[figure.unit]
     moved = metres * frames.translations[:, order]

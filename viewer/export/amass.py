@@ -31,7 +31,7 @@ from viewer.export._gaps import filled, gaps_text, runs
 from viewer.export._losses import frames_losses
 from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, MotionOptions
-from viewer.formats import Source, all_or_none, save_arrays
+from viewer.formats import Source, all_or_none, keeping_written, save_arrays
 from viewer.formats.amass import read
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.take import Take
@@ -81,7 +81,7 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
     paths = split_paths(path, len(spans))
     up = up_axis(options)
     written = []
-    with all_or_none(paths):
+    with keeping_written() as saved, all_or_none(paths):
         for file, (start, stop) in zip(paths, spans, strict=True):
             arrays = _arrays(body, slice(start, stop), take.frame_rate, up)
             if not is_split and not present.all():
@@ -94,7 +94,7 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
             )
     lost = []
     for file, span in zip(paths, spans, strict=True):
-        again = read_frames(read(Source.open(file)), take, options)
+        again = read_frames(read(Source(file, saved[file])), take, options)
         lost += frames_losses(file, take, again, options.skinning, span)
     lost += resampling_losses(path, take, options.skinning)
     return [*written, *lost, *_remarks(body, take, present, options), *notes]

@@ -14,7 +14,7 @@ from viewer.export._gaps import filled, gaps_text, runs
 from viewer.export._losses import frames_losses
 from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, MotionOptions
-from viewer.formats import Source, all_or_none, read, write
+from viewer.formats import Source, all_or_none, keeping_written, read, write
 from viewer.rig.arrays import Floats
 from viewer.rig.clip import Clip, Tangent, is_course_rig
 from viewer.rig.clip_edit import clip_from_frames
@@ -76,10 +76,11 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
     if not frames.present.any():
         raise RigError(f"{take.name}: every frame is missing, there is nothing to write")
     if isinstance(take.motion, Clip) and _is_whole(take, take.motion):
-        write(take.motion, path)
+        with keeping_written() as saved:
+            write(take.motion, path)
         own = ", the clip's own" if take.motion.end > take.motion.start else ""
         notes = [f"{_summary(path, take.motion)}{own}"]
-        notes += _losses(take, path, (0, frames.n_frames), options)
+        notes += _losses(take, Source(path, saved[path]), (0, frames.n_frames), options)
         if frames.figure_translations.any():
             notes.append("the place of the whole figure is no part of its clip: it is left out")
         return notes + _left_out(figure, frames)
@@ -105,7 +106,7 @@ def _export_frames(take: Take, skeleton: Skeleton, path: Path, options: MotionOp
         clips.append(trials[best])
         rules.append(_RULES[best])
     paths = split_paths(path, len(clips))
-    with all_or_none(paths):
+    with keeping_written() as saved, all_or_none(paths):
         for file, clip in zip(paths, clips, strict=True):
             write(clip, file)
     notes = [
@@ -113,16 +114,16 @@ def _export_frames(take: Take, skeleton: Skeleton, path: Path, options: MotionOp
         for file, clip, rule in zip(paths, clips, rules, strict=True)
     ]
     for file, span in zip(paths, spans, strict=True):
-        notes += _losses(take, file, span, options)
+        notes += _losses(take, Source(file, saved[file]), span, options)
     return notes + _remarks(take, options)
 
 
-def _losses(take: Take, path: Path, span: tuple[int, int], options: MotionOptions) -> list[str]:
+def _losses(take: Take, source: Source, span: tuple[int, int], options: MotionOptions) -> list[str]:
     """Read a file back, and say how far it is off on the frames, and between them.
 
     Between them it is compared half-way, and where the motion has frames or keys of its own.
     """
-    clip = read(Source.open(path))
+    clip, path = read(source), source.path
     assert isinstance(clip, Clip)  # as was written
     figure, how, part = take.figure, options.skinning, slice(*span)
     times = take.frames.times[part]

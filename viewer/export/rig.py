@@ -10,7 +10,7 @@ import numpy as np
 from viewer.errors import RigError, printable
 from viewer.export._apart import Apart, Farthest, apart_lines, negligible
 from viewer.export._course_rig import course_skeleton, depth_first
-from viewer.formats import Source, all_or_none, read, write
+from viewer.formats import Source, all_or_none, keeping_written, read, write
 from viewer.rig.figure import Figure
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.mesh import Mesh, split_seams
@@ -37,11 +37,12 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
     rig, sources = _as_rig(whole, pose, skinning)
     skel, skin = path.with_suffix(".skel"), path.with_suffix(".skin")
     notes = [f"{printable(skel, 300)}: {figure.skeleton.n_joints} joints"]
-    with all_or_none(_files(rig, skel, skin)):
+    with keeping_written() as saved, all_or_none(_files(rig, skel, skin)):
         write(rig, skel)
         if rig.mesh is not None:
             write(rig, skin)
-        error = _error(actor, skel, skin, sources, skinning)
+        files = [Source(file, saved[file]) for file in (skel, skin) if file in saved]
+        error = _error(actor, files, sources, skinning)
     if rig.mesh is not None:
         notes.append(f"{printable(skin, 300)}: {rig.mesh.n_vertices} vertices")
         if figure.mesh is not None and rig.mesh.n_vertices != figure.mesh.n_vertices:
@@ -123,11 +124,11 @@ def _lost(figure: Figure, pose: Pose) -> list[str]:
 
 
 def _error(
-    actor: Actor, skel: Path, skin: Path, sources: np.ndarray | None, skinning: Skinning
+    actor: Actor, files: list[Source], sources: np.ndarray | None, skinning: Skinning
 ) -> list[str]:
     """Read the files back, pose them as they say, and compare with the figure as it is posed."""
     figure, pose = actor.figure, actor.pose
-    skeleton = read(Source.open(skel))
+    skeleton = read(files[0])
     assert isinstance(skeleton, Figure) and skeleton.skeleton is not None
     assert figure.skeleton is not None and pose is not None  # the caller looked
     there = world_matrices(skeleton.skeleton, rest_pose(skeleton.skeleton))[:, :3, 3]
@@ -138,8 +139,8 @@ def _error(
     least = negligible(one, first, np.zeros(1, dtype=np.intp))
     joints = Farthest(float(off[joint]), int(order[joint]), 0) if off[joint] > least else None
     if sources is None:
-        return apart_lines(skel, figure, Apart(joints, None, 1, 1), None)
-    mesh = read(Source.open(skin))
+        return apart_lines(files[0].path, figure, Apart(joints, None, 1, 1), None)
+    mesh = read(files[1])
     assert isinstance(mesh, Figure)
     again = Figure("again", mesh.mesh, skeleton.skeleton, mesh.skin)
     found = deform(again, rest_pose(skeleton.skeleton))[0]
@@ -147,4 +148,4 @@ def _error(
     vertex = int(apart.argmax()) if len(apart) else -1
     far = len(apart) > 0 and apart[vertex] > least
     vertices = Farthest(float(apart[vertex]), int(sources[vertex]), 0) if far else None
-    return apart_lines(skin, figure, Apart(joints, vertices, 1, 1), None)
+    return apart_lines(files[1].path, figure, Apart(joints, vertices, 1, 1), None)

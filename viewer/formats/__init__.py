@@ -14,7 +14,14 @@ from viewer.formats._faults import Fault
 from viewer.formats._image import is_picture, read_picture, save_image
 from viewer.formats._opened_names import file_stem, folder_name, opened_text
 from viewer.formats._references import referenced_path
-from viewer.formats._save import all_or_none, free_path, save_arrays, save_bytes, save_text
+from viewer.formats._save import (
+    all_or_none,
+    free_path,
+    keeping_written,
+    save_arrays,
+    save_bytes,
+    save_text,
+)
 from viewer.formats._source import MAX_SIZE, Source
 from viewer.formats._targets import check_folder_target, check_targets
 
@@ -56,6 +63,7 @@ __all__ = [
     "folder_name",
     "free_path",
     "is_picture",
+    "keeping_written",
     "opened_text",
     "read",
     "read_picture",

@@ -28,6 +28,7 @@ __all__ = [
     "all_or_none",
     "as_words",
     "free_path",
+    "keeping_written",
     "save_arrays",
     "save_bytes",
     "save_text",
@@ -77,6 +78,20 @@ def _holds(path: Path, data: bytes | None) -> bool:
     return False
 
 
+_written: ContextVar[dict[Path, bytes] | None] = ContextVar("what is written", default=None)
+
+
+@contextlib.contextmanager
+def keeping_written() -> Iterator[dict[Path, bytes]]:
+    """Keep the bytes of each file that the block writes, to be read back: a pipe keeps nothing."""
+    written: dict[Path, bytes] = {}
+    token = _written.set(written)
+    try:
+        yield written
+    finally:
+        _written.reset(token)
+
+
 def save_text(path: str | Path, text: str) -> None:
     """Write text as UTF-8 with LF line ends; see ``save_bytes``."""
     save_bytes(path, text.encode("utf-8", "surrogateescape"))
@@ -116,6 +131,9 @@ def save_bytes(path: str | Path, data: bytes) -> None:
     hold()  # a signal that comes after the rename must not make a failure of it
     poll()
     path = Path(path)
+    kept = _written.get()
+    if kept is not None:
+        kept[path] = data
     if is_stdout(path):
         write_stdout(path, data)
         return
