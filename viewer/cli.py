@@ -24,8 +24,8 @@ Without a command, FILES open in a window; without files, the bundled figure doe
 "viewer COMMAND --help" lists a command's options.
 
 exit codes: 0 done, 1 lint found or diff measured too much, 2 bad input, 4 no usable OpenGL,
-5 output could not be written, 130 interrupted (Ctrl-C), 143 terminated; a signal that comes when
-all is written changes nothing
+5 output could not be written, 129 hung up, 130 interrupted (Ctrl-C), 143 terminated; a signal that
+comes when all is written changes nothing
 """
 
 _DOWNWARD = ("-y", "-z")  # axes that point up the other way; no option has these letters

@@ -266,7 +266,7 @@ def test_unknown_length_is_refused_with_those_known(tmp_path):
 
 def test_nobody_is_refused(tmp_path):
     write_frames(tmp_path / "smpl", {0: [], 1: []})
-    assert refusal(tmp_path) == f"{tmp_path}: expected people, found nobody in 2 frames"
+    assert refusal(tmp_path) == f"{tmp_path}: expected people, found none in 2 frames"
 
 
 def test_folder_without_frames_is_refused(tmp_path):

@@ -107,7 +107,12 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
     saved = _files(list(zip(paths, documents, strict=True)))
     for file, (start, stop), data, made in zip(paths, spans, saved, built, strict=True):
         first = take.first_frame + start
-        motion = f"{stop - start} frames ({first} to {first + stop - start - 1})"
+        count = stop - start
+        motion = (
+            f"{count} frames ({first} to {first + count - 1})"
+            if count > 1
+            else f"1 frame ({first})"
+        )
         rate = f"at {take.frame_rate:g} a second"
         size = f"{len(data[file])} bytes"
         notes += [f"{printable(file, 300)}: {made.counts}, {motion} {rate}, {size}"]

@@ -118,8 +118,9 @@ def _name(source: Source) -> str:
 
 
 def _refusal(source: Source, count: int, fault: FormatError | None) -> FormatError:
+    frames = "1 frame" if count == 1 else f"{count} frames"
     if fault is None:
-        return source.error(f"expected people, found nobody in {count} frames")
+        return source.error(f"expected people, found none in {frames}")
     if not source.is_folder:
         return fault
-    return source.error(f"expected people, found none in {count} frames; the first: {fault}")
+    return source.error(f"expected people, found none in {frames}; the first: {fault}")
