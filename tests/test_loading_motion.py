@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose
 import viewer
 from viewer.errors import RigError
 from viewer.loading import MotionSettings, bundled_body, load
-from viewer.rig.motion import pose_actor
+from viewer.rig.motion.evaluation import pose_actor
 
 BVH = """HIERARCHY
 ROOT pelvis

@@ -24,7 +24,7 @@ import viewer
 from viewer.app.view_picks import vertex_at
 from viewer.app.window import _Rest
 from viewer.rendering.camera import facing_camera, fit
-from viewer.rig.front import guess_front
+from viewer.rig.inspection.front import guess_front
 from viewer.rig.scene import scene_points
 
 ROOT = Path(__file__).resolve().parents[1]

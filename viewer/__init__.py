@@ -24,12 +24,12 @@ if TYPE_CHECKING:
     from viewer.rendering.offscreen import render
     from viewer.rendering.options import DisplayOptions, Light, Lights
     from viewer.rig.blendshapes import BlendShapes
-    from viewer.rig.clip import Channel, Clip, evaluate, sample
     from viewer.rig.figure import Figure
     from viewer.rig.mesh import Material, Mesh
-    from viewer.rig.mirror import mirror_pose
+    from viewer.rig.motion.clip import Channel, Clip, evaluate, sample
     from viewer.rig.pose import Pose, rest_pose
-    from viewer.rig.pose_record import PoseRecord, apply_record, record_of
+    from viewer.rig.posing.pose_record import PoseRecord, apply_record, record_of
+    from viewer.rig.retargeting.mirror import mirror_pose
     from viewer.rig.scene import Actor, Scene
     from viewer.rig.shape import shaped, with_rest_mesh
     from viewer.rig.skeleton import Skeleton
@@ -79,8 +79,8 @@ _HOMES = {
     "Actor": "rig.scene",
     "BlendShapes": "rig.blendshapes",
     "Camera": "rendering.camera",
-    "Channel": "rig.clip",
-    "Clip": "rig.clip",
+    "Channel": "rig.motion.clip",
+    "Clip": "rig.motion.clip",
     "DisplayOptions": "rendering.options",
     "Figure": "rig.figure",
     "Light": "rendering.options",
@@ -88,24 +88,24 @@ _HOMES = {
     "Material": "rig.mesh",
     "Mesh": "rig.mesh",
     "Pose": "rig.pose",
-    "PoseRecord": "rig.pose_record",
+    "PoseRecord": "rig.posing.pose_record",
     "Scene": "rig.scene",
     "Skeleton": "rig.skeleton",
     "Skin": "rig.skin",
     "Skinning": "rig.skinning",
     "ViewerError": "errors",
-    "apply_record": "rig.pose_record",
+    "apply_record": "rig.posing.pose_record",
     "deform": "rig.skinning",
     "deform_frames": "rig.skinning",
-    "evaluate": "rig.clip",
+    "evaluate": "rig.motion.clip",
     "export": "export",
     "joint_matrices": "rig.skinning",
     "load": "loading",
-    "mirror_pose": "rig.mirror",
-    "record_of": "rig.pose_record",
+    "mirror_pose": "rig.retargeting.mirror",
+    "record_of": "rig.posing.pose_record",
     "render": "rendering.offscreen",
     "rest_pose": "rig.pose",
-    "sample": "rig.clip",
+    "sample": "rig.motion.clip",
     "shaped": "rig.shape",
     "show": "app.window",
     "with_rest_mesh": "rig.shape",

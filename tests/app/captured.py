@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 import viewer
+from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.figure import Figure
-from viewer.rig.points import PointClip, PointLayout
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor, Scene
-from viewer.rig.timing import Timing
 
 NAMES = ("nose", "left_eye", "right_eye", "neck")
 

@@ -12,7 +12,7 @@ from viewer.app.headless import HeadlessApp
 from viewer.app.state import AppState
 from viewer.rendering.camera import facing_camera, fit
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.front import guess_front
+from viewer.rig.inspection.front import guess_front
 from viewer.rig.scene import Scene, scene_box, scene_points
 from viewer.rig.skeleton import find_dof
 

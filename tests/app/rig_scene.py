@@ -7,8 +7,8 @@ import time
 import numpy as np
 from rig.transfer.rigged_shapes import arm, mesh_of, turn
 
-from viewer.rig.clip import Channel, Clip
 from viewer.rig.figure import Figure
+from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.pose import rest_pose
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import deform

@@ -8,12 +8,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 from rig.hand_made import skeleton
 
 from viewer.app.curve_data import channel_of, curves_of, keyed_values, sampled_points
-from viewer.rig.clip import Channel, Clip
+from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.figure import Figure
-from viewer.rig.points import PointClip, PointLayout
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.motion.clip import Channel, Clip
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor
-from viewer.rig.timing import Timing
 
 
 def rig():

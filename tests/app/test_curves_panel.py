@@ -12,12 +12,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import viewer
 from viewer.formats import Source, read
-from viewer.rig.clip import Clip, evaluate
+from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.figure import Figure
-from viewer.rig.points import PointClip, PointLayout
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.motion.clip import Clip, evaluate
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor, Scene
-from viewer.rig.timing import Timing
 
 ARM_X = 6  # rows of the tiny rig: three translations, three rotations of the root, then the arm
 SIZE = (1180, 900)
@@ -579,7 +579,7 @@ def test_choice_starts_anew_with_another_actor(drive, rig, tmp_path):
 
 
 def test_thousands_of_keys_are_drawn_but_not_taken_hold_of(curves):
-    from viewer.rig.clip_edit import clip_from_frames
+    from viewer.rig.motion.clip_edit import clip_from_frames
 
     times = np.linspace(0, 2, 4000)
     dofs = np.tile(curves.dofs(), (4000, 1))

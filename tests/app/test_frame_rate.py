@@ -12,7 +12,7 @@ from viewer.app.edits import History
 from viewer.app.frame_rate import foreign_rate, rate_of, set_rate, with_rate
 from viewer.app.stream import _keep_rate
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.clip import Channel, Clip
+from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.scene import Actor, Scene
 
 SIZE = (1280, 800)

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from viewer.app.posed_joint import posed_joint
 from viewer.app.rotate_tool import RADIUS
 from viewer.rendering.camera import camera_axes
-from viewer.rig.rotation import rotation_vector_to_matrix
+from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 from viewer.rig.scene import Actor, Scene
 
 VIEW_RADIUS = 1.2 * RADIUS

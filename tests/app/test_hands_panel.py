@@ -6,8 +6,8 @@ from driver import Driver
 from family_models import family_figure
 from numpy.testing import assert_allclose
 
+from viewer.rig.geometry.rotation import matrix_to_rotation_vector
 from viewer.rig.pose import joint_rotations
-from viewer.rig.rotation import matrix_to_rotation_vector
 from viewer.rig.scene import Actor, Scene
 
 

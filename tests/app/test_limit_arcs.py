@@ -9,9 +9,9 @@ from numpy.testing import assert_allclose
 
 from viewer.app.limit_arcs import arc_points, limit_arcs
 from viewer.app.posed_joint import posed_joint
-from viewer.rig.rotation import rotation_vector_to_matrix
+from viewer.rig.geometry.rotation import rotation_vector_to_matrix
+from viewer.rig.geometry.vectors import unit
 from viewer.rig.scene import Actor
-from viewer.rig.vectors import unit
 
 LIMITS = {(0, "x"): (-0.5, 0.7), (0, "y"): (-1.0, 0.4), (0, "z"): (-0.3, 1.2)}
 

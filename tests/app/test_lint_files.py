@@ -14,8 +14,8 @@ from lint.test_again import TEXTS
 
 from viewer.cli import run
 from viewer.loading import bundled_files
+from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Scene
-from viewer.rig.timing import Timing
 
 SIZE = (1000, 700)
 

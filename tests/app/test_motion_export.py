@@ -9,7 +9,7 @@ import pytest
 from app.captured import dots, people, walk
 
 from viewer.app.motion_actions import FOLDER, motion_files, motion_suffixes, save_motion
-from viewer.rig.clip import Channel, Clip
+from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.scene import Actor, Scene
 
 

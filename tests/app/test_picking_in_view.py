@@ -57,8 +57,8 @@ def test_click_on_nothing_changes_nothing(pair):
 def test_click_on_a_joint_selects_it(pair):
     pair.state.options.show = "skeleton"
     pair.step(2)
+    from viewer.rig.geometry.transform import apply_transform
     from viewer.rig.skinning import joint_matrices
-    from viewer.rig.transform import apply_transform
 
     actor = pair.state.scene.actors[1]
     joints = joint_matrices(actor.figure, actor.pose)[:, :3, 3]

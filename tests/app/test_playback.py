@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from viewer.app.playback import Playback
-from viewer.rig.clip import Channel, Clip
+from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.figure import Figure
-from viewer.rig.points import PointClip, PointLayout
+from viewer.rig.motion.clip import Channel, Clip
+from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor, Scene
-from viewer.rig.timing import Timing
 
 
 def keyed(start=1.0, end=5.0):

@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from viewer.formats.pose import pose_text
 from viewer.rig.pose import joint_rotations, pose_key, rest_pose
-from viewer.rig.pose_record import record_of
+from viewer.rig.posing.pose_record import record_of
 from viewer.rig.scene import Actor, Scene
 
 

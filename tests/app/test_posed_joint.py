@@ -8,8 +8,8 @@ from app.posing_rigs import arm_figure
 from numpy.testing import assert_allclose
 
 from viewer.app.posed_joint import posed_joint
+from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 from viewer.rig.pose import joint_rotations, placement_matrix
-from viewer.rig.rotation import rotation_vector_to_matrix
 from viewer.rig.scene import Actor
 
 

@@ -12,8 +12,8 @@ from viewer.app.recorded_marks import RecordedMarks
 from viewer.app.weights_actions import pin_vertex, unpin
 from viewer.rendering.joint_marks import HIGHLIGHT
 from viewer.rendering.recorder import copied
-from viewer.rig.clip import Channel, Clip
-from viewer.rig.crowd import pose_actors
+from viewer.rig.motion.clip import Channel, Clip
+from viewer.rig.motion.instances import pose_actors
 
 
 @pytest.fixture

@@ -25,8 +25,8 @@ from viewer.app.rig_placing import (
 from viewer.app.rig_sources import current_template, target_mesh
 from viewer.app.rig_steps import align_template
 from viewer.app.view_frame import view_frame
+from viewer.rig.geometry.transform import apply_transform, translation_matrix
 from viewer.rig.mesh import bounding_box
-from viewer.rig.transform import apply_transform, translation_matrix
 
 
 @pytest.fixture

@@ -23,10 +23,10 @@ from viewer.app.rig_steps import align_template
 from viewer.app.rig_work import start_adding, start_reading
 from viewer.export import export
 from viewer.formats.rigged import save
+from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import deform
 from viewer.rig.transfer.alignment import Alignment, AlignmentSettings
-from viewer.rig.transform import apply_transform
 
 SIZE = (900, 1250)
 

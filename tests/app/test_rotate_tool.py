@@ -11,8 +11,8 @@ from viewer.app.posed_joint import posed_joint
 from viewer.app.rotate_tool import RADIUS, TurnHandle, circle, grab_ring, limit_text, rings
 from viewer.app.view_frame import ViewFrame
 from viewer.rendering.camera import Camera
+from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 from viewer.rig.pose import joint_rotations
-from viewer.rig.rotation import rotation_vector_to_matrix
 from viewer.rig.scene import Actor
 
 BOX = np.array([[-1.0, -1, -1], [3, 1, 1]])

@@ -9,7 +9,7 @@ from imgui_bundle import imgui
 from numpy.testing import assert_allclose, assert_array_equal
 
 import viewer
-from viewer.rig.measure import measure
+from viewer.rig.inspection.measure import measure
 from viewer.rig.morph_target import MorphTarget, with_morphs
 from viewer.rig.scene import Actor
 from viewer.rig.shape import rest_joints, shaped

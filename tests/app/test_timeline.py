@@ -8,10 +8,10 @@ from numpy.testing import assert_allclose
 
 from viewer.app.stream import Stream
 from viewer.loading.capturing import Builder
-from viewer.rig.body_motion import BodyMotion
-from viewer.rig.capture import Capture, CapturePart
-from viewer.rig.clip import Channel, Clip
-from viewer.rig.timing import Timing
+from viewer.rig.captures.capture import Capture, CapturePart
+from viewer.rig.motion.body_motion import BodyMotion
+from viewer.rig.motion.clip import Channel, Clip
+from viewer.rig.motion.timing import Timing
 
 ARM = 0  # the DOF that the test's clip moves
 

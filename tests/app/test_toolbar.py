@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from viewer.app.posing_actions import no_chain, no_keys, no_orientation, no_tool
 from viewer.app.rotate_tool import RADIUS
-from viewer.rig.clip import Channel, Clip
+from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.pose import joint_rotations
 from viewer.rig.scene import Actor, Scene
 

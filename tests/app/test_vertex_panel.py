@@ -12,8 +12,8 @@ from viewer.app.panels.vertex import matrix_text
 from viewer.app.weights_actions import pin_vertex
 from viewer.rendering.projection import project
 from viewer.rendering.view import view_of
-from viewer.rig.explanation import explain
-from viewer.rig.explanation_text import explanation_text
+from viewer.rig.inspection.explanation import explain
+from viewer.rig.inspection.explanation_text import explanation_text
 from viewer.rig.skinning import Skinning, deform, joint_matrices
 
 

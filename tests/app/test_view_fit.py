@@ -16,7 +16,7 @@ from viewer.app.view_frame import view_frame
 from viewer.rendering.camera import Camera, fit
 from viewer.rendering.framing import frame_motion
 from viewer.rendering.recorder import Recording
-from viewer.rig.motion import pose_actor
+from viewer.rig.motion.evaluation import pose_actor
 from viewer.rig.scene import scene_points
 
 streaming = test_timeline.streaming  # the fixture

@@ -12,11 +12,11 @@ from measure import interleaved, report
 import viewer
 from viewer.export import MotionOptions, export_take
 from viewer.loading import bundled_body
-from viewer.rig.quaternion import rotation_vector_to_quaternion
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.geometry.quaternion import rotation_vector_to_quaternion
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.take import Take, take_of
+from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor
-from viewer.rig.take import Take, take_of
-from viewer.rig.timing import Timing
 
 FRAMES = 1000
 

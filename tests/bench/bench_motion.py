@@ -19,12 +19,12 @@ from measure import interleaved, median_ratio
 
 from viewer.rendering.offscreen import Offscreen, default_camera
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.clip import Channel, Clip
-from viewer.rig.motion import pose_actor
-from viewer.rig.rotation import matrix_to_quaternion, rotation_vector_to_matrix
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.geometry.rotation import matrix_to_quaternion, rotation_vector_to_matrix
+from viewer.rig.motion.clip import Channel, Clip
+from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor, Motion, Scene, scene_box
-from viewer.rig.timing import Timing
 
 GOAL = 0.05
 N_FRAMES, SECONDS = 300, 10.0

@@ -20,7 +20,7 @@ from viewer.rendering.framing import frame_motion
 from viewer.rendering.offscreen import Offscreen, default_camera
 from viewer.rendering.recorder import Recording, Sink, record
 from viewer.rig.arrays import Bytes
-from viewer.rig.clip import Channel, Clip
+from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.scene import Actor, Scene
 
 SIZE = 1280, 720

@@ -20,12 +20,12 @@ import transfer_targets as made
 
 import viewer
 from viewer.export import MotionOptions, export, export_take
+from viewer.rig.geometry.quaternion import multiply
 from viewer.rig.mesh import vertex_normals
-from viewer.rig.quaternion import multiply
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.take import take_of
+from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor
-from viewer.rig.take import take_of
-from viewer.rig.timing import Timing
 
 FRAMES, RATE = 32, 30.0  # one stride
 Z_UP = 100.0 * np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # metres, y up: to centimetres
@@ -228,8 +228,8 @@ def walk(figure: viewer.Figure, what: str) -> SampledClip:
         down[names.index("right_shoulder"), 2] = 1.2
         quaternions = multiply(quaternions, turns_to_quaternions(down))
     else:
+        from viewer.rig.geometry.rotation import matrix_to_quaternion
         from viewer.rig.pose import joint_rotations
-        from viewer.rig.rotation import matrix_to_quaternion
 
         at_rest = matrix_to_quaternion(joint_rotations(figure.skeleton, rest))
         quaternions = multiply(at_rest, quaternions)

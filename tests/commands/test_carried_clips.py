@@ -12,10 +12,10 @@ import viewer
 from viewer.cli import run
 from viewer.export import export
 from viewer.formats import write
-from viewer.rig.clip_edit import clip_from_frames
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh, vertex_normals
-from viewer.rig.motion import pose_actor
+from viewer.rig.motion.clip_edit import clip_from_frames
+from viewer.rig.motion.evaluation import pose_actor
 from viewer.rig.scene import Actor
 
 TURN = [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]

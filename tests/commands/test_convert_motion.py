@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 
 import viewer
 from viewer.cli import run
-from viewer.rig.motion import pose_actor
+from viewer.rig.motion.evaluation import pose_actor
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose
 import viewer
 from viewer.cli import run
 from viewer.loading import MotionSettings
-from viewer.rig.motion import pose_actor
+from viewer.rig.motion.evaluation import pose_actor
 from viewer.rig.skinning import Skinning, deform
 
 TO_Y = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # (x, y, z) -> (x, z, -y)

@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 
 import viewer
 from viewer.cli import run
-from viewer.rig.rotation import matrix_to_rotation_vector, rotation_vector_to_matrix
+from viewer.rig.geometry.rotation import matrix_to_rotation_vector, rotation_vector_to_matrix
 
 OVER = np.diag([1.0, -1.0, -1.0])
 

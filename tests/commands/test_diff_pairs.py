@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.commands._diff_pairs import pair_actors
-from viewer.rig.clip import Channel, Clip
+from viewer.rig.captures.points import PointLayout
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh
-from viewer.rig.points import PointLayout
+from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import Skeleton
 from viewer.rig.skin import skin_from_lists

@@ -15,11 +15,11 @@ from numpy.testing import assert_allclose
 from viewer.cli import run
 from viewer.commands._frame_numbers import Numbering, Range, numbering_of, parse_range
 from viewer.errors import ViewerError
-from viewer.rig.clip import Clip
+from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.figure import Figure
-from viewer.rig.points import PointClip, PointLayout
+from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor
-from viewer.rig.timing import Timing
 
 LAYOUT = PointLayout("pair", ("nose", "neck"), np.zeros((0, 2)), np.zeros(2))
 

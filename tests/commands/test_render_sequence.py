@@ -20,7 +20,7 @@ from PIL import Image
 import viewer
 from viewer.cli import run
 from viewer.commands._shots import Turntable, parse_turntable
-from viewer.rig.motion import pose_actor
+from viewer.rig.motion.evaluation import pose_actor
 
 av = pytest.importorskip("av")
 ROOT = Path(__file__).resolve().parents[2]

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from plain_smpl import rotation, smpl_forward
 
-from viewer.rig.body_motion import BodyMotion, body_clip
 from viewer.rig.figure import Figure
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.motion.body_motion import BodyMotion, body_clip
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.take import Take, take_of
+from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor
 from viewer.rig.smpl_family import FAMILY
-from viewer.rig.take import Take, take_of
-from viewer.rig.timing import Timing
 
 
 def waves(*shape: int, seed: float = 0.0) -> np.ndarray:

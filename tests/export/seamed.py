@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.mesh import Material, Mesh
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import ball_skeleton
 from viewer.rig.skin import skin_from_lists
-from viewer.rig.transform import translation_matrix
 
 # A roof of four vertices and three triangles; vertex 1 is on the seam, vertex 4 in no triangle.
 POSITIONS = np.array([[0, 0, 0], [1, 0, 0], [0, 2, 0], [1, 2, 1], [3, 3, 3]], dtype=float)

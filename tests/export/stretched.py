@@ -6,14 +6,14 @@ import numpy as np
 
 from viewer.rig.blendshapes import BlendShapes, JointRegressor
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.mesh import Mesh
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.take import Take, take_of
+from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import ball_skeleton
 from viewer.rig.skin import skin_from_lists
-from viewer.rig.take import Take, take_of
-from viewer.rig.timing import Timing
-from viewer.rig.transform import translation_matrix
 
 NAMES = ("low", "middle", "high")
 JOINTS = np.array([[0.0, 0, 0], [0, 1, 0], [0, 2, 0]])

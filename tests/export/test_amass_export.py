@@ -19,9 +19,9 @@ import viewer
 from viewer.errors import OutputError, RigError
 from viewer.export import MotionOptions, export_take, motion_exporters
 from viewer.formats import Source, read
-from viewer.rig.body_motion import BodyMotion, body_clip
-from viewer.rig.sampled_clip import SampledClip
-from viewer.rig.timing import Timing
+from viewer.rig.motion.body_motion import BodyMotion, body_clip
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.timing import Timing
 
 # Metres and radians: angles come back through an arctangent of numbers near 1.
 ATOL = 1e-13

@@ -15,13 +15,13 @@ import viewer
 from viewer.errors import OutputError, RigError
 from viewer.export import MotionOptions, export_take, motion_exporters
 from viewer.formats import Source, read
-from viewer.rig.clip import Channel, Clip
-from viewer.rig.clip_table import evaluate_all
 from viewer.rig.figure import Figure
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.motion.clip import Channel, Clip
+from viewer.rig.motion.clip_table import evaluate_all
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.take import take_of
+from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor
-from viewer.rig.take import take_of
-from viewer.rig.timing import Timing
 
 SHARED = Path(__file__).resolve().parents[2].parent / "shared" / "data" / "cse169"
 TINY = 1e-12

@@ -12,7 +12,7 @@ from viewer.export._apart import apart
 from viewer.export._bounds import Bounds
 from viewer.export._estimates import Estimator
 from viewer.export._skinned import Body, Poses, Side, poses_of
-from viewer.rig.rotation import rotation_vector_to_matrix
+from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 from viewer.rig.skin import skin_from_entries
 
 JOINTS, VERTICES, FRAMES = 5, 700, 90  # more vertices than a block, more frames than a chunk

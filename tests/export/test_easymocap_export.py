@@ -14,8 +14,8 @@ from numpy.testing import assert_allclose
 from viewer.errors import OutputError, RigError
 from viewer.export import MotionOptions, easymocap, export_take, motion_exporters
 from viewer.formats import Source, read
-from viewer.rig.body_motion import body_clip
-from viewer.rig.sampled_clip import joined
+from viewer.rig.motion.body_motion import body_clip
+from viewer.rig.motion.sampled_clip import joined
 
 ATOL = 1e-6  # metres and radians: seven decimals, summed along an arm
 COUNTS = {"smpl": 24, "smplh": 52, "smplx": 55, "mano": 16}
@@ -114,8 +114,8 @@ def test_round_trip_through_amass(family, tmp_path, kind):
 
 
 def take_of_clip(figure, clip):
+    from viewer.rig.motion.take import take_of
     from viewer.rig.scene import Actor
-    from viewer.rig.take import take_of
 
     return take_of(Actor(figure, clip=clip))
 
@@ -273,8 +273,8 @@ def test_other_figures_are_refused(tmp_path):
 
 def body_less(figure):
     """Return a clip of one frame at rest."""
-    from viewer.rig.sampled_clip import SampledClip
-    from viewer.rig.timing import Timing
+    from viewer.rig.motion.sampled_clip import SampledClip
+    from viewer.rig.motion.timing import Timing
 
     rotations = np.tile([0.0, 0, 0, 1], (1, figure.skeleton.n_joints, 1))
     return SampledClip("rest", Timing(30.0, np.arange(1)), rotations)

@@ -21,16 +21,16 @@ from viewer.export._bvh_angles import euler_angles, unrolled
 from viewer.export._options import ROTATION_ORDERS
 from viewer.formats import Source, bvh
 from viewer.loading import bundled_body
-from viewer.rig.body_motion import BodyMotion, body_clip
-from viewer.rig.clip import Channel, Clip
 from viewer.rig.figure import Figure
-from viewer.rig.motion import world_frames
-from viewer.rig.retarget import retarget
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.motion.body_motion import BodyMotion, body_clip
+from viewer.rig.motion.clip import Channel, Clip
+from viewer.rig.motion.evaluation import world_frames
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.take import Take, take_of
+from viewer.rig.motion.timing import Timing
+from viewer.rig.retargeting.retarget import retarget
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import Skeleton, ball_skeleton
-from viewer.rig.take import Take, take_of
-from viewer.rig.timing import Timing
 
 TENTH = 1e-5  # metres, 0.01 mm: what the issue allows
 TO_Y = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # z up to y up: (x, y, z) -> (x, z, -y)

@@ -14,9 +14,9 @@ import viewer
 from viewer.errors import RigError
 from viewer.export import MotionOptions, export
 from viewer.export.npz import export_points
+from viewer.rig.captures.point_take import PointTake
+from viewer.rig.captures.points import PointLayout
 from viewer.rig.figure import Figure
-from viewer.rig.point_take import PointTake
-from viewer.rig.points import PointLayout
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import ball_skeleton
 

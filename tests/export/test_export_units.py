@@ -19,13 +19,13 @@ from viewer.cli import run
 from viewer.errors import RigError
 from viewer.export import MotionOptions, export, export_take
 from viewer.rig.figure import Figure
-from viewer.rig.quaternion import rotation_vector_to_quaternion
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.geometry.quaternion import rotation_vector_to_quaternion
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.take import take_of
+from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import ball_skeleton
 from viewer.rig.smpl_family import FAMILY
-from viewer.rig.take import take_of
-from viewer.rig.timing import Timing
 
 GUESS = "taken for centimetres (skeleton 170 high); --unit sets it"
 TO_Z = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # y up to z up

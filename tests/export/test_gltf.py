@@ -28,10 +28,10 @@ import viewer
 from viewer.errors import OutputError, RigError
 from viewer.export import export, files_written
 from viewer.loading import bundled_body
+from viewer.rig.captures.points import PointLayout
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh
 from viewer.rig.morph_target import MorphTarget, with_morphs
-from viewer.rig.points import PointLayout
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import ball_skeleton
 from viewer.rig.skin import skin_from_lists

@@ -19,13 +19,13 @@ from viewer.export import EXPORTERS, MotionOptions, export_take
 from viewer.loading import bundled_body
 from viewer.rig.figure import Figure
 from viewer.rig.morph_target import MorphTarget, with_morphs
-from viewer.rig.motion import pose_of, world_frames
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.motion.evaluation import pose_of, world_frames
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.take import Take, take_of
+from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import ball_skeleton
 from viewer.rig.skinning import Skinning, deform
-from viewer.rig.take import Take, take_of
-from viewer.rig.timing import Timing
 
 LIMIT = "not held by glTF"
 ROOM = 3e-5  # metres: keys in single precision, one behind the other down a body's longest chain

@@ -12,10 +12,10 @@ from seamed import POSITIONS, seamed_actor
 
 from viewer.errors import RigError
 from viewer.export import MotionOptions, export_take
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.take import take_of
+from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor
-from viewer.rig.take import take_of
-from viewer.rig.timing import Timing
 
 ATOL = 1e-8  # lengths of 1 to 10: nine digits
 FILLED = {

@@ -19,18 +19,18 @@ from stretched import GROWTH, JOINTS, NAMES, POSITIONS, WEIGHTS, WORST, chain_ta
 
 import viewer
 from viewer.export import MotionOptions, export, export_take
-from viewer.rig.clip import Channel, Clip
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.mesh import Mesh
-from viewer.rig.motion import pose_of
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.motion.clip import Channel, Clip
+from viewer.rig.motion.evaluation import pose_of
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.take import Take, take_of, upright_take
+from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skeleton import ball_skeleton
 from viewer.rig.skin import skin_from_lists
 from viewer.rig.skinning import Skinning, deform
-from viewer.rig.take import Take, take_of, upright_take
-from viewer.rig.timing import Timing
-from viewer.rig.transform import translation_matrix
 
 TOLD = 5e-3  # three digits are told
 

@@ -16,8 +16,8 @@ import viewer
 from viewer.errors import OutputError, RigError, UnsupportedFormatError
 from viewer.export import export
 from viewer.rig.figure import Figure
-from viewer.rig.pose_record import PoseRecord, apply_record
-from viewer.rig.rotation import matrix_to_quaternion
+from viewer.rig.geometry.rotation import matrix_to_quaternion
+from viewer.rig.posing.pose_record import PoseRecord, apply_record
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import ball_skeleton
 from viewer.rig.skinning import Skinning, deform, joint_matrices

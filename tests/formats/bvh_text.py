@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from viewer.formats import Source, bvh
-from viewer.rig.skeleton_motion import SkeletonMotion
+from viewer.rig.motion.skeleton_motion import SkeletonMotion
 
 GOOD = """HIERARCHY
 ROOT Hips

@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from viewer.errors import FormatError
 from viewer.formats import Source, amass, detect, read
-from viewer.rig.body_motion import BodyMotion
-from viewer.rig.pose_record import PoseRecord
+from viewer.rig.motion.body_motion import BodyMotion
+from viewer.rig.posing.pose_record import PoseRecord
 from viewer.rig.smpl_family import FAMILY
 
 SMPLH, SMPLX, SMPL = FAMILY[52].names, FAMILY[55].names, FAMILY[24].names

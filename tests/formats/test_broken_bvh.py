@@ -13,7 +13,7 @@ from test_mutations import mutate
 
 from viewer.errors import FormatError, ViewerError
 from viewer.formats import Source, bvh
-from viewer.rig.motion import frames_of, world_frames
+from viewer.rig.motion.evaluation import frames_of, world_frames
 
 FRAMES = GOOD.partition("0.0333333\n")[2]
 

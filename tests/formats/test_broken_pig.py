@@ -8,7 +8,7 @@ from pig_text import GOOD, arrays, read, refusal, silent, write
 
 from viewer.errors import RigError
 from viewer.rig.pose import rest_pose
-from viewer.rig.pose_record import PoseRecord, apply_record
+from viewer.rig.posing.pose_record import PoseRecord, apply_record
 from viewer.rig.skinning import deform
 
 WEIGHTS = GOOD["skinning_weights.txt"]

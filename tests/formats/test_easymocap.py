@@ -8,7 +8,7 @@ from capture_files import body, opened, points, rows_of, waves, write_frames
 from numpy.testing import assert_array_equal
 
 from viewer.formats import Source, detect, read
-from viewer.rig.capture import Capture
+from viewer.rig.captures.capture import Capture
 from viewer.rig.smpl_family import FAMILY
 
 BODY = FAMILY[24].names[:22]

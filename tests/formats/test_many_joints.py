@@ -15,7 +15,7 @@ from viewer.rig.comparison.pairs import pair_names
 from viewer.rig.figure import Figure
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.pose import rest_pose
-from viewer.rig.pose_record import record_of
+from viewer.rig.posing.pose_record import record_of
 from viewer.rig.skeleton import ball_skeleton, dof_label, dof_labels, joint_labels
 
 FEW, MANY = 200, 800

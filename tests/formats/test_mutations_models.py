@@ -16,7 +16,7 @@ from viewer.errors import FormatError, RigError
 from viewer.formats import Source, read
 from viewer.rig.figure import Figure
 from viewer.rig.pose import rest_pose
-from viewer.rig.pose_record import PoseRecord, apply_record, record_of
+from viewer.rig.posing.pose_record import PoseRecord, apply_record, record_of
 from viewer.rig.skinning import deform, joint_matrices
 
 HEAD = model("flame", 16, 2, 1)

@@ -23,7 +23,7 @@ import viewer
 from viewer.formats import save_image
 from viewer.rig.mesh import split_seams
 from viewer.rig.pose import rest_pose
-from viewer.rig.pose_record import PoseRecord, apply_record
+from viewer.rig.posing.pose_record import PoseRecord, apply_record
 from viewer.rig.skinning import deform, joint_matrices
 
 EXACT = 1e-15  # metres; a rounding or two of numbers near 1

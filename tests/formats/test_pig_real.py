@@ -9,7 +9,7 @@ from viewer.errors import RigError
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.mesh import split_seams, volume
 from viewer.rig.pose import joint_rotations, rest_pose
-from viewer.rig.pose_record import PoseRecord, apply_record, record_of
+from viewer.rig.posing.pose_record import PoseRecord, apply_record, record_of
 from viewer.rig.skin import influence_counts, weight_sums
 from viewer.rig.skinning import deform, joint_matrices
 

@@ -12,10 +12,10 @@ from synthetic_smpl import model
 import viewer
 from viewer.errors import FormatError, UnsupportedFormatError
 from viewer.formats import Source, pose
+from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 from viewer.rig.hands import hand_vectors
 from viewer.rig.pose import joint_rotations, rest_pose
-from viewer.rig.pose_record import PoseRecord, apply_record, record_of
-from viewer.rig.rotation import rotation_vector_to_matrix
+from viewer.rig.posing.pose_record import PoseRecord, apply_record, record_of
 
 MODELS = {kind: model(kind, 32) for kind in ("smpl", "smplx", "flame", "mano")}
 

@@ -13,8 +13,8 @@ import viewer
 from viewer.errors import FormatError
 from viewer.formats import pose
 from viewer.formats._source import Source
-from viewer.rig.pose_record import PoseRecord
-from viewer.rig.pose_transfer import JointTurns
+from viewer.rig.posing.pose_record import PoseRecord
+from viewer.rig.retargeting.pose_transfer import JointTurns
 
 NAMES = ("root", "", "left knee", "knee", "knee")
 ROWS = np.array([[0.5, 0.5, 0.5, 0.5], [0, 0, 0, 1], [0.6, 0, 0, 0.8], [0, 1, 0, 0], [0, 0, -1, 0]])

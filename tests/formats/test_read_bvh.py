@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from viewer.formats import Source, detect
-from viewer.rig.motion import frames_of, world_frames
-from viewer.rig.skeleton_motion import SkeletonMotion
+from viewer.rig.motion.evaluation import frames_of, world_frames
+from viewer.rig.motion.skeleton_motion import SkeletonMotion
 
 
 def about(axis: int, degrees: float) -> np.ndarray:

@@ -17,7 +17,7 @@ from viewer.rig.blendshapes import Correctives
 from viewer.rig.figure import Figure
 from viewer.rig.hands import Hand
 from viewer.rig.mesh import Material, Mesh, vertex_normals
-from viewer.rig.pose_vector import PoseLayout
+from viewer.rig.posing.pose_vector import PoseLayout
 from viewer.rig.skeleton import ball_skeleton
 from viewer.rig.skin import skin_from_lists
 

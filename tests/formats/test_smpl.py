@@ -9,9 +9,9 @@ import viewer
 from viewer.errors import FormatError
 from viewer.formats import Source, smpl
 from viewer.rig.annotations import keypoint_positions
+from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 from viewer.rig.mesh import split_seams
 from viewer.rig.pose import rest_pose
-from viewer.rig.rotation import rotation_vector_to_matrix
 from viewer.rig.skinning import deform
 
 SMPL = model("smpl", 32)

@@ -10,7 +10,7 @@ from synthetic_smpl import model
 
 import viewer
 from viewer.rig.pose import rest_pose
-from viewer.rig.pose_record import PoseRecord, apply_record
+from viewer.rig.posing.pose_record import PoseRecord, apply_record
 from viewer.rig.skinning import deform, joint_matrices
 
 EXPECTED = np.load(Path(__file__).parents[1] / "data" / "smplx_expected.npz")

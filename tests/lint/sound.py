@@ -6,15 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.mesh import Mesh, vertex_normals
-from viewer.rig.points import PointClip, PointLayout
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skeleton import Skeleton
 from viewer.rig.skin import skin_from_lists
-from viewer.rig.timing import Timing
-from viewer.rig.transform import translation_matrix
 
 HEIGHTS = 5
 RATE = 30.0

@@ -10,7 +10,7 @@ from lint.sound import column, legs, scene_of, standing
 
 from viewer.app.playback import Playback
 from viewer.lint import Finding, LintOptions, lint_scene
-from viewer.rig.clip import Channel, Clip
+from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.scene import Actor, Scene
 
 

@@ -7,8 +7,8 @@ import pytest
 from lint.sound import column, legs, make_mesh
 
 from viewer.lint import MAX_TURN, LintOptions, Subject
+from viewer.rig.captures.points import PointLayout
 from viewer.rig.figure import Figure
-from viewer.rig.points import PointLayout
 from viewer.rig.scene import Actor
 
 

@@ -11,7 +11,7 @@ from lint.sound import FRAMES, RATE, legs, scene_of, standing
 
 from viewer.lint import Finding, LintOptions, lint_scene
 from viewer.lint._ground import Ground, ground_of
-from viewer.rig.timing import Timing
+from viewer.rig.motion.timing import Timing
 
 Change = Callable[[np.ndarray], np.ndarray]
 FLOORS = [0.0, 0.8, -0.95]

@@ -7,7 +7,7 @@ import pytest
 from lint.sound import column, keypoints, scene_of
 
 from viewer.lint import Finding, places_of, points_of
-from viewer.rig.rotation import rotation_vector_to_matrix
+from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 
 
 def about(**places: list[int]) -> Finding:

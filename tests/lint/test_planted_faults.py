@@ -21,13 +21,13 @@ from lint.sound import (
 )
 
 from viewer.lint import CODES, Finding, lint_scene
-from viewer.rig.clip import Channel, Clip
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh
+from viewer.rig.motion.clip import Channel, Clip
+from viewer.rig.motion.timing import Timing
 from viewer.rig.pose import rest_pose
 from viewer.rig.scene import Scene
 from viewer.rig.skin import Skin, skin_from_lists
-from viewer.rig.timing import Timing
 
 
 def lists(skin: Skin) -> list[list[tuple[int, float]]]:

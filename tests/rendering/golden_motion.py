@@ -13,15 +13,15 @@ from golden_scenes import LINES, Shot, options, posed_fox
 import viewer
 from viewer.loading import bundled_body
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.camera_view import CameraView
-from viewer.rig.clip import Channel, Clip
+from viewer.rig.captures.camera_view import CameraView
+from viewer.rig.captures.keypoint_layouts import keypoint_layout
+from viewer.rig.captures.points import PointClip
 from viewer.rig.figure import Figure
-from viewer.rig.keypoint_layouts import keypoint_layout
-from viewer.rig.motion import pose_actor
-from viewer.rig.points import PointClip
+from viewer.rig.motion.clip import Channel, Clip
+from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import joint_matrices
-from viewer.rig.timing import Timing
 
 # Where body25's points of somebody who walks are, metres, in the layout's order.
 _WALK = [

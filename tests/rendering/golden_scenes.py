@@ -13,7 +13,7 @@ from picture_metrics import OTHER_SSIM_ERROR
 import viewer
 from viewer.rendering.camera import VIEWS, Camera, fit
 from viewer.rendering.options import DisplayOptions, Light, Lights
-from viewer.rig.camera_view import CameraView
+from viewer.rig.captures.camera_view import CameraView
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Material, Mesh
 from viewer.rig.scene import Actor, Scene, scene_points

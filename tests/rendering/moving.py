@@ -7,9 +7,9 @@ import math
 import numpy as np
 from drawn_figures import arm
 
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor
-from viewer.rig.timing import Timing
 
 RATE, SPEED, MISSING = 10.0, 2.0, 5
 

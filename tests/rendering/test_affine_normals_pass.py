@@ -16,10 +16,10 @@ from viewer.rendering.program import Programs
 from viewer.rendering.skin_pass import PosedMesh
 from viewer.rendering.view import View
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.vectors import unit
 from viewer.rig.scene import Actor
 from viewer.rig.skin import Skin, skin_from_lists
 from viewer.rig.skinning import METHODS, Skinning
-from viewer.rig.vectors import unit
 
 HOW = [Skinning("lbs"), Skinning("dqs"), Skinning("mix", share=0.3)]
 assert {how.method for how in HOW} == set(METHODS)

@@ -21,10 +21,10 @@ from viewer.rendering.options import DisplayOptions
 from viewer.rendering.program import Programs
 from viewer.rendering.rest_buffers import WAYS
 from viewer.rendering.view import View
+from viewer.rig.captures.points import PointLayout
 from viewer.rig.figure import Figure
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.points import PointLayout
 from viewer.rig.scene import Actor, Scene, figure_pose, scene_box
 from viewer.rig.skinning import METHODS, Skinning
 

@@ -19,11 +19,11 @@ from viewer.rendering.framing import (
     outermost,
 )
 from viewer.rendering.recorder import Follow, Recording
+from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.figure import Figure
-from viewer.rig.motion import pose_actor
-from viewer.rig.points import PointClip, PointLayout
+from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor, Scene, scene_points
-from viewer.rig.timing import Timing
 
 ASPECT = 16 / 9
 LAYOUT = PointLayout("two", ("left_knee", "nose"), np.zeros((0, 2)), np.array([1, 0]))

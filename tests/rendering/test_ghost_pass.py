@@ -12,8 +12,8 @@ from front_view import PIXELS, drawn, front_view, pixel
 from viewer.rendering.ghost_pass import Ghost
 from viewer.rendering.offscreen import Offscreen
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.scene import Actor, Scene
-from viewer.rig.transform import translation_matrix
 
 BLUE = (0.0, 0.0, 1.0)
 

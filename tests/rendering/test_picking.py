@@ -15,8 +15,8 @@ from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.skin_pass import PosedMesh
 from viewer.rig.annotations import Keypoints, ReducedMesh
+from viewer.rig.captures.points import PointLayout
 from viewer.rig.figure import Figure
-from viewer.rig.points import PointLayout
 from viewer.rig.scene import Actor, Scene, scene_box
 
 

@@ -9,10 +9,10 @@ from front_view import PIXELS, drawn, front_view, pixel
 
 from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.point_pass import point_radii
+from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.figure import Figure
-from viewer.rig.points import PointClip, PointLayout
+from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor, Scene
-from viewer.rig.timing import Timing
 
 RADIUS = 0.2  # of the balls that are drawn here, 4 pixels
 

@@ -15,7 +15,7 @@ from viewer.rendering.camera import Camera
 from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.recorder import Follow, Progress, Recording, record
-from viewer.rig.motion import pose_actor
+from viewer.rig.motion.evaluation import pose_actor
 from viewer.rig.scene import Actor, Scene, scene_box
 
 SIZE = 64, 48

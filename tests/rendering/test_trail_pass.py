@@ -14,11 +14,11 @@ from viewer.rendering.camera import Camera
 from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.trail_pass import trail_colors
+from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.figure import Figure
-from viewer.rig.points import PointClip, PointLayout
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor, Scene
-from viewer.rig.timing import Timing
 
 PATH = ((0, 0),)
 

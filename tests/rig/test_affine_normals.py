@@ -7,12 +7,12 @@ from numpy.testing import assert_allclose
 
 import viewer
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.vectors import unit
 from viewer.rig.kinematics import is_rigid
 from viewer.rig.mesh import Mesh
 from viewer.rig.pose import rest_pose
 from viewer.rig.skin import skin_from_lists
 from viewer.rig.skinning import Skinning, deform, dqs, lbs, mix
-from viewer.rig.vectors import unit
 
 HOW = [Skinning("lbs"), Skinning("dqs"), Skinning("mix", share=0.4)]
 DIRECTIONS = unit(np.random.default_rng(0).normal(size=(200, 3)))

@@ -9,12 +9,12 @@ from hand_made import skeleton
 from numpy.testing import assert_allclose
 
 from viewer.errors import RigError
-from viewer.rig.body_motion import BodyMotion, body_clip, root_positions
 from viewer.rig.figure import Figure
-from viewer.rig.motion import frames_of, pose_of
+from viewer.rig.motion.body_motion import BodyMotion, body_clip, root_positions
+from viewer.rig.motion.evaluation import frames_of, pose_of
+from viewer.rig.motion.timing import Timing
 from viewer.rig.skinning import deform
 from viewer.rig.smpl_family import FAMILY
-from viewer.rig.timing import Timing
 
 ATOL = 1e-12  # metres: some hundred roundings of numbers near 1
 TURN, MOVE = np.array([0.7, -1.9, 0.4]), np.array([0.5, 2.0, -1.0])

@@ -9,7 +9,7 @@ import pytest
 
 import viewer
 from viewer.errors import RigError
-from viewer.rig.clip import (
+from viewer.rig.motion.clip import (
     EXTRAPOLATIONS,
     TANGENT_RULES,
     Channel,

@@ -6,8 +6,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from viewer.errors import RigError
-from viewer.rig.clip import Channel, Clip, evaluate, slopes
-from viewer.rig.clip_edit import (
+from viewer.rig.motion.clip import Channel, Clip, evaluate, slopes
+from viewer.rig.motion.clip_edit import (
     add_key,
     clip_from_frames,
     clip_from_pose,
@@ -22,7 +22,7 @@ from viewer.rig.clip_edit import (
     slope_at,
     with_channel,
 )
-from viewer.rig.clip_table import evaluate_all
+from viewer.rig.motion.clip_table import evaluate_all
 from viewer.rig.pose import rest_pose
 
 ROWS = [(0, kind, 0.0) for kind in ("tx", "ty", "tz", "x", "y")] + [(0, "z", 0.0, -1.0, 1.0)]

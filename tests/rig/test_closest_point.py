@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from viewer.errors import RigError
-from viewer.rig.closest_point import Surface, SurfacePoints, interpolate
+from viewer.rig.geometry.closest_point import Surface, SurfacePoints, interpolate
 
 sparse = pytest.importorskip("scipy.sparse")
 

@@ -12,12 +12,12 @@ from numpy.testing import assert_allclose
 from viewer.errors import RigError
 from viewer.rig.comparison import compare, rotation_distance
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.rotation import axis_rotations
 from viewer.rig.mesh import Mesh
-from viewer.rig.rotation import axis_rotations
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor
 from viewer.rig.skin import skin_from_lists
-from viewer.rig.timing import Timing
 
 CORNERS = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
 TWO = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)

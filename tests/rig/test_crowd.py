@@ -8,18 +8,18 @@ from hand_made import skeleton
 
 import viewer
 from viewer.loading import bundled_body
-from viewer.rig.clip import Channel, Clip
-from viewer.rig.crowd import local_rotations, palettes, placements, pose_actors, worlds
+from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.figure import Figure
 from viewer.rig.kinematics import skinning_matrices, world_matrices
-from viewer.rig.motion import pose_actor
-from viewer.rig.points import PointClip, PointLayout
+from viewer.rig.motion.clip import Channel, Clip
+from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.motion.instances import local_rotations, palettes, placements, pose_actors, worlds
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.timing import Timing
 from viewer.rig.pose import Pose, joint_rotations, placement_matrix, rest_pose
-from viewer.rig.sampled_clip import SampledClip
 from viewer.rig.scene import Actor, figure_pose
 from viewer.rig.shape import shaped
 from viewer.rig.skeleton import Skeleton
-from viewer.rig.timing import Timing
 
 EXACT = 1e-13  # the same products, summed in another order
 

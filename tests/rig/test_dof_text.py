@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from lint.sound import make_skeleton
 
-from viewer.rig.dof_text import beyond_text, dof_value_text
+from viewer.rig.posing.dof_text import beyond_text, dof_value_text
 from viewer.rig.skeleton import Skeleton
 
 

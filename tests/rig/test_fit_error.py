@@ -5,9 +5,9 @@ import pytest
 from hand_made import mesh, skeleton
 from numpy.testing import assert_allclose
 
+from viewer.rig.captures.fit_error import fitted_body, keypoint_distances
+from viewer.rig.captures.keypoint_layouts import keypoint_layout
 from viewer.rig.figure import Figure
-from viewer.rig.fit_error import fitted_body, keypoint_distances
-from viewer.rig.keypoint_layouts import keypoint_layout
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import ball_skeleton
 

@@ -10,13 +10,13 @@ from hand_made import matrix, mesh, turn_y, turn_z
 
 import viewer
 from viewer.loading import bundled_body
+from viewer.rig.captures.points import PointLayout
 from viewer.rig.figure import Figure
-from viewer.rig.front import front_axes, guess_front, usual_front
-from viewer.rig.points import PointLayout
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.inspection.front import front_axes, guess_front, usual_front
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skeleton import ball_skeleton
-from viewer.rig.timing import Timing
 
 # A quarter turn takes each axis to the next: about y, +z to +x; about z, -y to +x.
 CYCLES = {"y": ("+z", "+x", "-z", "-x"), "z": ("-y", "+x", "+y", "-x")}

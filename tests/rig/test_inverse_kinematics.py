@@ -9,9 +9,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from viewer.errors import RigError
-from viewer.rig.inverse_kinematics import chain_above, place_jacobian, reach
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.pose import rest_pose
+from viewer.rig.posing.inverse_kinematics import chain_above, place_jacobian, reach
 from viewer.rig.skeleton import Skeleton, ball_skeleton
 
 NO_LIMIT = (-np.inf, np.inf)

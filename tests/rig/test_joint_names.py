@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from viewer.rig.joint_names import canonical_names, plain_names
+from viewer.rig.retargeting.joint_names import canonical_names, plain_names
 from viewer.rig.smpl_family import FAMILY
 
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from viewer.rig.joint_turning import nearest_dofs, rotation_dofs, turns_freely
 from viewer.rig.pose import joint_rotations, rest_pose
+from viewer.rig.posing.joint_rotation import nearest_dofs, rotation_dofs, turns_freely
 from viewer.rig.skeleton import Skeleton
 
 FREE = (-np.inf, np.inf)

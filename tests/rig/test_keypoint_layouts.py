@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 
 from viewer.errors import RigError
-from viewer.rig.keypoint_layouts import TITLES, joined_layout, keypoint_layout, matching_joints
+from viewer.rig.captures.keypoint_layouts import (
+    TITLES,
+    joined_layout,
+    keypoint_layout,
+    matching_joints,
+)
 from viewer.rig.smpl_family import FAMILY
 
 

@@ -5,13 +5,13 @@ from numpy.testing import assert_allclose
 
 from viewer.errors import RigError
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.vectors import unit
 from viewer.rig.mesh import Mesh
 from viewer.rig.pose import rest_pose
 from viewer.rig.skin import skin_from_lists
 from viewer.rig.skinning import METHODS, deform
 from viewer.rig.skinning.lbs import blended_matrices
 from viewer.rig.skinning.lbs import deform as lbs
-from viewer.rig.vectors import unit
 
 RIGID = [matrix(turn_x(0.8), (1, 2, 3)), matrix(turn_z(-2.0), (-4, 0, 1)), np.eye(4)]
 PALETTE = np.array(RIGID)

@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose
 
 from viewer.errors import RigError
 from viewer.rig.figure import Figure
-from viewer.rig.mirror import asymmetry, joint_partners, mirror_axis, mirror_pose
 from viewer.rig.pose import joint_rotations, rest_pose
+from viewer.rig.retargeting.mirror import asymmetry, joint_partners, mirror_axis, mirror_pose
 from viewer.rig.skeleton import ball_skeleton
 from viewer.rig.skin import skin_from_lists
 from viewer.rig.skinning import deform

@@ -10,7 +10,7 @@ from viewer.rig.arrays import Deferred
 from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.figure import Figure
 from viewer.rig.morph_target import MorphTarget, with_morphs
-from viewer.rig.pose_record import apply_record, record_of
+from viewer.rig.posing.pose_record import apply_record, record_of
 from viewer.rig.scene import figure_pose
 from viewer.rig.shape import rest_joints, shaped
 from viewer.rig.skin import skin_from_lists

@@ -5,12 +5,12 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from viewer.errors import RigError
+from viewer.rig.captures.point_take import upright_point_take
+from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.figure import Figure
-from viewer.rig.point_take import upright_point_take
-from viewer.rig.points import PointClip, PointLayout
+from viewer.rig.geometry.transform import rotation_transform
+from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor, Scene
-from viewer.rig.timing import Timing
-from viewer.rig.transform import rotation_transform
 
 LAYOUT = PointLayout("two", ("a", "b"), np.array([[0, 1]]), np.array([-1, 1]))
 POINTS = np.array(

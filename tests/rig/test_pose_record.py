@@ -10,8 +10,8 @@ from numpy.testing import assert_allclose
 from viewer.errors import RigError
 from viewer.rig.figure import Figure
 from viewer.rig.pose import Pose, joint_rotations, pose_key, rest_pose
-from viewer.rig.pose_record import PoseRecord, apply_record, record_of
-from viewer.rig.pose_vector import own_numbers
+from viewer.rig.posing.pose_record import PoseRecord, apply_record, record_of
+from viewer.rig.posing.pose_vector import own_numbers
 from viewer.rig.scene import figure_pose
 
 

@@ -10,16 +10,16 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from viewer.errors import RigError
 from viewer.rig.blendshapes import BlendShapes
-from viewer.rig.clip import Clip
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.rotation import axis_rotations
+from viewer.rig.geometry.transform import rotation_transform
 from viewer.rig.mesh import Mesh
-from viewer.rig.motion import world_frames
-from viewer.rig.pose_take import pose_take, posed_take
-from viewer.rig.rotation import axis_rotations
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.evaluation import world_frames
+from viewer.rig.motion.pose_take import pose_take, posed_take
+from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skeleton import Skeleton, ball_skeleton
-from viewer.rig.transform import rotation_transform
 
 PLACES = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
 ATOL = 1e-12  # lengths of 1 to 10: rounding

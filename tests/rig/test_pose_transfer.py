@@ -12,8 +12,13 @@ from viewer.errors import RigError
 from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.figure import Figure
 from viewer.rig.pose import joint_rotations, pose_key, rest_pose
-from viewer.rig.pose_record import apply_record, record_of
-from viewer.rig.pose_transfer import dof_layout, joint_turns, joints_by_name, turn_joints
+from viewer.rig.posing.pose_record import apply_record, record_of
+from viewer.rig.retargeting.pose_transfer import (
+    dof_layout,
+    joint_turns,
+    joints_by_name,
+    turn_joints,
+)
 from viewer.rig.skeleton import Skeleton
 
 HALF = np.sqrt(0.5)

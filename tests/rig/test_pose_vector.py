@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from viewer.errors import RigError
 from viewer.rig.pose import joint_rotations, rest_pose
-from viewer.rig.pose_vector import (
+from viewer.rig.posing.pose_vector import (
     PoseLayout,
     own_numbers,
     read_vector,

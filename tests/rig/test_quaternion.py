@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from viewer.rig.quaternion import multiply, rotation_vector_to_quaternion, slerp
-from viewer.rig.rotation import quaternion_to_matrix, rotation_vector_to_matrix
+from viewer.rig.geometry.quaternion import multiply, rotation_vector_to_quaternion, slerp
+from viewer.rig.geometry.rotation import quaternion_to_matrix, rotation_vector_to_matrix
 
 RANDOM = np.random.default_rng(5)
 
@@ -80,7 +80,7 @@ def test_slerp_agrees_with_the_power_of_the_rotation_between():
         axis /= np.linalg.norm(axis)
         share = RANDOM.uniform()
         wanted = a @ rotation_vector_to_matrix(share * angle * axis)
-        from viewer.rig.rotation import matrix_to_quaternion
+        from viewer.rig.geometry.rotation import matrix_to_quaternion
 
         found = slerp(matrix_to_quaternion(a), matrix_to_quaternion(b), share)
         assert_allclose(quaternion_to_matrix(found), wanted, atol=1e-12)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from viewer.rig.ray_hit import first_hit, surface_point
+from viewer.rig.geometry.ray_hit import first_hit, surface_point
 
 # A unit square at z = 0, and the same at z = 1 with its corners the other way round.
 POSITIONS = np.array(
@@ -57,6 +57,6 @@ def test_edges_have_no_gap():
 
 
 def test_many_triangles_are_looked_at_in_parts(monkeypatch):
-    monkeypatch.setattr("viewer.rig.ray_hit._AT_ONCE", 1)
+    monkeypatch.setattr("viewer.rig.geometry.ray_hit._AT_ONCE", 1)
     hit = first_hit(POSITIONS, TRIANGLES, np.array([0.25, 0.75, 3.0]), DOWN)
     assert (hit.triangle, hit.distance) == (3, 2.0)

@@ -10,12 +10,12 @@ import pytest
 from viewer.errors import RigError
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh
-from viewer.rig.motion import frames_of, world_frames
-from viewer.rig.retarget import retarget, scaled_motion
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.motion.evaluation import frames_of, world_frames
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.skeleton_motion import SkeletonMotion
+from viewer.rig.motion.timing import Timing
+from viewer.rig.retargeting.retarget import retarget, scaled_motion
 from viewer.rig.skeleton import ball_skeleton
-from viewer.rig.skeleton_motion import SkeletonMotion
-from viewer.rig.timing import Timing
 
 # A T-pose in centimetres, as mocap programs name it: name, parent, place.
 HIK = {

@@ -3,7 +3,7 @@ import pytest
 from hand_made import turn_x, turn_y, turn_z
 from numpy.testing import assert_allclose
 
-from viewer.rig.rotation import axis_rotations, quaternion_to_matrix
+from viewer.rig.geometry.rotation import axis_rotations, quaternion_to_matrix
 
 ROUNDING = 1e-15  # a few units in the last place of numbers up to 1
 

@@ -5,7 +5,7 @@ import pytest
 from hand_made import turn_x, turn_y, turn_z
 from numpy.testing import assert_allclose
 
-from viewer.rig.rotation import (
+from viewer.rig.geometry.rotation import (
     matrix_to_euler,
     matrix_to_quaternion,
     matrix_to_rotation_vector,

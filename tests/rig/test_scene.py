@@ -2,8 +2,8 @@ import numpy as np
 from hand_made import mesh, skeleton
 
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.scene import Actor, Scene, actor_points, scene_box
-from viewer.rig.transform import translation_matrix
 
 
 def cloud(points) -> Actor:

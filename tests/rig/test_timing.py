@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from viewer.errors import RigError
-from viewer.rig.timing import Timing
+from viewer.rig.motion.timing import Timing
 
 # Four frames a second from second 1: 1.0, 1.25, (1.5 and 1.75 missing), 2.0, 2.25
 GAP = Timing(4.0, np.array([0, 1, -1, -1, 2, 3]), first_frame=7, start=1.0)

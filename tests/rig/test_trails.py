@@ -7,13 +7,13 @@ import pytest
 from hand_made import skeleton
 
 from viewer.errors import RigError
-from viewer.rig.clip import Channel, Clip
+from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.figure import Figure
-from viewer.rig.points import PointClip, PointLayout
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.motion.clip import Channel, Clip
+from viewer.rig.motion.motion_paths import segments, trail, trail_times
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import figure_pose
-from viewer.rig.timing import Timing
-from viewer.rig.trails import segments, trail, trail_times
 
 STILL = [0.0, 0.0, 0.0, 1.0]
 QUARTER = [0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)]  # about z

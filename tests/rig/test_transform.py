@@ -1,7 +1,7 @@
 import numpy as np
 from hand_made import matrix, turn_z
 
-from viewer.rig.transform import apply_transform, translation_matrix
+from viewer.rig.geometry.transform import apply_transform, translation_matrix
 
 
 def test_translation_matrix_has_the_offset_in_its_last_column():

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from family_models import family_figure
 
-from viewer.rig.body_motion import BodyMotion, body_clip
-from viewer.rig.clip import Clip
+from viewer.rig.captures.keypoint_layouts import keypoint_layout
+from viewer.rig.captures.points import PointClip
 from viewer.rig.figure import Figure
-from viewer.rig.keypoint_layouts import keypoint_layout
-from viewer.rig.points import PointClip
+from viewer.rig.motion.body_motion import BodyMotion, body_clip
+from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.timing import Timing
+from viewer.rig.motion.up_axis import guess_up
 from viewer.rig.scene import Actor
-from viewer.rig.timing import Timing
-from viewer.rig.up_axis import guess_up
 
 
 @pytest.fixture(scope="module")

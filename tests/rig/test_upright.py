@@ -10,15 +10,15 @@ from numpy.testing import assert_allclose
 import viewer
 from viewer.loading import bundled_body
 from viewer.rig.figure import Figure
-from viewer.rig.motion import pose_of
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.geometry.transform import rotation_transform
+from viewer.rig.motion.evaluation import pose_of
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.take import upright_take
+from viewer.rig.motion.timing import Timing
+from viewer.rig.motion.upright import own_up, upright_actor
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skeleton import ball_skeleton
 from viewer.rig.skinning import deform
-from viewer.rig.take import upright_take
-from viewer.rig.timing import Timing
-from viewer.rig.transform import rotation_transform
-from viewer.rig.upright import own_up, upright_actor
 
 OVER = np.array([1.0, -1.0, -1.0])
 
@@ -116,7 +116,7 @@ def test_one_pose_is_the_frame_of_the_motion():
     actor.placement = rotation_transform(0, np.pi)
     scene = Scene([actor], world_up="z")
     take, up = upright_take(scene, actor)
-    viewer.rig.motion.pose_actor(actor, 0.0)
+    viewer.rig.motion.evaluation.pose_actor(actor, 0.0)
     found = upright_actor(scene, actor)
     assert (up, found.figure.up) == ("z", "z")
     framed = pose_of(actor.figure, take.frames, 0)

@@ -13,12 +13,12 @@ from viewer.errors import RigError
 from viewer.rig.annotations import BodyParts
 from viewer.rig.blendshapes import BlendShapes, Correctives
 from viewer.rig.figure import Figure
+from viewer.rig.inspection.single_vertices import deform_vertices
+from viewer.rig.inspection.vertex_facts import facts_text, nearest_corner, vertex_facts
 from viewer.rig.mesh import Mesh
 from viewer.rig.pose import rest_pose
-from viewer.rig.single_vertices import deform_vertices
 from viewer.rig.skin import skin_from_lists
 from viewer.rig.skinning import Skinning, deform
-from viewer.rig.vertex_facts import facts_text, nearest_corner, vertex_facts
 
 POINTS = [[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
 ROWS = [[(0, 0.2), (1, 0.5), (0, 0.1), (2, 0.0), (3, 0.2)], [(2, 1.0)], [], [(0, 0.5), (1, 0.5)]]

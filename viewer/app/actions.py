@@ -14,8 +14,8 @@ from viewer.rendering.camera import Camera, camera_from_view, look_from
 from viewer.rendering.options import SHOWN, Lights
 from viewer.rendering.picking import Pick
 from viewer.rendering.pinhole import distortion_error
-from viewer.rig.follow import followed_point
-from viewer.rig.front import Front
+from viewer.rig.inspection.front import Front
+from viewer.rig.motion.follow import followed_point
 from viewer.rig.number_text import number_text
 from viewer.rig.pose import rest_pose
 from viewer.rig.scene import Actor

@@ -8,8 +8,8 @@ from viewer.app.file_dialog import FileDialog, folder_of
 from viewer.app.pose_actions import save_files
 from viewer.app.state import AppState
 from viewer.formats import FORMATS, file_stem, write
-from viewer.rig.clip import Clip
-from viewer.rig.clip_edit import clip_from_pose, key_pose
+from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.clip_edit import clip_from_pose, key_pose
 from viewer.rig.number_text import number_text
 
 __all__ = ["ask_for_clip", "can_have_keys", "key_present_pose", "new_clip", "save_clip"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from viewer.app.state import AppState
-from viewer.rig.clip import Clip
+from viewer.rig.motion.clip import Clip
 
 __all__ = ["pause_for_edit"]
 

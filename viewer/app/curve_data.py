@@ -8,12 +8,12 @@ import numpy as np
 
 from viewer.errors import printable
 from viewer.rig.arrays import Floats
-from viewer.rig.clip import Channel, Clip
-from viewer.rig.clip_table import evaluate_all
+from viewer.rig.captures.points import PointClip, PointLayout
+from viewer.rig.geometry.rotation import matrix_to_euler, quaternion_to_matrix
 from viewer.rig.memo import Memo
-from viewer.rig.points import PointClip, PointLayout
-from viewer.rig.rotation import matrix_to_euler, quaternion_to_matrix
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.motion.clip import Channel, Clip
+from viewer.rig.motion.clip_table import evaluate_all
+from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_labels
 

@@ -10,8 +10,8 @@ import numpy as np
 from viewer.app.curve_data import channel_of, keyed_values
 from viewer.app.curve_view import CurveView, KeyPlace
 from viewer.app.state import AppState
-from viewer.rig.clip import Channel, Clip, Extrapolation, Tangent
-from viewer.rig.clip_edit import (
+from viewer.rig.motion.clip import Channel, Clip, Extrapolation, Tangent
+from viewer.rig.motion.clip_edit import (
     add_key,
     delete_keys,
     move_keys,

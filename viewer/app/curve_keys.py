@@ -19,7 +19,7 @@ from viewer.app.curve_edit import (
 )
 from viewer.app.curve_view import KeyPlace
 from viewer.rig.arrays import Floats
-from viewer.rig.clip import Channel, Clip, slopes
+from viewer.rig.motion.clip import Channel, Clip, slopes
 from viewer.rig.number_text import number_text
 
 __all__ = ["draw_keys", "edit"]

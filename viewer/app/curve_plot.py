@@ -16,9 +16,9 @@ from viewer.app.curve_edit import set_clip_range
 from viewer.app.curve_keys import draw_keys, edit
 from viewer.app.state import AppState
 from viewer.rig.arrays import Floats
-from viewer.rig.clip import Clip
-from viewer.rig.points import PointClip
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.captures.points import PointClip
+from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.sampled_clip import SampledClip
 
 __all__ = ["draw_plot"]
 

@@ -20,9 +20,9 @@ from viewer.app.snapshot import (
     same_pose,
 )
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.points import PointClip
+from viewer.rig.captures.points import PointClip
+from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.pose import Pose
-from viewer.rig.sampled_clip import SampledClip
 from viewer.rig.scene import Actor, Motion, Scene
 
 if TYPE_CHECKING:

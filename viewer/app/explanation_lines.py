@@ -14,11 +14,11 @@ from viewer.rendering.projection import picture_scale, project
 from viewer.rendering.segments import Manner, Segments, dots, joined
 from viewer.rendering.view import view_of
 from viewer.rig.arrays import Bytes, Floats
-from viewer.rig.explanation import Explanation
+from viewer.rig.geometry.transform import apply_transform
+from viewer.rig.inspection.explanation import Explanation
 from viewer.rig.memo import Memo
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import Skeleton
-from viewer.rig.transform import apply_transform
 
 __all__ = ["draw_hovered", "influence_colors", "pinned_annotations", "vertex_annotation"]
 

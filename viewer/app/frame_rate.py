@@ -6,8 +6,8 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from viewer.rig.points import PointClip
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.captures.points import PointClip
+from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.scene import Actor
 
 if TYPE_CHECKING:

@@ -23,7 +23,7 @@ from viewer.app.rotate_tool import RADIUS, Ring, TurnHandle, circle, limit_text,
 from viewer.app.state import AppState
 from viewer.app.view_frame import ViewFrame, view_frame
 from viewer.rig.arrays import Floats
-from viewer.rig.rotation import rotation_vector_to_matrix
+from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 from viewer.rig.skeleton import joint_label
 
 __all__ = ["draw_gizmo"]

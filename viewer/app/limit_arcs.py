@@ -14,10 +14,10 @@ import numpy as np
 
 from viewer.app.posed_joint import PosedJoint
 from viewer.rig.arrays import Floats
-from viewer.rig.inverse_kinematics import rotation_axes
-from viewer.rig.joint_turning import rotation_dofs
+from viewer.rig.geometry.vectors import unit
 from viewer.rig.pose import Pose
-from viewer.rig.vectors import unit
+from viewer.rig.posing.inverse_kinematics import rotation_axes
+from viewer.rig.posing.joint_rotation import rotation_dofs
 
 __all__ = ["LimitArc", "arc_points", "limit_arcs"]
 

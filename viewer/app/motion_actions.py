@@ -18,9 +18,9 @@ from viewer.export import (
 )
 from viewer.export._motion_paths import motion_paths
 from viewer.formats import all_or_none, check_folder_target, check_targets
-from viewer.rig.clip import Clip
-from viewer.rig.points import PointClip
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.captures.points import PointClip
+from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.scene import Actor, Scene
 
 _MANY = (".obj",)  # a file for each frame: the command line writes them

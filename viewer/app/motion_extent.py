@@ -11,11 +11,11 @@ from viewer.app.playback import Playback
 from viewer.rendering.framing import frames_looked_at, outermost
 from viewer.rendering.recorder import copied
 from viewer.rig.arrays import Floats
-from viewer.rig.crowd import pose_actors
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import bounding_box
+from viewer.rig.motion.instances import pose_actors
+from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.pose import Pose
-from viewer.rig.sampled_clip import SampledClip
 from viewer.rig.scene import Actor, Scene, scene_points
 
 __all__ = ["MotionExtent"]

@@ -16,9 +16,9 @@ from viewer.app.posing import Outcome
 from viewer.app.view_frame import Place, ViewFrame
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
-from viewer.rig.inverse_kinematics import chain_above, reach
 from viewer.rig.number_text import number_text
 from viewer.rig.pose import Pose
+from viewer.rig.posing.inverse_kinematics import chain_above, reach
 from viewer.rig.skeleton import Skeleton, joint_label
 
 __all__ = [

@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from viewer.rig.clip import Clip
-from viewer.rig.crowd import pose_actors
-from viewer.rig.motion import DEFAULT_RATE, time_span
+from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.evaluation import DEFAULT_RATE, time_span
+from viewer.rig.motion.instances import pose_actors
 from viewer.rig.scene import Actor, Scene
 
 __all__ = ["FASTEST", "MODES", "Playback"]

@@ -14,11 +14,11 @@ from viewer.app.state import AppState
 from viewer.errors import ViewerError, printable
 from viewer.export import export, files_written
 from viewer.formats import Source, check_targets, write
-from viewer.rig.mirror import mirror_pose
-from viewer.rig.pose_record import PosePartError, PoseRecord, apply_record, record_of
-from viewer.rig.pose_vector import write_vector
+from viewer.rig.motion.upright import upright_actor
+from viewer.rig.posing.pose_record import PosePartError, PoseRecord, apply_record, record_of
+from viewer.rig.posing.pose_vector import write_vector
+from viewer.rig.retargeting.mirror import mirror_pose
 from viewer.rig.scene import figure_pose
-from viewer.rig.upright import upright_actor
 
 __all__ = [
     "copy_numbers",

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from viewer.rig.arrays import Floats
+from viewer.rig.geometry.rotation import nearest_rotations
+from viewer.rig.geometry.vectors import unit
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.pose import Pose, placement_matrix
-from viewer.rig.rotation import nearest_rotations
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
 from viewer.rig.skeleton import Skeleton
-from viewer.rig.vectors import unit
 
 __all__ = ["PosedJoint", "posed_joint"]
 

@@ -8,8 +8,8 @@ from viewer.app.posed_joint import PosedJoint, posed_joint
 from viewer.app.posing import ORIENTATIONS, TOOLS
 from viewer.app.reasons import no_pose
 from viewer.app.state import AppState
-from viewer.rig.clip import Clip
-from viewer.rig.joint_turning import rotation_dofs, turns_freely
+from viewer.rig.motion.clip import Clip
+from viewer.rig.posing.joint_rotation import rotation_dofs, turns_freely
 from viewer.rig.skeleton import joint_label
 
 __all__ = [

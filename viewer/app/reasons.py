@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from viewer.app.state import AppState
-from viewer.rig.clip import Clip
 from viewer.rig.memo import Memo
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.scene import Motion
 
 __all__ = [

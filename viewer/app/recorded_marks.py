@@ -11,7 +11,7 @@ from viewer.app.state import AppState
 from viewer.lint import Finding, places_of
 from viewer.rendering.annotation import Annotation
 from viewer.rendering.marks import mark_annotation
-from viewer.rig.explanation import explain
+from viewer.rig.inspection.explanation import explain
 from viewer.rig.scene import Scene
 
 __all__ = ["RecordedMarks"]

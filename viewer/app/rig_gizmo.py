@@ -23,8 +23,8 @@ from viewer.app.rig_view import Template
 from viewer.app.state import AppState
 from viewer.app.view_frame import view_frame
 from viewer.rig.arrays import Floats
+from viewer.rig.geometry.transform import apply_transform, translation_matrix
 from viewer.rig.mesh import bounding_box
-from viewer.rig.transform import apply_transform, translation_matrix
 
 __all__ = ["RADIUS", "use_gizmo"]
 

@@ -18,9 +18,9 @@ from viewer.app.rig_view import Landmark, Template
 from viewer.app.state import AppState
 from viewer.app.view_frame import ViewFrame, view_frame
 from viewer.rig.arrays import Floats
+from viewer.rig.geometry.ray_hit import RayHit, first_hit, surface_point
+from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.mesh import Mesh
-from viewer.rig.ray_hit import RayHit, first_hit, surface_point
-from viewer.rig.transform import apply_transform
 
 __all__ = ["draw_landmarks", "show_both", "take_click"]
 

@@ -11,14 +11,14 @@ from viewer.rendering.camera import camera_axes
 from viewer.rendering.ghost_pass import Ghost
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.rotation import nearest_rotations
+from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.mesh import Mesh, bounding_box, box_size
 from viewer.rig.pose import placement_matrix, pose_key
-from viewer.rig.rotation import nearest_rotations
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import deform
 from viewer.rig.transfer.alignment import AlignmentSettings
 from viewer.rig.transfer.similarity import Similarity
-from viewer.rig.transform import translation_matrix
 
 __all__ = [
     "as_similarity",

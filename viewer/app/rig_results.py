@@ -16,10 +16,10 @@ from viewer.export._rigged_files import files_of, write_rigged
 from viewer.formats import check_targets
 from viewer.rig.annotations import VertexField
 from viewer.rig.arrays import Floats, Ints
-from viewer.rig.clip import Clip
 from viewer.rig.comparison.pairs import Pairs
 from viewer.rig.comparison.weights import row_distances
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.scene import Actor, figure_pose
 from viewer.rig.skin import Skin, owners
 from viewer.rig.transfer.rigged import clip_for

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from viewer.app.state import AppState
     from viewer.rendering.ghost_pass import Ghost
     from viewer.rig.figure import Figure
+    from viewer.rig.geometry.ray_hit import RayHit
     from viewer.rig.pose import Pose
-    from viewer.rig.ray_hit import RayHit
     from viewer.rig.scene import Actor, Motion, Scene
     from viewer.rig.transfer.alignment import Alignment, AlignmentSettings
     from viewer.rig.transfer.rigged import Rigged

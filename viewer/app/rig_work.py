@@ -33,8 +33,8 @@ from viewer.app.state import AppState
 from viewer.errors import RigError, printable
 from viewer.loading import load
 from viewer.rig.arrays import Floats
+from viewer.rig.geometry.ray_hit import surface_point
 from viewer.rig.mesh import Mesh
-from viewer.rig.ray_hit import surface_point
 from viewer.rig.scene import Actor, free_title
 from viewer.rig.transfer.alignment import AlignmentSettings
 from viewer.rig.transfer.pipeline import transfer

@@ -16,13 +16,13 @@ from viewer.app.posed_joint import PosedJoint
 from viewer.app.posing import Outcome
 from viewer.app.view_frame import Place, ViewFrame
 from viewer.rig.arrays import Floats
-from viewer.rig.inverse_kinematics import rotation_axes
-from viewer.rig.joint_turning import nearest_dofs, rotation_dofs, turns_freely
+from viewer.rig.geometry.rotation import rotation_vector_to_matrix
+from viewer.rig.geometry.vectors import unit
 from viewer.rig.number_text import angle_text
 from viewer.rig.pose import Pose, joint_rotations
-from viewer.rig.rotation import rotation_vector_to_matrix
+from viewer.rig.posing.inverse_kinematics import rotation_axes
+from viewer.rig.posing.joint_rotation import nearest_dofs, rotation_dofs, turns_freely
 from viewer.rig.skeleton import Skeleton, dof_label, joint_label
-from viewer.rig.vectors import unit
 
 __all__ = [
     "RADIUS",

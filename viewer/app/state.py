@@ -23,7 +23,7 @@ from viewer.rendering.camera import Camera, front_azimuth, orbit
 from viewer.rendering.legend import Legend
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.arrays import Floats
-from viewer.rig.front import Front, guess_front
+from viewer.rig.inspection.front import Front, guess_front
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.scene import Actor, Scene, scene_points
 

@@ -9,10 +9,10 @@ from collections.abc import Callable, Sequence
 from viewer.app.frame_rate import with_rate
 from viewer.errors import ViewerError
 from viewer.loading.capturing import Builder
-from viewer.rig.capture import CapturePart
-from viewer.rig.motion import frame_rate
-from viewer.rig.points import PointClip
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.captures.capture import CapturePart
+from viewer.rig.captures.points import PointClip
+from viewer.rig.motion.evaluation import frame_rate
+from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.scene import Actor
 
 __all__ = ["Stream"]

@@ -13,7 +13,7 @@ from viewer.app.srgb import encode_srgb
 from viewer.app.state import AppState
 from viewer.app.widgets import note_item
 from viewer.errors import printable
-from viewer.rig.clip import Clip
+from viewer.rig.motion.clip import Clip
 from viewer.rig.scene import Actor, Motion
 
 __all__ = ["bars", "draw_tracks", "nice_step", "present_spans", "ruler_text_place"]

@@ -8,7 +8,7 @@ import numpy as np
 
 from viewer.app.state import AppState
 from viewer.rig.arrays import Floats
-from viewer.rig.vectors import unit
+from viewer.rig.geometry.vectors import unit
 
 __all__ = ["ViewFrame", "view_frame"]
 

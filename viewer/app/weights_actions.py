@@ -7,7 +7,7 @@ from viewer.app.shown_panels import is_open, set_open
 from viewer.app.state import AppState
 from viewer.app.weights_view import Pinned
 from viewer.errors import printable
-from viewer.rig.explanation import Explanation, explain
+from viewer.rig.inspection.explanation import Explanation, explain
 from viewer.rig.pose import pose_key
 from viewer.rig.scalars import (
     SCALARS,

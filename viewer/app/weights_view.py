@@ -13,7 +13,7 @@ from viewer.rig.figure import Figure
 
 if TYPE_CHECKING:
     from viewer.rendering.annotation import Annotation
-    from viewer.rig.explanation import Explanation
+    from viewer.rig.inspection.explanation import Explanation
 
 __all__ = ["Hover", "Pinned", "WeightsView", "wants_vertex"]
 

@@ -36,7 +36,7 @@ from viewer.loading.capturing import Builder  # noqa: E402
 from viewer.rendering.camera import Camera, facing_camera  # noqa: E402
 from viewer.rendering.context import explain  # noqa: E402
 from viewer.rendering.options import DisplayOptions  # noqa: E402
-from viewer.rig.front import guess_front  # noqa: E402
+from viewer.rig.inspection.front import guess_front  # noqa: E402
 from viewer.rig.mesh import bounding_box  # noqa: E402
 from viewer.rig.scene import Scene, scene_points  # noqa: E402
 

@@ -11,9 +11,9 @@ from viewer.errors import RigError, ViewerError, printable
 from viewer.export import MotionOptions, export_take, take_for
 from viewer.loading import MotionSettings, load
 from viewer.models import resolve
-from viewer.rig.clip import Clip, is_course_rig
 from viewer.rig.figure import Figure
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.motion.clip import Clip, is_course_rig
+from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.scene import Actor, Scene, figure_pose
 from viewer.rig.transfer.rigged import Rigged, clip_for
 

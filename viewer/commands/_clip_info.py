@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from viewer.errors import printable
-from viewer.rig.clip import Clip
+from viewer.rig.captures.points import PointClip
+from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.timing import Timing
 from viewer.rig.number_text import number_text
-from viewer.rig.points import PointClip
-from viewer.rig.sampled_clip import SampledClip
 from viewer.rig.scene import Motion
-from viewer.rig.timing import Timing
 
 __all__ = ["clip_lines", "describe_clip"]
 

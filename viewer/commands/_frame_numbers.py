@@ -145,10 +145,10 @@ def numbering_of(actors: Sequence[Actor], rate: float | None = None) -> Numberin
     rate : float, optional
         Frames a second; those of the longest capture, or 30, if omitted.
     """
-    from viewer.rig.clip import Clip
-    from viewer.rig.motion import scene_rate, time_span
-    from viewer.rig.points import PointClip
-    from viewer.rig.sampled_clip import SampledClip
+    from viewer.rig.captures.points import PointClip
+    from viewer.rig.motion.clip import Clip
+    from viewer.rig.motion.evaluation import scene_rate, time_span
+    from viewer.rig.motion.sampled_clip import SampledClip
 
     captures = [a.clip for a in actors if isinstance(a.clip, SampledClip | PointClip)]
     longest = max(captures, key=lambda clip: clip.end - clip.start, default=None)
@@ -225,7 +225,7 @@ def apply_time(scene: Scene, arguments: argparse.Namespace) -> None:
     """
     if arguments.frame is None and arguments.time is None:
         return
-    from viewer.rig.motion import pose_actor
+    from viewer.rig.motion.evaluation import pose_actor
 
     option = "--time" if arguments.frame is None else arguments.frame_option
     if arguments.frame is not None and arguments.time is not None:

@@ -8,11 +8,11 @@ import numpy as np
 
 from viewer.errors import printable
 from viewer.rig.figure import Figure
-from viewer.rig.measure import measure
-from viewer.rig.mirror import asymmetry
+from viewer.rig.inspection.measure import measure
 from viewer.rig.number_text import number_text
 from viewer.rig.pose import Pose
-from viewer.rig.pose_vector import write_vector
+from viewer.rig.posing.pose_vector import write_vector
+from viewer.rig.retargeting.mirror import asymmetry
 from viewer.rig.scalars import compute, length_text, strongest
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped

@@ -12,7 +12,7 @@ from viewer.near_names import name_hint
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.morph_target import MORPH_GROUP
-from viewer.rig.pose_record import PoseRecord
+from viewer.rig.posing.pose_record import PoseRecord
 from viewer.rig.scene import Actor, Scene
 
 __all__ = ["has_only_morphs", "is_named", "morph_record", "named_record"]

@@ -24,14 +24,14 @@ from viewer.export._options import GAPS, ROTATION_ORDERS
 from viewer.formats import all_or_none
 from viewer.interrupts import raising
 from viewer.rig.arrays import Bools
-from viewer.rig.clip import Clip
-from viewer.rig.person import is_tracked, person_label
-from viewer.rig.point_take import PointTake, upright_point_take
-from viewer.rig.points import PointClip
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.captures.person import is_tracked, person_label
+from viewer.rig.captures.point_take import PointTake, upright_point_take
+from viewer.rig.captures.points import PointClip
+from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.take import Take
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import Skinning
-from viewer.rig.take import Take
 from viewer.rig.units import METRES
 
 __all__ = [

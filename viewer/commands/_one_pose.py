@@ -9,12 +9,12 @@ from pathlib import Path
 from viewer.commands._frame_numbers import numbering_of
 from viewer.errors import ViewerError
 from viewer.export import EXPORTERS, MotionOptions
-from viewer.rig.clip import Clip
+from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.pose_take import posed_take
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.take import Take
 from viewer.rig.number_text import number_text
-from viewer.rig.pose_take import posed_take
-from viewer.rig.sampled_clip import SampledClip
 from viewer.rig.scene import Actor, Scene
-from viewer.rig.take import Take
 
 __all__ = ["asks_one_pose", "check_frame_options", "pose_line", "posed_actors", "take_of_pose"]
 

@@ -17,12 +17,12 @@ from viewer.formats import Source, read
 from viewer.formats.pose import pose_error
 from viewer.near_names import near_names
 from viewer.rig.arrays import Floats
+from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 from viewer.rig.hands import hand_vectors
-from viewer.rig.mirror import mirror_pose
 from viewer.rig.number_text import number_text
-from viewer.rig.pose_record import PoseRecord, apply_record
-from viewer.rig.pose_vector import set_joint_rotations
-from viewer.rig.rotation import rotation_vector_to_matrix
+from viewer.rig.posing.pose_record import PoseRecord, apply_record
+from viewer.rig.posing.pose_vector import set_joint_rotations
+from viewer.rig.retargeting.mirror import mirror_pose
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skeleton import clamp_dofs, dof_label, find_dof, joint_labels
 from viewer.rig.skinning import METHODS, Skinning

@@ -200,7 +200,7 @@ def _too_few(found: int, wanted: int) -> list[str]:
 
 def _overridden(arguments: argparse.Namespace, scene: Scene) -> list[str]:
     """Return which options shape or pose figures that the motion then shapes or poses anew."""
-    from viewer.rig.sampled_clip import SampledClip
+    from viewer.rig.motion.sampled_clip import SampledClip
 
     names = ["pose", "dof", "mirror"]
     clips = [actor.clip for actor in scene.actors if isinstance(actor.clip, SampledClip)]

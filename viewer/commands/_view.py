@@ -16,8 +16,8 @@ from viewer.rendering.options import BACKGROUNDS, SHOWN, DisplayOptions
 from viewer.rendering.pinhole import distortion_error
 from viewer.rendering.program import SHADING
 from viewer.rig.arrays import Floats
-from viewer.rig.camera_view import CameraView
-from viewer.rig.front import FRONTS, Front, front_axes, guess_front
+from viewer.rig.captures.camera_view import CameraView
+from viewer.rig.inspection.front import FRONTS, Front, front_axes, guess_front
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.scene import Scene
 

@@ -33,9 +33,9 @@ from viewer.errors import RigError, UnsupportedFormatError, printable
 from viewer.export import EXPORTERS, export, files_written
 from viewer.formats import all_or_none, check_folder_target, check_targets
 from viewer.interrupts import raising
+from viewer.rig.motion.upright import upright_actor
 from viewer.rig.scene import Scene
 from viewer.rig.skinning import Skinning
-from viewer.rig.upright import upright_actor
 from viewer.streams import is_stdout, require_stdout, summary_stream
 
 __all__ = ["add_arguments", "run"]

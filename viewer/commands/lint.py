@@ -32,7 +32,7 @@ from viewer.lint import (
     worst_first,
 )
 from viewer.near_names import did_you_mean
-from viewer.rig.motion import DEFAULT_RATE
+from viewer.rig.motion.evaluation import DEFAULT_RATE
 
 __all__ = ["add_arguments", "run"]
 

@@ -11,10 +11,10 @@ from types import ModuleType
 from viewer.errors import RigError, UnsupportedFormatError
 from viewer.export._options import MotionOptions
 from viewer.rig.figure import Figure
+from viewer.rig.motion.take import Take, upright_take
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import Skinning
 from viewer.rig.smpl_family import member_of
-from viewer.rig.take import Take, upright_take
 
 __all__ = [
     "EXPORTERS",
@@ -219,7 +219,7 @@ def take_for(
     options : MotionOptions
         Whether an up axis is asked for.
     scene, actor, rate, frames, fill
-        As for ``viewer.rig.take.upright_take``.
+        As for ``viewer.rig.motion.take.upright_take``.
     """
     keeps_world = EXPORTERS[key].keeps_world and not options.up
     return upright_take(scene, actor, rate, frames, fill, keeps_world)

@@ -16,7 +16,7 @@ from viewer.export._skinned import Body, Poses, Rows, Side, body_rows, poses_of,
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.motion import Frames, frames_between, world_frames
+from viewer.rig.motion.evaluation import Frames, frames_between, world_frames
 from viewer.rig.scalars import length_text
 from viewer.rig.skeleton import joint_label
 

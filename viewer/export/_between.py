@@ -9,12 +9,12 @@ import numpy as np
 
 from viewer.export._losses import frames_losses
 from viewer.rig.arrays import Floats
-from viewer.rig.clip import Clip
-from viewer.rig.motion import frames_of
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.evaluation import frames_of
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.take import Take, frames_at
+from viewer.rig.motion.timing import Timing
 from viewer.rig.skinning import Skinning
-from viewer.rig.take import Take, frames_at
-from viewer.rig.timing import Timing
 
 __all__ = ["PLACES", "own_times", "resampling_losses"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.rig.arrays import Floats
-from viewer.rig.rotation import axis_rotations
+from viewer.rig.geometry.rotation import axis_rotations
 
 __all__ = ["euler_angles", "unrolled"]
 

@@ -19,10 +19,10 @@ import numpy as np
 from viewer.export._bvh_angles import euler_angles
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.kinematics import forward_kinematics, world_matrices
-from viewer.rig.motion import Frames, frames_between, rest_translations_of, world_frames
+from viewer.rig.motion.evaluation import Frames, frames_between, rest_translations_of, world_frames
 from viewer.rig.pose import rest_pose
-from viewer.rig.rotation import quaternion_to_matrix
 
 __all__ = ["Body", "Space", "body_of", "rest_matrices", "shape_at"]
 

@@ -23,7 +23,13 @@ from viewer.export._skinned import Poses, Side, anchored, figure_side
 from viewer.formats import Source, bvh
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
-from viewer.rig.motion import Frames, frames_between, frames_of, rest_translations_of, world_frames
+from viewer.rig.motion.evaluation import (
+    Frames,
+    frames_between,
+    frames_of,
+    rest_translations_of,
+    world_frames,
+)
 from viewer.rig.shape import joint_directions
 from viewer.rig.skinning import Skinning
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
+from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.pose import Pose
-from viewer.rig.rotation import quaternion_to_matrix
 from viewer.rig.skeleton import Skeleton, joint_label
 
 __all__ = ["course_skeleton", "depth_first"]

@@ -9,14 +9,14 @@ import numpy as np
 from viewer.errors import RigError
 from viewer.export._options import MotionOptions
 from viewer.rig.arrays import Floats
-from viewer.rig.body_motion import root_positions
 from viewer.rig.figure import Figure
-from viewer.rig.motion import Frames
+from viewer.rig.geometry.quaternion import multiply, rotation_vector_to_quaternion
+from viewer.rig.geometry.rotation import rotation_vector_to_matrix
+from viewer.rig.motion.body_motion import root_positions
+from viewer.rig.motion.evaluation import Frames
+from viewer.rig.motion.take import Take
 from viewer.rig.number_text import number_text
-from viewer.rig.quaternion import multiply, rotation_vector_to_quaternion
-from viewer.rig.rotation import rotation_vector_to_matrix
 from viewer.rig.smpl_family import FAMILY, Member
-from viewer.rig.take import Take
 from viewer.rig.units import METRES, WORDS
 
 __all__ = ["FamilyFrames", "check_unit", "family_frames", "member_of_figure", "up_axis"]

@@ -11,13 +11,13 @@ import numpy as np
 from viewer.export._family_frames import up_axis
 from viewer.export._options import MotionOptions
 from viewer.rig.arrays import Floats
-from viewer.rig.body_motion import BodyMotion, body_clip
-from viewer.rig.motion import Frames, frames_of, rest_translations_of
-from viewer.rig.quaternion import multiply, rotation_vector_to_quaternion
-from viewer.rig.rotation import rotation_vector_to_matrix
+from viewer.rig.geometry.quaternion import multiply, rotation_vector_to_quaternion
+from viewer.rig.geometry.rotation import rotation_vector_to_matrix
+from viewer.rig.motion.body_motion import BodyMotion, body_clip
+from viewer.rig.motion.evaluation import Frames, frames_of, rest_translations_of
+from viewer.rig.motion.take import Take
+from viewer.rig.motion.timing import Timing
 from viewer.rig.smpl_family import Member
-from viewer.rig.take import Take
-from viewer.rig.timing import Timing
 from viewer.rig.units import METRES
 
 __all__ = ["Records", "read_frames"]

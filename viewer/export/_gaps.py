@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from viewer.errors import RigError
 from viewer.export._options import GAPS
 from viewer.rig.arrays import Bools, Floats
-from viewer.rig.motion import Frames
-from viewer.rig.quaternion import slerp
+from viewer.rig.geometry.quaternion import slerp
+from viewer.rig.motion.evaluation import Frames
 
 __all__ = ["filled", "gaps_text", "kept_gaps", "runs"]
 

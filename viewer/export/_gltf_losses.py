@@ -16,7 +16,7 @@ from viewer.export._skinned import Rows, Side, body_rows, changing, figure_side
 from viewer.rig.arrays import Ints
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import split_seams
-from viewer.rig.motion import Frames
+from viewer.rig.motion.evaluation import Frames
 from viewer.rig.scalars import length_text
 from viewer.rig.skinning import METHODS, Skinning
 

@@ -13,8 +13,8 @@ from viewer.export._gltf_skin import Influences, influence_sets
 from viewer.formats._image import encode_png
 from viewer.rig.arrays import Bytes, Floats, Ints
 from viewer.rig.blendshapes import BlendShapes
+from viewer.rig.geometry.vectors import unit
 from viewer.rig.mesh import Mesh, split_seams, vertex_normals
-from viewer.rig.vectors import unit
 
 __all__ = ["add_mesh"]
 

@@ -9,7 +9,7 @@ import numpy as np
 from viewer.export._gltf_document import Document, text_of
 from viewer.export._gltf_nodes import Locals, Tree
 from viewer.rig.arrays import Bools, Floats
-from viewer.rig.motion import Frames
+from viewer.rig.motion.evaluation import Frames
 from viewer.rig.skeleton import Skeleton
 
 __all__ = ["add_animation", "moving", "still_locals"]

@@ -20,8 +20,8 @@ import numpy as np
 from viewer.errors import RigError
 from viewer.export._gltf_document import Document, text_of
 from viewer.rig.arrays import Floats
+from viewer.rig.geometry.rotation import matrix_to_quaternion
 from viewer.rig.pose import Pose, joint_rotations, local_matrices
-from viewer.rig.rotation import matrix_to_quaternion
 from viewer.rig.skeleton import Skeleton
 from viewer.rig.units import METRES, WORDS
 

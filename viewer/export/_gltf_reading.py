@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from viewer.export._gltf_nodes import Tree
 from viewer.export._skinned import Body, Poses, Rows, Side
 from viewer.rig.arrays import Floats, Ints
+from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.kinematics import forward_kinematics
-from viewer.rig.rotation import quaternion_to_matrix
 from viewer.rig.skin import Skin, skin_from_entries
 
 __all__ = ["GltfFile", "parsed", "read_back"]

@@ -10,9 +10,9 @@ import numpy as np
 from viewer.export._apart import apart, apart_lines, negligible
 from viewer.export._skinned import Side, changing, figure_side
 from viewer.rig.arrays import Floats
-from viewer.rig.motion import Frames
+from viewer.rig.motion.evaluation import Frames
+from viewer.rig.motion.take import Take
 from viewer.rig.skinning import Skinning
-from viewer.rig.take import Take
 
 __all__ = ["driven_losses", "frames_losses", "shape_changes"]
 

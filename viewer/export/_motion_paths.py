@@ -10,10 +10,10 @@ import numpy as np
 from viewer.errors import OutputError, printable
 from viewer.export._gaps import runs
 from viewer.export._options import MotionOptions
-from viewer.rig.person import person_name
-from viewer.rig.point_take import PointTake
+from viewer.rig.captures.person import person_name
+from viewer.rig.captures.point_take import PointTake
+from viewer.rig.motion.take import Take
 from viewer.rig.scene import Actor
-from viewer.rig.take import Take
 
 __all__ = ["motion_paths", "numbered_paths", "split_paths", "take_files"]
 

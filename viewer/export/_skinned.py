@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
-from viewer.rig.motion import Frames, frames_between, pose_of, world_frames
-from viewer.rig.rotation import quaternion_to_matrix
+from viewer.rig.geometry.rotation import quaternion_to_matrix
+from viewer.rig.motion.evaluation import Frames, frames_between, pose_of, world_frames
 from viewer.rig.shape import joint_directions
 from viewer.rig.skin import Skin, has_influence, owners, skin_from_entries, skin_rows
 from viewer.rig.skinning import Skinning, deform, skin_used

@@ -34,7 +34,7 @@ from viewer.export._options import GAPS, MotionOptions
 from viewer.formats import Source, all_or_none, keeping_written, save_arrays
 from viewer.formats.amass import read
 from viewer.rig.arrays import Bools, Floats
-from viewer.rig.take import Take
+from viewer.rig.motion.take import Take
 
 __all__ = ["export_take"]
 

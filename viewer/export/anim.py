@@ -16,16 +16,16 @@ from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, MotionOptions
 from viewer.formats import Source, all_or_none, keeping_written, read, write
 from viewer.rig.arrays import Floats
-from viewer.rig.clip import Clip, Tangent, is_course_rig
-from viewer.rig.clip_edit import clip_from_frames
-from viewer.rig.clip_table import evaluate_all
 from viewer.rig.figure import Figure
-from viewer.rig.motion import Frames, frames_between, frames_of, world_frames
+from viewer.rig.geometry.rotation import quaternion_to_matrix
+from viewer.rig.motion.clip import Clip, Tangent, is_course_rig
+from viewer.rig.motion.clip_edit import clip_from_frames
+from viewer.rig.motion.clip_table import evaluate_all
+from viewer.rig.motion.evaluation import Frames, frames_between, frames_of, world_frames
+from viewer.rig.motion.take import Take, frames_at
 from viewer.rig.number_text import number_text
-from viewer.rig.rotation import quaternion_to_matrix
 from viewer.rig.scalars import length_text
 from viewer.rig.skeleton import Skeleton
-from viewer.rig.take import Take, frames_at
 
 __all__ = ["export_take"]
 

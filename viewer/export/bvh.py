@@ -21,12 +21,12 @@ from viewer.export._options import GAPS, ROTATION_ORDERS, MotionOptions
 from viewer.formats import all_or_none, save_bytes
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
-from viewer.rig.joint_names import plain_names
-from viewer.rig.motion import Frames, rest_translations_of
-from viewer.rig.rotation import axis_rotations
+from viewer.rig.geometry.rotation import axis_rotations
+from viewer.rig.motion.evaluation import Frames, rest_translations_of
+from viewer.rig.motion.take import Take
+from viewer.rig.retargeting.joint_names import plain_names
 from viewer.rig.shape import shaped
 from viewer.rig.skeleton import joint_label
-from viewer.rig.take import Take
 from viewer.rig.units import METRES, WORDS
 
 __all__ = ["export_take"]

@@ -37,9 +37,9 @@ from viewer.export._losses import frames_losses
 from viewer.export._options import MotionOptions
 from viewer.interrupts import hold, poll
 from viewer.rig.arrays import Floats
-from viewer.rig.motion import frames_between
-from viewer.rig.person import person_label
-from viewer.rig.take import Take
+from viewer.rig.captures.person import person_label
+from viewer.rig.motion.evaluation import frames_between
+from viewer.rig.motion.take import Take
 
 __all__ = ["export_take", "export_takes"]
 

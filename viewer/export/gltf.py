@@ -28,13 +28,13 @@ from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, MotionOptions
 from viewer.formats import all_or_none, save_bytes
 from viewer.rig.figure import Figure
-from viewer.rig.motion import Frames, frames_between
+from viewer.rig.motion.evaluation import Frames, frames_between
+from viewer.rig.motion.pose_take import pose_frames
+from viewer.rig.motion.take import Take
 from viewer.rig.pose import Pose
-from viewer.rig.pose_take import pose_frames
 from viewer.rig.scene import Actor, figure_pose
 from viewer.rig.skeleton import joint_label
 from viewer.rig.skinning import Skinning, skin_used
-from viewer.rig.take import Take
 from viewer.rig.units import METRES, WORDS
 
 __all__ = ["export", "export_take"]

@@ -29,13 +29,13 @@ from viewer.export import MotionOptions
 from viewer.export._gaps import kept_gaps
 from viewer.formats import save_arrays
 from viewer.rig.arrays import Bools, Floats
-from viewer.rig.motion import pose_of, world_frames
-from viewer.rig.point_take import PointTake
-from viewer.rig.points import PointLayout
-from viewer.rig.pose_vector import write_vector
+from viewer.rig.captures.point_take import PointTake
+from viewer.rig.captures.points import PointLayout
+from viewer.rig.motion.evaluation import pose_of, world_frames
+from viewer.rig.motion.take import Take
+from viewer.rig.posing.pose_vector import write_vector
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import Skinning, deform, joint_matrices
-from viewer.rig.take import Take
 
 __all__ = ["export", "export_points", "export_take"]
 

@@ -18,10 +18,10 @@ from viewer.formats import all_or_none, free_path, save_bytes, save_text
 from viewer.formats._image import encode_png
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.mesh import Mesh
-from viewer.rig.motion import pose_of
+from viewer.rig.motion.evaluation import pose_of
+from viewer.rig.motion.take import Take
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import Skinning, deform
-from viewer.rig.take import Take
 from viewer.rig.units import WORDS
 
 __all__ = ["export", "export_take"]

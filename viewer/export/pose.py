@@ -6,7 +6,7 @@ from pathlib import Path
 
 from viewer.errors import RigError, printable
 from viewer.formats import write
-from viewer.rig.pose_record import record_of
+from viewer.rig.posing.pose_record import record_of
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import Skinning
 

@@ -28,13 +28,13 @@ from viewer.formats._targets import check_folder_target, check_targets
 if TYPE_CHECKING:
     from viewer.formats._archive import Archive
     from viewer.formats.rig import NamedFiles
-    from viewer.rig.body_motion import BodyMotion
-    from viewer.rig.capture import Capture
-    from viewer.rig.clip import Clip
+    from viewer.rig.captures.capture import Capture
     from viewer.rig.figure import Figure
     from viewer.rig.morph_target import MorphTarget
-    from viewer.rig.pose_record import PoseRecord
-    from viewer.rig.skeleton_motion import SkeletonMotion
+    from viewer.rig.motion.body_motion import BodyMotion
+    from viewer.rig.motion.clip import Clip
+    from viewer.rig.motion.skeleton_motion import SkeletonMotion
+    from viewer.rig.posing.pose_record import PoseRecord
 
     Content = (
         Figure

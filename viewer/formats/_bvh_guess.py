@@ -9,10 +9,10 @@ import numpy as np
 from viewer.formats._source import Source
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
-from viewer.rig.joint_names import canonical_names
-from viewer.rig.motion import DEFAULT_RATE, frames_of, world_frames
-from viewer.rig.sampled_clip import SampledClip
-from viewer.rig.timing import FASTEST, SLOWEST, is_rate
+from viewer.rig.motion.evaluation import DEFAULT_RATE, frames_of, world_frames
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.timing import FASTEST, SLOWEST, is_rate
+from viewer.rig.retargeting.joint_names import canonical_names
 from viewer.rig.units import METRES, SIZES, WORDS
 
 __all__ = ["frame_rate", "guess_unit", "guess_up"]

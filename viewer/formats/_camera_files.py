@@ -31,8 +31,8 @@ from viewer.errors import FormatError, printable
 from viewer.formats._numbers import to_number
 from viewer.formats._source import Source, shown
 from viewer.rig.arrays import Floats
-from viewer.rig.camera_view import CameraView
-from viewer.rig.rotation import rotation_vector_to_matrix
+from viewer.rig.captures.camera_view import CameraView
+from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 
 __all__ = ["Storage", "find_cameras", "read_storage"]
 

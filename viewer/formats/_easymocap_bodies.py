@@ -18,9 +18,9 @@ from viewer.formats._easymocap_json import MisfitError, has_numbers, row_of, tak
 from viewer.formats._easymocap_shapes import COEFFICIENTS, carry, last_given
 from viewer.formats._numbers import LARGEST
 from viewer.rig.arrays import Bools, Floats
-from viewer.rig.body_motion import BodyMotion
+from viewer.rig.motion.body_motion import BodyMotion
+from viewer.rig.motion.timing import Timing
 from viewer.rig.smpl_family import FAMILY, members_by_numbers
-from viewer.rig.timing import Timing
 
 __all__ = ["BodyLayout", "BodyRows", "RowFault", "Rows", "body_layout", "with_coefficients"]
 

@@ -19,8 +19,8 @@ from viewer.formats._easymocap_bodies import RowFault, Rows
 from viewer.formats._easymocap_json import MisfitError
 from viewer.formats._numbers import LARGEST
 from viewer.rig.arrays import Floats
-from viewer.rig.keypoint_layouts import TITLES, joined_layout, keypoint_layout
-from viewer.rig.points import PointLayout
+from viewer.rig.captures.keypoint_layouts import TITLES, joined_layout, keypoint_layout
+from viewer.rig.captures.points import PointLayout
 
 __all__ = ["KEY", "PointRows", "point_layout"]
 

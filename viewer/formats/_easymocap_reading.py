@@ -27,10 +27,10 @@ from viewer.formats._easymocap_json import (
 from viewer.formats._easymocap_points import KEY, Parts, PointRows, point_layout
 from viewer.formats._easymocap_shapes import COEFFICIENTS
 from viewer.rig.arrays import Floats
-from viewer.rig.body_motion import BodyMotion
-from viewer.rig.capture import CapturePart
-from viewer.rig.person import is_tracked, person_label
-from viewer.rig.points import PointClip, PointLayout
+from viewer.rig.captures.capture import CapturePart
+from viewer.rig.captures.person import is_tracked, person_label
+from viewer.rig.captures.points import PointClip, PointLayout
+from viewer.rig.motion.body_motion import BodyMotion
 
 __all__ = ["Options", "Reading"]
 

@@ -10,7 +10,7 @@ from viewer.errors import printable
 from viewer.formats._archive import describe
 from viewer.formats._named_values import NamedValues
 from viewer.rig.arrays import Floats
-from viewer.rig.pose_transfer import JointTurns
+from viewer.rig.retargeting.pose_transfer import JointTurns
 
 __all__ = ["KEYS", "named_turns", "read_turns"]
 

@@ -11,9 +11,9 @@ from viewer.formats._skin_sections import Sections, check_declared
 from viewer.formats._source import Source
 from viewer.formats._tolerant import mended_corners
 from viewer.rig.arrays import Floats, Ints
+from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.mesh import Mesh, bounding_box
 from viewer.rig.skin import Skin, has_influence, weight_sums
-from viewer.rig.transform import translation_matrix
 
 __all__ = [
     "check_mesh",

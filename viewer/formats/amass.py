@@ -25,9 +25,9 @@ from viewer.formats._container import archive_of, finite
 from viewer.formats._source import Source
 from viewer.formats._tolerant import held_rows
 from viewer.rig.arrays import Deferred, Floats, Ints
-from viewer.rig.body_motion import BodyMotion
+from viewer.rig.motion.body_motion import BodyMotion
+from viewer.rig.motion.timing import RATES, Timing, is_rate
 from viewer.rig.smpl_family import FAMILY, members_by_numbers
-from viewer.rig.timing import RATES, Timing, is_rate
 
 __all__ = ["has_frames", "read"]
 

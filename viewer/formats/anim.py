@@ -24,8 +24,15 @@ from viewer.errors import FormatError, UnsupportedFormatError
 from viewer.formats._numbers import to_number
 from viewer.formats._save import save_text
 from viewer.formats._source import Source, no_number, shown
-from viewer.rig.clip import EXTRAPOLATIONS, TANGENT_RULES, Channel, Clip, Extrapolation, Tangent
 from viewer.rig.figure import Figure
+from viewer.rig.motion.clip import (
+    EXTRAPOLATIONS,
+    TANGENT_RULES,
+    Channel,
+    Clip,
+    Extrapolation,
+    Tangent,
+)
 from viewer.rig.number_text import number_text
 
 __all__ = ["read", "write"]

@@ -29,11 +29,11 @@ from viewer.formats._bvh_motion import Motion, read_motion
 from viewer.formats._source import Source
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
-from viewer.rig.motion import DEFAULT_RATE
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.motion.evaluation import DEFAULT_RATE
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.skeleton_motion import SkeletonMotion
+from viewer.rig.motion.timing import Timing
 from viewer.rig.skeleton import Skeleton, ball_skeleton
-from viewer.rig.skeleton_motion import SkeletonMotion
-from viewer.rig.timing import Timing
 
 __all__ = ["read"]
 

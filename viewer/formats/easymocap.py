@@ -24,7 +24,7 @@ from viewer.formats._easymocap_files import find_frames
 from viewer.formats._easymocap_reading import Options, Reading
 from viewer.formats._opened_names import folder_name
 from viewer.formats._source import Source
-from viewer.rig.capture import Capture
+from viewer.rig.captures.capture import Capture
 
 __all__ = ["open_capture", "read"]
 

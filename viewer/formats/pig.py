@@ -30,12 +30,12 @@ from viewer.rig.annotations import BodyParts, Keypoints, ReducedMesh
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.blendshapes import JointRegressor, regress_joints
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.hierarchy import cycle_members
 from viewer.rig.mesh import Mesh, vertex_normals
-from viewer.rig.pose_vector import PoseLayout
+from viewer.rig.posing.pose_vector import PoseLayout
 from viewer.rig.skeleton import ball_skeleton
 from viewer.rig.skin import Skin, has_influence, skin_from_entries, weight_sums
-from viewer.rig.transform import translation_matrix
 
 __all__ = ["read"]
 

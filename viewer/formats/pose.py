@@ -40,9 +40,9 @@ from viewer.formats._source import Source
 from viewer.formats._table import read_numbers
 from viewer.near_names import did_you_mean, near_names, question
 from viewer.rig.arrays import Deferred, Floats
-from viewer.rig.clip import Clip
 from viewer.rig.figure import Figure
-from viewer.rig.pose_record import PARTS, PosePartError, PoseRecord
+from viewer.rig.motion.clip import Clip
+from viewer.rig.posing.pose_record import PARTS, PosePartError, PoseRecord
 
 __all__ = ["pose_error", "pose_text", "read", "write"]
 

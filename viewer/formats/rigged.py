@@ -43,7 +43,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.hands import Hand
 from viewer.rig.hierarchy import cycle_members
 from viewer.rig.mesh import Material, Mesh, vertex_normals
-from viewer.rig.pose_vector import PoseLayout
+from viewer.rig.posing.pose_vector import PoseLayout
 from viewer.rig.skeleton import Skeleton
 from viewer.rig.skin import Skin
 

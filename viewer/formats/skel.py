@@ -26,8 +26,8 @@ from viewer.formats._numbers import is_infinite, is_number, to_number
 from viewer.formats._skel_writing import KEYWORDS, UNLIMITED, write
 from viewer.formats._source import Source, no_number, shown
 from viewer.rig.arrays import Floats
-from viewer.rig.dof_text import beyond_text
 from viewer.rig.figure import Figure
+from viewer.rig.posing.dof_text import beyond_text
 from viewer.rig.skeleton import DOF_KINDS, Skeleton
 
 __all__ = ["read", "write"]

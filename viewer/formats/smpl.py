@@ -33,13 +33,13 @@ from viewer.formats._tolerant import mended_positions
 from viewer.rig.arrays import Deferred, Floats, Ints
 from viewer.rig.blendshapes import BlendShapes, Correctives, JointRegressor, regress_joints
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.hierarchy import cycle_members
 from viewer.rig.mesh import Mesh, vertex_normals
-from viewer.rig.pose_vector import PoseLayout
+from viewer.rig.posing.pose_vector import PoseLayout
 from viewer.rig.skeleton import ball_skeleton
 from viewer.rig.skin import Skin, skin_from_entries
 from viewer.rig.smpl_family import Member, member_of
-from viewer.rig.transform import translation_matrix
 
 __all__ = ["KEYS", "read"]
 

@@ -8,10 +8,10 @@ import numpy as np
 
 from viewer.lint._finding import Finding
 from viewer.rig.arrays import Floats
-from viewer.rig.points import PointClip
+from viewer.rig.captures.points import PointClip
+from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.scene import Actor, Scene, actor_points
 from viewer.rig.skinning import Skinning, deform, joint_matrices
-from viewer.rig.transform import apply_transform
 
 __all__ = ["Places", "places_of", "points_of"]
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from viewer.rig.arrays import Floats, Ints
-from viewer.rig.motion import frame_rate, time_span
-from viewer.rig.points import PointClip
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.captures.points import PointClip
+from viewer.rig.motion.evaluation import frame_rate, time_span
+from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.scene import Scene
 
 __all__ = ["Counting", "counting_of"]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from viewer.lint._codes import CODES
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.motion import DEFAULT_RATE
+from viewer.rig.motion.evaluation import DEFAULT_RATE
 from viewer.rig.scalars import length_text
 from viewer.rig.scene import Actor
 from viewer.rig.shape import rest_joints

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.rig.motion import frames_of, pose_of
-from viewer.rig.points import PointClip
+from viewer.rig.captures.points import PointClip
+from viewer.rig.motion.evaluation import frames_of, pose_of
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor, figure_pose
 from viewer.rig.skeleton import clamp_dofs

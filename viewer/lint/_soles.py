@@ -8,8 +8,8 @@ import numpy as np
 
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
-from viewer.rig.joint_names import canonical_names
 from viewer.rig.mesh import Mesh
+from viewer.rig.retargeting.joint_names import canonical_names
 from viewer.rig.shape import rest_joints
 from viewer.rig.skeleton import Skeleton
 from viewer.rig.skin import Skin, owners

@@ -12,11 +12,11 @@ from viewer.lint._counting import Counting
 from viewer.lint._finding import Subject
 from viewer.lint._soles import soles_of
 from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.clip import Clip
+from viewer.rig.captures.points import PointClip
 from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.motion import Frames, frames_of, world_frames
-from viewer.rig.points import PointClip
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.evaluation import Frames, frames_of, world_frames
+from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.shape import rest_joints, shaped
 
 __all__ = ["Indices", "Track", "frame_numbers", "key_times", "track_of"]

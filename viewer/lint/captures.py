@@ -9,7 +9,7 @@ from viewer.errors import counted
 from viewer.lint._finding import Finding, Subject, listed
 from viewer.lint.clips import missing_frames
 from viewer.rig.arrays import Floats, Ints
-from viewer.rig.points import PointClip
+from viewer.rig.captures.points import PointClip
 
 __all__ = ["LOW_FRAMES", "LOW_SHARE", "check"]
 

@@ -8,14 +8,14 @@ from viewer.errors import counted
 from viewer.lint._finding import Finding, Subject, listed
 from viewer.lint._tracks import Indices, Track, frame_numbers, key_times, track_of
 from viewer.rig.arrays import Floats
-from viewer.rig.clip import SHORTEST, Clip
-from viewer.rig.clip_table import evaluate_all
-from viewer.rig.dof_text import beyond_text
+from viewer.rig.captures.points import PointClip
+from viewer.rig.motion.clip import SHORTEST, Clip
+from viewer.rig.motion.clip_table import evaluate_all
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.timing import Timing
 from viewer.rig.number_text import number_text
-from viewer.rig.points import PointClip
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.posing.dof_text import beyond_text
 from viewer.rig.skeleton import Skeleton, joint_labels
-from viewer.rig.timing import Timing
 
 __all__ = ["check", "missing_frames"]
 

@@ -9,8 +9,8 @@ from viewer.errors import counted
 from viewer.lint._finding import Finding, Subject
 from viewer.lint._topology import Edges, edges_of, orientations, welded
 from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.geometry.vectors import unit
 from viewer.rig.mesh import Mesh, triangle_areas
-from viewer.rig.vectors import unit
 
 __all__ = ["check"]
 

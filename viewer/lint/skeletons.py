@@ -9,9 +9,9 @@ import numpy as np
 
 from viewer.errors import counted, printable
 from viewer.lint._finding import Finding, Subject, listed
-from viewer.rig.dof_text import beyond_text
 from viewer.rig.number_text import number_text
 from viewer.rig.pose import Pose
+from viewer.rig.posing.dof_text import beyond_text
 from viewer.rig.skeleton import Skeleton, dof_label, joint_labels
 
 __all__ = ["check"]

@@ -9,7 +9,7 @@ from viewer.lint._finding import Finding, Subject
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh, bounding_box, box_size
-from viewer.rig.mirror import asymmetry, joint_partners
+from viewer.rig.retargeting.mirror import asymmetry, joint_partners
 from viewer.rig.skin import Skin, normalized, owners, row_norms
 
 __all__ = ["check"]

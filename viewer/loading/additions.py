@@ -14,7 +14,7 @@ from viewer.rig.arrays import Bytes
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Material
 from viewer.rig.pose import Pose
-from viewer.rig.pose_record import PoseRecord, apply_record
+from viewer.rig.posing.pose_record import PoseRecord, apply_record
 from viewer.rig.scene import Actor
 
 __all__ = ["add_to_actor", "apply_pose", "with_texture"]

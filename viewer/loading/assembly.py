@@ -15,9 +15,9 @@ from viewer.loading.contents import Contents
 from viewer.loading.settings import MotionSettings
 from viewer.rig.arrays import Bytes
 from viewer.rig.figure import Figure
-from viewer.rig.pose_record import PoseRecord
+from viewer.rig.geometry.transform import rotation_transform, translation_matrix
+from viewer.rig.posing.pose_record import PoseRecord
 from viewer.rig.scene import Actor, Scene, scene_box
-from viewer.rig.transform import rotation_transform, translation_matrix
 
 if TYPE_CHECKING:
     from viewer.loading.capturing import Builder
@@ -75,7 +75,7 @@ def begin(
     _give_morphs(contents, cast)
     if contents.has_motion:
         from viewer.loading.driving import drive
-        from viewer.rig.motion import pose_actor, time_span
+        from viewer.rig.motion.evaluation import pose_actor, time_span
 
         drive(contents, cast, settings or MotionSettings())
         start = time_span(cast.actors)[0]

@@ -10,16 +10,16 @@ import numpy as np
 
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
-from viewer.rig.body_motion import BodyMotion, body_clip
-from viewer.rig.capture import Capture, CapturePart
+from viewer.rig.captures.capture import Capture, CapturePart
+from viewer.rig.captures.person import is_tracked, person_label
+from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.figure import Figure
-from viewer.rig.motion import pose_actor
-from viewer.rig.person import is_tracked, person_label
-from viewer.rig.points import PointClip, PointLayout
-from viewer.rig.sampled_clip import SampledClip, joined
+from viewer.rig.geometry.transform import rotation_transform
+from viewer.rig.motion.body_motion import BodyMotion, body_clip
+from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.motion.sampled_clip import SampledClip, joined
+from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor
-from viewer.rig.timing import Timing
-from viewer.rig.transform import rotation_transform
 
 __all__ = ["Builder", "joined_points", "joined_timing"]
 

@@ -9,7 +9,7 @@ from viewer.rig.scene import Actor, free_title
 
 if TYPE_CHECKING:
     from viewer.loading.capturing import Builder
-    from viewer.rig.camera_view import CameraView
+    from viewer.rig.captures.camera_view import CameraView
 
 __all__ = ["Cast"]
 

@@ -25,12 +25,12 @@ from viewer.rig.figure import Figure
 if TYPE_CHECKING:
     from viewer.formats import Content
     from viewer.formats.rig import NamedFiles
-    from viewer.rig.body_motion import BodyMotion
-    from viewer.rig.capture import Capture
-    from viewer.rig.clip import Clip
+    from viewer.rig.captures.capture import Capture
     from viewer.rig.morph_target import MorphTarget
-    from viewer.rig.pose_record import PoseRecord
-    from viewer.rig.skeleton_motion import SkeletonMotion
+    from viewer.rig.motion.body_motion import BodyMotion
+    from viewer.rig.motion.clip import Clip
+    from viewer.rig.motion.skeleton_motion import SkeletonMotion
+    from viewer.rig.posing.pose_record import PoseRecord
 
 __all__ = ["Contents", "read_files", "read_source"]
 
@@ -160,7 +160,7 @@ def _read(source: Source, settings: MotionSettings) -> Content:
     kind = detect(source)
     if kind == "easymocap":
         from viewer.formats.easymocap import open_capture
-        from viewer.rig.motion import DEFAULT_RATE
+        from viewer.rig.motion.evaluation import DEFAULT_RATE
 
         return open_capture(
             source,

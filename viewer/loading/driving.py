@@ -16,12 +16,12 @@ from viewer.loading.capturing import Builder
 from viewer.loading.cast import Cast
 from viewer.loading.contents import Contents
 from viewer.loading.settings import MotionSettings
-from viewer.rig.body_motion import BodyMotion, body_clip
-from viewer.rig.capture import Capture
-from viewer.rig.clip import Clip, misfit, suits
+from viewer.rig.captures.capture import Capture
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.transform import rotation_transform
+from viewer.rig.motion.body_motion import BodyMotion, body_clip
+from viewer.rig.motion.clip import Clip, misfit, suits
 from viewer.rig.scene import Actor
-from viewer.rig.transform import rotation_transform
 
 if TYPE_CHECKING:
     from viewer.loading.skeleton_motions import Lone
@@ -177,7 +177,7 @@ def _give_body_motion(
 
 def _judged_up(path: Path, actors: Sequence[Actor], cast: Cast, usual: str = "") -> str:
     """Return what is up, judged by the people, and say so unless it is what is usual."""
-    from viewer.rig.up_axis import guess_up
+    from viewer.rig.motion.up_axis import guess_up
 
     up = guess_up(actors)
     if up != usual:

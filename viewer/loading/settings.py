@@ -27,8 +27,8 @@ class MotionSettings:
     flat_hands : bool or None
         Whether hand components leave the mean hand out; None for the model's custom.
     layout : str
-        What captured keypoints are, a title of ``viewer.rig.keypoint_layouts``; empty to judge by
-        their number.
+        What captured keypoints are, a title of ``viewer.rig.captures.keypoint_layouts``; empty to
+        judge by their number.
     legacy_expression : bool
         Whether expressions drive SMPL-X columns 10 to 19, as EasyMocap has it.
     drives : bool

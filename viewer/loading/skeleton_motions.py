@@ -13,10 +13,10 @@ from viewer.loading.cast import Cast
 from viewer.loading.settings import MotionSettings
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
-from viewer.rig.retarget import retarget, scaled_motion
+from viewer.rig.geometry.transform import rotation_transform
+from viewer.rig.motion.skeleton_motion import SkeletonMotion
+from viewer.rig.retargeting.retarget import retarget, scaled_motion
 from viewer.rig.scene import Actor, Scene, scene_box
-from viewer.rig.skeleton_motion import SkeletonMotion
-from viewer.rig.transform import rotation_transform
 from viewer.rig.units import METRES, is_metres
 
 __all__ = ["Lone", "agree_on_units", "give_skeleton_motion"]

@@ -13,7 +13,7 @@ from viewer.rendering.projection import picture_scale, project, unproject
 from viewer.rendering.segments import Manner, Segments
 from viewer.rendering.view import View
 from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.vectors import unit
+from viewer.rig.geometry.vectors import unit
 
 __all__ = [
     "LABEL_COLOR",

@@ -11,7 +11,7 @@ from pyrr import matrix44
 
 from viewer.rendering.pinhole import picture_size, pinhole_projection, pinhole_view
 from viewer.rig.arrays import Floats
-from viewer.rig.camera_view import CameraView
+from viewer.rig.captures.camera_view import CameraView
 from viewer.rig.mesh import bounding_box, box_size
 
 __all__ = [

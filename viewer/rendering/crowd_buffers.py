@@ -31,9 +31,9 @@ from viewer.rendering.upload import (
 )
 from viewer.rendering.view import View
 from viewer.rig.arrays import Bools, Floats
-from viewer.rig.crowd import local_rotations, placements, worlds
 from viewer.rig.figure import Figure
 from viewer.rig.kinematics import is_rigid, skinning_matrices
+from viewer.rig.motion.instances import local_rotations, placements, worlds
 from viewer.rig.pose import Pose, skinning_key
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped

@@ -14,8 +14,8 @@ from viewer.near_names import did_you_mean, name_hint
 from viewer.rendering.camera import Camera, fit
 from viewer.rendering.recorder import Follow, Recording, copied, pose_scene
 from viewer.rig.arrays import Floats
-from viewer.rig.follow import followed_point
 from viewer.rig.mesh import bounding_box
+from viewer.rig.motion.follow import followed_point
 from viewer.rig.scene import Actor, Scene, scene_points
 
 __all__ = [

@@ -14,6 +14,7 @@ from viewer.rendering.segments import Segments, dots
 from viewer.rendering.view import View
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.vectors import unit
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.memo import Memo
 from viewer.rig.mesh import bounding_box, box_size
@@ -21,7 +22,6 @@ from viewer.rig.pose import placement_matrix, pose_key
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
 from viewer.rig.skeleton import Skeleton
-from viewer.rig.vectors import unit
 
 __all__ = [
     "HIGHLIGHT",

@@ -12,11 +12,11 @@ from viewer.rendering.upload import buffer, matrix_texture, write_matrices
 from viewer.rendering.view import View, in_front
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.keypoints import posed_keypoints
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.pose import Pose, pose_key
 from viewer.rig.skinning import Skinning
-from viewer.rig.transform import translation_matrix
 
 __all__ = ["KeypointBuffers", "KeypointPass"]
 

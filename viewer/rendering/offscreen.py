@@ -12,7 +12,7 @@ from viewer.rendering.options import DisplayOptions
 from viewer.rendering.renderer import Renderer
 from viewer.rendering.target import Target, check_size
 from viewer.rig.arrays import Bytes, Floats
-from viewer.rig.front import guess_front
+from viewer.rig.inspection.front import guess_front
 from viewer.rig.scene import Scene, scene_box, scene_points
 
 __all__ = ["Offscreen", "default_camera", "render"]

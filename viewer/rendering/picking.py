@@ -30,8 +30,8 @@ from viewer.rendering.shown import (
 from viewer.rendering.skin_pass import PosedMesh
 from viewer.rendering.view import View, in_front, set_model
 from viewer.rig.arrays import Floats
+from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.scene import Actor, Scene
-from viewer.rig.transform import apply_transform
 
 __all__ = ["Passes", "Pick", "PickPass"]
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats
-from viewer.rig.camera_view import CameraView
+from viewer.rig.captures.camera_view import CameraView
 from viewer.rig.mesh import box_size
 
 __all__ = ["distortion_error", "picture_size", "pinhole_projection", "pinhole_view"]

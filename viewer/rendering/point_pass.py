@@ -18,8 +18,8 @@ from viewer.rendering.program import Programs, set_uniforms
 from viewer.rendering.upload import buffer, float32
 from viewer.rendering.view import View, set_lights, set_model
 from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.points import PointClip, PointLayout
 from viewer.rig.scene import Actor
 
 __all__ = ["LEFT", "MIDDLE", "RIGHT", "PointBuffers", "PointPass", "point_radii"]

@@ -34,8 +34,8 @@ from viewer.rendering.target import Target, picture_rows, straight
 from viewer.rendering.upload import checked
 from viewer.rendering.waiting import Waiter
 from viewer.rig.arrays import Bytes, Floats
-from viewer.rig.crowd import pose_actors
-from viewer.rig.follow import followed_point
+from viewer.rig.motion.follow import followed_point
+from viewer.rig.motion.instances import pose_actors
 from viewer.rig.scene import Scene, scene_box
 
 __all__ = ["Follow", "Progress", "Recording", "Sink", "copied", "pose_scene", "record"]

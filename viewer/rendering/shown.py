@@ -125,7 +125,7 @@ def update_skeletons(
             key = id(actor.figure), pose.shape_weights.tobytes()
             groups.setdefault(key, []).append((actor, pose))
     for group in groups.values():
-        from viewer.rig.crowd import worlds
+        from viewer.rig.motion.instances import worlds
 
         poses = [pose for _, pose in group]
         skeleton = shaped(group[0][0].figure, poses[0].shape_weights).skeleton

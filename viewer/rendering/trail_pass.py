@@ -13,11 +13,11 @@ from viewer.rendering.program import Programs, set_uniforms
 from viewer.rendering.upload import buffer
 from viewer.rendering.view import View, set_model
 from viewer.rig.arrays import Floats
-from viewer.rig.clip import Clip
+from viewer.rig.captures.points import PointClip
 from viewer.rig.mesh import bounding_box
-from viewer.rig.points import PointClip
+from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.motion_paths import Trail, segments, trail
 from viewer.rig.scene import Actor, Motion
-from viewer.rig.trails import Trail, segments, trail
 
 __all__ = ["Moment", "TrailBuffers", "TrailPass", "trail_colors"]
 

@@ -13,7 +13,7 @@ from viewer.rendering.options import Light, Lights
 from viewer.rendering.program import set_uniforms
 from viewer.rendering.upload import as_uniform
 from viewer.rig.arrays import Floats
-from viewer.rig.transform import translation_matrix
+from viewer.rig.geometry.transform import translation_matrix
 
 __all__ = ["View", "in_front", "set_lights", "set_model", "view_of"]
 

@@ -15,12 +15,12 @@ from viewer.rig.hands import Hand
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.mesh import Mesh
 from viewer.rig.pose import Pose
-from viewer.rig.pose_vector import PoseLayout
+from viewer.rig.posing.pose_vector import PoseLayout
 from viewer.rig.skeleton import Skeleton
 from viewer.rig.skin import Skin
 
 if TYPE_CHECKING:
-    from viewer.rig.points import PointLayout
+    from viewer.rig.captures.points import PointLayout
 
 __all__ = ["Figure", "skeleton_points"]
 

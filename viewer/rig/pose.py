@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.rig.arrays import Floats, Ints
-from viewer.rig.rotation import axis_rotations, quaternion_to_matrix
+from viewer.rig.geometry.rotation import axis_rotations, quaternion_to_matrix
 from viewer.rig.skeleton import Skeleton, clamp_dofs
 
 __all__ = [

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 import numpy as np
 
 from viewer.rig.arrays import Floats
+from viewer.rig.captures.person import person_name
 from viewer.rig.figure import Figure, skeleton_points
+from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.person import person_name
 from viewer.rig.pose import Pose, placement_matrix, rest_pose
 from viewer.rig.shape import shaped
 from viewer.rig.skinning import deform
-from viewer.rig.transform import apply_transform
 
 __all__ = [
     "Actor",
@@ -31,10 +31,10 @@ __all__ = [
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from viewer.rig.camera_view import CameraView
-    from viewer.rig.clip import Clip
-    from viewer.rig.points import PointClip
-    from viewer.rig.sampled_clip import SampledClip
+    from viewer.rig.captures.camera_view import CameraView
+    from viewer.rig.captures.points import PointClip
+    from viewer.rig.motion.clip import Clip
+    from viewer.rig.motion.sampled_clip import SampledClip
 
 Motion: TypeAlias = "Clip | SampledClip | PointClip"
 """Whatever moves an actor; all have ``name``, ``start`` and ``end`` in seconds."""
@@ -54,7 +54,7 @@ class Actor:
     pose : Pose or None
         This actor's own; None if the figure has no skeleton.
     clip : Motion or None
-        Its motion; ``viewer.rig.motion.pose_actor`` poses the actor by it.
+        Its motion; ``viewer.rig.motion.evaluation.pose_actor`` poses the actor by it.
     placement : (4, 4)
         Figure space to scene.
     visible : bool

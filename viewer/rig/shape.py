@@ -9,13 +9,13 @@ import numpy as np
 from viewer.rig.arrays import Floats
 from viewer.rig.blendshapes import corrective_weights, regress_joints
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.memo import Memo
 from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.pose import Pose, joint_rotations, rest_pose
 from viewer.rig.skeleton import Skeleton
 from viewer.rig.skin import Skin
-from viewer.rig.transform import translation_matrix
 
 __all__ = [
     "joint_directions",

@@ -5,8 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from viewer.errors import RigError
+from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.transfer.box_alignment import align_boxes
-from viewer.rig.transform import apply_transform
 
 
 def test_box_is_laid_onto_the_other_axis_by_axis():

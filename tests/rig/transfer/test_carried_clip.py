@@ -6,9 +6,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from rigged_shapes import arm
 
 from viewer.errors import RigError
-from viewer.rig.clip import Channel, Clip
-from viewer.rig.sampled_clip import SampledClip
-from viewer.rig.timing import Timing
+from viewer.rig.motion.clip import Channel, Clip
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.timing import Timing
 from viewer.rig.transfer.carried_clip import carry_clip
 
 SKELETON = arm().skeleton  # DOFs 0 to 2 move, the others turn

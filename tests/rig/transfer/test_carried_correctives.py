@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 pytest.importorskip("scipy")
 
 from viewer.rig.blendshapes import Correctives
-from viewer.rig.closest_point import SurfacePoints
+from viewer.rig.geometry.closest_point import SurfacePoints
 from viewer.rig.transfer import carried_correctives
 from viewer.rig.transfer.carried_correctives import carry_correctives
 

@@ -11,16 +11,16 @@ pytest.importorskip("scipy")
 
 from viewer.errors import RigError
 from viewer.loading import bundled_body, load
-from viewer.rig.clip import Channel, Clip
 from viewer.rig.figure import Figure
-from viewer.rig.motion import pose_actor
+from viewer.rig.geometry.transform import apply_transform
+from viewer.rig.motion.clip import Channel, Clip
+from viewer.rig.motion.evaluation import pose_actor
 from viewer.rig.pose import rest_pose
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import deform
 from viewer.rig.transfer.alignment import AlignmentSettings
 from viewer.rig.transfer.pipeline import METHODS, TransferSettings, transfer
 from viewer.rig.transfer.rigged import clip_for
-from viewer.rig.transform import apply_transform
 
 ROTATION = turn([0.1, 1, 0.2], 2.0)
 MOVE = np.array([3.0, -4.0, 5.0])

@@ -7,7 +7,7 @@ from rigged_shapes import arm, turn
 
 pytest.importorskip("scipy")
 
-from viewer.rig.closest_point import Surface
+from viewer.rig.geometry.closest_point import Surface
 from viewer.rig.pose import joint_rotations, rest_pose
 from viewer.rig.skinning import deform
 from viewer.rig.transfer.icp import Triangles

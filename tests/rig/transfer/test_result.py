@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from viewer.rig.closest_point import SurfacePoints
+from viewer.rig.geometry.closest_point import SurfacePoints
 from viewer.rig.transfer.matching import Matches
 from viewer.rig.transfer.result import RigidIslands, match_lines, nothing_matched, rigid_lines
 

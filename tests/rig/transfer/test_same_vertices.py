@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 pytest.importorskip("scipy")
 
-from viewer.rig.closest_point import Surface
+from viewer.rig.geometry.closest_point import Surface
 from viewer.rig.transfer.same_vertices import at_vertices, same_vertices
 from viewer.rig.transfer.welding import weld
 

@@ -11,10 +11,10 @@ from viewer.app.state import AppState, HeldVector
 from viewer.app.widgets import note_item, plain_zero
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.rotation import matrix_to_rotation_vector, rotation_vector_to_matrix
 from viewer.rig.number_text import number_text
 from viewer.rig.pose import Pose, joint_rotations
-from viewer.rig.pose_vector import own_numbers, rotation_rows, set_joint_rotations
-from viewer.rig.rotation import matrix_to_rotation_vector, rotation_vector_to_matrix
+from viewer.rig.posing.pose_vector import own_numbers, rotation_rows, set_joint_rotations
 
 __all__ = ["draw_own_numbers", "draw_vector_component", "is_ball"]
 

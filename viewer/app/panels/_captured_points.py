@@ -8,7 +8,7 @@ from viewer.app.state import AppState
 from viewer.app.widgets import note_item
 from viewer.errors import printable
 from viewer.rig.arrays import Floats
-from viewer.rig.points import PointLayout
+from viewer.rig.captures.points import PointLayout
 from viewer.rig.scene import Actor
 
 __all__ = ["draw_captured_points"]

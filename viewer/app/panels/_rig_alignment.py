@@ -35,7 +35,7 @@ from viewer.app.widgets import (
 )
 from viewer.errors import ViewerError
 from viewer.rig.arrays import Floats
-from viewer.rig.rotation import axis_rotations, matrix_to_euler
+from viewer.rig.geometry.rotation import axis_rotations, matrix_to_euler
 from viewer.rig.transfer.alignment import SCALES, Alignment, AlignmentSettings
 from viewer.rig.transfer.orientation_search import AXES
 from viewer.rig.transfer.similarity import Similarity

@@ -9,7 +9,7 @@ from viewer.app.actions import start_following, stop_following
 from viewer.app.state import AppState
 from viewer.app.widgets import button, checkbox, explain, note_item, plain_zero, same_line_if_room
 from viewer.errors import printable
-from viewer.rig.fit_error import fitted_body, keypoint_distances
+from viewer.rig.captures.fit_error import fitted_body, keypoint_distances
 from viewer.rig.mesh import box_size
 from viewer.rig.scalars import length_unit
 from viewer.rig.scene import Actor

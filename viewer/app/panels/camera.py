@@ -9,7 +9,7 @@ from viewer.app.state import AppState
 from viewer.app.widgets import button, checkbox, choice, explain, note_item, slider
 from viewer.errors import printable
 from viewer.rendering.camera import VIEWS, front_azimuth
-from viewer.rig.front import front_axes
+from viewer.rig.inspection.front import front_axes
 from viewer.rig.mesh import box_size
 
 __all__ = ["draw"]

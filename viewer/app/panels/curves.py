@@ -23,7 +23,7 @@ from viewer.app.curve_plot import draw_plot
 from viewer.app.curve_view import KeyPlace
 from viewer.app.state import AppState
 from viewer.app.widgets import button, choice, explain, note_item, plain_zero, same_line_if_room
-from viewer.rig.clip import EXTRAPOLATIONS, TANGENT_RULES, Channel, Clip, slopes
+from viewer.rig.motion.clip import EXTRAPOLATIONS, TANGENT_RULES, Channel, Clip, slopes
 
 __all__ = ["draw"]
 

@@ -11,11 +11,11 @@ from viewer.app.state import AppState
 from viewer.app.widgets import button, note_item, plain_zero, same_line_if_room
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.rotation import matrix_to_rotation_vector, rotation_vector_to_matrix
 from viewer.rig.hands import Hand, hand_coefficients, hand_vectors
 from viewer.rig.memo import Memo
 from viewer.rig.pose import Pose, joint_rotations
-from viewer.rig.pose_vector import set_joint_rotations
-from viewer.rig.rotation import matrix_to_rotation_vector, rotation_vector_to_matrix
+from viewer.rig.posing.pose_vector import set_joint_rotations
 
 __all__ = ["draw"]
 

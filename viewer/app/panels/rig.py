@@ -36,10 +36,10 @@ from viewer.app.widgets import (
     slider,
 )
 from viewer.errors import printable
+from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.mesh import bounding_box
 from viewer.rig.scene import Actor, actor_points, free_title
 from viewer.rig.transfer.settings import JOINTS, METHODS
-from viewer.rig.transform import translation_matrix
 
 __all__ = ["draw"]
 

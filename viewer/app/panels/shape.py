@@ -10,7 +10,7 @@ from viewer.app.state import AppState
 from viewer.app.widgets import button, checkbox, note_item, plain_zero, same_line_if_room
 from viewer.errors import printable
 from viewer.rig.figure import Figure
-from viewer.rig.measure import measure
+from viewer.rig.inspection.measure import measure
 from viewer.rig.memo import Memo
 from viewer.rig.morph_target import MORPH_GROUP
 from viewer.rig.pose import Pose

@@ -14,8 +14,8 @@ from viewer.app.weights_actions import explained, toggle_picking, unpin
 from viewer.app.widgets import button, checkbox, explain, note_item, same_line_if_room
 from viewer.errors import ViewerError, printable
 from viewer.rig.arrays import Floats
-from viewer.rig.explanation import DualTerms, Explanation
-from viewer.rig.explanation_text import explanation_text
+from viewer.rig.inspection.explanation import DualTerms, Explanation
+from viewer.rig.inspection.explanation_text import explanation_text
 from viewer.rig.number_text import number_text
 from viewer.rig.skinning import METHODS
 

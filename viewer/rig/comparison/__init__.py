@@ -8,15 +8,15 @@ import numpy as np
 
 from viewer.errors import counted
 from viewer.rig.arrays import Floats
-from viewer.rig.closest_point import Surface, SurfacePoints
 from viewer.rig.comparison.difference import Difference, Measure, Tally
 from viewer.rig.comparison.pairs import Pairs, pair_joints, pair_names, rotation_distance
 from viewer.rig.comparison.steps import FrameRange, Steps, steps_of
 from viewer.rig.comparison.weights import row_distances, skin_at
+from viewer.rig.geometry.closest_point import Surface, SurfacePoints
+from viewer.rig.geometry.rotation import nearest_rotations
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.mesh import Mesh, bounding_box, box_size
 from viewer.rig.pose import placement_matrix
-from viewer.rig.rotation import nearest_rotations
 from viewer.rig.scene import Actor, actor_points
 from viewer.rig.shape import shaped
 from viewer.rig.skinning import Skinning, deform

@@ -8,9 +8,9 @@ import numpy as np
 
 from viewer.errors import RigError, counted
 from viewer.rig.arrays import Floats, Ints
-from viewer.rig.clip import Clip
 from viewer.rig.comparison.pairs import pair_names
-from viewer.rig.motion import frame_rate, pose_actor
+from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.evaluation import frame_rate, pose_actor
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor, figure_pose
 from viewer.rig.skeleton import Skeleton, dof_labels

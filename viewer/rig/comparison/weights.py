@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from viewer.rig.arrays import Floats, Ints
-from viewer.rig.closest_point import SurfacePoints
 from viewer.rig.comparison.pairs import Pairs
+from viewer.rig.geometry.closest_point import SurfacePoints
 from viewer.rig.skin import Skin, owners, row_norms, skin_rows
 
 __all__ = ["row_distances", "skin_at"]

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from viewer.rig.arrays import Floats
-from viewer.rig.mirror import mirror_axis
+from viewer.rig.retargeting.mirror import mirror_axis
 from viewer.rig.scalars._asked import Asked, influences_kept
 from viewer.rig.skinning import Skinning, deform
 

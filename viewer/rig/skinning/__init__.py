@@ -12,13 +12,13 @@ from viewer.errors import RigError
 from viewer.near_names import name_hint
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.transform import apply_transform
+from viewer.rig.geometry.vectors import unit
 from viewer.rig.kinematics import skinning_matrices, world_matrices
 from viewer.rig.memo import Memo
 from viewer.rig.pose import Pose, placement_matrix, rest_pose
 from viewer.rig.shape import rest_positions, shaped
 from viewer.rig.skin import Skin, limit_influences, normalized
-from viewer.rig.transform import apply_transform
-from viewer.rig.vectors import unit
 
 __all__ = ["METHODS", "Skinning", "deform", "deform_frames", "joint_matrices", "skin_used"]
 

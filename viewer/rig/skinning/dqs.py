@@ -10,10 +10,10 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.rig.arrays import Floats, Ints
-from viewer.rig.rotation import matrix_to_quaternion, nearest_rotations
+from viewer.rig.geometry.rotation import matrix_to_quaternion, nearest_rotations
+from viewer.rig.geometry.vectors import unit
 from viewer.rig.skin import Skin, bind_positions, strongest_first
 from viewer.rig.skinning._normals import inverse_transposed
-from viewer.rig.vectors import unit
 
 __all__ = ["deform", "split_palette"]
 

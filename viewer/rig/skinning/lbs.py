@@ -7,11 +7,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from viewer.rig.arrays import Floats
+from viewer.rig.geometry.vectors import unit
 from viewer.rig.kinematics import is_rigid
 from viewer.rig.skin import Skin
 from viewer.rig.skinning._blocks import Block, blocks_of
 from viewer.rig.skinning._normals import inverse_transposed
-from viewer.rig.vectors import unit
 
 __all__ = ["blended_matrices", "deform", "move"]
 

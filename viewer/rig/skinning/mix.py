@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from viewer.rig.arrays import Floats
+from viewer.rig.geometry.vectors import unit
 from viewer.rig.skin import Skin
 from viewer.rig.skinning import dqs, lbs
-from viewer.rig.vectors import unit
 
 __all__ = ["deform"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.rig.arrays import Floats
-from viewer.rig.rotation import rotation_vector_to_matrix
+from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 from viewer.rig.transfer.icp import FEWEST, HOLD, SETTLED, Pairs, Side, pairs_between
 from viewer.rig.transfer.similarity import Similarity
 

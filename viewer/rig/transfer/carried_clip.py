@@ -8,8 +8,8 @@ import numpy as np
 
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats
-from viewer.rig.clip import Channel, Clip
-from viewer.rig.sampled_clip import SampledClip
+from viewer.rig.motion.clip import Channel, Clip
+from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.skeleton import Skeleton
 
 __all__ = ["carry_clip"]

@@ -6,7 +6,7 @@ import numpy as np
 
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.blendshapes import Correctives
-from viewer.rig.closest_point import SurfacePoints, interpolate
+from viewer.rig.geometry.closest_point import SurfacePoints, interpolate
 from viewer.rig.transfer.welding import edges, weld
 
 __all__ = ["MOST_NUMBERS", "carry_correctives"]

@@ -8,12 +8,12 @@ import numpy as np
 
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.mesh import Mesh, bounding_box, box_size
 from viewer.rig.pose import Pose
 from viewer.rig.skeleton import joint_label
 from viewer.rig.skinning import deform, joint_matrices
 from viewer.rig.transfer.joint_carrying import outside
-from viewer.rig.transform import apply_transform
 
 __all__ = ["check_lines", "joint_list", "newly_outside", "residual_of", "with_joint_name"]
 

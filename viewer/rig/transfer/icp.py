@@ -15,11 +15,11 @@ import numpy as np
 
 from viewer.rig._scipy import scipy_part
 from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.closest_point import Surface
-from viewer.rig.rotation import rotation_vector_to_matrix
+from viewer.rig.geometry.closest_point import Surface
+from viewer.rig.geometry.rotation import rotation_vector_to_matrix
+from viewer.rig.geometry.vectors import unit
 from viewer.rig.transfer.similarity import Similarity, fit_similarity
 from viewer.rig.transfer.surface_samples import SurfaceSamples, sample_surface, triangle_normals
-from viewer.rig.vectors import unit
 
 __all__ = [
     "FEWEST",

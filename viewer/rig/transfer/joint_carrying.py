@@ -8,7 +8,7 @@ import numpy as np
 
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.blendshapes import JointRegressor
-from viewer.rig.closest_point import Surface
+from viewer.rig.geometry.closest_point import Surface
 from viewer.rig.skin import Skin, influence_counts
 from viewer.rig.transfer.surface_samples import triangle_normals
 from viewer.rig.transfer.winding import winding_numbers

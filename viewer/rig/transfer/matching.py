@@ -16,11 +16,11 @@ import numpy as np
 
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.closest_point import Surface, SurfacePoints, interpolate
+from viewer.rig.geometry.closest_point import Surface, SurfacePoints, interpolate
+from viewer.rig.geometry.vectors import unit
 from viewer.rig.mesh import vertex_normals
 from viewer.rig.transfer.same_vertices import at_vertices, same_vertices
 from viewer.rig.transfer.welding import Welded, weld
-from viewer.rig.vectors import unit
 
 __all__ = ["MatchSettings", "Matches", "Template", "match", "sheet_normals"]
 

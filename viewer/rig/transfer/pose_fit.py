@@ -16,16 +16,18 @@ import numpy as np
 from viewer.rig._scipy import scipy_part
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
-from viewer.rig.kinematics import skinning_matrices, world_matrices
-from viewer.rig.mesh import vertex_normals
-from viewer.rig.pose import Pose, dof_rotations, joint_rotations, placement_matrix
-from viewer.rig.pose_vector import rotation_rows
-from viewer.rig.rotation import (
+from viewer.rig.geometry.rotation import (
     matrix_to_euler,
     matrix_to_quaternion,
     quaternion_to_matrix,
     rotation_vector_to_matrix,
 )
+from viewer.rig.geometry.transform import apply_transform
+from viewer.rig.geometry.vectors import unit
+from viewer.rig.kinematics import skinning_matrices, world_matrices
+from viewer.rig.mesh import vertex_normals
+from viewer.rig.pose import Pose, dof_rotations, joint_rotations, placement_matrix
+from viewer.rig.posing.pose_vector import rotation_rows
 from viewer.rig.skeleton import Skeleton, clamp_dofs
 from viewer.rig.skinning.lbs import move
 from viewer.rig.transfer.icp import Side
@@ -33,8 +35,6 @@ from viewer.rig.transfer.pose_step import Laid, Pairs, PoseStep, solve_step
 from viewer.rig.transfer.proportions import Limbs, limbs_of, resized
 from viewer.rig.transfer.similarity import Similarity
 from viewer.rig.transfer.surface_samples import even_vertices
-from viewer.rig.transform import apply_transform
-from viewer.rig.vectors import unit
 
 __all__ = ["Fitted", "fit_pose"]
 

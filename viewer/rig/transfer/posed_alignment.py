@@ -15,10 +15,10 @@ import numpy as np
 
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 from viewer.rig.mesh import Mesh, volume
 from viewer.rig.number_text import number_text
 from viewer.rig.pose import Pose
-from viewer.rig.rotation import rotation_vector_to_matrix
 from viewer.rig.skeleton import joint_label
 from viewer.rig.skinning import deform
 from viewer.rig.transfer.alignment import (

@@ -15,11 +15,11 @@ import numpy as np
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.vectors import unit
 from viewer.rig.mesh import vertex_normals
-from viewer.rig.mirror import joint_partners
+from viewer.rig.retargeting.mirror import joint_partners
 from viewer.rig.skin import Skin, influence_counts, weight_sums
 from viewer.rig.skinning.lbs import move
-from viewer.rig.vectors import unit
 
 __all__ = ["Limbs", "limbs_of", "resized"]
 

@@ -9,11 +9,11 @@ import numpy as np
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.rotation import matrix_to_euler, matrix_to_quaternion, quaternion_to_matrix
 from viewer.rig.kinematics import world_matrices
-from viewer.rig.mirror import joint_partners, mirror_axis
 from viewer.rig.pose import Pose, dof_rotations, joint_rotations
-from viewer.rig.pose_vector import rotation_rows
-from viewer.rig.rotation import matrix_to_euler, matrix_to_quaternion, quaternion_to_matrix
+from viewer.rig.posing.pose_vector import rotation_rows
+from viewer.rig.retargeting.mirror import joint_partners, mirror_axis
 from viewer.rig.skeleton import Skeleton, joint_label
 from viewer.rig.transfer.leg_scale import leg_scale
 from viewer.rig.transfer.similarity import Similarity

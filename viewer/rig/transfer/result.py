@@ -8,7 +8,7 @@ import numpy as np
 
 from viewer.errors import counted
 from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.closest_point import SurfacePoints
+from viewer.rig.geometry.closest_point import SurfacePoints
 from viewer.rig.skin import Skin
 from viewer.rig.transfer.matching import Matches
 

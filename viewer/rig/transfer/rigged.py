@@ -8,10 +8,10 @@ import numpy as np
 
 from viewer.rig.annotations import VertexField
 from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.clip import Clip
 from viewer.rig.figure import Figure
+from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.pose import Pose
-from viewer.rig.sampled_clip import SampledClip
 from viewer.rig.transfer.alignment import Alignment
 from viewer.rig.transfer.carried_clip import carry_clip
 from viewer.rig.transfer.result import WeightTransfer

@@ -15,7 +15,7 @@ import numpy as np
 
 from viewer.rig._scipy import scipy_part
 from viewer.rig.arrays import Floats, Ints
-from viewer.rig.closest_point import SurfacePoints
+from viewer.rig.geometry.closest_point import SurfacePoints
 from viewer.rig.transfer.welding import Welded, edges
 
 __all__ = ["at_vertices", "same_vertices"]

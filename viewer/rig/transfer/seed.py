@@ -8,6 +8,7 @@ import numpy as np
 
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.kinematics import skinning_matrices, world_matrices
 from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.pose import Pose, placement_matrix
@@ -19,7 +20,6 @@ from viewer.rig.transfer.rigged import Rigged
 from viewer.rig.transfer.settings import Report
 from viewer.rig.transfer.unposing import unpose
 from viewer.rig.transfer.weights import nearest_weights
-from viewer.rig.transform import apply_transform
 
 __all__ = ["nearest"]
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints, frozen
+from viewer.rig.geometry.vectors import unit
 from viewer.rig.mesh import triangle_areas
-from viewer.rig.vectors import unit
 
 __all__ = ["SurfaceSamples", "even_vertices", "sample_surface", "triangle_normals"]
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from viewer.rig._scipy import scipy_part
 from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.rotation import nearest_rotations
+from viewer.rig.geometry.rotation import nearest_rotations
 from viewer.rig.skin import Skin
 from viewer.rig.skinning.lbs import blended_matrices
 from viewer.rig.transfer.welding import edges, weld

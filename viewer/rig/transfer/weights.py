@@ -9,7 +9,7 @@ import numpy as np
 
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.closest_point import SurfacePoints, interpolate
+from viewer.rig.geometry.closest_point import SurfacePoints, interpolate
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.skin import Skin, skin_rows
 from viewer.rig.transfer.inpainting import NEGLIGIBLE, Report, fill

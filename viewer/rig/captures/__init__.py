@@ -1,0 +1,1 @@
+"""Captures: people, keypoints and cameras of recordings."""

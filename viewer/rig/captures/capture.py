@@ -1,0 +1,69 @@
+"""A recording of several people, read in parts: what a reader of sequences gives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+from viewer.rig.captures.camera_view import CameraView
+from viewer.rig.captures.points import PointClip, PointLayout
+from viewer.rig.motion.body_motion import BodyMotion
+
+__all__ = ["Capture", "CapturePart"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CapturePart:
+    """Consecutive frames of a capture.
+
+    Attributes
+    ----------
+    stop : int
+        Frames from the capture's first one up to here (not included) have been read.
+    bodies : mapping of person to BodyMotion
+        Only the rows of this part; their ``timing`` spans the whole capture, -1 elsewhere.
+    points : mapping of person to (PointLayout, PointClip)
+        The same for keypoints.
+    warnings : tuple of str
+        What the reader noticed in these frames, one line each.
+    """
+
+    stop: int
+    bodies: dict[int, BodyMotion] = field(default_factory=dict)
+    points: dict[int, tuple[PointLayout, PointClip]] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Capture:
+    """A sequence that has been looked at but not read.
+
+    Attributes
+    ----------
+    name : str
+        What menus call it.
+    n_frames : int
+        Frames on its timeline, gaps included, F.
+    first_frame : int
+        What the files call the first one.
+    parts : callable
+        Returns an iterator over the parts, in time order, the first one short so that
+        something can be shown; each call reads anew.
+    up : "y", "z", "-y", "-z" or ""
+        The axis that points up in the world; empty to guess from the first bodies.
+    views : tuple of CameraView
+        Calibrated cameras.
+    model : str
+        The member of the SMPL family that its bodies are, e.g. ``"SMPL+H"``; empty for none.
+    warnings : tuple of str
+        What was noticed when looking.
+    """
+
+    name: str
+    n_frames: int
+    first_frame: int
+    parts: Callable[[], Iterator[CapturePart]]
+    up: str = ""
+    views: tuple[CameraView, ...] = ()
+    model: str = ""
+    warnings: tuple[str, ...] = ()

@@ -1,0 +1,276 @@
+"""Layouts of captured keypoints, chosen by their number: names, limbs and sides.
+
+body25 and the orders of hands and face are OpenPose's, panoptic is CMU's, the others are those of
+COCO, Human3.6M as EasyMocap orders it (left first), the SMPL family and MediaPipe.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.rig.captures.points import PointLayout
+from viewer.rig.smpl_family import FAMILY
+
+__all__ = ["TITLES", "joined_layout", "keypoint_layout", "matching_joints"]
+
+Pairs = tuple[tuple[int, int], ...]
+
+_BODY25 = (
+    "nose neck right_shoulder right_elbow right_wrist left_shoulder left_elbow left_wrist mid_hip "
+    "right_hip right_knee right_ankle left_hip left_knee left_ankle right_eye left_eye right_ear "
+    "left_ear left_big_toe left_small_toe left_heel right_big_toe right_small_toe right_heel"
+)
+_BODY25_LIMBS = (
+    "8-1 1-0 2-1 3-2 4-3 5-1 6-5 7-6 9-8 10-9 11-10 12-8 13-12 14-13 15-0 16-0 17-15 18-16 19-14 "
+    "20-19 21-14 22-11 23-22 24-11"
+)
+_COCO = (
+    "nose left_eye right_eye left_ear right_ear left_shoulder right_shoulder left_elbow "
+    "right_elbow left_wrist right_wrist left_hip right_hip left_knee right_knee left_ankle "
+    "right_ankle"
+)
+_COCO_LIMBS = "0-1 0-2 1-3 2-4 0-5 0-6 5-6 5-7 6-8 7-9 8-10 5-11 6-12 11-12 11-13 12-14 13-15 14-16"
+_H36M = (
+    "mid_hip left_hip left_knee left_ankle right_hip right_knee right_ankle spine neck head "
+    "head_top left_shoulder left_elbow left_wrist right_shoulder right_elbow right_wrist"
+)
+_H36M_LIMBS = "0-1 1-2 2-3 0-4 4-5 5-6 0-7 7-8 8-9 9-10 8-11 11-12 12-13 8-14 14-15 15-16"
+_PANOPTIC = (
+    "neck nose mid_hip left_shoulder left_elbow left_wrist left_hip left_knee left_ankle "
+    "right_shoulder right_elbow right_wrist right_hip right_knee right_ankle left_eye left_ear "
+    "right_eye right_ear"
+)
+# The spec's list ends at the ankles; eyes and ears hang on as they do in body25.
+_PANOPTIC_LIMBS = (
+    "0-1 0-2 0-3 3-4 4-5 0-9 9-10 10-11 2-6 2-12 6-7 7-8 12-13 13-14 1-15 15-16 1-17 17-18"
+)
+_MEDIAPIPE = (
+    "nose left_eye_inner left_eye left_eye_outer right_eye_inner right_eye right_eye_outer "
+    "left_ear right_ear left_mouth right_mouth left_shoulder right_shoulder left_elbow "
+    "right_elbow left_wrist right_wrist left_pinky right_pinky left_index right_index left_thumb "
+    "right_thumb left_hip right_hip left_knee right_knee left_ankle right_ankle left_heel "
+    "right_heel left_big_toe right_big_toe"
+)
+_MEDIAPIPE_LIMBS = (
+    "0-1 1-2 2-3 3-7 0-4 4-5 5-6 6-8 9-10 11-12 11-13 13-15 15-17 15-19 15-21 17-19 12-14 14-16 "
+    "16-18 16-20 16-22 18-20 11-23 12-24 23-24 23-25 24-26 25-27 26-28 27-29 28-30 29-31 30-32 "
+    "27-31 28-32"
+)
+_FINGERS = ("thumb", "index", "middle", "ring", "pinky")
+# First keypoint, name, number of them, and whether their line is closed.
+_FACE = (
+    (0, "face_contour", 17, False),
+    (17, "right_brow", 5, False),
+    (22, "left_brow", 5, False),
+    (27, "nose_bridge", 4, False),
+    (31, "nose_base", 5, False),
+    (36, "right_eyelid", 6, True),
+    (42, "left_eyelid", 6, True),
+    (48, "outer_lip", 12, True),
+    (60, "inner_lip", 8, True),
+)
+_CONTOUR, _FACE_68, _FACE_70 = 17, 68, 70
+
+_WORDS = {
+    "body25": (_BODY25, _BODY25_LIMBS, 25),
+    "body15": (_BODY25, _BODY25_LIMBS, 15),
+    "body19": (_BODY25, _BODY25_LIMBS, 19),
+    "panoptic": (_PANOPTIC, _PANOPTIC_LIMBS, 19),
+    "coco": (_COCO, _COCO_LIMBS, 17),
+    "h36m": (_H36M, _H36M_LIMBS, 17),
+    "mediapipe": (_MEDIAPIPE, _MEDIAPIPE_LIMBS, 33),
+}
+_JOINTS = {"smpl": 24, "smplh": 52, "smplx": 55}
+# Body, hands and face put together; a mesh of 468 points on the face has no names.
+_SETS = {
+    "hand": ("hand",),
+    "hands": ("left_hand", "right_hand"),
+    "bodyhand": ("body25", "left_hand", "right_hand"),
+    "bodyhandface": ("body25", "left_hand", "right_hand", "face51"),
+    "total": ("body25", "left_hand", "right_hand", "face70"),
+    "face": ("face70",),
+    "face51": ("face51",),
+    "mediapipe_face": ("face468",),
+    "body25_hands_face": ("body25", "left_hand", "right_hand", "face468"),
+    "mediapipe_total": ("mediapipe", "left_hand", "right_hand", "face468"),
+}
+
+TITLES: dict[int, tuple[str, ...]] = {
+    25: ("body25",),
+    15: ("body15",),
+    19: ("body19", "panoptic"),
+    17: ("coco", "h36m"),
+    21: ("hand",),
+    42: ("hands",),
+    67: ("bodyhand",),
+    118: ("bodyhandface",),
+    137: ("total",),
+    24: ("smpl",),
+    52: ("smplh",),
+    55: ("smplx",),
+    33: ("mediapipe",),
+    51: ("face51",),
+    70: ("face",),
+    468: ("mediapipe_face",),
+    535: ("body25_hands_face",),
+    543: ("mediapipe_total",),
+}
+"""Layouts by their number of keypoints; the first is meant unless someone says otherwise."""
+
+# Keypoints that SMPLify-X and EasyMocap hold a joint of another name to.
+_SAME = {"mid_hip": "pelvis"}
+_ALIKE = (
+    "neck left_shoulder left_elbow left_wrist left_hip left_knee left_ankle right_shoulder "
+    "right_elbow right_wrist right_hip right_knee right_ankle"
+)
+
+
+def keypoint_layout(count: int, title: str = "") -> PointLayout:
+    """Return the layout of a set of keypoints.
+
+    Parameters
+    ----------
+    count : int
+        Number of keypoints, K.
+    title : str
+        A layout by name, for numbers that several layouts share; empty for the usual one.
+
+    Returns
+    -------
+    PointLayout
+        With names ``point0``, ``point1`` … and no limbs if no layout has this number.
+
+    Raises
+    ------
+    RigError
+        If the layout of that name has another number of keypoints, or there is none.
+
+    >>> keypoint_layout(17).title, keypoint_layout(17, "h36m").names[0]
+    ('coco', 'mid_hip')
+    """
+    known = TITLES.get(count, ())
+    if title and title not in known:
+        sizes = {name: size for size, names in TITLES.items() for name in names}
+        if title not in sizes:
+            raise RigError(f"keypoints: expected one of {', '.join(sizes)}, found {title}")
+        raise RigError(f"{title}: expected {sizes[title]} keypoints, found {count}")
+    if not known:
+        return _layout("points", [f"point{index}" for index in range(count)], ())
+    return _named(title or known[0])
+
+
+def _named(title: str) -> PointLayout:
+    if title in _WORDS:
+        names, limbs, count = _WORDS[title]
+        pairs = [(a, b) for a, b in _pairs(limbs) if max(a, b) < count]
+        return _layout(title, names.split()[:count], pairs)
+    if title in _JOINTS:
+        member = FAMILY[_JOINTS[title]]
+        joints = ((j, parent) for j, parent in enumerate(member.parents) if parent >= 0)
+        return _layout(title, member.names, tuple(joints))
+    return joined_layout(title, [_part(name) for name in _SETS[title]])
+
+
+def _part(name: str) -> PointLayout:
+    if name.startswith("face"):
+        return _face(int(name.removeprefix("face")))
+    if name.endswith("hand"):
+        return _hand(name.removesuffix("hand"))
+    return _named(name)
+
+
+def joined_layout(title: str, parts: Sequence[PointLayout]) -> PointLayout:
+    """Return one layout of several sets of keypoints, one behind the other.
+
+    A hand behind a body grows from the body's wrist: its own is the same point once more.
+
+    Parameters
+    ----------
+    title : str
+        What the whole is called.
+    parts : sequence of PointLayout
+        In the order of the points.
+    """
+    names: list[str] = []
+    limbs: list[tuple[int, int]] = []
+    for part in parts:
+        start = len(names)
+        moved = [start + index for index in range(len(part.names))]
+        first = part.names[0] if part.names else ""
+        wrist = first.replace("hand_wrist", "wrist")
+        if first.endswith("_hand_wrist") and wrist in names:
+            moved[0] = names.index(wrist)
+        limbs += [(moved[a], moved[b]) for a, b in part.limbs.tolist()]
+        names += part.names
+    return _layout(title, names, limbs)
+
+
+def _hand(side: str) -> PointLayout:
+    """Return 21 keypoints: the wrist, then four a finger, the thumb first."""
+    names = [f"{side}hand_wrist" if side else "wrist"]
+    limbs = []
+    for finger, label in enumerate(_FINGERS):
+        first = 4 * finger + 1
+        names += [f"{side}{label}{number}" for number in (1, 2, 3)] + [f"{side}{label}_tip"]
+        limbs += [(0, first), *((first + i, first + i + 1) for i in range(3))]
+    return _layout("hand", names, limbs)
+
+
+def _face(count: int) -> PointLayout:
+    """Return the 70 keypoints of a face, the 51 within its contour, or a mesh without names."""
+    if count not in (_FACE_70, _FACE_68 - _CONTOUR):
+        return _layout("face", [f"face{index}" for index in range(count)], ())
+    names, limbs = [], []
+    for first, label, size, is_closed in _FACE:
+        names += [f"{label}{number}" for number in range(1, size + 1)]
+        limbs += [(first + i, first + i + 1) for i in range(size - 1)]
+        limbs += [(first + size - 1, first)] * is_closed
+    names += ["right_pupil", "left_pupil"]
+    start = 0 if count == _FACE_70 else _CONTOUR
+    kept = [(a - start, b - start) for a, b in limbs if min(a, b) >= start]
+    return _layout("face", names[start : start + count], kept)
+
+
+def _layout(title: str, names: Iterable[str], limbs: Iterable[tuple[int, int]]) -> PointLayout:
+    names = tuple(names)
+    sides = [name.startswith("left_") - name.startswith("right_") for name in names]
+    return PointLayout(
+        title,
+        names,
+        np.array(list(limbs), dtype=np.int32).reshape(-1, 2),
+        np.array(sides, dtype=np.int32),
+    )
+
+
+def _pairs(text: str) -> Pairs:
+    words = (word.split("-") for word in text.split())
+    return tuple((int(first), int(second)) for first, second in words)
+
+
+def matching_joints(layout: PointLayout) -> dict[int, str]:
+    """Return which keypoints mean the same as a joint of the SMPL family.
+
+    The mapping is SMPLify-X's: limbs, fingers, the neck, and the middle of the hips as the pelvis.
+    Eyes, ears, toes and heels lie on the skin, where no joint is.
+
+    Parameters
+    ----------
+    layout : PointLayout
+        Of keypoints.
+
+    Returns
+    -------
+    dict of int to str
+        Index of a keypoint to the name of the joint.
+
+    >>> matching_joints(keypoint_layout(25))[8]
+    'pelvis'
+    """
+    if layout.title in _JOINTS:
+        return dict(enumerate(layout.names))
+    fingers = {name for name in FAMILY[52].names if name[-1] in "123" and "spine" not in name}
+    same = {name: name for name in (*_ALIKE.split(), *fingers)} | _SAME
+    return {index: same[name] for index, name in enumerate(layout.names) if name in same}

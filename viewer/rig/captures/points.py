@@ -1,0 +1,103 @@
+"""Points without a skin: captured 3D keypoints, their limbs, and their motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.rig.arrays import Floats, Ints, frozen
+from viewer.rig.motion.timing import Timing
+
+__all__ = ["PointClip", "PointLayout", "sample_points"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PointLayout:
+    """What a set of keypoints is called and how it hangs together.
+
+    Attributes
+    ----------
+    title : str
+        ``"body25"``, ``"coco"`` …
+    names : tuple of K str
+        In the field's words: ``left_knee``.
+    limbs : (L, 2) int32
+        Pairs of keypoints, drawn as lines.
+    sides : (K,) int32
+        -1 for right, 0 for the middle, 1 for left.
+    """
+
+    title: str
+    names: tuple[str, ...]
+    limbs: Ints
+    sides: Ints
+
+    def __post_init__(self) -> None:
+        count = len(self.names)
+        object.__setattr__(self, "limbs", frozen("limbs", self.limbs, (None, 2), np.int32))
+        object.__setattr__(self, "sides", frozen("sides", self.sides, (count,), np.int32))
+        if self.limbs.size and not 0 <= self.limbs.min() <= self.limbs.max() < count:
+            raise RigError(f"limbs: expected 0 to {count - 1}, found {self.limbs.max()}")
+
+
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
+class PointClip:
+    """A motion of points.
+
+    Attributes
+    ----------
+    name : str
+        What menus call it.
+    timing : Timing
+        Frame rate, and the row of each frame.
+    points : (N, K, 4)
+        x, y, z and confidence; 0 is "not seen", and such a point is nowhere.
+    """
+
+    name: str
+    timing: Timing
+    points: Floats
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points", frozen("points", self.points, (None, None, 4)))
+
+    @property
+    def start(self) -> float:
+        """Seconds of the first frame."""
+        return self.timing.start
+
+    @property
+    def end(self) -> float:
+        """Seconds of the last frame."""
+        return self.timing.end
+
+
+def sample_points(clip: PointClip, time: float, fill: bool = False) -> Floats | None:
+    """Return the points at one time, None where they are absent.
+
+    A point moves in a straight line between two frames that see it; seen in one of the two, it
+    stays there until the other is due.
+
+    Parameters
+    ----------
+    clip : PointClip
+        The motion.
+    time : float
+        Seconds.
+    fill : bool
+        Bridge gaps.
+
+    Returns
+    -------
+    (K, 4) or None
+        x, y, z, confidence.
+    """
+    before, after, share = (part[0] for part in clip.timing.locate(np.array([time]), fill))
+    if before < 0:
+        return None
+    start, end = clip.points[before], clip.points[after]
+    mixed = start + share * (end - start)
+    both = (start[:, 3] > 0.0) & (end[:, 3] > 0.0)
+    return np.where(both[:, None], mixed, start)

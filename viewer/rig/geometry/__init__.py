@@ -1,0 +1,1 @@
+"""Geometry: rotations, transforms, rays and closest points."""

@@ -1,0 +1,61 @@
+"""Affine transforms as 4 x 4 matrices for column vectors, translation in the last column."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.rig.arrays import Floats
+from viewer.rig.geometry.rotation import axis_rotations
+
+__all__ = ["apply_transform", "rotation_transform", "translation_matrix"]
+
+
+def translation_matrix(offset: Floats) -> Floats:
+    """Return the matrices that move by ``offset``.
+
+    Parameters
+    ----------
+    offset : (..., 3)
+        Lengths.
+
+    Returns
+    -------
+    (..., 4, 4)
+        Matrices for column vectors.
+
+    >>> float(translation_matrix(np.array([1.0, 2.0, 3.0]))[2, 3])
+    3.0
+    """
+    offset = np.asarray(offset, dtype=np.float64)
+    matrices = np.zeros((*offset.shape[:-1], 4, 4))
+    matrices[..., [0, 1, 2, 3], [0, 1, 2, 3]] = 1.0
+    matrices[..., :3, 3] = offset
+    return matrices
+
+
+def rotation_transform(axis: int, angle: float) -> Floats:
+    """Return the (4, 4) matrix that turns about a coordinate axis by ``angle`` radians."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = axis_rotations(axis, np.asarray(angle))
+    return matrix
+
+
+def apply_transform(matrix: Floats, points: Floats) -> Floats:
+    """Move points: p' = M [p 1].
+
+    Parameters
+    ----------
+    matrix : (4, 4)
+        Affine matrix.
+    points : (..., 3)
+        Points in the space the matrix maps from.
+
+    Returns
+    -------
+    (..., 3)
+        Points in the space it maps to.
+
+    >>> apply_transform(translation_matrix(np.array([1.0, 0.0, 0.0])), np.zeros(3))
+    array([1., 0., 0.])
+    """
+    return points @ matrix[:3, :3].T + matrix[:3, 3]

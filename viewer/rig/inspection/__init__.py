@@ -1,0 +1,1 @@
+"""Facts about vertices and bodies, and explanations of where a vertex is."""

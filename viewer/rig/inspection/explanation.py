@@ -1,0 +1,216 @@
+"""Why a vertex is where it is: every number of skinning, so that a person can check by hand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.figure import Figure
+from viewer.rig.geometry.rotation import quaternion_to_matrix
+from viewer.rig.geometry.transform import apply_transform
+from viewer.rig.inspection.single_vertices import check_vertices, rest_vertices
+from viewer.rig.kinematics import skinning_matrices, world_matrices
+from viewer.rig.pose import Pose, placement_matrix
+from viewer.rig.scalars import joint_text
+from viewer.rig.shape import shaped
+from viewer.rig.skin import Skin, bind_positions, has_influence, skin_rows, strongest_first
+from viewer.rig.skinning import Skinning, skin_used
+from viewer.rig.skinning.dqs import split_palette
+
+__all__ = ["DualTerms", "Explanation", "explain"]
+
+_TINY = 1e-12  # weights or quaternions that cancel out give no rotation
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DualTerms:
+    """What dual quaternion skinning adds up (Kavan et al. 2008, section 4).
+
+    Attributes
+    ----------
+    shares : (K,)
+        Weights over their sum.
+    duals : (K, 8)
+        Each influence's unit dual quaternion (x, y, z, w), real part, then dual part.
+    signs : (K,)
+        -1 where the quaternion was turned to the side of the strongest influence's.
+    stretches : (K, 3, 4)
+        What of each matrix is no rigid motion; applied before it.
+    blended : (8,)
+        sum_i share_i sign_i dual_i.
+    length : float
+        Of the real part of ``blended``, which is divided by it.
+    stretched : (3,)
+        The rest position after sum_i share_i stretch_i.
+    position : (3,)
+        Moved by the blended dual quaternion; the rest position where influences cancel out.
+    """
+
+    shares: Floats
+    duals: Floats
+    signs: Floats
+    stretches: Floats
+    blended: Floats
+    length: float
+    stretched: Floats
+    position: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Explanation:
+    """All steps from the file's vertex to the one that is drawn.
+
+    Attributes
+    ----------
+    vertex : int
+        Its index.
+    skinning : Skinning
+        How it was moved.
+    stored : (3,)
+        The vertex as the file has it, binding space.
+    shaped : (3,)
+        With the figure's blend shapes.
+    rest : (3,)
+        With pose correctives too: p, what the joints move.
+    joints : (K,)
+        Of the influences that count, strongest first.
+    names : tuple of K str
+        Of these joints.
+    weights : (K,)
+        w_i, after cutting and normalising if that is on.
+    matrices : (K, 4, 4)
+        M_i: skinning matrices, binding space to figure space.
+    images : (K, 3)
+        M_i p: where each joint alone would carry the vertex.
+    terms : (K, 3)
+        w_i M_i p.
+    linear : (3,)
+        Their sum: linear blend skinning; the rest position of a vertex without influence.
+    dual : DualTerms or None
+        Of methods that use dual quaternions.
+    skinned : (3,)
+        What the method gives.
+    placement : (4, 4)
+        The figure's own scale and translation, applied last.
+    position : (3,)
+        Where it is drawn, figure space.
+    """
+
+    vertex: int
+    skinning: Skinning
+    stored: Floats
+    shaped: Floats
+    rest: Floats
+    joints: Ints
+    names: tuple[str, ...]
+    weights: Floats
+    matrices: Floats
+    images: Floats
+    terms: Floats
+    linear: Floats
+    dual: DualTerms | None
+    skinned: Floats
+    placement: Floats
+    position: Floats
+
+    @property
+    def is_free(self) -> bool:
+        """Whether no joint moves the vertex: it stays where it was bound."""
+        return not bool((self.weights != 0.0).any())
+
+
+def explain(figure: Figure, pose: Pose, skinning: Skinning, vertex: int) -> Explanation:
+    """Return every number that puts a vertex where it is.
+
+    Linear blend skinning: v' = sum_i w_i M_i [p 1]. Dual quaternion skinning: q = sum_i s_i q_i
+    w_i / sum_j w_j, v' = (q / |q|) applied to the stretched p. Between them: the share of both.
+
+    Parameters
+    ----------
+    figure : Figure
+        With mesh, skeleton and skin.
+    pose : Pose
+        DOFs in lengths and radians.
+    skinning : Skinning
+        How the mesh is drawn.
+    vertex : int
+        Index.
+
+    Returns
+    -------
+    Explanation
+        Lengths in figure units.
+
+    Raises
+    ------
+    RigError
+        If the figure has no skin that follows a skeleton, or no such vertex.
+    """
+    if not figure.is_attached:
+        raise RigError(f"figure {figure.name} has no skin that follows a skeleton")
+    chosen = np.array([vertex], dtype=np.int32)
+    check_vertices(figure, chosen)
+    assert figure.mesh is not None  # it is attached
+    stored, figure = figure.mesh.positions[vertex], shaped(figure, pose.shape_weights)
+    mesh, skeleton, skin = figure.mesh, figure.skeleton, figure.skin
+    assert mesh is not None and skeleton is not None and skin is not None  # it is attached
+    rest = rest_vertices(figure, pose, chosen, skinning.correctives)[0]
+    row = strongest_first(skin_rows(skin_used(skin, skinning), chosen))
+    palette = skinning_matrices(world_matrices(skeleton, pose), skin.inverse_bind)
+    matrices = palette[row.joints]
+    images = matrices[:, :3, :3] @ rest + matrices[:, :3, 3]
+    terms = row.weights[:, None] * images
+    linear = terms.sum(axis=0) if has_influence(row)[0] else rest
+    dual = None if skinning.method == "lbs" else _dual_terms(row, palette, rest)
+    skinned = linear
+    if dual is not None:
+        share = 1.0 if skinning.method == "dqs" else skinning.share
+        skinned = (1.0 - share) * linear + share * dual.position
+    placement = placement_matrix(pose)
+    return Explanation(
+        vertex,
+        skinning,
+        stored,
+        mesh.positions[vertex],
+        rest,
+        row.joints,
+        tuple(joint_text(figure, joint) for joint in row.joints.tolist()),
+        row.weights,
+        matrices,
+        images,
+        terms,
+        linear,
+        dual,
+        skinned,
+        placement,
+        apply_transform(placement, skinned),
+    )
+
+
+def _dual_terms(row: Skin, palette: Floats, rest: Floats) -> DualTerms:
+    """Return what dual quaternion skinning does to one vertex, as ``dqs.deform`` does it."""
+    duals, stretches = (
+        values[row.joints] for values in split_palette(palette, bind_positions(row))
+    )
+    total = float(row.weights.sum())
+    is_moved = abs(total) > _TINY
+    shares = row.weights / (total if is_moved else 1.0)
+    signs = np.where(duals[:, :4] @ duals[0, :4] < 0.0, -1.0, 1.0) if len(duals) else np.ones(0)
+    blended = (shares * signs) @ duals
+    length = float(np.linalg.norm(blended[:4]))
+    stretch = np.einsum("k,kab->ab", shares, stretches)
+    if not is_moved or length <= _TINY:
+        return DualTerms(shares, duals, signs, stretches, blended, length, rest, rest)
+    stretched = stretch[:, :3] @ rest + stretch[:, 3]
+    position = _moved(blended / length, stretched)
+    return DualTerms(shares, duals, signs, stretches, blended, length, stretched, position)
+
+
+def _moved(dual: Floats, point: Floats) -> Floats:
+    """Rotate, then translate by 2 (w_r v_d - w_d v_r + v_r x v_d) (Kavan 2008, algorithm 1)."""
+    real, other = dual[:4], dual[4:]
+    shift = real[3] * other[:3] - other[3] * real[:3] + np.cross(real[:3], other[:3])
+    return quaternion_to_matrix(real) @ point + 2.0 * shift

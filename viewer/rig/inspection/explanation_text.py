@@ -1,0 +1,124 @@
+"""An explanation of a vertex as lines of text, with digits that stand below each other."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.errors import printable
+from viewer.rig.arrays import Floats
+from viewer.rig.inspection.explanation import DualTerms, Explanation
+from viewer.rig.number_text import number_text
+from viewer.rig.skinning import METHODS
+
+__all__ = ["explanation_text"]
+
+_LONGEST = 40  # letters of a joint's name
+_RIGID = 1e-9  # a stretch nearer to the identity is rounding
+
+
+def explanation_text(explanation: Explanation, digits: int = 4) -> list[str]:
+    """Return the numbers of an explanation as lines, in the order in which one would compute them.
+
+    Parameters
+    ----------
+    explanation : Explanation
+        Of one vertex.
+    digits : int
+        Behind the decimal point, of all numbers alike.
+
+    Returns
+    -------
+    list of str
+        To be shown in letters of one width.
+    """
+    text = _Text(explanation, digits)
+    text.rest()
+    if explanation.is_free:
+        text.lines.append("no influence: the vertex stays where it was bound")
+    for index in range(len(explanation.joints)):
+        text.influence(index)
+    if not explanation.is_free:
+        text.sums()
+    if explanation.dual is not None and not explanation.is_free:
+        text.dual(explanation.dual)
+    text.end()
+    return text.lines
+
+
+class _Text:
+    """Lines that all use the same width for a number."""
+
+    def __init__(self, explanation: Explanation, digits: int) -> None:
+        self.one, self.digits = explanation, digits
+        parts = [explanation.stored, explanation.matrices, explanation.images, explanation.position]
+        largest = max(float(np.abs(part).max(initial=1.0)) for part in parts)
+        self.width = len(f"{-largest:.{digits}f}")
+        self.lines = [f"vertex {explanation.vertex}: {METHODS[explanation.skinning.method]}"]
+
+    def rest(self) -> None:
+        """Say where the vertex is before joints move it."""
+        one = self.one
+        self._vector("stored", one.stored)
+        if not np.array_equal(one.shaped, one.stored):
+            self._vector("+ shape", one.shaped)
+        if not np.array_equal(one.rest, one.shaped):
+            self._vector("+ pose correctives", one.rest)
+        self._vector("p", one.rest)
+
+    def influence(self, index: int) -> None:
+        """Say what one joint does: its matrix, its image of the vertex, its term."""
+        one, number = self.one, index + 1
+        name = printable(one.names[index], _LONGEST)
+        self.lines.append(
+            f"{number}. {name}: w{number} = {self._number(float(one.weights[index]))}"
+        )
+        for row, values in enumerate(one.matrices[index]):
+            label = f"   M{number} =" if row == 0 else ""
+            self.lines.append(f"{label:<8}[ {self._numbers(values)} ]")
+        self._vector(f"   M{number} p", one.images[index])
+        self._vector(f"   w{number} M{number} p", one.terms[index])
+
+    def sums(self) -> None:
+        """Say what the terms add up to."""
+        self.lines.append(f"sum of w = {self._number(float(self.one.weights.sum()))}")
+        self._vector("sum of w M p", self.one.linear)
+
+    def dual(self, dual: DualTerms) -> None:
+        """Say what dual quaternions are added, and what they make of the vertex."""
+        for index, values in enumerate(dual.duals):
+            number = index + 1
+            flip = "" if dual.signs[index] > 0.0 else ", turned to the side of q1"
+            share = f"{dual.shares[index]:.{self.digits}f}"
+            self.lines.append(f"q{number}: share {share}{flip}")
+            self._quaternions("   ", values)
+        self.lines.append("q = sum of share times q, with these signs")
+        self._quaternions("   ", dual.blended)
+        self.lines.append(f"length of its real part = {dual.length:.{self.digits}f}")
+        identity = np.eye(3, 4)
+        if np.abs(dual.stretches - identity).max(initial=0.0) > _RIGID:
+            self._vector("p stretched", dual.stretched)
+        self._vector("moved by q / length", dual.position)
+
+    def end(self) -> None:
+        """Say where the vertex ends up."""
+        one = self.one
+        if one.skinning.method == "mix":
+            self._vector(f"{one.skinning.share:.{self.digits}f} of the way", one.skinned)
+        if not np.array_equal(one.placement, np.eye(4)):
+            self.lines.append(f"figure: times {one.placement[0, 0]:.{self.digits}f}, plus")
+            self._vector("", one.placement[:3, 3])
+        self._vector("position", one.position)
+
+    def _vector(self, label: str, values: Floats) -> None:
+        self.lines.append(f"{label:<20}( {self._numbers(values)} )")
+
+    def _quaternions(self, label: str, values: Floats) -> None:
+        self.lines.append(f"{label}real [ {self._numbers(values[:4])} ]")
+        self.lines.append(f"{label}dual [ {self._numbers(values[4:])} ]")
+
+    def _number(self, value: float) -> str:
+        return number_text(value, f".{self.digits}f")
+
+    def _numbers(self, values: Floats) -> str:
+        spec = f"{self.width}.{self.digits}f"
+        return "  ".join(number_text(value, spec) for value in values.tolist())

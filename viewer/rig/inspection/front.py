@@ -1,0 +1,145 @@
+"""The horizontal axis that the front of a figure or scene faces."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TypeAlias
+
+import numpy as np
+
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.geometry.transform import apply_transform
+from viewer.rig.inspection.front_evidence import (
+    from_ends,
+    from_face,
+    from_sides,
+    from_soles,
+    from_toes,
+    from_travel,
+)
+from viewer.rig.mesh import bounding_box, box_size
+from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.scene import Actor, Scene
+from viewer.rig.skinning import joint_matrices
+
+__all__ = ["FRONTS", "Front", "front_axes", "guess_front", "usual_front"]
+
+Front: TypeAlias = str
+"""An axis with its sign, as ``"+z"``; never the one that points up."""
+
+FRONTS = ("+x", "-x", "+y", "-y", "+z", "-z")
+"""All there are; which two do not apply depends on the up axis."""
+
+_MOST_ACTORS, _MOST_JOINTS, _MOST_VERTICES = 16, 2000, 100_000
+_N_TIMES = 9  # at which a motion is looked at
+_SURE = 0.5  # of a vote for one axis: less is no answer
+_WEIGHTS = {"sides": 3.0, "toes": 2.0, "face": 2.0, "ends": 2.0, "travel": 1.0}
+"""How much each kind of evidence counts. Left and right are said by names; the others are rules of
+thumb that have to agree to outvote them, and a walk may go backwards."""
+
+
+def usual_front(up: str) -> Front:
+    """Return the front where nothing shows another: +z if y is up, -y if z is up."""
+    return "+z" if up == "y" else "-y"
+
+
+def front_axes(up: str) -> tuple[Front, ...]:
+    """Return the four fronts that there are with an up axis.
+
+    >>> front_axes("y")
+    ('+x', '-x', '+z', '-z')
+    """
+    return tuple(front for front in FRONTS if front[1] != up)
+
+
+def guess_front(scene: Scene) -> Front:
+    """Return the front of what is shown, ``usual_front`` where the evidence is weak.
+
+    Each actor votes by its joints as they are posed now: by left and right, toes, face, head and
+    tail, and the way its motion goes; by the shape of its feet if it has neither joints nor
+    captured points. Actors that face different ways leave the usual front.
+
+    Parameters
+    ----------
+    scene : Scene
+        Posed; nothing of it changes.
+    """
+    up = np.zeros(3)
+    up["xyz".index(scene.up)] = 1.0
+    drawn = [actor for actor in scene.actors if actor.is_drawn][:_MOST_ACTORS]
+    votes = [vote for actor in drawn if (vote := _vote(actor, up)).any()]
+    return _nearest(sum(votes, np.zeros(3)) / max(len(votes), 1), scene.up)
+
+
+def _nearest(vote: Floats, up: str) -> Front:
+    """Return the axis that a vote is nearest to; the usual one if it is not near to any."""
+    fronts = front_axes(up)
+    signs = [1.0 if front[0] == "+" else -1.0 for front in fronts]
+    axes = ["xyz".index(front[1]) for front in fronts]
+    shares = vote[axes] * signs
+    best = int(np.argmax(shares))
+    return fronts[best] if shares[best] >= _SURE else usual_front(up)
+
+
+def _vote(actor: Actor, up: Floats) -> Floats:
+    """Return where an actor's front is: a unit vector, 0 if that is not clear."""
+    names, parents, places = _places(actor)
+    if not names:
+        mesh = actor.figure.mesh
+        way = np.zeros(3)
+        if mesh is not None and actor.figure.skeleton is None:
+            some = mesh.positions[:: max(mesh.n_vertices // _MOST_VERTICES, 1)]
+            way = from_soles(apply_transform(actor.placement, some), up)
+        return _unit(way, _SURE)
+    found = {
+        "sides": from_sides(names, places, up),
+        "toes": from_toes(names, parents, places, up),
+        "face": from_face(names, parents, places, up),
+        "ends": from_ends(names, places, up),
+        "travel": from_travel(_path(actor), box_size(bounding_box(places)), up),
+    }
+    total = sum(weight for kind, weight in _WEIGHTS.items() if found[kind].any())
+    vote = sum((_WEIGHTS[kind] * way for kind, way in found.items()), np.zeros(3))
+    return _unit(vote, max(0.25 * total, _SURE))
+
+
+def _unit(way: Floats, least: float) -> Floats:
+    length = float(np.linalg.norm(way))
+    return way / length if length >= least else np.zeros(3)
+
+
+def _places(actor: Actor) -> tuple[tuple[str, ...], Ints, Floats]:
+    """Return names, parents and places of an actor's joints or captured points."""
+    nothing: tuple[tuple[str, ...], Ints, Floats] = (), np.zeros(0, np.int32), np.zeros((0, 3))
+    figure = actor.figure
+    if actor.points is not None and figure.points is not None:
+        seen = np.flatnonzero(actor.points[:, 3] > 0.0)
+        names = tuple(figure.points.names[point] for point in seen)
+        roots = np.full(len(seen), -1, np.int32)
+        return names, roots, apply_transform(actor.placement, actor.points[seen, :3])
+    if figure.skeleton is None or actor.pose is None or figure.skeleton.n_joints > _MOST_JOINTS:
+        return nothing
+    joints = joint_matrices(figure, actor.pose)[:, :3, 3]
+    return (
+        figure.skeleton.names,
+        figure.skeleton.parents,
+        apply_transform(actor.placement, joints),
+    )
+
+
+def _path(actor: Actor) -> Floats:
+    """Return where the middle of an actor is from the start of its motion to the end: (F, 3)."""
+    clip, places = actor.clip, []
+    if clip is None or clip.end <= clip.start:
+        return np.zeros((0, 3))
+    moved = actor.copy()
+    for time in _times(clip.start, clip.end):
+        pose_actor(moved, time + actor.offset)
+        points = _places(moved)[2]
+        if moved.is_present and len(points):
+            places.append(points.mean(axis=0))
+    return np.array(places).reshape(-1, 3)
+
+
+def _times(start: float, end: float) -> Iterable[float]:
+    return map(float, np.linspace(start, end, _N_TIMES))

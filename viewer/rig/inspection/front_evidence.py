@@ -1,0 +1,191 @@
+"""Evidence of where a figure's front is: sides, toes, faces, heads and tails, soles, travel.
+
+Each kind gives a horizontal vector towards the front. Its length says how sure it is: 1 for
+evidence that is complete and consistent, 0 for none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.mesh import bounding_box, box_size
+from viewer.rig.retargeting.joint_names import sided_words
+
+__all__ = ["from_ends", "from_face", "from_sides", "from_soles", "from_toes", "from_travel"]
+
+_LEAST = 0.01  # of the figure's size: what is closer together shows no direction
+_CLEAR = 0.2  # of the figure's size: a head that far out is in front of a body
+_TOES, _FACE = ("toe", "ball"), ("eye", "nose", "jaw", "beak", "muzzle", "snout")
+_SLAB, _ABOVE = 0.015, (0.05, 0.09)  # of the height: the soles, and the ankles above them
+_MIRRORED = 0.98  # of the vertices: so many lie about where another's mirror image is
+_LOOKED_AT = 2000  # vertices that are mirrored
+
+
+def from_sides(names: Sequence[str], places: Floats, up: Floats) -> Floats:
+    """Judge by left and right: the front is left x up.
+
+    Parameters
+    ----------
+    names : sequence of J str
+        Of joints or keypoints.
+    places : (J, 3)
+        Where they are.
+    up : (3,)
+        Unit vector.
+
+    Returns
+    -------
+    (3,)
+        Sum of the unit vectors of all pairs over their number.
+    """
+    found: dict[str, dict[str, list[Floats]]] = {}
+    for (side, word), place in zip(sided_words(names), places, strict=True):
+        if side:
+            found.setdefault(word, {"left": [], "right": []})[side].append(place)
+    pairs = [
+        np.mean(pair["left"], axis=0) - np.mean(pair["right"], axis=0)
+        for pair in found.values()
+        if pair["left"] and pair["right"]
+    ]
+    across = _horizontal(np.array(pairs).reshape(-1, 3), up)
+    return _agreement(np.cross(across, up), _size(places))
+
+
+def from_toes(names: Sequence[str], parents: Ints, places: Floats, up: Floats) -> Floats:
+    """Judge by the feet: toes are ahead of the joints that they hang from."""
+    return _by_word(_TOES, names, parents, places, up)
+
+
+def from_face(names: Sequence[str], parents: Ints, places: Floats, up: Floats) -> Floats:
+    """Judge by the face: eyes and jaws are ahead of the head."""
+    return _by_word(_FACE, names, parents, places, up)
+
+
+def from_ends(names: Sequence[str], places: Floats, up: Floats) -> Floats:
+    """Judge by the ends of an animal: heads are in front of its middle, tails behind.
+
+    Heads above the middle, as those of people, show nothing.
+    """
+    words = [word for _, word in sided_words(names)]
+    heads = [j for j, word in enumerate(words) if word.startswith("head")]
+    tails = [j for j, word in enumerate(words) if word.startswith("tail")]
+    size = _size(places)
+    if not size or not (heads or tails):
+        return np.zeros(3)
+    others = [j for j in range(len(words)) if j not in heads and j not in tails]
+    middle = places[others or slice(None)].mean(axis=0)
+    ahead = places[heads].mean(axis=0) - middle if heads else np.zeros(3)
+    behind = places[tails].mean(axis=0) - middle if tails else np.zeros(3)
+    way = _horizontal(ahead - behind, up) / (_CLEAR * size)
+    return way / max(float(np.linalg.norm(way)), 1.0)
+
+
+def from_travel(places: Floats, size: float, up: Floats) -> Floats:
+    """Judge by a motion: figures mostly go forwards.
+
+    Parameters
+    ----------
+    places : (F, 3)
+        Where the figure is, in time order.
+    size : float
+        Of the figure.
+    up : (3,)
+        Unit vector.
+
+    Returns
+    -------
+    (3,)
+        The whole way over the length of the path; shorter if it is less than the figure's size.
+    """
+    steps = _horizontal(np.diff(places, axis=0), up)
+    path = float(np.linalg.norm(steps, axis=1).sum())
+    return steps.sum(axis=0) / max(path, size) if size > 0.0 else np.zeros(3)
+
+
+def from_soles(positions: Floats, up: Floats) -> Floats:
+    """Judge by a mesh alone: a mirror plane between two soles that reach ahead of the ankles.
+
+    Parameters
+    ----------
+    positions : (V, 3)
+        Rest vertices.
+    up : (3,)
+        The unit vector of an axis.
+
+    Returns
+    -------
+    (3,)
+        0 if the mesh has no mirror plane or two of them, or does not stand on two or more feet.
+    """
+    height = positions @ up
+    low, tall = float(height.min()), float(np.ptp(height))
+    planes = [
+        axis for axis in range(3) if up[axis] == 0.0 and tall > 0.0 and _mirrors(positions, axis)
+    ]
+    if len(planes) != 1:
+        return np.zeros(3)
+    box = bounding_box(positions)
+    beside = positions[:, planes[0]] - box.mean(axis=0)[planes[0]]
+    soles = height < low + _SLAB * tall
+    ankles = (height > low + _ABOVE[0] * tall) & (height < low + _ABOVE[1] * tall)
+    is_apart = (np.abs(beside[soles]) > _LEAST * tall).all()
+    if not ankles.any() or not is_apart:
+        return np.zeros(3)
+    way = positions[soles].mean(axis=0) - positions[ankles].mean(axis=0)
+    way[planes[0]] = 0.0
+    way = _horizontal(way, up) / (2.0 * _LEAST * tall)
+    return way / max(float(np.linalg.norm(way)), 1.0)
+
+
+def _mirrors(positions: Floats, axis: int) -> bool:
+    """Return whether a mesh is about its own mirror image across its middle."""
+    size = _LEAST * _size(positions)
+    mirrored = positions[:: max(len(positions) // _LOOKED_AT, 1)].copy()
+    middle = bounding_box(positions).mean(axis=0)[axis]
+    mirrored[:, axis] = 2.0 * middle - mirrored[:, axis]
+    low = positions.min(axis=0)
+    known = np.unique(_cells((positions - low) / size))
+    found = np.zeros(len(mirrored), dtype=bool)
+    for step in np.ndindex(3, 3, 3):
+        cells = _cells((mirrored - low) / size + step - 1.0)
+        found |= known[np.minimum(np.searchsorted(known, cells), len(known) - 1)] == cells
+    return bool(found.mean() > _MIRRORED)
+
+
+def _cells(places: Floats) -> Ints:
+    """Return the numbers of the unit cells that places are in: (N,)."""
+    x, y, z = np.floor(places).astype(np.int64).T + 2
+    return np.asarray((x * 1000 + y) * 1000 + z)
+
+
+def _by_word(
+    words: tuple[str, ...], names: Sequence[str], parents: Ints, places: Floats, up: Floats
+) -> Floats:
+    """Return the mean direction from parents to joints whose names contain a word."""
+    chosen = [
+        joint
+        for joint, (_, word) in enumerate(sided_words(names))
+        if parents[joint] >= 0 and any(part in word for part in words)
+    ]
+    ways = places[chosen] - places[parents[chosen]]
+    return _agreement(_horizontal(ways, up), _size(places))
+
+
+def _agreement(ways: Floats, size: float) -> Floats:
+    """Return the mean of the unit vectors of those that are long enough."""
+    lengths = np.linalg.norm(ways, axis=1)
+    clear = lengths > _LEAST * size
+    if not clear.any():
+        return np.zeros(3)
+    return np.asarray((ways[clear] / lengths[clear, None]).mean(axis=0))
+
+
+def _horizontal(vectors: Floats, up: Floats) -> Floats:
+    return np.asarray(vectors - (vectors @ up)[..., None] * up)
+
+
+def _size(places: Floats) -> float:
+    return box_size(bounding_box(places)) if len(places) else 0.0

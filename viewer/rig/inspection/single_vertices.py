@@ -1,0 +1,112 @@
+"""A few vertices of a posed figure, without the work of posing all of them."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.blendshapes import corrective_weights
+from viewer.rig.figure import Figure
+from viewer.rig.geometry.transform import apply_transform
+from viewer.rig.geometry.vectors import unit
+from viewer.rig.kinematics import skinning_matrices, world_matrices
+from viewer.rig.pose import Pose, joint_rotations, placement_matrix, rest_pose
+from viewer.rig.shape import shaped
+from viewer.rig.skin import skin_rows
+from viewer.rig.skinning import Skinning, skin_used
+
+__all__ = ["check_vertices", "deform_vertices", "rest_vertices"]
+
+
+def deform_vertices(
+    figure: Figure, pose: Pose | None, skinning: Skinning, vertices: Ints
+) -> tuple[Floats, Floats]:
+    """Return what ``viewer.rig.skinning.deform`` returns, for some vertices only.
+
+    Parameters
+    ----------
+    figure : Figure
+        With a mesh.
+    pose : Pose or None
+        None for the file's own pose.
+    skinning : Skinning
+        How the mesh is drawn.
+    vertices : (N,)
+        Indices.
+
+    Returns
+    -------
+    positions, normals : (N, 3)
+        Figure units; unit length.
+
+    Raises
+    ------
+    RigError
+        If the figure has no such vertices.
+    """
+    check_vertices(figure, vertices)
+    if pose is not None:
+        figure = shaped(figure, pose.shape_weights)
+    mesh, skeleton, skin = figure.mesh, figure.skeleton, figure.skin
+    assert mesh is not None  # it has such vertices
+    normals = mesh.normals[vertices]
+    if skeleton is None or skin is None:
+        moved, normals = mesh.positions[vertices], unit(normals)
+        return moved if pose is None else apply_transform(placement_matrix(pose), moved), normals
+    pose = rest_pose(skeleton) if pose is None else pose
+    palette = skinning_matrices(world_matrices(skeleton, pose), skin.inverse_bind)
+    rows = skin_rows(skin_used(skin, skinning), vertices)
+    rest = rest_vertices(figure, pose, vertices, skinning.correctives)
+    method = import_module(f"viewer.rig.skinning.{skinning.method}")
+    moved, normals = method.deform(rest, normals, rows, palette, skinning.share)
+    return apply_transform(placement_matrix(pose), moved), normals
+
+
+def rest_vertices(figure: Figure, pose: Pose, vertices: Ints, correct: bool = True) -> Floats:
+    """Return what a pose skins: some vertices of the rest mesh plus their pose correctives.
+
+    Parameters
+    ----------
+    figure : Figure
+        With a mesh, already shaped.
+    pose : Pose
+        DOFs in lengths and radians.
+    vertices : (N,)
+        Indices.
+    correct : bool
+        Whether correctives are added, if the figure has some.
+
+    Returns
+    -------
+    (N, 3)
+        Binding space.
+    """
+    assert figure.mesh is not None  # the caller looked
+    rest = figure.mesh.positions[vertices]
+    if not correct or figure.correctives is None or figure.skeleton is None:
+        return rest
+    weights = corrective_weights(joint_rotations(figure.skeleton, pose))
+    active = np.flatnonzero(weights)
+    if len(active) == 0:
+        return rest
+    offsets = figure.correctives.values()[active[:, None], vertices[None, :]]
+    return rest + np.einsum("p,pva->va", weights[active], offsets.astype(np.float64, copy=False))
+
+
+def check_vertices(figure: Figure, vertices: Ints) -> None:
+    """Refuse indices that are no vertices of a figure.
+
+    Raises
+    ------
+    RigError
+        With the index and how many vertices there are.
+    """
+    count = 0 if figure.mesh is None else figure.mesh.n_vertices
+    wrong = vertices[(vertices < 0) | (vertices >= count)]
+    if count == 0:
+        raise RigError(f"figure {figure.name} has no vertices")
+    if len(wrong):
+        raise RigError(f"vertex: expected 0 to {count - 1}, found {wrong[0]}")

@@ -1,0 +1,162 @@
+"""What is known of one vertex of a posed figure, to be shown where the mouse is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.errors import RigError, printable
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.figure import Figure
+from viewer.rig.inspection.single_vertices import check_vertices, deform_vertices
+from viewer.rig.number_text import number_text
+from viewer.rig.pose import Pose
+from viewer.rig.scalars import joint_text
+from viewer.rig.skin import merged, skin_rows, strongest_first
+from viewer.rig.skinning import Skinning, skin_used
+
+__all__ = ["VertexFacts", "facts_text", "nearest_corner", "vertex_facts"]
+
+_LONGEST = 40  # letters of a name
+_MOST = 8  # influences that are listed in full
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class VertexFacts:
+    """What is known of a vertex.
+
+    Attributes
+    ----------
+    vertex, triangle : int
+        Indices; -1 for no triangle.
+    position : (3,)
+        Where it is drawn, figure space and units.
+    normal : (3,)
+        Unit length.
+    uvs : (N, 2)
+        Its texture coordinates, several along a seam, those of the triangle first; none without.
+    body_part : str
+        Empty without one.
+    joints : (K,)
+        Of the influences that count, those of weight 0 left out, by falling weight.
+    names : tuple of K str
+        Of these joints.
+    weights : (K,)
+        Those that a joint has several times added up.
+    """
+
+    vertex: int
+    triangle: int
+    position: Floats
+    normal: Floats
+    uvs: Floats
+    body_part: str
+    joints: Ints
+    names: tuple[str, ...]
+    weights: Floats
+
+
+def vertex_facts(
+    figure: Figure, pose: Pose | None, skinning: Skinning, vertex: int, triangle: int = -1
+) -> VertexFacts:
+    """Return what is known of a vertex.
+
+    Parameters
+    ----------
+    figure : Figure
+        With a mesh.
+    pose : Pose or None
+        None for the file's own pose, or a figure without a skeleton.
+    skinning : Skinning
+        How the mesh is drawn.
+    vertex : int
+        Index.
+    triangle : int
+        The one that was pointed at, -1 for none.
+
+    Raises
+    ------
+    RigError
+        If the figure has no such vertex or triangle.
+    """
+    chosen = np.array([vertex], dtype=np.int32)
+    check_vertices(figure, chosen)
+    mesh, parts, skin = figure.mesh, figure.body_parts, figure.skin
+    assert mesh is not None  # it has this vertex
+    if not -1 <= triangle < mesh.n_triangles:
+        raise RigError(f"triangle: expected -1 to {mesh.n_triangles - 1}, found {triangle}")
+    positions, normals = deform_vertices(figure, pose, skinning, chosen)
+    joints, weights = np.zeros(0, dtype=np.int32), np.zeros(0)
+    if skin is not None:
+        row = strongest_first(merged(skin_rows(skin_used(skin, skinning), chosen)))
+        counts = row.weights != 0.0
+        joints, weights = row.joints[counts], row.weights[counts]
+    return VertexFacts(
+        vertex,
+        triangle,
+        positions[0],
+        normals[0],
+        _uvs(figure, vertex, triangle),
+        "" if parts is None else parts.names[parts.of_vertex[vertex]],
+        joints,
+        tuple(joint_text(figure, joint) for joint in joints.tolist()),
+        weights,
+    )
+
+
+def nearest_corner(positions: Floats, triangle: Ints, point: Floats) -> int:
+    """Return the vertex of a triangle that is nearest to a point on it.
+
+    Parameters
+    ----------
+    positions : (3, 3)
+        Where its corners are, in the space of the point.
+    triangle : (3,)
+        Their indices.
+    point : (3,)
+        In any unit.
+    """
+    return int(triangle[np.linalg.norm(positions - point, axis=1).argmin()])
+
+
+def facts_text(facts: VertexFacts) -> list[str]:
+    """Return the facts as lines: indices, place, and influences by falling weight."""
+    triangle = f", triangle {facts.triangle}" if facts.triangle >= 0 else ""
+    part = f", {printable(facts.body_part, _LONGEST)}" if facts.body_part else ""
+    lines = [
+        f"vertex {facts.vertex}{triangle}{part}",
+        f"position {_numbers(facts.position)}",
+        f"normal {_numbers(facts.normal)}",
+    ]
+    lines += [f"uv {_numbers(uv)}" for uv in facts.uvs]
+    lines += [
+        f"{number_text(weight, '.4f')} {printable(name, _LONGEST)}"
+        for weight, name in zip(facts.weights[:_MOST], facts.names[:_MOST], strict=True)
+    ]
+    if len(facts.weights) > _MOST:
+        rest = facts.weights[_MOST:]
+        lines.append(f"{number_text(float(rest.sum()), '.4f')} {len(rest)} more")
+    if len(facts.weights) == 0:
+        lines.append("no influence")
+    return lines
+
+
+def _uvs(figure: Figure, vertex: int, triangle: int) -> Floats:
+    """Return a vertex's texture coordinates, each once, that of a triangle first: (N, 2)."""
+    mesh = figure.mesh
+    assert mesh is not None  # the caller looked
+    if mesh.uvs is None or len(mesh.uvs) == 0:
+        return np.zeros((0, 2))
+    if mesh.uv_triangles is None:
+        return mesh.uvs[[vertex]]
+    used = mesh.uv_triangles[mesh.triangles == vertex]
+    if triangle >= 0:
+        own = mesh.uv_triangles[triangle][mesh.triangles[triangle] == vertex]
+        used = np.concatenate([own, used])
+    _, first = np.unique(used, return_index=True)
+    return mesh.uvs[used[np.sort(first)]]
+
+
+def _numbers(values: Floats) -> str:
+    return "  ".join(number_text(value, ".4f") for value in values.tolist())

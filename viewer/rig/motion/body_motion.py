@@ -1,0 +1,204 @@
+"""Motions in the SMPL family's own parameters, and what they become on a figure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from viewer.errors import RigError, counted
+from viewer.rig.arrays import Floats, frozen
+from viewer.rig.coefficients import unused_coefficients
+from viewer.rig.figure import Figure
+from viewer.rig.geometry.quaternion import multiply, rotation_vector_to_quaternion
+from viewer.rig.geometry.rotation import quaternion_to_matrix
+from viewer.rig.hands import Hand
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.timing import Timing
+from viewer.rig.shape import joint_directions, rest_joints
+
+__all__ = ["BodyMotion", "body_clip", "root_positions"]
+
+_LISTED = 6  # joints in a note
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BodyMotion:
+    """Rotation vectors by joint names, place, shape and hands of one person.
+
+    Attributes
+    ----------
+    name : str
+        What menus call it.
+    timing : Timing
+        Frame rate, and the row of each frame.
+    joint_names : tuple of K str
+        Which joints ``vectors`` turn, the root first.
+    vectors : (N, K, 3)
+        Rotation vectors within the parent, radians.
+    translations : (N, 3)
+        Of the body, metres.
+    about_origin : bool
+        True: the root turns about the figure's origin, V = R X + T, as EasyMocap has it. False:
+        about the rest pelvis, V = R (X - J0) + J0 + T, as SMPL has it.
+    shape, expression : (N, S) or (1, S) or None
+        Coefficients; one row counts for all frames.
+    hands : mapping of "left", "right" or "" to (N, C)
+        Coefficients of the hands' principal components, instead of finger joints.
+    flat_hands : bool
+        Whether ``hands`` leave the mean hand out.
+    up : "y", "z", "-y", "-z" or ""
+        The axis that points up in the world; empty if unknown.
+    facts : tuple of (str, str)
+        What the file says beside, for ``viewer info``.
+    world_turns : (N, 3) or None
+        Rotation vectors that turn the whole body about the figure's origin after ``vectors`` have
+        posed it, V = W (R (X - J0) + J0) + T; needs ``about_origin`` to be False.
+    """
+
+    name: str
+    timing: Timing
+    joint_names: tuple[str, ...]
+    vectors: Floats
+    translations: Floats
+    about_origin: bool = False
+    shape: Floats | None = None
+    expression: Floats | None = None
+    hands: dict[str, Floats] = field(default_factory=dict)
+    flat_hands: bool = False
+    up: str = ""
+    facts: tuple[tuple[str, str], ...] = ()
+    world_turns: Floats | None = None
+
+    def __post_init__(self) -> None:
+        def put(name: str, shape: tuple[int | None, ...]) -> None:
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, frozen(name, getattr(self, name), shape))
+
+        put("vectors", (None, len(self.joint_names), 3))
+        put("translations", (len(self.vectors), 3))
+        put("shape", (None, None))
+        put("expression", (None, None))
+        put("world_turns", (len(self.vectors), 3))
+
+    @property
+    def n_rows(self) -> int:
+        """Number of frames that hold data, N."""
+        return len(self.vectors)
+
+
+def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[str]]:
+    """Return a figure's clip of a body motion: joints found by name.
+
+    With the root turning about the origin, the figure's translation is t = T - J0 + R J0, where
+    J0 is the root joint of the frame's own shape; so the vertices are exactly R X + T. A turn W of
+    the whole body makes the root's rotation W R and the translation T - J0 + W J0.
+
+    Parameters
+    ----------
+    motion : BodyMotion
+        Any member of the family.
+    figure : Figure
+        With the family's joint names; joints without a vector stay at rest.
+
+    Returns
+    -------
+    clip : SampledClip
+        For that figure.
+    notes : list of str
+        What could not be taken over, one line each.
+
+    Raises
+    ------
+    RigError
+        If the figure has none of the joints.
+    """
+    skeleton = figure.skeleton
+    if skeleton is None or motion.joint_names[0] not in skeleton.names:
+        raise RigError(
+            f"{motion.name} moves the joint {motion.joint_names[0]}, "
+            f"which {figure.name} does not have"
+        )
+    count, notes = motion.n_rows, []
+    vectors = np.zeros((count, skeleton.n_joints, 3))
+    lost = []
+    for column, name in enumerate(motion.joint_names):
+        if name in skeleton.names:
+            vectors[:, skeleton.names.index(name)] = motion.vectors[:, column]
+        elif motion.vectors[:, column].any():
+            lost.append(name)
+    notes += _put_hands(motion, figure, vectors)
+    if lost:
+        were = "was" if len(lost) == 1 else "were"
+        rest = f", … and {len(lost) - _LISTED} more" * (len(lost) > _LISTED)
+        notes.append(
+            f"{counted(len(lost), 'joint')} that {figure.name} lacks {were} left out: "
+            f"{', '.join(lost[:_LISTED])}{rest}"
+        )
+    weights, more = _weights(motion, figure)
+    rotations = rotation_vector_to_quaternion(vectors)
+    translations, turns = motion.translations, None
+    if motion.world_turns is not None:
+        turns = rotation_vector_to_quaternion(motion.world_turns)
+        rotations[:, 0] = multiply(turns, rotations[:, 0])
+    elif motion.about_origin:
+        turns = rotations[:, 0]
+    if turns is not None:
+        root = root_positions(figure, weights)
+        turned = np.einsum("nab,nb->na", quaternion_to_matrix(turns), root + 0.0 * translations)
+        translations = translations - root + turned
+    clip = SampledClip(
+        motion.name,
+        motion.timing,
+        rotations,
+        figure_translations=translations,
+        shape_weights=weights,
+    )
+    return clip, notes + more
+
+
+def root_positions(figure: Figure, weights: Floats) -> Floats:
+    """Return the rest position of the root joint of many shapes: (N, 3) for weights (N, S)."""
+    directions = joint_directions(figure)[:, 0]
+    return rest_joints(figure)[0] + weights[:, : len(directions)] @ directions
+
+
+def _put_hands(motion: BodyMotion, figure: Figure, vectors: Floats) -> list[str]:
+    """Turn the fingers by their components, in place; return what was left out."""
+    notes = []
+    for side, coefficients in motion.hands.items():
+        hand = _hand(figure, side)
+        if hand is None:
+            if coefficients.any():
+                notes.append(f"the {side or 'only'} hand: {figure.name} has no hand components")
+            continue
+        used = min(coefficients.shape[1], len(hand.components))
+        if coefficients[:, used:].any():
+            notes.append(f"hand components beyond the {used} of {figure.name} were left out")
+        turned = coefficients[:, :used] @ hand.components[:used]
+        if not motion.flat_hands:
+            turned = turned + hand.mean
+        vectors[:, hand.joints] = turned.reshape(len(turned), -1, 3)
+    return notes
+
+
+def _hand(figure: Figure, side: str) -> Hand | None:
+    known = {hand.side: hand for hand in figure.hands}
+    return known.get(side) or (known.get("") if len(known) == 1 else None)
+
+
+def _weights(motion: BodyMotion, figure: Figure) -> tuple[Floats, list[str]]:
+    """Return the blend shape weights of every frame, or one row if they never change."""
+    notes = []
+    groups = figure.blend_shapes.groups if figure.blend_shapes else ()
+    given = {"shape": motion.shape, "expression": motion.expression}
+    rows = max([1, *(len(part) for part in given.values() if part is not None)])
+    weights = np.zeros((rows, len(groups)))
+    for group, values in given.items():
+        if values is None:
+            continue
+        columns = [index for index, name in enumerate(groups) if name == group]
+        used = min(len(columns), values.shape[1])
+        weights[:, columns[:used]] = values[:, :used]
+        notes += unused_coefficients(group, values, len(columns), figure.name)
+    return weights, notes

@@ -1,0 +1,263 @@
+"""A motion: one curve of keys per DOF, with tangent rules and extrapolation."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.rig.arrays import Floats, frozen
+from viewer.rig.pose import Pose
+from viewer.rig.skeleton import DOF_KINDS, Skeleton, clamp_dofs, joint_label
+
+__all__ = [
+    "EXTRAPOLATIONS",
+    "SHORTEST",
+    "TANGENT_RULES",
+    "Channel",
+    "Clip",
+    "Extrapolation",
+    "Tangent",
+    "check_fit",
+    "evaluate",
+    "is_course_rig",
+    "misfit",
+    "sample",
+    "slopes",
+    "suits",
+]
+
+Extrapolation = Literal["constant", "linear", "cycle", "cycle_offset", "bounce"]
+EXTRAPOLATIONS: tuple[Extrapolation, ...] = get_args(Extrapolation)
+"""What a curve does before its first and after its last key."""
+
+SHORTEST = 1e-9
+"""Seconds: keys that are no farther apart lie at one time, and no slope is measured there."""
+
+TangentRule = Literal["flat", "linear", "smooth"]
+TANGENT_RULES: tuple[TangentRule, ...] = get_args(TangentRule)
+
+Tangent = TangentRule | float
+"""A rule, or the slope itself in value per second."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Channel:
+    """The curve of one DOF.
+
+    Attributes
+    ----------
+    target : int
+        Row of the DOF in the skeleton's table.
+    times : (N,)
+        Seconds, never falling.
+    values : (N,)
+        Lengths or radians.
+    tangents : tuple of N (incoming, outgoing)
+        Rules or slopes on the two sides of each key.
+    extrapolation : (before, after)
+        Two of ``EXTRAPOLATIONS``.
+    """
+
+    target: int
+    times: Floats
+    values: Floats
+    tangents: tuple[tuple[Tangent, Tangent], ...]
+    extrapolation: tuple[Extrapolation, Extrapolation] = ("constant", "constant")
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "times", frozen("times", self.times, (None,)))
+        count = len(self.times)
+        object.__setattr__(self, "values", frozen("values", self.values, (count,)))
+        if len(self.tangents) != count:
+            raise RigError(f"tangents: expected {count} pairs, found {len(self.tangents)}")
+        if (np.diff(self.times) < 0).any():
+            raise RigError("times: expected seconds that never fall")
+        # Thousands of keys share a few pairs.
+        pairs = {pair: (_tangent(pair[0]), _tangent(pair[1])) for pair in set(self.tangents)}
+        object.__setattr__(self, "tangents", tuple(pairs[pair] for pair in self.tangents))
+        wrong = next((mode for mode in self.extrapolation if mode not in EXTRAPOLATIONS), None)
+        if wrong is not None or len(self.extrapolation) != 2:
+            raise RigError(
+                f"extrapolation: expected two of {', '.join(EXTRAPOLATIONS)}, "
+                f"found {self.extrapolation}"
+            )
+
+
+def _tangent(given: Tangent) -> Tangent:
+    """Return a rule as it is, a slope as a plain number, which files show in full."""
+    if given in TANGENT_RULES:
+        return given
+    if isinstance(given, str) or not math.isfinite(given):
+        raise RigError(f"tangent: expected {', '.join(TANGENT_RULES)} or a number, found {given}")
+    return float(given)
+
+
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
+class Clip:
+    """A motion of one skeleton.
+
+    Attributes
+    ----------
+    name : str
+        What menus call it.
+    channels : tuple of Channel
+        One per DOF that moves.
+    start, end : float
+        The seconds that are meant to be played; curves go on beyond.
+    """
+
+    name: str
+    channels: tuple[Channel, ...]
+    start: float
+    end: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "start", float(self.start))
+        object.__setattr__(self, "end", float(self.end))
+        if not (math.isfinite(self.start) and self.start <= self.end < math.inf):
+            raise RigError(f"clip {self.name}: expected a range, found {self.start} to {self.end}")
+
+
+def slopes(channel: Channel) -> Floats:
+    """Return the slopes on both sides of every key, as the tangent rules make them.
+
+    flat is 0; linear is the slope of the span on that side; smooth is the slope from the key
+    before to the key after. At the ends both use the only span there is.
+
+    Parameters
+    ----------
+    channel : Channel
+        With N keys.
+
+    Returns
+    -------
+    (N, 2)
+        Incoming and outgoing slope, value per second; 0 over a span without duration, and for
+        all keys at one time.
+    """
+    times, values = channel.times, channel.values
+    count = len(times)
+    result = np.zeros((count, 2))
+    if count < 2 or times[-1] - times[0] <= SHORTEST:
+        return result
+    spans = _ratio(np.diff(values), np.diff(times))
+    linear = np.stack([np.append(spans[0], spans), np.append(spans, spans[-1])], axis=1)
+    smooth = linear.copy()
+    smooth[1:-1] = _ratio(values[2:] - values[:-2], times[2:] - times[:-2])[:, None]
+    known = {"flat": result, "linear": linear, "smooth": smooth}
+    for rule, rates in known.items():
+        follows = np.array([[tangent == rule for tangent in pair] for pair in channel.tangents])
+        result = np.where(follows, rates, result)
+    numbers = [[0.0 if t in known else float(t) for t in pair] for pair in channel.tangents]
+    return result + np.array(numbers)
+
+
+def _ratio(rise: Floats, run: Floats) -> Floats:
+    return np.divide(rise, run, out=np.zeros_like(rise), where=run > SHORTEST)
+
+
+def evaluate(channel: Channel, times: Floats) -> Floats:
+    """Return a curve's values: cubic Hermite inside the keys, extrapolated outside.
+
+    With u in 0..1 across a span of h seconds, v0 = h out0 and v1 = h in1, the value is
+    ((a u + b) u + v0) u + p0, a = 2 p0 - 2 p1 + v0 + v1, b = -3 p0 + 3 p1 - 2 v0 - v1
+    (CSE169 course notes). On a key it is exactly the key's value.
+
+    Parameters
+    ----------
+    channel : Channel
+        The curve; without keys it is 0 everywhere.
+    times : (...)
+        Seconds.
+
+    Returns
+    -------
+    (...)
+        Lengths or radians.
+    """
+    from viewer.rig.motion.clip_table import evaluate_channels
+
+    times = np.asarray(times, dtype=np.float64)
+    return evaluate_channels((channel,), times.ravel())[:, 0].reshape(times.shape)
+
+
+def sample(clip: Clip, skeleton: Skeleton, time: float, out: Pose) -> None:
+    """Set a pose's DOFs to where a clip has them at one time, within their limits.
+
+    Parameters
+    ----------
+    clip : Clip
+        The motion.
+    skeleton : Skeleton
+        Gives the limits; the clip must fit it, see ``check_fit``.
+    time : float
+        Seconds; before ``start`` and after ``end`` the curves extrapolate.
+    out : Pose
+        Changed in place.
+    """
+    from viewer.rig.motion.clip_table import evaluate_all
+
+    targets, values = evaluate_all(clip, np.array([time]))
+    out.dofs[targets] = values[0]
+    out.dofs[:] = clamp_dofs(skeleton, out.dofs)
+
+
+def is_course_rig(skeleton: Skeleton) -> bool:
+    """Return whether a skeleton's DOFs are those that ``.anim`` channels move, in their order.
+
+    That is: translation x, y, z of the root, then rotations x, y, z of joint 0, 1, 2 and so on.
+    """
+    count = skeleton.n_joints
+    if skeleton.n_dofs != 3 + 3 * count:
+        return False
+    joints = np.concatenate([[0, 0, 0], np.repeat(np.arange(count), 3)])
+    kinds = np.concatenate([[0, 1, 2], np.tile([3, 4, 5], count)])
+    return bool((skeleton.dof_joints == joints).all() and (skeleton.dof_kinds == kinds).all())
+
+
+def suits(clip: Clip, skeleton: Skeleton) -> bool:
+    """Return whether a clip's channels are the DOFs of a skeleton; see ``check_fit``."""
+    return not misfit(clip, skeleton)
+
+
+def misfit(clip: Clip, skeleton: Skeleton) -> str:
+    """Return why a clip cannot move a skeleton, in words that follow its name; "" if it can."""
+    if not is_course_rig(skeleton):
+        return (
+            "is no course rig, whose clips move the root along x, y, z and turn each joint about "
+            f"x, y, z: {_strange_joint(skeleton)}"
+        )
+    if len(clip.channels) != skeleton.n_dofs:
+        return f"needs {skeleton.n_dofs} (3 + 3 x {skeleton.n_joints} joints)"
+    return ""
+
+
+def _strange_joint(skeleton: Skeleton) -> str:
+    """Return the first joint whose DOFs are not those of a course rig, and what they are."""
+    for joint in range(skeleton.n_joints):
+        kinds = [DOF_KINDS[kind] for kind in skeleton.dof_kinds[skeleton.dof_joints == joint]]
+        if kinds != list(DOF_KINDS if joint == 0 else DOF_KINDS[3:]):
+            found = f"DOFs {', '.join(kinds)}" if kinds else "no DOFs"
+            return f"joint {joint_label(skeleton, joint)} has {found}"
+    return "its DOFs are not in the order of its joints"
+
+
+def check_fit(clip: Clip, skeleton: Skeleton) -> None:
+    """Refuse a clip that was made for another skeleton.
+
+    Raises
+    ------
+    RigError
+        With both numbers, or if the DOFs are not those of ``is_course_rig``.
+    """
+    if not is_course_rig(skeleton):
+        raise RigError(f"clip {clip.name}: the skeleton {misfit(clip, skeleton)}")
+    if len(clip.channels) != skeleton.n_dofs:
+        raise RigError(
+            f"clip {clip.name} has {len(clip.channels)} channels, "
+            f"the skeleton {misfit(clip, skeleton)}"
+        )

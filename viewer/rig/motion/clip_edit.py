@@ -1,0 +1,324 @@
+"""Edit keyed clips: every function returns a new channel or clip and leaves the old one alone.
+
+Keys keep their order and so their index: one that is moved stops at a neighbour that is not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.rig.arrays import Bools, Floats
+from viewer.rig.motion.clip import (
+    SHORTEST,
+    Channel,
+    Clip,
+    Extrapolation,
+    Tangent,
+    evaluate,
+    slopes,
+)
+from viewer.rig.motion.clip_table import evaluate_all
+from viewer.rig.pose import Pose
+from viewer.rig.skeleton import Skeleton, clamp_dofs
+
+__all__ = [
+    "add_key",
+    "clip_from_frames",
+    "clip_from_pose",
+    "delete_keys",
+    "empty_clip",
+    "key_pose",
+    "move_keys",
+    "set_extrapolation",
+    "set_key",
+    "set_range",
+    "set_tangent",
+    "slope_at",
+    "with_channel",
+]
+
+_SMOOTH: tuple[Tangent, Tangent] = ("smooth", "smooth")
+_UNCHANGED = 1e-9  # radians or lengths by which a DOF may be off its curve and count as on it
+
+
+def add_key(
+    channel: Channel,
+    time: float,
+    value: float | None = None,
+    tangents: tuple[Tangent, Tangent] | None = None,
+) -> tuple[Channel, int]:
+    """Return a channel with a key more, and its index.
+
+    Without value and tangents a key between others leaves the curve exactly as it is: it gets the
+    slope that is there, and neighbours whose rules would see it keep their slopes as numbers.
+    A key that is there already at this time is changed instead.
+
+    Parameters
+    ----------
+    channel : Channel
+        With any number of keys.
+    time : float
+        Seconds.
+    value : float, optional
+        Length or radians; where the curve is if omitted.
+    tangents : (incoming, outgoing), optional
+        Rules or slopes; smooth if a value is given, or outside of the keys.
+    """
+    there = np.flatnonzero(np.abs(channel.times - time) <= SHORTEST)
+    if len(there):
+        key = int(there[0])
+        changed = channel if value is None else set_key(channel, key, value=value)
+        if tangents is not None:
+            changed = set_tangent(set_tangent(changed, key, 0, tangents[0]), key, 1, tangents[1])
+        return changed, key
+    key = int(np.searchsorted(channel.times, time))
+    pairs = list(channel.tangents)
+    is_between = 0 < key < len(channel.times)
+    if value is None and tangents is None and is_between:
+        slope = slope_at(channel, time)
+        tangents = (slope, slope)
+        for neighbour in (key - 1, key):
+            pairs[neighbour] = _as_numbers(channel, neighbour)
+    if value is None:
+        value = float(evaluate(channel, np.array(time)))
+    added = replace(
+        channel,
+        times=np.insert(channel.times, key, time),
+        values=np.insert(channel.values, key, value),
+        tangents=(*pairs[:key], tangents or _SMOOTH, *pairs[key:]),
+    )
+    return added, key
+
+
+def _as_numbers(channel: Channel, key: int) -> tuple[Tangent, Tangent]:
+    """Return a key's tangents with those that follow from its neighbours as numbers."""
+    pair = zip(channel.tangents[key], slopes(channel)[key].tolist(), strict=True)
+    incoming, outgoing = (
+        slope if tangent in ("linear", "smooth") else tangent for tangent, slope in pair
+    )
+    return incoming, outgoing
+
+
+def slope_at(channel: Channel, time: float) -> float:
+    """Return the derivative of a curve between its keys, value per second; 0 outside of them."""
+    times = channel.times
+    if len(times) < 2 or not times[0] <= time <= times[-1]:
+        return 0.0
+    key = min(int(np.searchsorted(times, time, side="right")) - 1, len(times) - 2)
+    h = float(times[key + 1] - times[key])
+    if h <= SHORTEST:
+        return 0.0
+    edges = slopes(channel)
+    u = (time - times[key]) / h
+    p0, p1 = channel.values[key], channel.values[key + 1]
+    v0, v1 = h * edges[key, 1], h * edges[key + 1, 0]
+    a, b = 2.0 * p0 - 2.0 * p1 + v0 + v1, -3.0 * p0 + 3.0 * p1 - 2.0 * v0 - v1
+    return float(((3.0 * a * u + 2.0 * b) * u + v0) / h)
+
+
+def move_keys(
+    channel: Channel, keys: Iterable[int], dt: float, dv: float, gap: float = 0.0
+) -> Channel:
+    """Return a channel with some keys moved together.
+
+    Parameters
+    ----------
+    channel : Channel
+        With these keys.
+    keys : iterable of int
+        Their indices, which stay the same.
+    dt : float
+        Seconds; less if one of them would pass a key that stays.
+    dv : float
+        Length or radians.
+    gap : float
+        Seconds that must be left to keys that stay, where there are as many now.
+    """
+    moved = np.zeros(len(channel.times), dtype=np.bool_)
+    moved[list(keys)] = True
+    pairs = np.flatnonzero(moved[1:] != moved[:-1])
+    room = np.maximum(np.diff(channel.times)[pairs] - gap, 0.0)
+    later = moved[pairs]  # whose later neighbour stays
+    dt = min(dt, float(room[later].min(initial=np.inf)))
+    dt = max(dt, -float(room[~later].min(initial=np.inf)))
+    times = np.where(moved, channel.times + dt, channel.times)
+    # Rounding must not let a key pass a neighbour by the last bit.
+    back = np.minimum.accumulate(times[::-1])[::-1]
+    times = back if dt > 0.0 else np.maximum.accumulate(times)
+    values = np.where(moved, channel.values + dv, channel.values)
+    return replace(channel, times=times, values=values)
+
+
+def set_key(
+    channel: Channel,
+    key: int,
+    time: float | None = None,
+    value: float | None = None,
+    gap: float = 0.0,
+) -> Channel:
+    """Return a channel with one key elsewhere; its time stops at its neighbours, see move_keys."""
+    times, values = channel.times.copy(), channel.values.copy()
+    if time is not None:
+        now = channel.times[key]
+        if key > 0:
+            time = max(time, times[key - 1] + min(gap, now - times[key - 1]))
+        if key + 1 < len(times):
+            time = min(time, times[key + 1] - min(gap, times[key + 1] - now))
+        times[key] = time
+    if value is not None:
+        values[key] = value
+    return replace(channel, times=times, values=values)
+
+
+def delete_keys(channel: Channel, keys: Iterable[int]) -> Channel:
+    """Return a channel without some keys; the others keep their tangents."""
+    stays = np.ones(len(channel.times), dtype=np.bool_)
+    stays[list(keys)] = False
+    return replace(
+        channel,
+        times=channel.times[stays],
+        values=channel.values[stays],
+        tangents=tuple(channel.tangents[key] for key in np.flatnonzero(stays)),
+    )
+
+
+def set_tangent(channel: Channel, key: int, side: int, tangent: Tangent) -> Channel:
+    """Return a channel with another rule or slope on one side of a key: 0 incoming, 1 outgoing.
+
+    Raises
+    ------
+    RigError
+        If the rule is unknown or the slope no finite number.
+    """
+    pairs = list(channel.tangents)
+    incoming, outgoing = pairs[key]
+    pairs[key] = (incoming, tangent) if side else (tangent, outgoing)
+    return replace(channel, tangents=tuple(pairs))
+
+
+def set_extrapolation(channel: Channel, side: int, mode: Extrapolation) -> Channel:
+    """Return a channel with another mode on one side of its keys: 0 before, 1 after."""
+    before, after = channel.extrapolation
+    return replace(channel, extrapolation=(before, mode) if side else (mode, after))
+
+
+def with_channel(clip: Clip, target: int, change: Callable[[Channel], Channel]) -> Clip:
+    """Return a clip with one channel changed, or added if there is none for this DOF yet.
+
+    Parameters
+    ----------
+    clip : Clip
+        Any.
+    target : int
+        Row of the DOF in the skeleton's table.
+    change : callable
+        Makes the new channel of the old one.
+    """
+    known = {channel.target for channel in clip.channels}
+    if target not in known:
+        channels = (*clip.channels, change(_no_keys(target)))
+        return replace(clip, channels=tuple(sorted(channels, key=lambda channel: channel.target)))
+    return replace(
+        clip,
+        channels=tuple(
+            change(channel) if channel.target == target else channel for channel in clip.channels
+        ),
+    )
+
+
+def _no_keys(target: int) -> Channel:
+    return Channel(target, np.zeros(0), np.zeros(0), ())
+
+
+def set_range(clip: Clip, start: float, end: float) -> Clip:
+    """Return a clip that is meant to be played from one time to another, put in order."""
+    return replace(clip, start=min(start, end), end=max(start, end))
+
+
+def empty_clip(skeleton: Skeleton, name: str, start: float = 0.0, end: float = 1.0) -> Clip:
+    """Return a clip with a channel without keys for every DOF; it holds them all at 0."""
+    return Clip(name, tuple(map(_no_keys, range(skeleton.n_dofs))), start, end)
+
+
+def clip_from_pose(
+    skeleton: Skeleton, pose: Pose, name: str, start: float = 0.0, end: float = 1.0
+) -> Clip:
+    """Return a clip with one key per DOF, at its start: a pose that stays."""
+    return key_pose(empty_clip(skeleton, name, start, end), skeleton, pose, start)
+
+
+def key_pose(
+    clip: Clip, skeleton: Skeleton, pose: Pose, time: float, only_changed: bool = False
+) -> Clip:
+    """Return a clip that has a pose's DOFs as keys at one time.
+
+    Parameters
+    ----------
+    clip : Clip
+        Of that skeleton; a range that ends before the time, or begins after it, grows to it.
+    skeleton : Skeleton
+        Gives the limits.
+    pose : Pose
+        Lengths and radians.
+    time : float
+        Seconds.
+    only_changed : bool
+        Leave out DOFs that the clip, within their limits, has there already.
+    """
+    targets, values = evaluate_all(clip, np.array([time]))
+    now = np.zeros(skeleton.n_dofs)
+    now[targets] = values[0]
+    changed = np.abs(clamp_dofs(skeleton, now) - pose.dofs) > _UNCHANGED
+    channels = {channel.target: channel for channel in clip.channels}
+    for dof in range(skeleton.n_dofs):
+        if changed[dof] or not only_changed:
+            channel = channels.get(dof) or _no_keys(dof)
+            channels[dof] = add_key(channel, time, float(pose.dofs[dof]))[0]
+    return Clip(
+        clip.name,
+        tuple(channels[dof] for dof in sorted(channels)),
+        min(clip.start, time),
+        max(clip.end, time),
+    )
+
+
+def clip_from_frames(
+    name: str, dofs: Floats, times: Floats, rule: Tangent = "linear", present: Bools | None = None
+) -> Clip:
+    """Return a clip with a key per frame.
+
+    Parameters
+    ----------
+    name : str
+        What menus call it.
+    dofs : (F, D)
+        Lengths and radians. A DOF that never moves gets a single key.
+    times : (F,)
+        Seconds, rising.
+    rule : Tangent
+        On both sides of every key: straight lines, or smooth ones.
+    present : (F,) bool, optional
+        Frames that get keys; all if omitted.
+
+    Raises
+    ------
+    RigError
+        If there is no frame.
+    """
+    keep = np.ones(len(times), dtype=np.bool_) if present is None else present
+    if not keep.any():
+        raise RigError(f"clip {name}: expected at least one frame, found none")
+    times, dofs = np.asarray(times, dtype=np.float64), np.asarray(dofs, dtype=np.float64)
+    span, times, dofs = times[[0, -1]].tolist(), times[keep], dofs[keep]
+    channels = tuple(_from_frames(dof, times, column, rule) for dof, column in enumerate(dofs.T))
+    return Clip(name, channels, *span)
+
+
+def _from_frames(dof: int, times: Floats, values: Floats, rule: Tangent) -> Channel:
+    count = 1 if (values == values[0]).all() else len(times)
+    pairs: Sequence[tuple[Tangent, Tangent]] = ((rule, rule),) * count
+    return Channel(dof, times[:count], values[:count], tuple(pairs))

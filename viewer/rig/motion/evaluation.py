@@ -1,0 +1,297 @@
+"""What moves actors: posing one at a time, and many frames of one as arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.errors import RigError
+from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.captures.points import PointClip, sample_points
+from viewer.rig.figure import Figure
+from viewer.rig.geometry.quaternion import multiply
+from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
+from viewer.rig.kinematics import forward_kinematics
+from viewer.rig.motion.clip import Clip, sample
+from viewer.rig.motion.clip_table import evaluate_all
+from viewer.rig.motion.sampled_clip import SampledClip, SampledRows, sample_rows
+from viewer.rig.pose import Pose, dof_rotations
+from viewer.rig.posing.pose_vector import set_joint_rotations
+from viewer.rig.scene import Actor, Motion, figure_pose
+from viewer.rig.shape import joint_directions, moved_rest_translations, rest_joints
+from viewer.rig.skeleton import Skeleton
+
+__all__ = [
+    "DEFAULT_RATE",
+    "Frames",
+    "frame_rate",
+    "frames_between",
+    "frames_of",
+    "place_pose",
+    "pose_actor",
+    "pose_of",
+    "rest_translations_of",
+    "scene_rate",
+    "time_span",
+    "world_frames",
+]
+
+DEFAULT_RATE = 30.0
+"""Frames a second of motions that do not say."""
+
+_FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frames:
+    """Many poses of one figure, in time order.
+
+    Attributes
+    ----------
+    times : (F,)
+        Seconds.
+    present : (F,) bool
+        Where False, the other rows mean nothing.
+    rotations : (F, J, 4)
+        Each joint's whole rotation within its parent: unit quaternions (x, y, z, w).
+    translations : (F, J, 3)
+        Added to the joints' rest translations, DOFs included.
+    shape_weights : (F, S) or (1, S)
+        Of the figure's blend shapes; one row counts for all.
+    figure_translations, figure_scales : (F, 3), (F,)
+        Of the whole figure.
+    """
+
+    times: Floats
+    present: Bools
+    rotations: Floats
+    translations: Floats
+    shape_weights: Floats
+    figure_translations: Floats
+    figure_scales: Floats
+
+    @property
+    def n_frames(self) -> int:
+        """Number of frames, F."""
+        return len(self.times)
+
+
+def time_span(actors: Iterable[Actor]) -> tuple[float, float]:
+    """Return the seconds from the earliest start to the latest end of all clips."""
+    spans = [
+        (actor.clip.start + actor.offset, actor.clip.end + actor.offset)
+        for actor in actors
+        if actor.clip is not None
+    ]
+    return min((low for low, _ in spans), default=0.0), max(
+        (high for _, high in spans), default=0.0
+    )
+
+
+def frame_rate(motion: Motion | None) -> float:
+    """Return a motion's frames a second; ``DEFAULT_RATE`` for keyed clips, which have none."""
+    return motion.timing.frame_rate if isinstance(motion, SampledClip | PointClip) else DEFAULT_RATE
+
+
+def scene_rate(actors: Iterable[Actor]) -> float:
+    """Return the frames a second by which a scene is counted: those of its longest capture."""
+    clips = [actor.clip for actor in actors if isinstance(actor.clip, SampledClip | PointClip)]
+    return frame_rate(max(clips, key=lambda clip: clip.end - clip.start, default=None))
+
+
+def pose_actor(actor: Actor, time: float, fill: bool = False) -> None:
+    """Pose an actor by its clip as it is at one time of the scene's clock, in place.
+
+    Parameters
+    ----------
+    actor : Actor
+        ``pose``, ``points`` and ``is_present`` change; without a clip nothing does.
+    time : float
+        Seconds; the actor's own ``offset`` is taken off.
+    fill : bool
+        Bridge gaps of captures instead of leaving the actor out.
+    """
+    clip, skeleton, own = actor.clip, actor.figure.skeleton, time - actor.offset
+    if isinstance(clip, PointClip):
+        actor.points = sample_points(clip, own, fill)
+        actor.is_present = actor.points is not None
+    elif isinstance(clip, SampledClip) and skeleton is not None and actor.pose is not None:
+        rows = sample_rows(clip, np.array([own]), fill)
+        actor.is_present = bool(rows.present[0])
+        if actor.is_present:
+            _apply(rows, 0, skeleton, actor.pose)
+    elif isinstance(clip, Clip) and skeleton is not None and actor.pose is not None:
+        sample(clip, skeleton, own, out=actor.pose)
+
+
+def _apply(rows: SampledRows, row: int, skeleton: Skeleton, pose: Pose) -> None:
+    joints: Ints = np.arange(skeleton.n_joints, dtype=np.int32)
+    moves = skeleton.dof_kinds < _FIRST_ROTATION
+    pose.dofs[moves] = np.clip(0.0, *skeleton.dof_limits[moves].T)
+    set_joint_rotations(skeleton, pose, joints, quaternion_to_matrix(rows.rotations[row]))
+    place_pose(pose, rows, row)
+
+
+def place_pose(pose: Pose, rows: SampledRows, row: int) -> None:
+    """Give a pose what a clip has at one time beside the joints' rotations, in place."""
+    if rows.translations is not None:
+        pose.translations[:] = rows.translations[row]
+    if rows.figure_translations is not None:
+        pose.figure_translation[:] = rows.figure_translations[row]
+    if rows.figure_scales is not None:
+        pose.figure_scale = float(rows.figure_scales[row])
+    if rows.shape_weights is not None:
+        count = min(len(pose.shape_weights), rows.shape_weights.shape[1])
+        pose.shape_weights[:count] = rows.shape_weights[row, :count]
+
+
+def frames_of(
+    figure: Figure,
+    motion: Clip | SampledClip,
+    times: Floats,
+    base: Pose | None = None,
+    fill: bool = False,
+) -> Frames:
+    """Return a figure's poses at many times.
+
+    Parameters
+    ----------
+    figure : Figure
+        With a skeleton.
+    motion : Clip or SampledClip
+        Of that skeleton.
+    times : (F,)
+        Seconds of the motion's own clock.
+    base : Pose, optional
+        Gives shape and place where the motion has none; the figure's own if omitted.
+    fill : bool
+        Bridge gaps.
+
+    Raises
+    ------
+    RigError
+        If the figure has no skeleton, or not the motion's number of joints.
+    """
+    skeleton = figure.skeleton
+    if skeleton is None:
+        raise RigError(f"figure {figure.name} has no skeleton to move")
+    times = np.atleast_1d(np.asarray(times, dtype=np.float64))
+    pose = figure_pose(figure) if base is None else base
+    if isinstance(motion, Clip):
+        return _keyed_frames(skeleton, motion, times, pose)
+    if motion.n_joints != skeleton.n_joints:
+        raise RigError(
+            f"clip {motion.name} has {motion.n_joints} joints, figure {figure.name} has "
+            f"{skeleton.n_joints}"
+        )
+    rows, count = sample_rows(motion, times, fill), len(times)
+    still = np.zeros((count, skeleton.n_joints, 3))
+    place = np.tile(pose.figure_translation, (count, 1))
+    weights = pose.shape_weights[None] if rows.shape_weights is None else rows.shape_weights
+    scales = np.full(count, pose.figure_scale)
+    return Frames(
+        times,
+        rows.present,
+        rows.rotations,
+        still if rows.translations is None else rows.translations,
+        weights[:1] if len(weights) > 1 and (weights == weights[0]).all() else weights,
+        place if rows.figure_translations is None else rows.figure_translations,
+        scales if rows.figure_scales is None else rows.figure_scales,
+    )
+
+
+def _keyed_frames(skeleton: Skeleton, clip: Clip, times: Floats, pose: Pose) -> Frames:
+    count = len(times)
+    targets, values = evaluate_all(clip, times)
+    dofs = np.tile(pose.dofs, (count, 1))
+    dofs[:, targets] = values
+    dofs = np.clip(dofs, *skeleton.dof_limits.T)
+    beneath = pose.rotations / np.linalg.norm(pose.rotations, axis=-1, keepdims=True)
+    rotations = multiply(beneath, matrix_to_quaternion(dof_rotations(skeleton, dofs)))
+    translations = np.tile(pose.translations, (count, 1, 1))
+    for dof in np.flatnonzero(skeleton.dof_kinds < _FIRST_ROTATION):
+        translations[:, skeleton.dof_joints[dof], skeleton.dof_kinds[dof]] += dofs[:, dof]
+    return Frames(
+        times,
+        np.ones(count, dtype=np.bool_),
+        rotations,
+        translations,
+        pose.shape_weights[None].copy(),
+        np.tile(pose.figure_translation, (count, 1)),
+        np.full(count, pose.figure_scale),
+    )
+
+
+def pose_of(figure: Figure, frames: Frames, frame: int) -> Pose:
+    """Return one frame as a pose of its own."""
+    assert figure.skeleton is not None  # whoever has frames has a skeleton
+    pose = figure_pose(figure)
+    row = SampledRows(
+        frames.present,
+        frames.rotations,
+        frames.translations,
+        frames.figure_translations,
+        frames.figure_scales,
+        np.broadcast_to(frames.shape_weights, (frames.n_frames, frames.shape_weights.shape[1])),
+    )
+    _apply(row, frame, figure.skeleton, pose)
+    return pose
+
+
+def frames_between(frames: Frames, rows: slice | NDArray[np.intp]) -> Frames:
+    """Return some of the frames; one shape for all of them stays one."""
+    weights = frames.shape_weights
+    return Frames(
+        frames.times[rows],
+        frames.present[rows],
+        frames.rotations[rows],
+        frames.translations[rows],
+        weights if len(weights) == 1 else weights[rows],
+        frames.figure_translations[rows],
+        frames.figure_scales[rows],
+    )
+
+
+def world_frames(figure: Figure, frames: Frames) -> Floats:
+    """Return where every joint is in every frame: forward kinematics of all frames at once.
+
+    Parameters
+    ----------
+    figure : Figure
+        With a skeleton; joints follow the frames' shapes.
+    frames : Frames
+        Of that figure.
+
+    Returns
+    -------
+    (F, J, 4, 4)
+        Joint space to figure space, the figure's own scale and translation included.
+    """
+    skeleton = figure.skeleton
+    assert skeleton is not None  # whoever has frames has a skeleton
+    count = frames.n_frames
+    local = np.zeros((skeleton.n_joints, count, 4, 4))
+    local[..., 3, 3] = 1.0
+    turns = quaternion_to_matrix(frames.rotations) * skeleton.rest_scales[:, None, :]
+    local[..., :3, :3] = np.swapaxes(turns, 0, 1)
+    offsets = rest_translations_of(figure, frames.shape_weights) + frames.translations
+    local[..., :3, 3] = np.swapaxes(offsets, 0, 1)
+    world = np.swapaxes(forward_kinematics(skeleton.parents, local), 0, 1)
+    place = np.zeros((count, 1, 4, 4))
+    place[:, 0, [0, 1, 2], [0, 1, 2]] = frames.figure_scales[:, None]
+    place[:, 0, :3, 3] = frames.figure_translations
+    place[..., 3, 3] = 1.0
+    return place @ world
+
+
+def rest_translations_of(figure: Figure, shape_weights: Floats) -> Floats:
+    """Return the rest translations of many shapes: (F, J, 3) for weights (F, S)."""
+    skeleton = figure.skeleton
+    assert skeleton is not None  # the callers looked
+    if not shape_weights.any():
+        return skeleton.rest_translations[None]
+    shifts = np.einsum("fs,sjc->fjc", shape_weights, joint_directions(figure))
+    return moved_rest_translations(skeleton, rest_joints(figure) + shifts)

@@ -1,0 +1,41 @@
+"""Where a camera that follows somebody looks."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.rig.arrays import Floats
+from viewer.rig.geometry.transform import apply_transform
+from viewer.rig.scene import Actor
+from viewer.rig.skinning import joint_matrices
+
+__all__ = ["followed_point"]
+
+
+def followed_point(actor: Actor, joint: int = -1) -> Floats | None:
+    """Return a joint's place, or the middle of all joints or captured points.
+
+    Parameters
+    ----------
+    actor : Actor
+        Posed and placed.
+    joint : int
+        Index of a joint or keypoint; -1 for the middle.
+
+    Returns
+    -------
+    (3,) or None
+        Scene space; None while the actor is absent or has neither joints nor points.
+    """
+    if not actor.is_present:
+        return None
+    if actor.points is not None:
+        seen = actor.points[:, 3] > 0.0
+        chosen = seen & (np.arange(len(seen)) == joint) if joint >= 0 else seen
+        points = actor.points[chosen, :3]
+    elif actor.pose is not None and actor.figure.skeleton is not None:
+        joints = joint_matrices(actor.figure, actor.pose)[:, :3, 3]
+        points = joints[[joint]] if 0 <= joint < len(joints) else joints
+    else:
+        return None
+    return apply_transform(actor.placement, points).mean(axis=0) if len(points) else None

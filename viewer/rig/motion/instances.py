@@ -1,0 +1,174 @@
+"""Many actors of one figure at once: posed by their clips, and their joints' matrices.
+
+Nothing here computes actor by actor; numbers are only copied into each one's own pose.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from viewer.rig.arrays import Floats
+from viewer.rig.figure import Figure
+from viewer.rig.geometry.rotation import matrix_to_euler, quaternion_to_matrix
+from viewer.rig.kinematics import forward_kinematics, skinning_matrices
+from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.clip_table import evaluate_all
+from viewer.rig.motion.evaluation import place_pose, pose_actor
+from viewer.rig.motion.sampled_clip import SampledClip, sample_rows
+from viewer.rig.pose import Pose, dof_rotations
+from viewer.rig.posing.pose_vector import rotation_rows
+from viewer.rig.scene import Actor
+from viewer.rig.shape import shaped
+from viewer.rig.skeleton import Skeleton, clamp_dofs
+
+__all__ = ["local_rotations", "palettes", "placements", "pose_actors", "worlds"]
+
+_FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
+
+
+def pose_actors(actors: Iterable[Actor], time: float, fill: bool = False) -> None:
+    """Pose actors by their clips as they are at one time of the scene's clock, in place.
+
+    Actors that share figure and clip, each at its own offset, are posed together; the result is
+    that of ``viewer.rig.motion.evaluation.pose_actor`` for each.
+
+    Parameters
+    ----------
+    actors : iterable of Actor
+        Those without a clip stay as they are.
+    time : float
+        Seconds; each actor's own ``offset`` is taken off.
+    fill : bool
+        Bridge gaps of captures instead of leaving actors out.
+    """
+    groups: dict[tuple[int, int], list[Actor]] = {}
+    for actor in actors:
+        groups.setdefault((id(actor.figure), id(actor.clip)), []).append(actor)
+    for group in groups.values():
+        clip, skeleton = group[0].clip, group[0].figure.skeleton
+        poses = [actor.pose for actor in group if actor.pose is not None]
+        times = np.array([time - actor.offset for actor in group])
+        if skeleton is None or len(group) < 2:
+            clip = None
+        if isinstance(clip, Clip) and skeleton is not None:
+            _pose_by_curves(clip, skeleton, poses, times)
+        elif isinstance(clip, SampledClip) and skeleton is not None and _takes_any(skeleton):
+            _pose_by_frames(group, clip, skeleton, times, fill)
+        else:
+            for actor in group:
+                pose_actor(actor, time, fill)
+
+
+def _takes_any(skeleton: Skeleton) -> bool:
+    """Return whether the DOFs of every joint can take any rotation."""
+    return bool((rotation_rows(skeleton) >= 0).all())
+
+
+def _pose_by_curves(clip: Clip, skeleton: Skeleton, poses: list[Pose], times: Floats) -> None:
+    targets, values = evaluate_all(clip, times)
+    dofs = np.stack([pose.dofs for pose in poses])
+    dofs[:, targets] = values
+    for pose, row in zip(poses, clamp_dofs(skeleton, dofs), strict=True):
+        pose.dofs[:] = row
+
+
+def _pose_by_frames(
+    actors: list[Actor], clip: SampledClip, skeleton: Skeleton, times: Floats, fill: bool
+) -> None:
+    """Pose by captured rotations; every joint takes any rotation as its DOFs."""
+    balls, rows = rotation_rows(skeleton), sample_rows(clip, times, fill)
+    base = quaternion_to_matrix(skeleton.rest_rotations)
+    within = np.swapaxes(base, -1, -2) @ quaternion_to_matrix(rows.rotations)
+    dofs = np.stack([actor.pose.dofs for actor in actors if actor.pose is not None])
+    dofs[:, skeleton.dof_kinds < _FIRST_ROTATION] = 0.0
+    dofs[:, balls] = matrix_to_euler(within)
+    dofs = clamp_dofs(skeleton, dofs)
+    for row, actor in enumerate(actors):
+        actor.is_present = bool(rows.present[row])
+        if actor.is_present and actor.pose is not None:
+            actor.pose.dofs[:] = dofs[row]
+            actor.pose.rotations[:] = skeleton.rest_rotations
+            place_pose(actor.pose, rows, row)
+
+
+def local_rotations(skeleton: Skeleton, poses: Sequence[Pose]) -> Floats:
+    """Return each joint's rotation within its parent, R(quaternion) R(DOFs).
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Of J joints.
+    poses : sequence of A Pose
+        DOFs in lengths and radians.
+
+    Returns
+    -------
+    (A, J, 3, 3)
+        Matrices for column vectors.
+    """
+    beneath = quaternion_to_matrix(np.stack([pose.rotations for pose in poses]))
+    return beneath @ dof_rotations(skeleton, np.stack([pose.dofs for pose in poses]))
+
+
+def worlds(skeleton: Skeleton, poses: Sequence[Pose], rotations: Floats | None = None) -> Floats:
+    """Return where poses put every joint; see ``viewer.rig.kinematics.world_matrices``.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Of the figure, already shaped; all poses have this shape.
+    poses : sequence of A Pose
+        DOFs in lengths and radians.
+    rotations : (A, J, 3, 3), optional
+        Their ``local_rotations``, if they are known.
+
+    Returns
+    -------
+    (A, J, 4, 4)
+        Joint-to-figure matrices.
+    """
+    rotations = local_rotations(skeleton, poses) if rotations is None else rotations
+    # Joints come first: kinematics takes one matrix or a whole row of them alike.
+    local = np.zeros((skeleton.n_joints, len(poses), 4, 4))
+    local[..., 3, 3] = 1.0
+    scales = np.stack([pose.scales for pose in poses])
+    local[..., :3, :3] = np.swapaxes(rotations * scales[:, :, None, :], 0, 1)
+    shifts = np.stack([pose.translations for pose in poses])
+    moves = np.flatnonzero(skeleton.dof_kinds < _FIRST_ROTATION)
+    if len(moves):
+        dofs = np.stack([pose.dofs[moves] for pose in poses])
+        every = np.arange(len(poses))[:, None]
+        np.add.at(shifts, (every, skeleton.dof_joints[moves], skeleton.dof_kinds[moves]), dofs)
+    local[..., :3, 3] = np.swapaxes(skeleton.rest_translations + shifts, 0, 1)
+    return np.swapaxes(forward_kinematics(skeleton.parents, local), 0, 1)
+
+
+def palettes(figure: Figure, poses: Sequence[Pose]) -> Floats:
+    """Return the skinning matrices of poses of one shape: M[a, j] = W[a, j] inverse(B[j]).
+
+    Parameters
+    ----------
+    figure : Figure
+        With skeleton and skin.
+    poses : sequence of A Pose
+        At least one; their shape is that of the first.
+
+    Returns
+    -------
+    (A, J, 4, 4)
+        Bind-to-posed matrices; the figure's own place is not part of them.
+    """
+    figure = shaped(figure, poses[0].shape_weights)
+    assert figure.skeleton is not None and figure.skin is not None  # the caller looked
+    return skinning_matrices(worlds(figure.skeleton, poses), figure.skin.inverse_bind)
+
+
+def placements(poses: Sequence[Pose]) -> Floats:
+    """Return T(figure_translation) S(figure_scale) of poses: (A, 4, 4), applied after skinning."""
+    matrices = np.zeros((len(poses), 4, 4))
+    matrices[:, [0, 1, 2], [0, 1, 2]] = np.array([pose.figure_scale for pose in poses])[:, None]
+    matrices[:, :3, 3] = [pose.figure_translation for pose in poses]
+    matrices[:, 3, 3] = 1.0
+    return matrices

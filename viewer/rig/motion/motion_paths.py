@@ -1,0 +1,125 @@
+"""Paths of joints and captured points over time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.captures.points import PointClip
+from viewer.rig.figure import Figure
+from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.evaluation import frames_of, world_frames
+from viewer.rig.pose import Pose
+from viewer.rig.scene import Motion
+
+__all__ = ["Trail", "segments", "trail", "trail_times"]
+
+_KEYED_RATE = 60.0  # points a second along curves, which have no frames of their own
+_MOST = 20_000  # points of one path along curves
+_BLOCK = 1 << 14  # matrices at a time, which bounds the memory of long captures
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trail:
+    """Where some joints of a figure are at F times.
+
+    Attributes
+    ----------
+    times : (F,)
+        Seconds of the motion's own clock.
+    points : (F, N, 3)
+        Figure space, the figure's own place and scale included.
+    present : (F, N) bool
+        Where False, the point means nothing.
+    """
+
+    times: Floats
+    points: Floats
+    present: Bools
+
+
+def trail_times(motion: Motion) -> Floats:
+    """Return the times at which a path is drawn: a capture's frames, 60 a second on curves."""
+    if isinstance(motion, Clip):
+        length = motion.end - motion.start
+        steps = int(min(np.ceil(length * _KEYED_RATE - 1e-6), _MOST - 1))
+        return np.linspace(motion.start, motion.end, max(steps, 0) + 1)
+    timing = motion.timing
+    return timing.start + np.arange(timing.n_frames) / timing.frame_rate
+
+
+def trail(
+    figure: Figure,
+    motion: Motion,
+    joints: Sequence[int],
+    times: Floats | None = None,
+    base: Pose | None = None,
+    min_confidence: float = 0.0,
+) -> Trail:
+    """Return the paths of joints, or of captured points.
+
+    Parameters
+    ----------
+    figure : Figure
+        With a skeleton, or made of points if the motion is.
+    motion : Motion
+        Of that figure.
+    joints : sequence of N int
+        Joints, or points of a ``PointClip``.
+    times : (F,), optional
+        Seconds of the motion's own clock; ``trail_times`` if omitted.
+    base : Pose, optional
+        Gives shape and place where the motion has none.
+    min_confidence : float
+        Less certain points are absent; those that were not seen always are.
+
+    Raises
+    ------
+    RigError
+        If the motion does not fit the figure.
+    """
+    times = trail_times(motion) if times is None else np.asarray(times, dtype=np.float64)
+    chosen: Ints = np.asarray(joints, dtype=np.int32)
+    if isinstance(motion, PointClip):
+        return _point_trail(motion, chosen, times, min_confidence)
+    points = np.zeros((len(times), len(chosen), 3))
+    present = np.zeros((len(times), len(chosen)), dtype=np.bool_)
+    count = 1 if figure.skeleton is None else figure.skeleton.n_joints
+    step = max(1, _BLOCK // count)
+    for first in range(0, len(times), step):
+        rows = slice(first, first + step)
+        frames = frames_of(figure, motion, times[rows], base)
+        points[rows] = world_frames(figure, frames)[:, chosen][..., :3, 3]
+        present[rows] = frames.present[:, None]
+    return Trail(times, points, present)
+
+
+def _point_trail(motion: PointClip, chosen: Ints, times: Floats, min_confidence: float) -> Trail:
+    before, _, _ = motion.timing.locate(times)
+    if not len(motion.points):
+        nothing = np.zeros((len(times), len(chosen)), dtype=np.bool_)
+        return Trail(times, np.zeros((len(times), len(chosen), 3)), nothing)
+    rows = motion.points[np.maximum(before, 0)][:, chosen]
+    certain = (rows[..., 3] > 0.0) & (rows[..., 3] >= min_confidence)
+    return Trail(times, rows[..., :3], certain & (before >= 0)[:, None])
+
+
+def segments(path: Trail) -> tuple[Floats, Floats, Ints]:
+    """Return the pieces between neighbouring times that both have the point: gaps break the line.
+
+    Returns
+    -------
+    points : (S, 2, 3)
+        Both ends, figure space.
+    times : (S, 2)
+        Of both ends.
+    which : (S,) int32
+        Index of the path, 0 to N - 1.
+    """
+    which, first = np.nonzero((path.present[:-1] & path.present[1:]).T)
+    ends = np.stack([first, first + 1], axis=1)
+    points = path.points[ends, which[:, None]]
+    return points, path.times[ends], which.astype(np.int32)

@@ -1,0 +1,188 @@
+"""A motion as frames: local rotations of every joint at a fixed rate, with gaps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.rig.arrays import Bools, Floats, Ints, frozen
+from viewer.rig.geometry.quaternion import slerp
+from viewer.rig.motion.timing import Timing
+
+__all__ = ["SampledClip", "SampledRows", "joined", "sample_rows"]
+
+
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
+class SampledClip:
+    """A motion of one skeleton, as captures have it.
+
+    Attributes
+    ----------
+    name : str
+        What menus call it.
+    timing : Timing
+        Frame rate, and the row of each frame.
+    rotations : (N, J, 4)
+        Each joint's whole rotation within its parent: unit quaternions (x, y, z, w).
+    translations : (N, J, 3) or None
+        Added to the joints' rest translations.
+    figure_translations : (N, 3) or None
+        Of the whole figure, after skinning.
+    figure_scales : (N,) or None
+        Of the whole figure.
+    shape_weights : (N, S) or (1, S) or None
+        Of the figure's blend shapes; one row counts for all frames. None leaves the pose's own.
+    """
+
+    name: str
+    timing: Timing
+    rotations: Floats
+    translations: Floats | None = None
+    figure_translations: Floats | None = None
+    figure_scales: Floats | None = None
+    shape_weights: Floats | None = None
+
+    def __post_init__(self) -> None:
+        def put(name: str, shape: tuple[int | None, ...]) -> None:
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, frozen(name, getattr(self, name), shape))
+
+        put("rotations", (None, None, 4))
+        put("translations", (*self.rotations.shape[:2], 3))
+        put("figure_translations", (self.n_rows, 3))
+        put("figure_scales", (self.n_rows,))
+        put("shape_weights", (None, None))
+        if self.shape_weights is not None and len(self.shape_weights) not in (1, self.n_rows):
+            raise RigError(
+                f"shape_weights: expected {self.n_rows} rows, found {len(self.shape_weights)}"
+            )
+        if self.timing.n_frames and self.timing.rows.max() >= self.n_rows:
+            raise RigError(f"rows: expected 0 to {self.n_rows - 1}, found {self.timing.rows.max()}")
+
+    @property
+    def n_rows(self) -> int:
+        """Number of frames that hold data, N."""
+        return len(self.rotations)
+
+    @property
+    def n_joints(self) -> int:
+        """Number of joints, J."""
+        return int(self.rotations.shape[1])
+
+    @property
+    def start(self) -> float:
+        """Seconds of the first frame."""
+        return self.timing.start
+
+    @property
+    def end(self) -> float:
+        """Seconds of the last frame."""
+        return self.timing.end
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SampledRows:
+    """What a clip has at T times; rows where ``present`` is False mean nothing."""
+
+    present: Bools
+    rotations: Floats
+    translations: Floats | None
+    figure_translations: Floats | None
+    figure_scales: Floats | None
+    shape_weights: Floats | None
+
+
+def sample_rows(clip: SampledClip, times: Floats, fill: bool = False) -> SampledRows:
+    """Return a clip at any times: rotations on the shorter arc, all else in a straight line.
+
+    On a frame the stored numbers come back as they are.
+
+    Parameters
+    ----------
+    clip : SampledClip
+        The motion.
+    times : (T,)
+        Seconds.
+    fill : bool
+        Bridge gaps instead of reporting absence.
+
+    Returns
+    -------
+    SampledRows
+        Arrays with T rows each.
+    """
+    before, after, share = clip.timing.locate(times, fill)
+    present = before >= 0
+    before, after = np.maximum(before, 0), np.maximum(after, 0)
+    between = np.flatnonzero(share > 0.0)
+    if clip.n_rows == 0:
+        rest = np.tile([0.0, 0.0, 0.0, 1.0], (len(before), clip.n_joints, 1))
+        return SampledRows(present, rest, None, None, None, None)
+    rotations = clip.rotations[before]
+    if len(between):
+        ends = clip.rotations[after[between]]
+        rotations[between] = slerp(rotations[between], ends, share[between, None])
+
+    def line(rows: Floats | None) -> Floats | None:
+        return None if rows is None else _line(rows, before, after, share)
+
+    return SampledRows(
+        present,
+        rotations,
+        line(clip.translations),
+        line(clip.figure_translations),
+        line(clip.figure_scales),
+        line(clip.shape_weights),
+    )
+
+
+def _line(rows: Floats, before: Ints, after: Ints, share: Floats) -> Floats:
+    if len(rows) == 1:
+        return rows[np.zeros(len(before), dtype=np.int32)]
+    start = rows[before]
+    weight = share.reshape(-1, *[1] * (rows.ndim - 1))
+    return start + weight * (rows[after] - start)
+
+
+def joined(clips: Sequence[SampledClip], timing: Timing) -> SampledClip:
+    """Return one clip of the rows of several, one after the other, for a new timing.
+
+    Parameters
+    ----------
+    clips : sequence of SampledClip
+        At least one, of one skeleton, all with the same arrays.
+    timing : Timing
+        Its rows refer to the rows put together.
+    """
+
+    def stack(name: str) -> Floats | None:
+        parts = [getattr(clip, name) for clip in clips]
+        if parts[0] is None:
+            return None
+        if name == "shape_weights":
+            # One row that counts for all must not be multiplied.
+            if all(len(part) == 1 and (part == parts[0]).all() for part in parts):
+                return np.asarray(parts[0])
+            parts = [
+                np.broadcast_to(part, (clip.n_rows, part.shape[1]))
+                for part, clip in zip(parts, clips, strict=True)
+            ]
+        return np.concatenate(parts)
+
+    first = clips[0]
+    if len(clips) == 1:
+        return replace(first, timing=timing)
+    rotations = stack("rotations")
+    assert rotations is not None  # every clip has them
+    return SampledClip(
+        first.name,
+        timing,
+        rotations,
+        stack("translations"),
+        stack("figure_translations"),
+        stack("figure_scales"),
+        stack("shape_weights"),
+    )

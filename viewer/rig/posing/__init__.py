@@ -1,0 +1,1 @@
+"""Posing: records and vectors of poses, DOFs as text, inverse kinematics."""

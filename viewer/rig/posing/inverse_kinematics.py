@@ -1,0 +1,284 @@
+"""Inverse kinematics: the joint angles that bring a joint to a place, within the limits.
+
+Damped least squares (Wampler 1986; Nakamura and Hanafusa 1986): with the error e from the joint
+to its target and the Jacobian J of the joint's place with respect to the chain's rotation DOFs,
+
+    step = J^T (J J^T + lambda^2 I)^-1 e
+
+A step that does not come nearer is taken back and damped more (Levenberg 1944). DOFs that a
+step would carry beyond a limit stop there, and the others make up for them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.geometry.rotation import axis_rotations, quaternion_to_matrix
+from viewer.rig.kinematics import world_matrices
+from viewer.rig.pose import Pose
+from viewer.rig.skeleton import Skeleton, joint_label
+
+__all__ = ["Reach", "chain_above", "place_jacobian", "reach", "rotation_axes"]
+
+_FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
+_CLOSE = 1e-7  # of the chain's length: an error below is none
+_STILL = 1e-10  # radians: a step below changes nothing
+_LARGEST_STEP = 0.5  # radians: beyond it the Jacobian says little
+_BEND = 0.02  # radians by which a stretched chain is bent to get it off a singular pose
+_LEAST_DAMPING, _MOST_DAMPING = 1e-4, 1e3  # of the chain's length
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reach:
+    """What came of reaching for a place.
+
+    Attributes
+    ----------
+    dofs : (D,)
+        Of the whole skeleton; only rotations of the chain differ from those before.
+    distance : float
+        What is left between the joint and its target, figure units.
+    limited : (N,) int32
+        DOFs of the chain that stand at one of their limits.
+    """
+
+    dofs: Floats
+    distance: float
+    limited: Ints
+
+
+def chain_above(skeleton: Skeleton, joint: int, length: int) -> Ints:
+    """Return the joints that may turn to move one: its nearest ancestors that can rotate.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Gives the hierarchy and the DOF table.
+    joint : int
+        The joint that is moved; its own rotations do not move it.
+    length : int
+        How many joints at most; joints without a free rotation do not count.
+
+    Returns
+    -------
+    (N,) int32
+        N <= length, the nearest first.
+    """
+    turns = (skeleton.dof_kinds >= _FIRST_ROTATION) & ~skeleton.locked
+    able = set(skeleton.dof_joints[turns].tolist())
+    chain: list[int] = []
+    above = int(skeleton.parents[joint])
+    while above >= 0 and len(chain) < length:
+        if above in able:
+            chain.append(above)
+        above = int(skeleton.parents[above])
+    return np.array(chain, dtype=np.int32)
+
+
+def place_jacobian(skeleton: Skeleton, pose: Pose, world: Floats, joint: int, rows: Ints) -> Floats:
+    """Return how a joint's place changes with rotation DOFs of joints above it.
+
+    With the parent's linear part A, the joint's own rotation axis a in the parent's frame (after
+    the rows that are applied later) and the arm y from the turning joint, the column of a DOF is
+    A (a x A^-1 y); this holds with scales too.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Gives the DOF table.
+    pose : Pose
+        Lengths and radians.
+    world : (J, 4, 4)
+        ``world_matrices`` of that pose.
+    joint : int
+        Whose origin moves.
+    rows : (N,)
+        Rotation DOFs of its ancestors.
+
+    Returns
+    -------
+    (3, N)
+        Figure units per radian.
+    """
+    columns = np.zeros((3, len(rows)))
+    end = world[joint, :3, 3]
+    for turning in np.unique(skeleton.dof_joints[rows]):
+        parent = int(skeleton.parents[turning])
+        linear = world[parent, :3, :3] if parent >= 0 else np.eye(3)
+        arm = np.linalg.solve(linear, end - world[turning, :3, 3])
+        axes = rotation_axes(skeleton, pose, int(turning))
+        for place in np.flatnonzero(skeleton.dof_joints[rows] == turning):
+            columns[:, place] = linear @ np.cross(axes[int(rows[place])], arm)
+    return columns
+
+
+def rotation_axes(skeleton: Skeleton, pose: Pose, joint: int) -> dict[int, Floats]:
+    """Return the axis about which each rotation DOF of a joint turns it right now.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Gives the DOF table.
+    pose : Pose
+        Radians; the DOFs that are applied later turn the axes of those before.
+    joint : int
+        Whose DOFs.
+
+    Returns
+    -------
+    dict of int to (3,)
+        By row of the DOF table: unit vectors in the parent's frame.
+    """
+    own = np.flatnonzero((skeleton.dof_joints == joint) & (skeleton.dof_kinds >= _FIRST_ROTATION))
+    after = quaternion_to_matrix(pose.rotations[joint])
+    axes = {}
+    for row in own[::-1]:  # the last row is applied last, so it is the outermost
+        kind = int(skeleton.dof_kinds[row]) - _FIRST_ROTATION
+        axes[int(row)] = after[:, kind].copy()
+        after = after @ axis_rotations(kind, pose.dofs[row])
+    return axes
+
+
+def reach(
+    skeleton: Skeleton, pose: Pose, joint: int, target: Floats, length: int = 2, rounds: int = 60
+) -> Reach:
+    """Return DOFs that bring a joint as near to a place as its chain can.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Gives the hierarchy, the DOFs and their limits.
+    pose : Pose
+        Where to start from; left as it is.
+    joint : int
+        The joint to move.
+    target : (3,)
+        Where to, figure units.
+    length : int
+        How many joints above it may turn.
+    rounds : int
+        Steps at most.
+
+    Returns
+    -------
+    Reach
+        Never farther from the target than the start, apart from a start outside its limits,
+        which is brought within them first.
+
+    Raises
+    ------
+    RigError
+        If no joint above it can turn.
+    """
+    chain = chain_above(skeleton, joint, length)
+    if not len(chain):
+        raise RigError(f"no joint above {joint_label(skeleton, joint)} can turn")
+    turns = (skeleton.dof_kinds >= _FIRST_ROTATION) & ~skeleton.locked
+    rows = np.flatnonzero(turns & np.isin(skeleton.dof_joints, chain)).astype(np.int32)
+    return _Solver(skeleton, pose.copy(), joint, np.asarray(target, float), rows).solve(rounds)
+
+
+class _Solver:
+    """One reach: the pose that moves, and how strongly steps are damped."""
+
+    def __init__(
+        self, skeleton: Skeleton, pose: Pose, joint: int, target: Floats, rows: Ints
+    ) -> None:
+        self.skeleton, self.pose, self.joint = skeleton, pose, joint
+        self.target, self.rows = target, rows
+        self.low, self.high = skeleton.dof_limits[rows].T
+        pose.dofs[rows] = np.clip(pose.dofs[rows], self.low, self.high)
+        self.world = world_matrices(skeleton, pose)
+        joints = np.append(skeleton.dof_joints[rows], joint)
+        places = self.world[joints, :3, 3]
+        self.size = float(np.linalg.norm(places - places[-1], axis=1).max()) or 1.0
+        self.damping = 0.05
+
+    def solve(self, rounds: int) -> Reach:
+        """Step until the joint is there, or can come no nearer."""
+        has_bent = False
+        for _ in range(rounds):
+            error = self._error()
+            if np.linalg.norm(error) <= _CLOSE * self.size:
+                break
+            if self._improve(error):
+                continue
+            if has_bent or not self._bend(error):
+                break
+            has_bent = True
+        dofs = self.pose.dofs[self.rows]
+        at_limit = (dofs <= self.low) | (dofs >= self.high)
+        distance = float(np.linalg.norm(self._error()))
+        return Reach(self.pose.dofs, distance, self.rows[at_limit])
+
+    def _error(self) -> Floats:
+        return self.target - self.world[self.joint, :3, 3]
+
+    def _improve(self, error: Floats) -> bool:
+        """Take one step that comes nearer; return whether there was one."""
+        jacobian = place_jacobian(self.skeleton, self.pose, self.world, self.joint, self.rows)
+        start = self.pose.dofs[self.rows].copy()
+        distance = np.linalg.norm(error)
+        while self.damping <= _MOST_DAMPING:
+            step = self._step(jacobian, error, start)
+            if np.abs(step).max() < _STILL:
+                break
+            self._put(start + step)
+            if np.linalg.norm(self._error()) < distance:
+                self.damping = max(0.3 * self.damping, _LEAST_DAMPING)
+                return True
+            self.damping *= 4.0
+        self._put(start)
+        self.damping = 0.05
+        return False
+
+    def _step(self, jacobian: Floats, error: Floats, start: Floats) -> Floats:
+        """Return the damped step; DOFs that reach a limit stop there, the others go on."""
+        step = np.zeros(len(start))
+        free: Bools = np.ones(len(start), dtype=bool)
+        damp = (self.damping * self.size) ** 2 * np.eye(3)
+        for _ in range(len(start)):
+            part = jacobian[:, free]
+            left = error - jacobian[:, ~free] @ step[~free]
+            step[free] = part.T @ np.linalg.solve(part @ part.T + damp, left)
+            step[free] *= min(1.0, _LARGEST_STEP / max(np.abs(step[free]).max(initial=0), 1e-300))
+            bounded = np.clip(start + step, self.low, self.high) - start
+            stopped = free & (bounded != step) & (np.abs(bounded - step) > _STILL)
+            if not stopped.any():
+                return bounded
+            step[stopped] = bounded[stopped]
+            free &= ~stopped
+            if not free.any():
+                break
+        return np.clip(start + step, self.low, self.high) - start
+
+    def _bend(self, error: Floats) -> bool:
+        """Bend a chain that points at its target or away from it: no small turn moves it there.
+
+        Of each DOF's two directions the one that leaves its limits more room is tried; the bend
+        that lets the next step come nearest is kept.
+        """
+        start, damping = self.pose.dofs[self.rows].copy(), self.damping
+        best, nearest = None, float(np.linalg.norm(error))
+        for place in range(len(start)):
+            room = self.high[place] - start[place] >= start[place] - self.low[place]
+            bent = start.copy()
+            bent[place] += _BEND if room else -_BEND
+            self._put(np.clip(bent, self.low, self.high))
+            for _ in range(4):
+                if not self._improve(self._error()):
+                    break
+            distance = float(np.linalg.norm(self._error()))
+            if distance < nearest * (1.0 - 1e-6):
+                best, nearest = self.pose.dofs[self.rows].copy(), distance
+            self.damping = damping
+        self._put(start if best is None else best)
+        return best is not None
+
+    def _put(self, values: Floats) -> None:
+        self.pose.dofs[self.rows] = values
+        self.world = world_matrices(self.skeleton, self.pose)

@@ -1,0 +1,202 @@
+"""One joint given a rotation: the values of its DOFs that come nearest to it, within the limits.
+
+A joint is turned within its parent by R(quaternion) E_n ... E_1, each E about one coordinate axis.
+Three DOFs about three different axes have a closed form with two solutions (Tait-Bryan angles); the
+one within the limits that is nearer to the present values is taken. Otherwise DOF by DOF is set to
+what is best while the others stay, over and over: with M the product of the factors around E_k
+and of the wanted rotation's transpose, the trace to be maximised is
+
+    trace(M E_k(t)) = M_kk + (M_ii + M_jj) cos t + (M_ij - M_ji) sin t,   (i, j) = (k + 1, k + 2)
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.geometry.rotation import axis_rotations, matrix_to_euler, quaternion_to_matrix
+from viewer.rig.pose import Pose
+from viewer.rig.skeleton import Skeleton
+
+__all__ = ["Turned", "nearest_dofs", "rotation_dofs", "turns_freely"]
+
+_FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
+_SWEEPS = 200
+_STILL = 1e-10  # radians: a sweep that changes less ends
+_ROUNDING = 1e-9  # radians by which a value may be beyond its limit and count as on it
+_TURN = 2.0 * math.pi
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Turned:
+    """What came of turning a joint.
+
+    Attributes
+    ----------
+    dofs : (D,)
+        Of the whole skeleton; only rotations of the joint differ from those before.
+    error : float
+        The angle that is left between the rotation that was wanted and the one there is, radians.
+    limited : (N,) int32
+        Rotation DOFs of the joint that stand at one of their limits while an error is left.
+    """
+
+    dofs: Floats
+    error: float
+    limited: Ints
+
+
+def rotation_dofs(skeleton: Skeleton, joint: int, free: bool = False) -> Ints:
+    """Return the rows of a joint's rotation DOFs, the one that is applied first at the front.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Holds the DOF table.
+    joint : int
+        Whose DOFs.
+    free : bool
+        Leave out those that are locked.
+
+    Returns
+    -------
+    (N,) int32
+        Rows of the DOF table.
+    """
+    chosen = (skeleton.dof_joints == joint) & (skeleton.dof_kinds >= _FIRST_ROTATION)
+    if free:
+        chosen &= ~skeleton.locked
+    return np.flatnonzero(chosen).astype(np.int32)
+
+
+def turns_freely(skeleton: Skeleton, joint: int) -> bool:
+    """Return whether a joint has three free rotations about three different axes, in any order."""
+    kinds = skeleton.dof_kinds[rotation_dofs(skeleton, joint, free=True)]
+    every = skeleton.dof_kinds[rotation_dofs(skeleton, joint)]
+    return len(kinds) == len(every) == 3 and len(set(kinds.tolist())) == 3
+
+
+def nearest_dofs(skeleton: Skeleton, pose: Pose, joint: int, rotation: Floats) -> Turned:
+    """Return the DOFs that turn a joint as near to a rotation as it can.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Gives the DOFs and their limits.
+    pose : Pose
+        Of equal solutions the one nearest to its DOFs is taken; left as it is.
+    joint : int
+        The joint to turn.
+    rotation : (3, 3)
+        Wanted within its parent: R(quaternion) R(DOFs) of ``joint_rotations``.
+
+    Returns
+    -------
+    Turned
+        Exact wherever limits and axes allow it.
+    """
+    rows = rotation_dofs(skeleton, joint)
+    low, high = skeleton.dof_limits[rows].T
+    axes = (skeleton.dof_kinds[rows] - _FIRST_ROTATION).tolist()
+    wanted = quaternion_to_matrix(pose.rotations[joint]).T @ rotation
+    solver = _Solver(axes, low, high, pose.dofs[rows], wanted)
+    dofs = pose.dofs.copy()
+    dofs[rows] = values = solver.best()
+    error = solver.error(values)
+    at_limit = ((values <= low) | (values >= high)) & (error > 1e-6)
+    return Turned(dofs, error, rows[at_limit])
+
+
+class _Solver:
+    """Angles about coordinate axes, the first applied first, that multiply to a rotation."""
+
+    def __init__(
+        self, axes: list[int], low: Floats, high: Floats, present: Floats, wanted: Floats
+    ) -> None:
+        self.axes, self.low, self.high, self.wanted = axes, low, high, wanted
+        self.present = np.clip(present, low, high)
+
+    def best(self) -> Floats:
+        """Return the values: exact and nearest to the present ones, else nearest to the goal."""
+        exact = self._exact()
+        within = [
+            values
+            for values in exact
+            if (np.abs(np.clip(values, self.low, self.high) - values) <= _ROUNDING).all()
+        ]
+        if within:
+            near = min(within, key=lambda values: float(np.abs(values - self.present).max()))
+            return np.clip(near, self.low, self.high)
+        starts = [self.present, *(np.clip(values, self.low, self.high) for values in exact)]
+        found = [self._improved(start.copy()) for start in starts]
+        errors = [self.error(values) for values in found]
+        # The start at the present values comes first: it wins where others are hardly better.
+        return found[int(np.argmin(np.round(errors, 7)))]
+
+    def error(self, values: Floats) -> float:
+        """Return the angle between what values give and what is wanted, from 0 to pi."""
+        left = self.wanted.T @ self._product(values, range(len(values)))
+        sine = np.linalg.norm([left[2, 1] - left[1, 2], left[0, 2] - left[2, 0],
+                               left[1, 0] - left[0, 1]])  # fmt: skip
+        return math.atan2(0.5 * float(sine), 0.5 * (float(np.trace(left)) - 1.0))
+
+    def _product(self, values: Floats, places: range) -> Floats:
+        product = np.eye(3)
+        for place in places:
+            product = axis_rotations(self.axes[place], values[place]) @ product
+        return product
+
+    def _exact(self) -> list[Floats]:
+        """Return both solutions in closed form for three different axes; none for others."""
+        if len(self.axes) != 3 or len(set(self.axes)) != 3:
+            return []
+        # With the axes renamed to x, y, z; an odd permutation mirrors, which turns angles round.
+        renamed = self.wanted[np.ix_(self.axes, self.axes)]
+        sign = 1.0 if (self.axes[1] - self.axes[0]) % 3 == 1 else -1.0
+        x, y, z = matrix_to_euler(renamed)
+        pair = np.array([[x, y, z], [x + math.pi, math.pi - y, z + math.pi]])
+        return [self._wrapped(sign * values) for values in pair]
+
+    def _wrapped(self, values: Floats) -> Floats:
+        """Add whole turns: nearest to the present values, or into the limits where these allow."""
+        near = values - _TURN * np.round((values - self.present) / _TURN)
+        inside = near - _TURN * np.round((near - np.clip(near, self.low, self.high)) / _TURN)
+        for turns in (-_TURN, _TURN):
+            moved = near + turns
+            inside = np.where((moved >= self.low) & (moved <= self.high), moved, inside)
+        is_inside = (near >= self.low - _ROUNDING) & (near <= self.high + _ROUNDING)
+        return np.where(is_inside, near, inside)
+
+    def _improved(self, values: Floats) -> Floats:
+        """Set each value to the best one beside the others until none changes any more."""
+        count = len(values)
+        for _ in range(_SWEEPS):
+            before = values.copy()
+            for place in range(count):
+                around = (
+                    self._product(values, range(place))
+                    @ self.wanted.T
+                    @ self._product(values, range(place + 1, count))
+                )
+                values[place] = self._best_one(place, around, float(values[place]))
+            if np.abs(values - before).max(initial=0.0) < _STILL:
+                break
+        return values
+
+    def _best_one(self, place: int, around: Floats, now: float) -> float:
+        """Return the angle that maximises the trace, within the limits and nearest to now."""
+        axis = self.axes[place]
+        i, j = (axis + 1) % 3, (axis + 2) % 3
+        cosine, sine = around[i, i] + around[j, j], around[i, j] - around[j, i]
+        if math.hypot(cosine, sine) < 1e-12:
+            return now  # every angle is as good
+        top = math.atan2(sine, cosine)
+        top -= _TURN * round((top - now) / _TURN)
+        low, high = float(self.low[place]), float(self.high[place])
+        for candidate in (top, top - _TURN, top + _TURN):
+            if low <= candidate <= high:
+                return candidate
+        return low if math.cos(low - top) >= math.cos(high - top) else high

@@ -1,0 +1,206 @@
+"""A model's own pose numbers, to and from a pose: a table says where each joint's rotation is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.rig.arrays import Bools, Floats, Ints, frozen
+from viewer.rig.geometry.rotation import (
+    axis_rotations,
+    matrix_to_euler,
+    matrix_to_quaternion,
+    matrix_to_rotation_vector,
+    quaternion_to_matrix,
+    rotation_vector_to_matrix,
+)
+from viewer.rig.pose import Pose, joint_rotations
+from viewer.rig.skeleton import Skeleton, clamp_dofs
+
+__all__ = [
+    "PoseLayout",
+    "own_numbers",
+    "read_vector",
+    "rotation_rows",
+    "set_joint_rotations",
+    "write_vector",
+]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PoseLayout:
+    """Where a model's files put the numbers of one pose.
+
+    Attributes
+    ----------
+    n_numbers : int
+        Length of the vector.
+    starts : (J,) int32
+        Index of the first of each joint's three rotation numbers.
+    is_euler : (J,) bool
+        True: angles about z, y, x with R = Rz Ry Rx. False: a rotation vector.
+    translation, scale : int
+        Index of the figure's translation (three numbers) and scale (one); -1 for none.
+    """
+
+    n_numbers: int
+    starts: Ints
+    is_euler: Bools
+    translation: int = -1
+    scale: int = -1
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, "starts", frozen("starts", self.starts, (None,), np.int32))
+        put(self, "is_euler", frozen("is_euler", self.is_euler, (len(self.starts),), np.bool_))
+
+
+def rotation_rows(skeleton: Skeleton) -> Ints:
+    """Return the DOF rows of ball joints: about x, y, z in this order.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Holds the DOF table.
+
+    Returns
+    -------
+    (J, 3) int32
+        -1 for all three of a joint that has not exactly these three rotations.
+    """
+    rows = np.full((skeleton.n_joints, 3), -1, dtype=np.int32)
+    turns = np.flatnonzero(skeleton.dof_kinds >= 3)
+    counts = np.bincount(skeleton.dof_joints[turns], minlength=skeleton.n_joints)
+    rows[skeleton.dof_joints[turns], skeleton.dof_kinds[turns] - 3] = turns
+    is_ball = (counts == 3) & (rows >= 0).all(axis=1) & (np.diff(rows, axis=1) > 0).all(axis=1)
+    rows[~is_ball] = -1
+    return rows
+
+
+def set_joint_rotations(
+    skeleton: Skeleton, pose: Pose, joints: Ints, rotations: Floats, clamp: bool = True
+) -> None:
+    """Turn joints within their parents, in place.
+
+    A ball joint's DOFs take the rotation as angles about x, y, z; a joint with fewer DOFs keeps
+    them as near to 0 as its limits allow and takes the rest as its quaternion.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Holds the DOF table.
+    pose : Pose
+        Changed.
+    joints : (N,)
+        Joints to turn.
+    rotations : (N, 3, 3)
+        Of each within its parent.
+    clamp : bool
+        Whether DOFs are brought within their limits.
+    """
+    joints = np.asarray(joints)
+    rows = rotation_rows(skeleton)[joints]
+    is_ball = rows[:, 0] >= 0
+    base = quaternion_to_matrix(skeleton.rest_rotations[joints])
+    pose.rotations[joints] = skeleton.rest_rotations[joints]
+    within = np.swapaxes(base, -1, -2) @ rotations
+    pose.dofs[rows[is_ball]] = matrix_to_euler(within[is_ball])
+    others = joints[~is_ball]
+    pose.dofs[np.isin(skeleton.dof_joints, others) & (skeleton.dof_kinds >= 3)] = 0.0
+    if clamp:
+        pose.dofs[:] = clamp_dofs(skeleton, pose.dofs)
+    if len(others):
+        # Limits may hold DOFs away from 0: the quaternion takes the rest.
+        pose.rotations[others] = 0.0, 0.0, 0.0, 1.0
+        held = joint_rotations(skeleton, pose)[others]
+        left = rotations[~is_ball] @ np.swapaxes(held, -1, -2)
+        pose.rotations[others] = matrix_to_quaternion(left)
+
+
+def own_numbers(layout: PoseLayout, rotations: Floats) -> Floats:
+    """Return each joint's three numbers as the model's files would give them.
+
+    Parameters
+    ----------
+    layout : PoseLayout
+        Says which joints are Euler angles.
+    rotations : (J, 3, 3)
+        Of each joint within its parent.
+
+    Returns
+    -------
+    (J, 3)
+        Radians.
+    """
+    numbers = matrix_to_rotation_vector(rotations)
+    numbers[layout.is_euler] = matrix_to_euler(rotations[layout.is_euler])[:, ::-1]
+    return numbers
+
+
+def write_vector(layout: PoseLayout | None, skeleton: Skeleton, pose: Pose) -> Floats:
+    """Return a pose as the model's own numbers.
+
+    Parameters
+    ----------
+    layout : PoseLayout or None
+        None for a model whose own numbers are its DOFs.
+    skeleton : Skeleton
+        Of the figure.
+    pose : Pose
+        What to write.
+
+    Returns
+    -------
+    (N,)
+        Lengths and radians.
+    """
+    if layout is None:
+        return pose.dofs.copy()
+    vector = np.zeros(layout.n_numbers)
+    rotations = joint_rotations(skeleton, pose)
+    vector[layout.starts[:, None] + np.arange(3)] = own_numbers(layout, rotations)
+    if layout.translation >= 0:
+        vector[layout.translation : layout.translation + 3] = pose.figure_translation
+    if layout.scale >= 0:
+        vector[layout.scale] = pose.figure_scale
+    return vector
+
+
+def read_vector(layout: PoseLayout | None, skeleton: Skeleton, pose: Pose, vector: Floats) -> None:
+    """Pose by the model's own numbers, in place.
+
+    Parameters
+    ----------
+    layout : PoseLayout or None
+        None for a model whose own numbers are its DOFs.
+    skeleton : Skeleton
+        Of the figure.
+    pose : Pose
+        Changed; its shape stays.
+    vector : (N,)
+        Lengths and radians.
+
+    Raises
+    ------
+    RigError
+        If there are more or fewer numbers than the model has.
+    """
+    wanted = skeleton.n_dofs if layout is None else layout.n_numbers
+    if len(vector) != wanted:
+        raise RigError(f"expected {wanted} pose numbers, found {len(vector)}")
+    if layout is None:
+        pose.dofs[:] = clamp_dofs(skeleton, vector)
+        return
+    numbers = vector[layout.starts[:, None] + np.arange(3)]
+    rotations = rotation_vector_to_matrix(numbers)
+    if layout.is_euler.any():
+        z, y, x = (axis_rotations(2 - axis, numbers[layout.is_euler, axis]) for axis in range(3))
+        rotations[layout.is_euler] = z @ y @ x
+    joints = np.arange(skeleton.n_joints, dtype=np.int32)
+    set_joint_rotations(skeleton, pose, joints, rotations)
+    if layout.translation >= 0:
+        pose.figure_translation[:] = vector[layout.translation : layout.translation + 3]
+    if layout.scale >= 0:
+        pose.figure_scale = float(vector[layout.scale])

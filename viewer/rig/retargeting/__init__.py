@@ -1,0 +1,1 @@
+"""Motions and poses of one skeleton on another."""

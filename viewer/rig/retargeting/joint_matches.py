@@ -1,0 +1,179 @@
+"""Which joint of one skeleton moves which of another."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.rig.arrays import Ints
+from viewer.rig.retargeting.joint_names import canonical_names, plain_names
+from viewer.rig.skeleton import Skeleton, joint_labels
+
+__all__ = ["Matches", "match_joints"]
+
+_LISTED = 60  # names in a note
+_SHORTLY = 8  # names in an error
+_LIMBS = ("left_hip left_knee", "right_hip right_knee", "left_shoulder left_elbow",
+          "right_shoulder right_elbow")  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Matches:
+    """Partners of one skeleton's joints in another.
+
+    Attributes
+    ----------
+    partners : (J,) int32
+        Joint of the source for each joint of the target, -1 for none.
+    names : tuple of J str
+        What the SMPL family calls the target's joints; empty where it has no such joint.
+    is_hierarchy : bool
+        Whether both have the same names and hierarchy.
+    notes : tuple of str
+        Who moves whom, who stays at rest, and who is not used.
+    """
+
+    partners: Ints
+    names: tuple[str, ...]
+    is_hierarchy: bool
+    notes: tuple[str, ...]
+
+
+def match_joints(
+    source: Skeleton,
+    target: Skeleton,
+    mapping: Mapping[str, str] | None,
+    titles: tuple[str, str],
+) -> Matches:
+    """Match by mapping, then by what names mean, then by equal names.
+
+    Parameters
+    ----------
+    source, target : Skeleton
+        Where the motion comes from, and where it goes to.
+    mapping : mapping of str to str, optional
+        Names of the source to names of the target.
+    titles : (str, str)
+        What both are called, for messages.
+
+    Raises
+    ------
+    RigError
+        If too few joints match, or the mapping names a joint that is not there.
+    """
+    plain = _lower(source.names), _lower(target.names)
+    meanings = tuple(canonical_names(s.names, s.parents) for s in (source, target))
+    is_hierarchy = not mapping and _has_same_hierarchy(source, target, plain)
+    partners = np.full(target.n_joints, -1, dtype=np.int32)
+    if is_hierarchy:
+        partners[:] = [plain[0].index(name) for name in plain[1]]
+    else:
+        for key, value in (mapping or {}).items():
+            joint = _find(target, value, titles[1])
+            partners[joint] = _find(source, key, titles[0])
+        for names, allowed in ((meanings, ""), (plain, meanings)):
+            _match_equal(partners, names, allowed)
+    if not (is_hierarchy or mapping or _is_enough(partners, meanings, plain)):
+        raise _misfit(source, target, partners, titles)
+    return Matches(
+        partners, meanings[1], is_hierarchy, tuple(_notes(source, target, partners, titles))
+    )
+
+
+def _lower(names: Sequence[str]) -> tuple[str, ...]:
+    return tuple(name.lower() for name in plain_names(names))
+
+
+def _has_same_hierarchy(
+    source: Skeleton, target: Skeleton, plain: tuple[tuple[str, ...], ...]
+) -> bool:
+    """Return whether every joint has a namesake below a namesake, in whatever order."""
+    trees = []
+    for skeleton, names in zip((source, target), plain, strict=True):
+        above = [names[parent] if parent >= 0 else "" for parent in skeleton.parents]
+        trees.append(dict(zip(names, above, strict=True)))
+    return len(trees[0]) == source.n_joints and trees[0] == trees[1]
+
+
+def _find(skeleton: Skeleton, name: str, title: str) -> int:
+    found = [joint for joint, known in enumerate(skeleton.names) if known == name]
+    if len(found) == 1:
+        return found[0]
+    if len(found) > 1:
+        raise RigError(f'the mapping names "{name}", of which {title} has {len(found)}')
+    raise RigError(f'the mapping names "{name}", which {title} does not have')
+
+
+def _match_equal(
+    partners: Ints,
+    names: tuple[tuple[str, ...], ...],
+    meanings: tuple[tuple[str, ...], ...] | str,
+) -> None:
+    """Match joints with equal names that are still free; of ``meanings``, neither has one."""
+    used = set(partners.tolist())
+    known = {
+        name: joint
+        for joint, name in enumerate(names[0])
+        if name and joint not in used and not (meanings and meanings[0][joint])
+    }
+    for joint, name in enumerate(names[1]):
+        if partners[joint] < 0 and name in known and not (meanings and meanings[1][joint]):
+            partners[joint] = known[name]
+
+
+def _is_enough(
+    partners: Ints, meanings: tuple[tuple[str, ...], ...], plain: tuple[tuple[str, ...], ...]
+) -> bool:
+    """Return whether the hips and a limb match, or half of the joints."""
+    matched = {name for joint, name in enumerate(meanings[1]) if partners[joint] >= 0}
+    if "pelvis" in matched and any(set(limb.split()) <= matched for limb in _LIMBS):
+        return True
+    count = int((partners >= 0).sum())
+    return count >= max(2, min(map(len, plain)) / 2)
+
+
+def _misfit(
+    source: Skeleton, target: Skeleton, partners: Ints, titles: tuple[str, str]
+) -> RigError:
+    unused, idle = _left(source, target, partners)
+    return RigError(
+        f"{titles[0]} does not fit {titles[1]}: expected hips and a leg or an arm in both, found "
+        f"{int((partners >= 0).sum())} joints that match; unknown in {titles[0]}: "
+        f"{_listed(unused, _SHORTLY)}; in {titles[1]}: {_listed(idle, _SHORTLY)}"
+    )
+
+
+def _left(source: Skeleton, target: Skeleton, partners: Ints) -> tuple[list[str], list[str]]:
+    used = set(partners.tolist())
+    unused = [label for j, label in enumerate(joint_labels(source)) if j not in used]
+    idle = joint_labels(target)
+    return unused, [idle[j] for j in np.flatnonzero(partners < 0)]
+
+
+def _listed(names: list[str], limit: int) -> str:
+    more = f" and {len(names) - limit} more" * (len(names) > limit)
+    return (", ".join(names[:limit]) or "none") + more
+
+
+def _notes(
+    source: Skeleton, target: Skeleton, partners: Ints, titles: tuple[str, str]
+) -> list[str]:
+    moved, movers = joint_labels(target), joint_labels(source)
+    pairs = [
+        f"{moved[joint]} by {movers[partner]}"
+        for joint, partner in enumerate(partners)
+        if partner >= 0 and target.names[joint] != source.names[partner]
+    ]
+    count = int((partners >= 0).sum())
+    notes = [f"{titles[0]} moves {count} of {target.n_joints} joints of {titles[1]}"]
+    if pairs:
+        notes[0] += f": {_listed(pairs, _LISTED)}"
+    unused, idle = _left(source, target, partners)
+    if idle:
+        notes.append(f"at rest, as nothing moves them: {_listed(idle, _LISTED)}")
+    if unused:
+        notes.append(f"joints of {titles[0]} without a partner: {_listed(unused, _LISTED)}")
+    return notes

@@ -1,0 +1,152 @@
+"""Left and right: the mirror plane of a figure, its joint pairs, and a pose mirrored."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import bounding_box, box_size
+from viewer.rig.pose import Pose, joint_rotations, rest_pose
+from viewer.rig.posing.pose_vector import set_joint_rotations
+from viewer.rig.shape import rest_joints
+from viewer.rig.skeleton import Skeleton, clamp_dofs
+
+__all__ = ["asymmetry", "joint_partners", "mirror_axis", "mirror_pose"]
+
+_NEAR = 0.02  # of the figure's size: how far a joint may be from its partner's mirror image
+
+
+def mirror_axis(figure: Figure) -> int:
+    """Return the axis across which a figure is symmetric: 0 for x, 1 for y.
+
+    With a symmetry map it is the one that fits best; else y for figures with z up, whose left
+    is +y, and x for figures with y up.
+    """
+    if figure.symmetry is None or figure.mesh is None:
+        return 1 if figure.up == "z" else 0
+    errors = [_mirror_distances(figure, axis).max() for axis in range(3)]
+    return int(np.argmin(errors))
+
+
+def asymmetry(figure: Figure) -> Floats:
+    """Return how far each rest vertex is from its partner's mirror image: (V,), figure units.
+
+    Raises
+    ------
+    RigError
+        If the figure has no symmetry map.
+    """
+    if figure.symmetry is None or figure.mesh is None:
+        raise RigError(f"figure {figure.name} has no symmetry map")
+    return _mirror_distances(figure, mirror_axis(figure))
+
+
+def _mirror_distances(figure: Figure, axis: int) -> Floats:
+    assert figure.mesh is not None and figure.symmetry is not None  # the callers looked
+    partner = figure.mesh.positions[figure.symmetry].copy()
+    partner[:, axis] *= -1.0
+    return np.linalg.norm(figure.mesh.positions - partner, axis=1)
+
+
+def joint_partners(figure: Figure) -> Ints:
+    """Return each joint's partner on the other side, itself for one in the middle: (J,) int32.
+
+    A partner is the joint nearest to the mirrored place, among those with the same number of
+    joints above them.
+
+    Raises
+    ------
+    RigError
+        If a joint has none within 2 % of the figure's size.
+    """
+    skeleton = figure.skeleton
+    if skeleton is None:
+        raise RigError(f"figure {figure.name} has no skeleton to mirror")
+    joints = rest_joints(figure)
+    mirrored = joints.copy()
+    axis = mirror_axis(figure)
+    mirrored[:, axis] = 2.0 * joints[0, axis] - mirrored[:, axis]
+    depths = np.zeros(skeleton.n_joints, dtype=int)
+    for joint, parent in enumerate(skeleton.parents):
+        depths[joint] = depths[parent] + 1 if parent >= 0 else 0
+    distances = np.linalg.norm(mirrored[:, None] - joints[None], axis=2)
+    distances[depths[:, None] != depths[None]] = np.inf
+    partners = distances.argmin(axis=1).astype(np.int32)
+    size = box_size(bounding_box(joints))
+    far = np.flatnonzero(distances[np.arange(len(joints)), partners] > _NEAR * size)
+    if len(far) or (partners[partners] != np.arange(len(joints))).any():
+        name = skeleton.names[int(far[0])] if len(far) else "two joints"
+        raise RigError(f"{name} has no partner on the other side: the skeleton is not symmetric")
+    return partners
+
+
+def mirror_pose(figure: Figure, pose: Pose) -> Pose:
+    """Return the pose seen in a mirror: left and right exchanged.
+
+    World rotations relative to the rest pose are mirrored, D' = F D F, and each joint takes its
+    partner's; so rest rotations may differ from side to side.
+
+    Parameters
+    ----------
+    figure : Figure
+        With a symmetric skeleton.
+    pose : Pose
+        Left as it is.
+
+    Returns
+    -------
+    Pose
+        Of the same shape; the figure's translation is mirrored as well.
+
+    Raises
+    ------
+    RigError
+        If the skeleton is not symmetric.
+    """
+    skeleton = figure.skeleton
+    partners = joint_partners(figure)
+    assert skeleton is not None  # joint_partners looked
+    flip = np.ones(3)
+    flip[mirror_axis(figure)] = -1.0
+    zero = rest_pose(skeleton)
+    zero.dofs[:] = 0.0
+    rest = _world_rotations(skeleton.parents, joint_rotations(skeleton, zero))
+    turned = _world_rotations(skeleton.parents, joint_rotations(skeleton, pose))
+    deltas = turned @ np.swapaxes(rest, 1, 2)
+    wanted = (flip[:, None] * deltas[partners] * flip) @ rest
+    local = wanted.copy()
+    below = np.flatnonzero(skeleton.parents >= 0)
+    local[below] = np.swapaxes(wanted[skeleton.parents[below]], 1, 2) @ wanted[below]
+    mirrored = pose.copy()
+    set_joint_rotations(skeleton, mirrored, np.arange(skeleton.n_joints, dtype=np.int32), local)
+    _mirror_moves(skeleton, pose, mirrored, partners, flip, rest)
+    return mirrored
+
+
+def _mirror_moves(
+    skeleton: Skeleton, pose: Pose, mirrored: Pose, partners: Ints, flip: Floats, rest: Floats
+) -> None:
+    """Mirror translations, of the figure and of joints, and exchange scales."""
+    mirrored.figure_translation[:] = pose.figure_translation * flip
+    mirrored.scales[:] = pose.scales[partners]
+    # A joint's translation counts in its parent's frame: t' = P'^T F P t.
+    parents = skeleton.parents
+    frames = np.where((parents >= 0)[:, None, None], rest[parents], np.eye(3))
+    carry = np.swapaxes(frames, 1, 2) @ (flip[:, None] * frames[partners])
+    mirrored.translations[:] = np.einsum("jab,jb->ja", carry, pose.translations[partners])
+    rows = np.flatnonzero(skeleton.dof_kinds < 3)
+    joints, kinds = skeleton.dof_joints[rows], skeleton.dof_kinds[rows]
+    moves = np.zeros((skeleton.n_joints, 3))
+    moves[joints, kinds] = pose.dofs[rows]
+    mirrored.dofs[rows] = np.einsum("jab,jb->ja", carry, moves[partners])[joints, kinds]
+    mirrored.dofs[:] = clamp_dofs(skeleton, mirrored.dofs)
+
+
+def _world_rotations(parents: Ints, local: Floats) -> Floats:
+    world = local.copy()
+    for joint, parent in enumerate(parents):
+        if parent >= 0:
+            world[joint] = world[parent] @ world[joint]
+    return world

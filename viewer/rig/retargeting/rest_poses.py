@@ -1,0 +1,255 @@
+"""Two skeletons' rest poses compared: what turns one into the other, joint by joint."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.geometry.rotation import (
+    nearest_rotations,
+    quaternion_to_matrix,
+    rotation_vector_to_matrix,
+)
+from viewer.rig.kinematics import forward_kinematics, world_matrices
+from viewer.rig.pose import rest_pose
+from viewer.rig.retargeting.joint_matches import Matches
+from viewer.rig.skeleton import Skeleton
+
+__all__ = ["RestPose", "alignment", "is_same_rest", "rest_of"]
+
+_SAME = np.cos(np.radians(20.0))  # bones nearer than this are one rest pose, otherwise shaped
+_NATURAL = np.cos(np.radians(25.0))  # ... of a torso or foot: its own bend is kept
+_UPRIGHT = np.cos(np.radians(25.0))  # ... of a body from the up axis: it stands straight
+_SHORT = 1e-6  # of the skeleton's size: bones without a direction
+_TRUNK = ("pelvis", "spine", "neck", "head", "jaw", "collar", "ankle", "foot", "eye")
+_SPINE = ("spine", "neck", "head")
+_FINGERS = ("index", "middle", "pinky", "ring", "thumb")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RestPose:
+    """Where joints are at rest.
+
+    Attributes
+    ----------
+    points : (J, 3)
+        World positions, in the axes that two skeletons share.
+    rotations : (J, 3, 3)
+        World rotations, in the skeleton's own axes.
+    up : (3,)
+        The axis that points up in the shared axes.
+    """
+
+    points: Floats
+    rotations: Floats
+    up: Floats
+
+
+def rest_of(skeleton: Skeleton, turn: Floats, up: str) -> RestPose:
+    """Return a skeleton's rest pose, all DOFs at 0.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Any.
+    turn : (3, 3)
+        Its own axes to the shared ones.
+    up : "y" or "z"
+        Of the shared axes.
+    """
+    pose = rest_pose(skeleton)
+    pose.dofs[:] = 0.0
+    points = world_matrices(skeleton, pose)[:, :3, 3]
+    local = quaternion_to_matrix(skeleton.rest_rotations)
+    axis = np.eye(3)["xyz".index(up)]
+    return RestPose(points @ turn.T, forward_kinematics(skeleton.parents, local), axis)
+
+
+def is_same_rest(source: RestPose, target: RestPose, matches: Matches, parents: Ints) -> bool:
+    """Return whether all bones point much the same way, whatever their lengths.
+
+    Parameters
+    ----------
+    source, target : RestPose
+        Of skeletons with the same hierarchy.
+    matches : Matches
+        Every joint has a partner.
+    parents : (J,)
+        Of the target.
+    """
+    inner = np.flatnonzero(parents >= 0)
+    bones = target.points[inner] - target.points[parents[inner]]
+    partners = matches.partners
+    others = source.points[partners[inner]] - source.points[partners[parents[inner]]]
+    lengths = np.linalg.norm(bones, axis=1) * np.linalg.norm(others, axis=1)
+    cosines = np.einsum("ja,ja->j", bones, others)
+    return bool((cosines >= _SAME * lengths).all())
+
+
+def alignment(source: RestPose, target: RestPose, matches: Matches, parents: Ints) -> Floats:
+    """Return what turns the target's rest pose into the source's at every matched joint.
+
+    Limbs and fingers: the bone's direction becomes the source's, with the least turn from how the
+    body stands, so without twist. Hands with fingers: also the knuckles' line. Trunk and feet:
+    only how the body stands, unless their directions differ by more than 25 degrees. The last
+    joint of a limb goes with the one before it.
+
+    Parameters
+    ----------
+    source, target : RestPose
+        In shared axes.
+    matches : Matches
+        Who moves whom.
+    parents : (J,)
+        Of the target.
+
+    Returns
+    -------
+    (J, 3, 3)
+        Rotations in the shared axes; the identity for joints without a partner.
+    """
+    stands = _standing(source, target, matches)
+    result = np.tile(np.eye(3), (len(parents), 1, 1))
+    above = _matched_above(matches, parents)
+    short = _SHORT * max(float(np.ptp(rest.points, axis=0).max()) for rest in (source, target))
+    for joint in np.flatnonzero(matches.partners >= 0):
+        reference = stands if above[joint] < 0 else result[above[joint]]
+        children = [int(child) for child in np.flatnonzero(above == joint)]
+        mine, theirs = _bones(source, target, matches, int(joint), children)
+        # What hangs from the side of a spine does not say where the spine points.
+        spine = np.array([matches.names[child].startswith(_SPINE) for child in children])
+        if matches.names[joint].startswith(_SPINE) and spine.any():
+            mine, theirs = mine[spine], theirs[spine]
+            children = [child for child, is_spine in zip(children, spine, strict=True) if is_spine]
+        long = np.minimum(np.linalg.norm(mine, axis=1), np.linalg.norm(theirs, axis=1)) > short
+        chosen = [child for child, is_long in zip(children, long, strict=True) if is_long]
+        result[joint] = _at_joint(
+            matches, int(joint), chosen, (mine[long], theirs[long]), stands, reference
+        )
+    return result
+
+
+def _at_joint(
+    matches: Matches,
+    joint: int,
+    children: list[int],
+    bones: tuple[Floats, Floats],
+    stands: Floats,
+    reference: Floats,
+) -> Floats:
+    """Return one joint's rotation; ``reference`` is that of the matched joint above it."""
+    part = matches.names[joint].removeprefix("left_").removeprefix("right_")
+    mine, theirs = (_directions(bone) for bone in bones)
+    if not children:
+        return reference
+    if part.startswith(_TRUNK):
+        near = np.einsum("ab,kb,ka->k", stands, mine, theirs)
+        if part == "pelvis" or (near > _NATURAL).all():
+            return stands
+    if part == "wrist":
+        knuckles = _knuckles(matches, children, bones)
+        if knuckles is not None:
+            return knuckles
+    if len(children) > 1:
+        # The least squares of all directions (Kabsch); the reference decides what they leave open.
+        sums = np.einsum("ka,kb->ab", theirs, mine) + _SHORT * reference
+        return nearest_rotations(sums)[0]
+    start = reference if part.startswith(_FINGERS) else stands
+    return _arc(start @ mine[0], theirs[0]) @ start
+
+
+def _bones(
+    source: RestPose, target: RestPose, matches: Matches, joint: int, children: list[int]
+) -> tuple[Floats, Floats]:
+    """Return the ways from a joint to some below it, in the target and in the source: (K, 3)."""
+    partners = matches.partners
+    mine = target.points[children] - target.points[joint]
+    return mine, source.points[partners[children]] - source.points[partners[joint]]
+
+
+def _directions(vectors: Floats) -> Floats:
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
+def _knuckles(matches: Matches, children: list[int], bones: tuple[Floats, Floats]) -> Floats | None:
+    """Return the turn of a hand by the middle of its fingers and the line across them."""
+    rows = {matches.names[child].rpartition("_")[2]: row for row, child in enumerate(children)}
+    fingers = [rows[f"{name}1"] for name in _FINGERS[:4] if f"{name}1" in rows]
+    if "index1" not in rows or not ({"pinky1", "ring1"} & set(rows)):
+        return None
+    last = rows.get("pinky1", rows.get("ring1"))
+    frames = [
+        _frame(bone[last] - bone[rows["index1"]], bone[fingers].mean(axis=0)) for bone in bones
+    ]
+    if frames[0] is None or frames[1] is None:
+        return None
+    return frames[1] @ frames[0].T
+
+
+def _matched_above(matches: Matches, parents: Ints) -> Ints:
+    """Return the nearest matched joint above each joint, -1 for none: (J,)."""
+    above = np.full(len(parents), -1, dtype=np.int32)
+    for joint, parent in enumerate(parents):
+        if parent >= 0:
+            above[joint] = parent if matches.partners[parent] >= 0 else above[parent]
+    above[matches.partners < 0] = -2  # they are nobody's children, see alignment
+    return above
+
+
+def _standing(source: RestPose, target: RestPose, matches: Matches) -> Floats:
+    """Return what turns the target's body as a whole: by its sides, and by what is up."""
+    joints = {
+        name: joint
+        for joint, name in enumerate(matches.names)
+        if name and matches.partners[joint] >= 0
+    }
+    frames = []
+    for rest, of in ((target, lambda joint: joint), (source, lambda j: int(matches.partners[j]))):
+        places = {name: rest.points[of(joint)] for name, joint in joints.items()}
+        frames.append(_body_frame(places, rest.up))
+    if frames[0] is None or frames[1] is None:
+        return np.eye(3)
+    return frames[1] @ frames[0].T
+
+
+def _body_frame(places: dict[str, Floats], up: Floats) -> Floats | None:
+    """Return the axes of a body: to its left, along its height, and the way it looks."""
+    sides = [
+        places[f"left_{part}"] - places[f"right_{part}"]
+        for part in ("hip", "shoulder", "collar", "knee", "elbow")
+        if {f"left_{part}", f"right_{part}"} <= set(places)
+    ]
+    high = [places[name] for name in ("neck", "head", "left_shoulder", "right_shoulder", "spine3")
+            if name in places]  # fmt: skip
+    low = [places[name] for name in ("left_hip", "right_hip", "pelvis") if name in places]
+    if not sides or not high or not low:
+        return None
+    height = np.mean(high, axis=0) - np.mean(low, axis=0)
+    # A body that stands is not tilted by how its spine happens to be bent.
+    is_upright = height @ up > _UPRIGHT * np.linalg.norm(height)
+    return _frame(sides[0], up if is_upright else height)
+
+
+def _frame(side: Floats, main: Floats) -> Floats | None:
+    """Return axes as columns: near ``side``, along ``main``, and across; None if parallel."""
+    across = np.cross(side, main)
+    length = np.linalg.norm(across)
+    if not length > _SHORT * np.linalg.norm(side) * np.linalg.norm(main):
+        return None
+    third, second = across / length, main / np.linalg.norm(main)
+    return np.stack([np.cross(second, third), second, third], axis=1)
+
+
+def _arc(start: Floats, end: Floats) -> Floats:
+    """Return the least rotation from one direction to another."""
+    axis = np.cross(start, end)
+    sine, cosine = float(np.linalg.norm(axis)), float(start @ end)
+    if sine > 1e-12:
+        return rotation_vector_to_matrix(axis / sine * np.arctan2(sine, cosine))
+    if cosine > 0.0:
+        return np.eye(3)
+    # Half a turn about any axis across.
+    across = np.cross(start, np.eye(3)[np.abs(start).argmin()])
+    return rotation_vector_to_matrix(np.pi * across / np.linalg.norm(across))

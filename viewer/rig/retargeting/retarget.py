@@ -1,0 +1,328 @@
+"""A motion of one skeleton on a figure with another: joints matched by name, rest poses aligned.
+
+World rotations are carried over, not local ones, so that joints between two matched ones are
+folded in. With everything in the figure's axes, and rest rotations R_s and R_t of both::
+
+    W_t(frame) = W_s(frame) R_s^-1 B R_t
+
+where B turns the figure's rest pose into the source's at that joint: from arms held out (T-pose)
+to arms held down (A-pose), say. Lengths are the figure's; the path is scaled by the ratio of legs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from viewer.errors import RigError, counted
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.figure import Figure
+from viewer.rig.geometry.quaternion import multiply
+from viewer.rig.geometry.rotation import axis_rotations, matrix_to_quaternion, quaternion_to_matrix
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.skeleton_motion import SkeletonMotion
+from viewer.rig.retargeting.joint_matches import Matches, match_joints
+from viewer.rig.retargeting.rest_poses import RestPose, alignment, is_same_rest, rest_of
+from viewer.rig.skeleton import Skeleton, joint_label
+
+__all__ = ["retarget", "scaled_motion"]
+
+_ROUNDING = 1e-9  # a scale nearer to 1 is 1
+_STILL = 1e-6  # of the skeleton's size: position channels that move less do not count
+_LEGS = (("left_hip", "left_knee", "left_ankle"), ("right_hip", "right_knee", "right_ankle"))
+_ARMS = (
+    ("left_shoulder", "left_elbow", "left_wrist"),
+    ("right_shoulder", "right_elbow", "right_wrist"),
+)
+
+
+def scaled_motion(motion: SkeletonMotion, factor: float, unit: str = "") -> SkeletonMotion:
+    """Return a skeleton and its motion with all lengths multiplied: from centimetres to metres.
+
+    Parameters
+    ----------
+    motion : SkeletonMotion
+        In any unit.
+    factor : float
+        More than 0.
+    unit : str
+        What the lengths are in now, as in ``Figure.unit``.
+
+    Raises
+    ------
+    RigError
+        If the factor is not above 0.
+    """
+    if not 0.0 < factor < np.inf:
+        raise RigError(f"expected a factor above 0, found {factor:g}")
+    figure, clip = motion.figure, motion.clip
+    skeleton = figure.skeleton
+    if skeleton is not None:
+        boxes = None if skeleton.boxes is None else skeleton.boxes * factor
+        moved = skeleton.rest_translations * factor
+        skeleton = replace(skeleton, rest_translations=moved, boxes=boxes)
+    shifts, place = clip.translations, clip.figure_translations
+    return replace(
+        motion,
+        figure=replace(figure, skeleton=skeleton, unit=unit),
+        clip=replace(
+            clip,
+            translations=None if shifts is None else shifts * factor,
+            figure_translations=None if place is None else place * factor,
+        ),
+    )
+
+
+def retarget(
+    motion: SkeletonMotion, figure: Figure, mapping: Mapping[str, str] | None = None
+) -> tuple[SampledClip, list[str]]:
+    """Return a figure's clip of a motion that was made for another skeleton.
+
+    Joints are matched by ``mapping``, then by the names that many programs use for a body (see
+    ``viewer.rig.retargeting.joint_names``), then by equal names; a skeleton with the same names
+    and hierarchy matches joint by joint. Limbs take the directions of the source's limbs, exactly;
+    spine, neck, head and feet keep the figure's own bend unless the rest poses differ much. With
+    the same hierarchy and much the same rest pose, local rotations are taken over as they are.
+
+    Parameters
+    ----------
+    motion : SkeletonMotion
+        Skeleton and clip, up along y or z.
+    figure : Figure
+        With a skeleton; its joints without a partner stay in their rest pose.
+    mapping : mapping of str to str, optional
+        From the motion's joint names to the figure's.
+
+    Returns
+    -------
+    clip : SampledClip
+        For the figure. A skinned figure moves as a whole (``figure_translations``), a bare
+        skeleton at its root.
+    notes : list of str
+        Which joints were matched and which not, and the scale of the path.
+
+    Raises
+    ------
+    RigError
+        If too few joints match, or the mapping names a joint that is not there.
+    """
+    source, target = motion.figure.skeleton, figure.skeleton
+    if source is None or target is None:
+        named = motion.figure.name if source is None else figure.name
+        raise RigError(f"{named} has no skeleton to move")
+    matches = match_joints(source, target, mapping, (motion.figure.name, figure.name))
+    turn = _up_turn(motion.figure.up, figure.up)
+    rests = rest_of(source, turn, figure.up), rest_of(target, np.eye(3), figure.up)
+    is_same = matches.is_hierarchy and is_same_rest(*rests, matches, target.parents)
+    carried = _Carried(motion.clip, source, target, rests, matches, turn, is_same)
+    worlds = _source_rotations(carried)
+    rotations = _target_rotations(carried, worlds)
+    scale, by = _scale(carried)
+    shifts, notes = _shifts(carried, worlds, rotations, scale)
+    roots = np.flatnonzero(target.parents < 0)
+    place: Floats | None = None
+    if figure.mesh is not None and len(roots) == 1:
+        place, shifts[:, 0] = shifts[:, 0].copy(), 0.0
+    clip = SampledClip(
+        motion.clip.name,
+        motion.clip.timing,
+        rotations,
+        translations=shifts if shifts.any() else None,
+        figure_translations=place,
+    )
+    return clip, [*matches.notes, f"its path is scaled by {scale:.4g}, the ratio of {by}", *notes]
+
+
+@dataclass(frozen=True, slots=True)
+class _Carried:
+    """All that the steps need."""
+
+    clip: SampledClip
+    source: Skeleton
+    target: Skeleton
+    rests: tuple[RestPose, RestPose]  # in the figure's axes
+    matches: Matches
+    turn: Floats  # (3, 3), the source's axes to the figure's
+    is_same: bool
+
+
+def _up_turn(source: str, target: str) -> Floats:
+    """Return the rotation that carries one up axis into the other: (3, 3)."""
+    if source == target:
+        return np.eye(3)
+    return axis_rotations(0, np.asarray(np.pi / 2 if target == "z" else -np.pi / 2))
+
+
+def _source_rotations(carried: _Carried) -> Floats:
+    """Return the source's world rotations in its own axes: (N, J, 4)."""
+    worlds = carried.clip.rotations.copy()
+    for joint, parent in enumerate(carried.source.parents):
+        if parent >= 0:
+            worlds[:, joint] = multiply(worlds[:, parent], worlds[:, joint])
+    return worlds
+
+
+def _target_rotations(carried: _Carried, worlds: Floats) -> Floats:
+    """Return the figure's local rotations: (N, J, 4)."""
+    source, target = carried.rests
+    parents = carried.target.parents
+    corrections = np.tile(np.eye(3), (len(parents), 1, 1))
+    if not carried.is_same:
+        corrections = alignment(source, target, carried.matches, parents)
+    turn = matrix_to_quaternion(carried.turn)
+    found = np.empty((len(worlds), carried.target.n_joints, 4))
+    local = np.empty_like(found)
+    for joint, partner in enumerate(carried.matches.partners):
+        parent = parents[joint]
+        above = found[:, parent] if parent >= 0 else np.array([0.0, 0.0, 0.0, 1.0])
+        if partner < 0:
+            local[:, joint] = _unit(carried.target.rest_rotations[joint])
+            found[:, joint] = multiply(above, local[:, joint])
+            continue
+        after = source.rotations[partner].T @ carried.turn.T @ corrections[joint]
+        rest = matrix_to_quaternion(after @ target.rotations[joint])
+        found[:, joint] = multiply(multiply(turn, worlds[:, partner]), rest)
+        local[:, joint] = multiply(_conjugate(above), found[:, joint])
+    signs = np.einsum("nja,nja->nj", local[1:], local[:-1]) < 0.0
+    local[1:][np.logical_xor.accumulate(signs, axis=0)] *= -1.0
+    return local
+
+
+def _scale(carried: _Carried) -> tuple[float, str]:
+    """Return the ratio of the target's lengths to the source's, and of what: legs if there are."""
+    partners, names = carried.matches.partners, carried.matches.names
+    source, target = carried.rests
+    place = {name: joint for joint, name in enumerate(names) if name and partners[joint] >= 0}
+
+    def length(pairs: list[tuple[int, int]]) -> tuple[float, float]:
+        ends = np.array(pairs, dtype=np.int32).reshape(-1, 2).T
+        mine = target.points[ends[1]] - target.points[ends[0]]
+        theirs = source.points[partners[ends[1]]] - source.points[partners[ends[0]]]
+        return float(np.linalg.norm(mine, axis=1).sum()), float(
+            np.linalg.norm(theirs, axis=1).sum()
+        )
+
+    matched = np.flatnonzero(partners >= 0)
+    bones = [(int(matched[0]), int(joint)) for joint in matched[1:]]
+    choices = [("legs", _pairs(_LEGS, place)), ("arms", _pairs(_ARMS, place)), ("bones", bones)]
+    for what, pairs in choices:
+        mine, theirs = length(pairs)
+        if mine > 0.0 and theirs > 0.0:
+            ratio = mine / theirs
+            return (1.0 if abs(ratio - 1.0) < _ROUNDING else ratio), what
+    return 1.0, "nothing"
+
+
+def _pairs(limbs: tuple[tuple[str, ...], ...], place: dict[str, int]) -> list[tuple[int, int]]:
+    return [
+        (place[start], place[end])
+        for limb in limbs
+        for start, end in pairwise(limb)
+        if start in place and end in place
+    ]
+
+
+def _shifts(
+    carried: _Carried, worlds: Floats, rotations: Floats, scale: float
+) -> tuple[Floats, list[str]]:
+    """Return what is added to the target's rest translations, (N, J, 3), and notes."""
+    shifts = np.zeros((len(worlds), carried.target.n_joints, 3))
+    places = _source_places(carried, worlds)
+    if carried.is_same:
+        notes = _carry_translations(carried, scale, shifts)
+        roots = np.flatnonzero(carried.target.parents < 0)
+        for root in roots:
+            wanted = scale * places[:, carried.matches.partners[root]] @ carried.turn.T
+            shifts[:, root] = wanted - carried.target.rest_translations[root]
+        return shifts, notes
+    anchor = _anchor(carried)
+    path = _path(carried.target.parents, anchor)
+    linear = np.eye(3)
+    reached = np.zeros((len(worlds), 3))
+    for joint in path:
+        reached = reached + linear @ carried.target.rest_translations[joint]
+        turned = quaternion_to_matrix(rotations[:, joint])
+        linear = linear @ turned * carried.target.rest_scales[joint]
+    wanted = scale * places[:, carried.matches.partners[anchor]] @ carried.turn.T
+    shifts[:, path[0]] = wanted - reached
+    return shifts, _lost(carried)
+
+
+def _source_places(carried: _Carried, worlds: Floats) -> Floats:
+    """Return where the source's joints are in its own axes: (N, J, 3)."""
+    clip, skeleton = carried.clip, carried.source
+    places = np.tile(skeleton.rest_translations, (len(worlds), 1, 1))
+    if clip.translations is not None:
+        places += clip.translations
+    for joint, parent in enumerate(skeleton.parents):
+        if parent >= 0:
+            turns = quaternion_to_matrix(worlds[:, parent])
+            places[:, joint] = np.einsum("nab,nb->na", turns, places[:, joint])
+            places[:, joint] += places[:, parent]
+    if clip.figure_scales is not None:
+        places *= clip.figure_scales[:, None, None]
+    if clip.figure_translations is not None:
+        places += clip.figure_translations[:, None]
+    return places
+
+
+def _carry_translations(carried: _Carried, scale: float, shifts: Floats) -> list[str]:
+    """Put the moves of joints below the root, in place: the two parents' axes may differ."""
+    if carried.clip.translations is None:
+        return []
+    source, target = carried.rests
+    for joint, parent in enumerate(carried.target.parents):
+        partner = carried.matches.partners[joint]
+        moves = carried.clip.translations[:, partner]
+        if parent >= 0 and moves.any():
+            above = carried.matches.partners[parent]
+            axes = target.rotations[parent].T @ carried.turn @ source.rotations[above]
+            shifts[:, joint] = scale * moves @ axes.T
+    return []
+
+
+def _lost(carried: _Carried) -> list[str]:
+    """Say which joints of the source move within their parents, which the target's do not."""
+    moves = carried.clip.translations
+    if moves is None:
+        return []
+    largest = np.linalg.norm(moves, axis=2).max(axis=0)
+    size = float(np.ptp(carried.rests[0].points, axis=0).max()) or 1.0
+    largest[_path(carried.source.parents, carried.matches.partners[_anchor(carried)])] = 0.0
+    found = np.flatnonzero(largest > _STILL * size)
+    if not len(found):
+        return []
+    worst = int(found[largest[found].argmax()])
+    whose = "its parent" if len(found) == 1 else "their parents"
+    return [
+        f"positions of {counted(len(found), 'joint')} within {whose} were left out, up to "
+        f"{largest[worst]:.3g} ({joint_label(carried.source, worst)})"
+    ]
+
+
+def _anchor(carried: _Carried) -> int:
+    """Return the joint that follows the source's path: the pelvis, else the first one matched."""
+    matched = carried.matches.partners >= 0
+    names = carried.matches.names
+    if "pelvis" in names and matched[names.index("pelvis")]:
+        return names.index("pelvis")
+    return int(np.flatnonzero(matched)[0])
+
+
+def _path(parents: Ints, joint: int) -> list[int]:
+    """Return the joints from the root to one joint."""
+    path = [joint]
+    while parents[path[-1]] >= 0:
+        path.append(int(parents[path[-1]]))
+    return path[::-1]
+
+
+def _unit(quaternions: Floats) -> Floats:
+    return quaternions / np.linalg.norm(quaternions, axis=-1, keepdims=True)
+
+
+def _conjugate(quaternions: Floats) -> Floats:
+    return quaternions * [-1.0, -1.0, -1.0, 1.0]
