@@ -15,12 +15,14 @@ SOURCES = sorted(PACKAGE.rglob("*.py"))
 # Which parts of the package each part may import.
 ALLOWED = {
     "rig": {"rig", "errors", "near_names"},
+    "autorig": {"autorig", "rig", "errors", "near_names"},
     "formats": {"formats", "rig", "errors", "interrupts", "near_names", "streams"},
     "rendering": {"rendering", "rig", "errors", "interrupts", "near_names", "resources"},
-    "export": {"export", "formats", "rig", "errors", "interrupts", "near_names"},
+    "export": {"autorig", "export", "formats", "rig", "errors", "interrupts", "near_names"},
     "loading": {"loading", "formats", "rig", "errors", "near_names", "resources"},
     "app": {
         "app",
+        "autorig",
         "export",
         "formats",
         "lint",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 
 import numpy as np
-from rig.transfer.rigged_shapes import arm, mesh_of, turn
+from autorig.rigged_shapes import arm, mesh_of, turn
 
 from viewer.rig.figure import Figure
 from viewer.rig.motion.clip import Channel, Clip

@@ -19,12 +19,12 @@ import scipy.spatial
 import transfer_targets as made
 
 import viewer
+from viewer.autorig.alignment import AlignmentSettings
+from viewer.autorig.matching import Template
+from viewer.autorig.pipeline import TransferSettings, transfer
+from viewer.autorig.weights import WeightSettings, nearest_weights, transferred_weights
 from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.skin import Skin, skin_from_entries
-from viewer.rig.transfer.alignment import AlignmentSettings
-from viewer.rig.transfer.matching import Template
-from viewer.rig.transfer.pipeline import TransferSettings, transfer
-from viewer.rig.transfer.weights import WeightSettings, nearest_weights, transferred_weights
 
 # Of weights alone: a template in another pose, which the whole way finds, is no test of these.
 UNFITTED = {"aligned": {"bent by 4 degrees"}}

@@ -6,19 +6,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from autorig.rigged_shapes import arm
 from numpy.testing import assert_allclose
-from rig.transfer.rigged_shapes import arm
 
 pytest.importorskip("scipy")
 
 import viewer
+from viewer.autorig.pipeline import transfer
 from viewer.errors import UnsupportedFormatError
 from viewer.export._rigged_files import files_of, without_correctives, write_rigged
 from viewer.rig.blendshapes import Correctives
 from viewer.rig.figure import Figure
 from viewer.rig.pose import rest_pose
 from viewer.rig.skinning import deform
-from viewer.rig.transfer.pipeline import transfer
 
 
 @pytest.fixture(scope="module")

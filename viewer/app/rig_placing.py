@@ -7,6 +7,8 @@ import numpy as np
 from viewer.app.rig_sources import current_template, target_mesh
 from viewer.app.rig_view import Placing, RigView, Template
 from viewer.app.state import AppState
+from viewer.autorig.alignment import AlignmentSettings
+from viewer.autorig.similarity import Similarity
 from viewer.rendering.camera import camera_axes
 from viewer.rendering.ghost_pass import Ghost
 from viewer.rig.arrays import Floats
@@ -17,8 +19,6 @@ from viewer.rig.mesh import Mesh, bounding_box, box_size
 from viewer.rig.pose import placement_matrix, pose_key
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import deform
-from viewer.rig.transfer.alignment import AlignmentSettings
-from viewer.rig.transfer.similarity import Similarity
 
 __all__ = [
     "as_similarity",

@@ -11,6 +11,7 @@ from viewer.app.jobs import ThreadJob
 from viewer.app.rig_placing import target_place
 from viewer.app.rig_view import Comparison, Result
 from viewer.app.state import AppState
+from viewer.autorig.rigged import clip_for
 from viewer.errors import RigError, ViewerError, printable
 from viewer.export._rigged_files import files_of, write_rigged
 from viewer.formats import check_targets
@@ -22,7 +23,6 @@ from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.scene import Actor, figure_pose
 from viewer.rig.skin import Skin, owners
-from viewer.rig.transfer.rigged import clip_for
 
 __all__ = [
     "MATCH_COLORS",

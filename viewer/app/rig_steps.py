@@ -9,20 +9,20 @@ from dataclasses import replace
 import numpy as np
 
 from viewer.app.rig_view import Placing, RigChoices, Template
+from viewer.autorig.alignment import AlignmentSettings, alignment_lines
+from viewer.autorig.matching import MatchSettings, match
+from viewer.autorig.matching import Template as Surface
+from viewer.autorig.posed_alignment import align_posed
+from viewer.autorig.rigged import Rigged
+from viewer.autorig.settings import TransferSettings
+from viewer.autorig.similarity import Similarity
+from viewer.autorig.weights import WeightSettings
+from viewer.autorig.welding import weld
 from viewer.rig.annotations import VertexField
 from viewer.rig.mesh import Mesh, bounding_box, box_size
 from viewer.rig.pose import pose_key
 from viewer.rig.shape import shaped
 from viewer.rig.skinning import deform
-from viewer.rig.transfer.alignment import AlignmentSettings, alignment_lines
-from viewer.rig.transfer.matching import MatchSettings, match
-from viewer.rig.transfer.matching import Template as Surface
-from viewer.rig.transfer.posed_alignment import align_posed
-from viewer.rig.transfer.rigged import Rigged
-from viewer.rig.transfer.settings import TransferSettings
-from viewer.rig.transfer.similarity import Similarity
-from viewer.rig.transfer.weights import WeightSettings
-from viewer.rig.transfer.welding import weld
 
 __all__ = ["align_template", "match_fields", "match_settings", "retold", "transfer_settings"]
 

@@ -14,14 +14,14 @@ from viewer.rig.arrays import Floats
 if TYPE_CHECKING:
     from viewer.app.jobs import CountedJob
     from viewer.app.state import AppState
+    from viewer.autorig.alignment import Alignment, AlignmentSettings
+    from viewer.autorig.rigged import Rigged
+    from viewer.autorig.similarity import Similarity
     from viewer.rendering.ghost_pass import Ghost
     from viewer.rig.figure import Figure
     from viewer.rig.geometry.ray_hit import RayHit
     from viewer.rig.pose import Pose
     from viewer.rig.scene import Actor, Motion, Scene
-    from viewer.rig.transfer.alignment import Alignment, AlignmentSettings
-    from viewer.rig.transfer.rigged import Rigged
-    from viewer.rig.transfer.similarity import Similarity
 
 __all__ = [
     "GHOSTS",

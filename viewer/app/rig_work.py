@@ -30,15 +30,15 @@ from viewer.app.rig_steps import (
 )
 from viewer.app.rig_view import Landmark, Placing, Result, RigChoices, Running, Template
 from viewer.app.state import AppState
+from viewer.autorig.alignment import AlignmentSettings
+from viewer.autorig.pipeline import transfer
+from viewer.autorig.settings import METHODS
 from viewer.errors import RigError, printable
 from viewer.loading import load
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.ray_hit import surface_point
 from viewer.rig.mesh import Mesh
 from viewer.rig.scene import Actor, free_title
-from viewer.rig.transfer.alignment import AlignmentSettings
-from viewer.rig.transfer.pipeline import transfer
-from viewer.rig.transfer.settings import METHODS
 
 __all__ = [
     "landmark_settings",

@@ -6,6 +6,7 @@ import argparse
 from dataclasses import dataclass
 from pathlib import Path
 
+from viewer.autorig.rigged import Rigged, clip_for
 from viewer.commands._scene import print_warnings
 from viewer.errors import RigError, ViewerError, printable
 from viewer.export import MotionOptions, export_take, take_for
@@ -15,7 +16,6 @@ from viewer.rig.figure import Figure
 from viewer.rig.motion.clip import Clip, is_course_rig
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.scene import Actor, Scene, figure_pose
-from viewer.rig.transfer.rigged import Rigged, clip_for
 
 __all__ = ["CarriedClip", "add_clip_argument", "read_clips", "write_clips"]
 

@@ -11,6 +11,13 @@ from typing import TextIO
 
 import numpy as np
 
+from viewer.autorig.alignment import SCALES, AlignmentSettings
+from viewer.autorig.matching import MatchSettings
+from viewer.autorig.orientation_search import AXES
+from viewer.autorig.pipeline import transfer
+from viewer.autorig.rigged import Rigged
+from viewer.autorig.settings import JOINTS, METHODS, TransferSettings
+from viewer.autorig.weights import WeightSettings
 from viewer.commands._carried_clips import add_clip_argument, read_clips, write_clips
 from viewer.commands._frame_numbers import add_frame_arguments
 from viewer.commands._landmarks import read_landmarks
@@ -27,13 +34,6 @@ from viewer.near_names import did_you_mean
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import deform
-from viewer.rig.transfer.alignment import SCALES, AlignmentSettings
-from viewer.rig.transfer.matching import MatchSettings
-from viewer.rig.transfer.orientation_search import AXES
-from viewer.rig.transfer.pipeline import transfer
-from viewer.rig.transfer.rigged import Rigged
-from viewer.rig.transfer.settings import JOINTS, METHODS, TransferSettings
-from viewer.rig.transfer.weights import WeightSettings
 from viewer.streams import require_stdout, summary_stream
 
 __all__ = ["add_arguments", "run"]

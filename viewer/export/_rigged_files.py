@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.autorig.rigged import Rigged
 from viewer.errors import UnsupportedFormatError, printable
 from viewer.export import export
 from viewer.formats import all_or_none
@@ -17,7 +18,6 @@ from viewer.rig.figure import Figure
 from viewer.rig.mesh import vertex_normals
 from viewer.rig.pose import joint_rotations
 from viewer.rig.scene import Actor, figure_pose
-from viewer.rig.transfer.rigged import Rigged
 
 __all__ = ["RIGGED_SUFFIXES", "files_of", "without_correctives", "write_rigged"]
 

@@ -33,12 +33,12 @@ from viewer.app.widgets import (
     plain_zero,
     same_line_if_room,
 )
+from viewer.autorig.alignment import SCALES, Alignment, AlignmentSettings
+from viewer.autorig.orientation_search import AXES
+from viewer.autorig.similarity import Similarity
 from viewer.errors import ViewerError
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.rotation import axis_rotations, matrix_to_euler
-from viewer.rig.transfer.alignment import SCALES, Alignment, AlignmentSettings
-from viewer.rig.transfer.orientation_search import AXES
-from viewer.rig.transfer.similarity import Similarity
 
 __all__ = ["draw_alignment"]
 

@@ -35,11 +35,11 @@ from viewer.app.widgets import (
     same_line_if_room,
     slider,
 )
+from viewer.autorig.settings import JOINTS, METHODS
 from viewer.errors import printable
 from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.mesh import bounding_box
 from viewer.rig.scene import Actor, actor_points, free_title
-from viewer.rig.transfer.settings import JOINTS, METHODS
 
 __all__ = ["draw"]
 

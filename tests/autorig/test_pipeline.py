@@ -1,0 +1,266 @@
+"""The whole transfer, on targets whose rig is known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from rigged_shapes import arm, mesh_of, turn
+
+pytest.importorskip("scipy")
+
+from viewer.autorig.alignment import AlignmentSettings
+from viewer.autorig.pipeline import METHODS, TransferSettings, transfer
+from viewer.autorig.rigged import clip_for
+from viewer.errors import RigError
+from viewer.loading import bundled_body, load
+from viewer.rig.figure import Figure
+from viewer.rig.geometry.transform import apply_transform
+from viewer.rig.motion.clip import Channel, Clip
+from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.pose import rest_pose
+from viewer.rig.scene import Actor
+from viewer.rig.skinning import deform
+
+ROTATION = turn([0.1, 1, 0.2], 2.0)
+MOVE = np.array([3.0, -4.0, 5.0])
+
+
+def bent_arm():
+    figure = arm()
+    pose = rest_pose(figure.skeleton)
+    pose.dofs[6:] = 0.2, -0.1, 0.7
+    return figure, pose
+
+
+def moved(figure, pose, scale=30.0):
+    positions = scale * deform(figure, pose)[0] @ ROTATION.T + MOVE
+    return mesh_of(positions, figure.mesh.triangles)
+
+
+def again(rigged):
+    return apply_transform(rigged.placement, deform(rigged.figure, rigged.pose)[0])
+
+
+@pytest.fixture(scope="module")
+def carried():
+    figure, pose = bent_arm()
+    target = moved(figure, pose)
+    return figure, pose, target, transfer(figure, pose, target)
+
+
+def test_the_templates_own_mesh_gets_its_rig_back(carried):
+    figure, _, _, rigged = carried
+    size = 30.0 * 2.4
+    assert_allclose(rigged.figure.mesh.positions, 30.0 * figure.mesh.positions, atol=1e-6 * size)
+    assert_allclose(
+        np.linalg.inv(rigged.figure.skin.inverse_bind)[:, :3, 3],
+        [[0, 0, 0], [0, 30, 0]],
+        atol=1e-6 * size,
+    )
+    dense = np.zeros((figure.mesh.n_vertices, 2))
+    skin = rigged.figure.skin
+    np.add.at(dense, (np.repeat(np.arange(len(dense)), np.diff(skin.starts)), skin.joints),
+              skin.weights)  # fmt: skip
+    share = np.clip((figure.mesh.positions[:, 1] - 0.8) / 0.4, 0.0, 1.0)
+    assert_allclose(dense[:, 1], share, atol=1e-6)
+
+
+def test_posed_again_it_is_the_target(carried):
+    _, _, target, rigged = carried
+    assert_allclose(again(rigged), target.positions, atol=1e-10)
+    assert rigged.residual < 1e-12
+    assert rigged.weights.matched.all() and not rigged.guarded.any()
+    assert rigged.confidence.tolist() == [0] * target.n_vertices
+
+
+def test_target_is_not_altered_and_keeps_its_texture_coordinates(carried):
+    figure, pose, target, _ = carried
+    uvs = np.random.default_rng(2).random((target.n_vertices, 2))
+    with_uvs = replace(target, uvs=uvs)
+    rigged = transfer(figure, pose, with_uvs)
+    assert (rigged.figure.mesh.uvs == uvs).all()
+    assert (rigged.figure.mesh.triangles == target.triangles).all()
+
+
+def test_target_that_is_inside_out_is_turned_round_in_the_result(carried):
+    figure, pose, target, rigged = carried
+    backwards = mesh_of(target.positions, target.triangles[:, ::-1])
+    found = transfer(figure, pose, backwards)
+    assert (found.figure.mesh.triangles == target.triangles).all()
+    assert_allclose(found.figure.mesh.normals, rigged.figure.mesh.normals, atol=1e-6)
+    assert_allclose(again(found), target.positions, atol=1e-10)
+    count = target.n_triangles
+    told = f"wound inside out, and turned round in the result: {count} triangles"
+    assert told in found.lines and told not in rigged.lines
+
+
+@pytest.mark.parametrize(
+    ("scale", "unit", "told"),
+    [
+        (1.2, "m", "metres"),
+        (1000.0, "mm", "millimetres"),
+        (30.0, "", "not known, much larger or smaller than the template"),
+    ],
+)
+def test_unit_is_judged_by_size(scale, unit, told):
+    figure, pose = bent_arm()
+    rigged = transfer(replace(figure, unit="m"), pose, moved(figure, pose, scale))
+    assert rigged.figure.unit == unit
+    assert f"unit, judged by size: {told}" in rigged.lines
+
+
+def test_the_templates_clip_plays(carried):
+    figure, _, _, rigged = carried
+    times = np.array([0.0, 1.0])
+    linear = (("linear", "linear"),) * 2
+    rows = [(0, 0.5), (4, 0.8), (8, -1.1)]
+    channels = tuple(Channel(dof, times, np.array([0.0, value]), linear) for dof, value in rows)
+    clip = Clip("wave", channels, 0.0, 1.0)
+    one, other = Actor(figure, clip=clip), Actor(rigged.figure, clip=clip_for(rigged, clip))
+    for actor in (one, other):
+        pose_actor(actor, 0.6)
+    expected = 30.0 * deform(figure, one.pose)[0]
+    assert_allclose(deform(rigged.figure, other.pose)[0], expected, atol=1e-4)
+
+
+def test_scale_and_place_of_the_templates_pose_become_the_targets():
+    figure, pose = bent_arm()
+    pose.figure_scale = 3.0
+    pose.figure_translation[:] = 1.0, 2.0, 3.0
+    rigged = transfer(figure, pose, moved(figure, pose, scale=1.0))
+    assert_allclose(rigged.figure.mesh.positions, 3.0 * figure.mesh.positions, atol=1e-5)
+    assert (rigged.figure_scale, rigged.length_scale) == (3.0, pytest.approx(1.0))
+
+
+def test_correctives_of_a_body_come_along():
+    actor = load(bundled_body()).actors[0]
+    figure, pose = actor.figure, actor.pose
+    names = figure.skeleton.names
+    pose.dofs[3 * names.index("right_knee")] = 1.0
+    target = mesh_of(2.0 * deform(figure, pose)[0], figure.mesh.triangles)
+    rigged = transfer(figure, pose, target)
+    assert rigged.residual < 1e-12
+    # At rest it is the body at rest, without the bulges of the bent knee.
+    assert_allclose(rigged.figure.mesh.positions, 2.0 * figure.mesh.positions, atol=1e-6)
+    other = rest_pose(figure.skeleton)
+    other.dofs[3 * names.index("left_elbow") + 1] = -1.5
+    assert_allclose(deform(rigged.figure, other)[0], 2.0 * deform(figure, other)[0], atol=1e-6)
+    plain = transfer(figure, pose, target, TransferSettings(correctives=False))
+    assert plain.figure.correctives is None and plain.residual < 1e-12
+    assert "pose correctives of the template: left out" in plain.lines
+    assert "not carried over: 10 shape directions of the template" in plain.lines
+
+
+def test_joints_follow_the_surface_and_copies_do_not():
+    # Without alignment the target stands 0.1 beside the template. Closest points see the part of
+    # that across the surface: about half of it, as cos^2 around a section has the mean 1 / 2.
+    figure, pose = arm(), rest_pose(arm().skeleton)
+    target = mesh_of(figure.mesh.positions + np.array([0.1, 0, 0]), figure.mesh.triangles)
+    still = AlignmentSettings(matrix=np.eye(4))
+    places = {}
+    for joints in ("carried", "copied"):
+        how = TransferSettings(alignment=still, joints=joints, fits=False)
+        rigged = transfer(figure, pose, target, how)
+        bound = np.linalg.inv(rigged.figure.skin.inverse_bind)[1, :3, 3]
+        places[joints] = bound + rigged.pose.figure_translation
+        assert rigged.residual < 1e-12
+    assert 0.02 < places["carried"][0] < 0.08
+    assert_allclose(places["copied"], [0, 1, 0], atol=1e-12)
+
+
+def test_nearest_follows_the_seed():
+    figure, pose = bent_arm()
+    stretch, shift = np.array([4.0, 2.0, 3.0]), np.array([1.0, 0, 0])
+    posed = deform(figure, pose)[0]
+    target = mesh_of(posed * stretch + shift, figure.mesh.triangles)
+    rigged = transfer(figure, pose, target, TransferSettings(method="nearest"))
+    # Boxes undo the stretch: vertices find themselves, and unposing gives the template.
+    assert_allclose(rigged.figure.mesh.positions, figure.mesh.positions, atol=1e-10)
+    assert rigged.figure.skin.weights.tolist() == figure.skin.weights.tolist()
+    assert_allclose(np.diag(rigged.placement), [4.0, 2.0, 3.0, 1.0])
+    assert_allclose(again(rigged), target.positions, atol=1e-10)
+    assert rigged.figure.skeleton is figure.skeleton
+    assert (
+        rigged.lines[0] == "alignment: boxes; the target scaled along x, y, z by 0.25, 0.5, 0.3333"
+    )
+
+
+def test_progress_rises_to_1_and_may_cancel():
+    figure, pose = bent_arm()
+    told = []
+    target = moved(figure, pose)
+    transfer(figure, pose, target, report=lambda share, what: told.append((share, what)))
+    shares = [share for share, _ in told]
+    assert shares == sorted(shares) and shares[0] == 0.0 and told[-1] == (1.0, "done")
+
+    def stop(share, what):
+        if what == "joints":
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        transfer(figure, pose, target, report=stop)
+
+
+def test_joint_outside_the_target_is_told():
+    # The inside of the template is solid; the target is two flat shells far from the axis.
+    figure, pose = arm(), rest_pose(arm().skeleton)
+    still = AlignmentSettings(matrix=np.eye(4))
+    side = figure.mesh.positions[figure.mesh.triangles][:, :, 0].mean(axis=1) > 0.1
+    target = mesh_of(figure.mesh.positions, figure.mesh.triangles[side])
+    rigged = transfer(figure, pose, target, TransferSettings(alignment=still, joints="copied"))
+    assert rigged.outside == (0, 1)
+    assert "warning: outside the mesh: base, tip" in rigged.lines
+
+
+@pytest.mark.parametrize(
+    ("part", "found"),
+    [("skin", "mesh and skeleton"), ("mesh", "skeleton"), ("skeleton", "mesh and skin")],
+)
+def test_template_without_a_rig_is_refused(part, found):
+    figure, pose = bent_arm()
+    lacking = replace(figure, **{part: None, "skin": None if part == "mesh" else figure.skin}
+                      if part != "skin" else {"skin": None})  # fmt: skip
+    with pytest.raises(RigError) as problem:
+        transfer(lacking, pose, figure.mesh)
+    assert str(problem.value) == (
+        f"arm: expected a template with mesh, skeleton and skin, found {found}"
+    )
+
+
+def test_target_without_triangles_is_refused():
+    figure, pose = bent_arm()
+    with pytest.raises(RigError) as problem:
+        transfer(figure, pose, mesh_of(np.zeros((3, 3)), np.zeros((0, 3))))
+    assert str(problem.value) == "expected a target with triangles, found none"
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"method": "best"}, f'method: expected {" or ".join(METHODS)}, found "best"'),
+        ({"joints": "none"}, 'joints: expected carried or copied, found "none"'),
+    ],
+)
+def test_settings_that_do_not_exist_are_refused(settings, message):
+    with pytest.raises(RigError) as problem:
+        TransferSettings(**settings)
+    assert str(problem.value) == message
+
+
+def test_scipy_that_is_missing_is_named(monkeypatch):
+    import sys
+
+    figure, pose = bent_arm()
+    monkeypatch.setitem(sys.modules, "scipy.spatial", None)
+    with pytest.raises(RigError) as problem:
+        transfer(figure, pose, figure.mesh)
+    assert str(problem.value) == "rigging needs scipy: pip install scipy"
+
+
+def test_figure_is_complete():
+    figure, pose = bent_arm()
+    rigged = transfer(figure, pose, moved(figure, pose), name="scan")
+    assert isinstance(rigged.figure, Figure) and rigged.figure.name == "scan"
+    assert rigged.figure.is_attached and rigged.figure.up == "y"
+    assert rigged.figure.facts == (("rig", "carried over from arm"),)

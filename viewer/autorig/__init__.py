@@ -1,0 +1,1 @@
+"""Automatic rigging: alignment, correspondence, weights and joints from a template figure."""

@@ -1,1 +1,0 @@
-"""A rig carried over from one figure to another mesh."""
