@@ -5,7 +5,7 @@ import pytest
 from capture_files import body, opened, rows_of, waves, write_frames
 from numpy.testing import assert_array_equal
 
-from viewer.formats._easymocap_shapes import carry, last_given
+from viewer.formats._easymocap.shapes import carry, last_given
 
 ROWS = np.array([[9.0, 9.0], [1.0, 2.0], [9.0, 9.0], [np.nan, 3.0], [9.0, 9.0]])
 GIVEN = np.array([False, True, False, True, False])

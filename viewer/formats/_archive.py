@@ -374,7 +374,7 @@ def open_archive(source: Source, max_size: int = MAX_SIZE) -> Archive:
     """
     # Reading figures of other formats should not pay for these.
     from viewer.formats._npz import open_npy, open_npz
-    from viewer.formats._pickle import open_pickle
+    from viewer.formats._pickle.reading import open_pickle
 
     head = source.peek(4096)
     if head.startswith(_ZIP):

@@ -23,9 +23,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from viewer.errors import printable
-from viewer.formats._bvh_guess import frame_rate, guess_unit, guess_up
-from viewer.formats._bvh_hierarchy import BvhJoint, read_hierarchy
-from viewer.formats._bvh_motion import Motion, read_motion
+from viewer.formats._bvh.guess import frame_rate, guess_unit, guess_up
+from viewer.formats._bvh.hierarchy import BvhJoint, read_hierarchy
+from viewer.formats._bvh.motion import Motion, read_motion
 from viewer.formats._source import Source
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure

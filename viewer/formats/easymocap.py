@@ -19,9 +19,9 @@ V = R(Rh) X(poses, shapes) + Th, turned about the model's origin. There is no fr
 from __future__ import annotations
 
 from viewer.errors import FormatError
-from viewer.formats._camera_files import find_cameras
-from viewer.formats._easymocap_files import find_frames
-from viewer.formats._easymocap_reading import Options, Reading
+from viewer.formats._easymocap.cameras import find_cameras
+from viewer.formats._easymocap.files import find_frames
+from viewer.formats._easymocap.reading import Options, Reading
 from viewer.formats._opened_names import folder_name
 from viewer.formats._source import Source
 from viewer.rig.captures.capture import Capture

@@ -17,7 +17,7 @@ import numpy as np
 
 from viewer.errors import FormatError
 from viewer.formats._numbers import to_number
-from viewer.formats._skin_blocks import (
+from viewer.formats._skin.blocks import (
     Block,
     block_rows,
     find_block,

@@ -19,9 +19,9 @@ import re
 import numpy as np
 
 from viewer.errors import counted
-from viewer.formats._mtl import read_libraries
-from viewer.formats._obj_lines import Places
-from viewer.formats._obj_parts import ObjParts, read_parts
+from viewer.formats._obj.lines import Places
+from viewer.formats._obj.mtl import read_libraries
+from viewer.formats._obj.parts import ObjParts, read_parts
 from viewer.formats._polygons import triangulate
 from viewer.formats._source import Source
 from viewer.formats._surface import filled_normals, polygon_text, stated_unit, stated_up

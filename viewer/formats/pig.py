@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 
 from viewer.errors import FormatError, counted
 from viewer.formats._opened_names import folder_name
-from viewer.formats._pig_names import JOINTS, KEYPOINTS
-from viewer.formats._pig_parts import Part, PigFiles, open_parts
+from viewer.formats._pig.names import JOINTS, KEYPOINTS
+from viewer.formats._pig.parts import Part, PigFiles, open_parts
 from viewer.formats._source import Source
 from viewer.formats._tolerant import mended_corners, mended_positions
 from viewer.rig.annotations import BodyParts, Keypoints, ReducedMesh

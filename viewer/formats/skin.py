@@ -27,8 +27,8 @@ from viewer.errors import OutputError, UnsupportedFormatError, counted, printabl
 from viewer.formats._image import load_image, save_image
 from viewer.formats._numbers import LARGEST
 from viewer.formats._save import as_words, save_text
-from viewer.formats._skin_blocks import KEYWORDS
-from viewer.formats._skin_checks import (
+from viewer.formats._skin.blocks import KEYWORDS
+from viewer.formats._skin.checks import (
     check_mesh,
     check_weights,
     checked_influences,
@@ -37,7 +37,7 @@ from viewer.formats._skin_checks import (
     invert_bindings,
     unbound_skin,
 )
-from viewer.formats._skin_sections import Sections, read_sections
+from viewer.formats._skin.sections import Sections, read_sections
 from viewer.formats._source import Source
 from viewer.formats._tolerant import mended_positions
 from viewer.rig.arrays import Bools, Floats, Ints

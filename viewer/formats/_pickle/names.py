@@ -12,7 +12,7 @@ from typing import TypeGuard
 
 from viewer.errors import printable
 from viewer.formats._archive import Opaque
-from viewer.formats._pickle_values import Array, Dtype, Instance, Span, StandIn, is_sizes, noun
+from viewer.formats._pickle.values import Array, Dtype, Instance, Span, StandIn, is_sizes, noun
 
 __all__ = ["as_key", "build", "call", "create", "find"]
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from viewer.errors import FormatError
 from viewer.formats._numbers import parse_numbers, word_begins
-from viewer.formats._obj_lines import Lines, Places, Rows, rows_of
+from viewer.formats._obj.lines import Lines, Places, Rows, rows_of
 from viewer.formats._source import Source, shown
 from viewer.rig.arrays import Bools, Floats
 

@@ -13,9 +13,9 @@ import struct
 from collections.abc import Callable
 from typing import TypeVar
 
-from viewer.formats import _pickle_names as names
-from viewer.formats._pickle_machine import Machine
-from viewer.formats._pickle_values import Span, noun
+from viewer.formats._pickle import names as names
+from viewer.formats._pickle.machine import Machine
+from viewer.formats._pickle.values import Span, noun
 from viewer.formats._source import shown
 
 __all__ = ["run"]

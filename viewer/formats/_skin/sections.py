@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.formats._numbers import to_number
-from viewer.formats._skin_bindings import read_bindings
-from viewer.formats._skin_blocks import KEYWORDS, Block, block_rows, find_block, whole_numbers
-from viewer.formats._skin_material import read_material
-from viewer.formats._skin_mending import mended_rows, mended_weights, whole_corners
-from viewer.formats._skin_weights import read_weights
+from viewer.formats._skin.bindings import read_bindings
+from viewer.formats._skin.blocks import KEYWORDS, Block, block_rows, find_block, whole_numbers
+from viewer.formats._skin.material import read_material
+from viewer.formats._skin.mending import mended_rows, mended_weights, whole_corners
+from viewer.formats._skin.weights import read_weights
 from viewer.formats._source import Source, shown
 from viewer.rig.arrays import Bytes, Floats, Ints
 from viewer.rig.mesh import Material

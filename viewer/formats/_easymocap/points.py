@@ -15,8 +15,8 @@ import numpy as np
 
 from viewer.errors import counted
 from viewer.formats._archive import describe
-from viewer.formats._easymocap_bodies import RowFault, Rows
-from viewer.formats._easymocap_json import MisfitError
+from viewer.formats._easymocap.bodies import RowFault, Rows
+from viewer.formats._easymocap.json_frames import MisfitError
 from viewer.formats._numbers import LARGEST
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.keypoint_layouts import TITLES, joined_layout, keypoint_layout

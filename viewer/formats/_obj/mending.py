@@ -10,8 +10,8 @@ import numpy as np
 from viewer.errors import FormatError
 from viewer.formats._faults import Part
 from viewer.formats._numbers import parse_words, word_begins
-from viewer.formats._obj_faces import CORNER, CORNER_KINDS, FEWEST, FaceRows, fits_corner
-from viewer.formats._obj_lines import Lines, Places, Rows, rows_of
+from viewer.formats._obj.faces import CORNER, CORNER_KINDS, FEWEST, FaceRows, fits_corner
+from viewer.formats._obj.lines import Lines, Places, Rows, rows_of
 from viewer.formats._polygons import first_known, triangles_of
 from viewer.formats._source import Source, shown
 from viewer.formats._tolerant import Words, refuse_words

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from viewer.errors import counted
 from viewer.formats._numbers import parse_numbers, parse_words
-from viewer.formats._ply_header import Element, Header
+from viewer.formats._ply.header import Element, Header
 from viewer.formats._source import Source, no_number
 
 __all__ = ["Table", "read_tables"]

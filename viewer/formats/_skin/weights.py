@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.errors import FormatError
-from viewer.formats._skin_blocks import Block, block_numbers, opened, to_whole, word_at
+from viewer.formats._skin.blocks import Block, block_numbers, opened, to_whole, word_at
 from viewer.formats._source import Source, shown
 from viewer.formats._tolerant import read_words
 from viewer.rig.arrays import Floats, Ints

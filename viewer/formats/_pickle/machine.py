@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 
 from viewer.errors import FormatError
-from viewer.formats._pickle_values import Span
+from viewer.formats._pickle.values import Span
 from viewer.formats._source import Source, shown
 
 __all__ = ["Machine"]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from viewer.errors import FormatError, printable
 from viewer.formats._archive import Opaque, Sparse, Value
-from viewer.formats._pickle_values import Array, Dtype, Instance, Span, StandIn, is_sizes
+from viewer.formats._pickle.values import Array, Dtype, Instance, Span, StandIn, is_sizes
 from viewer.rig.arrays import Deferred
 
 __all__ = ["resolve"]

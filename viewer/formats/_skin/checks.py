@@ -6,8 +6,8 @@ import numpy as np
 
 from viewer.errors import FormatError, counted
 from viewer.formats._numbers import LARGEST
-from viewer.formats._skin_mending import LOST
-from viewer.formats._skin_sections import Sections, check_declared
+from viewer.formats._skin.mending import LOST
+from viewer.formats._skin.sections import Sections, check_declared
 from viewer.formats._source import Source
 from viewer.formats._tolerant import mended_corners
 from viewer.rig.arrays import Floats, Ints

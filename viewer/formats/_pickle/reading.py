@@ -17,10 +17,10 @@ from __future__ import annotations
 
 from viewer.errors import counted, printable
 from viewer.formats._archive import Archive, Value
-from viewer.formats._pickle_machine import Machine
-from viewer.formats._pickle_resolve import resolve
-from viewer.formats._pickle_steps import run
-from viewer.formats._pickle_values import noun
+from viewer.formats._pickle.machine import Machine
+from viewer.formats._pickle.resolving import resolve
+from viewer.formats._pickle.steps import run
+from viewer.formats._pickle.values import noun
 from viewer.formats._source import Source
 
 __all__ = ["open_pickle"]

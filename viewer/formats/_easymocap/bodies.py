@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from viewer.formats._easymocap_json import MisfitError, has_numbers, row_of, take_row
-from viewer.formats._easymocap_shapes import COEFFICIENTS, carry, last_given
+from viewer.formats._easymocap.json_frames import MisfitError, has_numbers, row_of, take_row
+from viewer.formats._easymocap.shapes import COEFFICIENTS, carry, last_given
 from viewer.formats._numbers import LARGEST
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.motion.body_motion import BodyMotion

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.formats._faults import Part
-from viewer.formats._skin_blocks import KEYWORDS, Block, block_rows, to_whole, unclosed
-from viewer.formats._skin_weights import find_heads, read_weights
+from viewer.formats._skin.blocks import KEYWORDS, Block, block_rows, to_whole, unclosed
+from viewer.formats._skin.weights import find_heads, read_weights
 from viewer.formats._source import Source, shown
 from viewer.formats._tolerant import Words, read_words, refuse_words
 from viewer.rig.arrays import Floats, Ints

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from viewer.errors import counted
-from viewer.formats._obj_faces import CORNER_KINDS, FaceRows, read_faces
-from viewer.formats._obj_lines import KEYWORDS, Lines, Places, Rows, number_rows, pieces
-from viewer.formats._obj_mending import mended_faces, mended_rows, settled_corners
+from viewer.formats._obj.faces import CORNER_KINDS, FaceRows, read_faces
+from viewer.formats._obj.lines import KEYWORDS, Lines, Places, Rows, number_rows, pieces
+from viewer.formats._obj.mending import mended_faces, mended_rows, settled_corners
 from viewer.formats._source import Source, shown
 from viewer.rig.arrays import Floats
 

@@ -7,7 +7,7 @@ import re
 import numpy as np
 
 from viewer.errors import counted
-from viewer.formats._skin_blocks import Block, block_numbers, find_block, opened
+from viewer.formats._skin.blocks import Block, block_numbers, find_block, opened
 from viewer.formats._source import Source, shown
 from viewer.formats._tolerant import read_words, refuse_words
 from viewer.rig.arrays import Floats

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from viewer.errors import FormatError, printable
-from viewer.formats._easymocap_bodies import (
+from viewer.formats._easymocap.bodies import (
     BodyLayout,
     BodyRows,
     RowFault,
@@ -16,16 +16,16 @@ from viewer.formats._easymocap_bodies import (
     body_layout,
     with_coefficients,
 )
-from viewer.formats._easymocap_files import FrameFiles, FrameFolder
-from viewer.formats._easymocap_json import (
+from viewer.formats._easymocap.files import FrameFiles, FrameFolder
+from viewer.formats._easymocap.json_frames import (
     MisfitError,
     has_numbers,
     load_people,
     person_of,
     record_line,
 )
-from viewer.formats._easymocap_points import KEY, Parts, PointRows, point_layout
-from viewer.formats._easymocap_shapes import COEFFICIENTS
+from viewer.formats._easymocap.points import KEY, Parts, PointRows, point_layout
+from viewer.formats._easymocap.shapes import COEFFICIENTS
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.capture import CapturePart
 from viewer.rig.captures.person import is_tracked, person_label
