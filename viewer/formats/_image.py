@@ -1,4 +1,4 @@
-"""Read and write pictures; Pillow is imported only when there is one."""
+"""Decode and write pictures; Pillow is imported only when there is one."""
 
 from __future__ import annotations
 
@@ -11,59 +11,17 @@ import numpy as np
 
 from viewer.errors import FormatError, OutputError, printable
 from viewer.formats._png import encode_png
-from viewer.formats._references import referenced_path
 from viewer.formats._save import save_bytes
-from viewer.formats._source import Source, read_bytes
 from viewer.rig.arrays import Bytes
 
 if TYPE_CHECKING:
     from PIL import Image
 
-__all__ = ["encode_png", "is_picture", "load_image", "read_picture", "save_image"]
+__all__ = ["decode_picture", "encode_png", "is_picture", "save_image"]
 
 _MAX_PIXELS = 16384 * 16384
 _REFUSALS = (OSError, ValueError, SyntaxError, MemoryError, Warning)  # what Pillow raises
 _FORMATS = ("PNG", "JPEG", "BMP", "TGA", "TIFF", "GIF", "WEBP", "PPM")
-
-
-def load_image(source: Source, name: str, offset: int) -> Bytes | None:
-    """Return a texture's pixels, or None with a warning that gives its path as resolved.
-
-    Parameters
-    ----------
-    source : Source
-        The file that names the picture.
-    name : str
-        The picture, which must lie below that file's folder, see ``referenced_path``.
-    offset : int
-        Where the name is in the file.
-
-    Returns
-    -------
-    (H, W, 4) uint8 or None
-        sRGB with alpha, first row at the top.
-    """
-    path = referenced_path(source.path.parent, name)
-    if path is None:
-        source.warn(f"texture {printable(name)} lies outside the folder: not read", offset)
-        return None
-    source.also_read.append(path)
-    try:
-        return _decode(path, read_bytes(path))
-    except FormatError as problem:
-        source.warn(f"texture {problem}; drawn untextured", offset)
-        return None
-
-
-def read_picture(source: Source) -> Bytes:
-    """Return the pixels of a picture file: (H, W, 4) uint8, first row at the top.
-
-    Raises
-    ------
-    FormatError
-        If it is no picture that can be read.
-    """
-    return _decode(source.path, source.data)
 
 
 def is_picture(head: bytes) -> bool:
@@ -73,7 +31,21 @@ def is_picture(head: bytes) -> bool:
     )
 
 
-def _decode(path: Path, data: bytes) -> Bytes:
+def decode_picture(path: Path, data: bytes) -> Bytes:
+    """Return the pixels of a picture: (H, W, 4) uint8, first row at the top.
+
+    Parameters
+    ----------
+    path : Path
+        Named in errors.
+    data : bytes
+        The file.
+
+    Raises
+    ------
+    FormatError
+        If it is no picture that can be read.
+    """
     from PIL import Image, UnidentifiedImageError
 
     try:

@@ -17,13 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.errors import counted, printable
-from viewer.formats._image import load_image
 from viewer.formats._numbers import LARGEST
 from viewer.formats._ply.header import Header, read_header
 from viewer.formats._ply.rows import Table, read_tables
 from viewer.formats._polygons import first_known, triangles_of, triangulate
 from viewer.formats._source import Source
 from viewer.formats._surface import filled_normals, polygon_text, stated_unit, stated_up
+from viewer.formats._texture import load_image
 from viewer.formats._tolerant import mended_positions
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure

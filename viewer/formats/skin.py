@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 
 from viewer.errors import OutputError, UnsupportedFormatError, counted, printable
-from viewer.formats._image import load_image, save_image
+from viewer.formats._image import save_image
 from viewer.formats._numbers import LARGEST
 from viewer.formats._save import as_words, save_text
 from viewer.formats._skin.blocks import KEYWORDS
@@ -39,6 +39,7 @@ from viewer.formats._skin.checks import (
 )
 from viewer.formats._skin.sections import Sections, read_sections
 from viewer.formats._source import Source
+from viewer.formats._texture import load_image
 from viewer.formats._tolerant import mended_positions
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure

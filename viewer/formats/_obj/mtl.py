@@ -11,9 +11,9 @@ Colours and other maps are not shown. An option is a word that begins with ``-``
 from __future__ import annotations
 
 from viewer.errors import FormatError, counted, printable
-from viewer.formats._image import load_image
 from viewer.formats._references import referenced_path
 from viewer.formats._source import Source
+from viewer.formats._texture import load_image
 from viewer.rig.arrays import Bytes
 from viewer.rig.mesh import Material
 

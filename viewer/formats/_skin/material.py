@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Container
 
-from viewer.formats._image import load_image
 from viewer.formats._numbers import is_number
 from viewer.formats._source import Source, shown
+from viewer.formats._texture import load_image
 from viewer.rig.arrays import Bytes
 from viewer.rig.mesh import Material
 

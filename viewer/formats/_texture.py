@@ -1,0 +1,51 @@
+"""Pictures that files name as textures, and picture files themselves."""
+
+from __future__ import annotations
+
+from viewer.errors import FormatError, printable
+from viewer.formats._image import decode_picture
+from viewer.formats._references import referenced_path
+from viewer.formats._source import Source, read_bytes
+from viewer.rig.arrays import Bytes
+
+__all__ = ["load_image", "read_picture"]
+
+
+def load_image(source: Source, name: str, offset: int) -> Bytes | None:
+    """Return a texture's pixels, or None with a warning that gives its path as resolved.
+
+    Parameters
+    ----------
+    source : Source
+        The file that names the picture.
+    name : str
+        The picture, which must lie below that file's folder, see ``referenced_path``.
+    offset : int
+        Where the name is in the file.
+
+    Returns
+    -------
+    (H, W, 4) uint8 or None
+        sRGB with alpha, first row at the top.
+    """
+    path = referenced_path(source.path.parent, name)
+    if path is None:
+        source.warn(f"texture {printable(name)} lies outside the folder: not read", offset)
+        return None
+    source.also_read.append(path)
+    try:
+        return decode_picture(path, read_bytes(path))
+    except FormatError as problem:
+        source.warn(f"texture {problem}; drawn untextured", offset)
+        return None
+
+
+def read_picture(source: Source) -> Bytes:
+    """Return the pixels of a picture file: (H, W, 4) uint8, first row at the top.
+
+    Raises
+    ------
+    FormatError
+        If it is no picture that can be read.
+    """
+    return decode_picture(source.path, source.data)
