@@ -16,9 +16,19 @@ SOURCES = sorted(PACKAGE.rglob("*.py"))
 ALLOWED = {
     "rig": {"rig", "errors", "near_names"},
     "autorig": {"autorig", "rig", "errors", "near_names"},
-    "formats": {"formats", "rig", "errors", "interrupts", "near_names", "streams"},
+    "media": {"media", "rig", "errors", "interrupts", "streams"},
+    "formats": {"formats", "media", "rig", "errors", "interrupts", "near_names", "streams"},
     "rendering": {"rendering", "rig", "errors", "interrupts", "near_names", "resources"},
-    "export": {"autorig", "export", "formats", "rig", "errors", "interrupts", "near_names"},
+    "export": {
+        "autorig",
+        "export",
+        "formats",
+        "media",
+        "rig",
+        "errors",
+        "interrupts",
+        "near_names",
+    },
     "loading": {"loading", "formats", "rig", "errors", "near_names", "resources"},
     "app": {
         "app",
@@ -27,6 +37,7 @@ ALLOWED = {
         "formats",
         "lint",
         "loading",
+        "media",
         "models",
         "rendering",
         "rig",
@@ -49,8 +60,8 @@ HOMES = {
     "pyrr": {"rendering/camera.py"},
     "glfw": {"app"},
     "imgui_bundle": {"app"},
-    "PIL": {"formats/_image.py", "rendering/legend_picture.py", "rendering/lettering.py"},
-    "av": {"formats/_video.py"},
+    "PIL": {"media/image.py", "rendering/legend_picture.py", "rendering/lettering.py"},
+    "av": {"media/video.py"},
 }
 
 

@@ -219,7 +219,7 @@ def test_terminal_without_unicode_is_no_fault(tmp_path):
 def test_signal_while_writing_leaves_no_file(rig, tmp_path, number, code):
     # The program stops itself at the moment when the temporary file is complete.
     program = (
-        "import os, sys, viewer.formats._save, viewer.cli\n"
+        "import os, sys, viewer.media.saving, viewer.cli\n"
         f"os.fsync = lambda handle: os.kill(os.getpid(), {int(number)})\n"
         "sys.exit(viewer.cli.run(sys.argv[1:]))\n"
     )
@@ -238,7 +238,7 @@ def test_sigterm_ends_a_program_that_waits(rig, tmp_path):
     os.mkfifo(pipe)
     # It waits for a reader of the pipe, or is just about to.
     program = (
-        "import os, sys, threading, viewer.formats._save as save, viewer.cli\n"
+        "import os, sys, threading, viewer.media.saving as save, viewer.cli\n"
         "write = save._write_through\n"
         "def waiting(*given):\n"
         "    threading.Timer(0.5, os.kill, [os.getpid(), 15]).start()\n"

@@ -150,9 +150,9 @@ def test_signal_while_moderngl_calls_python_is_no_crash(end, number, helper, kin
         "import viewer.rendering.recorder as r\nafter(r._Drawer, '_draw', 2)",
         "import viewer.rendering.recorder as r\nbefore(r._Drawer, 'release')\n"
         "def fail(*_): strike()\nr.pose_scene = fail",
-        "import viewer.formats._video as v\nafter(v.VideoSink, 'write')",
+        "import viewer.media.video as v\nafter(v.VideoSink, 'write')",
         # In the encoder's thread; the handler runs in the main one, which must have its turn.
-        "import viewer.formats._video as v, viewer.interrupts as i\n"
+        "import viewer.media.video as v, viewer.interrupts as i\n"
         "old = v.VideoSink.close\n"
         "def close(sink):\n"
         "    strike()\n"

@@ -13,8 +13,8 @@ from formats.pig_text import write as write_pig
 
 from viewer.cli import run
 from viewer.formats import file_stem
-from viewer.formats._opened_names import folder_name, opened_text
 from viewer.loading import MotionSettings, bundled_files, load
+from viewer.media.file_names import folder_name, opened_text
 from viewer.rig.scene import Actor, free_title
 
 BVH = """HIERARCHY

@@ -12,7 +12,7 @@ from app.tiny import write_rig
 
 from viewer.errors import OutputError
 from viewer.formats import all_or_none, save_bytes
-from viewer.formats._save import Replacement
+from viewer.media.saving import Replacement
 from viewer.streams import is_stdout, standard_streams
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -15,7 +15,7 @@ import numpy as np
 from measure import interleaved
 
 import viewer
-from viewer.formats._video import VideoSink
+from viewer.media.video import VideoSink
 from viewer.rendering.framing import frame_motion
 from viewer.rendering.offscreen import Offscreen, default_camera
 from viewer.rendering.recorder import Recording, Sink, record

@@ -11,7 +11,7 @@ import pytest
 from commands.writing_runs import Inputs, contents, converting, drawing, into, write_inputs
 
 from viewer.cli import run
-from viewer.formats import _save
+from viewer.media import saving as _save
 
 CONVERTING = [*converting(Inputs()), "people as a folder"]
 PICTURES = [case for case in drawing(Inputs()) if not case.startswith("v.")]

@@ -16,7 +16,8 @@ from seamed import OTHER_PICTURE, PICTURE, seamed_actor, seamed_mesh
 from viewer.cli import run
 from viewer.errors import OutputError
 from viewer.export import EXPORTERS, export
-from viewer.formats import _save, all_or_none, save_text
+from viewer.formats import all_or_none, save_text
+from viewer.media import saving as _save
 
 SUFFIXES = [kind.suffixes[0] for kind in EXPORTERS.values() if kind.writes_pose]
 # Files that each one writes for the figure below, which has two pictures.

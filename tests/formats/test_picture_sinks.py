@@ -7,8 +7,8 @@ import pytest
 from PIL import Image
 
 from viewer.errors import OutputError, ViewerError
-from viewer.formats._digits import digits, write_number
-from viewer.formats._picture_sinks import PictureSink, SheetSink, sheet_layout
+from viewer.media.digits import digits, write_number
+from viewer.media.picture_sinks import PictureSink, SheetSink, sheet_layout
 
 
 def plain(color, size=(40, 30)):

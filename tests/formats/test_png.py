@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from viewer.formats._png import encode_png
+from viewer.media.png import encode_png
 
 
 def noise(height: int, width: int, seed: int) -> np.ndarray:

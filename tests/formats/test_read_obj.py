@@ -8,7 +8,7 @@ import pytest
 import viewer
 from viewer.errors import FormatError
 from viewer.formats import Source, detect, obj
-from viewer.formats._png import encode_png
+from viewer.media.png import encode_png
 from viewer.rig.mesh import triangle_areas, volume
 
 SQUARE = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\n"

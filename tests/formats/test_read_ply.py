@@ -8,7 +8,7 @@ import pytest
 import viewer
 from viewer.errors import FormatError
 from viewer.formats import Source, detect, ply
-from viewer.formats._png import encode_png
+from viewer.media.png import encode_png
 
 VERTEX = "element vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
 FACE = "element face 2\nproperty list uchar int vertex_indices\n"

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from viewer.errors import OutputError
-from viewer.formats import _save
-from viewer.formats._save import as_words, save_bytes, save_text
+from viewer.media import saving as _save
+from viewer.media.saving import as_words, save_bytes, save_text
 
 
 def refused(path, data=b"new"):

@@ -9,7 +9,7 @@ import pytest
 
 from viewer.errors import OutputError
 from viewer.formats import check_folder_target, check_targets
-from viewer.formats._save import free_path
+from viewer.media.saving import free_path
 
 
 def refused(files, inputs=(), force=False, check=check_targets) -> str:

@@ -3,8 +3,8 @@
 import pytest
 
 from viewer.formats import save_bytes
-from viewer.formats._save import Replacement
-from viewer.formats._unfinished import remove_unfinished
+from viewer.media.saving import Replacement
+from viewer.media.unfinished import remove_unfinished
 
 
 def test_what_is_finished_stays_and_what_is_not_goes(tmp_path):

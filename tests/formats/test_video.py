@@ -14,9 +14,9 @@ import pytest
 from PIL import Image
 
 from viewer.errors import OutputError, UnsupportedFormatError, ViewerError
-from viewer.formats import _video_kinds
-from viewer.formats._video import VideoSink
-from viewer.formats._video_kinds import video_kind
+from viewer.media import video_kinds as _video_kinds
+from viewer.media.video import VideoSink
+from viewer.media.video_kinds import video_kind
 
 av = pytest.importorskip("av")
 ROOT = Path(__file__).resolve().parents[2]
@@ -376,7 +376,7 @@ import resource, sys
 import numpy as np
 from pathlib import Path
 from viewer.errors import OutputError
-from viewer.formats._video import VideoSink
+from viewer.media.video import VideoSink
 
 def write(path):
     sink = VideoSink(path, (320, 240), 25.0)

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from viewer.errors import OutputError
-from viewer.formats._video import VideoSink
-from viewer.formats._video_file import VideoFile
+from viewer.media.video import VideoSink
+from viewer.media.video_file import VideoFile
 
 pytest.importorskip("av")
 ROOT = Path(__file__).resolve().parents[2]

@@ -13,7 +13,7 @@ import sys
 from typing import Any
 
 from viewer.errors import RenderError
-from viewer.formats._unfinished import remove_unfinished
+from viewer.media.unfinished import remove_unfinished
 
 __all__ = ["DisplayLoss"]
 

@@ -17,7 +17,7 @@ from viewer.app.recorded_marks import RecordedMarks
 from viewer.app.state import AppState
 from viewer.errors import OutputError, printable
 from viewer.formats import check_targets
-from viewer.formats._video_kinds import MOST_GIF_RATE
+from viewer.media.video_kinds import MOST_GIF_RATE
 from viewer.rendering.ghost_pass import Ghost
 from viewer.rendering.recorder import Follow, Recording, Sink, record
 from viewer.rendering.renderer import Renderer
@@ -159,14 +159,14 @@ def _sink(
 ) -> tuple[Sink, tuple[int, int]]:
     """Return where frames go, and their size."""
     if settings.kind == "pictures":
-        from viewer.formats._picture_sinks import PictureSink
+        from viewer.media.picture_sinks import PictureSink
 
         return PictureSink(files), size
     if settings.kind == "sheet":
-        from viewer.formats._picture_sinks import SheetSink
+        from viewer.media.picture_sinks import SheetSink
 
         sheet = SheetSink(files[0], size, numbers)
         return sheet, sheet.cell
-    from viewer.formats._video import VideoSink
+    from viewer.media.video import VideoSink
 
     return VideoSink(files[0], size, rate, settings.quality, settings.transparent), size

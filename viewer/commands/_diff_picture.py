@@ -72,7 +72,7 @@ def save_heat(heats: Sequence[Heat], output: Path, skinning: Skinning) -> str:
     OutputError
         If it cannot be written.
     """
-    from viewer.formats._picture_sinks import SheetSink
+    from viewer.media.picture_sinks import SheetSink
     from viewer.rendering.offscreen import render
 
     if not heats:

@@ -19,13 +19,13 @@ from viewer.commands._shots import Shots, Turntable, parse_turntable, shots_of
 from viewer.commands._view import camera_of
 from viewer.errors import UnsupportedFormatError, ViewerError, printable
 from viewer.formats import check_targets
-from viewer.formats._video_kinds import VIDEOS
 from viewer.interrupts import hold, poll
+from viewer.media.video_kinds import VIDEOS
 from viewer.rig.scene import Scene
 
 if TYPE_CHECKING:
-    from viewer.formats._picture_sinks import PictureSink, SheetSink
-    from viewer.formats._video import VideoSink
+    from viewer.media.picture_sinks import PictureSink, SheetSink
+    from viewer.media.video import VideoSink
     from viewer.rendering.options import DisplayOptions
     from viewer.rendering.recorder import Recording
 
@@ -237,12 +237,12 @@ def _sink(
     size: tuple[int, int],
 ) -> PictureSink | SheetSink | VideoSink:
     if request.kind == "video":
-        from viewer.formats._video import VideoSink
+        from viewer.media.video import VideoSink
 
         quality = 75.0 if arguments.quality is None else arguments.quality
         is_transparent = options.background == "transparent"
         return VideoSink(outputs[0], size, shots.rate, quality, is_transparent)
-    from viewer.formats._picture_sinks import PictureSink, SheetSink
+    from viewer.media.picture_sinks import PictureSink, SheetSink
 
     if request.kind == "sheet":
         return SheetSink(outputs[0], size, shots.numbers)

@@ -12,7 +12,7 @@ import numpy as np
 
 from viewer.commands._frame_numbers import Numbering, numbering_of
 from viewer.errors import ViewerError, printable
-from viewer.formats._video_kinds import MOST_GIF_RATE
+from viewer.media.video_kinds import MOST_GIF_RATE
 from viewer.rig.arrays import Floats
 from viewer.rig.scene import Scene
 

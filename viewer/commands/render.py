@@ -28,8 +28,8 @@ from viewer.commands._view import (
 )
 from viewer.errors import UnsupportedFormatError, ViewerError, printable
 from viewer.formats import check_targets
-from viewer.formats._video_kinds import VIDEOS
 from viewer.interrupts import deferred
+from viewer.media.video_kinds import VIDEOS
 from viewer.rendering.camera import Camera
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.arrays import Bytes, Floats

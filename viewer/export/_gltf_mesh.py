@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from viewer.export._gltf_document import INDICES, VERTICES, Document, text_of
 from viewer.export._gltf_shape import Shape
 from viewer.export._gltf_skin import Influences, influence_sets
-from viewer.formats._image import encode_png
+from viewer.media.image import encode_png
 from viewer.rig.arrays import Bytes, Floats, Ints
 from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.geometry.vectors import unit

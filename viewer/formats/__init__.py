@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING
 
 from viewer.errors import FormatError, UnsupportedFormatError, printable
 from viewer.formats._faults import Fault
-from viewer.formats._image import is_picture, save_image
-from viewer.formats._opened_names import file_stem, folder_name, opened_text
 from viewer.formats._references import referenced_path
-from viewer.formats._save import (
+from viewer.formats._source import MAX_SIZE, Source
+from viewer.formats._texture import read_picture
+from viewer.media.file_names import file_stem, folder_name, opened_text
+from viewer.media.image import is_picture, save_image
+from viewer.media.saving import (
     all_or_none,
     free_path,
     keeping_written,
@@ -22,9 +24,7 @@ from viewer.formats._save import (
     save_bytes,
     save_text,
 )
-from viewer.formats._source import MAX_SIZE, Source
-from viewer.formats._targets import check_folder_target, check_targets
-from viewer.formats._texture import read_picture
+from viewer.media.targets import check_folder_target, check_targets
 
 if TYPE_CHECKING:
     from viewer.formats._archive import Archive

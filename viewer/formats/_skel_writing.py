@@ -8,7 +8,7 @@ import numpy as np
 
 from viewer.errors import UnsupportedFormatError, printable
 from viewer.formats._numbers import LARGEST
-from viewer.formats._save import as_words, save_text
+from viewer.media.saving import as_words, save_text
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.skeleton import Skeleton, joint_label

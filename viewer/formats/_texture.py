@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from viewer.errors import FormatError, printable
-from viewer.formats._image import decode_picture
 from viewer.formats._references import referenced_path
 from viewer.formats._source import Source, read_bytes
+from viewer.media.image import decode_picture
 from viewer.rig.arrays import Bytes
 
 __all__ = ["load_image", "read_picture"]

@@ -22,8 +22,8 @@ import numpy as np
 
 from viewer.errors import FormatError, UnsupportedFormatError
 from viewer.formats._numbers import to_number
-from viewer.formats._save import save_text
 from viewer.formats._source import Source, no_number, shown
+from viewer.media.saving import save_text
 from viewer.rig.figure import Figure
 from viewer.rig.motion.clip import (
     EXTRAPOLATIONS,

@@ -22,8 +22,8 @@ from viewer.errors import FormatError
 from viewer.formats._easymocap.cameras import find_cameras
 from viewer.formats._easymocap.files import find_frames
 from viewer.formats._easymocap.reading import Options, Reading
-from viewer.formats._opened_names import folder_name
 from viewer.formats._source import Source
+from viewer.media.file_names import folder_name
 from viewer.rig.captures.capture import Capture
 
 __all__ = ["open_capture", "read"]

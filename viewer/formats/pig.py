@@ -21,11 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.errors import FormatError, counted
-from viewer.formats._opened_names import folder_name
 from viewer.formats._pig.names import JOINTS, KEYPOINTS
 from viewer.formats._pig.parts import Part, PigFiles, open_parts
 from viewer.formats._source import Source
 from viewer.formats._tolerant import mended_corners, mended_positions
+from viewer.media.file_names import folder_name
 from viewer.rig.annotations import BodyParts, Keypoints, ReducedMesh
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.blendshapes import JointRegressor, regress_joints

@@ -35,9 +35,9 @@ from viewer.formats._archive import describe
 from viewer.formats._container import archive_of
 from viewer.formats._named_values import NamedValues, described, parse_json
 from viewer.formats._pose_turns import KEYS, named_turns, read_turns
-from viewer.formats._save import save_arrays, save_text
 from viewer.formats._source import Source
 from viewer.formats._table import read_numbers
+from viewer.media.saving import save_arrays, save_text
 from viewer.near_names import did_you_mean, near_names, question
 from viewer.rig.arrays import Deferred, Floats
 from viewer.rig.figure import Figure

@@ -33,9 +33,9 @@ from viewer.errors import RigError
 from viewer.formats._archive import Archive
 from viewer.formats._container import archive_of, corners_of, finite
 from viewer.formats._faults import Part
-from viewer.formats._save import save_arrays
 from viewer.formats._source import Source
 from viewer.formats._tolerant import mended_positions
+from viewer.media.saving import save_arrays
 from viewer.rig.annotations import VertexField
 from viewer.rig.arrays import Deferred, Floats
 from viewer.rig.blendshapes import Correctives

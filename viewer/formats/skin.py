@@ -24,9 +24,7 @@ from pathlib import Path
 import numpy as np
 
 from viewer.errors import OutputError, UnsupportedFormatError, counted, printable
-from viewer.formats._image import save_image
 from viewer.formats._numbers import LARGEST
-from viewer.formats._save import as_words, save_text
 from viewer.formats._skin.blocks import KEYWORDS
 from viewer.formats._skin.checks import (
     check_mesh,
@@ -41,6 +39,8 @@ from viewer.formats._skin.sections import Sections, read_sections
 from viewer.formats._source import Source
 from viewer.formats._texture import load_image
 from viewer.formats._tolerant import mended_positions
+from viewer.media.image import save_image
+from viewer.media.saving import as_words, save_text
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Material, Mesh, vertex_normals

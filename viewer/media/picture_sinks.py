@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from viewer.errors import ViewerError
-from viewer.formats._digits import write_number
-from viewer.formats._image import save_image
+from viewer.media.digits import write_number
+from viewer.media.image import save_image
 from viewer.rig.arrays import Bytes
 
 __all__ = ["PictureSink", "SheetSink", "sheet_layout"]

@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from viewer.errors import OutputError, ViewerError, printable
-from viewer.formats._gif_palette import PaletteChooser, PaletteUser
-from viewer.formats._save import Replacement
-from viewer.formats._video_file import VideoFile
-from viewer.formats._video_kinds import MOST_GIF_RATE, VideoKind, video_kind
+from viewer.media.gif_palette import PaletteChooser, PaletteUser
+from viewer.media.saving import Replacement
+from viewer.media.video_file import VideoFile
+from viewer.media.video_kinds import MOST_GIF_RATE, VideoKind, video_kind
 from viewer.rig.arrays import Bytes
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from viewer.errors import FormatError, OutputError, printable
-from viewer.formats._png import encode_png
-from viewer.formats._save import save_bytes
+from viewer.media.png import encode_png
+from viewer.media.saving import save_bytes
 from viewer.rig.arrays import Bytes
 
 if TYPE_CHECKING:

@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.errors import OutputError, printable
-from viewer.formats._opened_names import file_stem
-from viewer.formats._unfinished import note_unfinished
 from viewer.interrupts import hold, poll, raising
+from viewer.media.file_names import file_stem
+from viewer.media.unfinished import note_unfinished
 from viewer.streams import is_stdout, write_stdout
 
 __all__ = [
