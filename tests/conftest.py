@@ -63,7 +63,7 @@ def own_settings(tmp_path_factory, monkeypatch) -> None:
 @pytest.fixture(scope="session")
 def gl_framebuffer() -> Iterator[moderngl.Framebuffer]:
     """A framebuffer of a context without a window, for all tests; use ``ctx``, which checks it."""
-    from viewer.rendering.context import headless_context
+    from viewer.rendering.gpu.context import headless_context
 
     context = headless_context()
     framebuffer = context.simple_framebuffer((4, 4))

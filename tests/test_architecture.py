@@ -60,7 +60,11 @@ HOMES = {
     "pyrr": {"rendering/camera.py"},
     "glfw": {"app"},
     "imgui_bundle": {"app"},
-    "PIL": {"media/image.py", "rendering/legend_picture.py", "rendering/lettering.py"},
+    "PIL": {
+        "media/image.py",
+        "rendering/overlay/legend_picture.py",
+        "rendering/overlay/lettering.py",
+    },
     "av": {"media/video.py"},
 }
 

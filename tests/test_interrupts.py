@@ -125,7 +125,7 @@ INFO = ("info",), {}
         "viewer.formats.skin",
         "viewer.rendering.offscreen",
         "moderngl",
-        "viewer.rendering.program",
+        "viewer.rendering.gpu.program",
     ],
 )
 def test_import_that_is_interrupted_ends_in_one_line(end, module):

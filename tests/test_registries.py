@@ -10,7 +10,7 @@ from viewer.app.panels import PANELS
 from viewer.commands import COMMANDS
 from viewer.export import EXPORTERS
 from viewer.formats import FORMATS
-from viewer.rendering.program import SHADING
+from viewer.rendering.gpu.program import SHADING
 from viewer.resources import resource
 from viewer.rig.skinning import METHODS
 

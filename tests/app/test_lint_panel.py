@@ -15,7 +15,7 @@ from viewer.app.lint_actions import check_rig, start_check
 from viewer.app.lint_marks import marks_of
 from viewer.lint import CODES, Places, describe, lint_scene
 from viewer.rendering.camera import camera_axes
-from viewer.rendering.marks import MARK_COLOR
+from viewer.rendering.overlay.marks import MARK_COLOR
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor, Scene
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 from viewer.rendering.camera import VIEWS
+from viewer.rendering.gpu.program import SHADING
 from viewer.rendering.options import SHOWN, Lights
-from viewer.rendering.program import SHADING
 from viewer.rig.scene import Actor
 
 

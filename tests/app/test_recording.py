@@ -10,7 +10,7 @@ from PIL import Image
 from viewer.app.record_dialog import RecordSettings
 from viewer.app.recorded_marks import RecordedMarks
 from viewer.app.weights_actions import pin_vertex, unpin
-from viewer.rendering.joint_marks import HIGHLIGHT
+from viewer.rendering.overlay.joint_marks import HIGHLIGHT
 from viewer.rendering.recorder import copied
 from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.motion.instances import pose_actors

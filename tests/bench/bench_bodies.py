@@ -12,7 +12,7 @@ import viewer
 from viewer.loading import bundled_body
 from viewer.rendering.offscreen import Offscreen, default_camera
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.skin_pass import PosedMesh
+from viewer.rendering.passes.skin_pass import PosedMesh
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor, Scene, scene_box
 from viewer.rig.skinning import Skinning

@@ -18,13 +18,13 @@ from measure import interleaved, median_ratio, report
 
 import viewer
 from viewer.loading import bundled_body
-from viewer.rendering import crowd_pass
-from viewer.rendering.crowd_buffers import CrowdBuffers
-from viewer.rendering.mesh_pass import draw_runs, set_surface
+from viewer.rendering.gpu.instance_buffers import CrowdBuffers
+from viewer.rendering.gpu.program import Programs, set_uniforms
+from viewer.rendering.gpu.upload import as_uniform
 from viewer.rendering.offscreen import Offscreen, default_camera
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.program import Programs, set_uniforms
-from viewer.rendering.upload import as_uniform
+from viewer.rendering.passes import instance_pass as crowd_pass
+from viewer.rendering.passes.mesh_pass import draw_runs, set_surface
 from viewer.rendering.view import View, set_lights, view_of
 from viewer.resources import resource
 from viewer.rig.figure import Figure

@@ -9,11 +9,11 @@ from drawn_figures import random_pose, skeleton, sphere
 
 import viewer
 from viewer.rendering.camera import Camera
-from viewer.rendering.crowd_buffers import CrowdBuffers
-from viewer.rendering.joint_pass import JointPass, SkeletonBuffers
-from viewer.rendering.mesh_buffers import MeshBuffers
-from viewer.rendering.program import Programs
-from viewer.rendering.skin_pass import PosedMesh
+from viewer.rendering.gpu.instance_buffers import CrowdBuffers
+from viewer.rendering.gpu.mesh_buffers import MeshBuffers
+from viewer.rendering.gpu.program import Programs
+from viewer.rendering.passes.joint_pass import JointPass, SkeletonBuffers
+from viewer.rendering.passes.skin_pass import PosedMesh
 from viewer.rendering.view import View
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.vectors import unit

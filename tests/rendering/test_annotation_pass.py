@@ -7,9 +7,9 @@ import pytest
 from drawn_figures import square
 from front_view import PIXELS, drawn, front_view, pixel
 
-from viewer.rendering.annotation import Annotation, Labels
 from viewer.rendering.offscreen import Offscreen
-from viewer.rendering.segments import Manner, dots
+from viewer.rendering.overlay.annotation import Annotation, Labels
+from viewer.rendering.overlay.segments import Manner, dots
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor, Scene
 

@@ -13,9 +13,9 @@ import pytest
 
 from viewer.cli import run
 from viewer.errors import RenderError, ViewerError
-from viewer.rendering.context import check_errors, device_count, explain, headless_context
+from viewer.rendering.gpu.context import check_errors, device_count, explain, headless_context
+from viewer.rendering.gpu.upload import buffer
 from viewer.rendering.offscreen import Offscreen
-from viewer.rendering.upload import buffer
 
 ROOT = Path(__file__).resolve().parents[2]
 LINUX = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="EGL is Linux's way")

@@ -11,15 +11,16 @@ from drawn_figures import arm, bent, checker, random_figure, random_pose
 import viewer
 from viewer.errors import RenderError
 from viewer.loading import bundled_body
-from viewer.rendering import crowd_buffers, crowd_pass
 from viewer.rendering.camera import Camera
-from viewer.rendering.crowd_buffers import CrowdBuffers
-from viewer.rendering.crowd_pass import FEWEST, crowds_of
-from viewer.rendering.mesh_buffers import MeshBuffers
+from viewer.rendering.gpu import instance_buffers as crowd_buffers
+from viewer.rendering.gpu.instance_buffers import CrowdBuffers
+from viewer.rendering.gpu.mesh_buffers import MeshBuffers
+from viewer.rendering.gpu.program import Programs
+from viewer.rendering.gpu.rest_buffers import WAYS
 from viewer.rendering.offscreen import Offscreen, default_camera
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.program import Programs
-from viewer.rendering.rest_buffers import WAYS
+from viewer.rendering.passes import instance_pass as crowd_pass
+from viewer.rendering.passes.instance_pass import FEWEST, crowds_of
 from viewer.rendering.view import View
 from viewer.rig.captures.points import PointLayout
 from viewer.rig.figure import Figure

@@ -9,8 +9,8 @@ import pytest
 from drawn_figures import square
 from front_view import PIXELS, drawn, front_view, pixel
 
-from viewer.rendering.ghost_pass import Ghost
 from viewer.rendering.offscreen import Offscreen
+from viewer.rendering.passes.ghost_pass import Ghost
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.scene import Actor, Scene

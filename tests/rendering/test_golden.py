@@ -18,8 +18,8 @@ from PIL import Image
 
 import viewer
 from viewer.rendering.camera import camera_axes
+from viewer.rendering.gpu.target import Target
 from viewer.rendering.offscreen import Offscreen
-from viewer.rendering.target import Target
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh
 from viewer.rig.scene import Scene, scene_box

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from drawn_figures import sphere
 
-from viewer.rendering.index_sets import curve_places, index_set
+from viewer.rendering.gpu.index_sets import curve_places, index_set
 
 
 def shaded(triangles, kept=32) -> int:

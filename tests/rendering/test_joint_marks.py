@@ -8,7 +8,7 @@ from drawn_figures import skeleton
 from numpy.testing import assert_allclose
 
 from viewer.rendering.camera import Camera
-from viewer.rendering.joint_marks import (
+from viewer.rendering.overlay.joint_marks import (
     HIGHLIGHT,
     axis_segments,
     bone_segments,

@@ -7,11 +7,11 @@ import pytest
 from drawn_figures import skeleton
 from numpy.testing import assert_allclose
 
-from viewer.rendering.annotation import letters_for, place_labels
 from viewer.rendering.camera import Camera
-from viewer.rendering.joint_marks import HIGHLIGHT, marks_of
-from viewer.rendering.joint_names import name_labels
-from viewer.rendering.lettering import Lettering
+from viewer.rendering.overlay.annotation import letters_for, place_labels
+from viewer.rendering.overlay.joint_marks import HIGHLIGHT, marks_of
+from viewer.rendering.overlay.joint_names import name_labels
+from viewer.rendering.overlay.lettering import Lettering
 from viewer.rendering.view import view_of
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor

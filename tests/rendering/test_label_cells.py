@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from viewer.rendering.label_cells import Cells, Dots, spread, summed, sums_within
+from viewer.rendering.overlay.label_cells import Cells, Dots, spread, summed, sums_within
 
 
 def test_cells_count_from_one_and_what_lies_outside_has_its_own():

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from viewer.rendering.label_cells import Cells, Dots
-from viewer.rendering.label_places import (
+from viewer.rendering.overlay.label_cells import Cells, Dots
+from viewer.rendering.overlay.label_places import (
     clear_places,
     crowded,
     crowded_lines,

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from drawn_figures import skeleton
 
-from viewer.rendering.legend import Entry, Shown, legend_of, round_ticks
 from viewer.rendering.options import DisplayOptions
+from viewer.rendering.overlay.legend import Entry, Shown, legend_of, round_ticks
 from viewer.rendering.palettes import NOTHING
 from viewer.rendering.scalar_look import look_of, shown_ends
 from viewer.rig.annotations import BodyParts, VertexField

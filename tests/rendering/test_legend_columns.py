@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from viewer.rendering.legend_columns import LegendColumns, legend_columns
+from viewer.rendering.overlay.legend_columns import LegendColumns, legend_columns
 
 
 def test_nothing_needs_no_column():

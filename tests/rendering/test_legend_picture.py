@@ -10,10 +10,10 @@ from test_legend import legend, strip
 
 from viewer.rendering.camera import Camera, fit
 from viewer.rendering.colormap import colormap
-from viewer.rendering.legend import Entry, Legend
-from viewer.rendering.legend_picture import legend_pixels
 from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
+from viewer.rendering.overlay.legend import Entry, Legend
+from viewer.rendering.overlay.legend_picture import legend_pixels
 from viewer.rig.scene import Actor, Scene, scene_box, scene_points
 
 SIZE = 640, 360

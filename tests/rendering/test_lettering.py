@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.rendering.lettering import Lettering, shelves
+from viewer.rendering.overlay.lettering import Lettering, shelves
 
 
 def test_sizes_are_those_of_the_pixels():

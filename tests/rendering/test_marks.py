@@ -10,9 +10,9 @@ from drawn_figures import square
 from front_view import PIXELS, drawn, front_view, pixel
 
 from viewer.rendering.camera import Camera
-from viewer.rendering.marks import MARK_COLOR, Marks, mark_annotation
 from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
+from viewer.rendering.overlay.marks import MARK_COLOR, Marks, mark_annotation
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor, Scene
 

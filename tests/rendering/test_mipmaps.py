@@ -6,8 +6,8 @@ import moderngl
 import numpy as np
 import pytest
 
-from viewer.rendering import mipmaps
-from viewer.rendering.mipmaps import add_mipmaps, halved_pictures
+from viewer.rendering.gpu import mipmaps
+from viewer.rendering.gpu.mipmaps import add_mipmaps, halved_pictures
 
 SRGB8_ALPHA8 = 0x8C43
 

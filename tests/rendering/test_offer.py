@@ -2,7 +2,7 @@
 
 import pytest
 
-from viewer.rendering.offer import Offer, offer_text
+from viewer.rendering.gpu.offer import Offer, offer_text
 
 MESA = "llvmpipe (LLVM 15.0.6, 256 bits)"
 

@@ -14,13 +14,13 @@ from drawn_figures import arm, bent, checker, scene_of, square
 
 import viewer
 from viewer.errors import RenderError, ViewerError
-from viewer.rendering import target as target_module
 from viewer.rendering.camera import Camera
-from viewer.rendering.context import headless_context
+from viewer.rendering.gpu import target as target_module
+from viewer.rendering.gpu.context import headless_context
+from viewer.rendering.gpu.target import Target, target_bytes
+from viewer.rendering.gpu.upload import matrix_texture, picture_texture
 from viewer.rendering.offscreen import Offscreen, default_camera
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.target import Target, target_bytes
-from viewer.rendering.upload import matrix_texture, picture_texture
 from viewer.rig.scene import Scene, scene_box
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -7,12 +7,12 @@ import pytest
 
 import viewer
 from viewer.errors import RenderError
-from viewer.rendering import upload
-from viewer.rendering.joint_pass import SkeletonBuffers
-from viewer.rendering.mesh_buffers import MeshBuffers
-from viewer.rendering.ownership import Owner
-from viewer.rendering.program import Programs
-from viewer.rendering.skin_pass import PosedMesh
+from viewer.rendering.gpu import upload
+from viewer.rendering.gpu.mesh_buffers import MeshBuffers
+from viewer.rendering.gpu.ownership import Owner
+from viewer.rendering.gpu.program import Programs
+from viewer.rendering.passes.joint_pass import SkeletonBuffers
+from viewer.rendering.passes.skin_pass import PosedMesh
 
 
 class Item:

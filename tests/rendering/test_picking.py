@@ -9,11 +9,11 @@ import pytest
 from drawn_figures import arm, bent, skeleton, square
 from front_view import PIXELS, grid_figure
 
-from viewer.rendering import crowd_pass
 from viewer.rendering.camera import Camera
 from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.skin_pass import PosedMesh
+from viewer.rendering.passes import instance_pass as crowd_pass
+from viewer.rendering.passes.skin_pass import PosedMesh
 from viewer.rig.annotations import Keypoints, ReducedMesh
 from viewer.rig.captures.points import PointLayout
 from viewer.rig.figure import Figure

@@ -10,9 +10,9 @@ from drawn_figures import arm, bent, picture, scene_of, skeleton, sphere, square
 
 from viewer.errors import ViewerError
 from viewer.rendering.camera import Camera
-from viewer.rendering.mesh_pass import SKIN_COLOR
 from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions, Light, Lights
+from viewer.rendering.passes.mesh_pass import SKIN_COLOR
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh
 from viewer.rig.scene import Actor, Scene, scene_box

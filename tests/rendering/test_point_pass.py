@@ -8,7 +8,7 @@ from drawn_figures import square
 from front_view import PIXELS, drawn, front_view, pixel
 
 from viewer.rendering.offscreen import Offscreen
-from viewer.rendering.point_pass import point_radii
+from viewer.rendering.passes.point_pass import point_radii
 from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.figure import Figure
 from viewer.rig.motion.timing import Timing

@@ -7,8 +7,8 @@ import shutil
 import pytest
 
 from viewer.errors import RenderError
-from viewer.rendering import program
-from viewer.rendering.program import SHADING, Programs, set_uniforms
+from viewer.rendering.gpu import program
+from viewer.rendering.gpu.program import SHADING, Programs, set_uniforms
 from viewer.resources import resource
 from viewer.rig.skinning import METHODS
 

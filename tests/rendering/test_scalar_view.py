@@ -12,11 +12,11 @@ from front_view import alone, drawn, front_view, grid_figure, pixel
 
 from viewer.rendering.camera import Camera
 from viewer.rendering.colormap import colormap
-from viewer.rendering.mesh_buffers import MeshBuffers
+from viewer.rendering.gpu.mesh_buffers import MeshBuffers
+from viewer.rendering.gpu.scalar_buffer import ScalarBuffer
 from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.palettes import NOTHING, count_palette, joint_palette
-from viewer.rendering.scalar_buffer import ScalarBuffer
 from viewer.rendering.scalar_views import name_for
 from viewer.rig import scalars
 from viewer.rig.annotations import BodyParts
@@ -139,7 +139,7 @@ def test_numbers_are_computed_when_something_changed_only(buffers, monkeypatch):
         calls.append(parts[0])
         return original(*parts)
 
-    monkeypatch.setattr("viewer.rendering.scalar_buffer.compute", counted)
+    monkeypatch.setattr("viewer.rendering.gpu.scalar_buffer.compute", counted)
     pose, how = posed(buffers.mesh.figure), Skinning()
     for change in (
         lambda: None,

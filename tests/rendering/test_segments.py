@@ -8,9 +8,9 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from viewer.rendering.camera import Camera
-from viewer.rendering.program import Programs
+from viewer.rendering.gpu.program import Programs
+from viewer.rendering.overlay.segments import HIDDEN, Manner, SegmentPass, Segments, dots, joined
 from viewer.rendering.projection import project
-from viewer.rendering.segments import HIDDEN, Manner, SegmentPass, Segments, dots, joined
 from viewer.rendering.view import view_of
 
 SIDE = 80  # pixels; x and y from -2 to 2, so a unit is 20 pixels

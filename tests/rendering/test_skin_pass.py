@@ -11,12 +11,12 @@ from drawn_figures import arm, random_figure, random_pose, square
 
 import viewer
 from viewer.rendering.camera import Camera, orbit
-from viewer.rendering.mesh_buffers import MeshBuffers
+from viewer.rendering.gpu.mesh_buffers import MeshBuffers
+from viewer.rendering.gpu.program import Programs
+from viewer.rendering.gpu.target import Target
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.program import Programs
+from viewer.rendering.passes.skin_pass import PosedMesh
 from viewer.rendering.renderer import Renderer
-from viewer.rendering.skin_pass import PosedMesh
-from viewer.rendering.target import Target
 from viewer.rig.figure import Figure
 from viewer.rig.kinematics import skinning_matrices, world_matrices
 from viewer.rig.mesh import bounding_box, box_size

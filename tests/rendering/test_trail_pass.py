@@ -9,11 +9,11 @@ import pytest
 from drawn_figures import arm, square
 from front_view import drawn, front_view, pixel
 
-from viewer.rendering import trail_pass
 from viewer.rendering.camera import Camera
 from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.trail_pass import trail_colors
+from viewer.rendering.passes import motion_path_pass as trail_pass
+from viewer.rendering.passes.motion_path_pass import trail_colors
 from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.figure import Figure
 from viewer.rig.motion.sampled_clip import SampledClip

@@ -8,8 +8,8 @@ import warnings
 from typing import Any
 
 from viewer.errors import RenderError, ViewerError
-from viewer.rendering.context import explain
-from viewer.rendering.offer import offer_of, offer_text
+from viewer.rendering.gpu.context import explain
+from viewer.rendering.gpu.offer import offer_of, offer_text
 
 __all__ = ["NoDisplay", "find_display", "import_glfw", "is_on_x11", "window_error"]
 

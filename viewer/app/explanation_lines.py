@@ -8,10 +8,10 @@ from imgui_bundle import imgui
 from viewer.app.state import AppState
 from viewer.app.weights_actions import explained, unpin
 from viewer.errors import ViewerError, printable
-from viewer.rendering.annotation import LABEL_COLOR, Annotation, Labels
+from viewer.rendering.overlay.annotation import LABEL_COLOR, Annotation, Labels
+from viewer.rendering.overlay.segments import Manner, Segments, dots, joined
 from viewer.rendering.palettes import joint_palette
 from viewer.rendering.projection import picture_scale, project
-from viewer.rendering.segments import Manner, Segments, dots, joined
 from viewer.rendering.view import view_of
 from viewer.rig.arrays import Bytes, Floats
 from viewer.rig.geometry.transform import apply_transform

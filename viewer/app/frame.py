@@ -34,8 +34,8 @@ from viewer.errors import RenderError, ViewerError, printable
 from viewer.formats import FORMATS, free_path, save_image
 from viewer.loading import Contents, add_to_actor, bundled_body, bundled_files
 from viewer.loading.capturing import Builder
+from viewer.rendering.gpu.target import Target
 from viewer.rendering.renderer import Renderer
-from viewer.rendering.target import Target
 from viewer.rig.arrays import Bytes
 from viewer.rig.scene import Scene
 

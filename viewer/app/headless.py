@@ -9,8 +9,8 @@ from imgui_bundle import imgui, implot
 from viewer.app.frame import Frame
 from viewer.app.state import AppState
 from viewer.app.theme import apply_theme
-from viewer.rendering.context import headless_context
-from viewer.rendering.target import Target
+from viewer.rendering.gpu.context import headless_context
+from viewer.rendering.gpu.target import Target
 from viewer.rig.arrays import Bytes
 
 __all__ = ["HeadlessApp"]

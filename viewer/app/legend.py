@@ -7,8 +7,8 @@ from imgui_bundle import imgui
 from viewer.app.state import AppState
 from viewer.app.widgets import Rect, begin_overlay, overlay_rect
 from viewer.errors import printable
-from viewer.rendering.legend import Entry, Legend
-from viewer.rendering.legend_columns import legend_columns
+from viewer.rendering.overlay.legend import Entry, Legend
+from viewer.rendering.overlay.legend_columns import legend_columns
 
 __all__ = ["draw_legend"]
 

@@ -12,7 +12,7 @@ from viewer.app.state import AppState
 from viewer.errors import ViewerError
 from viewer.lint import Places, places_of, points_of
 from viewer.rendering.camera import Camera, camera_axes
-from viewer.rendering.marks import Marks
+from viewer.rendering.overlay.marks import Marks
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.pose import pose_key

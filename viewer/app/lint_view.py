@@ -11,7 +11,7 @@ from viewer.lint import SEVERITIES, Finding, LintOptions
 if TYPE_CHECKING:
     from viewer.app.jobs import CountedJob
     from viewer.loading import MotionSettings
-    from viewer.rendering.marks import Marks
+    from viewer.rendering.overlay.marks import Marks
     from viewer.rig.scene import Scene
 
 __all__ = ["Checked", "LintView", "Running"]

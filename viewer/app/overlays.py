@@ -19,7 +19,7 @@ from viewer.app.state import AppState
 from viewer.app.toolbar import draw_toolbar
 from viewer.app.widgets import Rect, begin_overlay, button, overlay_rect
 from viewer.errors import printable
-from viewer.rendering.ground_pass import grid_step
+from viewer.rendering.passes.ground_pass import grid_step
 
 __all__ = ["draw_hints", "draw_overlays"]
 

@@ -9,8 +9,8 @@ from viewer.app.explanation_lines import vertex_annotation
 from viewer.app.lint_marks import marks_of
 from viewer.app.state import AppState
 from viewer.lint import Finding, places_of
-from viewer.rendering.annotation import Annotation
-from viewer.rendering.marks import mark_annotation
+from viewer.rendering.overlay.annotation import Annotation
+from viewer.rendering.overlay.marks import mark_annotation
 from viewer.rig.inspection.explanation import explain
 from viewer.rig.scene import Scene
 

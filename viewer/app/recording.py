@@ -18,7 +18,7 @@ from viewer.app.state import AppState
 from viewer.errors import OutputError, printable
 from viewer.formats import check_targets
 from viewer.media.video_kinds import MOST_GIF_RATE
-from viewer.rendering.ghost_pass import Ghost
+from viewer.rendering.passes.ghost_pass import Ghost
 from viewer.rendering.recorder import Follow, Recording, Sink, record
 from viewer.rendering.renderer import Renderer
 from viewer.rig.arrays import Floats

@@ -10,7 +10,7 @@ from viewer.app.state import AppState
 from viewer.autorig.alignment import AlignmentSettings
 from viewer.autorig.similarity import Similarity
 from viewer.rendering.camera import camera_axes
-from viewer.rendering.ghost_pass import Ghost
+from viewer.rendering.passes.ghost_pass import Ghost
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import nearest_rotations

@@ -12,7 +12,7 @@ from viewer.app.rig_sources import refresh
 from viewer.app.rig_view import TOOLS
 from viewer.app.rig_work import start_align, start_reading, take_finished
 from viewer.app.state import AppState
-from viewer.rendering.ghost_pass import Ghost
+from viewer.rendering.passes.ghost_pass import Ghost
 
 __all__ = ["choose_rig_tool", "draw_rig_tools", "drop_rig_tool", "holds_mouse", "show_rig"]
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from viewer.autorig.alignment import Alignment, AlignmentSettings
     from viewer.autorig.rigged import Rigged
     from viewer.autorig.similarity import Similarity
-    from viewer.rendering.ghost_pass import Ghost
+    from viewer.rendering.passes.ghost_pass import Ghost
     from viewer.rig.figure import Figure
     from viewer.rig.geometry.ray_hit import RayHit
     from viewer.rig.pose import Pose

@@ -20,8 +20,8 @@ from viewer.app.posing import Posing
 from viewer.app.rig_view import RigView
 from viewer.app.weights_view import WeightsView
 from viewer.rendering.camera import Camera, front_azimuth, orbit
-from viewer.rendering.legend import Legend
 from viewer.rendering.options import DisplayOptions
+from viewer.rendering.overlay.legend import Legend
 from viewer.rig.arrays import Floats
 from viewer.rig.inspection.front import Front, guess_front
 from viewer.rig.mesh import bounding_box, box_size

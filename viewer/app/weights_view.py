@@ -12,7 +12,7 @@ from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 
 if TYPE_CHECKING:
-    from viewer.rendering.annotation import Annotation
+    from viewer.rendering.overlay.annotation import Annotation
     from viewer.rig.inspection.explanation import Explanation
 
 __all__ = ["Hover", "Pinned", "WeightsView", "wants_vertex"]

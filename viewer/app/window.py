@@ -34,7 +34,7 @@ from viewer.interrupts import hold, poll  # noqa: E402
 from viewer.loading import MotionSettings  # noqa: E402
 from viewer.loading.capturing import Builder  # noqa: E402
 from viewer.rendering.camera import Camera, facing_camera  # noqa: E402
-from viewer.rendering.context import explain  # noqa: E402
+from viewer.rendering.gpu.context import explain  # noqa: E402
 from viewer.rendering.options import DisplayOptions  # noqa: E402
 from viewer.rig.inspection.front import guess_front  # noqa: E402
 from viewer.rig.mesh import bounding_box  # noqa: E402

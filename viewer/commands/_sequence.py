@@ -193,9 +193,9 @@ def draw_sequence(
     OutputError
         If a file is there already, or cannot be written.
     """
+    from viewer.rendering.gpu.target import check_size
     from viewer.rendering.offscreen import Offscreen
     from viewer.rendering.recorder import record
-    from viewer.rendering.target import check_size
 
     shots = shots_of(request, arguments, scene)
     outputs = _outputs(request, shots)

@@ -11,10 +11,10 @@ from viewer.commands._scalar import add_scalar_arguments, scalar_notes, set_scal
 from viewer.errors import ViewerError, printable
 from viewer.near_names import name_hint
 from viewer.rendering.camera import Camera, camera_from_view, facing_camera, fit, front_azimuth
-from viewer.rendering.ground_pass import parse_color
+from viewer.rendering.gpu.program import SHADING
 from viewer.rendering.options import BACKGROUNDS, SHOWN, DisplayOptions
+from viewer.rendering.passes.ground_pass import parse_color
 from viewer.rendering.pinhole import distortion_error
-from viewer.rendering.program import SHADING
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.camera_view import CameraView
 from viewer.rig.inspection.front import FRONTS, Front, front_axes, guess_front

@@ -87,7 +87,7 @@ def _examine_devices() -> Iterator[Finding]:
     """Report every EGL device by itself: `--gpu N` chooses among them."""
     if not sys.platform.startswith("linux"):
         return
-    from viewer.rendering.context import device_count, headless_context, unreadable_devices
+    from viewer.rendering.gpu.context import device_count, headless_context, unreadable_devices
 
     count = device_count()
     for index in range(count):
@@ -104,7 +104,7 @@ def _examine_devices() -> Iterator[Finding]:
 
 
 def _examine_drawing() -> Iterator[Finding]:
-    from viewer.rendering.context import headless_context, is_software
+    from viewer.rendering.gpu.context import headless_context, is_software
 
     try:
         context = headless_context()

@@ -101,7 +101,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _check_device(device: int | None) -> None:
     """Refuse a graphics device that is not there, before anything is read."""
     if device is not None:
-        from viewer.rendering.context import check_device
+        from viewer.rendering.gpu.context import check_device
 
         check_device(device)
 
@@ -186,6 +186,6 @@ def _draw_panels(
 
 
 def _grid_step(points: Floats) -> float:
-    from viewer.rendering.ground_pass import grid_step
+    from viewer.rendering.passes.ground_pass import grid_step
 
     return grid_step(bounding_box(points))

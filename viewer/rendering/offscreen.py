@@ -7,10 +7,10 @@ import threading
 
 from viewer.interrupts import deferred
 from viewer.rendering.camera import Camera, facing_camera, fit
-from viewer.rendering.context import headless_context, is_software, unreadable_devices
+from viewer.rendering.gpu.context import headless_context, is_software, unreadable_devices
+from viewer.rendering.gpu.target import Target, check_size
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.renderer import Renderer
-from viewer.rendering.target import Target, check_size
 from viewer.rig.arrays import Bytes, Floats
 from viewer.rig.inspection.front import guess_front
 from viewer.rig.scene import Scene, scene_box, scene_points

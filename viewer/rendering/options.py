@@ -77,7 +77,7 @@ class DisplayOptions:
         A key of ``SHOWN``; a figure without a mesh shows its skeleton, one without a skeleton
         its mesh.
     shading : str
-        A key of ``viewer.rendering.program.SHADING``.
+        A key of ``viewer.rendering.gpu.program.SHADING``.
     flat, wireframe, normals, texture, grid, cull : bool
         One normal per triangle; edges on top; vertex normals as lines; the texture; the ground
         grid; leave out triangles seen from behind.

@@ -9,14 +9,15 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.rendering.actor_buffers import ActorBuffers
-from viewer.rendering.crowd_buffers import CrowdBuffers
-from viewer.rendering.joint_marks import joint_at, marks_of
-from viewer.rendering.joint_pass import draw_boxes
-from viewer.rendering.mesh_pass import MeshPass
+from viewer.rendering.gpu.actor_buffers import ActorBuffers
+from viewer.rendering.gpu.instance_buffers import CrowdBuffers
+from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.point_pass import PointPass
-from viewer.rendering.program import Programs, set_uniforms
+from viewer.rendering.overlay.joint_marks import joint_at, marks_of
+from viewer.rendering.passes.joint_pass import draw_boxes
+from viewer.rendering.passes.mesh_pass import MeshPass
+from viewer.rendering.passes.point_pass import PointPass
+from viewer.rendering.passes.skin_pass import PosedMesh
 from viewer.rendering.shown import (
     has_joint_marks,
     has_markers,
@@ -27,7 +28,6 @@ from viewer.rendering.shown import (
     update_meshes,
     update_skeletons,
 )
-from viewer.rendering.skin_pass import PosedMesh
 from viewer.rendering.view import View, in_front, set_model
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.transform import apply_transform

@@ -26,13 +26,13 @@ from typing import Protocol
 
 import numpy as np
 
-from viewer.rendering.annotation import Annotation
 from viewer.rendering.camera import Camera
+from viewer.rendering.gpu.target import Target, picture_rows, straight
+from viewer.rendering.gpu.upload import checked
+from viewer.rendering.gpu.waiting import Waiter
 from viewer.rendering.options import DisplayOptions
+from viewer.rendering.overlay.annotation import Annotation
 from viewer.rendering.renderer import Renderer
-from viewer.rendering.target import Target, picture_rows, straight
-from viewer.rendering.upload import checked
-from viewer.rendering.waiting import Waiter
 from viewer.rig.arrays import Bytes, Floats
 from viewer.rig.motion.follow import followed_point
 from viewer.rig.motion.instances import pose_actors

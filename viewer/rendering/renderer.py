@@ -8,17 +8,19 @@ from typing import TYPE_CHECKING
 
 import moderngl
 
-from viewer.rendering.actor_buffers import ActorBuffers
 from viewer.rendering.camera import Camera
-from viewer.rendering.crowd_pass import draw_crowd
-from viewer.rendering.ground_pass import GroundPass
-from viewer.rendering.joint_pass import JointPass
-from viewer.rendering.late_passes import LatePasses
-from viewer.rendering.mesh_pass import MeshPass
+from viewer.rendering.gpu.actor_buffers import ActorBuffers
+from viewer.rendering.gpu.program import Programs
+from viewer.rendering.gpu.target import Target
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.program import Programs
+from viewer.rendering.passes.ground_pass import GroundPass
+from viewer.rendering.passes.instance_pass import draw_crowd
+from viewer.rendering.passes.joint_pass import JointPass
+from viewer.rendering.passes.late_passes import LatePasses
+from viewer.rendering.passes.mesh_pass import MeshPass
+from viewer.rendering.passes.see_through import draw_layer
+from viewer.rendering.passes.skin_pass import PosedMesh
 from viewer.rendering.scalar_views import ScalarViews
-from viewer.rendering.see_through import draw_layer
 from viewer.rendering.shown import (
     Meshes,
     has_joint_marks,
@@ -31,17 +33,15 @@ from viewer.rendering.shown import (
     update_meshes,
     update_skeletons,
 )
-from viewer.rendering.skin_pass import PosedMesh
-from viewer.rendering.target import Target
 from viewer.rendering.view import View, view_of
 from viewer.rig.arrays import Floats
 from viewer.rig.scene import Actor, Scene
 
 if TYPE_CHECKING:
-    from viewer.rendering.annotation import Annotation
-    from viewer.rendering.ghost_pass import Ghost
-    from viewer.rendering.legend import Legend
-    from viewer.rendering.marks import Marks
+    from viewer.rendering.overlay.annotation import Annotation
+    from viewer.rendering.overlay.legend import Legend
+    from viewer.rendering.overlay.marks import Marks
+    from viewer.rendering.passes.ghost_pass import Ghost
     from viewer.rendering.picking import Pick
 
 __all__ = ["Renderer"]
@@ -279,7 +279,7 @@ class Renderer:
         """Draw what lies over everything but legends; all words last."""
         self.names_left_out, drawn = (0, 0), []
         if has_joint_marks(options):
-            from viewer.rendering.joint_annotation import joint_annotation
+            from viewer.rendering.overlay.joint_annotation import joint_annotation
 
             joints = joint_annotation(scene.actors, options, size, selected)
             if joints is not None:
@@ -298,7 +298,7 @@ class Renderer:
         """Return what is marked as an annotation."""
         if self.marks is None:
             return []
-        from viewer.rendering.marks import mark_annotation
+        from viewer.rendering.overlay.marks import mark_annotation
 
         return [mark_annotation(self.marks)]
 
@@ -307,7 +307,7 @@ class Renderer:
     ) -> None:
         if not options.trail_joints:
             return
-        from viewer.rendering.trail_pass import Moment
+        from viewer.rendering.passes.motion_path_pass import Moment
 
         at = Moment(scene.time or 0.0, options.trail_seconds)
         for index, actor in enumerate(scene.actors):

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from viewer.rendering.legend import Legend, Shown, legend_of
 from viewer.rendering.options import DisplayOptions
+from viewer.rendering.overlay.legend import Legend, Shown, legend_of
+from viewer.rendering.passes.skin_pass import PosedMesh
 from viewer.rendering.scalar_look import look_of, shown_ends
-from viewer.rendering.skin_pass import PosedMesh
 from viewer.rig.figure import Figure
 from viewer.rig.scalars import find_view, joint_text, missing_part
 from viewer.rig.scene import Actor

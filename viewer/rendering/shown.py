@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from viewer.rendering.actor_buffers import ActorBuffers
-from viewer.rendering.crowd_pass import crowds_of
+from viewer.rendering.gpu.actor_buffers import ActorBuffers
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.skin_pass import PosedMesh
+from viewer.rendering.passes.instance_pass import crowds_of
+from viewer.rendering.passes.skin_pass import PosedMesh
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.pose import Pose, placement_matrix
@@ -17,7 +17,7 @@ from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
 
 if TYPE_CHECKING:
-    from viewer.rendering.crowd_buffers import CrowdBuffers
+    from viewer.rendering.gpu.instance_buffers import CrowdBuffers
 
 __all__ = [
     "Meshes",

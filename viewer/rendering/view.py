@@ -9,9 +9,9 @@ import moderngl
 import numpy as np
 
 from viewer.rendering.camera import Camera, camera_axes
+from viewer.rendering.gpu.program import set_uniforms
+from viewer.rendering.gpu.upload import as_uniform
 from viewer.rendering.options import Light, Lights
-from viewer.rendering.program import set_uniforms
-from viewer.rendering.upload import as_uniform
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.transform import translation_matrix
 

@@ -19,10 +19,10 @@ from viewer.app.widgets import (
     slider,
 )
 from viewer.errors import printable
-from viewer.rendering.ground_pass import grid_step, parse_color
+from viewer.rendering.gpu.program import SHADING
 from viewer.rendering.options import SHOWN
 from viewer.rendering.part_colors import part_colors
-from viewer.rendering.program import SHADING
+from viewer.rendering.passes.ground_pass import grid_step, parse_color
 from viewer.rig.annotations import BodyParts
 
 __all__ = ["draw"]

@@ -1,0 +1,1 @@
+"""OpenGL objects: context, programs, buffers, textures and targets."""

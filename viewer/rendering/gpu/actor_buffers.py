@@ -1,0 +1,175 @@
+"""What was uploaded for the figures and actors of a scene, and when it is freed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
+
+import moderngl
+
+from viewer.rendering.gpu.mesh_buffers import MeshBuffers
+from viewer.rendering.gpu.program import Programs
+from viewer.rendering.passes.joint_pass import SkeletonBuffers
+from viewer.rendering.passes.skin_pass import PosedMesh
+from viewer.rig.figure import Figure
+from viewer.rig.scene import Actor
+
+if TYPE_CHECKING:
+    from viewer.rendering.gpu.instance_buffers import CrowdBuffers
+    from viewer.rendering.passes.keypoint_pass import KeypointBuffers
+    from viewer.rendering.passes.motion_path_pass import TrailBuffers
+    from viewer.rendering.passes.point_pass import PointBuffers
+
+__all__ = ["ActorBuffers", "Kept"]
+
+
+class _Releasable(Protocol):
+    def release(self) -> object: ...
+
+
+_Owner = TypeVar("_Owner")
+_Item = TypeVar("_Item", bound=_Releasable)
+
+
+class Kept(Generic[_Owner, _Item]):
+    """One item for each owner, told apart by identity, made when first asked for."""
+
+    def __init__(self) -> None:
+        # Owners are kept too, so that no other object can take over their identity.
+        self._items: dict[int, tuple[_Owner, _Item]] = {}
+
+    def __len__(self) -> int:
+        return len(self._items)
+
+    def get(self, owner: _Owner, make: Callable[[], _Item]) -> _Item:
+        """Return an owner's item, made now if there is none."""
+        if id(owner) not in self._items:
+            self._items[id(owner)] = (owner, make())
+        return self._items[id(owner)][1]
+
+    def drop(self, owner: _Owner, before: Callable[[_Item], object]) -> None:
+        """Free one owner's item; ``before`` is called with it."""
+        item = self._items.pop(id(owner))[1]
+        before(item)
+        item.release()
+
+    def keep_only(
+        self, owners: Sequence[_Owner], before: Callable[[_Item], object] | None = None
+    ) -> None:
+        """Free the items of all other owners; ``before`` is called with each."""
+        present = {id(owner) for owner in owners}
+        for key in [key for key in self._items if key not in present]:
+            item = self._items.pop(key)[1]
+            if before is not None:
+                before(item)
+            item.release()
+
+
+class _Crowds:
+    """The crowds of one figure: one for each of its shapes that several actors have."""
+
+    def __init__(self) -> None:
+        self.items: list[CrowdBuffers] = []
+
+    def release(self) -> None:
+        for crowd in self.items:
+            crowd.release()
+        self.items.clear()
+
+
+class ActorBuffers:
+    """Everything on the GPU that belongs to figures and actors.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        The context in use.
+    programs : Programs
+        Gives the skinning programs.
+    cube : moderngl.Buffer
+        What boxes are instances of.
+    notes : list of str
+        Gets what the driver cannot do as asked.
+    forget : callable
+        Called with a posed mesh that is about to be freed.
+    """
+
+    def __init__(
+        self,
+        context: moderngl.Context,
+        programs: Programs,
+        cube: moderngl.Buffer,
+        notes: list[str],
+        forget: Callable[[PosedMesh], object],
+    ) -> None:
+        self.context, self.programs, self._cube, self._notes = context, programs, cube, notes
+        self._forget = forget
+        self.meshes: Kept[Figure, MeshBuffers] = Kept()
+        self._crowds: Kept[Figure, _Crowds] = Kept()
+        self.posed: Kept[Actor, PosedMesh] = Kept()
+        self.skeletons: Kept[Actor, SkeletonBuffers] = Kept()
+        self.keypoints: Kept[Actor, KeypointBuffers] = Kept()
+        self.points: Kept[Actor, PointBuffers] = Kept()
+        self.trails: Kept[Actor, TrailBuffers] = Kept()
+
+    def mesh(self, figure: Figure) -> MeshBuffers:
+        """Return a figure's mesh; it must have one."""
+        return self.meshes.get(figure, lambda: MeshBuffers(self.context, figure, self._notes))
+
+    def posed_mesh(self, actor: Actor) -> PosedMesh:
+        """Return an actor's posed vertices; its figure must have a mesh."""
+        mesh = self.mesh(actor.figure)
+        make = lambda: PosedMesh(self.context, self.programs, mesh)  # noqa: E731
+        posed = self.posed.get(actor, make)
+        if posed.mesh is not mesh:  # the actor has got another figure
+            self.posed.drop(actor, self._forget)
+            posed = self.posed.get(actor, make)
+        return posed
+
+    def skeleton(self, actor: Actor) -> SkeletonBuffers:
+        """Return an actor's boxes; its figure must have a skeleton."""
+        figure = actor.figure
+        make = lambda: SkeletonBuffers(self.context, figure, self._cube)  # noqa: E731
+        return self.skeletons.get(actor, make)
+
+    def keypoints_of(self, actor: Actor) -> KeypointBuffers:
+        """Return the markers of an actor's own keypoints; its figure must have some."""
+        from viewer.rendering.passes.keypoint_pass import KeypointBuffers
+
+        figure = actor.figure
+        make = lambda: KeypointBuffers(self.context, figure, self._cube)  # noqa: E731
+        return self.keypoints.get(actor, make)
+
+    def points_of(self, actor: Actor) -> PointBuffers:
+        """Return an actor's captured points; its figure must be made of some."""
+        from viewer.rendering.passes.point_pass import PointBuffers
+
+        layout = actor.figure.points
+        assert layout is not None  # the caller looked
+        return self.points.get(actor, lambda: PointBuffers(self.context, layout))
+
+    def trail(self, actor: Actor) -> TrailBuffers:
+        """Return an actor's paths."""
+        from viewer.rendering.passes.motion_path_pass import TrailBuffers
+
+        return self.trails.get(actor, lambda: TrailBuffers(self.context))
+
+    def crowds(self, figure: Figure, count: int) -> list[CrowdBuffers]:
+        """Return as many crowds of a figure, the same ones in the same order as before."""
+        from viewer.rendering.gpu.instance_buffers import CrowdBuffers
+
+        kept = self._crowds.get(figure, _Crowds).items
+        while len(kept) > count:
+            kept.pop().release()
+        while len(kept) < count:
+            kept.append(CrowdBuffers(self.context, self.mesh(figure)))
+        return kept
+
+    def keep_only(self, actors: Sequence[Actor]) -> None:
+        """Free what belongs to actors that left the scene, and to figures that nobody has."""
+        self.posed.keep_only(actors, self._forget)
+        for kept in (self.skeletons, self.keypoints, self.points, self.trails):
+            kept.keep_only(actors)
+        figures = [actor.figure for actor in actors]
+        self._crowds.keep_only(figures)
+        self.meshes.keep_only(figures)

@@ -1,0 +1,198 @@
+"""An OpenGL context without a window, with every known failure put into words."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import moderngl
+
+from viewer.errors import RenderError, ViewerError
+from viewer.interrupts import deferred
+from viewer.rendering.gpu.offer import headless_offer, offer_text
+
+__all__ = [
+    "check_device",
+    "check_errors",
+    "device_count",
+    "explain",
+    "headless_context",
+    "is_software",
+    "unreadable_devices",
+]
+
+NEEDED_VERSION = 330
+
+_LIBEGL, _LIBGL = "libEGL.so.1", "libGL.so.1"
+_INSTALL = "on Debian or Ubuntu: apt install libegl1 libgl1 libgl1-mesa-dri"
+_EGL_ERRORS = {
+    "0x3001": "EGL could not be initialised: its driver files are missing or broken",
+    "0x3002": "EGL was refused access to the graphics device",
+    "0x3003": "the driver is out of memory",
+    "0x3008": "EGL does not accept this display",
+    "0x3009": "OpenGL 3.3 is needed and the driver does not offer it",
+}
+
+
+def headless_context(device: int | None = None) -> moderngl.Context:
+    """Return a context that needs neither display nor window.
+
+    Parameters
+    ----------
+    device : int, optional
+        Index of the EGL device; without it each one is tried in turn.
+
+    Returns
+    -------
+    moderngl.Context
+        OpenGL 3.3 core or newer, current in this thread. Whoever calls this releases it.
+
+    Raises
+    ------
+    RenderError
+        With the cause and the cure.
+    ViewerError
+        If there are devices, but none of this index.
+    """
+    if not sys.platform.startswith("linux"):
+        return _create({})
+    if device is not None:
+        check_device(device)
+        return _create({"device_index": device})
+    try:
+        return _create({"device_index": 0})
+    except RenderError as first:
+        for index in range(1, device_count()):
+            try:
+                return _create({"device_index": index})
+            except RenderError:
+                continue
+        raise first from None
+
+
+def _create(options: Mapping[str, int]) -> moderngl.Context:
+    settings: dict[str, Any] = {"standalone": True, "require": NEEDED_VERSION, **options}
+    if sys.platform.startswith("linux"):
+        # Given names spare a search that starts other programs and takes 60 ms.
+        settings |= {"backend": "egl", "libegl": _LIBEGL, "libgl": _LIBGL}
+        # Mesa would print lines of its own before the one that says what to do.
+        os.environ.setdefault("EGL_LOG_LEVEL", "fatal")
+    try:
+        with deferred():
+            return moderngl.create_context(**settings)
+    except Exception as problem:  # glcontext raises nothing more special
+        text = str(problem)
+        offer = headless_offer(settings) if "0x3009" in text or "version" in text else None
+        raise RenderError(explain(text) if offer is None else offer_text(offer)) from None
+
+
+def check_device(device: int) -> None:
+    """Refuse a device that is not there; nothing if there are none at all, or not by number.
+
+    Raises
+    ------
+    ViewerError
+        With the numbers that there are.
+    """
+    count = device_count() if sys.platform.startswith("linux") else 0
+    if device < 0 or (count and device >= count):
+        known = {0: "0 or more", 1: "0, the only one"}.get(count, f"0 to {count - 1}")
+        raise ViewerError(
+            f"graphics device (--gpu): expected {known}, found {device} (viewer doctor lists them)"
+        )
+
+
+def device_count() -> int:
+    """Ask for an impossible device: the refusal tells how many there are."""
+    try:
+        _create({"device_index": 1 << 20})
+    except RenderError as problem:
+        found = re.search(r"found (\d+) device", str(problem))
+        return int(found.group(1)) if found else 0
+    return 0
+
+
+def explain(text: str) -> str:
+    """Return what a message of glcontext or GLFW means and what to do about it.
+
+    Parameters
+    ----------
+    text : str
+        As the library put it.
+
+    Returns
+    -------
+    str
+        One line: cause and cure, the library's own words in brackets.
+
+    >>> explain("libEGL.so.1 not loaded").startswith("libEGL was not found")
+    True
+    """
+    devices = re.search(r"requested device index (\d+), but found (\d+)", text)
+    code = re.search(r"0x30[0-9a-fA-F]{2}", text)
+    if "not loaded" in text or "cannot open shared object" in text:
+        # glcontext lets these variables replace the names we gave.
+        asked_gl = os.environ.get("GLCONTEXT_LINUX_LIBGL") or _LIBGL
+        library = "libGL" if asked_gl in text else "libEGL"
+        return f"{library} was not found ({_INSTALL}) [{text}]"
+    if devices and int(devices.group(2)) == 0:
+        return (
+            "EGL found 0 devices: in a container start it with NVIDIA_DRIVER_CAPABILITIES=all, "
+            f"or install Mesa for drawing in software ({_INSTALL})"
+        )
+    if devices:
+        count = int(devices.group(2))
+        plural = "" if count == 1 else "s"
+        return (
+            f"there is no graphics device {devices.group(1)}: EGL found {count} device{plural}, "
+            "counted from 0"
+        )
+    if code:
+        meaning = _EGL_ERRORS.get(code.group().lower(), "EGL refused")
+        return f"{meaning} ({_INSTALL}) [{text}]"
+    if "version" in text.lower():
+        return f"OpenGL 3.3 is needed: {text}"
+    if re.match(r"(GLX|WGL|NSGL|EGL): ", text):
+        return f"OpenGL 3.3 is needed and this display's driver does not offer it [{text}]"
+    return f"no OpenGL context: {text} ({_INSTALL})"
+
+
+def is_software(context: moderngl.Context) -> bool:
+    """Return whether the processor draws, not a graphics card."""
+    renderer = context.info["GL_RENDERER"].lower()
+    return any(name in renderer for name in ("llvmpipe", "softpipe", "swrast", "software", "basic"))
+
+
+def unreadable_devices() -> list[str]:
+    """Return the render nodes of graphics cards that this user may not open."""
+    folder = Path("/dev/dri")
+    nodes = sorted(folder.glob("renderD*")) if folder.is_dir() else []
+    return [str(node) for node in nodes if not os.access(node, os.R_OK | os.W_OK)]
+
+
+def check_errors(context: moderngl.Context, doing: str) -> None:
+    """Raise if OpenGL has noted an error: too large a buffer or texture raises nothing itself.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        The context in use.
+    doing : str
+        What was attempted, for the message.
+
+    Raises
+    ------
+    RenderError
+        With the renderer's name.
+    """
+    error = context.error
+    if error == "GL_NO_ERROR":
+        return
+    renderer = context.info["GL_RENDERER"]
+    if error == "GL_OUT_OF_MEMORY":
+        raise RenderError(f"{doing}: not enough graphics memory on {renderer} ({error})")
+    raise RenderError(f"{doing}: {error} on {renderer}")

@@ -1,0 +1,136 @@
+"""Which triangles are drawn, and in what order: neighbours follow one another.
+
+Drivers keep the last few vertices that they computed, at best a few hundred. Files often list
+triangles in an order that finds none of them there, so that every vertex is computed three to five
+times; along a space-filling curve it is once or twice (``tests/bench/bench_crowd.py``).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.rendering.gpu.upload import buffer
+from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.figure import Figure
+
+__all__ = ["IndexSet", "MeshRun", "curve_places", "index_set", "kept_triangles"]
+
+_CURVE_BITS = 10  # an axis
+
+
+@dataclass(frozen=True, slots=True)
+class MeshRun:
+    """Consecutive triangles with one material: first index, number of indices, its texture."""
+
+    first: int
+    count: int
+    texture: moderngl.Texture | None
+
+
+@dataclass(frozen=True, slots=True)
+class IndexSet:
+    """An index buffer and its runs; whoever made it releases the buffer.
+
+    Attributes
+    ----------
+    indices : moderngl.Buffer
+        Of split vertices.
+    runs : tuple of MeshRun
+        One after the other.
+    order : (N,) int32
+        Which of the triangles that were given is drawn first, second …
+    """
+
+    indices: moderngl.Buffer
+    runs: tuple[MeshRun, ...]
+    order: Ints
+
+    @property
+    def n_indices(self) -> int:
+        """Number of indices of all runs together."""
+        return 3 * len(self.order)
+
+
+def index_set(
+    context: moderngl.Context,
+    triangles: Ints,
+    materials: Ints,
+    textures: list[moderngl.Texture | None],
+    positions: Floats | None = None,
+) -> IndexSet:
+    """Upload triangles; runs follow their materials, and a space-filling curve within each.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        Gives the buffer.
+    triangles : (T, 3)
+        Indices of split vertices.
+    materials : (T,)
+        Index into ``textures`` of each triangle, -1 for none.
+    textures : list
+        Of the materials.
+    positions : (R, 3), optional
+        Of the split vertices, at rest; without them triangles stay in their order.
+    """
+    edges = np.flatnonzero(np.diff(materials)) + 1
+    runs = []
+    for first, last in zip([0, *edges], [*edges, len(materials)], strict=True):
+        index = int(materials[first]) if len(materials) else -1
+        texture = None if index < 0 else textures[index]
+        runs.append(MeshRun(3 * int(first), 3 * int(last - first), texture))
+    order: Ints = np.arange(len(triangles), dtype=np.int32)
+    if positions is not None and len(triangles):
+        run = np.zeros(len(triangles), dtype=np.int64)
+        run[edges] = 1
+        places = curve_places(positions[triangles].mean(axis=1))
+        along = (np.cumsum(run) << 3 * _CURVE_BITS) + places
+        order = np.argsort(along, kind="stable").astype(np.int32)
+    return IndexSet(buffer(context, triangles[order], "u4"), tuple(runs), order)
+
+
+def curve_places(points: Floats) -> NDArray[np.int64]:
+    """Return where points lie on a Z-order curve through their box (Morton 1966).
+
+    Parameters
+    ----------
+    points : (N, 3)
+        At least one.
+
+    Returns
+    -------
+    (N,)
+        Bits of x, y and z interleaved, of 1024 cells along the longest side.
+
+    >>> curve_places(np.array([[0.0, 0, 0], [1023, 0, 0], [0, 1, 0], [1, 1, 1]])).tolist()
+    [0, 153391689, 2, 7]
+    """
+    low = points.min(axis=0)
+    size = float((points.max(axis=0) - low).max()) or 1.0
+    cells = ((points - low) * ((2**_CURVE_BITS - 1) / size)).astype(np.int64)
+    # Each step spreads groups of bits apart, until two zeros lie between any two.
+    for shift, mask in ((16, 0x30000FF), (8, 0x300F00F), (4, 0x30C30C3), (2, 0x9249249)):
+        cells = (cells | cells << shift) & mask
+    return cells[:, 0] | cells[:, 1] << 1 | cells[:, 2] << 2
+
+
+def kept_triangles(figure: Figure, hidden: tuple[int, ...], triangles: Ints) -> Bools:
+    """Return which triangles have a corner outside the hidden body parts: (T,) bool.
+
+    Parameters
+    ----------
+    figure : Figure
+        With or without body parts.
+    hidden : tuple of int
+        Parts that are not drawn.
+    triangles : (T, 3)
+        Indices of the figure's vertices.
+    """
+    if figure.body_parts is None or not hidden:
+        return np.ones(len(triangles), dtype=bool)
+    is_shown: Bools = ~np.isin(figure.body_parts.of_vertex, hidden)
+    return np.any(is_shown[triangles], axis=1)

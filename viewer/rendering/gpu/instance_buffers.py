@@ -1,0 +1,259 @@
+"""Several actors of one figure and shape on the GPU: what one instanced draw of them needs.
+
+No posed vertices are kept: the vertex shader skins each instance by its own row of matrices, which
+on a driver in software takes less time than to write posed vertices and to read them again
+(``tests/bench/bench_crowd.py``). Every draw skins anew, so a camera that moves is not free, and
+views that draw a mesh several times take the posed buffers of single actors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.rendering.gpu.index_sets import IndexSet
+from viewer.rendering.gpu.mesh_buffers import MeshBuffers
+from viewer.rendering.gpu.program import set_uniforms
+from viewer.rendering.gpu.rest_buffers import RestBuffers
+from viewer.rendering.gpu.summed_offsets import SummedOffsets
+from viewer.rendering.gpu.upload import (
+    as_uniform,
+    float32,
+    matrix_texture,
+    rigid_texture,
+    write_stacked,
+)
+from viewer.rendering.passes.mesh_pass import SKIN_COLOR
+from viewer.rendering.passes.skin_pass import skinning_words
+from viewer.rendering.view import View
+from viewer.rig.arrays import Bools, Floats
+from viewer.rig.figure import Figure
+from viewer.rig.kinematics import is_rigid, skinning_matrices
+from viewer.rig.motion.instances import local_rotations, placements, worlds
+from viewer.rig.pose import Pose, skinning_key
+from viewer.rig.scene import Actor
+from viewer.rig.shape import shaped
+from viewer.rig.skin import bind_positions
+from viewer.rig.skinning import Skinning
+from viewer.rig.skinning.dqs import split_palette
+
+__all__ = ["CrowdBuffers"]
+
+_PALETTE_UNIT, _PAIRS_UNIT, _RIGID_UNIT, _LIST_UNIT, _OFFSETS_UNIT = range(5)
+_PER_INSTANCE = (
+    ("in_model_x", 4),
+    ("in_model_y", 4),
+    ("in_model_z", 4),
+    ("in_actor_color", 3),
+    ("in_rest_shift", 3),
+    ("in_center", 3),
+    ("in_is_rigid", 1),
+)
+_FLOATS = sum(count for _, count in _PER_INSTANCE)
+
+
+class CrowdBuffers:
+    """Matrices, places and colours of actors that share figure and shape.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        Gives textures and buffers.
+    mesh : MeshBuffers
+        Of the figure, which has skeleton and skin.
+    way : str
+        How pose correctives are summed, see ``rest_buffers``.
+
+    Attributes
+    ----------
+    count : int
+        Number of actors, A.
+    n_updates : int
+        How often matrices went up.
+    """
+
+    def __init__(self, context: moderngl.Context, mesh: MeshBuffers, way: str = "") -> None:
+        self.context, self.mesh = context, mesh
+        self.count = self.n_updates = 0
+        assert mesh.figure.skin is not None  # only attached figures come here
+        self._n_joints = mesh.figure.skin.n_joints
+        self._rest = RestBuffers(context, mesh, way)
+        self._offsets = SummedOffsets(context, mesh, self._rest.way)
+        self._how = Skinning()
+        self._words: tuple[object, ...] = ()
+        self._keys: list[tuple[bytes, ...]] = []
+        self._centers: Floats = np.zeros((0, 3))
+        self._is_rigid: Bools = np.ones(0, dtype=np.bool_)
+        self._rows: NDArray[np.float32] = np.zeros((0, self._n_joints, 3, 4), "f4")
+        self._rigid_rows: NDArray[np.float32] = np.zeros((0, self._n_joints, 5, 4), "f4")
+        self._palette: moderngl.Texture | None = None
+        self._rigid: moderngl.Texture | None = None
+        self._instances: moderngl.Buffer | None = None
+        self._arrays: dict[tuple[int, ...], moderngl.VertexArray] = {}
+
+    def update(self, poses: Sequence[Pose], how: Skinning) -> None:
+        """Send the matrices of poses that changed.
+
+        Parameters
+        ----------
+        poses : sequence of A Pose
+            All of one shape.
+        how : Skinning
+            Method and influences.
+
+        Raises
+        ------
+        RenderError
+            If the driver has no room for so many.
+        """
+        figure = shaped(self.mesh.figure, poses[0].shape_weights)
+        words = (*skinning_words(how), poses[0].shape_weights.tobytes())
+        keys = [skinning_key(pose) for pose in poses]
+        old = self._keys if words == self._words else []
+        changed = [row for row, key in enumerate(keys) if row >= len(old) or key != old[row]]
+        self._how, self._words, self.count = how, words, len(poses)
+        if changed:
+            self._keys = []  # a refusal leaves nothing that passes for done
+            self._reserve(len(poses))
+            self._rest.update(figure, poses[0], correct=False)
+            self._write(figure, [poses[row] for row in changed], np.array(changed))
+            self.n_updates += 1
+        self._keys = keys
+
+    def _reserve(self, count: int) -> None:
+        """Make room; textures grow by half, so that a growing crowd is not copied each time."""
+        if self._palette is not None and count <= len(self._rows):
+            return
+        room = max(count, len(self._rows) * 3 // 2)
+        self._release_textures()
+        self._palette = matrix_texture(self.context, room * self._n_joints)
+        self._instances = self.context.buffer(reserve=4 * _FLOATS * room, dynamic=True)
+        more = room - len(self._rows)
+        empty = np.zeros((more, self._n_joints, 5, 4), "f4")
+        self._rows = np.concatenate([self._rows, empty[:, :, :3]])
+        self._rigid_rows = np.concatenate([self._rigid_rows, empty])
+        self._centers = np.concatenate([self._centers, np.zeros((more, 3))])
+        self._is_rigid = np.concatenate([self._is_rigid, np.ones(more, dtype=np.bool_)])
+
+    def _write(self, figure: Figure, poses: list[Pose], rows: NDArray[np.intp]) -> None:
+        """Upload T(-center') M T(center) of the poses at ``rows``, as ``PosedMesh`` does of one."""
+        skeleton, skin, how = figure.skeleton, figure.skin, self._how
+        assert skeleton is not None and skin is not None and self._palette is not None
+        rotations = local_rotations(skeleton, poses)
+        palette = skinning_matrices(worlds(skeleton, poses, rotations), skin.inverse_bind)
+        self._is_rigid[rows] = is_rigid(palette)
+        palette[..., :3, 3] += palette[..., :3, :3] @ self.mesh.center
+        shares = self.mesh.skin(how).joint_shares
+        moved = np.einsum("j,aji->ai", shares, palette[..., :3, 3])
+        self._centers[rows] = moved if shares.any() else self.mesh.center
+        palette[..., :3, 3] -= self._centers[rows, None]
+        if how.method != "dqs":
+            self._rows[rows] = palette[..., :3, :]
+            write_stacked(self._palette, self._rows[: self.count])
+        if how.method != "lbs":
+            if self._rigid is None:
+                self._rigid = rigid_texture(self.context, len(self._rows) * self._n_joints)
+            binds = np.tile(bind_positions(skin) - self.mesh.center, (len(poses), 1))
+            duals, stretches = split_palette(palette.reshape(-1, 4, 4), binds)
+            shape = (len(poses), self._n_joints)
+            self._rigid_rows[rows, :, :2] = duals.reshape(*shape, 2, 4)
+            self._rigid_rows[rows, :, 2:] = stretches.reshape(*shape, 3, 4)
+            write_stacked(self._rigid, self._rigid_rows[: self.count])
+        active = how.correctives and figure.correctives is not None
+        self._offsets.update(rotations if active else None, rows, self.count)
+
+    def place(self, actors: Sequence[Actor], view: View) -> None:
+        """Send where the actors are, seen from a camera, and their colours.
+
+        Products are formed in float64: large translations cancel before float32 sees them.
+        """
+        assert self._instances is not None  # updated before
+        poses = [actor.pose for actor in actors if actor.pose is not None]
+        model = view.matrix @ np.stack([actor.placement for actor in actors]) @ placements(poses)
+        centers = self._centers[: self.count]
+        model[:, :3, 3] += np.einsum("aij,aj->ai", model[:, :3, :3], centers)
+        colors = np.array([actor.color or SKIN_COLOR for actor in actors])
+        rigid = self._is_rigid[: self.count, None]
+        rows = [model[:, :3].reshape(-1, 12), colors, self.mesh.center - centers, centers, rigid]
+        self._instances.write(float32(np.concatenate(rows, axis=1)))
+
+    def use(self, program: moderngl.Program, view: View) -> None:
+        """Set what ``crowd.vert`` needs beside its attributes."""
+        skin = self.mesh.skin(self._how)
+        values = {
+            "u_projection": as_uniform(view.projection),
+            "u_orthographic": view.camera.is_parallel,
+            "u_share": self._how.share,
+            "u_n_joints": self._n_joints,
+            "u_n_summed": self._offsets.n_summed,
+            "u_n_offsets": self._offsets.n_listed,
+            "u_n_sources": len(self.mesh.copies),
+            "u_palette": _PALETTE_UNIT,
+            "u_pairs": _PAIRS_UNIT,
+            "u_rigid": _RIGID_UNIT,
+            "u_offset_list": _LIST_UNIT,
+            "u_offsets": _OFFSETS_UNIT,
+        }
+        set_uniforms(program, values)
+        skin.pairs.use(_PAIRS_UNIT)
+        for texture, unit in ((self._palette, _PALETTE_UNIT), (self._rigid, _RIGID_UNIT)):
+            if texture is not None:
+                texture.use(unit)
+        self._offsets.use(_LIST_UNIT, _OFFSETS_UNIT)
+
+    @property
+    def method(self) -> str:
+        """The skinning method, a key of ``viewer.rig.skinning.METHODS``."""
+        return self._how.method
+
+    @property
+    def is_affine(self) -> bool:
+        """Whether joints of some actor scale or shear."""
+        return not self._is_rigid[: self.count].all()
+
+    def array(
+        self, program: moderngl.Program, indices: IndexSet | None = None
+    ) -> moderngl.VertexArray:
+        """Return the vertex array for a program; without indices it draws single vertices."""
+        mesh, skin = self.mesh, self.mesh.skin(self._how)
+        key = (id(program), id(indices), id(skin), id(self._rest.positions))
+        if key not in self._arrays:
+            content: list[Any] = [
+                (buffer, layout, name)
+                for buffer, layout, name in (
+                    (self._rest.positions, "3f4", "in_position"),
+                    (self._rest.normals, "3f4", "in_normal"),
+                    (skin.bindings, "4u4", "in_bindings"),
+                    (mesh.uvs, "2f4", "in_uv"),
+                    (mesh.colors, "3f4", "in_color"),
+                )
+                if name in program and buffer is not None
+            ]
+            # What the compiler dropped is skipped, four bytes a number.
+            layout = " ".join(
+                f"{size}f4" if name in program else f"{4 * size}x" for name, size in _PER_INSTANCE
+            )
+            names = [name for name, _ in _PER_INSTANCE if name in program]
+            content.append((self._instances, f"{layout}/i", *names))
+            index_buffer = None if indices is None else indices.indices
+            self._arrays[key] = self.context.vertex_array(
+                program, content, index_buffer=index_buffer
+            )
+        return self._arrays[key]
+
+    def _release_textures(self) -> None:
+        for item in (*self._arrays.values(), self._palette, self._rigid, self._instances):
+            if item is not None:
+                item.release()
+        self._arrays.clear()
+        self._palette = self._rigid = self._instances = None
+
+    def release(self) -> None:
+        """Free what belongs to these actors."""
+        self._release_textures()
+        self._offsets.release()
+        self._rest.release()

@@ -1,0 +1,153 @@
+"""A figure's mesh and skin on the GPU: uploaded when first needed, never changed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import moderngl
+import numpy as np
+
+from viewer.rendering.gpu.index_sets import IndexSet, index_set, kept_triangles
+from viewer.rendering.gpu.ownership import Owner
+from viewer.rendering.gpu.skin_buffers import SkinBuffers
+from viewer.rendering.gpu.upload import buffer, float32, offset_texture, picture_texture
+from viewer.rendering.part_colors import part_colors
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import Mesh, bounding_box, split_seams
+from viewer.rig.skinning import Skinning, skin_used
+
+__all__ = ["MeshBuffers"]
+
+
+class MeshBuffers:
+    """Rest vertices, triangle indices, influences and textures of one figure.
+
+    Along seams a vertex is uploaded once per texture coordinate: these are the split vertices.
+    Positions are stored relative to the middle of the mesh: float32 then spends its digits on
+    the figure's shape, however far from the origin it stands.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        Owns nothing here; ``release`` frees all.
+    figure : Figure
+        With a mesh.
+    notes : list of str
+        Gets a line for each thing that the driver cannot do as asked.
+
+    Attributes
+    ----------
+    center : (3,)
+        What was subtracted, figure space.
+    sources : (R,) int32
+        The figure's vertex of each split vertex.
+    copies : (V,) int32
+        A split vertex of each of the figure's.
+    """
+
+    def __init__(self, context: moderngl.Context, figure: Figure, notes: list[str]) -> None:
+        mesh = figure.mesh
+        assert mesh is not None  # only figures with a mesh come here
+        self.context, self.figure = context, figure
+        self.sources, uv_indices, self.triangles = split_seams(mesh)
+        self.n_vertices = len(self.sources)
+        self.copies: Ints = np.empty(mesh.n_vertices, dtype=np.int32)
+        self.copies[self.sources] = np.arange(self.n_vertices)
+        self.center: Floats = bounding_box(mesh.positions).mean(axis=0)
+        self._owner = Owner()
+        self._index_sets: dict[tuple[bool, tuple[int, ...], bool], IndexSet] = {}
+        self._skins: dict[tuple[int, bool], SkinBuffers] = {}
+        self._colors: moderngl.Buffer | None = None
+        self._offsets: moderngl.Texture | None = None
+        self._product: np.ndarray | None = None
+        with self._owner.guard():
+            self._upload(mesh, uv_indices, notes)
+
+    def _upload(self, mesh: Mesh, uv_indices: Ints, notes: list[str]) -> None:
+        keep = self._owner.keep
+        self.positions = self.upload(mesh.positions - self.center)
+        self.normals = self.upload(mesh.normals)
+        self.uvs: moderngl.Buffer | None = None
+        if mesh.uvs is not None and len(mesh.uvs):
+            self.uvs = keep(buffer(self.context, mesh.uvs[uv_indices], "f4"))
+        self._textures = [
+            None
+            if material.image is None or self.uvs is None
+            else keep(picture_texture(self.context, material.image, notes))
+            for material in mesh.materials
+        ]
+        self.index_set(False, ())
+        self.skin(Skinning())
+
+    def upload(self, rows: Floats) -> moderngl.Buffer:
+        """Return a buffer with one row of (V, 3) for every split vertex."""
+        return self._owner.keep(buffer(self.context, rows[self.sources], "f4"))
+
+    def index_set(
+        self, reduced: bool, hidden: tuple[int, ...], as_listed: bool = False
+    ) -> IndexSet:
+        """Return the triangles of the full or the reduced mesh, without hidden body parts.
+
+        ``as_listed`` keeps the file's order: translucent edges look different in another one.
+        """
+        reduced = reduced and self.figure.reduced is not None
+        key = (reduced, hidden, as_listed)
+        if key not in self._index_sets:
+            self._index_sets[key] = self._make_index_set(*key)
+        return self._index_sets[key]
+
+    def _make_index_set(self, reduced: bool, hidden: tuple[int, ...], as_listed: bool) -> IndexSet:
+        mesh, coarse = self.figure.mesh, self.figure.reduced
+        assert mesh is not None
+        if reduced and coarse is not None:
+            of_figure = coarse.vertices[coarse.triangles]
+            split, materials = self.copies[of_figure], np.full(len(of_figure), -1, dtype=np.int32)
+        else:
+            of_figure, split, materials = mesh.triangles, self.triangles, mesh.material_indices
+        kept = kept_triangles(self.figure, hidden, of_figure)
+        rest = None if as_listed else mesh.positions[self.sources]
+        made = index_set(self.context, split[kept], materials[kept], self._textures, rest)
+        self._owner.keep(made.indices)
+        return replace(made, order=np.flatnonzero(kept).astype(np.int32)[made.order])
+
+    def skin(self, skinning: Skinning) -> SkinBuffers:
+        """Return the influences that count."""
+        key = (skinning.max_influences, skinning.normalize)
+        if key not in self._skins:
+            skin = self.figure.skin
+            used = None if skin is None else skin_used(skin, skinning)
+            buffers = SkinBuffers(self.context, used, self.sources)
+            self._skins[key] = self._owner.keep(buffers)
+        return self._skins[key]
+
+    @property
+    def colors(self) -> moderngl.Buffer | None:
+        """A colour for every split vertex by its body part; None if the figure has no parts."""
+        parts = self.figure.body_parts
+        if self._colors is None and parts is not None:
+            self._colors = self.upload(part_colors(len(parts.names))[parts.of_vertex])
+        return self._colors
+
+    @property
+    def offsets(self) -> moderngl.Texture:
+        """The pose correctives as a texture, for drivers that sum them in the shader."""
+        if self._offsets is None:
+            correctives = self.figure.correctives
+            assert correctives is not None  # the caller looked
+            self._offsets = self._owner.keep(offset_texture(self.context, correctives.values()))
+        return self._offsets
+
+    @property
+    def product(self) -> np.ndarray:
+        """The pose correctives as float32, (P, 3 V), for drivers that want them summed here."""
+        if self._product is None:
+            correctives = self.figure.correctives
+            assert correctives is not None  # the caller looked
+            values = correctives.values()
+            self._product = float32(values.reshape(len(values), -1))
+        return self._product
+
+    def release(self) -> None:
+        """Free every buffer and texture."""
+        self._owner.release()

@@ -1,0 +1,122 @@
+"""The rest vertices of one actor: the figure's own, or changed by its shape and correctives.
+
+Pose correctives are summed in one of two ways. Drivers on a graphics card sum them in the vertex
+shader from a texture: a frame then uploads the weights alone. Drivers in software are several
+times faster with one product of matrix and vector per changed pose (``tests/bench`` prints both).
+"""
+
+from __future__ import annotations
+
+import moderngl
+import numpy as np
+
+from viewer.rendering.gpu.context import is_software
+from viewer.rendering.gpu.mesh_buffers import MeshBuffers
+from viewer.rendering.gpu.upload import float32, pair_texture, write_pairs
+from viewer.rig.arrays import Floats
+from viewer.rig.blendshapes import active_rows, corrective_weights
+from viewer.rig.figure import Figure
+from viewer.rig.pose import Pose, joint_rotations
+
+__all__ = ["WAYS", "RestBuffers"]
+
+WAYS = ("texture", "product")
+"""How pose correctives are summed."""
+
+
+class RestBuffers:
+    """Positions and normals that the skinning shader starts from.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        Gives the buffers.
+    mesh : MeshBuffers
+        Used as it is while shape and correctives are 0.
+    way : str
+        One of ``WAYS``; chosen by the driver if empty.
+
+    Attributes
+    ----------
+    positions, normals : moderngl.Buffer
+        Of every split vertex, positions minus the mesh's centre.
+    n_offsets : int
+        How many rows of correctives the shader has to add.
+    """
+
+    def __init__(self, context: moderngl.Context, mesh: MeshBuffers, way: str = "") -> None:
+        self.context, self.mesh = context, mesh
+        self.way = way or ("product" if is_software(context) else "texture")
+        self.positions, self.normals = mesh.positions, mesh.normals
+        self.n_offsets = 0
+        self._own: tuple[moderngl.Buffer, moderngl.Buffer] | None = None
+        self._list: moderngl.Texture | None = None
+        self._key: tuple[bytes, bytes] = b"", b""
+
+    def update(self, figure: Figure, pose: Pose, correct: bool) -> None:
+        """Follow shape and pose.
+
+        Parameters
+        ----------
+        figure : Figure
+            Already shaped.
+        pose : Pose
+            DOFs in lengths and radians.
+        correct : bool
+            Whether pose correctives are added.
+        """
+        weights = self._weights(figure, pose) if correct else np.zeros(0)
+        active = weights.any()
+        self.n_offsets = 0
+        if active and self.way == "texture":
+            self._write_list(weights)
+        shape = b"" if figure is self.mesh.figure else pose.shape_weights.tobytes()
+        key = (shape, weights.tobytes() if active and self.way == "product" else b"")
+        if key != self._key:
+            self._write(figure, weights if key[1] else None, normals=key[0] != self._key[0])
+            self._key = key
+
+    def _weights(self, figure: Figure, pose: Pose) -> Floats:
+        if figure.correctives is None or figure.skeleton is None:
+            return np.zeros(0)
+        return corrective_weights(joint_rotations(figure.skeleton, pose))
+
+    def _write_list(self, weights: Floats) -> None:
+        rows = np.flatnonzero(weights)
+        if self._list is None:
+            self._list = pair_texture(self.context, np.zeros(len(weights)), np.zeros(len(weights)))
+        write_pairs(self._list, rows, weights[rows])
+        self.n_offsets = len(rows)
+
+    def _write(self, figure: Figure, weights: Floats | None, normals: bool) -> None:
+        """Upload positions, and normals if the shape changed, of every split vertex."""
+        shape = figure.mesh
+        assert shape is not None  # the mesh buffers have one
+        if self._own is None:
+            size = self.mesh.positions.size
+            self._own = (
+                self.context.buffer(reserve=size, dynamic=True),
+                self.context.buffer(reserve=size, dynamic=True),
+            )
+            self.positions, self.normals = self._own
+            normals = True
+        rest = float32(shape.positions - self.mesh.center)
+        if weights is not None:
+            product = self.mesh.product
+            for rows in active_rows(weights):
+                rest += (float32(weights[rows]) @ product[rows]).reshape(-1, 3)
+        self.positions.write(rest[self.mesh.sources])
+        if normals:
+            self.normals.write(float32(shape.normals[self.mesh.sources]))
+
+    def use(self, list_unit: int, offsets_unit: int) -> None:
+        """Bind what the shader needs to sum correctives, if it has to."""
+        if self.n_offsets and self._list is not None:
+            self._list.use(list_unit)
+            self.mesh.offsets.use(offsets_unit)
+
+    def release(self) -> None:
+        """Free what belongs to this actor alone."""
+        for item in (*(self._own or ()), self._list):
+            if item is not None:
+                item.release()

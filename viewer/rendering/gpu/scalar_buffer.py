@@ -1,0 +1,112 @@
+"""The numbers of a scalar view on the GPU: one per vertex, computed when one of them may change."""
+
+from __future__ import annotations
+
+import moderngl
+import numpy as np
+
+from viewer.rendering.gpu.mesh_buffers import MeshBuffers
+from viewer.rendering.gpu.upload import float32, ramp_texture
+from viewer.rendering.scalar_look import ScalarLook, typical_span
+from viewer.rig.arrays import Floats
+from viewer.rig.pose import Pose, pose_key
+from viewer.rig.scalars import compute, find_view, missing_part
+from viewer.rig.skinning import Skinning
+
+__all__ = ["ScalarBuffer"]
+
+
+class ScalarBuffer:
+    """One actor's numbers.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        Gives the buffer.
+    mesh : MeshBuffers
+        Its split vertices.
+
+    Attributes
+    ----------
+    values : moderngl.Buffer or None
+        One float32 for every split vertex, once something was computed.
+    numbers : (V,)
+        The same for the figure's own vertices.
+    range : (float, float)
+        Lowest and highest value, in the unit that ``SCALARS`` names.
+    span : (float, float)
+        The same, or between which nearly all lie if the view's range is robust.
+    name : str
+        Of the view.
+    version : int
+        How often something was computed.
+    look : ScalarLook or None
+        How they are coloured; None for a figure that lacks what the view shows.
+    is_shown : bool
+        Whether ``show`` was called.
+    """
+
+    def __init__(self, context: moderngl.Context, mesh: MeshBuffers) -> None:
+        self.context, self.mesh = context, mesh
+        self.values: moderngl.Buffer | None = None
+        self.numbers: Floats = np.zeros(0)
+        self.range = self.span = 0.0, 1.0
+        self.name, self.version = "", 0
+        self.look: ScalarLook | None = None
+        self.is_shown = False
+        self._colors: moderngl.Texture | None = None
+        self._key: tuple[object, ...] | None = None
+
+    def update(self, name: str, pose: Pose | None, skinning: Skinning) -> None:
+        """Compute a scalar view if what its numbers depend on changed.
+
+        Parameters
+        ----------
+        name : str
+            A key of ``SCALARS``, with a joint if the view is about one. What the figure lacks is 0.
+        pose : Pose or None
+            None for the mesh in its binding space.
+        skinning : Skinning
+            How the mesh is drawn.
+        """
+        depends = find_view(name).moves and pose is not None
+        key = (name, repr(skinning), pose is None, pose_key(pose) if depends and pose else None)
+        if key == self._key:
+            return
+        figure, view = self.mesh.figure, find_view(name)
+        if view.about and missing_part(name, figure):
+            # Another figure of the scene may have this joint or field.
+            nothing = -1.0 if view.kind == "categorical" else 0.0
+            self.numbers = np.full(len(self.mesh.copies), nothing)
+        else:
+            self.numbers = compute(name, figure, pose, skinning)
+        if self.values is None:
+            self.values = self.context.buffer(reserve=4 * self.mesh.n_vertices, dynamic=True)
+        self.values.write(float32(self.numbers[self.mesh.sources]))
+        self.range = float(np.min(self.numbers)), float(np.max(self.numbers))
+        self.span = typical_span(self.numbers) if view.robust else self.range
+        self.name, self._key = name, key
+        self.version += 1
+
+    def show(self, look: ScalarLook | None) -> None:
+        """Take over how the numbers are coloured, None for not at all."""
+        self.is_shown = True
+        if look is not None and (self._colors is None or not self._has(look)):
+            if self._colors is not None:
+                self._colors.release()
+            self._colors = ramp_texture(self.context, look.colors)
+        self.look = look
+
+    def use(self, unit: int) -> None:
+        """Bind the colours to a texture unit."""
+        assert self._colors is not None  # there is a look
+        self._colors.use(unit)
+
+    def _has(self, look: ScalarLook) -> bool:
+        return self.look is not None and np.array_equal(look.colors, self.look.colors)
+
+    def release(self) -> None:
+        """Free buffer and colours."""
+        for item in (self.values, self._colors):
+            if item is not None:
+                item.release()

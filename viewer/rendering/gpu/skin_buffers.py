@@ -1,0 +1,64 @@
+"""A skin's influences on the GPU: a range of pairs per vertex, the strongest pair first."""
+
+from __future__ import annotations
+
+import moderngl
+import numpy as np
+
+from viewer.rendering.gpu.ownership import Owner
+from viewer.rendering.gpu.upload import buffer, pair_texture
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.skin import Skin, has_influence, strongest_first, weight_sums
+
+__all__ = ["SkinBuffers"]
+
+
+class SkinBuffers:
+    """Influences of a mesh's split vertices.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        Owns nothing here; ``release`` frees all.
+    skin : Skin or None
+        None binds every vertex to nothing.
+    sources : (R,)
+        The skin's vertex of each split vertex.
+
+    Attributes
+    ----------
+    bindings : moderngl.Buffer
+        A row of each split vertex, see ``include/skinning.glsl``.
+    joint_shares : (J,)
+        Each joint's part in all weights: their mean motion is that of the figure.
+    """
+
+    def __init__(self, context: moderngl.Context, skin: Skin | None, sources: Ints) -> None:
+        self._owner = Owner()
+        with self._owner.guard():
+            self._upload(context, skin, sources)
+
+    def _upload(self, context: moderngl.Context, skin: Skin | None, sources: Ints) -> None:
+        keep = self._owner.keep
+        if skin is None:
+            self.joint_shares: Floats = np.zeros(0)
+            ranges, excess = np.zeros((len(sources), 2), "u4"), np.zeros(len(sources))
+            self.pairs = keep(pair_texture(context, [], []))
+        else:
+            skin = strongest_first(skin)
+            counts = np.where(has_influence(skin), np.diff(skin.starts), 0)
+            ranges = np.stack([skin.starts[:-1], counts], axis=1)[sources]
+            self.pairs = keep(pair_texture(context, skin.joints, skin.weights))
+            sums = np.bincount(skin.joints, np.abs(skin.weights), minlength=skin.n_joints)
+            self.joint_shares = sums / (sums.sum() or 1.0)
+            # Summed in float64: in float32 even thirds miss 1, which far away moves a vertex.
+            excess = (weight_sums(skin) - 1.0)[sources]
+        # One attribute of four words: drivers in software spend as long on each as on a product.
+        bindings = np.empty((len(sources), 4), dtype="u4")
+        bindings[:, :2], bindings[:, 2] = ranges, sources
+        bindings[:, 3] = excess.astype("f4").view("u4")
+        self.bindings = keep(buffer(context, bindings, "u4"))
+
+    def release(self) -> None:
+        """Free everything."""
+        self._owner.release()

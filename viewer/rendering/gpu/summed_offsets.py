@@ -1,0 +1,127 @@
+"""Pose correctives of many actors on the GPU, in the two ways that ``rest_buffers`` explains."""
+
+from __future__ import annotations
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.rendering.gpu.mesh_buffers import MeshBuffers
+from viewer.rendering.gpu.upload import (
+    empty_offsets,
+    float32,
+    pair_texture,
+    write_pairs,
+    write_stacked,
+)
+from viewer.rig.arrays import Floats
+from viewer.rig.blendshapes import active_rows
+
+__all__ = ["SummedOffsets"]
+
+
+class SummedOffsets:
+    """What ``include/skinning.glsl`` adds to the vertices of each instance.
+
+    Where the shader sums, its list holds the weights of all instances. Where the processor does,
+    one product of matrices makes a row of offsets for every instance.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        Gives textures.
+    mesh : MeshBuffers
+        Of the figure.
+    way : str
+        One of ``rest_buffers.WAYS``.
+
+    Attributes
+    ----------
+    n_listed : int
+        Rows of each instance's list; 0 if there is nothing to sum.
+    n_summed : int
+        1 if there is a row of sums for each instance, else 0.
+    """
+
+    def __init__(self, context: moderngl.Context, mesh: MeshBuffers, way: str) -> None:
+        self.context, self.mesh, self.way = context, mesh, way
+        self.n_listed = self.n_summed = 0
+        self._weights: NDArray[np.float32] = np.zeros((0, 0), "f4")
+        self._sums: NDArray[np.float32] = np.zeros((0, 0), "f4")
+        self._list: moderngl.Texture | None = None
+        self._summed: moderngl.Texture | None = None
+
+    def update(self, rotations: Floats | None, rows: NDArray[np.intp], count: int) -> None:
+        """Follow the poses.
+
+        Parameters
+        ----------
+        rotations : (C, J, 3, 3) or None
+            Of the joints within their parents, of instances that changed; None adds nothing.
+        rows : (C,)
+            Which instances those are.
+        count : int
+            Number of all instances, A.
+        """
+        self.n_listed = self.n_summed = 0
+        if rotations is None:
+            self._weights = np.zeros((0, 0), "f4")
+            return
+        weights = float32((rotations[:, 1:] - np.eye(3)).reshape(len(rows), -1))
+        if len(self._weights) < count or self._weights.shape[1] != weights.shape[1]:
+            grown = np.zeros((count, weights.shape[1]), "f4")
+            if self._weights.shape[1] == weights.shape[1]:
+                grown[: len(self._weights)] = self._weights
+            self._weights = grown
+        self._weights[rows] = weights
+        if not self._weights[:count].any():
+            self._sums = self._sums[:0]  # none of them counts any more
+            return
+        if self.way == "texture":
+            self._list_weights(count)
+        else:
+            self._sum(rows, count)
+
+    def _list_weights(self, count: int) -> None:
+        columns = np.flatnonzero(self._weights[:count].any(axis=0))
+        self.n_listed = len(columns)
+        indices, weights = np.tile(columns, count), self._weights[:count, columns].ravel()
+        if self._list is None or self._list.width * self._list.height < len(indices):
+            if self._list is not None:
+                self._list.release()
+            self._list = pair_texture(self.context, indices, weights)
+        else:
+            write_pairs(self._list, indices, weights)
+
+    def _sum(self, rows: NDArray[np.intp], count: int) -> None:
+        """Multiply the weights of all changed instances by the offsets, at once."""
+        product, size = self.mesh.product, 3 * len(self.mesh.copies)
+        if len(self._sums) < count:
+            self._sums, rows = np.zeros((count, size), "f4"), np.arange(count)
+        weights = self._weights[rows]
+        total = np.zeros((len(rows), size), "f4")
+        for run in active_rows(np.abs(weights).max(axis=0)):
+            total += weights[:, run] @ product[run]
+        self._sums[rows] = total
+        texels = count * size // 3
+        if self._summed is None or self._summed.width * self._summed.height < texels:
+            if self._summed is not None:
+                self._summed.release()
+            self._summed = empty_offsets(self.context, texels)
+        write_stacked(self._summed, self._sums[:count])
+        self.n_summed = 1
+
+    def use(self, list_unit: int, offsets_unit: int) -> None:
+        """Bind what the shader sums, if it has to."""
+        if self.n_listed and self._list is not None:
+            self._list.use(list_unit)
+            self.mesh.offsets.use(offsets_unit)
+        if self.n_summed and self._summed is not None:
+            self._summed.use(offsets_unit)
+
+    def release(self) -> None:
+        """Free the textures."""
+        for item in (self._list, self._summed):
+            if item is not None:
+                item.release()
+        self._list = self._summed = None

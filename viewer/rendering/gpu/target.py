@@ -1,0 +1,177 @@
+"""Where pictures are drawn: a multisampled framebuffer and the plain one it is resolved into."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import moderngl
+import numpy as np
+
+from viewer.errors import RenderError, ViewerError
+from viewer.rendering.gpu.context import check_errors
+from viewer.rig.arrays import Bytes
+
+__all__ = ["Target", "check_size", "picture_rows", "straight", "target_bytes"]
+
+
+def check_size(
+    context: moderngl.Context, size: tuple[int, int], what: str = "picture size"
+) -> None:
+    """Refuse a picture that the driver cannot draw; ``what`` begins the message.
+
+    Raises
+    ------
+    ViewerError
+        With the size and the limit.
+    """
+    limit = min(*context.info["GL_MAX_VIEWPORT_DIMS"], context.info["GL_MAX_RENDERBUFFER_SIZE"])
+    if not all(1 <= side <= limit for side in size):
+        raise ViewerError(
+            f"{what}: expected 1 to {limit} pixels a side, found {size[0]} x {size[1]}"
+        )
+
+
+def target_bytes(size: tuple[int, int], samples: int) -> int:
+    """Return the memory of a picture being drawn, in bytes: what OpenGL has to hold at once.
+
+    Colour and depth of every sample, 4 bytes each, and the picture that they are resolved into;
+    without multisampling that picture and its depth.
+
+    Parameters
+    ----------
+    size : (int, int)
+        Width and height in pixels.
+    samples : int
+        A pixel; 0 without multisampling.
+
+    >>> target_bytes((100, 10), 4), target_bytes((100, 10), 0)
+    (36000, 8000)
+    """
+    picture = 4 * size[0] * size[1]
+    return picture * (2 * samples + 1) if samples else 2 * picture
+
+
+def _gigabytes(count: int) -> str:
+    return f"{count / 1e9:.1f} GB" if count >= 1e8 else f"{count / 1e6:.3g} MB"
+
+
+class Target:
+    """A picture being drawn.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        The context in use.
+    size : (int, int)
+        Width and height in pixels.
+    samples : int
+        Wanted samples a pixel; the driver's maximum if that is smaller.
+
+    Attributes
+    ----------
+    framebuffer : moderngl.Framebuffer
+        Draw here.
+    texture : moderngl.Texture
+        The picture after ``resolve``.
+    """
+
+    def __init__(self, context: moderngl.Context, size: tuple[int, int], samples: int) -> None:
+        check_size(context, size)
+        self.context, self.size = context, size
+        self.samples = min(samples, context.max_samples) if samples > 1 else 0
+        self.asked_samples = samples
+        self._owned: list[Any] = []
+        try:
+            self._allocate()
+            check_errors(context, f"a picture of {size[0]} x {size[1]} pixels")
+        except (moderngl.Error, RenderError):
+            self.release()
+            context.clear_errors()  # that of a buffer which there is no room for
+            raise self._no_room() from None
+
+    def _allocate(self) -> None:
+        """Make the framebuffers; what they are made of is released even if the last one fails."""
+        context, size, own = self.context, self.size, self._owned
+        self.texture = context.texture(size, 4)
+        own.append(self.texture)
+        self.texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        if self.samples:
+            self._resolved = context.framebuffer([self.texture])
+            own.append(self._resolved)
+            color = context.renderbuffer(size, 4, samples=self.samples)
+            own.append(color)
+            depth = context.depth_renderbuffer(size, samples=self.samples)
+            own.append(depth)
+            self.framebuffer = context.framebuffer([color], depth)
+        else:
+            depth = context.depth_renderbuffer(size)
+            own.append(depth)
+            self.framebuffer = self._resolved = context.framebuffer([self.texture], depth)
+        own.append(self.framebuffer)
+
+    def _no_room(self) -> RenderError:
+        """Return an error that says how much memory would be needed, and what needs less."""
+        width, height = self.size
+        samples = f" with {self.samples} samples a pixel" if self.samples else ""
+        less = "a smaller size needs less"
+        if self.samples:
+            alone = _gigabytes(target_bytes(self.size, 0))
+            less = f"1 sample a pixel (--samples 1) needs {alone}, {less}"
+        return RenderError(
+            f"a picture of {width} x {height} pixels{samples} needs "
+            f"{_gigabytes(target_bytes(self.size, self.samples))} of graphics memory, which "
+            f"{self.context.info['GL_RENDERER']} does not provide; {less}"
+        )
+
+    def resolve(self) -> moderngl.Texture:
+        """Average the samples and return the picture's texture."""
+        if self.samples:
+            self.context.copy_framebuffer(self._resolved, self.framebuffer)
+        return self.texture
+
+    def read(self) -> Bytes:
+        """Return the resolved picture: (H, W, 4) uint8, first row at the top.
+
+        Colours are not multiplied by alpha any more, as picture files expect.
+        """
+        return straight(picture_rows(self._resolved.read(components=4), self.size))
+
+    def read_into(self, buffer: moderngl.Buffer) -> None:
+        """Have the resolved picture copied into a buffer, as soon as the driver gets to it.
+
+        Parameters
+        ----------
+        buffer : moderngl.Buffer
+            4 bytes a pixel, last row first; ``picture_rows`` makes a picture of what is read
+            from it. Whoever reads it waits until it is there.
+        """
+        self._resolved.read_into(buffer, components=4)
+
+    def release(self) -> None:
+        """Free framebuffers and textures."""
+        for item in self._owned:
+            item.release()
+
+
+def picture_rows(data: bytes, size: tuple[int, int]) -> Bytes:
+    """Return what OpenGL read as a picture: (H, W, 4) uint8, first row at the top, not a copy.
+
+    Parameters
+    ----------
+    data : bytes
+        Last row first.
+    size : (int, int)
+        Width and height.
+    """
+    return np.frombuffer(data, dtype=np.uint8).reshape(size[1], size[0], 4)[::-1]
+
+
+def straight(pixels: Bytes) -> Bytes:
+    """Return colours that are not multiplied by their alpha any more: (H, W, 4), a copy."""
+    pixels = pixels.copy()
+    alpha = pixels[..., 3]
+    partial = (alpha > 0) & (alpha < 255)
+    if partial.any():
+        colors = pixels[partial, :3].astype(np.float64) * 255.0 / alpha[partial, None]
+        pixels[partial, :3] = np.minimum(np.rint(colors), 255.0)
+    return pixels

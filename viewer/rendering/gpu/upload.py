@@ -1,0 +1,201 @@
+"""Arrays to the GPU: the only place that turns float64 into float32 or transposes a matrix."""
+
+from __future__ import annotations
+
+from typing import Any, TypeVar
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.errors import RenderError
+from viewer.rendering.gpu.context import check_errors, is_software
+from viewer.rendering.gpu.mipmaps import add_mipmaps
+from viewer.rig.arrays import Bytes, Floats
+
+__all__ = [
+    "as_uniform",
+    "buffer",
+    "checked",
+    "empty_offsets",
+    "float32",
+    "matrix_rows",
+    "matrix_texture",
+    "offset_texture",
+    "pair_texture",
+    "picture_texture",
+    "ramp_texture",
+    "rigid_texture",
+    "write_matrices",
+    "write_pairs",
+    "write_rigid",
+    "write_stacked",
+]
+
+_Item = TypeVar("_Item", moderngl.Buffer, moderngl.Texture)
+
+# Every driver takes textures 1024 wide, and those with OpenGL 3.3 4096; the shaders count on
+# these.
+_MATRICES_PER_ROW = 256  # three texels each
+_PAIRS_PER_ROW = 1024
+_OFFSETS_PER_ROW = 4096
+_RIGID_PER_ROW = 128  # five texels each
+_SRGB8_ALPHA8 = 0x8C43
+
+
+def buffer(context: moderngl.Context, values: Any, dtype: str) -> moderngl.Buffer:
+    """Return a vertex or index buffer; one byte long if there is nothing to hold."""
+    data = np.ascontiguousarray(values, dtype=dtype).tobytes() or b"\0"
+    return checked(context, context.buffer(data), f"a mesh buffer of {len(data) / 1e6:.1f} MB")
+
+
+def checked(context: moderngl.Context, item: _Item, what: str) -> _Item:
+    """Return an object that the driver made without complaint; else free it and say so."""
+    try:
+        check_errors(context, what)
+    except RenderError:
+        item.release()
+        raise
+    return item
+
+
+def float32(values: Floats) -> NDArray[np.float32]:
+    """Return the same numbers as float32, in row order."""
+    return np.ascontiguousarray(values, dtype=np.float32)
+
+
+def as_uniform(matrix: NDArray[np.floating]) -> bytes:
+    """Return a matrix for column vectors as GLSL stores it, column by column."""
+    return np.ascontiguousarray(matrix.T, dtype="f4").tobytes()
+
+
+def matrix_rows(matrices: Floats) -> bytes:
+    """Return the affine rows of (J, 4, 4) matrices, three texels each, padded to whole rows."""
+    rows = np.zeros((_height(len(matrices), _MATRICES_PER_ROW) * _MATRICES_PER_ROW, 3, 4), "f4")
+    rows[: len(matrices)] = matrices[:, :3, :]
+    return rows.tobytes()
+
+
+def matrix_texture(context: moderngl.Context, count: int) -> moderngl.Texture:
+    """Return an empty texture for ``count`` joint matrices."""
+    size = (3 * _MATRICES_PER_ROW, _height(count, _MATRICES_PER_ROW))
+    return _data_texture(context, size, 4, f"{count} joints")
+
+
+def write_matrices(texture: moderngl.Texture, matrices: Floats) -> None:
+    """Upload (J, 4, 4) matrices: all that a frame of a posed figure sends."""
+    texture.write(matrix_rows(matrices))
+
+
+def write_stacked(texture: moderngl.Texture, rows: NDArray[np.float32]) -> None:
+    """Upload rows of texels that fill the first rows of a texture, the last one perhaps in part.
+
+    Parameters
+    ----------
+    texture : moderngl.Texture
+        Of float32.
+    rows : (N, ...)
+        Texels one after the other; written in place of what was there.
+    """
+    wide = texture.width * texture.components
+    flat = rows.reshape(-1)
+    height = -(-flat.size // wide)
+    if flat.size < height * wide:
+        flat = np.concatenate([flat, np.zeros(height * wide - flat.size, "f4")])
+    texture.write(flat, viewport=(0, 0, texture.width, height))
+
+
+def rigid_texture(context: moderngl.Context, count: int) -> moderngl.Texture:
+    """Return an empty texture for ``count`` joints' dual quaternions and stretches."""
+    size = (5 * _RIGID_PER_ROW, _height(count, _RIGID_PER_ROW))
+    return _data_texture(context, size, 4, f"{count} joints")
+
+
+def write_rigid(texture: moderngl.Texture, duals: Floats, stretches: Floats) -> None:
+    """Upload (J, 8) dual quaternions and (J, 3, 4) stretches, five texels a joint."""
+    rows = np.zeros((_height(len(duals), _RIGID_PER_ROW) * _RIGID_PER_ROW, 5, 4), "f4")
+    rows[: len(duals), :2] = duals.reshape(-1, 2, 4)
+    rows[: len(duals), 2:] = stretches
+    texture.write(rows.tobytes())
+
+
+def pair_texture(context: moderngl.Context, indices: Any, weights: Any) -> moderngl.Texture:
+    """Return a texture of (index, weight) pairs, one texel each."""
+    count = len(indices)
+    height = _height(count, _PAIRS_PER_ROW)
+    texture = _data_texture(context, (_PAIRS_PER_ROW, height), 2, f"{count} influences")
+    write_pairs(texture, indices, weights)
+    return checked(context, texture, f"{count} influences")
+
+
+def write_pairs(texture: moderngl.Texture, indices: Any, weights: Any) -> None:
+    """Upload (index, weight) pairs into a texture that holds at least as many."""
+    pairs = np.zeros((texture.width * texture.height, 2), "f4")
+    # float32 holds every index below 2^24 exactly.
+    pairs[: len(indices), 0] = indices
+    pairs[: len(indices), 1] = weights
+    texture.write(pairs.tobytes())
+
+
+def offset_texture(context: moderngl.Context, offsets: Floats) -> moderngl.Texture:
+    """Return a texture of (P, V, 3) offsets, one texel each, row after row."""
+    texture = empty_offsets(context, offsets.shape[0] * offsets.shape[1])
+    write_stacked(texture, float32(offsets))
+    return checked(context, texture, f"{offsets.shape[0] * offsets.shape[1]} offsets")
+
+
+def empty_offsets(context: moderngl.Context, count: int) -> moderngl.Texture:
+    """Return an empty texture for offsets of vertices, one texel each."""
+    size = (_OFFSETS_PER_ROW, _height(count, _OFFSETS_PER_ROW))
+    return _data_texture(context, size, 3, f"{count} offsets")
+
+
+def picture_texture(context: moderngl.Context, pixels: Bytes, notes: list[str]) -> moderngl.Texture:
+    """Return a mip-mapped sRGB texture, clamped at its edges, v = 0 at the picture's last row.
+
+    A picture larger than the driver takes is shrunk by whole factors, and ``notes`` says so.
+    """
+    limit = context.info["GL_MAX_TEXTURE_SIZE"]
+    factor = -(-max(pixels.shape[:2]) // limit)
+    if factor > 1:
+        notes.append(
+            f"a texture of {pixels.shape[1]} x {pixels.shape[0]} pixels is above this driver's "
+            f"limit of {limit} and was shrunk by {factor}"
+        )
+        pixels = pixels[::factor, ::factor]
+    flipped = np.ascontiguousarray(pixels[::-1])
+    size = (pixels.shape[1], pixels.shape[0])
+    texture = context.texture(size, 4, flipped.tobytes(), internal_format=_SRGB8_ALPHA8)
+    texture.repeat_x = texture.repeat_y = False
+    add_mipmaps(texture, flipped)
+    texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+    if not is_software(context):
+        texture.anisotropy = 8.0  # without a GPU it doubles the time of a picture
+    return checked(context, texture, f"a texture of {size[0]} x {size[1]} pixels")
+
+
+def ramp_texture(context: moderngl.Context, pixels: Bytes) -> moderngl.Texture:
+    """Return an sRGB texture of one row without smaller copies: a colour map stays itself."""
+    size = (len(pixels), 1)
+    texture = context.texture(size, 4, pixels.tobytes(), internal_format=_SRGB8_ALPHA8)
+    texture.repeat_x = texture.repeat_y = False
+    texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
+    return texture
+
+
+def _height(count: int, per_row: int) -> int:
+    return max(1, -(-count // per_row))
+
+
+def _data_texture(
+    context: moderngl.Context, size: tuple[int, int], components: int, what: str
+) -> moderngl.Texture:
+    limit = context.info["GL_MAX_TEXTURE_SIZE"]
+    if max(size) > limit:
+        raise RenderError(
+            f"{what} need a texture of {size[0]} x {size[1]}; "
+            f"{context.info['GL_RENDERER']} takes at most {limit}"
+        )
+    texture = context.texture(size, components, dtype="f4")
+    texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+    return checked(context, texture, what)

@@ -1,0 +1,1 @@
+"""Text, marks and legends drawn over a picture."""

@@ -1,0 +1,196 @@
+"""What is drawn over a picture to explain it: lines and dots in the scene, words beside points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.rendering.overlay.label_layout import lay_out
+from viewer.rendering.overlay.lettering import Lettering
+from viewer.rendering.overlay.segments import Manner, Segments
+from viewer.rendering.projection import picture_scale, project, unproject
+from viewer.rendering.view import View
+from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.geometry.vectors import unit
+
+__all__ = [
+    "LABEL_COLOR",
+    "Annotation",
+    "Labels",
+    "PlacedLabels",
+    "leader_lines",
+    "letters_for",
+    "place_labels",
+]
+
+LABEL_COLOR = (0.97, 0.97, 0.98)
+"""Usual colour of words, sRGB."""
+
+_LETTERS = 13.0  # pixels of a picture of usual height
+_GAP = 7.0  # pixels between a point and its word
+_LEADER, _BENEATH = 1.3, 2.6  # widths of a line to a word and of the dark beneath it, pixels
+_RIM = 5.0  # pixels between a point and the line that leads from it
+_DARK = (0.05, 0.06, 0.08, 0.7)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Labels:
+    """Words beside points.
+
+    Attributes
+    ----------
+    words : tuple of N str
+        What they say.
+    points : (N, 3)
+        Scene space.
+    ranks : (N,) int
+        Where there is no room for all, the lower are drawn, also of several annotations; of equal
+        ones those that are nearer.
+    colors : (N, 3)
+        Of the letters, sRGB, 0 to 1.
+    """
+
+    words: tuple[str, ...]
+    points: Floats
+    ranks: Ints
+    colors: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Annotation:
+    """Segments, and words over them.
+
+    Attributes
+    ----------
+    segments : Segments
+        In the order in which they lie over each other.
+    manner : Manner
+        How they are drawn.
+    labels : Labels or None
+        Words, which nothing hides.
+    """
+
+    segments: Segments
+    manner: Manner
+    labels: Labels | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlacedLabels:
+    """The words that are drawn.
+
+    Attributes
+    ----------
+    words : tuple of M str
+        What they say.
+    corners : (M, 2)
+        Left upper corners, pixels from the picture's left and upper edge.
+    colors : (M, 3)
+        sRGB, 0 to 1.
+    points : (M, 3)
+        What they belong to, scene space.
+    ends : (M, 2)
+        The point of each that is nearest to that, pixels.
+    has_line : (M,) bool
+        Whether a line has to lead there.
+    owners : (M,)
+        Whose words they are: indices of the labels that were placed together.
+    n_seen : tuple of int
+        For each of these how many points are within the picture.
+    """
+
+    words: tuple[str, ...]
+    corners: Ints
+    colors: Floats
+    points: Floats
+    ends: Floats
+    has_line: Bools
+    owners: Ints
+    n_seen: tuple[int, ...]
+
+    @property
+    def n_left_out(self) -> tuple[int, ...]:
+        """For each of the labels how many words are not drawn, as there is no room beside them."""
+        drawn = np.bincount(self.owners, minlength=len(self.n_seen)).tolist()
+        return tuple(seen - count for seen, count in zip(self.n_seen, drawn, strict=True))
+
+
+def letters_for(size: tuple[int, int]) -> int:
+    """Return how high letters are in a picture, pixels.
+
+    Parameters
+    ----------
+    size : (int, int)
+        Width and height of the picture, pixels.
+    """
+    return round(_LETTERS * picture_scale(size))
+
+
+def place_labels(
+    labels: Sequence[Labels], view: View, size: tuple[int, int], lettering: Lettering
+) -> PlacedLabels:
+    """Place words beside their points: those of low rank first, then the nearer ones.
+
+    Parameters
+    ----------
+    labels : sequence of Labels
+        What is to be said where; none of all these words covers another one.
+    view : View
+        The camera's matrices.
+    size : (int, int)
+        Width and height of the picture, pixels.
+    lettering : Lettering
+        The letters.
+    """
+    words = [word for one in labels for word in one.words]
+    points = np.concatenate([np.zeros((0, 3)), *(one.points for one in labels)])
+    colors = np.concatenate([np.zeros((0, 3)), *(one.colors for one in labels)])
+    ranks = np.concatenate([np.zeros(0, np.int32), *(one.ranks for one in labels)])
+    owners = np.repeat(np.arange(len(labels)), [len(one.words) for one in labels])
+    found = project(view, size, points)
+    nearest = np.lexsort((found.depths, ranks))
+    order = nearest[found.seen[nearest]].astype(np.int32)
+    sizes = lettering.sizes(words)
+    layout = lay_out(found.pixels, order, sizes, size, _GAP * picture_scale(size))
+    chosen = layout.chosen
+    return PlacedLabels(
+        tuple(words[index] for index in chosen.tolist()),
+        layout.corners,
+        colors[chosen],
+        points[chosen],
+        layout.ends,
+        layout.has_line,
+        owners[chosen].astype(np.int32),
+        tuple(np.bincount(owners[order], minlength=len(labels)).tolist()),
+    )
+
+
+def leader_lines(placed: PlacedLabels, view: View, size: tuple[int, int]) -> Segments:
+    """Return the lines that lead from points to words which are not right beside them.
+
+    Parameters
+    ----------
+    placed : PlacedLabels
+        As ``place_labels`` gives them.
+    view : View
+        The camera's matrices.
+    size : (int, int)
+        Width and height of the picture, pixels.
+    """
+    led, scale = placed.has_line, picture_scale(size)
+    points, to = placed.points[led], placed.ends[led]
+    pixels = project(view, size, points).pixels
+    # The point's own dot stays free.
+    pixels = pixels + scale * _RIM * unit(to - pixels)
+    starts, ends = (unproject(view, size, points, places) for places in (pixels, to))
+    colors = np.hstack([placed.colors[led], np.ones((len(starts), 1))])
+    dark = np.broadcast_to(_DARK, colors.shape)
+    widths = scale * np.repeat([_BENEATH, _LEADER], len(starts))
+    return Segments(
+        np.concatenate([starts, starts]),
+        np.concatenate([ends, ends]),
+        np.concatenate([dark, colors]),
+        widths,
+    )

@@ -1,0 +1,254 @@
+"""Joints over the picture: bones seen through the skin, axes, and the joint under a pixel."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.rendering.colormap import from_linear
+from viewer.rendering.overlay.segments import Segments, dots
+from viewer.rendering.passes.joint_pass import joint_colors
+from viewer.rendering.projection import picture_scale, project, project_segments
+from viewer.rendering.view import View
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.figure import Figure
+from viewer.rig.geometry.vectors import unit
+from viewer.rig.kinematics import world_matrices
+from viewer.rig.memo import Memo
+from viewer.rig.mesh import bounding_box, box_size
+from viewer.rig.pose import placement_matrix, pose_key
+from viewer.rig.scene import Actor
+from viewer.rig.shape import shaped
+from viewer.rig.skeleton import Skeleton
+
+__all__ = [
+    "HIGHLIGHT",
+    "JointMarks",
+    "axis_segments",
+    "bone_segments",
+    "joint_at",
+    "joint_dots",
+    "marks_of",
+]
+
+HIGHLIGHT = (1.0, 0.77, 0.16, 1.0)
+"""Of the selected joint, sRGB and opacity."""
+
+_AXIS_COLORS = ((0.95, 0.36, 0.33), (0.42, 0.83, 0.36), (0.36, 0.58, 1.0))  # x, y, z; sRGB
+_AXIS_SHARE = 0.4  # of the way to the nearest joint that hangs together with this one
+_AXIS_LIMITS = 0.005, 0.05  # of the skeleton's size
+_DOT, _BONE, _AXIS = 7.0, 3.0, 2.0  # pixels of a picture of usual height
+_OUTLINE = 2.0
+_DARK = (0.05, 0.06, 0.08, 0.85)
+_DOT_REACH, _BONE_REACH = 8.0, 4.0  # pixels
+_known: Memo[Figure, Floats] = Memo(kept=64)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointMarks:
+    """One actor's joints.
+
+    Attributes
+    ----------
+    actor : int
+        Index in the scene.
+    skeleton : Skeleton
+        Of its figure.
+    matrices : (J, 4, 4)
+        Joint space to scene.
+    """
+
+    actor: int
+    skeleton: Skeleton
+    matrices: Floats
+
+    @property
+    def points(self) -> Floats:
+        """Where the joints are, (J, 3), scene space."""
+        return self.matrices[:, :3, 3]
+
+
+def marks_of(actors: Sequence[Actor]) -> list[JointMarks]:
+    """Return the joints of all actors that are drawn and have some."""
+    found = []
+    for index, actor in enumerate(actors):
+        skeleton, pose = actor.figure.skeleton, actor.pose
+        if skeleton is None or pose is None or not actor.is_drawn:
+            continue
+        placement = actor.placement @ placement_matrix(pose)
+        found.append(JointMarks(index, skeleton, placement @ _worlds(actor)))
+    return found
+
+
+def _worlds(actor: Actor) -> Floats:
+    """Return joint-to-figure matrices, remembered for a camera that moves: (J, 4, 4)."""
+    figure, pose = actor.figure, actor.pose
+    assert pose is not None  # the caller looked
+
+    def make() -> Floats:
+        skeleton = shaped(figure, pose.shape_weights).skeleton
+        assert skeleton is not None  # shaping keeps it
+        return world_matrices(skeleton, pose)
+
+    return _known.get(figure, pose_key(pose), make)
+
+
+def bone_segments(marks: JointMarks, selected: int, scale: float) -> Segments:
+    """Return a line from each parent to its child, in the colour of the parent's box.
+
+    Parameters
+    ----------
+    marks : JointMarks
+        Of one actor.
+    selected : int
+        The joint whose bones are highlighted, -1 for none.
+    scale : float
+        How much larger than usual marks are.
+    """
+    parents = marks.skeleton.parents
+    children = np.flatnonzero(parents >= 0)
+    points, above = marks.points, parents[children]
+    colors = _colors(marks.skeleton, selected)[above]
+    # A dark line beneath each, so that it is seen on any background.
+    starts = np.concatenate([points[above], points[above]])
+    ends = np.concatenate([points[children], points[children]])
+    dark = np.broadcast_to(_DARK, colors.shape)
+    widths = np.full(2 * len(children), scale * _BONE)
+    widths[: len(children)] += scale * _OUTLINE
+    return Segments(starts, ends, np.concatenate([dark, colors]), widths)
+
+
+def joint_dots(marks: JointMarks, selected: int, scale: float) -> list[Segments]:
+    """Return a dot at each joint, dark ones beneath; parameters are those of ``bone_segments``."""
+    colors, points = _colors(marks.skeleton, selected), marks.points
+    parts = [dots(points, np.array(_DARK), scale * (_DOT + _OUTLINE))]
+    parts.append(dots(points, colors, scale * _DOT))
+    if selected >= 0:
+        chosen = points[selected : selected + 1]
+        parts.append(dots(chosen, np.array(_DARK), scale * (1.5 * _DOT + _OUTLINE)))
+        parts.append(dots(chosen, np.array(HIGHLIGHT), scale * 1.5 * _DOT))
+    return parts
+
+
+def axis_segments(marks: JointMarks, scale: float) -> Segments:
+    """Return the x, y and z axis of each joint: red, green, blue.
+
+    They reach some of the way to the nearest parent or child, so that those of a hand's many
+    joints stay apart.
+
+    Parameters
+    ----------
+    marks : JointMarks
+        Of one actor.
+    scale : float
+        How much larger than usual marks are.
+    """
+    points, count = marks.points, len(marks.points)
+    lengths = _axis_lengths(points, marks.skeleton)
+    axes = unit(np.swapaxes(marks.matrices[:, :3, :3], 1, 2))
+    starts = np.repeat(points[:, None], 3, axis=1)
+    ends = starts + lengths[:, None, None] * axes
+    colors = np.ones((count, 3, 4))
+    colors[..., :3] = _AXIS_COLORS
+    widths = np.full(3 * count, scale * _AXIS)
+    return Segments(starts.reshape(-1, 3), ends.reshape(-1, 3), colors.reshape(-1, 4), widths)
+
+
+def _axis_lengths(points: Floats, skeleton: Skeleton) -> Floats:
+    """Return how long each joint's axes are: (J,), scene units."""
+    size = box_size(bounding_box(points)) or 1.0
+    children = np.flatnonzero(skeleton.parents >= 0)
+    above = skeleton.parents[children]
+    apart = np.linalg.norm(points[children] - points[above], axis=1)
+    apart[apart < 1e-6 * size] = np.inf  # joints in one place say nothing
+    nearest = np.full(len(points), np.inf)
+    np.minimum.at(nearest, children, apart)
+    np.minimum.at(nearest, above, apart)
+    return np.clip(_AXIS_SHARE * nearest, _AXIS_LIMITS[0] * size, _AXIS_LIMITS[1] * size)
+
+
+def _colors(skeleton: Skeleton, selected: int) -> Floats:
+    """Return the colours of the joints' boxes: (J, 4), sRGB and opacity."""
+    colors = np.ones((skeleton.n_joints, 4))
+    colors[:, :3] = from_linear(joint_colors(skeleton.n_joints))
+    if selected >= 0:
+        colors[selected] = HIGHLIGHT
+    return colors
+
+
+def joint_at(
+    marks: Sequence[JointMarks],
+    view: View,
+    size: tuple[int, int],
+    pixel: tuple[float, float],
+    with_bones: bool,
+) -> tuple[int, int, Floats] | None:
+    """Return the joint whose dot or bone is at a pixel.
+
+    Parameters
+    ----------
+    marks : sequence of JointMarks
+        Of all actors.
+    view : View
+        The camera's matrices.
+    size : (int, int)
+        Width and height of the picture, pixels.
+    pixel : (float, float)
+        From the picture's left and upper edge.
+    with_bones : bool
+        Whether bones are drawn; a bone belongs to the joint that turns it.
+
+    Returns
+    -------
+    (actor, joint, point) or None
+        Indices, and where it is: (3,), scene space.
+    """
+    best: tuple[float, float, int, int, Floats] | None = None
+    for one in marks:
+        away, joints, depths = _away(one, view, size, pixel, with_bones)
+        nearest = int(away.argmin())
+        found = float(away[nearest]), float(depths[nearest])
+        if np.isfinite(found[0]) and (best is None or found < best[:2]):
+            joint = int(joints[nearest])
+            best = (*found, one.actor, joint, one.points[joint])
+    return None if best is None else best[2:]
+
+
+def _away(
+    marks: JointMarks,
+    view: View,
+    size: tuple[int, int],
+    pixel: tuple[float, float],
+    with_bones: bool,
+) -> tuple[Floats, Ints, Floats]:
+    """Return how far a pixel is from dots (up to 1) and bones (1 to 2), their joints and depths."""
+    scale, seen = picture_scale(size), project(view, size, marks.points)
+    away = np.linalg.norm(seen.pixels - pixel, axis=1) / (scale * _DOT_REACH)
+    away[~seen.seen | (away > 1.0)] = np.inf
+    joints: Ints = np.arange(len(away), dtype=np.int32)
+    if with_bones:
+        # Dots lie over bones.
+        beside, parents = _beside_bones(marks, view, size, pixel)
+        beside = 1.0 + beside / (scale * _BONE_REACH)
+        away = np.concatenate([away, np.where(beside > 2.0, np.inf, beside)])
+        joints = np.concatenate([joints, parents])
+    return away, joints, seen.depths[joints]
+
+
+def _beside_bones(
+    marks: JointMarks, view: View, size: tuple[int, int], pixel: tuple[float, float]
+) -> tuple[Floats, Ints]:
+    """Return how far a pixel is from each bone, and the joints that turn them."""
+    children = np.flatnonzero(marks.skeleton.parents >= 0)
+    above = marks.skeleton.parents[children]
+    ends, seen = project_segments(view, size, marks.points[above], marks.points[children])
+    along = ends[:, 1] - ends[:, 0]
+    to_pixel = np.asarray(pixel) - ends[:, 0]
+    squares = (along**2).sum(axis=1)
+    share = (to_pixel * along).sum(axis=1) / np.where(squares > 0.0, squares, 1.0)
+    nearest = np.clip(share, 0.0, 1.0)[:, None] * along
+    away = np.linalg.norm(to_pixel - nearest, axis=1)
+    away[~seen] = np.inf
+    return away, above

@@ -1,0 +1,38 @@
+"""Names of joints, to be written beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from viewer.errors import printable
+from viewer.rendering.overlay.annotation import LABEL_COLOR, Labels
+from viewer.rendering.overlay.joint_marks import HIGHLIGHT, JointMarks
+from viewer.rig.skeleton import joint_labels
+
+__all__ = ["name_labels"]
+
+_LONGEST = 40  # letters of a name
+_LATE = 1000  # rank of joints that nobody chose: other words come before their names
+
+
+def name_labels(marks: Sequence[JointMarks], selected: tuple[int, int]) -> Labels:
+    """Return the joints' names: that of the selected joint comes first, then the nearer ones.
+
+    Parameters
+    ----------
+    marks : sequence of JointMarks
+        Of all actors.
+    selected : (int, int)
+        An actor's index and a joint of it; -1 for none.
+    """
+    words = [printable(word, _LONGEST) for one in marks for word in joint_labels(one.skeleton)]
+    if not words:
+        return Labels((), np.zeros((0, 3)), np.zeros(0, dtype=np.int32), np.zeros((0, 3)))
+    is_chosen = np.concatenate(
+        [(np.arange(len(one.points)) == selected[1]) & (one.actor == selected[0]) for one in marks]
+    )
+    points = np.concatenate([one.points for one in marks])
+    colors = np.where(is_chosen[:, None], HIGHLIGHT[:3], LABEL_COLOR)
+    return Labels(tuple(words), points, np.where(is_chosen, 0, _LATE).astype(np.int32), colors)

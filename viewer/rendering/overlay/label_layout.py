@@ -1,0 +1,180 @@
+"""Which of many labels are drawn, and where, so that none covers another or seems another's."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.rendering.overlay.label_cells import Cells, Dots
+from viewer.rendering.overlay.label_places import (
+    Places,
+    clear_places,
+    crowded,
+    crowded_lines,
+    line_pixels,
+    places_of,
+)
+from viewer.rig.arrays import Bools, Floats, Ints
+
+__all__ = ["Layout", "lay_out"]
+
+_FEWEST, _MOST = 256, 1024  # labels whose places are tried together, the first and later ones
+_CELL = 0.5  # gaps, side of a cell unless they are too many
+_CELLS_PER_LABEL, _MANY_CELLS = 40, 300_000  # sums over more cost more than they save
+_SAMPLES = 5  # columns of a label whose pixels tell most labels that are in its way
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Layout:
+    """The labels that are drawn.
+
+    Attributes
+    ----------
+    chosen : (M,)
+        Indices of the labels, in the order in which they were placed.
+    corners : (M, 2)
+        Their left upper corners, whole pixels.
+    ends : (M, 2)
+        The point of each that is nearest to its own point, pixels.
+    has_line : (M,) bool
+        Whether a line has to lead there, because there was no room right beside the point.
+    """
+
+    chosen: Ints
+    corners: Ints
+    ends: Floats
+    has_line: Bools
+
+
+def lay_out(
+    anchors: Floats,
+    order: Ints,
+    sizes: Ints,
+    picture: tuple[int, int],
+    gap: float,
+) -> Layout:
+    """Place labels one after the other beside their points, and leave out those without room.
+
+    A label lies right of its point, left, askew, above or below, where the most room is; else a
+    little away from it with a line. It is never nearer to another point than to its own,
+    which is known to a quarter of a pixel.
+
+    Parameters
+    ----------
+    anchors : (N, 2)
+        The points, pixels from the picture's left and upper edge.
+    order : (N,)
+        Indices of the labels: those that come first are placed first.
+    sizes : (N, 2)
+        Width and height of the labels, pixels, 1 or more.
+    picture : (int, int)
+        Width and height of the picture; labels lie within it.
+    gap : float
+        Pixels between a point and its label.
+    """
+    n_cells = min(_CELLS_PER_LABEL * max(len(order), 1), _MANY_CELLS)
+    side = max(int(_CELL * gap), math.ceil(math.sqrt(math.prod(picture) / n_cells)))
+    cells = Cells(picture, side)
+    dots, taken = Dots(cells, anchors[order]), _Taken(picture, gap)
+    chosen, corners = [np.zeros(0, np.int32)], [np.zeros((0, 2), np.int32)]
+    ends, has_line = [np.zeros((0, 2))], [np.zeros(0, np.bool_)]
+    for some in _portions(order):
+        places = places_of(anchors[some], sizes[some], picture, gap)
+        # Most places without room in a crowd are found out here, all at once.
+        may = np.flatnonzero(~crowded(places, anchors[some], dots, gap))
+        places = places.take(may[taken.may_be_open(places.low[may], places.high[may])])
+        places = places.take(_with_free_lines(places, taken, dots, gap))
+        places = clear_places(places, dots, gap)
+        found = places.take(_settle(places, taken, gap))
+        chosen.append(some[found.labels])
+        corners.append(found.low)
+        ends.append(found.ends)
+        has_line.append(found.has_line)
+    return Layout(
+        np.concatenate(chosen), np.concatenate(corners), np.concatenate(ends),
+        np.concatenate(has_line),
+    )  # fmt: skip
+
+
+def _portions(order: Ints) -> Iterator[Ints]:
+    """Give the labels in parts that grow: the more lie there, the fewer places are still open."""
+    first, count = 0, _FEWEST
+    while first < len(order):
+        yield order[first : first + count]
+        first, count = first + count, min(2 * count, _MOST)
+
+
+def _with_free_lines(places: Places, taken: _Taken, dots: Dots, gap: float) -> Ints:
+    """Return the places to which lines can lead, or need not: (M,), indices."""
+    rows = np.flatnonzero(places.has_line)
+    led = places.take(rows)
+    pixels, are_part = line_pixels(led, gap)
+    is_crowded = crowded_lines(led, pixels, are_part, dots, gap)
+    free = ~(taken.at(pixels) & are_part).any(axis=1) & ~is_crowded
+    return np.delete(np.arange(len(places.labels)), rows[~free])
+
+
+def _settle(places: Places, taken: _Taken, gap: float) -> Ints:
+    """Take the first place of each label that is still open: (M,), indices of places."""
+    found: list[int] = []
+    settled = -1  # the label that was placed last
+    closed: set[tuple[int, ...]] = set()  # the same places of labels of the same point
+    pixels, are_part = line_pixels(places, gap)
+    corners = list(map(tuple, np.hstack([places.low, places.high]).tolist()))
+    for row, label in enumerate(places.labels.tolist()):
+        if label == settled or corners[row] in closed:
+            continue
+        if not taken.is_open(corners[row]):
+            closed.add(corners[row])
+            continue
+        path = pixels[row, are_part[row]]
+        if not taken.at(path).any():
+            taken.take(corners[row], path)
+            found.append(row)
+            settled = label
+    return np.array(found, dtype=np.int32)
+
+
+class _Taken:
+    """The pixels beneath labels and lines.
+
+    Parameters
+    ----------
+    picture : (int, int)
+        Width and height, pixels.
+    gap : float
+        Pixels between a point and its label.
+    """
+
+    def __init__(self, picture: tuple[int, int], gap: float) -> None:
+        self._pixels = np.zeros(picture[::-1], dtype=np.bool_)
+        # Half a gap stays free around each: two words beside each other are not one.
+        self._apart = round(0.5 * gap)
+
+    def may_be_open(self, low: Ints, high: Ints) -> Bools:
+        """Return which rectangles may have nothing beneath them: (M,); the others have for sure."""
+        # Labels have one height, so what another one covers has a pixel of an upper or lower edge.
+        left = np.maximum(low[:, :1] - self._apart, 0)
+        right = np.minimum(high[:, :1] + self._apart, self._pixels.shape[1]) - 1
+        columns = left + (right - left) * np.arange(_SAMPLES) // (_SAMPLES - 1)
+        edges = self._pixels[low[:, 1:], columns] | self._pixels[high[:, 1:] - 1, columns]
+        return ~edges.any(axis=1)
+
+    def at(self, pixels: Ints) -> Bools:
+        """Return whether something is at pixels, columns and rows: (...,)."""
+        return self._pixels[pixels[..., 1], pixels[..., 0]]
+
+    def is_open(self, corners: tuple[int, ...]) -> bool:
+        """Return whether nothing is beneath a label: left, top, right, bottom."""
+        left, top, right, bottom = corners
+        around = slice(max(left - self._apart, 0), right + self._apart)
+        return not self._pixels[top:bottom, around].any()
+
+    def take(self, corners: tuple[int, ...], path: Ints) -> None:
+        """Put a label there, and the pixels (S, 2) of its line."""
+        left, top, right, bottom = corners
+        self._pixels[path[:, 1], path[:, 0]] = True
+        self._pixels[top:bottom, left:right] = True

@@ -1,0 +1,234 @@
+"""Where labels may lie beside their points, and which of these places are clear of other points."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.rendering.overlay.label_cells import Dots
+from viewer.rig.arrays import Bools, Floats, Ints
+
+__all__ = [
+    "Places",
+    "clear_places",
+    "crowded",
+    "crowded_lines",
+    "line_pixels",
+    "places_of",
+]
+
+_SIDE = math.sqrt(0.5)
+_WAYS = np.array(
+    [[1, 0], [-1, 0], [_SIDE, -_SIDE], [_SIDE, _SIDE], [-_SIDE, -_SIDE], [-_SIDE, _SIDE],
+     [0, -1], [0, 1]],
+    dtype=np.float64,
+)  # fmt: skip
+"""From a point to its label, in the order of preference; y grows downwards."""
+
+_REACHES = (1.0, 3.0, 5.0)
+"""How far labels are from their points, gaps; from the second on a line leads there."""
+
+_ALIKE = 1.0  # pixels between points whose labels cannot be told apart by their places
+_CLEARER = 1.5  # times as far from other points as from its own, a label without a line; with
+# one, so many gaps
+_FREE = 3.0  # the same where there is much room
+_BESIDE_LINE = 0.75  # gaps between a line and other points
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Places:
+    """Places of labels.
+
+    Attributes
+    ----------
+    labels : (M,)
+        Whose place each is.
+    ranks : (M,)
+        Which of its places, the lower the better.
+    anchors : (M, 2)
+        The labels' points, pixels.
+    low, high : (M, 2)
+        Left upper and right lower corners, whole pixels.
+    ends : (M, 2)
+        What of each is nearest to its point, pixels.
+    own : (M,)
+        How far that is.
+    has_line : (M,) bool
+        Whether a line leads there.
+    """
+
+    labels: Ints
+    ranks: Ints
+    anchors: Floats
+    low: Ints
+    high: Ints
+    ends: Floats
+    own: Floats
+    has_line: Bools
+
+    def take(self, rows: NDArray[np.integer[Any]]) -> Places:
+        """Return some of them."""
+        return Places(
+            self.labels[rows],
+            self.ranks[rows],
+            self.anchors[rows],
+            self.low[rows],
+            self.high[rows],
+            self.ends[rows],
+            self.own[rows],
+            self.has_line[rows],
+        )
+
+
+def places_of(anchors: Floats, sizes: Ints, picture: tuple[int, int], gap: float) -> Places:
+    """Return the places of labels that lie within a picture.
+
+    Parameters
+    ----------
+    anchors : (N, 2)
+        The points, pixels from the picture's left and upper edge.
+    sizes : (N, 2)
+        Width and height of the labels, pixels.
+    picture : (int, int)
+        Width and height of the picture.
+    gap : float
+        Pixels between a point and its label.
+    """
+    ways = np.tile(_WAYS, (len(_REACHES), 1))
+    nearest = anchors[:, None] + gap * np.repeat(_REACHES, len(_WAYS))[:, None] * ways
+    low = np.rint(nearest - 0.5 * (1.0 - np.sign(ways)) * sizes[:, None])
+    # What lies straight beside its point may be shifted along it to stay within the picture.
+    room = np.maximum(np.array(picture) - sizes, 0)[:, None]
+    low = np.where(ways == 0.0, np.clip(low, 0.0, room), low)
+    is_inside = (low >= 0.0) & (low + np.maximum(sizes, 1)[:, None] <= picture)
+    inside = np.nonzero(is_inside[..., 0] & is_inside[..., 1])
+    labels, ranks = (indices.astype(np.int32) for indices in inside)
+    low, anchors = low[labels, ranks].astype(np.int32), anchors[labels]
+    high = low + sizes[labels]
+    ends = np.clip(anchors, low, high)
+    own = np.hypot(*(ends - anchors).T)
+    return Places(labels, ranks, anchors, low, high, ends, own, ranks >= len(_WAYS))
+
+
+def crowded(places: Places, anchors: Floats, dots: Dots, gap: float) -> Bools:
+    """Return which places are for certain too near to other points, or over their own: (M,).
+
+    Parameters
+    ----------
+    places : Places
+        Within the picture.
+    anchors : (N, 2)
+        The labels' points, pixels.
+    dots : Dots
+        All points.
+    gap : float
+        Pixels between a point and its label.
+    """
+    # A rectangle that is this much larger all around has its corners within the least distance.
+    more = 0.7 * _least(places, gap)[:, None]
+    around = dots.most_within(anchors - _ALIKE, anchors + _ALIKE)
+    found = dots.fewest_within(places.low - more, places.high + more)
+    # With gaps of less than a pixel, a place may also be over its own point.
+    return np.asarray((found > around[places.labels]) | (places.own == 0.0))
+
+
+def line_pixels(places: Places, gap: float) -> tuple[Ints, Bools]:
+    """Return the pixels of lines from beside points to just before their labels.
+
+    Parameters
+    ----------
+    places : Places
+        Within the picture.
+    gap : float
+        Pixels between a point and its label.
+
+    Returns
+    -------
+    pixels : (M, S, 2)
+        Column and row, one pixel after the other from the point on.
+    are_part : (M, S) bool
+        Which of them the line has: it ends before its label, and some places have none.
+    """
+    start, length = places.anchors[:, None], places.own[:, None]
+    steps = np.arange(0.5 * gap, places.own.max(initial=0.0))
+    are_part = places.has_line[:, None] & (steps < length - 1.0)
+    shares = np.where(are_part, steps, 0.0)[..., None] / length[..., None]
+    pixels = np.floor(start + shares * (places.ends[:, None] - start)).astype(np.int32)
+    return np.where(are_part[..., None], pixels, 0), are_part
+
+
+def crowded_lines(places: Places, pixels: Ints, are_part: Bools, dots: Dots, gap: float) -> Bools:
+    """Return which lines for certain pass too near to other points: (M,).
+
+    Parameters
+    ----------
+    places : Places
+        To which they lead.
+    pixels, are_part : (M, S, 2), (M, S) bool
+        As ``line_pixels`` gives them.
+    dots : Dots
+        All points.
+    gap : float
+        Pixels between a point and its label.
+    """
+    diagonal = math.sqrt(2.0) * dots.cells.side
+    if diagonal > _BESIDE_LINE * gap:
+        return np.zeros(len(pixels), dtype=np.bool_)
+    # A dot in a cell through which the line passes is nearer than the cell's diagonal; the points
+    # that are alike are in no cell so far from the line's beginning.
+    across, down = np.moveaxis(np.abs(pixels + 0.5 - places.anchors[:, None]), 2, 0)
+    is_away = are_part & (np.maximum(across, down) > _ALIKE + dots.cells.side + 0.5)
+    return np.asarray((is_away & (dots.count_at(pixels) > 0)).any(axis=1))
+
+
+def clear_places(places: Places, dots: Dots, gap: float) -> Places:
+    """Return the places that are far enough from other points, the best of each label first.
+
+    Parameters
+    ----------
+    places : Places
+        Within the picture.
+    dots : Dots
+        All points.
+    gap : float
+        Pixels between a point and its label.
+    """
+    clear = np.full(len(places.labels), np.inf)
+    for layer in range(dots.n_layers):
+        nearest, beside_line = _clearances(places, dots, layer, gap)
+        clear = np.minimum(clear, nearest)
+        rows = np.flatnonzero((clear >= _least(places, gap)) & (beside_line >= _BESIDE_LINE * gap))
+        places, clear = places.take(rows), clear[rows]
+    # Free places come before those that are near other points, and these before those with lines.
+    is_free = ~places.has_line & (clear >= _FREE * places.own)
+    order = np.lexsort((places.ranks, places.has_line, ~is_free, places.labels))
+    return places.take(order)
+
+
+def _least(places: Places, gap: float) -> Floats:
+    """Return how far places have to be from other points, pixels: (M,)."""
+    return _CLEARER * np.where(places.has_line, gap, places.own)
+
+
+def _clearances(places: Places, dots: Dots, layer: int, gap: float) -> tuple[Floats, Floats]:
+    """Return how far other points are from the places and from lines there: (M,), inf if far."""
+    reach = np.where(places.has_line, _CLEARER * gap, _FREE * places.own)[:, None]
+    low = np.minimum(places.low - reach, places.anchors - _BESIDE_LINE * gap)
+    high = np.maximum(places.high + reach, places.anchors + _BESIDE_LINE * gap)
+    clear, beside_line = np.full((2, len(reach)), np.inf)
+    for owners, points in dots.pairs(low, high, layer):
+        away = points - places.anchors[owners]
+        others = np.flatnonzero(np.maximum(*np.abs(away).T) >= _ALIKE)
+        owners, points, away = owners[others], points[others], away[others]
+        outside = np.maximum(places.low[owners] - points, points - places.high[owners])
+        np.minimum.at(clear, owners, np.hypot(*np.maximum(outside, 0.0).T))
+        led = np.flatnonzero(places.has_line[owners])
+        owners, away = owners[led], away[led]
+        along = places.ends[owners] - places.anchors[owners]
+        shares = np.clip((away * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, 1.0)
+        np.minimum.at(beside_line, owners, np.hypot(*(away - shares[:, None] * along).T))
+    return clear, beside_line

@@ -1,0 +1,163 @@
+"""A legend as pixels, for pictures without a window; Pillow is imported when one is drawn."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from viewer.errors import printable
+from viewer.rendering.overlay.legend import Legend
+from viewer.rendering.overlay.legend_columns import legend_columns
+from viewer.rig.arrays import Bytes
+
+if TYPE_CHECKING:
+    from PIL import ImageDraw, ImageFont
+
+    Font = ImageFont.ImageFont | ImageFont.FreeTypeFont
+
+__all__ = ["legend_pixels"]
+
+_SIZES = 9, 40  # height of letters, pixels: smallest and largest
+_LETTERS_PER_HEIGHT, _LETTERS_PER_WIDTH = 40.0, 56.0
+_SMALLER = 0.6  # of the letters' height, down to which names of many things may shrink
+_MOST = 0.9  # of the picture's width and height, for all
+# Of the picture's width, for several columns: figures stand in the middle, so letters shrink
+# before columns of names become wider than the first.
+_WIDE, _WIDER = 0.3, 0.45
+_LONGEST = 40  # letters of a name
+_BAR = 14.0  # width, in heights of letters
+_PANEL, _TEXT, _FAINT, _LINE = (20, 22, 26, 214), (240, 242, 245), (176, 182, 190), (12, 12, 14)
+
+
+def legend_pixels(legend: Legend, size: tuple[int, int]) -> Bytes | None:
+    """Return a legend's picture, as large as suits a picture of some size.
+
+    Many things with names stand in several columns, then in smaller letters, then in more columns;
+    those that still have no room are counted.
+
+    Parameters
+    ----------
+    legend : Legend
+        What the colours stand for.
+    size : (int, int)
+        Width and height of the picture that it goes into, pixels.
+
+    Returns
+    -------
+    (H, W, 4) uint8 or None
+        sRGB, not multiplied by alpha, first row at the top; None if there is no room for it.
+    """
+    wanted = min(size[1] / _LETTERS_PER_HEIGHT, size[0] / _LETTERS_PER_WIDTH)
+    letters = round(min(max(wanted, _SIZES[0]), _SIZES[1]))
+    least = max(round(_SMALLER * letters), _SIZES[0])
+    tries = [(height, _WIDE) for height in range(letters, least - 1, -1)] + [(least, _WIDER)]
+    for height, share in tries:
+        drawing = _Drawing(legend, height, size, share)
+        if not drawing.columns.left_out:
+            break
+    return drawing.pixels()
+
+
+class _Drawing:
+    """Lays a legend out: lines of text, a bar or columns of swatches, from the top down."""
+
+    def __init__(self, legend: Legend, letters: int, size: tuple[int, int], share: float) -> None:
+        from PIL import Image, ImageDraw, ImageFont
+
+        self.legend, self.letters, self.size = legend, letters, size
+        self.font: Font = ImageFont.load_default(letters)
+        self.gap = max(letters // 2, 3)
+        self.line = round(1.35 * letters)
+        self.new = Image.new
+        self.draw_on = ImageDraw.Draw
+        self._ruler = ImageDraw.Draw(Image.new("L", (1, 1)))
+        self.texts = [printable(entry.text, _LONGEST) for entry in legend.entries]
+        self.bar_height = letters + self.gap + self.line if len(legend.colors) else 0
+        rest = self.line * (2 if legend.note else 1) + self.bar_height + 2 * self.gap
+        rows = max((int(_MOST * size[1]) - rest) // self.line, 1)
+        widths = [self._width(text) + 2 * letters for text in self.texts]
+        self.columns = legend_columns(widths, rows, share * size[0] - 2 * self.gap)
+
+    def pixels(self) -> Bytes | None:
+        """Return the picture if it fits into nine tenths of another one."""
+        legend, gap = self.legend, self.gap
+        width = max(
+            self._width(legend.heading),
+            self._width(legend.note),
+            round(_BAR * self.letters) + 2 * gap if self.bar_height else 0,
+            self._columns_width(),
+        )
+        lines = 1 + self.columns.rows + (1 if legend.note else 0)
+        height = lines * self.line + self.bar_height
+        whole = width + 2 * gap, height + 2 * gap
+        if whole[0] > _MOST * self.size[0] or whole[1] > _MOST * self.size[1]:
+            return None
+        image = self.new("RGBA", whole, _PANEL)
+        draw = self.draw_on(image)
+        y = gap
+        draw.text((gap, y), legend.heading, _TEXT, self.font)
+        y += self.line
+        if self.bar_height:
+            self._draw_bar(draw, gap, y, width)
+        y += self.bar_height
+        self._draw_entries(draw, y)
+        y += self.columns.rows * self.line
+        if legend.note:
+            draw.text((gap, y), legend.note, _FAINT, self.font)
+        return np.array(image)
+
+    def _columns_width(self) -> int:
+        *others, last = self.columns.widths or (0.0,)
+        more = self._width(self._more()) + 2 * self.letters if self.columns.left_out else 0
+        return int(sum(others) + max(last, more))
+
+    def _more(self) -> str:
+        return f"and {self.columns.left_out} more"
+
+    def _draw_entries(self, draw: ImageDraw.ImageDraw, top: int) -> None:
+        """Draw the columns, and beneath the last one how many things are left out."""
+        left, first, y = float(self.gap), 0, top
+        for count, width in zip(self.columns.counts, self.columns.widths, strict=True):
+            y = top
+            for row in range(first, first + count):
+                self._draw_entry(draw, left, y, self.legend.entries[row].color, self.texts[row])
+                y += self.line
+            first, left = first + count, left + width
+        if self.columns.left_out:
+            self._draw_entry(draw, left - self.columns.widths[-1], y, None, self._more())
+
+    def _draw_bar(self, draw: ImageDraw.ImageDraw, left: float, top: float, width: int) -> None:
+        """Draw the colours, the isolines, and the numbers beneath, which stay within the panel."""
+        colors, bottom = self.legend.colors, top + self.letters
+        # Room for half a number on both sides.
+        margin = max((self._width(tick.text) for tick in self.legend.ticks), default=0) // 2
+        first, length = left + margin, width - 2 * margin
+        for column in range(length):
+            color = colors[column * len(colors) // length, :3]
+            draw.line([(first + column, top), (first + column, bottom)], tuple(color.tolist()))
+        for place in self.legend.lines:
+            x = first + round(place * (length - 1))
+            draw.line([(x, top), (x, bottom)], _LINE)
+        for tick in self.legend.ticks:
+            x = first + round(tick.place * (length - 1))
+            draw.line([(x, bottom), (x, bottom + self.gap // 2)], _TEXT)
+            corner = (x - self._width(tick.text) / 2, bottom + self.gap // 2)
+            draw.text(corner, tick.text, _TEXT, self.font)
+
+    def _draw_entry(
+        self,
+        draw: ImageDraw.ImageDraw,
+        left: float,
+        top: float,
+        color: tuple[int, int, int] | None,
+        text: str,
+    ) -> None:
+        side = self.letters
+        if color is not None:
+            edge = top + 0.15 * side
+            draw.rectangle([(left, edge), (left + side, edge + side)], color, _FAINT)
+        draw.text((left + 1.6 * side, top), text, _TEXT if color else _FAINT, self.font)
+
+    def _width(self, text: str) -> int:
+        return int(np.ceil(self._ruler.textlength(text, self.font)))

@@ -1,0 +1,47 @@
+"""Marks that say "here": points and lines as large on the screen from wherever one looks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from viewer.rendering.overlay.annotation import Annotation
+from viewer.rendering.overlay.segments import Manner, Segments
+from viewer.rig.arrays import Floats
+
+__all__ = ["MARK_COLOR", "Marks", "mark_annotation"]
+
+MARK_COLOR = (1.0, 0.16, 0.56)
+"""Of marks, sRGB: it is neither in the colour maps nor in the lights."""
+
+_LINE = 1.0  # radius of lines, pixels
+_MANNER = Manner(hidden=0.5, lift=0.004, border=1.5, border_color=(0.08, 0.02, 0.05))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Marks:
+    """Where marks are.
+
+    Attributes
+    ----------
+    points : (N, 3)
+        Scene space.
+    radii : (N,)
+        Of the points, pixels.
+    lines : (M, 2, 3)
+        Both ends of each, scene space.
+    """
+
+    points: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    radii: Floats = field(default_factory=lambda: np.zeros(0))
+    lines: Floats = field(default_factory=lambda: np.zeros((0, 2, 3)))
+
+
+def mark_annotation(marks: Marks) -> Annotation:
+    """Return marks as they are drawn: lines first, so that points lie over them."""
+    radii = np.concatenate([np.full(len(marks.lines), _LINE), marks.radii])
+    colors = np.broadcast_to((*MARK_COLOR, 1.0), (len(radii), 4))
+    starts = np.concatenate([marks.lines[:, 0], marks.points])
+    ends = np.concatenate([marks.lines[:, 1], marks.points])
+    return Annotation(Segments(starts, ends, colors, 2.0 * radii), _MANNER)

@@ -1,0 +1,172 @@
+"""Thick line segments and round dots as arrays, and the pass that draws them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+
+from viewer.rendering.gpu.program import Programs, set_uniforms
+from viewer.rendering.gpu.upload import checked, float32
+from viewer.rendering.options import Color
+from viewer.rendering.view import View, set_model
+from viewer.rig.arrays import Floats
+
+__all__ = ["HIDDEN", "Manner", "SegmentPass", "Segments", "dots", "joined"]
+
+HIDDEN = 0.4
+"""Usual opacity of what lies behind a surface."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Segments:
+    """Segments in drawing order; those of length 0 are dots.
+
+    Attributes
+    ----------
+    starts, ends : (N, 3)
+        Scene space.
+    colors : (N, 4)
+        sRGB and opacity, 0 to 1.
+    widths : (N,)
+        Pixels.
+    """
+
+    starts: Floats
+    ends: Floats
+    colors: Floats
+    widths: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Manner:
+    """How segments are drawn.
+
+    Attributes
+    ----------
+    on_top : bool
+        Whether nothing that was drawn before hides them.
+    hidden : float
+        Opacity of what is hidden, 0 to 1.
+    lift : float
+        Share of the way to the eye by which segments lie before their places, so that those on a
+        surface are seen.
+    border : float
+        Width of the border around each, pixels.
+    border_color : (r, g, b)
+        sRGB, 0 to 1.
+    """
+
+    on_top: bool = False
+    hidden: float = HIDDEN
+    lift: float = 0.0
+    border: float = 0.0
+    border_color: Color = (0.0, 0.0, 0.0)
+
+
+def dots(points: Floats, colors: Floats, diameter: float) -> Segments:
+    """Return round dots.
+
+    Parameters
+    ----------
+    points : (N, 3)
+        Scene space.
+    colors : (N, 4) or (4,)
+        sRGB and opacity, 0 to 1.
+    diameter : float
+        Pixels.
+    """
+    colors = np.broadcast_to(colors, (len(points), 4))
+    return Segments(points, points, colors, np.full(len(points), diameter))
+
+
+def joined(parts: Sequence[Segments]) -> Segments:
+    """Return all segments of several parts, the first part's first; at least one part."""
+    return Segments(
+        np.concatenate([part.starts for part in parts]),
+        np.concatenate([part.ends for part in parts]),
+        np.concatenate([part.colors for part in parts]),
+        np.concatenate([part.widths for part in parts]),
+    )
+
+
+class SegmentPass:
+    """Draws segments.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        The context in use.
+    programs : Programs
+        Gives the program.
+    """
+
+    def __init__(self, context: moderngl.Context, programs: Programs) -> None:
+        self.context = context
+        self._program = programs.drawing("segment")
+        self._buffer: moderngl.Buffer | None = None
+        self._array: moderngl.VertexArray | None = None
+
+    def draw(self, segments: Segments, view: View, size: tuple[int, int], manner: Manner) -> None:
+        """Draw segments over what is bound.
+
+        Parameters
+        ----------
+        segments : Segments
+            In the order in which they lie over each other.
+        view : View
+            The camera's matrices.
+        size : (int, int)
+            Width and height of the picture, pixels.
+        manner : Manner
+            How they are drawn.
+        """
+        count = len(segments.widths)
+        if not count:
+            return
+        # Relative to their middle, so that float32 counts from there.
+        center = 0.5 * (segments.starts.min(axis=0) + segments.starts.max(axis=0))
+        places = segments.starts - center, segments.ends - center
+        rows = np.hstack([*places, segments.colors, segments.widths[:, None]])
+        array = self._filled(float32(rows).tobytes())
+        set_model(self._program, view, np.eye(4), center)
+        values = {
+            "u_size": size,
+            "u_lift": manner.lift,
+            "u_height": manner.lift * view.camera.distance,
+            "u_border": manner.border,
+            "u_border_color": manner.border_color,
+        }
+        set_uniforms(self._program, values)
+        target = self.context.fbo
+        target.depth_mask = False  # segments over one another all count
+        target.use()  # moderngl hands masks to OpenGL only then
+        steps = (("1", 1.0),) if manner.on_top else ((">", manner.hidden), ("<=", 1.0))
+        for order, opacity in steps:
+            self.context.depth_func = order
+            set_uniforms(self._program, {"u_opacity": opacity})
+            array.render(moderngl.TRIANGLE_STRIP, vertices=4, instances=count)
+        self.context.depth_func = "<"
+        target.depth_mask = True
+        target.use()
+
+    def _filled(self, data: bytes) -> moderngl.VertexArray:
+        """Return a vertex array of these rows; its buffer grows when it has to."""
+        if self._buffer is None or self._array is None or self._buffer.size < len(data):
+            self.release()
+            buffer = self.context.buffer(reserve=2 * len(data), dynamic=True)
+            self._buffer = checked(self.context, buffer, "segments")
+            names = "in_start", "in_end", "in_color", "in_width"
+            content = [(self._buffer, "3f4 3f4 4f4 f4/i", *names)]
+            self._array = self.context.vertex_array(self._program, content)
+        self._buffer.write(data)
+        return self._array
+
+    def release(self) -> None:
+        """Free buffer and vertex array."""
+        for item in (self._array, self._buffer):
+            if item is not None:
+                item.release()
+        self._array = self._buffer = None

@@ -1,0 +1,1 @@
+"""Passes: each draws one kind of thing into the bound framebuffer."""

@@ -1,0 +1,97 @@
+"""Draws annotations: marks of findings, joints seen through the skin, a vertex explained."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import moderngl
+
+from viewer.rendering.gpu.program import Programs
+from viewer.rendering.overlay.annotation import Annotation, leader_lines, letters_for, place_labels
+from viewer.rendering.overlay.lettering import Lettering
+from viewer.rendering.overlay.segments import Manner, SegmentPass
+from viewer.rendering.passes.label_pass import LabelPass
+from viewer.rendering.view import View
+
+__all__ = ["AnnotationPass"]
+
+
+class AnnotationPass:
+    """Draws annotations over what is bound.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        The context in use.
+    programs : Programs
+        Gives the programs.
+    """
+
+    def __init__(self, context: moderngl.Context, programs: Programs) -> None:
+        self.segments = SegmentPass(context, programs)
+        self.labels = LabelPass(context, programs)
+        self._lettering: Lettering | None = None
+
+    def draw(self, annotation: Annotation, view: View, size: tuple[int, int]) -> None:
+        """Draw the segments of one annotation.
+
+        Parameters
+        ----------
+        annotation : Annotation
+            What is drawn.
+        view : View
+            The camera's matrices.
+        size : (int, int)
+            Width and height of the picture, pixels.
+
+        Raises
+        ------
+        RenderError
+            If the driver has no room for it.
+        """
+        self.segments.draw(annotation.segments, view, size, annotation.manner)
+
+    def write(
+        self, annotations: Sequence[Annotation], view: View, size: tuple[int, int]
+    ) -> list[tuple[int, int]]:
+        """Write the words of several annotations, so that none covers another.
+
+        Parameters
+        ----------
+        annotations : sequence of Annotation
+            All that are in the picture.
+        view : View
+            The camera's matrices.
+        size : (int, int)
+            Width and height of the picture, pixels.
+
+        Returns
+        -------
+        list of (int, int)
+            For each of them how many of the words that belong to this picture are not drawn because
+            there is no room beside their points, and of how many.
+
+        Raises
+        ------
+        RenderError
+            If the driver has no room for it.
+        """
+        having = [row for row, one in enumerate(annotations) if one.labels is not None]
+        labels = [one.labels for one in annotations if one.labels is not None]
+        counts = [(0, 0)] * len(annotations)
+        if not labels:
+            return counts
+        letters = letters_for(size)
+        if self._lettering is None or self._lettering.letters != letters:
+            self._lettering = Lettering(letters)
+        placed = place_labels(labels, view, size, self._lettering)
+        self.segments.draw(leader_lines(placed, view, size), view, size, Manner(on_top=True))
+        self.labels.draw(placed.words, placed.corners, placed.colors, self._lettering, size)
+        for row, left_out, seen in zip(having, placed.n_left_out, placed.n_seen, strict=True):
+            counts[row] = left_out, seen
+        return counts
+
+    def release(self) -> None:
+        """Free everything."""
+        self.segments.release()
+        self.labels.release()

@@ -1,0 +1,140 @@
+"""Draws the background and the ground grid."""
+
+from __future__ import annotations
+
+import math
+
+import moderngl
+import numpy as np
+
+from viewer.errors import ViewerError
+from viewer.rendering.gpu.program import Programs
+from viewer.rendering.gpu.upload import buffer
+from viewer.rendering.view import View, set_model
+from viewer.rig.arrays import Floats
+from viewer.rig.mesh import box_size
+
+__all__ = ["GroundPass", "grid_step", "parse_color"]
+
+_BOTTOM, _TOP = (0.80, 0.83, 0.86), (0.36, 0.43, 0.52)  # sRGB
+_LINE_COLOR = (0.20, 0.25, 0.32)
+_LINE_ON_DARK = (0.62, 0.67, 0.73)
+_EXTENT = 6.0  # half the grid's side, in sizes of the figure
+
+
+def grid_step(box: Floats) -> float:
+    """Return the distance between grid lines: 1, 2 or 5 times a power of ten of scene units.
+
+    >>> grid_step(np.array([[0.0, 0.0, 0.0], [0.0, 1.6, 0.0]]))
+    0.2
+    """
+    wanted = (box_size(box) or 1.0) / 8.0
+    power = 10.0 ** math.floor(math.log10(wanted))
+    step = next(factor for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= wanted * 0.999)
+    return float(f"{step * power:.6g}")
+
+
+def parse_color(text: str) -> tuple[float, float, float]:
+    """Return the colour of ``#rrggbb``, sRGB from 0 to 1.
+
+    Raises
+    ------
+    ViewerError
+        If the text is anything else.
+
+    >>> parse_color("#ff0000")
+    (1.0, 0.0, 0.0)
+    """
+    digits = text.removeprefix("#")
+    if not text.startswith("#") or len(digits) != 6 or set(digits) - set("0123456789abcdefABCDEF"):
+        raise ViewerError(
+            f'background: expected "gradient", "transparent" or "#rrggbb", found "{text}"'
+        )
+    red, green, blue = (int(digits[i : i + 2], 16) / 255.0 for i in (0, 2, 4))
+    return red, green, blue
+
+
+class GroundPass:
+    """Draws what is behind and beneath the figures.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        The context in use.
+    programs : Programs
+        Gives the programs.
+    """
+
+    def __init__(self, context: moderngl.Context, programs: Programs) -> None:
+        self.context, self.programs = context, programs
+        self._corners = buffer(context, [[-1, -1], [1, -1], [-1, 1], [1, 1]], "f4")
+        self._ground: moderngl.VertexArray | None = None
+        self._background: moderngl.VertexArray | None = None
+
+    def draw_background(self, background: str) -> None:
+        """Fill the picture; "transparent" leaves it as it was cleared."""
+        if background == "transparent":
+            return
+        program = self.programs.drawing("background")
+        bottom, top = (
+            (_BOTTOM, _TOP) if background == "gradient" else (parse_color(background),) * 2
+        )
+        program["u_bottom"], program["u_top"] = bottom, top
+        if self._background is None:
+            self._background = self.context.vertex_array(program, [])
+        self.context.disable(moderngl.DEPTH_TEST)
+        self._background.render(moderngl.TRIANGLES, vertices=3)
+        self.context.enable(moderngl.DEPTH_TEST)
+
+    def draw_grid(self, view: View, box: Floats, background: str) -> None:
+        """Draw the grid under a box.
+
+        Parameters
+        ----------
+        view : View
+            The camera's matrices.
+        box : (2, 3)
+            What stands on the ground, scene space: gives height, step and extent.
+        background : str
+            Lines are light on a dark one.
+        """
+        program = self.programs.drawing("ground")
+        step, extent = grid_step(box), _EXTENT * (box_size(box) or 1.0)
+        axes = ground_axes(view.camera.up)
+        center = box.mean(axis=0)
+        # The square's middle lies on a crossing of lines, so float32 never sees large numbers.
+        cells = np.round(axes[:2] @ center / step)
+        height = (axes[2] @ box.T).min()
+        placement = np.eye(4)
+        placement[:3, :3] = axes.T
+        origin = axes.T @ np.array([*(cells * step), height])
+        placement[:3, 3] = origin
+        set_model(program, view, placement, np.zeros(3))
+        program["u_extent"], program["u_fade"] = extent, extent
+        program["u_step"] = step
+        # Every tenth line is the scene's own: count from its origin.
+        program["u_origin"] = tuple(np.fmod(-cells, 10.0))
+        dark = background.startswith("#") and sum(parse_color(background)) < 1.2
+        program["u_line_color"] = _LINE_ON_DARK if dark else _LINE_COLOR
+        if self._ground is None:
+            content = [(self._corners, "2f4", "in_corner")]
+            self._ground = self.context.vertex_array(program, content)
+        target = self.context.fbo
+        target.depth_mask = False  # the translucent grid hides nothing
+        target.use()  # moderngl hands masks to OpenGL only then
+        self._ground.render(moderngl.TRIANGLE_STRIP)
+        target.depth_mask = True
+        target.use()
+
+    def release(self) -> None:
+        """Free vertex arrays and buffers."""
+        for item in (self._ground, self._background, self._corners):
+            if item is not None:
+                item.release()
+
+
+def ground_axes(up: str) -> Floats:
+    """Return the ground's two axes and the up axis as rows, right-handed: (3, 3)."""
+    if up == "z":
+        return np.eye(3)
+    return np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])

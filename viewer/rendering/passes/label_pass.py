@@ -1,0 +1,105 @@
+"""Draws labels over a picture, all from one texture of the words they say."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import moderngl
+import numpy as np
+
+from viewer.rendering.gpu.program import Programs
+from viewer.rendering.gpu.upload import checked, float32
+from viewer.rendering.overlay.lettering import Lettering, shelves
+from viewer.rig.arrays import Floats, Ints
+
+__all__ = ["LabelPass"]
+
+_WIDTH, _TALLEST = 2048, 4096  # pixels of the texture; every driver with OpenGL 3.3 takes it
+_MOST = 1000  # words that are kept in the texture though they are not drawn right now
+
+
+class LabelPass:
+    """Draws words.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        The context in use.
+    programs : Programs
+        Gives the program.
+    """
+
+    def __init__(self, context: moderngl.Context, programs: Programs) -> None:
+        self.context = context
+        self._program = programs.drawing("label")
+        self._places: dict[str, tuple[int, int]] = {}
+        self._letters = 0
+        self._texture: moderngl.Texture | None = None
+
+    def draw(
+        self,
+        words: Sequence[str],
+        corners: Ints,
+        colors: Floats,
+        lettering: Lettering,
+        size: tuple[int, int],
+    ) -> None:
+        """Draw words over everything that is bound.
+
+        Parameters
+        ----------
+        words : sequence of N str
+            What they say; those for which the texture has no room are left out.
+        corners : (N, 2)
+            Left upper corners, pixels from the picture's left and upper edge.
+        colors : (N, 3)
+            Of the letters, sRGB, 0 to 1.
+        lettering : Lettering
+            The letters.
+        size : (int, int)
+            Width and height of the picture, pixels.
+        """
+        if not words:
+            return
+        if self._letters != lettering.letters or not self._places.keys() >= set(words):
+            self._fill(words, lettering)
+        assert self._texture is not None  # it was filled
+        shown = np.array([word in self._places for word in words])
+        sources = np.array([self._places.get(word, (0, 0)) for word in words])
+        rows = np.hstack([corners, sources, lettering.sizes(words), colors])[shown]
+        buffer = self.context.buffer(float32(rows).tobytes())
+        names = "in_corner", "in_source", "in_extent", "in_color"
+        array = self.context.vertex_array(self._program, [(buffer, "2f4 2f4 2f4 3f4/i", *names)])
+        self._program["u_picture"] = size
+        self._program["u_texture"] = 0
+        self._texture.use(0)
+        self.context.disable(moderngl.DEPTH_TEST)
+        array.render(moderngl.TRIANGLE_STRIP, vertices=4, instances=len(rows))
+        self.context.enable(moderngl.DEPTH_TEST)
+        array.release()
+        buffer.release()
+
+    def _fill(self, words: Sequence[str], lettering: Lettering) -> None:
+        """Draw a new texture: of the words that are new, and of those it had if they are few."""
+        wanted = dict.fromkeys(words)
+        if self._letters == lettering.letters and len(self._places) < _MOST:
+            wanted |= dict.fromkeys(self._places)
+        sizes = lettering.sizes(list(wanted))
+        corners = shelves(sizes, _WIDTH, _TALLEST)
+        self._places = dict(zip(wanted, map(tuple, corners.tolist()), strict=False))
+        height = int(corners[-1, 1] + sizes[0, 1]) if len(corners) else 1
+        pixels = np.zeros((height, _WIDTH, 2), dtype=np.uint8)
+        for word, (x, y) in self._places.items():
+            drawn = lettering.pixels(word)
+            pixels[y : y + drawn.shape[0], x : x + drawn.shape[1]] = drawn
+        self.release()
+        texture = self.context.texture((_WIDTH, height), 2, pixels.tobytes())
+        self._texture = checked(self.context, texture, "names of joints")
+        self._texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self._letters = lettering.letters
+
+    def release(self) -> None:
+        """Free the texture."""
+        if self._texture is not None:
+            self._texture.release()
+        self._texture = None

@@ -1,0 +1,117 @@
+"""Passes that many scenes never need: imported and made when they are first asked for."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import moderngl
+
+from viewer.rendering.gpu.actor_buffers import ActorBuffers
+from viewer.rendering.gpu.program import Programs
+from viewer.rendering.passes.joint_pass import JointPass
+from viewer.rendering.passes.mesh_pass import MeshPass
+
+if TYPE_CHECKING:
+    from viewer.rendering.passes.annotation_pass import AnnotationPass
+    from viewer.rendering.passes.ghost_pass import GhostPass
+    from viewer.rendering.passes.keypoint_pass import KeypointPass
+    from viewer.rendering.passes.legend_pass import LegendPass
+    from viewer.rendering.passes.motion_path_pass import TrailPass
+    from viewer.rendering.passes.point_pass import PointPass
+    from viewer.rendering.picking import PickPass
+
+__all__ = ["LatePasses"]
+
+
+class LatePasses:
+    """Makes each of its passes once.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        OpenGL 3.3 or newer.
+    programs : Programs
+        All passes share them.
+    mesh_pass, joint_pass : MeshPass, JointPass
+        What some of these passes draw with.
+    buffers : ActorBuffers
+        What was uploaded.
+    """
+
+    def __init__(
+        self,
+        context: moderngl.Context,
+        programs: Programs,
+        mesh_pass: MeshPass,
+        joint_pass: JointPass,
+        buffers: ActorBuffers,
+    ) -> None:
+        self._context, self._programs, self._buffers = context, programs, buffers
+        self._mesh_pass, self._joint_pass = mesh_pass, joint_pass
+        self._made: list[PointPass | PickPass | LegendPass | AnnotationPass | GhostPass] = []
+
+    @cached_property
+    def keypoint_pass(self) -> KeypointPass:
+        """Draws keypoints that figures themselves have."""
+        from viewer.rendering.passes.keypoint_pass import KeypointPass
+
+        return KeypointPass(self._joint_pass)
+
+    @cached_property
+    def point_pass(self) -> PointPass:
+        """Draws captured points."""
+        from viewer.rendering.passes.point_pass import PointPass
+
+        points = PointPass(self._context, self._programs)
+        self._made.append(points)
+        return points
+
+    @cached_property
+    def trail_pass(self) -> TrailPass:
+        """Draws paths of joints."""
+        from viewer.rendering.passes.motion_path_pass import TrailPass
+
+        return TrailPass(self._context, self._programs)
+
+    @cached_property
+    def pick_pass(self) -> PickPass:
+        """Finds what is seen at a pixel."""
+        from viewer.rendering.picking import Passes, PickPass
+
+        passes = Passes(self._programs, self._mesh_pass, self.point_pass, self._buffers)
+        picks = PickPass(self._context, passes)
+        self._made.append(picks)
+        return picks
+
+    @cached_property
+    def legend_pass(self) -> LegendPass:
+        """Draws legends into pictures."""
+        from viewer.rendering.passes.legend_pass import LegendPass
+
+        legends = LegendPass(self._context, self._programs)
+        self._made.append(legends)
+        return legends
+
+    @cached_property
+    def annotation_pass(self) -> AnnotationPass:
+        """Draws marks, what is seen of joints beside their boxes, and annotations."""
+        from viewer.rendering.passes.annotation_pass import AnnotationPass
+
+        annotations = AnnotationPass(self._context, self._programs)
+        self._made.append(annotations)
+        return annotations
+
+    @cached_property
+    def ghost_pass(self) -> GhostPass:
+        """Draws what is shown over the scene."""
+        from viewer.rendering.passes.ghost_pass import GhostPass
+
+        ghosts = GhostPass(self._context, self._programs, self._mesh_pass)
+        self._made.append(ghosts)
+        return ghosts
+
+    def release(self) -> None:
+        """Free those that were made."""
+        for item in self._made:
+            item.release()

@@ -1,0 +1,86 @@
+"""Draws the legend of a scalar view into the corner of a picture."""
+
+from __future__ import annotations
+
+import moderngl
+import numpy as np
+
+from viewer.rendering.gpu.program import Programs
+from viewer.rendering.overlay.legend import Legend
+
+__all__ = ["LegendPass"]
+
+_MARGIN = 0.014  # of the picture's height
+
+
+class LegendPass:
+    """Draws a legend over everything else.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        The context in use.
+    programs : Programs
+        Gives the program.
+    """
+
+    def __init__(self, context: moderngl.Context, programs: Programs) -> None:
+        self.context = context
+        self._program = programs.drawing("overlay")
+        self._array = context.vertex_array(self._program, [])
+        self._texture: moderngl.Texture | None = None
+        self._drawn: tuple[Legend, tuple[int, int]] | None = None
+
+    def draw(self, legend: Legend, size: tuple[int, int]) -> bool:
+        """Draw a legend into the upper left corner of what is bound.
+
+        Parameters
+        ----------
+        legend : Legend
+            Drawn as a texture once, and kept as long as it is the same.
+        size : (int, int)
+            Of the picture, pixels.
+
+        Returns
+        -------
+        bool
+            Whether there was room for it.
+        """
+        if self._drawn is None or self._drawn[0] is not legend or self._drawn[1] != size:
+            self._prepare(legend, size)
+        if self._texture is None:
+            return False
+        margin = max(round(_MARGIN * size[1]), 2)
+        self._program["u_place"] = margin, size[1] - margin - self._texture.height
+        self._program["u_extent"] = self._texture.size
+        self._program["u_picture"] = size
+        self._program["u_texture"] = 0
+        self._texture.use(0)
+        self.context.disable(moderngl.DEPTH_TEST)
+        self._array.render(moderngl.TRIANGLE_STRIP, vertices=4)
+        self.context.enable(moderngl.DEPTH_TEST)
+        return True
+
+    def _prepare(self, legend: Legend, size: tuple[int, int]) -> None:
+        from viewer.rendering.overlay.legend_picture import legend_pixels
+
+        self._free()
+        pixels = legend_pixels(legend, size)
+        if pixels is not None:
+            # Colours are multiplied by alpha, as all that is drawn; textures begin at the bottom.
+            multiplied = pixels.astype(np.float64)
+            multiplied[..., :3] *= multiplied[..., 3:] / 255.0
+            data = np.ascontiguousarray(np.rint(multiplied[::-1]).astype(np.uint8))
+            self._texture = self.context.texture(data.shape[1::-1], 4, data.tobytes())
+            self._texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self._drawn = legend, size
+
+    def _free(self) -> None:
+        if self._texture is not None:
+            self._texture.release()
+        self._texture = None
+
+    def release(self) -> None:
+        """Free texture and vertex array."""
+        self._free()
+        self._array.release()

@@ -1,0 +1,184 @@
+"""Draws posed meshes: surface, edges, vertex normals. Nothing here knows of skinning."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import moderngl
+import numpy as np
+
+from viewer.rendering.gpu.index_sets import IndexSet
+from viewer.rendering.gpu.mesh_buffers import MeshBuffers
+from viewer.rendering.gpu.program import Programs, set_uniforms
+from viewer.rendering.options import Color, DisplayOptions
+from viewer.rendering.passes.see_through import surface_opacity
+from viewer.rendering.passes.skin_pass import PosedMesh
+from viewer.rendering.view import View, set_lights, set_model
+from viewer.rig.arrays import Floats
+from viewer.rig.mesh import bounding_box, box_size
+
+__all__ = ["SKIN_COLOR", "MeshPass", "draw_runs", "set_surface"]
+
+SKIN_COLOR = (0.62, 0.60, 0.57)
+"""Of a surface without texture, linear."""
+
+_EDGE_COLOR = (0.05, 0.07, 0.10, 0.55)  # sRGB and alpha
+_NORMAL_COLOR = (0.10, 0.75, 0.85, 1.0)
+_NORMAL_LENGTH = 0.02  # of the figure's size
+_USUAL = DisplayOptions().shading
+_TEXTURE_UNIT, _COLORMAP_UNIT = 5, 6  # those before are the skinning shader's
+
+
+class MeshPass:
+    """Draws posed meshes with any shading.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        The context in use.
+    programs : Programs
+        Gives the shading programs.
+    """
+
+    def __init__(self, context: moderngl.Context, programs: Programs) -> None:
+        self.context, self.programs = context, programs
+        self._arrays: dict[tuple[int, int, int], tuple[PosedMesh, moderngl.VertexArray]] = {}
+
+    def draw(
+        self,
+        mesh: PosedMesh,
+        placement: Floats,
+        view: View,
+        options: DisplayOptions,
+        color: Color | None = None,
+    ) -> None:
+        """Draw the surface.
+
+        Parameters
+        ----------
+        mesh : PosedMesh
+            Already updated.
+        placement : (4, 4)
+            Figure space to scene.
+        view : View
+            The camera's matrices.
+        options : DisplayOptions
+            Shading and lights.
+        color : (r, g, b), optional
+            Of what has no texture, linear; ``SKIN_COLOR`` if omitted.
+        """
+        look = mesh.scalars.look if options.shading == "scalar" else None
+        corners = "corners" if look is not None else ""
+        program = self.programs.drawing("mesh", _shading(mesh, options), geometry=corners)
+        set_model(program, view, placement, mesh.center)
+        set_lights(program, view, options.lights)
+        set_surface(program, mesh.mesh, options)
+        set_uniforms(program, {"u_color": SKIN_COLOR if color is None else color})
+        if look is not None:
+            set_uniforms(program, {"u_colormap": _COLORMAP_UNIT, **look.uniforms})
+            mesh.scalars.use(_COLORMAP_UNIT)
+        indices = mesh.mesh.index_set(options.reduced, options.hidden_parts)
+        draw_runs(self.array(mesh, program, indices), indices, options.texture)
+
+    def draw_lines(
+        self, mesh: PosedMesh, placement: Floats, view: View, options: DisplayOptions
+    ) -> None:
+        """Draw what is asked for of edges and normals, over the surface."""
+        self.context.depth_func = "<="
+        if options.wireframe:
+            self.draw_edges(mesh, placement, view, options)
+        shape = mesh.mesh.figure.mesh
+        if options.normals and shape is not None:
+            self.draw_normals(mesh, placement, view, box_size(bounding_box(shape.positions)))
+        self.context.depth_func = "<"
+
+    def draw_edges(
+        self, mesh: PosedMesh, placement: Floats, view: View, options: DisplayOptions
+    ) -> None:
+        """Draw every triangle's edges over its surface."""
+        program = self.programs.drawing("edge", fragment="line")
+        set_model(program, view, placement, mesh.center)
+        program["u_line_color"] = _premultiplied(_EDGE_COLOR)
+        self.context.wireframe = True
+        indices = mesh.mesh.index_set(options.reduced, options.hidden_parts, as_listed=True)
+        self.array(mesh, program, indices).render(moderngl.TRIANGLES)
+        self.context.wireframe = False
+
+    def draw_normals(self, mesh: PosedMesh, placement: Floats, view: View, size: float) -> None:
+        """Draw a line along every vertex's normal; ``size`` is the figure's."""
+        program = self.programs.drawing("line")
+        set_model(program, view, placement, mesh.center)
+        program["u_line_color"] = _premultiplied(_NORMAL_COLOR)
+        program["u_length"] = _NORMAL_LENGTH * size
+        key = (id(mesh), id(program), 0)
+        if key not in self._arrays:
+            content = [(mesh.posed, "3f4 3f4/i", "in_position", "in_normal")]
+            self._arrays[key] = (mesh, self.context.vertex_array(program, content))
+        instances = mesh.mesh.n_vertices
+        self._arrays[key][1].render(moderngl.LINES, vertices=2, instances=instances)
+
+    def array(
+        self, mesh: PosedMesh, program: moderngl.Program, indices: IndexSet
+    ) -> moderngl.VertexArray:
+        """Return the mesh's vertex array for a program, with what the compiler kept."""
+        key = (id(mesh), id(program), id(indices))
+        if key not in self._arrays:
+            content: list[Any] = [(mesh.posed, "3f4 12x", "in_position")]
+            if "in_normal" in program:
+                content = [(mesh.posed, "3f4 3f4", "in_position", "in_normal")]
+            for values, layout, name in (
+                (mesh.mesh.uvs, "2f4", "in_uv"),
+                (mesh.mesh.colors, "3f4", "in_color"),
+                (mesh.scalars.values, "f4", "in_scalar"),
+            ):
+                if name in program and values is not None:
+                    content.append((values, layout, name))
+            array = self.context.vertex_array(program, content, index_buffer=indices.indices)
+            self._arrays[key] = (mesh, array)
+        return self._arrays[key][1]
+
+    def forget(self, mesh: PosedMesh) -> None:
+        """Free what was made for a mesh that is about to be released."""
+        for key in [key for key, (owner, _) in self._arrays.items() if owner is mesh]:
+            self._arrays.pop(key)[1].release()
+
+    def release(self) -> None:
+        """Free all vertex arrays."""
+        for _, array in self._arrays.values():
+            array.release()
+        self._arrays.clear()
+
+
+def _shading(mesh: PosedMesh, options: DisplayOptions) -> str:
+    """Return how a mesh is shaded: as usual if it lacks the numbers that others show."""
+    if options.shading == "scalar" and mesh.scalars.look is None:
+        return _USUAL
+    return options.shading
+
+
+def set_surface(program: moderngl.Program, mesh: MeshBuffers, options: DisplayOptions) -> None:
+    """Set what the shading programs must know of a figure's surface."""
+    values = {
+        "u_flat": options.flat,
+        "u_opacity": surface_opacity(options),
+        "u_has_uv": mesh.uvs is not None,
+        "u_texture": _TEXTURE_UNIT,
+        "u_has_colors": options.shading == "parts" and mesh.colors is not None,
+    }
+    set_uniforms(program, values)
+
+
+def draw_runs(
+    array: moderngl.VertexArray, indices: IndexSet, textured: bool, instances: int = 1
+) -> None:
+    """Draw all triangles, those of one material at a time."""
+    for run in indices.runs:
+        has_texture = textured and run.texture is not None
+        set_uniforms(array.program, {"u_textured": has_texture})
+        if has_texture and run.texture is not None:
+            run.texture.use(_TEXTURE_UNIT)
+        array.render(moderngl.TRIANGLES, vertices=run.count, first=run.first, instances=instances)
+
+
+def _premultiplied(color: tuple[float, float, float, float]) -> tuple[float, ...]:
+    return tuple(np.multiply(color, (color[3], color[3], color[3], 1.0)))

@@ -1,0 +1,174 @@
+"""Draws the paths of joints over time as lines."""
+
+from __future__ import annotations
+
+import colorsys
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+
+from viewer.rendering.gpu.ownership import Owner
+from viewer.rendering.gpu.program import Programs, set_uniforms
+from viewer.rendering.gpu.upload import buffer
+from viewer.rendering.view import View, set_model
+from viewer.rig.arrays import Floats
+from viewer.rig.captures.points import PointClip
+from viewer.rig.mesh import bounding_box
+from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.motion_paths import Trail, segments, trail
+from viewer.rig.scene import Actor, Motion
+
+__all__ = ["Moment", "TrailBuffers", "TrailPass", "trail_colors"]
+
+_WIDTH = 2.5  # pixels
+_HIDDEN = 0.3  # opacity of what lies behind something
+_GOLDEN = 0.618033988749895
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """What part of the paths is drawn: ``reach`` seconds around ``now``; all of them if 0."""
+
+    now: float
+    reach: float
+
+
+def trail_colors(count: int) -> Floats:
+    """Return a strong colour for each of some paths: (N, 3), sRGB."""
+    hues = 0.1 + _GOLDEN * np.arange(count)
+    return np.array([colorsys.hsv_to_rgb(hue % 1.0, 0.85, 0.95) for hue in hues]).reshape(-1, 3)
+
+
+class TrailBuffers:
+    """Segments of one actor's paths; computed again only if what they follow from changed.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        Gives the buffers.
+    """
+
+    def __init__(self, context: moderngl.Context) -> None:
+        self.context = context
+        self.count = 0
+        self.center: Floats = np.zeros(3)
+        self._owner = Owner()
+        self._arrays: dict[int, moderngl.VertexArray] = {}
+        self._clip: Motion | None = None
+        self._key: tuple[object, ...] | None = None
+
+    def update(self, actor: Actor, joints: tuple[int, ...], min_confidence: float) -> None:
+        """Follow clip, joints, and what the clip leaves to the pose."""
+        key = (id(actor.clip), joints, min_confidence, actor.offset, *_still(actor))
+        if key == self._key or actor.clip is None:
+            return
+        self._clip = actor.clip  # kept, so that its id stays its own
+        path = trail(
+            actor.figure, actor.clip, joints, base=actor.pose, min_confidence=min_confidence
+        )
+        self._upload(path, actor.offset)
+        self._key = key
+
+    def _upload(self, path: Trail, offset: float) -> None:
+        self.release()
+        points, times, which = segments(path)
+        self.count = len(points)
+        if not self.count:
+            return
+        self.center = bounding_box(points.reshape(-1, 3)).mean(axis=0)
+        colors = trail_colors(path.points.shape[1])[which]
+        content = [(points - self.center).reshape(-1, 6), times + offset, colors]
+        self._segments = self._owner.keep(buffer(self.context, np.hstack(content), "f4"))
+
+    def array(self, program: moderngl.Program) -> moderngl.VertexArray:
+        """Return the segments as instances for a program."""
+        if id(program) not in self._arrays:
+            names = "in_start", "in_end", "in_times", "in_color"
+            content = [(self._segments, "3f4 3f4 2f4 3f4/i", *names)]
+            self._arrays[id(program)] = self.context.vertex_array(program, content)
+        return self._arrays[id(program)]
+
+    def release(self) -> None:
+        """Free the buffers."""
+        for array in self._arrays.values():
+            array.release()
+        self._arrays.clear()
+        self._owner.release()
+
+
+def _still(actor: Actor) -> tuple[object, ...]:
+    """Return what of a pose the clip does not move, and paths depend on."""
+    pose, clip = actor.pose, actor.clip
+    if pose is None or clip is None or isinstance(clip, PointClip):
+        return ()
+    if isinstance(clip, Clip):
+        moved = np.array([channel.target for channel in clip.channels], dtype=np.int64)
+        dofs = np.delete(pose.dofs, moved)
+        free = [dofs, pose.translations, pose.rotations, pose.shape_weights]
+        return (*(part.tobytes() for part in free), *_place(actor))
+    weights = pose.shape_weights.tobytes() if clip.shape_weights is None else b""
+    moves = clip.figure_translations is not None, clip.figure_scales is not None
+    place = _place(actor)
+    return weights, b"" if moves[0] else place[0], 0.0 if moves[1] else place[1]
+
+
+def _place(actor: Actor) -> tuple[bytes, float]:
+    assert actor.pose is not None  # the caller looked
+    return actor.pose.figure_translation.tobytes(), actor.pose.figure_scale
+
+
+class TrailPass:
+    """Draws paths.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        The context in use.
+    programs : Programs
+        Gives the program.
+    """
+
+    def __init__(self, context: moderngl.Context, programs: Programs) -> None:
+        self.context, self.programs = context, programs
+
+    def draw(
+        self, paths: TrailBuffers, placement: Floats, view: View, size: tuple[int, int], at: Moment
+    ) -> None:
+        """Draw one actor's paths; what lies behind something is drawn faintly.
+
+        Parameters
+        ----------
+        paths : TrailBuffers
+            Already updated.
+        placement : (4, 4)
+            Figure space to scene.
+        view : View
+            The camera's matrices.
+        size : (int, int)
+            Width and height of the picture, pixels.
+        at : Moment
+            What part of them.
+        """
+        if not paths.count:
+            return
+        program = self.programs.drawing("trail")
+        set_model(program, view, placement, paths.center)
+        values = {
+            "u_size": size,
+            "u_width": _WIDTH,
+            "u_now": at.now,
+            "u_reach": at.reach,
+        }
+        set_uniforms(program, values)
+        target = self.context.fbo
+        target.depth_mask = False  # lines over one another all count
+        target.use()  # moderngl hands masks to OpenGL only then
+        for order, opacity in ((">", _HIDDEN), ("<=", 1.0)):
+            self.context.depth_func = order
+            set_uniforms(program, {"u_opacity": opacity})
+            array = paths.array(program)
+            array.render(moderngl.TRIANGLE_STRIP, vertices=4, instances=paths.count)
+        self.context.depth_func = "<"
+        target.depth_mask = True
+        target.use()

@@ -1,0 +1,293 @@
+"""Draws captured keypoints as small spheres, and the limbs between them, coloured by side.
+
+A limb is never left out for its length, as some viewers do beyond two metres: files do not say
+their unit, and a limb that is far too long shows a keypoint that is far off.
+"""
+
+from __future__ import annotations
+
+import math
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.rendering.gpu.ownership import Owner
+from viewer.rendering.gpu.program import Programs, set_uniforms
+from viewer.rendering.gpu.upload import buffer, float32
+from viewer.rendering.options import Color, DisplayOptions
+from viewer.rendering.view import View, set_lights, set_model
+from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.captures.points import PointClip, PointLayout
+from viewer.rig.mesh import bounding_box, box_size
+from viewer.rig.scene import Actor
+
+__all__ = ["LEFT", "MIDDLE", "RIGHT", "PointBuffers", "PointPass", "point_radii"]
+
+RIGHT: Color = (0.75, 0.06, 0.05)
+LEFT: Color = (0.05, 0.20, 0.75)
+MIDDLE: Color = (0.42, 0.42, 0.42)
+"""Colours by side, linear; an actor's own colour takes the place of the middle's."""
+
+_LARGEST = 0.012  # radius of a point, of the size of all of them: 2 cm on a person
+_SMALLEST = 0.0015  # points that coincide are seen too
+_SPACING = 0.3  # radius, of the distance to the nearest other point: fingers stay apart
+_LIMB = 0.5  # radius of a limb, of its thinner end's
+_SAMPLES = 32  # frames of a clip by which points are measured
+_CERTAIN = 0.999  # confidence from which on a point hides what is behind it
+_SIDES, _RINGS = 12, 3  # of a capsule: around, and from its equator to a pole
+_FLOATS = 11  # numbers of an instance
+
+
+def point_radii(points: Floats) -> Floats:
+    """Return how large each point is drawn, by how far apart the points are.
+
+    Files do not say their unit, so size is a share of the size of all points, and less where
+    points are close to one another: hands and faces among a body's.
+
+    Parameters
+    ----------
+    points : (F, K, 4)
+        x, y, z and confidence in some frames.
+
+    Returns
+    -------
+    (K,)
+        Figure units, medians over the frames that see the points; 0 if no frame sees any.
+    """
+    sizes, gaps = [], []
+    for frame in points:
+        seen = np.flatnonzero(frame[:, 3] > 0.0)
+        if len(seen) < 2:
+            continue
+        places = frame[seen, :3]
+        sizes.append(box_size(bounding_box(places)))
+        apart = np.linalg.norm(places[:, None] - places[None], axis=2)
+        apart[apart == 0.0] = np.inf
+        row = np.full(frame.shape[0], np.nan)
+        row[seen] = apart.min(axis=1)
+        gaps.append(row)
+    if not sizes:
+        return np.zeros(points.shape[1])
+    size = float(np.median(sizes))
+    seen_ever = ~np.isnan(gaps).all(axis=0)
+    widest = np.full(points.shape[1], np.inf)
+    widest[seen_ever] = np.nanmedian(np.array(gaps)[:, seen_ever], axis=0)
+    return np.clip(_SPACING * widest, _SMALLEST * size, _LARGEST * size)
+
+
+def _radii_of(actor: Actor, points: Floats) -> Floats:
+    """Measure an actor's clip once; without one, what it shows now."""
+    clip = actor.clip
+    if not isinstance(clip, PointClip) or not len(clip.points):
+        return point_radii(points[None])
+    rows = np.unique(np.linspace(0, len(clip.points) - 1, _SAMPLES).astype(np.int64))
+    return point_radii(clip.points[rows])
+
+
+class PointBuffers:
+    """Capsules of one actor's keypoints and limbs.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        Gives the buffers.
+    layout : PointLayout
+        Of the figure.
+
+    Attributes
+    ----------
+    elements : (N,) int32
+        What each instance is: a keypoint, or from their number on a limb.
+    """
+
+    def __init__(self, context: moderngl.Context, layout: PointLayout) -> None:
+        self.context, self.layout = context, layout
+        self.elements: Ints = np.zeros(0, dtype=np.int32)
+        self.center: Floats = np.zeros(3)
+        self._owner = Owner()
+        room = len(layout.names) + len(layout.limbs)
+        self._rows = self._owner.keep(context.buffer(reserve=4 * _FLOATS * max(room, 1)))
+        self._arrays: dict[int, moderngl.VertexArray] = {}
+        self._key: tuple[object, ...] | None = None
+        self._numbers: Ints = self.elements
+        self._measured: tuple[object, Floats] | None = None
+
+    def update(self, actor: Actor, placement: Floats, view: View, min_confidence: float) -> None:
+        """Follow the actor's points, and sort what is translucent from back to front.
+
+        Parameters
+        ----------
+        actor : Actor
+            With points.
+        placement : (4, 4)
+            Figure space to scene.
+        view : View
+            The camera's matrices.
+        min_confidence : float
+            Less certain points, and limbs that end at one, are left out.
+        """
+        points = actor.points
+        assert points is not None  # the caller looked
+        shown = (points[:, 3] > 0.0) & (points[:, 3] >= min_confidence)
+        self.center = bounding_box(points[shown, :3]).mean(axis=0) if shown.any() else np.zeros(3)
+        ends, opacity = self._capsules(points, shown)
+        toward = (view.matrix @ placement)[2, :3]
+        depth = (points[ends, :3].mean(axis=1) - self.center) @ toward
+        # What hides the rest comes first; of the others, the farthest.
+        order = np.lexsort((depth, np.where(opacity < _CERTAIN, 1, 0)))
+        certain = opacity[order] >= _CERTAIN
+        order[certain] = np.sort(order[certain])
+        key = (points.tobytes(), min_confidence, actor.color, order.tobytes(), id(actor.clip))
+        if key != self._key:
+            self._write(actor, points, ends[order], opacity[order])
+            self.elements = self._numbers[order]
+            self._key = key
+
+    def _capsules(self, points: Floats, shown: Bools) -> tuple[NDArray[np.int64], Floats]:
+        """Return both ends and the opacity of everything that is drawn: (N, 2), (N,)."""
+        limbs = self.layout.limbs
+        single = np.flatnonzero(shown)
+        kept = np.flatnonzero(shown[limbs].all(axis=1))
+        ends = np.concatenate([np.stack([single, single], axis=1), limbs[kept]])
+        self._numbers = np.concatenate([single, len(self.layout.names) + kept]).astype(np.int32)
+        # A limb is as certain as its less certain end.
+        return ends, np.clip(points[ends, 3].min(axis=1), 0.0, 1.0)
+
+    def _write(
+        self, actor: Actor, points: Floats, ends: NDArray[np.int64], opacity: Floats
+    ) -> None:
+        if self._measured is None or self._measured[0] is not actor.clip or actor.clip is None:
+            self._measured = actor.clip, _radii_of(actor, points)
+        radii = self._measured[1][ends].min(axis=1)
+        radii[ends[:, 0] != ends[:, 1]] *= _LIMB
+        sides = self.layout.sides[ends]
+        # A limb from the middle to a side belongs to the side, one across to neither.
+        side = np.sign(sides.sum(axis=1)) + 1
+        palette = np.array([RIGHT, actor.color or MIDDLE, LEFT])
+        places = (points[ends, :3] - self.center).reshape(-1, 6)
+        columns = [places, radii[:, None], palette[side], opacity[:, None]]
+        if len(ends):
+            self._rows.write(float32(np.concatenate(columns, axis=1)))
+
+    def array(
+        self, program: moderngl.Program, capsule: tuple[moderngl.Buffer, moderngl.Buffer]
+    ) -> moderngl.VertexArray:
+        """Return the instanced capsules for a program."""
+        if id(program) not in self._arrays:
+            layout = "3f4 3f4 f4 4f4/i" if "in_color" in program else "3f4 3f4 f4 16x/i"
+            names = [
+                name for name in ("in_start", "in_end", "in_radius", "in_color") if name in program
+            ]
+            content = [(capsule[0], "4f4", "in_corner"), (self._rows, layout, *names)]
+            self._arrays[id(program)] = self.context.vertex_array(
+                program, content, index_buffer=capsule[1]
+            )
+        return self._arrays[id(program)]
+
+    def release(self) -> None:
+        """Free the buffer."""
+        for array in self._arrays.values():
+            array.release()
+        self._owner.release()
+
+
+class PointPass:
+    """Draws keypoints and limbs.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        The context in use.
+    programs : Programs
+        Gives the program.
+
+    Attributes
+    ----------
+    capsule : (moderngl.Buffer, moderngl.Buffer)
+        Vertices and indices, shared by all.
+    """
+
+    def __init__(self, context: moderngl.Context, programs: Programs) -> None:
+        self.context, self.programs = context, programs
+        vertices, triangles = _capsule()
+        self.capsule = buffer(context, vertices, "f4"), buffer(context, triangles, "u4")
+
+    def draw(
+        self,
+        points: PointBuffers,
+        placement: Floats,
+        view: View,
+        options: DisplayOptions,
+        overlays: bool,
+    ) -> None:
+        """Draw one actor's keypoints.
+
+        Parameters
+        ----------
+        points : PointBuffers
+            Already updated.
+        placement : (4, 4)
+            Figure space to scene.
+        view : View
+            The camera's matrices.
+        options : DisplayOptions
+            Lights; the opacity of a skeleton over a skin.
+        overlays : bool
+            Whether what lies behind something, as a fitted body, is drawn translucently.
+        """
+        if not len(points.elements):
+            return
+        program = self.programs.drawing("point", "phong", fragment="mesh")
+        set_model(program, view, placement, points.center)
+        set_lights(program, view, options.lights)
+        set_uniforms(program, {"u_flat": False, "u_textured": False, "u_opacity": 1.0})
+        array, count = points.array(program, self.capsule), len(points.elements)
+        # What is translucent shows its front alone; a mirroring placement turns triangles round.
+        is_mirrored = bool(np.linalg.det(placement[:3, :3]) < 0.0)
+        self.context.front_face = "cw" if is_mirrored else "ccw"
+        self.context.enable(moderngl.CULL_FACE)
+        if overlays:
+            self._draw_hidden(array, count, options.skeleton_opacity)
+        array.render(moderngl.TRIANGLES, instances=count)
+        self.context.disable(moderngl.CULL_FACE)
+        self.context.front_face = "ccw"
+
+    def _draw_hidden(self, array: moderngl.VertexArray, count: int, opacity: float) -> None:
+        target = self.context.fbo
+        target.depth_mask = False
+        target.use()  # moderngl hands masks to OpenGL only then
+        self.context.depth_func = ">"
+        set_uniforms(array.program, {"u_opacity": opacity})
+        array.render(moderngl.TRIANGLES, instances=count)
+        set_uniforms(array.program, {"u_opacity": 1.0})
+        self.context.depth_func = "<"
+        target.depth_mask = True
+        target.use()
+
+    def release(self) -> None:
+        """Free the capsule."""
+        for item in self.capsule:
+            item.release()
+
+
+def _capsule() -> tuple[Floats, Ints]:
+    """Return two halves of a sphere and the tube between them: (N, 4) and (T, 3).
+
+    The last column is 0 for what stays at the start, 1 for what goes to the end.
+    """
+    rows = []
+    for end in (0.0, 1.0):
+        tilts = np.linspace(0.0, math.pi / 2, _RINGS + 1)
+        for tilt in tilts[::-1] if end == 0.0 else tilts:
+            around = 2.0 * math.pi * np.arange(_SIDES) / _SIDES
+            flat, height = math.cos(tilt), (2.0 * end - 1.0) * math.sin(tilt)
+            x, y = flat * np.cos(around), flat * np.sin(around)
+            rows.append(np.stack([x, y, np.full(_SIDES, height), np.full(_SIDES, end)], axis=1))
+    ring, side = np.divmod(np.arange((len(rows) - 1) * _SIDES), _SIDES)
+    here, right = ring * _SIDES + side, ring * _SIDES + (side + 1) % _SIDES
+    above, corner = here + _SIDES, right + _SIDES
+    triangles = np.concatenate(
+        [np.stack([here, right, corner], axis=1), np.stack([here, corner, above], axis=1)]
+    )
+    return np.concatenate(rows), triangles.astype(np.int32)

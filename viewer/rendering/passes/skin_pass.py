@@ -1,0 +1,194 @@
+"""The skinning vertex shader, run once per changed pose, by transform feedback.
+
+What it writes, the posed buffer, is what every other pass draws as a static mesh, and what the
+tests read back: shading, wireframe, normals and picking cost no second skinning.
+"""
+
+from __future__ import annotations
+
+import moderngl
+import numpy as np
+
+from viewer.rendering.gpu.mesh_buffers import MeshBuffers
+from viewer.rendering.gpu.ownership import Owner
+from viewer.rendering.gpu.program import Programs, set_uniforms
+from viewer.rendering.gpu.rest_buffers import RestBuffers
+from viewer.rendering.gpu.scalar_buffer import ScalarBuffer
+from viewer.rendering.gpu.skin_buffers import SkinBuffers
+from viewer.rendering.gpu.upload import (
+    checked,
+    matrix_texture,
+    rigid_texture,
+    write_matrices,
+    write_rigid,
+)
+from viewer.rig.arrays import Floats
+from viewer.rig.figure import Figure
+from viewer.rig.kinematics import is_rigid, skinning_matrices, world_matrices
+from viewer.rig.pose import Pose, skinning_key
+from viewer.rig.shape import shaped
+from viewer.rig.skin import bind_positions
+from viewer.rig.skinning import Skinning
+from viewer.rig.skinning.dqs import split_palette
+
+__all__ = ["PosedMesh", "skinning_words"]
+
+_BYTES_PER_VERTEX = 24  # position and normal, three float32 each
+_PALETTE_UNIT, _PAIRS_UNIT, _RIGID_UNIT, _LIST_UNIT, _OFFSETS_UNIT = range(5)
+
+
+class PosedMesh:
+    """One actor's posed vertices.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        The context in use; some framebuffer must be bound when ``update`` runs.
+    programs : Programs
+        Gives the skinning program.
+    mesh : MeshBuffers
+        Shared with all actors of the figure.
+    way : str
+        How pose correctives are summed, see ``rest_buffers``.
+
+    Attributes
+    ----------
+    posed : moderngl.Buffer
+        A row of position (relative to ``center``) and unit normal for every split vertex.
+    center : (3,)
+        Add it to the positions for figure space; it is part of the model matrix.
+    scalars : ScalarBuffer
+        The numbers of a scalar view, computed when one is shown.
+    """
+
+    def __init__(
+        self, context: moderngl.Context, programs: Programs, mesh: MeshBuffers, way: str = ""
+    ) -> None:
+        self.context, self.programs, self.mesh = context, programs, mesh
+        self._owner = Owner()
+        size = _BYTES_PER_VERTEX * mesh.n_vertices
+        posed = checked(
+            context, context.buffer(reserve=size), f"a posed mesh of {size / 1e6:.1f} MB"
+        )
+        self.posed = self._owner.keep(posed)
+        self.center: Floats = mesh.center
+        skin = mesh.figure.skin
+        self._n_joints = skin.n_joints if skin else 0
+        with self._owner.guard():
+            self._palette = self._owner.keep(matrix_texture(context, self._n_joints))
+        self._rigid: moderngl.Texture | None = None
+        self._rest = self._owner.keep(RestBuffers(context, mesh, way))
+        self.scalars = self._owner.keep(ScalarBuffer(context, mesh))
+        self._arrays: dict[tuple[object, ...], moderngl.VertexArray] = {}
+        self._key: tuple[object, ...] | None = None
+        self._is_affine = False
+        self.n_updates = 0
+
+    def update(self, pose: Pose | None, skinning: Skinning | str = "lbs") -> None:
+        """Skin the mesh if pose or method changed since the last call.
+
+        Parameters
+        ----------
+        pose : Pose or None
+            None leaves the mesh in its binding space.
+        skinning : Skinning or str
+            How, or a key of ``viewer.rig.skinning.METHODS`` alone.
+        """
+        how = Skinning(skinning) if isinstance(skinning, str) else skinning
+        attached = self.mesh.figure.is_attached and pose is not None
+        key = (*skinning_words(how), *skinning_key(pose)) if attached and pose else ("binding",)
+        if key == self._key:
+            return
+        self.center = self.mesh.center
+        if attached and pose is not None:
+            self.upload(pose, how)
+        self._run(self.mesh.skin(how), how, bool(attached))
+        self._key = key
+        self.n_updates += 1
+
+    def upload(self, pose: Pose, how: Skinning) -> None:
+        """Send what a pose needs and skin nothing: the processor's part of ``update``."""
+        figure = shaped(self.mesh.figure, pose.shape_weights)
+        self._rest.update(figure, pose, how.correctives)
+        self._write_palette(figure, pose, how, self.mesh.skin(how))
+
+    def _run(self, skin: SkinBuffers, how: Skinning, attached: bool) -> None:
+        array = self._array(how.method, skin, attached)
+        values = {
+            "u_attached": attached,
+            "u_rest_shift": tuple(self.mesh.center - self.center),
+            "u_center": tuple(self.center),
+            "u_share": how.share,
+            "u_n_summed": 0,
+            "u_n_offsets": self._rest.n_offsets if attached else 0,
+            "u_n_sources": len(self.mesh.copies),
+            "u_palette": _PALETTE_UNIT,
+            "u_pairs": _PAIRS_UNIT,
+            "u_rigid": _RIGID_UNIT,
+            "u_offset_list": _LIST_UNIT,
+            "u_offsets": _OFFSETS_UNIT,
+        }
+        set_uniforms(array.program, values)
+        self._palette.use(_PALETTE_UNIT)
+        skin.pairs.use(_PAIRS_UNIT)
+        if self._rigid is not None:
+            self._rigid.use(_RIGID_UNIT)
+        self._rest.use(_LIST_UNIT, _OFFSETS_UNIT)
+        array.transform(self.posed, mode=moderngl.POINTS, vertices=self.mesh.n_vertices)
+
+    def _write_palette(
+        self, figure: Figure, pose: Pose, how: Skinning, buffers: SkinBuffers
+    ) -> None:
+        """Upload T(-center') M T(center): the shader sees small numbers on both sides."""
+        skeleton, skin = figure.skeleton, figure.skin
+        assert skeleton is not None and skin is not None  # the caller looked
+        palette = skinning_matrices(world_matrices(skeleton, pose), skin.inverse_bind)
+        self._is_affine = not is_rigid(palette)
+        palette[:, :3, 3] += palette[:, :3, :3] @ self.mesh.center
+        if buffers.joint_shares.any():
+            self.center = buffers.joint_shares @ palette[:, :3, 3]
+        palette[:, :3, 3] -= self.center
+        if how.method != "dqs":
+            write_matrices(self._palette, palette)
+        if how.method != "lbs":
+            if self._rigid is None:
+                self._rigid = self._owner.keep(rigid_texture(self.context, self._n_joints))
+            centers = bind_positions(skin) - self.mesh.center
+            write_rigid(self._rigid, *split_palette(palette, centers))
+
+    def _array(self, method: str, skin: SkinBuffers, attached: bool) -> moderngl.VertexArray:
+        mesh, rest = self.mesh, self._rest
+        positions = rest.positions if attached else mesh.positions
+        normals = rest.normals if attached else mesh.normals
+        # Rigid joints, by far the most common, get a program that does not pay for the others.
+        affine = attached and self._is_affine
+        key = (method, affine, id(skin), id(positions))
+        if key not in self._arrays:
+            program = self.programs.feedback("skin", method, ("v_position", "v_normal"), affine)
+            attributes = [
+                (positions, "3f4", "in_position"),
+                (normals, "3f4", "in_normal"),
+                (skin.bindings, "4u4", "in_bindings"),
+            ]
+            self._arrays[key] = self.context.vertex_array(program, attributes)
+        return self._arrays[key]
+
+    def read(self) -> tuple[Floats, Floats]:
+        """Return what was drawn last: positions in figure space and normals, (V, 3) each.
+
+        Of the split vertices only one copy each; the place of the pose is not applied.
+        """
+        rows = np.frombuffer(self.posed.read(), dtype="f4").reshape(-1, 6).astype(np.float64)
+        rows = rows[self.mesh.copies]
+        return rows[:, :3] + self.center, rows[:, 3:]
+
+    def release(self) -> None:
+        """Free what belongs to this actor alone."""
+        for array in self._arrays.values():
+            array.release()
+        self._owner.release()
+
+
+def skinning_words(how: Skinning) -> tuple[object, ...]:
+    """Return what changes if and only if the way of skinning does."""
+    return (how.method, how.share, how.max_influences, how.normalize, how.correctives)
