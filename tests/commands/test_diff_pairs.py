@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.commands._diff_pairs import pair_actors
+from viewer.commands._diff.pairs import pair_actors
 from viewer.rig.captures.points import PointLayout
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh

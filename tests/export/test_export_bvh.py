@@ -17,7 +17,7 @@ from plain_bvh import PlainBvh, about
 import viewer
 from viewer.errors import OutputError, RigError
 from viewer.export import MotionOptions, export_take, motion_exporters
-from viewer.export._bvh_angles import euler_angles, unrolled
+from viewer.export._bvh.angles import euler_angles, unrolled
 from viewer.export._options import ROTATION_ORDERS
 from viewer.formats import Source, bvh
 from viewer.loading import bundled_body

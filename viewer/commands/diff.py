@@ -11,10 +11,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TextIO
 
-from viewer.commands._diff_inputs import input_files
-from viewer.commands._diff_pairs import Pairing, pair_actors
-from viewer.commands._diff_picture import Heat, heat_of, save_heat
-from viewer.commands._diff_report import Compared, json_text, lines_of, table_of
+from viewer.commands._diff.inputs import input_files
+from viewer.commands._diff.pairs import Pairing, pair_actors
+from viewer.commands._diff.picture import Heat, heat_of, save_heat
+from viewer.commands._diff.report import Compared, json_text, lines_of, table_of
 from viewer.commands._frame_numbers import parse_range
 from viewer.commands._output import PICTURES
 from viewer.commands._pose import add_skinning_arguments, skinning_of

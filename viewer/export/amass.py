@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.errors import RigError, printable
-from viewer.export._between import resampling_losses
 from viewer.export._family_frames import (
     FamilyFrames,
     check_unit,
@@ -28,7 +27,8 @@ from viewer.export._family_frames import (
 )
 from viewer.export._family_reading import read_frames
 from viewer.export._gaps import filled, gaps_text, runs
-from viewer.export._losses import frames_losses
+from viewer.export._losses.between import resampling_losses
+from viewer.export._losses.lines import frames_losses
 from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, MotionOptions
 from viewer.formats import Source, all_or_none, keeping_written, save_arrays

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from viewer.errors import RigError, printable
-from viewer.export._between import PLACES, own_times
-from viewer.export._bvh_angles import euler_angles, unrolled
+from viewer.export._bvh.angles import euler_angles, unrolled
 from viewer.export._gaps import filled, gaps_text, runs
-from viewer.export._losses import frames_losses
+from viewer.export._losses.between import PLACES, own_times
+from viewer.export._losses.lines import frames_losses
 from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, MotionOptions
 from viewer.formats import Source, all_or_none, keeping_written, read, write

@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from viewer.errors import RigError, printable
-from viewer.export._between import resampling_losses
-from viewer.export._bvh_angles import unrolled
-from viewer.export._bvh_body import Body, Space, body_of, rest_matrices, shape_at
-from viewer.export._bvh_ends import end_offsets
-from viewer.export._bvh_reading import BvhFile, read_back
-from viewer.export._bvh_text import bvh_text
+from viewer.export._bvh.angles import unrolled
+from viewer.export._bvh.body import Body, Space, body_of, rest_matrices, shape_at
+from viewer.export._bvh.ends import end_offsets
+from viewer.export._bvh.reading import BvhFile, read_back
+from viewer.export._bvh.text import bvh_text
 from viewer.export._gaps import filled, gaps_text, runs
-from viewer.export._losses import driven_losses, shape_changes
+from viewer.export._losses.between import resampling_losses
+from viewer.export._losses.lines import driven_losses, shape_changes
 from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, ROTATION_ORDERS, MotionOptions
 from viewer.formats import all_or_none, save_bytes

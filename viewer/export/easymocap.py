@@ -23,7 +23,6 @@ from pathlib import Path
 import numpy as np
 
 from viewer.errors import OutputError, RigError, printable
-from viewer.export._between import resampling_losses
 from viewer.export._family_frames import (
     FamilyFrames,
     check_unit,
@@ -33,7 +32,8 @@ from viewer.export._family_frames import (
 )
 from viewer.export._family_reading import Records, read_frames
 from viewer.export._gaps import gaps_text, kept_gaps
-from viewer.export._losses import frames_losses
+from viewer.export._losses.between import resampling_losses
+from viewer.export._losses.lines import frames_losses
 from viewer.export._options import MotionOptions
 from viewer.interrupts import hold, poll
 from viewer.rig.arrays import Floats

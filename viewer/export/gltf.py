@@ -14,16 +14,16 @@ from typing import Any
 import numpy as np
 
 from viewer.errors import RigError, printable
-from viewer.export._between import resampling_losses
 from viewer.export._gaps import filled, gaps_text, runs
-from viewer.export._gltf_document import Document, text_of
-from viewer.export._gltf_losses import Written, gltf_losses, not_held, vertices_text
-from viewer.export._gltf_mesh import Color, add_mesh
-from viewer.export._gltf_motion import add_animation, moving, still_locals
-from viewer.export._gltf_nodes import Locals, Tree, add_nodes, locals_of
-from viewer.export._gltf_reading import parsed
-from viewer.export._gltf_shape import Shape, shape_of
-from viewer.export._gltf_skin import Influences, influences_of, inverse_bind_matrices
+from viewer.export._gltf.document import Document, text_of
+from viewer.export._gltf.losses import Written, gltf_losses, not_held, vertices_text
+from viewer.export._gltf.mesh import Color, add_mesh
+from viewer.export._gltf.motion import add_animation, moving, still_locals
+from viewer.export._gltf.nodes import Locals, Tree, add_nodes, locals_of
+from viewer.export._gltf.reading import parsed
+from viewer.export._gltf.shape import Shape, shape_of
+from viewer.export._gltf.skin import Influences, influences_of, inverse_bind_matrices
+from viewer.export._losses.between import resampling_losses
 from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, MotionOptions
 from viewer.formats import all_or_none, save_bytes

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.export._losses import frames_losses
+from viewer.export._losses.lines import frames_losses
 from viewer.rig.arrays import Floats
 from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.evaluation import frames_of

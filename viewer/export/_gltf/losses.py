@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.export._apart import apart, apart_lines, negligible, shared_extent
-from viewer.export._gltf_nodes import Tree
-from viewer.export._gltf_reading import GltfFile, read_back
-from viewer.export._gltf_shape import Shape
-from viewer.export._gltf_skin import PER_SET, Influences
-from viewer.export._skinned import Rows, Side, body_rows, changing, figure_side
+from viewer.export._gltf.nodes import Tree
+from viewer.export._gltf.reading import GltfFile, read_back
+from viewer.export._gltf.shape import Shape
+from viewer.export._gltf.skin import PER_SET, Influences
+from viewer.export._losses.apart import apart, apart_lines, negligible, shared_extent
+from viewer.export._losses.skinned import Rows, Side, body_rows, changing, figure_side
 from viewer.rig.arrays import Ints
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import split_seams

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.export._gltf_document import INDICES, VERTICES, Document, text_of
-from viewer.export._gltf_shape import Shape
-from viewer.export._gltf_skin import Influences, influence_sets
+from viewer.export._gltf.document import INDICES, VERTICES, Document, text_of
+from viewer.export._gltf.shape import Shape
+from viewer.export._gltf.skin import Influences, influence_sets
 from viewer.media.image import encode_png
 from viewer.rig.arrays import Bytes, Floats, Ints
 from viewer.rig.blendshapes import BlendShapes

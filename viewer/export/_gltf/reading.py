@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.export._gltf_nodes import Tree
-from viewer.export._skinned import Body, Poses, Rows, Side
+from viewer.export._gltf.nodes import Tree
+from viewer.export._losses.skinned import Body, Poses, Rows, Side
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.kinematics import forward_kinematics

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.export._skinned import Body, Poses
+from viewer.export._losses.skinned import Body, Poses
 from viewer.rig.arrays import Floats
 from viewer.rig.skin import Skin, merged, owners, skin_from_entries
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from viewer.export._bvh_angles import euler_angles
+from viewer.export._bvh.angles import euler_angles
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import quaternion_to_matrix

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from viewer.errors import RigError
-from viewer.export._gltf_document import Document, text_of
+from viewer.export._gltf.document import Document, text_of
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.rotation import matrix_to_quaternion
 from viewer.rig.pose import Pose, joint_rotations, local_matrices

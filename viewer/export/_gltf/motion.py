@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from viewer.export._gltf_document import Document, text_of
-from viewer.export._gltf_nodes import Locals, Tree
+from viewer.export._gltf.document import Document, text_of
+from viewer.export._gltf.nodes import Locals, Tree
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.motion.evaluation import Frames
 from viewer.rig.skeleton import Skeleton

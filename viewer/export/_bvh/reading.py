@@ -18,8 +18,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.export._bvh_body import Space, rest_matrices
-from viewer.export._skinned import Poses, Side, anchored, figure_side
+from viewer.export._bvh.body import Space, rest_matrices
+from viewer.export._losses.skinned import Poses, Side, anchored, figure_side
 from viewer.formats import Source, bvh
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure

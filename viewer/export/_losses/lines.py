@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.export._apart import apart, apart_lines, negligible
-from viewer.export._skinned import Side, changing, figure_side
+from viewer.export._losses.apart import apart, apart_lines, negligible
+from viewer.export._losses.skinned import Side, changing, figure_side
 from viewer.rig.arrays import Floats
 from viewer.rig.motion.evaluation import Frames
 from viewer.rig.motion.take import Take

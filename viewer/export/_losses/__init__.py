@@ -1,0 +1,1 @@
+"""Differences between a motion and the file that was written of it."""
