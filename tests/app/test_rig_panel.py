@@ -518,7 +518,7 @@ def test_mesh_is_added_by_the_dialog_and_the_body_is_read_when_needed(drive, tmp
     assert hand.state.rig.template.figure.name == "fox"
     hand.click("Pose it…")
     hand.step(2)
-    assert names(hand) == ["fox", "scan", "fox"]
+    assert names(hand) == ["fox", "scan", "fox-2"]
     chosen = hand.state.scene.actors[2]
     assert hand.state.rig.template_key == f"actor {id(chosen)}"
     assert seen(hand, 2)[:, 0].min() > seen(hand, 1)[:, 0].max()  # beside the others

@@ -118,7 +118,8 @@ def test_numbered_pictures_are_the_frames(draw, walk, tmp_path):
 def test_sequence_shows_the_same_as_single_frames(draw, walk, tmp_path):
     """At a given distance only the target is fitted: that of the middle of all frames."""
     options = ("--distance", "30", "--no-grid", "--background", "transparent")
-    draw(walk, "{frame}.png", "--frames", "0:31", *options)
+    axis = ("--front", "+z")  # as cameras have it that know nothing of figures
+    draw(walk, "{frame}.png", "--frames", "0:31", *axis, *options)
     assert len(names(tmp_path, ".png")) == 31
     scene = viewer.load(*walk)
     clouds = []

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import viewer
-from viewer.errors import RigError
+from viewer.errors import FormatError
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.mesh import split_seams, volume
 from viewer.rig.pose import joint_rotations, rest_pose
@@ -249,8 +249,7 @@ def test_pose_file_of_190_numbers_comes_back(pig, folder, tmp_path, separator):
 def test_pose_file_of_another_length_is_refused(folder, tmp_path, count):
     path = tmp_path / "pose.txt"
     path.write_text("0\n" * count)
-    with pytest.raises(RigError) as caught:
+    with pytest.raises(FormatError) as caught:
         viewer.load(folder, path)
-    assert str(caught.value) == (
-        f"{path}: expected 190 pose numbers for core_txt_files, found {count}"
-    )
+    assert (caught.value.path, caught.value.line) == (path, count)
+    assert f"190 pose numbers for pig, found {count}" in str(caught.value)
