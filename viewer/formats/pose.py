@@ -33,8 +33,8 @@ import numpy as np
 from viewer.errors import FormatError, RigError, UnsupportedFormatError, printable
 from viewer.formats._archive import describe
 from viewer.formats._container import archive_of
-from viewer.formats._named_values import NamedValues, described, parse_json
-from viewer.formats._pose_turns import KEYS, named_turns, read_turns
+from viewer.formats._pose.named_values import NamedValues, described, parse_json
+from viewer.formats._pose.turns import KEYS, named_turns, read_turns
 from viewer.formats._source import Source
 from viewer.formats._table import read_numbers
 from viewer.media.saving import save_arrays, save_text

@@ -23,7 +23,7 @@ import numpy as np
 
 from viewer.errors import FormatError, counted
 from viewer.formats._numbers import is_infinite, is_number, to_number
-from viewer.formats._skel_writing import KEYWORDS, UNLIMITED, write
+from viewer.formats._skel.writing import KEYWORDS, UNLIMITED, write
 from viewer.formats._source import Source, no_number, shown
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure

@@ -20,7 +20,7 @@ from viewer.errors import FormatError, printable
 from viewer.formats._archive import Archive, Opaque, Sparse, describe
 from viewer.formats._container import archive_of, corners_of, finite
 from viewer.formats._numbers import LARGEST
-from viewer.formats._smpl_parts import (
+from viewer.formats._smpl.parts import (
     IGNORED,
     model_hands,
     model_keypoints,

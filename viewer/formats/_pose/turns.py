@@ -8,7 +8,7 @@ import numpy as np
 
 from viewer.errors import printable
 from viewer.formats._archive import describe
-from viewer.formats._named_values import NamedValues
+from viewer.formats._pose.named_values import NamedValues
 from viewer.rig.arrays import Floats
 from viewer.rig.retargeting.pose_transfer import JointTurns
 
