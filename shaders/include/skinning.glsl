@@ -21,6 +21,7 @@ vec3 rest_shift;     // rest centre minus posed centre
 vec3 center;         // posed centre, figure space
 #ifdef AFFINE_PALETTE  // some joint of some instance scales or shears
 bool is_rigid;       // none of this instance does
+mat3 linear;         // what skin() did to directions; it sets it
 #endif
 
 // Sum of the vertex's weights, minus 1.

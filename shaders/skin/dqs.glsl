@@ -35,6 +35,9 @@ void skin(inout vec3 position, inout vec3 normal) {
     float size = length(real);
     if (abs(1.0 + excess()) < 1e-12 || size < 1e-12 * abs(sum)) {
         position += rest_shift;  // influences that cancel out give no rotation
+#ifdef AFFINE_PALETTE
+        linear = mat3(1.0);
+#endif
         return;
     }
     // A negative sum turns the blended quaternion around, which is the same rotation.
@@ -47,5 +50,11 @@ void skin(inout vec3 position, inout vec3 normal) {
     vec3 stretched = vec3(dot(x, point), dot(y, point), dot(z, point));
     vec3 shift = 2.0 * (real.w * dual.xyz - dual.w * real.xyz + cross(real.xyz, dual.xyz));
     position = rotate(real, stretched) + shift;
+#ifdef AFFINE_PALETTE
+    vec3 first_column = rotate(real, vec3(x.x, y.x, z.x));
+    vec3 second_column = rotate(real, vec3(x.y, y.y, z.y));
+    vec3 third_column = rotate(real, vec3(x.z, y.z, z.z));
+    linear = mat3(first_column, second_column, third_column);
+#endif
     normal = rotate(real, blended_normal(x.xyz, y.xyz, z.xyz, normal));
 }

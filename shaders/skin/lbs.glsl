@@ -13,5 +13,8 @@ void skin(inout vec3 position, inout vec3 normal) {
     vec4 point = vec4(position, 1.0);
     // The matrices have the posed centre subtracted once per unit of weight.
     position = vec3(dot(x, point), dot(y, point), dot(z, point)) + excess() * center;
+#ifdef AFFINE_PALETTE
+    linear = transpose(mat3(x.xyz, y.xyz, z.xyz));
+#endif
     normal = blended_normal(x.xyz, y.xyz, z.xyz, normal);
 }

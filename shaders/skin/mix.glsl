@@ -3,9 +3,19 @@
 uniform float u_share;          // of DQS, 0 to 1
 
 void skin(inout vec3 position, inout vec3 normal) {
-    vec3 dual_position = position, dual_normal = normal;
+    vec3 rest_normal = normal, dual_position = position, dual_normal = normal;
     skin_lbs(position, normal);
+#ifdef AFFINE_PALETTE
+    mat3 mixed = (1.0 - u_share) * linear;
+#endif
     skin_dqs(dual_position, dual_normal);
     position = mix(position, dual_position, u_share);
     normal = mix(unit(normal), unit(dual_normal), u_share);
+#ifdef AFFINE_PALETTE
+    if (!is_rigid) {
+        // Of the map as a whole: normals of scaled joints do not mix.
+        mixed = transpose(mixed + u_share * linear);
+        normal = blended_normal(mixed[0], mixed[1], mixed[2], rest_normal);
+    }
+#endif
 }

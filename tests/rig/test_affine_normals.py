@@ -148,3 +148,20 @@ def test_palette_is_rigid(palette, expected):
 def test_palettes_of_several_poses_are_judged_one_by_one():
     stretched = [RIGID[0], np.diag([1.0, 2.0, 1.0, 1.0])]
     assert is_rigid(np.array([RIGID, stretched, RIGID])).tolist() == [True, False, True]
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
+def test_mixed_normals_are_those_of_the_surface_that_is_mixed(share):
+    """With equal weights everywhere, each method maps the sphere linearly, and so does the mixture.
+
+    Its matrix is found by moving the three unit vectors; the ellipsoid A p has normals A^-T p.
+    """
+    palette = np.array([matrix(turn_x(0.9) @ np.diag([3.0, 1, 0.5])), matrix(turn_z(1.4))])
+    pairs = [(0, 0.6), (1, 0.4)]
+    skin = skin_from_lists([pairs] * 4, EYES)
+    corners = np.concatenate([np.zeros((1, 3)), np.eye(3)])
+    moved, _ = mix.deform(corners, corners, skin, palette, share)
+    linear = (moved[1:] - moved[0]).T
+    skin = skin_from_lists([pairs] * len(DIRECTIONS), EYES)
+    found = mix.deform(DIRECTIONS, DIRECTIONS, skin, palette, share)[1]
+    assert_allclose(found, unit(DIRECTIONS @ np.linalg.inv(linear)), atol=1e-13)

@@ -7,15 +7,21 @@ space, and a rigid motion, blended as dual quaternions.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.geometry.rotation import matrix_to_quaternion, nearest_rotations
+from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.geometry.rotation import (
+    matrix_to_quaternion,
+    nearest_rotations,
+    quaternion_to_matrix,
+)
 from viewer.rig.geometry.vectors import unit
 from viewer.rig.skin import Skin, bind_positions, strongest_first
 from viewer.rig.skinning._normals import inverse_transposed
 
-__all__ = ["deform", "split_palette"]
+__all__ = ["deform", "linear_maps", "split_palette"]
 
 _CHUNK = 1 << 16  # vertices at a time, which bounds the memory that large meshes take
 _RIGID = 1e-12  # a stretch nearer to the identity is rounding
@@ -53,16 +59,35 @@ def deform(
     centers = bind_positions(skin)
     duals, stretches = split_palette(palette, centers)
     moved, turned = positions.copy(), normals.copy()
-    for first in range(0, skin.n_vertices, _CHUNK):
-        rows = slice(first, min(first + _CHUNK, skin.n_vertices))
-        starts = skin.starts[rows.start : rows.stop + 1]
-        listing = np.flatnonzero(np.diff(starts) > 0)
-        if len(listing):
-            chosen = rows.start + listing
-            moved[chosen], turned[chosen] = _move(
-                positions[chosen], normals[chosen], skin, starts, listing, duals, stretches
-            )
+    for chosen, blended, stretch in _blended(skin, duals, stretches):
+        points = positions[chosen]
+        stretched = np.einsum("vab,vb->va", stretch[:, :, :3], points) + stretch[:, :, 3]
+        moved[chosen] = _rigid(blended, stretched)
+        facing = inverse_transposed(np.moveaxis(stretch[:, :, :3], 0, -1), normals[chosen])
+        turned[chosen] = _rotated(blended[:, :4], facing)
     return moved, unit(turned)
+
+
+def linear_maps(skin: Skin, palette: Floats) -> Floats:
+    """Return what moving does to directions at each vertex, rotation after stretch.
+
+    Parameters
+    ----------
+    skin : Skin
+        V vertices.
+    palette : (J, 4, 4)
+        Skinning matrices, bind to posed.
+
+    Returns
+    -------
+    (V, 3, 3)
+        The identity for a vertex that stays.
+    """
+    skin = strongest_first(skin)
+    maps = np.tile(np.eye(3), (skin.n_vertices, 1, 1))
+    for chosen, blended, stretch in _blended(skin, *split_palette(palette, bind_positions(skin))):
+        maps[chosen] = quaternion_to_matrix(blended[:, :4]) @ stretch[:, :, :3]
+    return maps
 
 
 def split_palette(palette: Floats, centers: Floats) -> tuple[Floats, Floats]:
@@ -109,16 +134,23 @@ def split_palette(palette: Floats, centers: Floats) -> tuple[Floats, Floats]:
     return np.concatenate([real, dual], axis=1), np.concatenate([stretches, shifts[..., None]], 2)
 
 
-def _move(
-    positions: Floats,
-    normals: Floats,
-    skin: Skin,
-    starts: Ints,
-    listing: np.ndarray,
-    duals: Floats,
-    stretches: Floats,
-) -> tuple[Floats, Floats]:
-    """Move the vertices of one chunk that list influences."""
+def _blended(
+    skin: Skin, duals: Floats, stretches: Floats
+) -> Iterator[tuple[np.ndarray, Floats, Floats]]:
+    """Yield vertices that move, their unit dual quaternions and stretches, a chunk at a time."""
+    for first in range(0, skin.n_vertices, _CHUNK):
+        rows = slice(first, min(first + _CHUNK, skin.n_vertices))
+        starts = skin.starts[rows.start : rows.stop + 1]
+        listing = np.flatnonzero(np.diff(starts) > 0)
+        if len(listing):
+            blended, stretch, is_moved = _blend(skin, starts, listing, duals, stretches)
+            yield (rows.start + listing)[is_moved], blended[is_moved], stretch[is_moved]
+
+
+def _blend(
+    skin: Skin, starts: Ints, listing: np.ndarray, duals: Floats, stretches: Floats
+) -> tuple[Floats, Floats, Bools]:
+    """Blend for the vertices of one chunk that list influences; not all of them can be moved."""
     span = slice(starts[0], starts[-1])
     edges = starts[listing] - starts[0]
     joints, weights = skin.joints[span], skin.weights[span]
@@ -134,13 +166,7 @@ def _move(
     lengths = np.linalg.norm(blended[:, :4], axis=1)
     is_moved &= lengths > _TINY
     blended /= np.where(is_moved, lengths, 1.0)[:, None]
-    stretched = np.einsum("vab,vb->va", stretch[:, :, :3], positions) + stretch[:, :, 3]
-    moved = _rigid(blended, stretched)
-    stretched_normals = inverse_transposed(np.moveaxis(stretch[:, :, :3], 0, -1), normals)
-    turned = _rotated(blended[:, :4], stretched_normals)
-    keep = ~is_moved
-    moved[keep], turned[keep] = positions[keep], normals[keep]
-    return moved, turned
+    return blended, stretch, is_moved
 
 
 def _rigid(duals: Floats, points: Floats) -> Floats:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.vectors import unit
+from viewer.rig.kinematics import is_rigid
 from viewer.rig.skin import Skin
 from viewer.rig.skinning import dqs, lbs
+from viewer.rig.skinning._normals import inverse_transposed
 
 __all__ = ["deform"]
 
@@ -14,6 +18,8 @@ def deform(
     positions: Floats, normals: Floats, skin: Skin, palette: Floats, share: float = 0.5
 ) -> tuple[Floats, Floats]:
     """Return (1 - share) LBS + share DQS, vertex by vertex.
+
+    Where joints scale or shear, normals take the inverse transpose of the mixed linear maps.
 
     Parameters
     ----------
@@ -36,4 +42,8 @@ def deform(
     linear = lbs.deform(positions, normals, skin, palette)
     dual = dqs.deform(positions, normals, skin, palette)
     moved, turned = ((1.0 - share) * a + share * b for a, b in zip(linear, dual, strict=True))
+    if not is_rigid(palette):
+        maps = (1.0 - share) * lbs.blended_matrices(skin, palette)[:, :, :3]
+        maps += share * dqs.linear_maps(skin, palette)
+        turned = inverse_transposed(np.moveaxis(maps, 0, -1), normals)
     return moved, unit(turned)
