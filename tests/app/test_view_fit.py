@@ -7,10 +7,12 @@ import pytest
 from app import box_body, test_timeline
 from app.captured import people, walk
 from app.hand_made_figures import bar, sided_skel
+from app.test_curves_panel import clip_text
 from app.test_timeline import capture, finish
 
 import viewer
 from viewer.app import actions
+from viewer.app.curve_edit import place_key
 from viewer.app.framing import restart_framing
 from viewer.app.view_frame import view_frame
 from viewer.rendering.camera import Camera, fit
@@ -207,6 +209,32 @@ def test_fit_leaves_a_camera_that_was_moved_while_a_capture_is_read(streaming):
     assert streaming.state.camera.distance == camera.distance
     assert (streaming.state.camera.target == camera.target).all()
     assert streaming.state.box[1, 0] > 98.0  # the ground reaches as far all the same
+
+
+@pytest.mark.parametrize("edit", ["key", "offset and key", "undo"])
+def test_views_fit_the_motion_as_it_was_edited(drive, rig, tmp_path, edit):
+    (tmp_path / "wave.anim").write_text(clip_text())
+    hand = drive(*rig, tmp_path / "wave.anim", size=(1200, 700), samples=1)
+    restart_framing(hand.state)
+    hand.step(3)
+    before = hand.state.camera.distance
+    if edit == "offset and key":
+        hand.state.actor.offset = 0.5
+        hand.step(3)
+    place_key(hand.state, (0, 1), value=20.0)  # root x, at its end
+    hand.step(3)
+    assert hand.state.camera.distance == before  # the edit is to be seen
+    if edit == "undo":
+        hand.key("z", "ctrl")
+        hand.step(3)
+    hand.key("_1")
+    reach_at_most = 20.0 if edit != "undo" else 1.0
+    wide = hand.state.framing.extent.box[1, 0] - hand.state.framing.extent.box[0, 0]
+    assert reach_at_most < wide < reach_at_most + 3.0
+    actor = hand.state.actor.copy()
+    for time in np.linspace(0.0, 2.0, 21) + actor.offset:
+        pose_actor(actor, float(time))
+        assert reach(hand, scene_points(viewer.Scene([actor]))).max() < 1.0
 
 
 def test_tools_cover_nothing_that_is_fitted(drive, tmp_path):

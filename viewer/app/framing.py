@@ -78,8 +78,8 @@ def keep_fitting(state: AppState) -> None:
     extent, grows = framing.extent, state.stream is not None
     if extent.look(state.scene, state.playback, state.options.show, grows):
         state.box = extent.box
-        # The camera stays where a shape is changed by hand: the change is to be seen.
-        framing._is_stale |= not extent.was_reshaped
+        # The camera stays where a shape or motion is edited: the change is to be seen.
+        framing._is_stale |= not extent.was_edited
     _, _, width, height = state.view_rect
     if not framing.is_fitting or min(width, height) < _NARROWEST:
         return

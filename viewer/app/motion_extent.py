@@ -38,22 +38,24 @@ class MotionExtent:
     ----------
     is_done : bool
         Whether all frames have been looked at.
-    was_reshaped : bool
-        Whether somebody has changed a shape since the scene was opened.
+    was_edited : bool
+        Whether somebody has changed a shape or a motion since the scene was opened.
     """
 
     is_done: bool = False
-    was_reshaped: bool = False
+    was_edited: bool = False
     _clouds: dict[float, Floats] = field(default_factory=dict)  # by the seconds they are seen at
-    _kept: dict[float, Floats] = field(default_factory=dict)  # as shapes were before
+    _kept: dict[float, Floats] = field(default_factory=dict)  # of before an edit
     _shapes: tuple[bytes, ...] = ()
+    _motions: tuple[object, ...] = ()
     _opened: dict[int, tuple[Actor, Figure, Pose]] = field(default_factory=dict)
     _grew: bool = False
 
     def restart(self) -> None:
         """Forget everything: other figures are shown, or these in other poses."""
-        self.is_done = self.was_reshaped = self._grew = False
-        self._clouds, self._kept, self._shapes, self._opened = {}, {}, (), {}
+        self.is_done = self.was_edited = self._grew = False
+        self._clouds, self._kept, self._opened = {}, {}, {}
+        self._shapes, self._motions = (), ()
 
     @property
     def points(self) -> Floats:
@@ -81,12 +83,15 @@ class MotionExtent:
             Whether more of the motion is still to come.
         """
         shapes = tuple(map(_own_shape, scene.actors))
-        is_reshaped = shapes[: len(self._shapes)] != self._shapes
-        if is_reshaped or (self._grew and not grows):
-            # Frames are looked at again: shapes changed, or another capture had not come so far.
+        motions = tuple(map(_own_motion, scene.actors))
+        is_edited = shapes[: len(self._shapes)] != self._shapes
+        if not grows and not self._grew:  # motions that grow are no edits
+            is_edited |= motions[: len(self._motions)] != self._motions
+        if is_edited or (self._grew and not grows):
+            # Frames are looked at again: after an edit, or as another capture had not come so far.
             self._kept, self._clouds = {**self._kept, **self._clouds}, {}
-        self.was_reshaped |= is_reshaped
-        self._shapes, self._grew = shapes, grows
+        self.was_edited |= is_edited
+        self._shapes, self._motions, self._grew = shapes, motions, grows
         self._keep_poses(scene)
         left = self._left(scene, playback, grows)
         self.is_done = not left and not grows
@@ -157,6 +162,11 @@ def _own_shape(actor: Actor) -> bytes:
     """Return the key of a shape that no motion changes."""
     is_driven = isinstance(actor.clip, SampledClip) and actor.clip.shape_weights is not None
     return b"" if actor.pose is None or is_driven else actor.pose.shape_weights.tobytes()
+
+
+def _own_motion(actor: Actor) -> tuple[object, ...]:
+    """Return the key of what moves and places an actor; clips are replaced when they are edited."""
+    return actor.clip, actor.offset, actor.placement.tobytes()
 
 
 def _n_points(scene: Scene) -> int:
