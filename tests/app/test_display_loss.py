@@ -38,6 +38,25 @@ sys.exit(run(sys.argv[3:]))
 """
 
 
+# The same at start-up: when a step of it begins, the server is no longer there.
+START = """
+import os, signal, sys
+from viewer.app.display import import_glfw
+from viewer.cli import run
+
+server, step = int(sys.argv[1]), sys.argv[2]
+glfw = import_glfw()
+original = getattr(glfw, step)
+
+def killed(*arguments):
+    os.kill(server, signal.SIGKILL)
+    return original(*arguments)
+
+setattr(glfw, step, killed)
+sys.exit(run(sys.argv[3:]))
+"""
+
+
 @pytest.fixture
 def server():
     """An Xvfb of the test's own: its process and the display's name."""
@@ -57,7 +76,7 @@ def server():
     process.wait(10)
 
 
-def ended(server, tmp_path, folder=""):
+def ended(server, tmp_path, word="", program=PROGRAM):
     """Return how the viewer ended whose display was taken away."""
     process, display = server
     environment = {
@@ -70,7 +89,7 @@ def ended(server, tmp_path, folder=""):
     environment.pop("WAYLAND_DISPLAY", None)
     rig = write_rig(tmp_path)
     return subprocess.run(
-        [sys.executable, "-c", PROGRAM, str(process.pid), str(folder), *map(str, rig)],
+        [sys.executable, "-c", program, str(process.pid), str(word), *map(str, rig)],
         env=environment, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False,
     )  # fmt: skip
 
@@ -92,22 +111,27 @@ def test_lost_display_leaves_no_half_written_recording(server, tmp_path):
     assert list(folder.iterdir()) == []
 
 
+@pytest.mark.parametrize("step", ["create_window", "make_context_current", "swap_interval"])
+def test_display_lost_at_start_is_told_alike(server, tmp_path, step):
+    check_end(ended(server, tmp_path, step, START), server[1])
+
+
 def test_handler_of_others_comes_back():
     """Run in a process of its own, as Xlib has one handler for all."""
     program = (
         "import ctypes\n"
-        "from viewer.app.display_loss import DisplayLoss, _library\n"
-        "library = _library()\n"
+        "from viewer.app.display_loss import stop_watching, watch_display\n"
         "ask = ctypes.CDLL('libX11.so.6')['XSetIOErrorHandler']\n"
         "ask.restype = ctypes.c_void_p\n"
         "first = ask(None)\n"  # Xlib's own
         "ask(ctypes.c_void_p(first))\n"
-        "loss = DisplayLoss(True)\n"
+        "watch_display()\n"
+        "watch_display()\n"  # twice is once
         "held = ask(None)\n"
         "ask(ctypes.c_void_p(held))\n"
-        "loss.release()\n"
+        "stop_watching()\n"
         "assert held != first and ask(None) == first\n"
-        "DisplayLoss(False).release()\n"
+        "stop_watching()\n"
     )
     done = subprocess.run(
         [sys.executable, "-c", program],

@@ -7,11 +7,12 @@ import sys
 import warnings
 from typing import Any
 
+from viewer.app.display_loss import stop_watching, watch_display
 from viewer.errors import RenderError, ViewerError
 from viewer.rendering.gpu.context import explain
 from viewer.rendering.gpu.offer import offer_of, offer_text
 
-__all__ = ["NoDisplay", "find_display", "import_glfw", "is_on_x11", "window_error"]
+__all__ = ["NoDisplay", "find_display", "import_glfw", "window_error"]
 
 
 class NoDisplay(ViewerError):  # noqa: N818  a state of the machine, not a fault
@@ -31,13 +32,6 @@ def import_glfw() -> Any:
     # GLFW reports errors as Python warnings; here they are asked for and raised instead.
     glfw.ERROR_REPORTING = "ignore"
     return glfw
-
-
-def is_on_x11() -> bool:
-    """Return whether GLFW, once it has started, talks to an X server."""
-    glfw = import_glfw()
-    has_name = sys.platform.startswith("linux") and hasattr(glfw, "get_x11_display")
-    return has_name and bool(glfw.get_x11_display())
 
 
 def window_error(words: str) -> RenderError:
@@ -77,11 +71,13 @@ def find_display() -> None:
             raise NoDisplay("no display found (DISPLAY is not set)")
         if not os.environ.get("DISPLAY"):
             raise NoDisplay("no X display found (DISPLAY is not set; Wayland needs XWayland)")
+        watch_display()
     glfw = import_glfw()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         started = glfw.init()
     if not started:
+        stop_watching()
         code, text = glfw.get_error()
         words = text.decode() if isinstance(text, bytes) else text or f"GLFW error {code}"
         display = os.environ.get("DISPLAY", "")

@@ -15,32 +15,31 @@ from typing import Any
 from viewer.errors import RenderError
 from viewer.media.unfinished import remove_unfinished
 
-__all__ = ["DisplayLoss"]
+__all__ = ["stop_watching", "watch_display"]
 
 _LIBRARY = "libX11.so.6"  # the one that GLFW opens: both share its handlers
 _Handler = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p)
 
 
-class DisplayLoss:
-    """Ends the process in the program's own way if the X server goes away.
+def watch_display() -> None:
+    """End the process in the program's own way if the X server goes away, from now on.
 
-    Parameters
-    ----------
-    has_display : bool
-        Whether there is an X server; without one there is nothing to lose.
+    To be called before GLFW starts: the server may go while a window is being made. It may be
+    called again.
     """
+    global _library
+    if _library is None:
+        _library = _open_library()
+        if _library is not None:
+            _before.append(_library.XSetIOErrorHandler(_handler))
 
-    def __init__(self, has_display: bool) -> None:
-        self._library = _library() if has_display else None
-        # Xlib calls it as long as it has it: it lives as long as this object.
-        self._handler = _Handler(_leave)
-        if self._library is not None:
-            self._before = self._library.XSetIOErrorHandler(self._handler)
 
-    def release(self) -> None:
-        """Give Xlib back the handler that it had."""
-        if self._library is not None:
-            self._library.XSetIOErrorHandler(self._before)
+def stop_watching() -> None:
+    """Give Xlib back the handler that it had."""
+    global _library
+    if _library is not None:
+        _library.XSetIOErrorHandler(_before.pop())
+        _library = None
 
 
 def _leave(_: Any) -> int:
@@ -56,7 +55,7 @@ def _leave(_: Any) -> int:
         os._exit(RenderError.exit_code)
 
 
-def _library() -> ctypes.CDLL | None:
+def _open_library() -> ctypes.CDLL | None:
     try:
         library = ctypes.CDLL(_LIBRARY)
     except OSError:  # GLFW was linked in another way
@@ -64,3 +63,9 @@ def _library() -> ctypes.CDLL | None:
     library.XSetIOErrorHandler.argtypes = [_Handler]
     library.XSetIOErrorHandler.restype = _Handler
     return library
+
+
+# Xlib has one handler for the process, and calls it as long as it has it.
+_handler = _Handler(_leave)
+_library: ctypes.CDLL | None = None
+_before: list[Any] = []

@@ -7,14 +7,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from viewer.app.display import find_display, import_glfw, is_on_x11, window_error
+from viewer.app.display import find_display, import_glfw, window_error
 
 glfw = import_glfw()
 
 import moderngl  # noqa: E402  after glfw, whose library imgui-bundle chooses
 from imgui_bundle import imgui, implot  # noqa: E402
 
-from viewer.app.display_loss import DisplayLoss  # noqa: E402
+from viewer.app.display_loss import stop_watching  # noqa: E402
 from viewer.app.frame import Frame  # noqa: E402
 from viewer.app.jobs import FrameJob  # noqa: E402
 from viewer.app.recent import (  # noqa: E402
@@ -124,6 +124,7 @@ def probe() -> str:
         return found
     finally:
         glfw.destroy_window(handle)
+        stop_watching()
 
 
 class _Window:
@@ -132,14 +133,13 @@ class _Window:
     def __init__(self, state: AppState, scale: float | None) -> None:
         self.state = state
         self.handle = _create_window(_title(state))
-        self._loss = DisplayLoss(is_on_x11())
         try:
             glfw.make_context_current(self.handle)
             glfw.swap_interval(1)
             self.context = _context()
         except BaseException:
             glfw.destroy_window(self.handle)
-            self._loss.release()
+            stop_watching()
             raise
         self._dropped: list[Path] = []
         self._is_dirty = True
@@ -275,7 +275,7 @@ class _Window:
         self.frame.release()
         self.context.release()
         glfw.destroy_window(self.handle)
-        self._loss.release()
+        stop_watching()
 
 
 class _Rest:
