@@ -76,6 +76,14 @@ def test_a_very_wide_picture_shows_the_whole_figure(scene):
     assert not alpha[:, -1].any()
 
 
+@pytest.mark.parametrize(("asked", "drawn"), [(1, None), (2, None), (3, 2), (4, None), (5, 4)])
+def test_samples_are_a_power_of_two(scene, asked, drawn):
+    with Offscreen() as offscreen:
+        draw(offscreen, scene, samples=asked)
+        note = f"{asked} samples a pixel asked for, {drawn} drawn"
+        assert offscreen.renderer.notes == ([] if drawn is None else [note])
+
+
 def test_too_many_samples_are_noted_once(scene):
     with Offscreen() as offscreen:
         for _ in range(2):

@@ -65,7 +65,7 @@ class Target:
     size : (int, int)
         Width and height in pixels.
     samples : int
-        Wanted samples a pixel; the driver's maximum if that is smaller.
+        Wanted samples a pixel; the next smaller power of two, and at most the driver's maximum.
 
     Attributes
     ----------
@@ -78,7 +78,9 @@ class Target:
     def __init__(self, context: moderngl.Context, size: tuple[int, int], samples: int) -> None:
         check_size(context, size)
         self.context, self.size = context, size
-        self.samples = min(samples, context.max_samples) if samples > 1 else 0
+        most = min(samples, context.max_samples)
+        # Drivers offer powers of two.
+        self.samples = 1 << (most.bit_length() - 1) if most > 1 else 0
         self.asked_samples = samples
         self._owned: list[Any] = []
         try:
