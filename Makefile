@@ -5,6 +5,7 @@
 
 PYTHON ?= python3
 VENV ?= .venv
+WORKERS ?= auto
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
@@ -15,11 +16,13 @@ run: $(READY)
 	@sh .ci/system "$(BIN)/python" || true
 	@$(BIN)/viewer $(FILES)
 
+# One process of tests per core (WORKERS=0 for none), each drawing with one thread: no test waits for
+# the threads of another one's pictures.
 test: $(READY) system
 	@$(BIN)/ruff check viewer tests assets
 	@$(BIN)/ruff format --check viewer tests assets
 	@$(BIN)/mypy
-	@$(BIN)/python -m pytest $(TESTS)
+	@LP_NUM_THREADS=1 $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile $(TESTS)
 
 lint: $(READY)
 	@$(BIN)/ruff check --fix viewer tests assets

@@ -146,7 +146,7 @@ def test_gaps_split_into_files(tmp_path):
         assert_drawn(gltf, take.figure, pose_of(take.figure, take.frames, frame), time=time)
     assert abs(first.duration() - 0.1) < 1e-7 and second.duration() == 0
     assert "walk-1.gltf: 7 vertices" in notes[0] and "2 frames (8 to 9)" in notes[0]
-    assert "walk-2.gltf: 7 vertices" in notes[2] and "1 frames (12 to 12)" in notes[2]
+    assert "walk-2.gltf: 7 vertices" in notes[2] and "1 frame (12)" in notes[2]
     assert notes[4] == "missing frames 7, 10 to 11, 13: one file for each run of frames"
 
 
