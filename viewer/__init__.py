@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from viewer.rig.blendshapes import BlendShapes
     from viewer.rig.figure import Figure
     from viewer.rig.mesh import Material, Mesh
-    from viewer.rig.motion.clip import Channel, Clip, evaluate, sample
+    from viewer.rig.motion.clip import Channel, Clip
+    from viewer.rig.motion.clip_sampling import evaluate, sample
     from viewer.rig.pose import Pose, rest_pose
     from viewer.rig.posing.pose_record import PoseRecord, apply_record, record_of
     from viewer.rig.retargeting.mirror import mirror_pose
@@ -97,7 +98,7 @@ _HOMES = {
     "apply_record": "rig.posing.pose_record",
     "deform": "rig.skinning",
     "deform_frames": "rig.skinning",
-    "evaluate": "rig.motion.clip",
+    "evaluate": "rig.motion.clip_sampling",
     "export": "export",
     "joint_matrices": "rig.skinning",
     "load": "loading",
@@ -105,7 +106,7 @@ _HOMES = {
     "record_of": "rig.posing.pose_record",
     "render": "rendering.offscreen",
     "rest_pose": "rig.pose",
-    "sample": "rig.motion.clip",
+    "sample": "rig.motion.clip_sampling",
     "shaped": "rig.shape",
     "show": "app.window",
     "with_rest_mesh": "rig.shape",

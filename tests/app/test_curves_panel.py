@@ -14,7 +14,8 @@ import viewer
 from viewer.formats import Source, read
 from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.figure import Figure
-from viewer.rig.motion.clip import Clip, evaluate
+from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.clip_sampling import evaluate
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor, Scene

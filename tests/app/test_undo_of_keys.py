@@ -21,7 +21,7 @@ from viewer.app.curve_edit import (
     turn_tangent,
 )
 from viewer.app.frame_rate import set_rate
-from viewer.rig.motion.clip import evaluate
+from viewer.rig.motion.clip_sampling import evaluate
 from viewer.rig.scene import Actor, Scene
 
 KEY = (ARM_X, 1)  # at 1 s: 0.6

@@ -6,7 +6,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from viewer.errors import RigError
-from viewer.rig.motion.clip import Channel, Clip, evaluate, slopes
+from viewer.rig.motion.clip import Channel, Clip, slopes
 from viewer.rig.motion.clip_edit import (
     add_key,
     clip_from_frames,
@@ -22,6 +22,7 @@ from viewer.rig.motion.clip_edit import (
     slope_at,
     with_channel,
 )
+from viewer.rig.motion.clip_sampling import evaluate
 from viewer.rig.motion.clip_table import evaluate_all
 from viewer.rig.pose import rest_pose
 

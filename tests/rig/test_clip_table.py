@@ -8,7 +8,8 @@ import math
 import numpy as np
 import pytest
 
-from viewer.rig.motion.clip import EXTRAPOLATIONS, Channel, Clip, evaluate
+from viewer.rig.motion.clip import EXTRAPOLATIONS, Channel, Clip
+from viewer.rig.motion.clip_sampling import evaluate
 from viewer.rig.motion.clip_table import evaluate_all
 
 RULES = ("flat", "linear", "smooth", 1.75)

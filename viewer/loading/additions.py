@@ -5,19 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from viewer.errors import RigError, printable
 from viewer.formats.pose import pose_error
 from viewer.loading.contents import Contents
-from viewer.rig.arrays import Bytes
-from viewer.rig.figure import Figure
-from viewer.rig.mesh import Material
+from viewer.loading.covering import with_texture
 from viewer.rig.pose import Pose
 from viewer.rig.posing.pose_record import PoseRecord, apply_record
 from viewer.rig.scene import Actor
 
-__all__ = ["add_to_actor", "apply_pose", "with_texture"]
+__all__ = ["add_to_actor", "apply_pose"]
 
 
 def add_to_actor(contents: Contents, actor: Actor) -> tuple[Actor, list[str]]:
@@ -58,27 +54,6 @@ def add_to_actor(contents: Contents, actor: Actor) -> tuple[Actor, list[str]]:
             setattr(actor.pose, name, getattr(trial.pose, name))
     is_same = trial.figure is actor.figure
     return actor if is_same else replace(actor, figure=trial.figure), notes
-
-
-def with_texture(figure: Figure, path: Path, pixels: Bytes) -> Figure:
-    """Return a figure covered with one picture.
-
-    Raises
-    ------
-    RigError
-        If it has no texture coordinates.
-    """
-    mesh = figure.mesh
-    if mesh is None or mesh.uvs is None:
-        raise RigError(
-            f"{printable(path, 300)} is a picture, {figure.name} has no texture coordinates"
-        )
-    covered = replace(
-        mesh,
-        materials=(Material(name=path.stem, texture=path.name, image=pixels),),
-        triangle_materials=np.zeros(mesh.n_triangles, dtype=np.int32),
-    )
-    return replace(figure, mesh=covered)
 
 
 def apply_pose(path: Path, record: PoseRecord, actor: Actor) -> list[str]:

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from viewer.errors import FormatError, RigError, printable
-from viewer.loading.additions import apply_pose, with_texture
+from viewer.loading.additions import apply_pose
 from viewer.loading.cast import Cast
 from viewer.loading.contents import Contents
+from viewer.loading.covering import with_texture
 from viewer.loading.settings import MotionSettings
 from viewer.rig.arrays import Bytes
 from viewer.rig.figure import Figure

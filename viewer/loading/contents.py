@@ -18,6 +18,7 @@ from viewer.formats import (
     read_picture,
     referenced_path,
 )
+from viewer.loading.covering import with_texture
 from viewer.loading.settings import MotionSettings
 from viewer.rig.arrays import Bytes
 from viewer.rig.figure import Figure
@@ -184,8 +185,6 @@ def _with_own_picture(source: Source, figure: Figure) -> Figure:
     mesh = figure.mesh
     if mesh is None or mesh.uvs is None or mesh.materials:
         return figure
-    from viewer.loading.additions import with_texture
-
     pictures = []
     for path in sorted(source.path.iterdir()):
         inside = source.inside(path.name)

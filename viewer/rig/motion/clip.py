@@ -10,8 +10,7 @@ import numpy as np
 
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, frozen
-from viewer.rig.pose import Pose
-from viewer.rig.skeleton import DOF_KINDS, Skeleton, clamp_dofs, joint_label
+from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_label
 
 __all__ = [
     "EXTRAPOLATIONS",
@@ -22,10 +21,8 @@ __all__ = [
     "Extrapolation",
     "Tangent",
     "check_fit",
-    "evaluate",
     "is_course_rig",
     "misfit",
-    "sample",
     "slopes",
     "suits",
 ]
@@ -158,52 +155,6 @@ def slopes(channel: Channel) -> Floats:
 
 def _ratio(rise: Floats, run: Floats) -> Floats:
     return np.divide(rise, run, out=np.zeros_like(rise), where=run > SHORTEST)
-
-
-def evaluate(channel: Channel, times: Floats) -> Floats:
-    """Return a curve's values: cubic Hermite inside the keys, extrapolated outside.
-
-    With u in 0..1 across a span of h seconds, v0 = h out0 and v1 = h in1, the value is
-    ((a u + b) u + v0) u + p0, a = 2 p0 - 2 p1 + v0 + v1, b = -3 p0 + 3 p1 - 2 v0 - v1
-    (CSE169 course notes). On a key it is exactly the key's value.
-
-    Parameters
-    ----------
-    channel : Channel
-        The curve; without keys it is 0 everywhere.
-    times : (...)
-        Seconds.
-
-    Returns
-    -------
-    (...)
-        Lengths or radians.
-    """
-    from viewer.rig.motion.clip_table import evaluate_channels
-
-    times = np.asarray(times, dtype=np.float64)
-    return evaluate_channels((channel,), times.ravel())[:, 0].reshape(times.shape)
-
-
-def sample(clip: Clip, skeleton: Skeleton, time: float, out: Pose) -> None:
-    """Set a pose's DOFs to where a clip has them at one time, within their limits.
-
-    Parameters
-    ----------
-    clip : Clip
-        The motion.
-    skeleton : Skeleton
-        Gives the limits; the clip must fit it, see ``check_fit``.
-    time : float
-        Seconds; before ``start`` and after ``end`` the curves extrapolate.
-    out : Pose
-        Changed in place.
-    """
-    from viewer.rig.motion.clip_table import evaluate_all
-
-    targets, values = evaluate_all(clip, np.array([time]))
-    out.dofs[targets] = values[0]
-    out.dofs[:] = clamp_dofs(skeleton, out.dofs)
 
 
 def is_course_rig(skeleton: Skeleton) -> bool:

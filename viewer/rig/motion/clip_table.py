@@ -32,7 +32,7 @@ _tables: Memo[Clip, _Table] = Memo(kept=1)
 
 
 def evaluate_all(clip: Clip, times: Floats) -> tuple[Ints, Floats]:
-    """Return all curves of a clip at many times; the formula is that of ``clip.evaluate``.
+    """Return all curves of a clip at many times; the formula is that of ``clip_sampling.evaluate``.
 
     Parameters
     ----------

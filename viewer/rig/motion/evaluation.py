@@ -15,7 +15,8 @@ from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import multiply
 from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
 from viewer.rig.kinematics import forward_kinematics
-from viewer.rig.motion.clip import Clip, sample
+from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.clip_sampling import sample
 from viewer.rig.motion.clip_table import evaluate_all
 from viewer.rig.motion.sampled_clip import SampledClip, SampledRows, sample_rows
 from viewer.rig.pose import Pose, dof_rotations

@@ -1,0 +1,36 @@
+"""A figure covered with a picture."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from viewer.errors import RigError, printable
+from viewer.rig.arrays import Bytes
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import Material
+
+__all__ = ["with_texture"]
+
+
+def with_texture(figure: Figure, path: Path, pixels: Bytes) -> Figure:
+    """Return a figure covered with one picture.
+
+    Raises
+    ------
+    RigError
+        If it has no texture coordinates.
+    """
+    mesh = figure.mesh
+    if mesh is None or mesh.uvs is None:
+        raise RigError(
+            f"{printable(path, 300)} is a picture, {figure.name} has no texture coordinates"
+        )
+    covered = replace(
+        mesh,
+        materials=(Material(name=path.stem, texture=path.name, image=pixels),),
+        triangle_materials=np.zeros(mesh.n_triangles, dtype=np.int32),
+    )
+    return replace(figure, mesh=covered)
