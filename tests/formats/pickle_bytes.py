@@ -13,7 +13,8 @@ import pytest
 from numpy.typing import NDArray
 
 from viewer.errors import FormatError
-from viewer.formats._archive import Archive, open_archive
+from viewer.formats._archive import Archive
+from viewer.formats._archive_opening import open_archive
 from viewer.formats._source import Source
 from viewer.rig.arrays import Deferred
 

@@ -12,7 +12,8 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from viewer.errors import FormatError
-from viewer.formats._archive import Archive, Opaque, Sparse, is_archive, open_archive
+from viewer.formats._archive import Archive, Opaque, Sparse
+from viewer.formats._archive_opening import is_archive, open_archive
 from viewer.formats._container import are_indices
 from viewer.formats._source import Source
 from viewer.rig.arrays import Deferred

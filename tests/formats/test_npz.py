@@ -17,7 +17,8 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from viewer.errors import FormatError
-from viewer.formats._archive import Archive, Opaque, open_archive
+from viewer.formats._archive import Archive, Opaque
+from viewer.formats._archive_opening import open_archive
 from viewer.formats._source import Source
 from viewer.rig.arrays import Deferred
 

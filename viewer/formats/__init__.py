@@ -245,7 +245,7 @@ def _is_archive(source: Source) -> bool:
     head = source.peek(_ARCHIVE_HEAD)
     if head[:1].isalpha() and not head.startswith((b"PK", b"c")):
         return False  # most text files, before the module for archives is loaded
-    from viewer.formats._archive import is_archive
+    from viewer.formats._archive_opening import is_archive
 
     return is_archive(head)
 

@@ -7,7 +7,6 @@ and refuses all others by name. What a file holds beyond that arrives as ``Opaqu
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from viewer.errors import FormatError, printable
 from viewer.formats._faults import Part
 from viewer.formats._floats import in_double, widened
-from viewer.formats._source import MAX_SIZE, Source
+from viewer.formats._source import Source
 from viewer.rig.arrays import Deferred
 
 __all__ = [
@@ -30,19 +29,9 @@ __all__ = [
     "Sparse",
     "Value",
     "describe",
-    "is_archive",
-    "open_archive",
 ]
 
 _MAX_SIDE = 1 << 27  # rows or columns of a sparse matrix; a mesh has far fewer vertices
-_ZIP = (b"PK\x03\x04", b"PK\x05\x06")
-_NPY = b"\x93NUMPY"
-_LFS = b"version https://git-lfs"
-# Protocols 2 to 5 announce themselves; 0 and 1 begin with what they build.
-_PICKLE = re.compile(
-    rb"\x80[\x02-\x05]|\(d[pqSUVX(.]|\}[q(.]|\(lp[0-9]|\][q(.]"
-    rb"|c(?:__builtin__|builtins|copy_reg|collections|numpy|scipy|chumpy|os|posix|nt)[\w.]*\r?\n"
-)
 _KIND_NAMES = {"biuf": "numbers", "iuf": "numbers", "iu": "whole numbers", "SU": "texts"}
 
 
@@ -346,45 +335,3 @@ def _is_numbers(value: Value) -> bool:
     if isinstance(value, list | tuple):
         return all(map(_is_numbers, value))
     return isinstance(value, int | float)
-
-
-def is_archive(head: bytes) -> bool:
-    r"""Return whether a file that begins like this is a pickle, an ``.npz`` or an ``.npy``.
-
-    >>> is_archive(b"\x80\x02}q\x01."), is_archive(b"positions 4 {")
-    (True, False)
-    """
-    return head.startswith((*_ZIP, _NPY)) or _PICKLE.match(head) is not None
-
-
-def open_archive(source: Source, max_size: int = MAX_SIZE) -> Archive:
-    """Open a pickle, ``.npz`` or ``.npy`` file, as its first bytes tell.
-
-    Parameters
-    ----------
-    source : Source
-        The file. Odd but harmless things are added to its warnings.
-    max_size : int
-        Largest size of all members of an ``.npz`` together, unpacked, in bytes.
-
-    Raises
-    ------
-    FormatError
-        If it is none of these, is damaged, or holds anything but data.
-    """
-    # Reading figures of other formats should not pay for these.
-    from viewer.formats._npz import open_npy, open_npz
-    from viewer.formats._pickle.reading import open_pickle
-
-    head = source.peek(4096)
-    if head.startswith(_ZIP):
-        return open_npz(source, max_size)
-    if head.startswith(_NPY):
-        return open_npy(source, max_size)
-    if head.startswith(_LFS):
-        found = "a Git LFS pointer, not the file itself (`git lfs pull` fetches it)"
-        raise source.error(f"expected a pickle, .npz or .npy file, found {found}")
-    if not is_archive(head):
-        looks = source.looks_like() or "something else"
-        raise source.error(f"expected a pickle, .npz or .npy file, found {looks}")
-    return open_pickle(source)
