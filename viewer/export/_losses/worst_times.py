@@ -34,10 +34,12 @@ Sampler = Callable[[Floats], Frames]
 
 _MOST = 8192  # times looked at in all, before the highest are refined
 _STEPS = 16  # of these, at most so many between two keys or frames
-_FEWEST = 4  # with fewer, a peak may be missed
+_FEWEST = 4  # with fewer, only spans whose middle is far apart are sampled
+_LIKELY = 256  # of these, for joints and vertices each
 _INSET = 1e-6  # of the span between two keys: curves may jump on a key itself
 _SHORT = 1e-6  # of a frame: spans that are shorter are none
 _BLOCK = 1024  # poses at a time
+_NAMING = 1024  # times, more or less, at which all vertices are looked at
 _GROUPS = 32  # stretches of time, each of which names its farthest vertex
 _PEAKS = 64  # peaks refined at most
 _HOPEFUL = 0.75  # of the highest sample: lower ones cannot be refined to be the highest
@@ -105,42 +107,45 @@ def worst_times(
     how : Skinning
         What moves the mesh; blended linearly.
     """
-    times, is_estimate = _samples(edges, _SHORT / rate)
-    if len(times) == 0:
-        return WorstTimes(times, 0, False)
-    pair = _Pair(figure, one, other, replace(how, method="lbs"))
-    pair = replace(pair, body=pair.witnesses(times))
+    spans = _spans(edges, _SHORT / rate)
+    if len(spans) == 0:
+        return WorstTimes(np.zeros(0), 0, False)
+    pair, looked = _Pair(figure, one, other, replace(how, method="lbs")), 0
+    is_estimate = len(spans) * _FEWEST > _MOST
+    if is_estimate:
+        looked = min(len(spans), _MOST)
+        spans = _likely(pair, spans)
+    steps = min(_STEPS, _MOST // len(spans))
+    times = _within(spans, np.linspace(_INSET, 1.0 - _INSET, steps + 1))
+    pair = pair.watching(times)
     heights = pair.heights(times)
-    found, looked = [], len(times)
+    looked += len(times)
+    found = []
     for kind in range(len(heights)):
         peaks = _peaks(heights[kind])
-        low, high = times[np.maximum(peaks - 1, 0)], times[np.minimum(peaks + 1, len(times) - 1)]
-        parts, every = np.linspace(0.0, 1.0, _PARTS + 1), np.arange(len(peaks))
-        best = times[peaks]
-        for _ in range(_ROUNDS):
-            # The best so far stays among them, so that no round loses what was found.
-            near = np.sort(np.column_stack([low[:, None] + np.outer(high - low, parts), best]))
-            top = pair.heights(near.ravel())[kind].reshape(near.shape).argmax(axis=1)
-            low, best = near[every, np.maximum(top - 1, 0)], near[every, top]
-            high = near[every, np.minimum(top + 1, near.shape[1] - 1)]
-            looked += near.size
-        found.append(best)
+        found.append(_refined(pair, kind, times, peaks))
+        looked += _ROUNDS * (_PARTS + 1) * len(peaks)
     return WorstTimes(np.unique(np.concatenate(found)), looked, is_estimate)
 
 
-def _samples(edges: Floats, short: float) -> tuple[Floats, bool]:
-    """Return times between edges, and whether they are too few."""
-    edges = edges[np.append(True, np.diff(edges) > 0.0)] if len(edges) else edges
+def _spans(edges: Floats, short: float) -> Floats:
+    """Return the start and end of each span between edges: (N, 2)."""
     spans = np.column_stack([edges[:-1], edges[1:]])
-    spans = spans[spans[:, 1] - spans[:, 0] > short]
-    if len(spans) == 0:
-        return np.zeros(0), False
-    steps = max(1, min(_STEPS, _MOST // len(spans)))
+    return spans[spans[:, 1] - spans[:, 0] > short]
+
+
+def _within(spans: Floats, places: Floats) -> Floats:
+    """Return times at some places of all spans, 0 to 1."""
+    return np.asarray(spans[:, :1] + np.diff(spans, axis=1) * places).ravel()
+
+
+def _likely(pair: _Pair, spans: Floats) -> Floats:
+    """Return the spans in whose middle joints or vertices are farthest apart, in time order."""
     if len(spans) > _MOST:
         spans = spans[np.linspace(0, len(spans) - 1, _MOST).astype(int)]
-    places = np.array([0.5]) if steps < _FEWEST else np.linspace(_INSET, 1.0 - _INSET, steps + 1)
-    times = spans[:, :1] + np.diff(spans, axis=1) * places
-    return times.ravel(), steps < _FEWEST
+    middles = _within(spans, np.array([0.5]))
+    order = np.argsort(-pair.watching(middles).heights(middles), axis=1, kind="stable")
+    return spans[np.unique(order[:, :_LIKELY])]
 
 
 def _peaks(heights: Floats) -> Rows:
@@ -149,6 +154,20 @@ def _peaks(heights: Floats) -> Rows:
     is_peak = (heights >= padded[:-2]) & (heights >= padded[2:]) & (heights > 0.0)
     rows = np.flatnonzero(is_peak & (heights >= _HOPEFUL * heights.max(initial=0.0)))
     return rows[np.argsort(-heights[rows], kind="stable")[:_PEAKS]]
+
+
+def _refined(pair: _Pair, kind: int, times: Floats, peaks: Rows) -> Floats:
+    """Return the times at which joints (0) or vertices (1) are farthest apart around peaks."""
+    best = times[peaks, None]
+    low = times[np.maximum(peaks - 1, 0), None]
+    high = times[np.minimum(peaks + 1, len(times) - 1), None]
+    reach = np.maximum(best - low, high - best)
+    for _ in range(_ROUNDS):
+        near = np.clip(best + reach * np.linspace(-1.0, 1.0, _PARTS + 1), low, high)
+        top = pair.heights(near.ravel())[kind].reshape(near.shape).argmax(axis=1)
+        best = np.take_along_axis(near, top[:, None], axis=1)
+        reach = reach * 2.0 / _PARTS
+    return best.ravel()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -170,10 +189,11 @@ class _Pair:
         ]
         return sides[0], sides[1], first
 
-    def witnesses(self, times: Floats) -> tuple[Body, Body] | None:
-        """Return the vertices that are farthest apart in a stretch of time, of all of these."""
+    def watching(self, times: Floats) -> _Pair:
+        """Return the same with the vertices that are farthest apart in stretches of some times."""
         if self.figure.mesh is None:
-            return None
+            return self
+        times = times[:: max(1, len(times) // _NAMING)]
         first, second, frames = self._sides(times)
         assert first.body is not None and second.body is not None  # there is a mesh
         every = np.arange(len(times))
@@ -184,7 +204,8 @@ class _Pair:
             if worst is not None:
                 found.add(worst.index)
         chosen = np.array(sorted(found), dtype=np.int32)
-        return body_rows(first.body, chosen), body_rows(second.body, chosen)
+        bodies = body_rows(first.body, chosen), body_rows(second.body, chosen)
+        return replace(self, body=bodies)
 
     def heights(self, times: Floats) -> NDArray[np.float64]:
         """Return how far joints, and the vertices if there are any, are apart: (1 or 2, T)."""
