@@ -199,6 +199,20 @@ def test_programs_that_read_four_influences_are_told_of_the_worst_frame(tmp_path
     assert said(cut) == {} and not [note for note in cut if "JOINTS_0" in note]
 
 
+def test_programs_that_read_four_influences_are_held_against_the_motion(tmp_path):
+    """Weights that add up to 0.95, the joint of the weakest, 0.05, 2 m along x in one frame.
+
+    As the figure moves it, vertex 1 goes from (0, 1, 0) to (0.1, 0.95, 0); the other four weights,
+    scaled, leave it where it was. All five, scaled, would take it to (0.1 / 0.95, 1, 0).
+    """
+    row = (0.3, 0.3, 0.2, 0.1, 0.05)
+    take = weighted([row, row, (1.0, 0, 0, 0, 0)], 20, 7, 2.0)
+    notes = write(take, tmp_path, "gltf", "a.glb")
+    (line,) = [note for note in notes if "JOINTS_0" in note]
+    size = float(re.search(r"off by up to (\S+) mm", line)[1])
+    assert size == pytest.approx(1000 * np.hypot(0.1, 0.05), rel=TOLD)
+
+
 def test_influences_that_never_matter_are_told_without_a_number(tmp_path):
     take = weighted([(0.3, 0.3, 0.2, 0.15, 0.05)] * 3, 4, 1, 0.0)
     notes = write(take, tmp_path, "gltf", "a.glb")

@@ -10,7 +10,7 @@ import numpy as np
 from viewer.errors import RigError, printable
 from viewer.export._bvh.angles import euler_angles, unrolled
 from viewer.export._gaps import filled, gaps_text, runs
-from viewer.export._losses.between import PLACES, own_times
+from viewer.export._losses.between import between_losses
 from viewer.export._losses.lines import frames_losses
 from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, MotionOptions
@@ -121,7 +121,7 @@ def _export_frames(take: Take, skeleton: Skeleton, path: Path, options: MotionOp
 def _losses(take: Take, source: Source, span: tuple[int, int], options: MotionOptions) -> list[str]:
     """Read a file back, and say how far it is off on the frames, and between them.
 
-    Between them it is compared half-way, and where the motion has frames or keys of its own.
+    Between them captures are compared half-way, and on frames of their own.
     """
     clip, path = read(source), source.path
     assert isinstance(clip, Clip)  # as was written
@@ -131,13 +131,8 @@ def _losses(take: Take, source: Source, span: tuple[int, int], options: MotionOp
     notes = frames_losses(path, take, on_frames, how, span)
     there = take.frames.present[part]
     middles = _middles(times)[there[1:] & there[:-1]]
-    between = np.union1d(
-        middles, own_times(replace(take, frames=frames_between(take.frames, part)))
-    )
-    if len(between):
-        wanted = replace(take, frames=frames_at(take, between))
-        found = frames_of(figure, clip, between)
-        notes += frames_losses(path, wanted, found, how, places=PLACES)
+    spanned = replace(take, frames=frames_between(take.frames, part))
+    notes += between_losses(path, spanned, lambda t: frames_of(figure, clip, t), how, middles)
     return notes
 
 

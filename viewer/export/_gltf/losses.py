@@ -97,9 +97,7 @@ def gltf_losses(
     lines = apart_lines(written.path, figure, found, first_frame, sources)
     lines = [line + f": {'; '.join(why)}" * bool(why) for line in lines]
     if influences is not None and influences.most > PER_SET and sources is not None:
-        lines += _first_set(
-            read_back(*place), read_back(*place, 1), figure, rows, least, influences
-        )
+        lines += _first_set(meant, read_back(*place, 1), figure, rows, least, influences)
     return lines
 
 
@@ -114,10 +112,10 @@ def _split(side: Side, sources: Ints) -> Side:
 
 
 def _first_set(
-    whole: Side, cut: Side, figure: Figure, rows: Rows, least: float, influences: Influences
+    meant: Side, cut: Side, figure: Figure, rows: Rows, least: float, influences: Influences
 ) -> list[str]:
-    """Say what programs make of the file that read four influences a vertex."""
-    found = apart(whole, cut, rows, least)
+    """Say how far off programs are that read four influences a vertex of the file."""
+    found = apart(meant, cut, rows, least)
     text = f"up to {influences.most} influences a vertex, all of them written, strongest first"
     if found.vertices is None:
         return [text]

@@ -1,4 +1,4 @@
-"""What a motion does between the frames that are written, where it is resampled."""
+"""What a motion does between the frames that are written."""
 
 from __future__ import annotations
 
@@ -8,37 +8,26 @@ from pathlib import Path
 import numpy as np
 
 from viewer.export._losses.lines import frames_losses
+from viewer.export._losses.worst_times import Sampler, key_times, worst_times
 from viewer.rig.arrays import Floats
 from viewer.rig.motion.clip import Clip
-from viewer.rig.motion.evaluation import frames_of
+from viewer.rig.motion.evaluation import Frames, frames_of
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.take import Take, frames_at
 from viewer.rig.motion.timing import Timing
 from viewer.rig.skinning import Skinning
 
-__all__ = ["PLACES", "own_times", "resampling_losses"]
+__all__ = ["between_losses", "resampling_losses"]
 
-PLACES = "between frames"
+_PLACES = "between frames"
 _ON_FRAME = 1e-6  # of a frame: nearer than this to a frame is that frame
-
-
-def own_times(take: Take) -> Floats:
-    """Return the seconds of a motion's own frames or keys that lie between frames of a take."""
-    motion, times = take.motion, take.frames.times
-    if isinstance(motion, Clip):
-        own = np.unique(np.concatenate([np.zeros(0), *(c.times for c in motion.channels)]))
-    else:
-        own = motion.start + np.arange(motion.timing.n_frames) / motion.timing.frame_rate
-    place = (own - times[0]) * take.frame_rate
-    is_between = np.abs(place - np.round(place)) > _ON_FRAME
-    return own[is_between & (place > 0.0) & (place < len(times) - 1)]
 
 
 def resampling_losses(path: Path, take: Take, how: Skinning) -> list[str]:
     """Return a line that says what frames at a fixed rate leave out of a motion, or none.
 
-    A capture's own frames, or a clip's keys, that lie between the frames that are written are held
-    against these, with rotations on the shorter arc and all else in straight lines between them.
+    What is between the frames that are written has rotations on the shorter arc, and all else in
+    straight lines.
 
     Parameters
     ----------
@@ -50,9 +39,6 @@ def resampling_losses(path: Path, take: Take, how: Skinning) -> list[str]:
         What moves the mesh.
     """
     motion, frames, rate = take.motion, take.frames, take.frame_rate
-    times = own_times(take)
-    if len(times) == 0:
-        return []
     written = SampledClip(
         motion.name,
         Timing(rate, np.where(frames.present, np.arange(frames.n_frames), -1).astype(np.int32)),
@@ -62,10 +48,63 @@ def resampling_losses(path: Path, take: Take, how: Skinning) -> list[str]:
         frames.figure_scales,
         frames.shape_weights,
     )
-    found = frames_of(take.figure, written, times - frames.times[0])
-    wanted = frames_at(take, times)
-    wanted = replace(wanted, present=wanted.present & found.present)
+    first = frames.times[0]
+
+    def found(times: Floats) -> Frames:
+        return frames_of(take.figure, written, np.maximum(times - first, 0.0))
+
+    lines = between_losses(path, take, found, how)
+    return [f"{line}: {rate:g} a second are written" for line in lines]
+
+
+def between_losses(
+    path: Path, take: Take, found: Sampler, how: Skinning, also: Floats | None = None
+) -> list[str]:
+    """Return a line with the largest differences between a take's frames, or none.
+
+    Keyed curves are searched for the times at which they differ most. A capture is known on its
+    own frames alone, and is compared there.
+
+    Parameters
+    ----------
+    path : Path
+        What was written.
+    take : Take
+        What was written into it.
+    found : callable
+        From seconds (T,) to the poses that a reader of the file makes of it.
+    how : Skinning
+        What moves the mesh.
+    also : (T,), optional
+        Seconds at which captures are compared, too.
+    """
+    note = ""
+    if isinstance(take.motion, Clip):
+        edges = np.union1d(
+            take.frames.times, key_times(take.motion, *take.frames.times[[0, -1]].tolist())
+        )
+        worst = worst_times(
+            take.figure, lambda times: frames_at(take, times), found, edges, take.frame_rate, how
+        )
+        times = worst.times
+        if worst.is_estimate:
+            note = f" (an estimate: {worst.looked} times were looked at)"
+    else:
+        times = _own_times(take, take.motion)
+        times = times if also is None else np.union1d(times, also)
+    if len(times) == 0:
+        return []
+    read, wanted = found(times), frames_at(take, times)
+    wanted = replace(wanted, present=wanted.present & read.present)
     if not wanted.present.any():
         return []
-    lines = frames_losses(path, replace(take, frames=wanted), found, how, places=PLACES)
-    return [f"{line}: {rate:g} a second are written" for line in lines]
+    lines = frames_losses(path, replace(take, frames=wanted), read, how, places=_PLACES)
+    return [line + note for line in lines]
+
+
+def _own_times(take: Take, motion: SampledClip) -> Floats:
+    """Return the seconds of a capture's own frames that lie between frames of a take."""
+    own = motion.start + np.arange(motion.timing.n_frames) / motion.timing.frame_rate
+    place = (own - take.frames.times[0]) * take.frame_rate
+    is_between = np.abs(place - np.round(place)) > _ON_FRAME
+    return own[is_between & (place > 0.0) & (place < take.frames.n_frames - 1)]

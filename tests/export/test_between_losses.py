@@ -1,0 +1,101 @@
+"""What exporters say is lost between frames of keyed curves: the maximum over all times."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rig import hand_made
+
+from viewer.export import MotionOptions, export_take
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import Mesh
+from viewer.rig.motion.clip import Channel, Clip, evaluate
+from viewer.rig.motion.take import Take, take_of
+from viewer.rig.scene import Actor
+from viewer.rig.skin import skin_from_lists
+
+TOLD = 5e-3  # three digits are told
+
+
+def write(take: Take, folder: Path, kind: str, name: str) -> list[str]:
+    return export_take(take, folder / name, kind, MotionOptions())
+
+
+def swinging(extrapolation=("constant", "constant"), end=4.0, times=(0.0, 1, 2, 3, 4)) -> Actor:
+    """Return an arm a metre long, turned about z by 2 radians to and fro, a key a second."""
+    rows = [(0, kind, 0.0) for kind in ("tx", "ty", "tz", "x", "y", "z")]
+    rows += [(1, kind, 0.0) for kind in ("x", "y", "z")]
+    skeleton = hand_made.skeleton([-1, 0], rows, None, [[0.0] * 3, [1.0, 0, 0]])
+    values = np.array([0.0, 2, 0, -2, 0])[: len(times)]
+    pairs = (("smooth", "smooth"),) * len(times)
+    turn = Channel(5, np.array(times, dtype=float), values, pairs, extrapolation)
+    others = [Channel(dof, np.zeros(0), np.zeros(0), ()) for dof in (0, 1, 2, 3, 4, 6, 7, 8)]
+    channels = (*others[:5], turn, *others[5:])
+    return Actor(Figure("arm", skeleton=skeleton), clip=Clip("swing", channels, 0.0, end))
+
+
+def densest(actor: Actor, rate: float) -> float:
+    """Return how far the arm's end is from straight lines between angles: 20000 times a second."""
+    times = np.linspace(0.0, actor.clip.end, int(actor.clip.end * 20000) + 1)
+    frames = np.arange(int(np.floor(actor.clip.end * rate + 1e-9)) + 1) / rate
+    times = times[times <= frames[-1]]
+    turn = actor.clip.channels[5]
+    straight = np.interp(times, frames, evaluate(turn, frames))
+    return float(np.max(2.0 * np.abs(np.sin(0.5 * (evaluate(turn, times) - straight)))))
+
+
+def between(notes: list[str]) -> float:
+    """Return by how many units joints differ between frames."""
+    (line,) = [note for note in notes if " between frames " in note]
+    assert "an estimate" not in line
+    return float(re.search(r"joints differ .*? by up to (\S+) units", line)[1])
+
+
+@pytest.mark.parametrize(("kind", "name"), [("bvh", "a.bvh"), ("gltf", "a.glb")])
+def test_curves_between_keys_that_lie_on_frames_are_told(tmp_path, kind, name):
+    """From 0 to 2 with slopes 2 and 0: 2 u^2 (1 - u) above the line, 8/27 where u is 2/3."""
+    notes = write(take_of(swinging(), 1.0), tmp_path, kind, name)
+    assert between(notes) == pytest.approx(2.0 * np.sin(4.0 / 27.0), rel=TOLD)
+
+
+@pytest.mark.parametrize("rate", [0.99, 2.0, 2.7, 30.0])
+def test_curves_between_frames_are_told_as_dense_samples_have_them(tmp_path, rate):
+    actor = swinging()
+    size = pytest.approx(densest(actor, rate), rel=TOLD)
+    assert between(write(take_of(actor, rate), tmp_path, "bvh", "a.bvh")) == size
+
+
+@pytest.mark.parametrize("mode", ["cycle", "cycle_offset", "bounce"])
+def test_curves_that_repeat_are_told_where_their_keys_do(tmp_path, mode):
+    """Three keys within 1.9 s, of which a clip of 40 s repeats kinks and jumps."""
+    actor = swinging((mode, mode), 40.0, (0.0, 0.3, 1.9))
+    size = pytest.approx(densest(actor, 1.0), rel=TOLD)
+    assert between(write(take_of(actor, 1.0), tmp_path, "bvh", "a.bvh")) == size
+
+
+def test_vertices_between_frames_are_told_too(tmp_path):
+    """A vertex three metres out, on the joint that turns."""
+    actor = swinging()
+    mesh = Mesh(np.diag([3.0, 1, 1]), np.eye(3), np.array([[0, 1, 2]]))
+    skin = skin_from_lists([[(0, 1.0)]] * 3, np.tile(np.eye(4), (2, 1, 1)))
+    figure = replace(actor.figure, mesh=mesh, skin=skin, unit="m")
+    notes = write(take_of(Actor(figure, clip=actor.clip), 1.0), tmp_path, "gltf", "a.glb")
+    (line,) = [note for note in notes if " between frames " in note]
+    size = 2000.0 * np.sin(4.0 / 27.0)
+    found = re.findall(r"by up to (\S+) mm \((.*?)\)", line)
+    assert [label for _, label in found] == ["j1", "vertex 0"]
+    assert [float(each) for each, _ in found] == pytest.approx([size, 3.0 * size], rel=TOLD)
+
+
+def test_motions_too_long_to_be_sure_of_say_so(tmp_path):
+    """Two minutes at 20 a second: more spans between frames than are all sampled."""
+    actor = swinging(end=120.0)
+    notes = write(take_of(actor, 20.0), tmp_path, "bvh", "a.bvh")
+    (line,) = [note for note in notes if " between frames " in note]
+    assert re.search(r"\(an estimate: \d+ times were looked at\)", line)
+    size = float(re.search(r"by up to (\S+) units", line)[1])
+    assert size == pytest.approx(densest(actor, 20.0), rel=TOLD)

@@ -1,0 +1,226 @@
+"""The times at which two motions of one figure are farthest apart, where both are curves.
+
+Curves are smooth between their keys, so the differences are sampled there, and the highest
+samples are refined.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.export._losses.apart import apart, negligible
+from viewer.export._losses.skinned import (
+    Body,
+    Rows,
+    Side,
+    body_rows,
+    changing,
+    figure_side,
+    vertices,
+)
+from viewer.rig.arrays import Floats
+from viewer.rig.figure import Figure
+from viewer.rig.motion.clip import SHORTEST, Channel, Clip
+from viewer.rig.motion.evaluation import Frames
+from viewer.rig.skinning import Skinning
+
+__all__ = ["Sampler", "WorstTimes", "key_times", "worst_times"]
+
+Sampler = Callable[[Floats], Frames]
+
+_MOST = 8192  # times looked at in all, before the highest are refined
+_STEPS = 16  # of these, at most so many between two keys or frames
+_FEWEST = 4  # with fewer, only spans whose middle is far apart are sampled
+_LIKELY = 256  # of these, for joints and vertices each
+_INSET = 1e-6  # of the span between two keys: curves may jump on a key itself
+_SHORT = 1e-6  # of a frame: spans that are shorter are none
+_BLOCK = 1024  # poses at a time
+_NAMING = 1024  # times, more or less, at which all vertices are looked at
+_GROUPS = 32  # stretches of time, each of which names its farthest vertex
+_PEAKS = 64  # peaks refined at most
+_HOPEFUL = 0.75  # of the highest sample: lower ones cannot be refined to be the highest
+_PARTS = 8  # of the time around a peak that is narrowed down to two of these
+_ROUNDS = 4  # of narrowing
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WorstTimes:
+    """When motions may be farthest apart.
+
+    Attributes
+    ----------
+    times : (T,)
+        Seconds, one of them the worst.
+    looked : int
+        How many times were looked at.
+    is_estimate : bool
+        Whether these were too few to be sure of it.
+    """
+
+    times: Floats
+    looked: int
+    is_estimate: bool
+
+
+def key_times(clip: Clip, start: float, stop: float) -> Floats:
+    """Return the seconds of all keys within a range, those of repeated curves included."""
+    every = [_repeated(channel, start, stop) for channel in clip.channels if len(channel.times)]
+    times = np.unique(np.concatenate([np.zeros(0), *every]))
+    return times[(times > start) & (times < stop)]
+
+
+def _repeated(channel: Channel, start: float, stop: float) -> Floats:
+    times = channel.times
+    first, span = times[0], times[-1] - times[0]
+    if span <= SHORTEST or (stop - start) / span > _MOST:
+        return times
+    rounds = np.arange(np.floor((start - first) / span), np.ceil((stop - first) / span))
+    before, after = (mode not in ("constant", "linear") for mode in channel.extrapolation)
+    rounds = rounds[((rounds >= 0) | before) & ((rounds <= 0) | after)]
+    is_back = (rounds % 2 == 1) & np.where(
+        rounds < 0, channel.extrapolation[0] == "bounce", channel.extrapolation[1] == "bounce"
+    )
+    within = np.where(is_back[:, None], times[-1] - times, times - first)
+    again = first + rounds[:, None] * span + within
+    return np.concatenate([times, again.ravel()])
+
+
+def worst_times(
+    figure: Figure, one: Sampler, other: Sampler, edges: Floats, rate: float, how: Skinning
+) -> WorstTimes:
+    """Return when joints or vertices of a figure that moves in two ways are farthest apart.
+
+    Parameters
+    ----------
+    figure : Figure
+        Unshaped.
+    one, other : callable
+        From seconds (T,) to poses of the figure, none of them missing.
+    edges : (E,)
+        Seconds between which both are smooth, rising.
+    rate : float
+        Frames a second, by which spans are too short to matter.
+    how : Skinning
+        What moves the mesh; blended linearly.
+    """
+    spans = _spans(edges, _SHORT / rate)
+    if len(spans) == 0:
+        return WorstTimes(np.zeros(0), 0, False)
+    pair, looked = _Pair(figure, one, other, replace(how, method="lbs")), 0
+    is_estimate = len(spans) * _FEWEST > _MOST
+    if is_estimate:
+        looked = min(len(spans), _MOST)
+        spans = _likely(pair, spans)
+    steps = min(_STEPS, _MOST // len(spans))
+    times = _within(spans, np.linspace(_INSET, 1.0 - _INSET, steps + 1))
+    pair = pair.watching(times)
+    heights = pair.heights(times)
+    looked += len(times)
+    found = []
+    for kind in range(len(heights)):
+        peaks = _peaks(heights[kind])
+        found.append(_refined(pair, kind, times, peaks))
+        looked += _ROUNDS * (_PARTS + 1) * len(peaks)
+    return WorstTimes(np.unique(np.concatenate(found)), looked, is_estimate)
+
+
+def _spans(edges: Floats, short: float) -> Floats:
+    """Return the start and end of each span between edges: (N, 2)."""
+    spans = np.column_stack([edges[:-1], edges[1:]])
+    return spans[spans[:, 1] - spans[:, 0] > short]
+
+
+def _within(spans: Floats, places: Floats) -> Floats:
+    """Return times at some places of all spans, 0 to 1."""
+    return np.asarray(spans[:, :1] + np.diff(spans, axis=1) * places).ravel()
+
+
+def _likely(pair: _Pair, spans: Floats) -> Floats:
+    """Return the spans in whose middle joints or vertices are farthest apart, in time order."""
+    if len(spans) > _MOST:
+        spans = spans[np.linspace(0, len(spans) - 1, _MOST).astype(int)]
+    middles = _within(spans, np.array([0.5]))
+    order = np.argsort(-pair.watching(middles).heights(middles), axis=1, kind="stable")
+    return spans[np.unique(order[:, :_LIKELY])]
+
+
+def _peaks(heights: Floats) -> Rows:
+    """Return where the highest peaks may be: samples no lower than those beside them."""
+    padded = np.concatenate([[-np.inf], heights, [-np.inf]])
+    is_peak = (heights >= padded[:-2]) & (heights >= padded[2:]) & (heights > 0.0)
+    rows = np.flatnonzero(is_peak & (heights >= _HOPEFUL * heights.max(initial=0.0)))
+    return rows[np.argsort(-heights[rows], kind="stable")[:_PEAKS]]
+
+
+def _refined(pair: _Pair, kind: int, times: Floats, peaks: Rows) -> Floats:
+    """Return the times at which joints (0) or vertices (1) are farthest apart around peaks."""
+    best = times[peaks, None]
+    low = times[np.maximum(peaks - 1, 0), None]
+    high = times[np.minimum(peaks + 1, len(times) - 1), None]
+    reach = np.maximum(best - low, high - best)
+    for _ in range(_ROUNDS):
+        near = np.clip(best + reach * np.linspace(-1.0, 1.0, _PARTS + 1), low, high)
+        top = pair.heights(near.ravel())[kind].reshape(near.shape).argmax(axis=1)
+        best = np.take_along_axis(near, top[:, None], axis=1)
+        reach = reach * 2.0 / _PARTS
+    return best.ravel()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Pair:
+    """A figure that moves in two ways, and the few vertices of it that are looked at."""
+
+    figure: Figure
+    one: Sampler
+    other: Sampler
+    how: Skinning
+    body: tuple[Body, Body] | None = None
+
+    def _sides(self, times: Floats) -> tuple[Side, Side, Frames]:
+        first, second = self.one(times), self.other(times)
+        still = second.shape_weights[0]
+        columns = np.union1d(changing(first, still), changing(second, still))
+        sides = [
+            figure_side(self.figure, frames, self.how, still, columns) for frames in (first, second)
+        ]
+        return sides[0], sides[1], first
+
+    def watching(self, times: Floats) -> _Pair:
+        """Return the same with the vertices that are farthest apart in stretches of some times."""
+        if self.figure.mesh is None:
+            return self
+        times = times[:: max(1, len(times) // _NAMING)]
+        first, second, frames = self._sides(times)
+        assert first.body is not None and second.body is not None  # there is a mesh
+        every = np.arange(len(times))
+        least = negligible(self.figure, frames, every)
+        found = set()
+        for rows in np.array_split(every, min(_GROUPS, len(every))):
+            worst = apart(first, second, rows, least).vertices
+            if worst is not None:
+                found.add(worst.index)
+        chosen = np.array(sorted(found), dtype=np.int32)
+        bodies = body_rows(first.body, chosen), body_rows(second.body, chosen)
+        return replace(self, body=bodies)
+
+    def heights(self, times: Floats) -> NDArray[np.float64]:
+        """Return how far joints, and the vertices if there are any, are apart: (1 or 2, T)."""
+        blocks = [times[start : start + _BLOCK] for start in range(0, len(times), _BLOCK)]
+        return np.concatenate([np.zeros((self._kinds, 0)), *map(self._block, blocks)], axis=1)
+
+    @property
+    def _kinds(self) -> int:
+        return 1 if self.body is None or len(self.body[0].positions) == 0 else 2
+
+    def _block(self, times: Floats) -> Floats:
+        first, second, _ = self._sides(times)
+        rows = np.arange(len(times))
+        one, other = first.poses(rows), second.poses(rows)
+        off = [one.places - other.places]
+        if self.body is not None and self._kinds == 2:
+            off.append(vertices(self.body[0], one) - vertices(self.body[1], other))
+        return np.stack([np.linalg.norm(each, axis=2).max(axis=1, initial=0.0) for each in off])
