@@ -13,7 +13,8 @@ from rig import hand_made
 from viewer.export import MotionOptions, export_take
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh
-from viewer.rig.motion.clip import Channel, Clip, evaluate
+from viewer.rig.motion.clip import Channel, Clip
+from viewer.rig.motion.clip_sampling import evaluate
 from viewer.rig.motion.take import Take, take_of
 from viewer.rig.scene import Actor
 from viewer.rig.skin import skin_from_lists
