@@ -14,7 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from viewer.formats._easymocap.json_frames import MisfitError, has_numbers, row_of, take_row
+from viewer.formats._easymocap.json_frames import (
+    MisfitError,
+    has_numbers,
+    row_of,
+    take_row,
+    width_of,
+)
 from viewer.formats._easymocap.shapes import COEFFICIENTS, carry, last_given
 from viewer.formats._numbers import LARGEST
 from viewer.rig.arrays import Bools, Floats
@@ -91,7 +97,8 @@ def body_layout(record: dict[str, Any]) -> BodyLayout:
     Raises
     ------
     MisfitError
-        If no layout has this length.
+        If no layout has this length, or the record cannot be used: other records must not be
+        measured by it.
     """
     count = len(row_of(record, "poses"))
     if count == _VPOSER:
@@ -105,11 +112,12 @@ def body_layout(record: dict[str, Any]) -> BodyLayout:
         known = ", ".join(str(number) for number in sorted(_LAYOUTS))
         raise MisfitError("poses", f"expected {known} numbers, found {count}")
     widths = [("Rh", 3), ("Th", 3), ("poses", count)]
-    widths += [(key, len(row_of(record, key))) for key in COEFFICIENTS if has_numbers(record, key)]
+    keys = [key for key in COEFFICIENTS if has_numbers(record, key)]
     hands = layout.hands
     if count == 63:
-        keys = [key for key in ("handl", "handr") if has_numbers(record, key)]
-        widths += [(key, len(row_of(record, key))) for key in keys]
+        keys += [key for key in ("handl", "handr") if has_numbers(record, key)]
+    widths = [(key, width_of(record, key, width)) for key, width in widths]
+    widths += [(key, width_of(record, key)) for key in keys]
     return BodyLayout(
         layout.model,
         layout.names,
@@ -127,11 +135,11 @@ def with_coefficients(layout: BodyLayout, record: dict[str, Any]) -> BodyLayout:
     Raises
     ------
     MisfitError
-        If they are no numbers.
+        If they are no finite numbers.
     """
     known = [key for key, _ in layout.widths]
     new = [key for key in COEFFICIENTS if has_numbers(record, key) and key not in known]
-    more = [(key, len(row_of(record, key))) for key in new]
+    more = [(key, width_of(record, key)) for key in new]
     return replace(layout, widths=(*layout.widths, *more))
 
 
