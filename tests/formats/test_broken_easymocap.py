@@ -113,7 +113,7 @@ def test_pipe_among_the_frames_is_not_opened(tmp_path):
         ({"poses": None, "pose": 1},
          "expected poses or keypoints3d, found the keys id, Rh, Th, shapes, pose"),
         ({"poses": [[float("nan")] * 72]}, "poses: expected finite numbers, found nan"),
-        ({"Th": [[0.0, 1e300, 0.0]]}, "Th: expected finite numbers, found 1e+300"),
+        ({"Th": [[0.0, 1e300, 0.0]]}, "Th: expected numbers up to 1e+09, found 1e+300"),
         ({"Rh": [[0.0, float("-inf"), 0.0]]}, "Rh: expected finite numbers, found -inf"),
         ({"Rh": None}, "Rh: expected numbers, found no such key"),
         ({"Th": 3}, "Th: expected numbers, found 3"),

@@ -21,6 +21,7 @@ _ERRORS = (
     ("W003", r"weights\b.*(?:finite numbers|found \"[+-]?(?:nan|inf))"),
     ("F003", r"expected finite|found \"[+-]?(?:nan|inf(?:inity)?)\""),
     ("F003", r"found \"[+-]?(?:1\.#|[\d.]+e\+?\d\d)"),
+    ("F003", r"expected numbers up to"),
     ("W002", r"expected no negative weight"),
     ("W001", r"vertex \d+: expected weights with the sum 1"),
     ("W010", r"expected a joint index below|expected a joint from 0 to"),

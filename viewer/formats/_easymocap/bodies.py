@@ -17,12 +17,13 @@ import numpy as np
 from viewer.formats._easymocap.json_frames import (
     MisfitError,
     has_numbers,
+    limit_of,
     row_of,
     take_row,
     width_of,
 )
 from viewer.formats._easymocap.shapes import COEFFICIENTS, carry, last_given
-from viewer.formats._numbers import LARGEST
+from viewer.formats._reach import within_text
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.motion.body_motion import BodyMotion
 from viewer.rig.motion.timing import Timing
@@ -262,12 +263,12 @@ class BodyRows(Rows):
         return zip(self.layout.widths, self.buffers, strict=True)
 
     def values(self) -> tuple[dict[str, Floats], Bools, list[RowFault]]:
-        """Return the numbers by key, which rows are finite, and the faults of the others.
+        """Return the numbers by key, which rows can be used, and the faults of the others.
 
         Returns
         -------
         values : mapping of str to (N, C)
-            Of the finite rows.
+            Of the rows that can be used.
         keep : (rows,) bool
             Which ones those are.
         faults : list of (int, str, str)
@@ -282,12 +283,12 @@ class BodyRows(Rows):
                 rows = self._carried(key, rows)
             values[key] = rows
             # NaN passes through the sum; the rows are looked at only if something is wrong.
-            if rows.size and not -LARGEST <= rows.min() <= rows.max() <= LARGEST:
-                is_good = (np.abs(rows) <= LARGEST).all(axis=1)
+            limit = limit_of(key)
+            if rows.size and not -limit <= rows.min() <= rows.max() <= limit:
+                is_good = (np.abs(rows) <= limit).all(axis=1)
                 for row in np.flatnonzero(~is_good & keep):
-                    odd = rows[row][~(np.abs(rows[row]) <= LARGEST)][0]
-                    text = f"{key}: expected finite numbers, found {odd:g}"
-                    faults.append((int(row), key, text))
+                    odd = rows[row][~(np.abs(rows[row]) <= limit)][0]
+                    faults.append((int(row), key, f"{key}: {within_text(odd, limit)}"))
                 keep &= is_good
         if faults:
             values = {key: rows[keep] for key, rows in values.items()}

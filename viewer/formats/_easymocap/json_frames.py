@@ -20,10 +20,12 @@ from viewer.formats._json_places import (
     repeated_key,
 )
 from viewer.formats._numbers import LARGEST
+from viewer.formats._reach import FARTHEST, within_text
 
 __all__ = [
     "MisfitError",
     "has_numbers",
+    "limit_of",
     "load_people",
     "person_of",
     "record_line",
@@ -33,6 +35,7 @@ __all__ = [
 ]
 
 Record = dict[str, Any]
+_TRANSLATION = "Th"
 _WRAPPER = "annots"  # key of the people, in files that hold more
 
 
@@ -202,6 +205,11 @@ def row_of(record: Record, key: str) -> list[Any]:
     return values
 
 
+def limit_of(key: str) -> float:
+    """Return how large the numbers of a key may be."""
+    return FARTHEST if key == _TRANSLATION else LARGEST
+
+
 def width_of(record: Record, key: str, count: int | None = None) -> int:
     """Return how many numbers a key has, all of them finite, so that others can be measured by it.
 
@@ -220,9 +228,10 @@ def width_of(record: Record, key: str, count: int | None = None) -> int:
     count = len(row_of(record, key)) if count is None else count
     numbers = array("d")
     take_row(record, key, count, numbers.fromlist)
-    odd = [number for number in numbers if not abs(number) <= LARGEST]
+    limit = limit_of(key)
+    odd = [number for number in numbers if not abs(number) <= limit]
     if odd:
-        raise MisfitError(key, f"expected finite numbers, found {odd[0]:g}")
+        raise MisfitError(key, within_text(odd[0], limit))
     return count
 
 
