@@ -42,7 +42,7 @@ def gap(tmp_path, content, kind="smpl"):
         ("[1, 2", ":1: expected JSON, found a mistake: Expecting ',' delimiter"),
         ("null", ":1: expected a list of people, found nothing"),
         ("17", ":1: expected a list of people, found 17"),
-        ('{"id": 0}', ":1: expected a list of people, found a dict of 1"),
+        ('{"id": 0}', ":1: expected a list of people, found 1 named value"),
         ('{"annots":\n 3}', ":1: expected a list of people, found 3"),
         ("\n[" * 100_000, ":100001: expected JSON, found too deep a nesting"),
         (f"[\n1{'0' * 5000}]", ":2: expected numbers of up to 4300 digits, found a longer one"),
@@ -117,7 +117,7 @@ def test_pipe_among_the_frames_is_not_opened(tmp_path):
         ({"Rh": [[0.0, float("-inf"), 0.0]]}, "Rh: expected finite numbers, found -inf"),
         ({"Rh": None}, "Rh: expected numbers, found no such key"),
         ({"Th": 3}, "Th: expected numbers, found 3"),
-        ({"Th": {"x": 1, "y": 2, "z": 3}}, "Th: expected numbers, found a dict of 3"),
+        ({"Th": {"x": 1, "y": 2, "z": 3}}, "Th: expected numbers, found 3 named values"),
         ({"shapes": [[1.0] * 9]}, "shapes: expected 10 numbers, found 9"),
     ],
 )  # fmt: skip

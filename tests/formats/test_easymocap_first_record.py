@@ -15,7 +15,7 @@ def warnings_of(parts):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"shapes": [[], []]}, "shapes: expected 2 numbers, found a list of 0 among them"),
+        ({"shapes": [[], []]}, "shapes: expected 2 numbers, found an empty list among them"),
         ({"shapes": [[None]]}, "shapes: expected 1 number, found"),
         ({"shapes": [[INFINITE]]}, "shapes: expected finite numbers, found inf"),
         ({"shapes": "x"}, "shapes: expected numbers, found 'x'"),
