@@ -51,7 +51,11 @@ _WARNINGS = (
     ("C010", r"channel \d+ has no keys"),
     ("C005", r"frames? .*(?:gap|left out|missing)"),
     ("F007", r"texcoords without a texture"),  # nothing is missing: no picture was ever named
-    ("F005", r"drawn untextured|drawn without|a texture without|lies outside the folder"),
+    (
+        "F005",
+        r"drawn untextured|drawn without|a texture without|lies outside the folder"
+        r"|is an absolute path",
+    ),
     (
         "F006",
         r"skipped unknown|is missing: .* ends with the file|the last \"}\" is missing|ignored",
