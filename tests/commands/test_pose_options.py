@@ -294,3 +294,12 @@ def test_mistyped_key_beside_others_is_a_warning_with_its_line(folder, capsys):
     _, said = described(capsys, "smpl.npz", "--pose", "p.json")
     assert len(said) == 1 and said[0].startswith("warning: p.json:2: ")
     assert "trnsl (did you mean transl?)" in said[0]
+
+
+@pytest.mark.parametrize(
+    ("text", "found"), [("[]", "an empty list"), ("[{}]", "a list of 1"), ("[[1, 2]]", "a list of")]
+)
+def test_pose_file_with_a_list_is_refused_as_a_pose(folder, capsys, text, found):
+    (folder / "list.json").write_text(text)
+    message = refused(capsys, "smpl.npz", "--pose", "list.json")
+    assert message.startswith("list.json:1: expected a pose (an object with names), found " + found)

@@ -198,7 +198,7 @@ def test_shape_and_kind_are_checked(shape: Any, kinds: str, message: str | None)
         ("lbs", "'lbs'"),
         (b"lbs", "3 bytes"),
         (None, "nothing"),
-        ({"a": 1}, "a dict of 1"),
+        ({"a": 1}, "1 named value"),
         ([[1, 2], [3]], "a list of 2"),
         (["a", 1], "a list of 2"),
         ([ROWS, ROWS], "a list of 2"),

@@ -105,7 +105,19 @@ def test_a_texture_from_outside_is_not_read(folder, kind, name):
     source = Source.open(path)
     (material,) = read(source).mesh.materials
     assert (material.texture, material.image) == (name, None)
-    assert source.warnings == [f"{place}: texture {name} lies outside the folder: not read"]
+    is_absolute = name.startswith("/")
+    why = "is an absolute path: not followed," if is_absolute else "lies outside the folder:"
+    assert source.warnings == [f"{place}: texture {name} {why} not read"]
+
+
+@pytest.mark.parametrize("kind", ["skin", "obj", "ply"])
+def test_an_absolute_path_is_called_so_even_within_the_folder(folder, kind):
+    path, place = write_model(folder, kind, f"{folder}/in.png")
+    source = Source.open(path)
+    assert read(source).mesh.materials[0].image is None
+    (warning,) = source.warnings
+    assert warning.startswith(f"{place}: texture {folder}/in.png is an absolute path")
+    assert "outside" not in warning
 
 
 @pytest.mark.parametrize("kind", ["skin", "obj", "ply"])

@@ -89,6 +89,13 @@ def test_devices_are_never_replaced_and_need_no_force(tmp_path):
     check_targets([Path("/dev/null"), Path("/dev/null"), tmp_path / "pipe"], [], False)
 
 
+def test_folder_that_was_read_is_named_where_it_would_be_written_into(tmp_path):
+    (tmp_path / "take" / "smpl").mkdir(parents=True)
+    target = tmp_path / "take" / "smpl" / "smpl"
+    words = refused(target, [tmp_path / "take" / "smpl"], True, check_folder_target)
+    assert words.startswith(f"{tmp_path}/take/smpl: is an input folder")
+
+
 @pytest.mark.parametrize("name", ["in", "in/smpl", "link"])
 def test_folder_that_was_read_is_not_replaced(tmp_path, name):
     (tmp_path / "in" / "smpl").mkdir(parents=True)

@@ -191,9 +191,10 @@ def test_body_pose_begins_after_the_root(family):
 
 
 def test_body_pose_of_another_length_is_refused(family):
-    message = "body_pose: expected at most 69 numbers, found "
-    assert refusal(family("smpl"), parts={"body_pose": np.ones(72)}) == f"{message}72"
-    assert refusal(family("smpl"), parts={"body_pose": np.ones(64)}) == f"{message}64"
+    message = "body_pose: expected 3 numbers a joint, of up to 23 joints, found "
+    for kind, count in (("smpl", 72), ("smpl", 64), ("smpl", 2), ("smplx", 72), ("smplx", 65)):
+        found = refusal(family(kind), parts={"body_pose": np.ones(count)})
+        assert found == f"{message}{count} numbers"
 
 
 @pytest.mark.parametrize(

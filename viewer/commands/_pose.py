@@ -13,8 +13,9 @@ from viewer.commands._frame_numbers import apply_time
 from viewer.commands._morph_weights import has_only_morphs, is_named, morph_record, named_record
 from viewer.commands._numbers import number
 from viewer.errors import RigError, ViewerError, printable
-from viewer.formats import Source, read
+from viewer.formats import Source, detect, read
 from viewer.formats.pose import pose_error
+from viewer.formats.pose import read as read_pose
 from viewer.near_names import near_names
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
@@ -155,9 +156,11 @@ def _pose(text: str) -> tuple[PoseRecord, Source | None]:
     if _is_numbers(text):
         return PoseRecord(vector=_numbers("--pose", text)), None
     source = Source.open(text)
-    record = read(source)
+    # A list of people begins as any list does: here it is a pose that is no object.
+    is_list = not source.is_folder and detect(source) == "easymocap"
+    record = read_pose(source) if is_list else read(source)
     if not isinstance(record, PoseRecord):
-        raise source.error("--pose: expected a pose, found a figure or clip")
+        raise source.error("--pose: expected a pose, found a figure or motion")
     return record, source
 
 

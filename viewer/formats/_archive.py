@@ -15,7 +15,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from viewer.errors import FormatError, printable
+from viewer.errors import FormatError, counted, printable
 from viewer.formats._faults import Part
 from viewer.formats._floats import in_double, widened
 from viewer.formats._source import Source
@@ -278,7 +278,7 @@ def describe(value: Value) -> str:
     """Return what a value is, for a message.
 
     >>> describe(Deferred((800, 3), "f4", lambda: np.zeros((800, 3)))), describe({})
-    ('800 x 3 float32', 'a dict of 0')
+    ('800 x 3 float32', 'no named values')
     """
     if isinstance(value, Deferred):
         texts = "texts" if value.shape else "text"
@@ -288,9 +288,9 @@ def describe(value: Value) -> str:
     if isinstance(value, Opaque):
         return f"an unread value ({value.what})"
     if isinstance(value, list | tuple):
-        return f"a list of {len(value)}"
+        return f"a list of {len(value)}" if value else "an empty list"
     if isinstance(value, dict):
-        return f"a dict of {len(value)}"
+        return counted(len(value), "named value") if value else "no named values"
     if isinstance(value, bytes):
         return f"{len(value)} bytes"
     return "nothing" if value is None else printable(repr(value), 40)

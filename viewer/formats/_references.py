@@ -15,7 +15,7 @@ import os
 import re
 from pathlib import Path
 
-__all__ = ["referenced_path"]
+__all__ = ["referenced_path", "refused_text"]
 
 _DRIVE = re.compile(r"[A-Za-z]:")
 
@@ -31,7 +31,7 @@ def referenced_path(folder: Path, name: str) -> Path | None:
         As written; back slashes count as slashes. The file need not exist.
     """
     written = name.replace("\\", "/")
-    if written.startswith("/") or _DRIVE.match(written):
+    if _is_absolute(written):
         return None
     path = folder / written
     try:
@@ -40,3 +40,18 @@ def referenced_path(folder: Path, name: str) -> Path | None:
     except ValueError:  # a name with a NUL, which no file has
         return path
     return path if inside != base and inside.is_relative_to(base) else None
+
+
+def refused_text(name: str) -> str:
+    """Return why ``referenced_path`` gives no path, to follow the file's name in a message.
+
+    >>> refused_text("../a.png"), refused_text("/home/a.png")
+    ('lies outside the folder: not read', 'is an absolute path: not followed, not read')
+    """
+    if _is_absolute(name.replace("\\", "/")):
+        return "is an absolute path: not followed, not read"
+    return "lies outside the folder: not read"
+
+
+def _is_absolute(written: str) -> bool:
+    return written.startswith("/") or _DRIVE.match(written) is not None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from viewer.errors import FormatError, printable
-from viewer.formats._references import referenced_path
+from viewer.formats._references import referenced_path, refused_text
 from viewer.formats._source import Source, read_bytes
 from viewer.media.image import decode_picture
 from viewer.rig.arrays import Bytes
@@ -30,7 +30,7 @@ def load_image(source: Source, name: str, offset: int) -> Bytes | None:
     """
     path = referenced_path(source.path.parent, name)
     if path is None:
-        source.warn(f"texture {printable(name)} lies outside the folder: not read", offset)
+        source.warn(f"texture {printable(name)} {refused_text(name)}", offset)
         return None
     source.also_read.append(path)
     try:

@@ -22,6 +22,7 @@ import numpy as np
 from viewer.errors import FormatError, counted, printable
 from viewer.formats._archive import Archive
 from viewer.formats._container import archive_of, finite
+from viewer.formats._reach import is_beyond, within_text
 from viewer.formats._source import Source
 from viewer.formats._tolerant import held_rows
 from viewer.rig.arrays import Deferred, Floats, Ints
@@ -103,7 +104,8 @@ def read(source: Source) -> BodyMotion:
     Raises
     ------
     FormatError
-        If there are no poses, or arrays differ in their number of frames.
+        If there are no poses, arrays differ in their number of frames, or the body is moved out
+        of reach.
     """
     archive = archive_of(source)
     found = _first_key(source, archive, _POSES)
@@ -276,7 +278,15 @@ def _translations(source: Source, archive: Archive, count: int, first: str) -> F
     if not 1.0 / _MOST_SCALED <= scale <= _MOST_SCALED:
         wanted = f"expected {1.0 / _MOST_SCALED:g} to {_MOST_SCALED:g}"
         raise archive.error("smpl_scaling", f"{wanted}, found {scale:g}")
-    return finite(archive, key, rows / scale)
+    rows = finite(archive, key, rows / scale)
+    is_far = is_beyond(rows)
+    if not is_far.any():
+        return rows
+    frame = int(is_far.argmax())
+    worst = rows[frame][np.abs(rows[frame]).argmax()]
+    error = archive.error(key, f"{within_text(worst)} in frame {frame}")
+    archive.refuse(error, int(is_far.sum()), "frames", np.flatnonzero(is_far))
+    return held_rows(rows, is_far)
 
 
 def _coefficients(

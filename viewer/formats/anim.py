@@ -22,6 +22,7 @@ import numpy as np
 
 from viewer.errors import FormatError, UnsupportedFormatError
 from viewer.formats._numbers import to_number
+from viewer.formats._reach import FARTHEST, within_text
 from viewer.formats._source import Source, no_number, shown
 from viewer.media.saving import save_text
 from viewer.rig.figure import Figure
@@ -234,6 +235,9 @@ class _Parser:
             if not of_key or self.word is None or self.word.group() in (b"{", b"}"):
                 raise error
             self.source.refuse(error)
+            value = math.nan
+        elif item == "value" and abs(value) > FARTHEST:
+            self.source.refuse(self._error(f"{item}: {within_text(value)}"))
             value = math.nan
         self._advance()
         return value

@@ -26,7 +26,9 @@ from viewer.errors import printable
 from viewer.formats._bvh.guess import frame_rate, guess_unit, guess_up
 from viewer.formats._bvh.hierarchy import BvhJoint, read_hierarchy
 from viewer.formats._bvh.motion import Motion, read_motion
+from viewer.formats._reach import is_beyond, within_text
 from viewer.formats._source import Source
+from viewer.formats._tolerant import held_rows
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import DEFAULT_RATE
@@ -240,5 +242,21 @@ def _translations(source: Source, table: _Table, values: Floats) -> Floats | Non
         source.warn("position channels are 0 but for the root's: taken as added to OFFSET")
         base[inner] = 0.0
     translations = np.zeros((len(values), len(table.names), 3))
-    translations[:, joints, axes] = shifts - base
+    names = [
+        f"{'XYZ'[axis]}position of joint {table.names[at]}"
+        for at, axis in zip(joints, axes, strict=True)
+    ]
+    translations[:, joints, axes] = _within_reach(source, shifts - base, names)
     return translations
+
+
+def _within_reach(source: Source, shifts: Floats, names: list[str]) -> Floats:
+    """Refuse frames that carry a joint too far; where faults are noted, hold the one before."""
+    is_far = is_beyond(shifts)
+    if is_far.any():
+        frame = int(is_far.argmax())
+        at = int(np.abs(shifts[frame]).argmax())
+        text = f"frame {frame}: {printable(names[at], 80)}: {within_text(shifts[frame, at])}"
+        error = source.error(text, source.offset_of("frames", frame))
+        source.refuse(error, int(is_far.sum()), "frames", np.flatnonzero(is_far))
+    return held_rows(shifts, is_far)

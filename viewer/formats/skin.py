@@ -282,7 +282,8 @@ def _save_texture(material: Material, folder: Path) -> None:
             raise OutputError(f"{printable(path, 300)}: another picture is there already")
         return
     if name.is_absolute() or ".." in name.parts:
-        raise UnsupportedFormatError(f"the texture {printable(path, 300)} lies outside the folder")
+        why = "is an absolute path" if name.is_absolute() else "lies outside the folder"
+        raise UnsupportedFormatError(f"the texture {printable(path, 300)} {why}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as problem:

@@ -21,6 +21,7 @@ _ERRORS = (
     ("W003", r"weights\b.*(?:finite numbers|found \"[+-]?(?:nan|inf))"),
     ("F003", r"expected finite|found \"[+-]?(?:nan|inf(?:inity)?)\""),
     ("F003", r"found \"[+-]?(?:1\.#|[\d.]+e\+?\d\d)"),
+    ("F003", r"expected numbers up to"),
     ("W002", r"expected no negative weight"),
     ("W001", r"vertex \d+: expected weights with the sum 1"),
     ("W010", r"expected a joint index below|expected a joint from 0 to"),
@@ -50,7 +51,11 @@ _WARNINGS = (
     ("C010", r"channel \d+ has no keys"),
     ("C005", r"frames? .*(?:gap|left out|missing)"),
     ("F007", r"texcoords without a texture"),  # nothing is missing: no picture was ever named
-    ("F005", r"drawn untextured|drawn without|a texture without|lies outside the folder"),
+    (
+        "F005",
+        r"drawn untextured|drawn without|a texture without|lies outside the folder"
+        r"|is an absolute path",
+    ),
     (
         "F006",
         r"skipped unknown|is missing: .* ends with the file|the last \"}\" is missing|ignored",

@@ -72,6 +72,8 @@ def check_folder_target(folder: Path, inputs: Iterable[Path], force: bool) -> No
         place = folder.resolve()
         for path in inputs:
             opened = path.resolve()
+            if opened == place.parent and not os.path.lexists(folder):
+                raise _refusal(folder.parent, "is an input folder: nothing is written into it")
             if opened in (place, place.parent) or place in opened.parents:
                 raise _refusal(folder, "is an input folder, which is never replaced")
         if os.path.lexists(folder) and not force:

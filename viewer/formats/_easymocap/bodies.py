@@ -14,9 +14,16 @@ from typing import Any
 
 import numpy as np
 
-from viewer.formats._easymocap.json_frames import MisfitError, has_numbers, row_of, take_row
+from viewer.formats._easymocap.json_frames import (
+    MisfitError,
+    has_numbers,
+    limit_of,
+    row_of,
+    take_row,
+    width_of,
+)
 from viewer.formats._easymocap.shapes import COEFFICIENTS, carry, last_given
-from viewer.formats._numbers import LARGEST
+from viewer.formats._reach import within_text
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.motion.body_motion import BodyMotion
 from viewer.rig.motion.timing import Timing
@@ -91,7 +98,8 @@ def body_layout(record: dict[str, Any]) -> BodyLayout:
     Raises
     ------
     MisfitError
-        If no layout has this length.
+        If no layout has this length, or the record cannot be used: other records must not be
+        measured by it.
     """
     count = len(row_of(record, "poses"))
     if count == _VPOSER:
@@ -105,11 +113,12 @@ def body_layout(record: dict[str, Any]) -> BodyLayout:
         known = ", ".join(str(number) for number in sorted(_LAYOUTS))
         raise MisfitError("poses", f"expected {known} numbers, found {count}")
     widths = [("Rh", 3), ("Th", 3), ("poses", count)]
-    widths += [(key, len(row_of(record, key))) for key in COEFFICIENTS if has_numbers(record, key)]
+    keys = [key for key in COEFFICIENTS if has_numbers(record, key)]
     hands = layout.hands
     if count == 63:
-        keys = [key for key in ("handl", "handr") if has_numbers(record, key)]
-        widths += [(key, len(row_of(record, key))) for key in keys]
+        keys += [key for key in ("handl", "handr") if has_numbers(record, key)]
+    widths = [(key, width_of(record, key, width)) for key, width in widths]
+    widths += [(key, width_of(record, key)) for key in keys]
     return BodyLayout(
         layout.model,
         layout.names,
@@ -127,11 +136,11 @@ def with_coefficients(layout: BodyLayout, record: dict[str, Any]) -> BodyLayout:
     Raises
     ------
     MisfitError
-        If they are no numbers.
+        If they are no finite numbers.
     """
     known = [key for key, _ in layout.widths]
     new = [key for key in COEFFICIENTS if has_numbers(record, key) and key not in known]
-    more = [(key, len(row_of(record, key))) for key in new]
+    more = [(key, width_of(record, key)) for key in new]
     return replace(layout, widths=(*layout.widths, *more))
 
 
@@ -254,12 +263,12 @@ class BodyRows(Rows):
         return zip(self.layout.widths, self.buffers, strict=True)
 
     def values(self) -> tuple[dict[str, Floats], Bools, list[RowFault]]:
-        """Return the numbers by key, which rows are finite, and the faults of the others.
+        """Return the numbers by key, which rows can be used, and the faults of the others.
 
         Returns
         -------
         values : mapping of str to (N, C)
-            Of the finite rows.
+            Of the rows that can be used.
         keep : (rows,) bool
             Which ones those are.
         faults : list of (int, str, str)
@@ -274,12 +283,12 @@ class BodyRows(Rows):
                 rows = self._carried(key, rows)
             values[key] = rows
             # NaN passes through the sum; the rows are looked at only if something is wrong.
-            if rows.size and not -LARGEST <= rows.min() <= rows.max() <= LARGEST:
-                is_good = (np.abs(rows) <= LARGEST).all(axis=1)
+            limit = limit_of(key)
+            if rows.size and not -limit <= rows.min() <= rows.max() <= limit:
+                is_good = (np.abs(rows) <= limit).all(axis=1)
                 for row in np.flatnonzero(~is_good & keep):
-                    odd = rows[row][~(np.abs(rows[row]) <= LARGEST)][0]
-                    text = f"{key}: expected finite numbers, found {odd:g}"
-                    faults.append((int(row), key, text))
+                    odd = rows[row][~(np.abs(rows[row]) <= limit)][0]
+                    faults.append((int(row), key, f"{key}: {within_text(odd, limit)}"))
                 keep &= is_good
         if faults:
             values = {key: rows[keep] for key, rows in values.items()}

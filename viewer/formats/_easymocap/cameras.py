@@ -29,7 +29,7 @@ import numpy as np
 
 from viewer.errors import FormatError, printable
 from viewer.formats._numbers import to_number
-from viewer.formats._source import Source, shown
+from viewer.formats._source import Source, no_number, shown
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.camera_view import CameraView
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
@@ -303,8 +303,8 @@ def _close(source: Source, matrix: _Matrix | None, values: dict[str, Value]) -> 
     numbers = [to_number(word) for word in matrix.data]
     if None in numbers:
         at = numbers.index(None)
-        found = f"expected numbers, found {shown(matrix.data[at])}"
-        raise FormatError(source.path, f"{matrix.key}: {found}", matrix.lines[at])
+        text = f"{matrix.key}: {no_number(matrix.data[at])}"
+        raise FormatError(source.path, text, matrix.lines[at])
     if matrix.is_open or matrix.rows * matrix.columns != len(numbers):
         raise FormatError(
             source.path,

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 import os
+from array import array
 from collections import Counter
 from typing import Any
 
-from viewer.errors import FormatError, printable
+from viewer.errors import FormatError, counted, printable
 from viewer.formats._archive import describe
 from viewer.formats._json_places import (
     MOST_DIGITS,
@@ -18,18 +19,23 @@ from viewer.formats._json_places import (
     nearest_place,
     repeated_key,
 )
+from viewer.formats._numbers import LARGEST
+from viewer.formats._reach import FARTHEST, within_text
 
 __all__ = [
     "MisfitError",
     "has_numbers",
+    "limit_of",
     "load_people",
     "person_of",
     "record_line",
     "row_of",
     "take_row",
+    "width_of",
 ]
 
 Record = dict[str, Any]
+_TRANSLATION = "Th"
 _WRAPPER = "annots"  # key of the people, in files that hold more
 
 
@@ -199,6 +205,36 @@ def row_of(record: Record, key: str) -> list[Any]:
     return values
 
 
+def limit_of(key: str) -> float:
+    """Return how large the numbers of a key may be."""
+    return FARTHEST if key == _TRANSLATION else LARGEST
+
+
+def width_of(record: Record, key: str, count: int | None = None) -> int:
+    """Return how many numbers a key has, all of them finite, so that others can be measured by it.
+
+    Parameters
+    ----------
+    record, key
+        Where to look.
+    count : int, optional
+        How many it must have; any number if left out.
+
+    Raises
+    ------
+    MisfitError
+        If it is no list, has more or fewer, or others than finite numbers are among them.
+    """
+    count = len(row_of(record, key)) if count is None else count
+    numbers = array("d")
+    take_row(record, key, count, numbers.fromlist)
+    limit = limit_of(key)
+    odd = [number for number in numbers if not abs(number) <= limit]
+    if odd:
+        raise MisfitError(key, within_text(odd[0], limit))
+    return count
+
+
 def take_row(record: Record, key: str, count: int, put: Any) -> None:
     """Hand the numbers of a key to ``put``, the ``fromlist`` of an ``array("d")``.
 
@@ -216,12 +252,10 @@ def take_row(record: Record, key: str, count: int, put: Any) -> None:
             return
     except (KeyError, TypeError, ValueError, OverflowError):
         pass  # looked at below
-    values = row_of(record, key)
+    values, wanted = row_of(record, key), counted(count, "number")
     if len(values) != count:
-        raise MisfitError(key, f"expected {count} numbers, found {len(values)}")
-    raise MisfitError(
-        key, f"expected {count} numbers, found {describe(_odd_one(values))} among them"
-    )
+        raise MisfitError(key, f"expected {wanted}, found {len(values)}")
+    raise MisfitError(key, f"expected {wanted}, found {describe(_odd_one(values))} among them")
 
 
 def _odd_one(values: list[Any]) -> Any:

@@ -18,7 +18,7 @@ from viewer.formats._archive import describe
 from viewer.formats._easymocap.bodies import RowFault, Rows
 from viewer.formats._easymocap.json_frames import MisfitError
 from viewer.formats._numbers import LARGEST
-from viewer.rig.arrays import Floats
+from viewer.rig.arrays import Bools, Floats
 from viewer.rig.captures.keypoint_layouts import TITLES, joined_layout, keypoint_layout
 from viewer.rig.captures.points import PointLayout
 
@@ -116,6 +116,17 @@ class PointRows(Rows):
             raise
         self.keep_origin(frame, path, place)
 
+    def check_any(self) -> None:
+        """Refuse rows in which no keypoint can be used: others must not be measured by them.
+
+        Raises
+        ------
+        MisfitError
+            If every keypoint is at fault.
+        """
+        if _is_odd(self._rows()).all():
+            raise MisfitError(KEY, "expected rows of 3 or 4 finite numbers, found none")
+
     def _take(self, rows: Any, key: str, count: int) -> None:
         try:
             if len(rows) == count:
@@ -137,11 +148,8 @@ class PointRows(Rows):
 
     def points(self) -> tuple[Floats, list[RowFault]]:
         """Return the points (N, K, 4), and what was wrong with some."""
-        count = sum(size for _, size in self.parts)
-        points = np.frombuffer(self.buffer, dtype=np.float64).reshape(-1, count, 4).copy()
-        confidence = points[..., 3]
-        is_unseen = confidence == 0.0
-        is_odd = ~((np.abs(points) <= LARGEST).all(axis=-1) & (confidence >= 0.0)) & ~is_unseen
+        points = self._rows().copy()
+        is_odd, is_unseen = _is_odd(points), points[..., 3] == 0.0
         points[is_odd | is_unseen] = 0.0
         faults = [
             (int(row), KEY, _unseen_text(int(is_odd[row].sum())))
@@ -149,6 +157,17 @@ class PointRows(Rows):
         ]
         points.flags.writeable = False  # so that it is not copied again
         return points, faults
+
+    def _rows(self) -> Floats:
+        count = sum(size for _, size in self.parts)
+        return np.frombuffer(self.buffer, dtype=np.float64).reshape(-1, count, 4)
+
+
+def _is_odd(points: Floats) -> Bools:
+    """Return which of (N, K, 4) points count as not seen though they claim to be."""
+    confidence = points[..., 3]
+    is_good = (np.abs(points) <= LARGEST).all(axis=-1) & (confidence >= 0.0)
+    return ~is_good & (confidence != 0.0)
 
 
 def _unseen_text(count: int) -> str:

@@ -211,11 +211,12 @@ class Reading:
     ) -> None:
         rows = part.points.get(person)
         if rows is None:
-            if self.point_layout is None:
-                self.point_layout = point_layout(record, self.options.layout)
-            layout, parts = self.point_layout
+            layout, parts = self.point_layout or point_layout(record, self.options.layout)
             rows = PointRows(layout=layout, parts=parts)
         rows.add(record, frame, *origin)
+        if self.point_layout is None:
+            rows.check_any()
+            self.point_layout = rows.layout, rows.parts
         part.points[person] = rows
 
     def _finished(self, part: _Part, stop: int) -> CapturePart:

@@ -11,7 +11,7 @@ Colours and other maps are not shown. An option is a word that begins with ``-``
 from __future__ import annotations
 
 from viewer.errors import FormatError, counted, printable
-from viewer.formats._references import referenced_path
+from viewer.formats._references import referenced_path, refused_text
 from viewer.formats._source import Source
 from viewer.formats._texture import load_image
 from viewer.rig.arrays import Bytes
@@ -76,9 +76,7 @@ def _opened(source: Source, text: bytes, offset: int) -> list[Source]:
     found = []
     for name in names:
         if referenced_path(source.path.parent, name) is None:
-            source.warn(
-                f"material library {printable(name)} lies outside the folder: not read", offset
-            )
+            source.warn(f"material library {printable(name)} {refused_text(name)}", offset)
             continue
         library = source.beside(name.replace("\\", "/"))
         try:

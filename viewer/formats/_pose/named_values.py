@@ -134,7 +134,9 @@ def parse_json(source: Source) -> NamedValues:
         raise _odd_json(source, text)
     named = NamedValues(source, values if isinstance(values, dict) else {}, text)
     if not isinstance(values, dict):
-        raise named.error(f"expected an object with names, found a {type(values).__name__}")
+        is_word = values is None or isinstance(values, bool)
+        found = json.dumps(values) if is_word else describe(values)
+        raise named.error(f"expected a pose (an object with names), found {found}")
     return named
 
 

@@ -332,7 +332,8 @@ def _apply_body(values: Floats, figure: Figure, pose: Pose) -> list[str]:
     own = _BODY if has_more else skeleton.n_joints - 1
     most = _LONGEST_BODY if has_more else own
     if len(values) % 3 or len(values) > 3 * most:
-        raise RigError(f"body_pose: expected at most {3 * own} numbers, found {len(values)}")
+        wanted = f"3 numbers a joint, of up to {most} joints"
+        raise RigError(f"body_pose: expected {wanted}, found {counted(len(values), 'number')}")
     taken = values[: 3 * own]
     _turn(figure, pose, np.arange(1, len(taken) // 3 + 1, dtype=np.int32), taken)
     return [_left_out(values[3 * own :], own)] if values[3 * own :].any() else []

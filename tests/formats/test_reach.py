@@ -1,0 +1,118 @@
+"""Motions that lead further than single precision can draw: refused where they say so."""
+
+import numpy as np
+import pytest
+from capture_files import body, opened, rows_of, write_frames
+
+from viewer.errors import FormatError
+from viewer.formats import Source, amass, anim
+from viewer.formats import bvh as bvh_reader
+from viewer.formats._reach import is_beyond
+
+TOO_FAR = [2e9, -1e20, 1e38]
+
+
+def refusal(read, path):
+    with pytest.raises(FormatError) as caught:
+        read(Source.open(path))
+    return caught.value
+
+
+def tolerant(read, path):
+    source = Source.open(path)
+    source.faults = []
+    return read(source), source.faults
+
+
+def test_beyond_is_told_row_by_row():
+    rows = np.array([[[1e9, 0.0]], [[0.0, -1.0000001e9]], [[np.nan, 0.0]]])
+    assert is_beyond(rows).tolist() == [False, True, False]
+
+
+def motion_file(path, far, key="trans", **more):
+    trans = np.zeros((3, 3))
+    trans[1, 2] = far
+    np.savez(path, poses=np.zeros((3, 72)), mocap_framerate=30.0, **{key: trans}, **more)
+    return path
+
+
+@pytest.mark.parametrize("far", TOO_FAR)
+@pytest.mark.parametrize("key", ["trans", "transl"])
+def test_far_translation_is_refused_with_its_key(tmp_path, far, key):
+    path = motion_file(tmp_path / "a.npz", far, key)
+    assert str(refusal(amass.read, path)) == (
+        f"{path}: {key}: expected numbers up to 1e+09, found {far:g} in frame 1"
+    )
+
+
+def test_translation_is_measured_as_scaled(tmp_path):
+    path = motion_file(tmp_path / "a.npz", 5e10, smpl_scaling=np.array([100.0]))
+    assert amass.read(Source.open(path)).translations[1, 2] == 5e8
+
+
+def test_translation_at_the_limit_is_taken(tmp_path):
+    path = motion_file(tmp_path / "a.npz", 1e9)
+    assert amass.read(Source.open(path)).translations[1, 2] == 1e9
+
+
+@pytest.mark.parametrize("far", TOO_FAR)
+def test_far_person_is_a_gap(tmp_path, far):
+    good, bad = [body(0)], [body(0, Th=[[0.0, far, 0.0]])]
+    folder = write_frames(tmp_path / "smpl", {0: bad, 1: good, 2: bad, 3: good})
+    _, parts, _ = opened(tmp_path)
+    assert rows_of(parts, 0) == [1, 3]
+    text = f"json:1: person 0: Th: expected numbers up to 1e+09, found {far:g}"
+    assert [text for part in parts for text in part.warnings] == [
+        f"{folder}/000000.{text}",
+        f"{folder}/000002.{text}",
+    ]
+
+
+BVH = """HIERARCHY
+ROOT hip
+{{
+OFFSET {offset} 0 0
+CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+End Site
+{{
+OFFSET 0 1 0
+}}
+}}
+MOTION
+Frames: 3
+Frame Time: 0.1
+{offset} 0 0 0 0 0
+{offset} 0 {far} 0 0 0
+{offset} 1 0 0 0 0
+"""
+
+
+@pytest.mark.parametrize("far", TOO_FAR)
+def test_far_position_is_refused_with_its_line(tmp_path, far):
+    path = tmp_path / "a.bvh"
+    path.write_text(BVH.format(offset=0, far=far))
+    assert str(refusal(bvh_reader.read, path)) == (
+        f"{path}:15: frame 1: Zposition of joint hip: expected numbers up to 1e+09, found {far:g}"
+    )
+    motion, faults = tolerant(bvh_reader.read, path)
+    assert [(fault.part, fault.places.tolist()) for fault in faults] == [("frames", [1])]
+    assert motion.clip.translations[:, 0].tolist() == [[0, 0, 0], [0, 0, 0], [0, 1, 0]]
+
+
+def test_large_skeleton_that_stays_in_its_place_is_taken(tmp_path):
+    path = tmp_path / "a.bvh"
+    path.write_text(BVH.format(offset=1e12, far=1))
+    assert bvh_reader.read(Source.open(path)).clip.translations[1, 0].tolist() == [0, 0, 1]
+
+
+@pytest.mark.parametrize("far", TOO_FAR)
+def test_far_key_is_refused_with_its_line(tmp_path, far):
+    path = tmp_path / "a.anim"
+    keys = f"keys 2 {{\n0 1 linear linear\n1 {far} linear linear\n}}"
+    head = "animation {\nrange 0 1\nnumchannels 1\nchannel {\nextrapolate constant constant\n"
+    path.write_text(f"{head}{keys}\n}}\n}}\n")
+    error = refusal(anim.read, path)
+    assert error.line == 8
+    assert str(error).endswith(f"value: expected numbers up to 1e+09, found {far:g}")
+    clip, faults = tolerant(anim.read, path)
+    assert len(faults) == 1 and clip.channels[0].values.tolist() == [1.0]
