@@ -104,7 +104,7 @@ def test_rows_that_move_get_channels(tmp_path):
     take = roof_take(translations=moves)
     gltf, notes = write(tmp_path, take)
     assert_played(gltf, take)
-    assert notes[1:] == ["1 joints below the root move within their parents: tip"]
+    assert notes[1:] == ["1 joint below the root moves within its parent: tip"]
 
 
 def test_place_that_stays_is_no_channel(tmp_path):
@@ -146,7 +146,7 @@ def test_gaps_split_into_files(tmp_path):
         assert_drawn(gltf, take.figure, pose_of(take.figure, take.frames, frame), time=time)
     assert abs(first.duration() - 0.1) < 1e-7 and second.duration() == 0
     assert "walk-1.gltf: 7 vertices" in notes[0] and "2 frames (8 to 9)" in notes[0]
-    assert "walk-2.gltf: 7 vertices" in notes[2] and "1 frames (12 to 12)" in notes[2]
+    assert "walk-2.gltf: 7 vertices" in notes[2] and "1 frame (12)" in notes[2]
     assert notes[4] == "missing frames 7, 10 to 11, 13: one file for each run of frames"
 
 
