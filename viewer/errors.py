@@ -12,6 +12,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 __all__ = [
@@ -22,6 +23,7 @@ __all__ = [
     "UnsupportedFormatError",
     "ViewerError",
     "counted",
+    "one_of",
     "printable",
 ]
 
@@ -71,6 +73,16 @@ def counted(count: int, noun: str, one: str = "", many: str = "", of: int | None
     share = "" if of is None else f"of {of} "
     text = f"{count} {share}{noun if (count if of is None else of) == 1 else plural}"
     return f"{text} {one if count == 1 else many}" if one else text
+
+
+def one_of(values: Sequence[object]) -> str:
+    """Return what is possible, as messages list it.
+
+    >>> one_of([9, 48, 63]), one_of([3])
+    ('9, 48 or 63', '3')
+    """
+    *others, last = map(str, values)
+    return f"{', '.join(others)} or {last}" if others else last
 
 
 class ViewerError(Exception):

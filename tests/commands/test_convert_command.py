@@ -279,7 +279,7 @@ def test_several_actors_become_numbered_files(tmp_path, capsys):
     out = tmp_path / "out.obj"
     assert run(["convert", *first, *second, path, "-o", str(out)]) == 0
     lines = capsys.readouterr().out.splitlines()
-    counts = [" 3 vertices, 1 triangles", " 3 vertices, 1 triangles", " 48 vertices, 92 triangles"]
+    counts = [" 3 vertices, 1 triangle", " 3 vertices, 1 triangle", " 48 vertices, 92 triangles"]
     paths = [out, tmp_path / "out-2.obj", tmp_path / "out-3.obj"]
     assert lines == [f"{path}:{text}" for path, text in zip(paths, counts, strict=True)]
     # Where they stand in the scene is no part of them.

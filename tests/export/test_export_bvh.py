@@ -330,7 +330,7 @@ def test_joints_that_move_get_position_channels_and_shifted_ones_an_offset(tmp_p
     assert [len(channels) for channels in found.channels] == [6, 3, 3, 6]
     np.testing.assert_allclose(found.offsets[1], [0.25, 1.5, -0.5])
     assert notes[1] == (
-        "1 joints below the root move within their parents and have position channels: d"
+        "1 joint below the root moves within its parent and has position channels: d"
     )
 
 

@@ -104,7 +104,7 @@ def test_rows_that_move_get_channels(tmp_path):
     take = roof_take(translations=moves)
     gltf, notes = write(tmp_path, take)
     assert_played(gltf, take)
-    assert notes[1:] == ["1 joints below the root move within their parents: tip"]
+    assert notes[1:] == ["1 joint below the root moves within its parent: tip"]
 
 
 def test_place_that_stays_is_no_channel(tmp_path):

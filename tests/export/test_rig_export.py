@@ -144,7 +144,7 @@ def test_skeleton_without_mesh_writes_one_file(tmp_path):
     actor = Actor(Figure("bones", skeleton=ball_skeleton(("hip",), np.array([-1]), np.eye(1, 3))))
     notes = export(actor, tmp_path / "rig.skin")
     assert names(tmp_path) == ["rig.skel"]
-    assert notes == [f"{tmp_path / 'rig.skel'}: 1 joints"]
+    assert notes == [f"{tmp_path / 'rig.skel'}: 1 joint"]
 
 
 def test_either_suffix_writes_both(tmp_path):

@@ -65,7 +65,7 @@ def table(*parents):
          "v_template: expected V x 3 numbers, found 32 x 4 float64"),
         ({"v_template": np.zeros((0, 3))},
          "v_template: expected at least one vertex, found none"),
-        ({"v_template": np.array("x")}, "v_template: expected V x 3 numbers, found a single text"),
+        ({"v_template": np.array("x")}, "v_template: expected V x 3 numbers, found a text"),
         ({"f": np.zeros((60, 4), int)}, "f: expected any x 3 numbers, found 60 x 4 int64"),
         ({"weights": np.ones((31, 24)) / 24},
          "weights: expected 32 x 24 numbers, found 31 x 24 float64"),

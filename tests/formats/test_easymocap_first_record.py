@@ -79,3 +79,17 @@ def test_keypoints_that_are_not_seen_are_a_measure(tmp_path):
     write_frames(tmp_path / "keypoints3d", {0: [points(0) | unseen], 1: [points(0)]})
     _, parts, _ = opened(tmp_path)
     assert sum(len(part.points[0][1].points) for part in parts) == 2
+
+
+def test_lengths_of_poses_are_listed_as_a_choice(tmp_path):
+    write_frames(tmp_path / "smpl", {0: [body(0, poses=[[0.0] * 7])], 1: [body(0)]})
+    _, parts, _ = opened(tmp_path)
+    (warning,) = warnings_of(parts)
+    wanted = "9, 48, 63, 69, 72, 78, 87, 156 or 165"
+    assert warning.endswith(f"poses: expected {wanted} numbers, found 7")
+
+
+def test_record_without_keys_has_no_keys(tmp_path):
+    write_frames(tmp_path / "smpl", {0: [{}], 1: [body(0)]})
+    _, parts, _ = opened(tmp_path)
+    assert [text for text in warnings_of(parts) if text.endswith("found no keys")]

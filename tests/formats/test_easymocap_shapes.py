@@ -69,7 +69,7 @@ def test_last_good_shapes_are_kept(tmp_path):
     assert shapes_of(parts[1:], 0) == found[1:]
     texts = [text.removeprefix(f"{tmp_path}/smpl/") for part in parts for text in part.warnings]
     assert texts == [
-        "000001.json: the first record with shapes: 0 before it",
+        "000001.json: no earlier record has shapes: 0 is taken there",
         "000004.json:1: person 0: shapes: expected finite numbers, found nan",
         "000002.json: no shapes in this record: the person's last ones are kept, wherever there "
         "are none",

@@ -303,7 +303,7 @@ def test_text_may_be_laid_out_in_any_way(tmp_path, text, mark):
         ('{"scale": [1, 2]}', ":1: scale: expected one number, found 2"),
         ('{"figure": "a", "gender": "male"}',
          ":1: expected a pose (dofs, poses, body_pose, betas …), found keys figure, gender"),
-        ("{}", ":1: expected a pose (dofs, poses, body_pose, betas …), found keys none"),
+        ("{}", ":1: expected a pose (dofs, poses, body_pose, betas …), found no keys"),
         ('{"poses": [[1, 2, 3, 4], [1, 2, 3, 4]]}', ":1: poses: expected one pose, found 2 frames"),
         ('{"body_pose": [[1, 2, 3, 4], [1, 2, 3, 4]]}',
          ":1: body_pose: expected one pose, found 2 frames"),

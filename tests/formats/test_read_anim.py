@@ -223,7 +223,7 @@ def test_clip_of_another_skeleton_names_both_numbers(tmp_path: Path) -> None:
     with pytest.raises(RigError) as caught:
         load(tmp_path / "a.skel", tmp_path / "a.anim")
     assert str(caught.value) == (
-        f"{tmp_path / 'a.anim'} has 1 channels, {tmp_path / 'a.skel'} needs 6 (3 + 3 x 1 joints)"
+        f"{tmp_path / 'a.anim'} has 1 channel, {tmp_path / 'a.skel'} needs 6 (3 + 3 x 1 joints)"
     )
 
 

@@ -96,7 +96,7 @@ def test_polygons_are_cut_and_counted() -> None:
     figure = silent(text)
     triangles = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 1, 2], [0, 2, 4], [0, 1, 2]]
     assert figure.mesh.triangles.tolist() == triangles
-    text = "1 triangles, 1 quads, 1 with 5 or more corners: 6 triangles in all"
+    text = "1 triangle, 1 quad, 1 with 5 or more corners: 6 triangles in all"
     assert ("polygons", text) in figure.facts
 
 

@@ -63,7 +63,7 @@ def test_text() -> None:
     assert figure.mesh.triangles.tolist() == [[0, 1, 2], [0, 1, 2], [0, 2, 3]]
     assert figure.mesh.normals.tolist() == [[0, 0, 1]] * 4
     assert figure.facts == (
-        ("polygons", "1 triangles, 1 quads: 3 triangles in all"),
+        ("polygons", "1 triangle, 1 quad: 3 triangles in all"),
         ("normals", "none in the file: computed from the triangles"),
     )
     assert (figure.name, figure.up, figure.unit) == ("a", "y", "")

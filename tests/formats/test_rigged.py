@@ -130,7 +130,7 @@ BROKEN = {
     "version": ({"viewer_rig": np.array(2)}, "viewer_rig: expected version 1, found 2"),
     "no version": (
         {"viewer_rig": np.array("one")},
-        "viewer_rig: expected a single number, found a single text",
+        "viewer_rig: expected a single number, found a text",
     ),
     "up": ({"up": np.array("x")}, 'up: expected y or z, found "x"'),
     "no positions": ({"positions": None}, "positions: expected a value, found no such key"),

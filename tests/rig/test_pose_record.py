@@ -78,6 +78,11 @@ def test_unknown_dof_is_refused_and_leaves_the_pose():
     )
 
 
+def test_malformed_dof_is_named_once():
+    message = refusal(hinges(), dofs={"knee.q": 0.5})
+    assert message.count("knee.q") == 1 and ": expected JOINT.KIND with KIND" in message
+
+
 def test_dofs_win_over_the_vector():
     figure = hinges()
     pose = rest_pose(figure.skeleton)

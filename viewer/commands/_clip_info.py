@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from viewer.errors import printable
+from viewer.errors import counted, printable
 from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.sampled_clip import SampledClip
@@ -73,7 +73,7 @@ def clip_lines(clip: dict[str, Any]) -> list[str]:
     if "kind" in clip:
         return [head + _rows_text(clip), *_gap_lines(clip)]
     modes = ", ".join(f"{mode} {count}" for mode, count in clip["extrapolation"].items())
-    lines = [f"{head}{clip['channels']} channels, {clip['keys']} keys"]
+    lines = [f"{head}{counted(clip['channels'], 'channel')}, {counted(clip['keys'], 'key')}"]
     if clip["key_times"]:
         first, last = clip["key_times"]
         lines.append(
@@ -83,12 +83,14 @@ def clip_lines(clip: dict[str, Any]) -> list[str]:
 
 
 def _rows_text(clip: dict[str, Any]) -> str:
-    frames = f"{clip['frames']} frame{'s' * (clip['frames'] != 1)}"
+    frames = counted(clip["frames"], "frame")
     frames += f" at {clip['frame_rate']:g} a second"
     if clip["kind"] == "points":
-        return f"{frames}, {clip['points']} points, {100 * clip['seen']:.1f} % of them seen"
+        return (
+            f"{frames}, {counted(clip['points'], 'point')}, {100 * clip['seen']:.1f} % of them seen"
+        )
     shape = "a shape of its own in each frame" if clip["shape_varies"] else "one shape"
-    return f"{frames}, {clip['joints']} joints, {shape}"
+    return f"{frames}, {counted(clip['joints'], 'joint')}, {shape}"
 
 
 def _gap_lines(clip: dict[str, Any]) -> list[str]:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from viewer.errors import printable
+from viewer.errors import counted, printable
 from viewer.rig.figure import Figure
 from viewer.rig.inspection.measure import measure
 from viewer.rig.number_text import number_text
@@ -117,7 +117,8 @@ def model_lines(model: dict[str, Any], figure: Figure) -> list[str]:
     if "reduced" in model:
         reduced = model["reduced"]
         lines.append(
-            f"  reduced    {reduced['vertices']} vertices, {reduced['triangles']} triangles"
+            f"  reduced    {counted(reduced['vertices'], 'vertex')}, "
+            f"{counted(reduced['triangles'], 'triangle')}"
         )
     if "keypoints" in model:
         lines.append(f"  keypoints  {len(model['keypoints'])}")

@@ -14,7 +14,7 @@ from viewer.commands._model_info import describe_model, model_lines
 from viewer.commands._pose import add_skinning_arguments, skinning_of
 from viewer.commands._scene import add_scene_arguments, open_scene
 from viewer.commands._usage import require_files
-from viewer.errors import printable
+from viewer.errors import counted, printable
 from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.mesh import Mesh, bounding_box, box_size, triangle_areas
 from viewer.rig.morph_target import MORPH_GROUP
@@ -201,12 +201,12 @@ def _box_text(actor: dict[str, Any]) -> str:
 
 
 def _vertices(count: int) -> str:
-    return "1 vertex" if count == 1 else f"{count} vertices"
+    return counted(count, "vertex")
 
 
 def _skeleton_lines(skeleton: dict[str, Any]) -> list[str]:
     lines = [
-        f"  skeleton   {skeleton['joints']} joints, {skeleton['dofs']} DOFs "
+        f"  skeleton   {counted(skeleton['joints'], 'joint')}, {counted(skeleton['dofs'], 'DOF')} "
         f"({skeleton['limited_dofs']} limited, {skeleton['locked_dofs']} of them locked)"
     ]
     for dof in skeleton["dof_table"]:
@@ -231,7 +231,8 @@ def _bound(value: float | None) -> str:
 
 def _mesh_lines(mesh: dict[str, Any]) -> list[str]:
     lines = [
-        f"  mesh       {mesh['vertices']} vertices, {mesh['triangles']} triangles "
+        f"  mesh       {counted(mesh['vertices'], 'vertex')}, "
+        f"{counted(mesh['triangles'], 'triangle')} "
         f"({mesh['degenerate_triangles']} without area), "
         f"{'with' if mesh['has_uvs'] else 'without'} texture coordinates"
     ]
@@ -263,7 +264,8 @@ def _skin_lines(skin: dict[str, Any]) -> list[str]:
         if skin[key]:
             lines.append(f"    {skin[key]} {text}")
     if skin["joints_without_vertices"]:
-        lines.append(f"    {len(skin['joints_without_vertices'])} joints move no vertex")
+        idle = counted(len(skin["joints_without_vertices"]), "joint", "moves", "move")
+        lines.append(f"    {idle} no vertex")
     return lines
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.errors import RigError, printable
+from viewer.errors import RigError, counted, printable
 from viewer.export._bvh.angles import euler_angles, unrolled
 from viewer.export._gaps import filled, gaps_text, runs
 from viewer.export._losses.between import between_losses
@@ -203,7 +203,8 @@ def _distance(take: Take, clip: Clip, times: Floats) -> float:
 def _summary(path: Path, clip: Clip) -> str:
     keys = sum(len(channel.times) for channel in clip.channels)
     return (
-        f"{printable(path, 300)}: {len(clip.channels)} channels with {keys} keys, "
+        f"{printable(path, 300)}: {counted(len(clip.channels), 'channel')} with "
+        f"{counted(keys, 'key')}, "
         f"{number_text(clip.start)} to {number_text(clip.end)} s"
     )
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.errors import RigError, printable
+from viewer.errors import RigError, counted, printable
 from viewer.export._bvh.angles import unrolled
 from viewer.export._bvh.body import Body, Space, body_of, rest_matrices, shape_at
 from viewer.export._bvh.ends import end_offsets
@@ -239,7 +239,7 @@ class _Writer:
         span = f"{stop - start} frames ({first} to {first + stop - start - 1})"
         span = span if stop - start > 1 else f"1 frame ({first})"
         return (
-            f"{printable(path, 300)}: {len(self.names)} joints, {rest}{span} at "
+            f"{printable(path, 300)}: {counted(len(self.names), 'joint')}, {rest}{span} at "
             f"{self.take.frame_rate:g} a second, "
             f"{unit}, {self.options.up or 'y'} up, channels {self.options.rotation_order.upper()}"
         )
@@ -265,10 +265,13 @@ def _remarks(
     moving = [joint_label(skeleton, int(joint)) for joint in np.flatnonzero(body.moves)]
     if moving:
         more = f" and {len(moving) - _LISTED} more" * (len(moving) > _LISTED)
-        notes.append(
-            f"{len(moving)} joints below the root move within their parents and have position "
-            f"channels: {', '.join(moving[:_LISTED])}{more}"
+        moved = counted(
+            len(moving),
+            "joint",
+            "below the root moves within its parent and has position channels",
+            "below the root move within their parents and have position channels",
         )
+        notes.append(f"{moved}: {', '.join(moving[:_LISTED])}{more}")
     if shape_changes(frames):
         first = reference + take.first_frame
         notes.append(f"the shape changes over time: bones are written as in frame {first}")

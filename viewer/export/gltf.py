@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from viewer.errors import RigError, printable
+from viewer.errors import RigError, counted, printable
 from viewer.export._gaps import filled, gaps_text, runs
 from viewer.export._gltf.document import Document, text_of
 from viewer.export._gltf.losses import Written, gltf_losses, not_held, vertices_text
@@ -206,10 +206,10 @@ def _add_body(
         else:
             document.root["nodes"][tree.place].setdefault("children", []).append(node)
         split = f" ({figure.mesh.n_vertices} before they were split along texture seams)"
-        counts = [f"{written} vertices{split * (written != figure.mesh.n_vertices)}"]
-        counts += [f"{figure.mesh.n_triangles} triangles"]
+        counts = [f"{counted(written, 'vertex')}{split * (written != figure.mesh.n_vertices)}"]
+        counts += [counted(figure.mesh.n_triangles, "triangle")]
     if figure.skeleton is not None:
-        counts += [f"{figure.skeleton.n_joints} joints"]
+        counts += [counted(figure.skeleton.n_joints, "joint")]
     document.root["scene"] = document.add("scenes", {"nodes": scene})
     return _Built(tree, node, ", ".join(counts))
 
@@ -307,8 +307,11 @@ def _motion_remarks(take: Take, body: _Body, frames: Frames, options: MotionOpti
     if len(moves):
         names = ", ".join(joint_label(skeleton, int(joint)) for joint in moves[:_LISTED])
         more = f" and {len(moves) - _LISTED} more" * (len(moves) > _LISTED)
-        notes.append(
-            f"{len(moves)} joints below the root move within their parents: "
-            f"{printable(names, 300)}{more}"
+        moved = counted(
+            len(moves),
+            "joint",
+            "below the root moves within its parent",
+            "below the root move within their parents",
         )
+        notes.append(f"{moved}: {printable(names, 300)}{more}")
     return notes

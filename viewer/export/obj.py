@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.errors import printable
+from viewer.errors import counted, printable
 from viewer.export import MotionOptions, require_mesh
 from viewer.export._gaps import kept_gaps
 from viewer.export._motion_paths import numbered_paths
@@ -52,7 +52,7 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
         for file in missing:
             save_bytes(file, beside[file])
         save_text(path, "".join(parts))
-    counts = f"{mesh.n_vertices} vertices, {mesh.n_triangles} triangles"
+    counts = f"{counted(mesh.n_vertices, 'vertex')}, {counted(mesh.n_triangles, 'triangle')}"
     notes = [f"{printable(file, 300)}: its texture" for file in beside if file.suffix == ".png"]
     return [f"{printable(path, 300)}: {counts}", *notes]
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.errors import printable
+from viewer.errors import counted, printable
 from viewer.export import require_mesh
 from viewer.formats import save_bytes
 from viewer.rig.mesh import Mesh
@@ -38,7 +38,8 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
     text = "\n".join(header).encode("ascii", "backslashreplace")
     save_bytes(path, text + vertices.tobytes() + faces.tobytes())
     return [
-        f"{printable(path, 300)}: {mesh.n_vertices} vertices, {mesh.n_triangles} triangles",
+        f"{printable(path, 300)}: {counted(mesh.n_vertices, 'vertex')}, "
+        f"{counted(mesh.n_triangles, 'triangle')}",
     ]
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.errors import RigError, printable
+from viewer.errors import RigError, counted, printable
 from viewer.export._course_rig import course_skeleton, depth_first
 from viewer.export._losses.apart import Apart, Farthest, apart_lines, negligible
 from viewer.formats import Source, all_or_none, keeping_written, read, write
@@ -36,7 +36,7 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
     whole = scaled(shaped(figure, pose.shape_weights), pose.figure_scale)
     rig, sources = _as_rig(whole, pose, skinning)
     skel, skin = path.with_suffix(".skel"), path.with_suffix(".skin")
-    notes = [f"{printable(skel, 300)}: {figure.skeleton.n_joints} joints"]
+    notes = [f"{printable(skel, 300)}: {counted(figure.skeleton.n_joints, 'joint')}"]
     with keeping_written() as saved, all_or_none(_files(rig, skel, skin)):
         write(rig, skel)
         if rig.mesh is not None:
@@ -44,7 +44,7 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
         files = [Source(file, saved[file]) for file in (skel, skin) if file in saved]
         error = _error(actor, files, sources, skinning)
     if rig.mesh is not None:
-        notes.append(f"{printable(skin, 300)}: {rig.mesh.n_vertices} vertices")
+        notes.append(f"{printable(skin, 300)}: {counted(rig.mesh.n_vertices, 'vertex')}")
         if figure.mesh is not None and rig.mesh.n_vertices != figure.mesh.n_vertices:
             notes.append(
                 f"split at texture seams: {figure.mesh.n_vertices} vertices are "

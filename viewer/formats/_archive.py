@@ -281,8 +281,9 @@ def describe(value: Value) -> str:
     ('800 x 3 float32', 'no named values')
     """
     if isinstance(value, Deferred):
-        texts = "texts" if value.shape else "text"
-        return f"{_axes(value.shape)} {texts if value.dtype.kind in 'SU' else value.dtype.name}"
+        if value.dtype.kind in "SU" and not value.shape:
+            return "a text"
+        return f"{_axes(value.shape)} {'texts' if value.dtype.kind in 'SU' else value.dtype.name}"
     if isinstance(value, Sparse):
         return f"a sparse matrix {value.size}"
     if isinstance(value, Opaque):

@@ -16,7 +16,7 @@ from viewer.rig.mesh import vertex_normals
 __all__ = ["filled_normals", "polygon_text", "stated_unit", "stated_up"]
 
 _SHORTEST = 1e-15  # of a normal: the square of a shorter one is 0 in float32
-_SIZES = {3: "triangles", 4: "quads"}
+_SIZES = {3: "triangle", 4: "quad"}
 
 
 def filled_normals(
@@ -50,11 +50,11 @@ def filled_normals(
 
 def polygon_text(counts: NDArray[np.int64], n_triangles: int) -> str:
     """Return how many polygons of which size were cut: ``"2 quads, 1 with 5 or more corners"``."""
-    sizes = [f"{(counts == size).sum()} {name}" for size, name in _SIZES.items()]
+    sizes = [counted(int((counts == size).sum()), name) for size, name in _SIZES.items()]
     large = int((counts > 4).sum())
     parts = [text for text in sizes if not text.startswith("0 ")]
     parts += [f"{large} with 5 or more corners"] * (large > 0)
-    return f"{', '.join(parts)}: {n_triangles} triangles in all"
+    return f"{', '.join(parts)}: {counted(n_triangles, 'triangle')} in all"
 
 
 def stated_up(comment: str) -> Literal["y", "z"]:

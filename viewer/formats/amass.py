@@ -19,7 +19,7 @@ import math
 
 import numpy as np
 
-from viewer.errors import FormatError, counted, printable
+from viewer.errors import FormatError, counted, one_of, printable
 from viewer.formats._archive import Archive
 from viewer.formats._container import archive_of, finite
 from viewer.formats._reach import is_beyond, within_text
@@ -137,18 +137,19 @@ def read(source: Source) -> BodyMotion:
 
 
 def _refusal(source: Source, archive: Archive) -> str:
-    keys = ", ".join(printable(key, 40) for key in archive.keys[:8]) or "none"
+    keys = ", ".join(printable(key, 40) for key in archive.keys[:8])
     if archive.has("markers_latent") or "stagei." in source.path.name:
         return (
             "expected a motion, found the first stage of a marker fit, which has no poses: open "
             "the *_stageii.npz files beside it"
         )
-    if set(archive.keys) <= {"betas", *_BESIDES.split(), *_RATES}:
+    if archive.keys and set(archive.keys) <= {"betas", *_BESIDES.split(), *_RATES}:
         return (
             f"expected a motion, found a subject's shape (keys {keys}): open the *_poses.npz files "
             "beside it"
         )
-    return f"expected a motion (poses, or root_orient and pose_body), found the keys {keys}"
+    found = f"the keys {keys}" if keys else "no keys"
+    return f"expected a motion (poses, or root_orient and pose_body), found {found}"
 
 
 def _rows(archive: Archive, key: str, count: int | None = None, first: str = "") -> Floats:
@@ -156,7 +157,9 @@ def _rows(archive: Archive, key: str, count: int | None = None, first: str = "")
     array = archive.array(key)
     shape = array.shape if len(array.shape) > 1 else (1, *array.shape)
     if count is not None and shape[0] != count:
-        raise archive.error(key, f"expected {count} frames as in {first}, found {shape[0]}")
+        raise archive.error(
+            key, f"expected {counted(count, 'frame')} as in {first}, found {shape[0]}"
+        )
     if not shape[0]:
         raise archive.error(key, "expected frames, found none")
     values = array.values().reshape(shape[0], math.prod(shape[1:]))
@@ -167,7 +170,7 @@ def _rows(archive: Archive, key: str, count: int | None = None, first: str = "")
 def _whole_poses(archive: Archive, key: str) -> tuple[tuple[str, ...], Floats]:
     rows, known = _rows(archive, key), members_by_numbers()
     if rows.shape[1] not in known:
-        wanted = ", ".join(map(str, sorted(known)))
+        wanted = one_of(sorted(known))
         raise archive.error(key, f"expected {wanted} numbers a frame, found {rows.shape[1]}")
     return known[rows.shape[1]], rows.reshape(len(rows), -1, 3)
 

@@ -164,11 +164,11 @@ def _check_keys(named: NamedValues, record: PoseRecord) -> None:
     arrays = (record.vector, record.shape, record.expression, record.translation)
     is_empty = not record.dofs and not record.parts and record.scale is None
     if is_empty and all(array is None for array in arrays):
-        keys = ", ".join(printable(key, 40) for key in list(named.values)[:12]) or "none"
+        keys = ", ".join(printable(key, 40) for key in list(named.values)[:12])
         known = (*_KNOWN, *_NOT_NEEDED, *KEYS)
         odd = next((key for key in named.values if key not in known), "")
         near = did_you_mean(odd, known)
-        found = f"found keys {keys}{f'; {near}' if near else ''}"
+        found = f"found {f'keys {keys}' if keys else 'no keys'}{f'; {near}' if near else ''}"
         message = f"expected a pose (dofs, poses, body_pose, betas …), {found}"
         raise named.error(message, *([odd] if odd else []))
     used = (*_KNOWN, *_NOT_NEEDED) if record.turns is None else (*_KNOWN, *_NOT_NEEDED, *KEYS)

@@ -32,7 +32,7 @@ _ERRORS = (
         "B001",
         r"binding matrices|bindings.*: expected \d+ matri|beside `(?:bindings|skinweights)`",
     ),
-    ("C009", r"channels, .* needs|has \d+ joints, figure"),
+    ("C009", r"channels?, .* needs|has \d+ joints, figure"),
     (
         "F004",
         r"open it (?:together )?with|does not fit|has no texture coordinates|needs a skeleton"

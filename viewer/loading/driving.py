@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from viewer.errors import RigError, printable
+from viewer.errors import RigError, counted, printable
 from viewer.formats import Source, read
 from viewer.loading.bundled import bundled_body
 from viewer.loading.capturing import Builder
@@ -97,7 +97,9 @@ def _give_clip(path: Path, clip: Clip, cast: Cast, contents: Contents) -> None:
     if any(skeleton is not None and suits(clip, skeleton) for skeleton in skeletons):
         raise RigError(f"{shown}: every skeleton that it fits has a clip already")
     owner = next(path for path, figure in contents.figures if figure.skeleton)
-    raise RigError(f"{shown} has {count} channels, {printable(owner, 300)} {misfit(clip, first)}")
+    raise RigError(
+        f"{shown} has {counted(count, 'channel')}, {printable(owner, 300)} {misfit(clip, first)}"
+    )
 
 
 def is_body(figure: Figure) -> bool:

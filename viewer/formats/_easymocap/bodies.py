@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from viewer.errors import one_of
 from viewer.formats._easymocap.json_frames import (
     MisfitError,
     has_numbers,
@@ -110,8 +111,7 @@ def body_layout(record: dict[str, Any]) -> BodyLayout:
         )
     layout = _LAYOUTS.get(count)
     if layout is None:
-        known = ", ".join(str(number) for number in sorted(_LAYOUTS))
-        raise MisfitError("poses", f"expected {known} numbers, found {count}")
+        raise MisfitError("poses", f"expected {one_of(sorted(_LAYOUTS))} numbers, found {count}")
     widths = [("Rh", 3), ("Th", 3), ("poses", count)]
     keys = [key for key in COEFFICIENTS if has_numbers(record, key)]
     hands = layout.hands

@@ -141,9 +141,9 @@ class PointRows(Rows):
         except (TypeError, ValueError, OverflowError):
             pass  # said below
         if not isinstance(rows, list):
-            raise MisfitError(key, f"expected {count} keypoints, found {describe(rows)}")
+            raise MisfitError(key, f"expected {counted(count, 'keypoint')}, found {describe(rows)}")
         if len(rows) != count:
-            raise MisfitError(key, f"expected {count} keypoints, found {len(rows)}")
+            raise MisfitError(key, f"expected {counted(count, 'keypoint')}, found {len(rows)}")
         raise MisfitError(key, "expected rows of 3 or 4 numbers, found others")
 
     def points(self) -> tuple[Floats, list[RowFault]]:

@@ -199,7 +199,7 @@ class Reading:
             layout = body_layout(record)
         elif first := [key for key in self._awaited if has_numbers(record, key)]:
             layout = with_coefficients(layout, record)
-            self._say_once(path, f"the first record with {' and '.join(first)}: 0 before it")
+            self._say_once(path, f"no earlier record has {' or '.join(first)}: 0 is taken there")
         else:
             return layout
         self.body_layout, keys = layout, [key for key, _ in layout.widths]
@@ -290,5 +290,6 @@ class Reading:
 
 def _lacks(record: dict[str, Any], folder: FrameFolder) -> str:
     wanted = ("poses",) * folder.has_bodies + (KEY,) * folder.has_points
-    keys = ", ".join(printable(key, 40) for key in list(record)[:8]) or "none"
-    return f"expected {' or '.join(wanted)}, found the keys {keys}"
+    keys = ", ".join(printable(key, 40) for key in list(record)[:8])
+    found = f"the keys {keys}" if keys else "no keys"
+    return f"expected {' or '.join(wanted)}, found {found}"

@@ -8,7 +8,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from viewer.errors import RigError
+from viewer.errors import RigError, counted
 from viewer.rig.arrays import Floats, frozen
 from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_label
 
@@ -209,6 +209,6 @@ def check_fit(clip: Clip, skeleton: Skeleton) -> None:
         raise RigError(f"clip {clip.name}: the skeleton {misfit(clip, skeleton)}")
     if len(clip.channels) != skeleton.n_dofs:
         raise RigError(
-            f"clip {clip.name} has {len(clip.channels)} channels, "
+            f"clip {clip.name} has {counted(len(clip.channels), 'channel')}, "
             f"the skeleton {misfit(clip, skeleton)}"
         )

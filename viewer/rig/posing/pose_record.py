@@ -263,7 +263,8 @@ def _dof(figure: Figure, label: str) -> int:
     try:
         return find_dof(figure.skeleton, label)
     except RigError as problem:
-        raise RigError(f'expected a DOF of {figure.name}, found "{label}": {problem}') from None
+        why = str(problem).removeprefix(f'"{label}": ')  # once is enough
+        raise RigError(f'expected a DOF of {figure.name}, found "{label}": {why}') from None
 
 
 def _beyond_limits(skeleton: Skeleton, dofs: Floats) -> list[str]:
