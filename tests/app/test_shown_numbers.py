@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from app import test_curves_panel
 from app.test_curves_panel import SIZE, _center, clip_text
 from imgui_bundle import imgui
 
@@ -100,16 +101,12 @@ def test_own_numbers_have_no_negative_zero(box, texts):
     assert shown == {"file: 0.0000  0.0000  0.0000"}
 
 
-def test_curves_are_fitted_again_when_the_unit_changes(drive, rig, tmp_path):
-    (tmp_path / "wave.anim").write_text(clip_text())
-    hand = drive(*rig, tmp_path / "wave.anim", size=SIZE, samples=1)
-    hand.show_panel("Curves")
-    hand.state.selected_joint = 1
-    hand.step(3)
-    hand.click("curve arm.x")
-    hand.step(3)
-    heights = [_center(hand, f"key arm.x {key}")[1] for key in (0, 1, 2)]
-    hand.click("radians")
-    hand.step(3)
-    again = [_center(hand, f"key arm.x {key}")[1] for key in (0, 1, 2)]
+curves = test_curves_panel.curves  # the fixture
+
+
+def test_curves_are_fitted_again_when_the_unit_changes(curves):
+    heights = [_center(curves, f"key arm.x {key}")[1] for key in (0, 1, 2)]
+    curves.click("radians")
+    curves.step(3)
+    again = [_center(curves, f"key arm.x {key}")[1] for key in (0, 1, 2)]
     assert again == pytest.approx(heights, abs=1.5)

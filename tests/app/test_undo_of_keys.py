@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from app import test_curves_panel
 from app.captured import dots, people
 from app.test_curves_panel import ARM_X, SIZE, _at, _center, clip_text
 from numpy.testing import assert_allclose
@@ -27,17 +28,7 @@ from viewer.rig.scene import Actor, Scene
 KEY = (ARM_X, 1)  # at 1 s: 0.6
 
 
-@pytest.fixture
-def curves(drive, rig, tmp_path):
-    """A hand on the Curves panel of the tiny rig; the arm's curves are shown."""
-    (tmp_path / "wave.anim").write_text(clip_text())
-    hand = drive(*rig, tmp_path / "wave.anim", size=SIZE, samples=1)
-    hand.show_panel("Curves")
-    hand.state.selected_joint = 1
-    hand.step(3)
-    hand.click("curve arm.x")
-    hand.step(3)
-    return hand
+curves = test_curves_panel.curves  # the fixture
 
 
 def go(hand, time):
