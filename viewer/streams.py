@@ -1,4 +1,4 @@
-"""The standard streams, also where the caller closed them, filled their disk or reads no more."""
+"""Standard streams, including closed, full and abandoned ones."""
 
 from __future__ import annotations
 

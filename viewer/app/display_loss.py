@@ -1,4 +1,4 @@
-"""What happens when the X server goes away while a window is open.
+"""Orderly end of the program when the X server goes away.
 
 Xlib then leaves the process from within whatever called it, with a line of its own and exit code 1.
 It lets a program have a handler instead, which must not return: OpenGL's drivers go on with what an

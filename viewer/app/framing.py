@@ -1,4 +1,4 @@
-"""The camera's fit: kept up with the window and the motion until somebody moves the camera."""
+"""Fitting of the camera to the free view until the user moves it."""
 
 from __future__ import annotations
 

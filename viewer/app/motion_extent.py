@@ -1,4 +1,4 @@
-"""How far a scene reaches over its whole motion, found some frames at a time."""
+"""Extent of a scene over its whole motion, computed a few frames at a time."""
 
 from __future__ import annotations
 

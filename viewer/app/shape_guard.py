@@ -1,4 +1,4 @@
-"""Takes back shapes that cannot be shown, before panels use them."""
+"""Reset of shapes whose directions cannot be read, before panels use them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far a motion may carry a figure from its place.
+"""Limits of the translations that a motion may contain.
 
 Single precision holds 24 bits: at 1e9 units a body of any size is drawn as one point already, and
 beyond 1e19 the squares that lengths are made of overflow. Recordings stay within kilometres, which

@@ -1,4 +1,4 @@
-"""Names of things after the files and folders that were opened."""
+"""Names derived from the files and folders that were opened."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The gate that every result passes before anything is written: no file is lost by accident."""
+"""Checks of all output files of a run before the first is written."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What glTF cannot hold of a figure, and by how much a file that was read back differs for it."""
+"""Parts of a figure that glTF cannot hold, and the differences of a file that was read back."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far a figure as it moves here and what was written of it are apart, and how that is told."""
+"""Largest distances between a figure and the file that was written of it, as text."""
 
 from __future__ import annotations
 

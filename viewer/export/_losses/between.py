@@ -1,4 +1,4 @@
-"""What a motion does between the frames that are written."""
+"""Differences between the frames that are written."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Upper bounds of how far apart two bodies' vertices are, a number a pose at a small price.
+"""Cheap upper bounds of the distance between two bodies' vertices, one per pose.
 
 With palettes M and N, rest meshes a and b, weights v and w, T = max sum_j |v_j|::
 

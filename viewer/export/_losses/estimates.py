@@ -1,4 +1,4 @@
-"""How far apart vertices may be, in single precision: which frames and vertices matter.
+"""Single-precision estimates of distances: the frames and vertices worth measuring.
 
 Many frames are skinned at once, a few hundred vertices at a time, so that their matrices stay in
 the processor's cache. What is so found to be far apart is measured in double precision afterwards.

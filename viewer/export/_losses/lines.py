@@ -1,4 +1,4 @@
-"""What is said of a motion that was read back: by how much it differs, of joints and vertices."""
+"""Lines about a motion that was read back: largest differences of joints and vertices."""
 
 from __future__ import annotations
 

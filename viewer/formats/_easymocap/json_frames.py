@@ -1,4 +1,4 @@
-"""One frame file of EasyMocap: its list of people, and the words for what is wrong in it."""
+"""One frame file of EasyMocap: its list of people, and messages about its faults."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What OpenGL a machine offers where it refuses the one that is needed."""
+"""The OpenGL version that a machine offers where it refuses the one needed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a scalar view shows at first: a joint or a field that is not 0 everywhere."""
+"""The first joint or field of a scalar view: one that is not 0 everywhere."""
 
 from __future__ import annotations
 
