@@ -1,6 +1,7 @@
 #version 330
 // Skins and places a vertex of one of many actors that share a figure: instances of its mesh.
 
+#pragma include normals
 #pragma include skinning
 
 in vec2 in_uv;              // v = 0 at the bottom row of the texture
@@ -38,12 +39,7 @@ void main() {
     pose_vertex(true, position, normal);
     vec4 point = vec4(position, 1.0);
     v_position = vec3(dot(in_model_x, point), dot(in_model_y, point), dot(in_model_z, point));
-    // Rows of the cofactor matrix, which is the inverse transpose times the determinant.
-    vec3 x = cross(in_model_y.xyz, in_model_z.xyz);
-    vec3 y = cross(in_model_z.xyz, in_model_x.xyz);
-    vec3 z = cross(in_model_x.xyz, in_model_y.xyz);
-    v_normal = vec3(dot(x, normal), dot(y, normal), dot(z, normal));
-    v_normal *= sign(dot(in_model_x.xyz, x));
+    v_normal = inverse_transposed(in_model_x.xyz, in_model_y.xyz, in_model_z.xyz, normal, 0.0);
     v_uv = in_uv;
     v_color = u_has_colors ? in_color : in_actor_color;
     v_scalar = 0.0;

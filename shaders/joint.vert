@@ -1,6 +1,8 @@
 #version 330
 // Places one box per joint: instances of a cube from 0 to 1.
 
+#pragma include normals
+
 in vec3 in_corner;      // corner of the cube
 in vec3 in_normal;      // of its face
 in vec3 in_low;         // per joint: lowest corner of the box, joint space
@@ -32,11 +34,7 @@ vec4 world_row(int row) {
 void main() {
     vec4 corner = vec4(mix(in_low, in_high, in_corner), 1.0);
     vec4 x = world_row(0), y = world_row(1), z = world_row(2);
-    // Rows of the cofactor matrix: exact under joints that scale. Boxes that are mirrored keep
-    // outward normals outward.
-    vec3 a = cross(y.xyz, z.xyz), b = cross(z.xyz, x.xyz), c = cross(x.xyz, y.xyz);
-    vec3 normal = vec3(dot(a, in_normal), dot(b, in_normal), dot(c, in_normal));
-    normal *= dot(x.xyz, a) < 0.0 ? -1.0 : 1.0;
+    vec3 normal = inverse_transposed(x.xyz, y.xyz, z.xyz, in_normal, 0.0);
     vec4 position = u_model_view * vec4(dot(x, corner), dot(y, corner), dot(z, corner), 1.0);
     v_position = position.xyz;
     v_normal = u_normal_matrix * normal;

@@ -1,6 +1,7 @@
 #version 330
 // Skins a vertex once per changed pose; its outputs are captured by transform feedback.
 
+#pragma include normals
 #pragma include skinning
 
 uniform bool u_attached;    // false: leave the vertex in its binding space

@@ -52,18 +52,12 @@ vec3 unit(vec3 v) {
 vec3 blended_normal(vec3 x, vec3 y, vec3 z, vec3 normal) {
 #ifdef AFFINE_PALETTE
     if (!is_rigid) {
-        // The inverse transpose times |determinant|: rows of the cofactor matrix, with the sign
-        // that keeps outward normals outward where a joint mirrors. Scaled to entries of at most
-        // 1, as only directions count; then rounding reaches 1e-5 of the determinant.
+        // Scaled to entries of at most 1, as only directions count: no scale overflows, and
+        // rounding reaches 1e-5 of the determinant.
         vec3 sizes = max(max(abs(x), abs(y)), abs(z));
         float size = max(max(sizes.x, sizes.y), sizes.z);
         size = size > 0.0 ? size : 1.0;
-        x /= size;
-        y /= size;
-        z /= size;
-        vec3 a = cross(y, z), b = cross(z, x), c = cross(x, y);
-        vec3 moved = vec3(dot(a, normal), dot(b, normal), dot(c, normal));
-        return dot(x, a) < -1e-5 ? -moved : moved;
+        return inverse_transposed(x / size, y / size, z / size, normal, 1e-5);
     }
 #endif
     return vec3(dot(x, normal), dot(y, normal), dot(z, normal));
