@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.formats._faults import Part
+from viewer.diagnostics import Part
 from viewer.formats._numbers import is_infinite, parse_words, word_begins
 from viewer.formats._source import Source, no_number
 from viewer.rig.arrays import Bools, Floats, Ints
@@ -100,7 +100,7 @@ def refuse_words(
             int(words.offsets[first]),
         )
         error.code = "W003" if part == "weights" and code == "F003" else code
-        source.refuse(error, len(chosen), part, places[chosen])
+        source.refuse_error(error, len(chosen), part, places[chosen])
 
 
 def mended_positions(positions: Floats, triangles: Ints) -> Floats:

@@ -25,7 +25,8 @@ from viewer.formats._skin.blocks import (
     to_whole,
     word_at,
 )
-from viewer.formats._source import Source, shown
+from viewer.formats._source import Source
+from viewer.phrases import quoted
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.morph_target import MorphTarget
 
@@ -81,7 +82,9 @@ def _unexpected(source: Source, word: re.Match[bytes], is_repeated: bool) -> For
         return source.error(
             f"expected one section of {word.group().decode()}, found another", word.start()
         )
-    return source.error(f"expected positions or normals, found {shown(word.group())}", word.start())
+    return source.error(
+        f"expected positions or normals, found {quoted(word.group())}", word.start()
+    )
 
 
 def _section(source: Source, name: str, header: re.Match[bytes]) -> tuple[Rows, int]:
@@ -94,13 +97,13 @@ def _section(source: Source, name: str, header: re.Match[bytes]) -> tuple[Rows, 
         wrong = int(vertices.argmin())
     if wrong >= 0:
         offset, word = word_at(source, block, _WIDTH * wrong)
-        raise source.error(f"{name}: expected a vertex index, found {shown(word)}", offset)
+        raise source.error(f"{name}: expected a vertex index, found {quoted(word)}", offset)
     order = np.argsort(vertices, kind="stable")
     vertices = vertices[order]
     twice = np.flatnonzero(np.diff(vertices) == 0)
     if len(twice):
         offset, word = word_at(source, block, _WIDTH * int(order[twice[0] + 1]))
-        raise source.error(f"{name}: vertex {shown(word)} is listed twice", offset)
+        raise source.error(f"{name}: vertex {quoted(word)} is listed twice", offset)
     if not block.closed:
         source.warn(f'the last "}}" is missing: {name} ends with the file')
     return (vertices, rows[order, 1:], block), block.end + block.closed
@@ -113,7 +116,7 @@ def _count(source: Source, name: str, header: re.Match[bytes]) -> tuple[int, int
         raise source.error(f"{name}: expected a count, found the end of the file", header.start())
     value, left = to_number(word.group()), len(source.data) - word.end()
     if value is None or value != int(value) or value < 0:
-        raise source.error(f"{name}: expected a count, found {shown(word.group())}", word.start())
+        raise source.error(f"{name}: expected a count, found {quoted(word.group())}", word.start())
     # Even an entry of one letter needs white space before it.
     if value * 2 > left + 1:
         raise source.error(

@@ -146,7 +146,7 @@ def _skin(source: Source, sections: Sections) -> Skin | None:
         missing = "skinweights" if sections.starts is None else "bindings"
         present = "bindings" if sections.starts is None else "skinweights"
         skin = None if sections.starts is None else unbound_skin(sections)
-        source.refuse(
+        source.refuse_error(
             source.error(
                 f"expected a `{missing}` section beside `{present}`, found none",
                 sections.offsets[present],

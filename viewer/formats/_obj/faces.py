@@ -9,7 +9,8 @@ import numpy as np
 from viewer.errors import FormatError
 from viewer.formats._numbers import parse_numbers, word_begins
 from viewer.formats._obj.lines import Lines, Places, Rows, rows_of
-from viewer.formats._source import Source, shown
+from viewer.formats._source import Source
+from viewer.phrases import quoted
 from viewer.rig.arrays import Bools, Floats
 
 __all__ = ["CORNER", "CORNER_KINDS", "FEWEST", "FaceRows", "fits_corner", "read_faces"]
@@ -189,4 +190,4 @@ def _corner_error(source: Source, rows: Rows, place: int) -> FormatError:
     offset = rows.offset(place)
     word = source.next_word(offset)
     assert word is not None  # it was found there
-    return source.error(f"f: {CORNER}, found {shown(word.group())}", offset)
+    return source.error(f"f: {CORNER}, found {quoted(word.group())}", offset)

@@ -7,14 +7,15 @@ from collections.abc import Callable
 
 import numpy as np
 
+from viewer.diagnostics import Part
 from viewer.errors import FormatError
-from viewer.formats._faults import Part
 from viewer.formats._numbers import parse_words, word_begins
 from viewer.formats._obj.faces import CORNER, CORNER_KINDS, FEWEST, FaceRows, fits_corner
 from viewer.formats._obj.lines import Lines, Places, Rows, rows_of
 from viewer.formats._polygons import first_known, triangles_of
-from viewer.formats._source import Source, shown
+from viewer.formats._source import Source
 from viewer.formats._tolerant import Words, refuse_words
+from viewer.phrases import quoted
 from viewer.rig.arrays import Bools, Floats
 
 __all__ = ["mended_faces", "mended_rows", "settled_corners"]
@@ -75,7 +76,7 @@ def mended_rows(
             f"found {counts[short[0]]}",
             int(rows.origins[short[0]]) - 1,
         )
-        source.refuse(error, len(short), part, short + first)
+        source.refuse_error(error, len(short), part, short + first)
     table = np.full((len(counts), width), np.nan)
     long = counts >= width
     table[long] = values[firsts[:-1][long, None] + np.arange(width)]
@@ -106,7 +107,7 @@ def mended_faces(source: Source, lines: Lines, before: dict[str, int]) -> FaceRo
     small = np.flatnonzero(counts < FEWEST)
     if len(small):
         found = f"f: expected {FEWEST} or more corners, found {counts[small[0]]}"
-        source.refuse(source.error(found, int(rows.origins[small[0]]) - 1), len(small))
+        source.refuse_error(source.error(found, int(rows.origins[small[0]]) - 1), len(small))
     written, lost = _corners(rows, begins)
     kept = counts >= FEWEST
     places = (np.cumsum(kept) - 1)[owners]
@@ -135,7 +136,7 @@ def _corner_error(source: Source, offset: int) -> FormatError:
     assert word is not None  # it was found there
     if _ZERO.search(word.group()):
         return source.error("f: expected an index from 1, found 0", offset)
-    return source.error(f"f: {CORNER}, found {shown(word.group())}", offset)
+    return source.error(f"f: {CORNER}, found {quoted(word.group())}", offset)
 
 
 def _corners(rows: Rows, begins: Places) -> tuple[Places, Bools]:
@@ -185,7 +186,7 @@ def settled_corners(
     first = 0
     for rows in faces:
         for error, count, places in rows.faults:
-            source.refuse(error, count, "triangles", triangles_of(counts, places + first))
+            source.refuse_error(error, count, "triangles", triangles_of(counts, places + first))
         first += len(rows.counts)
     owners = np.repeat(np.arange(len(counts)), counts)
     for column, (keyword, kind) in enumerate(CORNER_KINDS.items()):
@@ -194,7 +195,7 @@ def settled_corners(
             error = _index_error(source, kind, limit(keyword), corners[wrong[0], column] + 1,
                                  int(offsets[owners[wrong[0]]]))  # fmt: skip
             part: Part = "triangles" if column == 0 else ""
-            source.refuse(error, len(wrong), part, triangles_of(counts, owners[wrong]))
+            source.refuse_error(error, len(wrong), part, triangles_of(counts, owners[wrong]))
             corners[wrong, column] = -1
     corners[:, 0] = first_known(corners[:, 0], counts, owners)
     return corners

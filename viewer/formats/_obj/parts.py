@@ -11,7 +11,8 @@ from viewer.errors import counted
 from viewer.formats._obj.faces import CORNER_KINDS, FaceRows, read_faces
 from viewer.formats._obj.lines import KEYWORDS, Lines, Places, Rows, number_rows, pieces
 from viewer.formats._obj.mending import mended_faces, mended_rows, settled_corners
-from viewer.formats._source import Source, shown
+from viewer.formats._source import Source
+from viewer.phrases import quoted
 from viewer.rig.arrays import Floats
 
 __all__ = ["ObjParts", "read_parts"]
@@ -155,7 +156,7 @@ def _positions(source: Source, lines: Lines, gathered: _Gathered) -> Floats:
             f"v: expected 3 numbers, or 4, 6 or 7 with w or a colour, found {counts[wrong[0]]}",
             int(rows.origins[wrong[0]]) - 1,
         )
-        source.refuse(error, len(wrong))
+        source.refuse_error(error, len(wrong))
     colored = np.flatnonzero(counts >= 6)
     if len(colored):
         gathered.leave_out("the colour", len(colored), int(rows.origins[colored[0]]) - 1)
@@ -195,7 +196,7 @@ def _read_others(source: Source, lines: Lines, gathered: _Gathered) -> None:
             gathered.libraries.append((rest, offset))
         elif words[0] not in _QUIET:
             if words[0] not in _SHAPES and not gathered.odd[words[0]]:
-                source.warn(f"skipped unknown {shown(words[0])}", offset)
+                source.warn(f"skipped unknown {quoted(words[0])}", offset)
             gathered.odd[words[0]] += 1
 
 

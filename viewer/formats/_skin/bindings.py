@@ -8,8 +8,9 @@ import numpy as np
 
 from viewer.errors import counted
 from viewer.formats._skin.blocks import Block, block_numbers, find_block, opened
-from viewer.formats._source import Source, shown
+from viewer.formats._source import Source
 from viewer.formats._tolerant import read_words, refuse_words
+from viewer.phrases import quoted
 from viewer.rig.arrays import Floats
 
 __all__ = ["read_bindings"]
@@ -34,7 +35,7 @@ def read_bindings(source: Source, count: int, position: int) -> tuple[Floats, in
     source.remember("bindings", offsets.__getitem__)
     if len(matrices) != count:
         is_whole = word is not None and word.group() == b"}"
-        there = "the end of the file" if word is None else shown(word.group())
+        there = "the end of the file" if word is None else quoted(word.group())
         end = source.end if word is None else word.start()
         # A count that is wrong is the fault; if the text breaks off, the end of it is.
         where, other = (stated, end) if is_whole else (end, stated)
@@ -46,11 +47,11 @@ def read_bindings(source: Source, count: int, position: int) -> tuple[Floats, in
         if not is_whole:
             error.code = "F002"  # the text is broken, whatever was bound
             raise error
-        source.refuse(error)
+        source.refuse_error(error)
     if word is None:
         source.warn('the last "}" is missing: bindings ends with the file')
     elif word.group() != b"}":
-        raise source.error(f'bindings: expected "}}", found {shown(word.group())}', word.start())
+        raise source.error(f'bindings: expected "}}", found {quoted(word.group())}', word.start())
     bindings = np.tile(np.eye(4), (len(matrices), 1, 1))
     if matrices:
         bindings[:, :3, :] = np.array(matrices).reshape(-1, 4, 3).transpose(0, 2, 1)
@@ -80,6 +81,6 @@ def _read_matrix(source: Source, index: int, word: Word) -> tuple[Floats, int]:
         )
     if len(values) != 12:
         message = f"matrix {index} of bindings: expected 12 numbers, found {len(values)}"
-        source.refuse(source.error(message, word.start()), 1, "bindings", [index])
+        source.refuse_error(source.error(message, word.start()), 1, "bindings", [index])
         return _NEUTRAL, block.end + 1
     return values, block.end + 1

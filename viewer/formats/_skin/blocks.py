@@ -9,7 +9,8 @@ import numpy as np
 
 from viewer.errors import FormatError
 from viewer.formats._numbers import parse_numbers
-from viewer.formats._source import Source, no_number, shown
+from viewer.formats._source import Source, no_number
+from viewer.phrases import quoted
 from viewer.rig.arrays import Floats, Ints
 
 __all__ = [
@@ -69,7 +70,7 @@ def find_block(source: Source, name: str, header: Word, position: int) -> Block:
     if brace is not None and brace.group() == b"{":
         position = brace.end()
     elif name != "skinweights":
-        found = "the end of the file" if brace is None else shown(brace.group())
+        found = "the end of the file" if brace is None else quoted(brace.group())
         where = header.start() if brace is None else brace.start()
         raise source.error(f'{name}: expected "{{", found {found}', where)
     end = source.data.find(b"}", position)
@@ -93,7 +94,7 @@ def block_numbers(source: Source, block: Block) -> Floats:
 def unclosed(source: Source, block: Block, offset: int, word: bytes) -> FormatError:
     """Return the error that a word begins something else before a block ends."""
     return source.error(
-        f'expected "}}" to close {opened(source, block)}, found {shown(word)}', offset
+        f'expected "}}" to close {opened(source, block)}, found {quoted(word)}', offset
     )
 
 
@@ -153,7 +154,7 @@ def whole_numbers(source: Source, block: Block, values: Floats, what: str) -> In
     whole, wrong = to_whole(values)
     if wrong >= 0:
         offset, word = word_at(source, block, wrong)
-        raise source.error(f"{block.name}: expected {what}, found {shown(word)}", offset)
+        raise source.error(f"{block.name}: expected {what}, found {quoted(word)}", offset)
     return whole
 
 

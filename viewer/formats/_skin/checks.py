@@ -46,7 +46,7 @@ def even_counts(source: Source, sections: Sections) -> None:
         name, wanted = next(iter(others.items()))
         if wanted != n_positions:
             error = _count_error(source, sections, "positions", wanted, name, n_positions)
-            source.refuse(error, 1, "positions", np.arange(wanted))
+            source.refuse_error(error, 1, "positions", np.arange(wanted))
             missing = max(wanted - n_positions, 0)
             padded = np.pad(tables["positions"], ((0, missing), (0, 0)), constant_values=np.nan)
             tables["positions"] = padded[:wanted]
@@ -57,10 +57,10 @@ def even_counts(source: Source, sections: Sections) -> None:
             continue
         error = _count_error(source, sections, name, n_positions, "positions", count)
         if name == "skinweights":
-            source.refuse(error, 1, "weights", np.arange(count, n_positions))
+            source.refuse_error(error, 1, "weights", np.arange(count, n_positions))
             _fit_weights(sections, n_positions)
         else:
-            source.refuse(error)
+            source.refuse_error(error)
             del tables[name]
 
 
@@ -129,7 +129,7 @@ def checked_triangles(source: Source, sections: Sections, n_vertices: int) -> In
                     run.offset(source, row, corner),
                 )
                 triangles = np.flatnonzero(wrong.any(axis=1)) + first
-                source.refuse(error, int(wrong.sum()), "triangles", triangles)
+                source.refuse_error(error, int(wrong.sum()), "triangles", triangles)
             rows = mended_corners(rows, fits)
         tables.append(rows)
         first += len(rows)
@@ -154,7 +154,7 @@ def invert_bindings(source: Source, sections: Sections) -> Floats:
             f"with determinant {determinants[index]:.3g}",
             source.offset_of("bindings", index),
         )
-        source.refuse(error, int(flat.sum()), "bindings", np.flatnonzero(flat))
+        source.refuse_error(error, int(flat.sum()), "bindings", np.flatnonzero(flat))
         # A joint that is where it was bound, unturned.
         inverse[flat] = translation_matrix(-bindings[flat, :3, 3])
         linear = np.where(flat[:, None, None], np.eye(3), linear)
@@ -189,7 +189,7 @@ def checked_influences(source: Source, sections: Sections, n_joints: int) -> tup
         f"found {joints[influence]}",
         offset,
     )
-    source.refuse(error, len(wrong), "weights", vertices)
+    source.refuse_error(error, len(wrong), "weights", vertices)
     return np.where(fits, joints, 0).astype(np.int32), np.where(fits, weights, 0.0)
 
 

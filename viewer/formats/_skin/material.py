@@ -6,8 +6,9 @@ import re
 from collections.abc import Container
 
 from viewer.formats._numbers import is_number
-from viewer.formats._source import Source, shown
+from viewer.formats._source import Source
 from viewer.formats._texture import load_image
+from viewer.phrases import quoted
 from viewer.rig.arrays import Bytes
 from viewer.rig.mesh import Material
 
@@ -58,7 +59,7 @@ def read_material(
             texture = rest[1].strip().decode("utf-8", "surrogateescape") or None
             named, position = word.start(), rest.end()
         else:
-            source.warn(f"skipped unknown {shown(word.group())} in a material", word.start())
+            source.warn(f"skipped unknown {quoted(word.group())} in a material", word.start())
             position = _skip(source, word)
     if word is None:
         raise source.error(
@@ -82,7 +83,7 @@ def _name(source: Source, header: Word, keywords: Container[bytes]) -> tuple[str
         words.append(word.group())
         word = source.next_word(word.end())
     if word is None or word.group() != b"{":
-        found = "the end of the file" if word is None else shown(word.group())
+        found = "the end of the file" if word is None else quoted(word.group())
         where = header.start() if word is None else word.start()
         raise source.error(f'material: expected "{{", found {found}', where)
     return b" ".join(words).decode("utf-8", "surrogateescape"), word
@@ -100,5 +101,7 @@ def _skip(source: Source, word: Word) -> int:
         if text == b"}" and depth == 0:
             return position
     if depth:
-        raise source.error(f"{shown(word.group())} is still open where the file ends", word.start())
+        raise source.error(
+            f"{quoted(word.group())} is still open where the file ends", word.start()
+        )
     return position

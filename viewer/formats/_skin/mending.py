@@ -9,11 +9,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.formats._faults import Part
+from viewer.diagnostics import Part
 from viewer.formats._skin.blocks import KEYWORDS, Block, block_rows, to_whole, unclosed
 from viewer.formats._skin.weights import find_heads, read_weights
-from viewer.formats._source import Source, shown
+from viewer.formats._source import Source
 from viewer.formats._tolerant import Words, read_words, refuse_words
+from viewer.phrases import quoted
 from viewer.rig.arrays import Floats, Ints
 
 __all__ = ["LOST", "mended_rows", "mended_weights", "whole_corners"]
@@ -71,10 +72,10 @@ def mended_rows(
         found = f"expected {width} numbers, found {sizes[wrong[0]]}"
         offset = int(words.offsets[begins[wrong[0]]])
         error = source.error(f"{item} {wrong[0] + first}: {found}", offset)
-        source.refuse(error, len(wrong), part, wrong + first)
+        source.refuse_error(error, len(wrong), part, wrong + first)
     if block.name == "triangles" and len(begins) != count:
         found = f"triangles: expected {count} rows of 3 numbers, found {len(begins)}"
-        source.refuse(source.error(found, block.header))
+        source.refuse_error(source.error(found, block.header))
     return rows, words.offsets[begins]
 
 
@@ -123,7 +124,7 @@ def whole_corners(source: Source, rows: Floats, offsets: Places, first: int) -> 
         found = f"{rows[row][wrong[row]][0]:g}"
         message = f"triangle {row + first}: expected a vertex index, found {found}"
         error = source.error(message, int(offsets[row]))
-        source.refuse(error, int(wrong.sum()), "triangles", triangles + first)
+        source.refuse_error(error, int(wrong.sum()), "triangles", triangles + first)
     return np.where(wrong, LOST, corners).astype(np.int32)
 
 
@@ -184,10 +185,10 @@ def _say_lines(
         pairs, found = words.word(int(heads[0])), int(after[0] - heads[0]) - 1
         error = source.error(
             f"skinweights of vertex {vertices[0]}: expected a count and as many pairs of joint "
-            f"and weight, found {shown(pairs)} and {found} numbers",
+            f"and weight, found {quoted(pairs)} and {found} numbers",
             int(words.offsets[heads[0]]),
         )
-        source.refuse(error, len(vertices), "weights", vertices)
+        source.refuse_error(error, len(vertices), "weights", vertices)
 
 
 def _influences(
@@ -208,9 +209,9 @@ def _influences(
         place = int(places[wrong[0]])
         error = source.error(
             f"skinweights of vertex {owners[wrong[0]]}: expected a joint index, "
-            f"found {shown(words.word(place))}",
+            f"found {quoted(words.word(place))}",
             int(words.offsets[place]),
         )
-        source.refuse(error, len(wrong), "weights", owners[wrong])
+        source.refuse_error(error, len(wrong), "weights", owners[wrong])
     lost = np.isnan(joints) | np.isnan(weights) | (whole != joints)
     return np.where(lost, 0, whole).astype(np.int32), np.where(lost, 0.0, weights)

@@ -14,7 +14,8 @@ from viewer.formats._skin.blocks import KEYWORDS, Block, block_rows, find_block,
 from viewer.formats._skin.material import read_material
 from viewer.formats._skin.mending import mended_rows, mended_weights, whole_corners
 from viewer.formats._skin.weights import read_weights
-from viewer.formats._source import Source, shown
+from viewer.formats._source import Source
+from viewer.phrases import quoted
 from viewer.rig.arrays import Bytes, Floats, Ints
 from viewer.rig.mesh import Material
 
@@ -104,7 +105,7 @@ def read_sections(source: Source) -> Sections:
             extra_braces += 1
             position = word.end()
         else:
-            source.warn(f"skipped unknown section {shown(name)}", word.start())
+            source.warn(f"skipped unknown section {quoted(name)}", word.start())
             position = _skip(source, word)
     if extra_braces:
         source.warn(f'ignored {extra_braces} "}}" outside all sections')
@@ -187,7 +188,7 @@ def check_declared(source: Source, sections: Sections, name: str) -> None:
     declared = sections.counts[name]
     if declared != found:
         message = f"{name}: expected {declared} entries as its count says, found {found}"
-        source.refuse(source.error(message, sections.offsets[name]))
+        source.refuse_error(source.error(message, sections.offsets[name]))
 
 
 def _count(source: Source, name: str, word: Word) -> tuple[int, int]:
@@ -197,7 +198,9 @@ def _count(source: Source, name: str, word: Word) -> tuple[int, int]:
         raise source.error(f"{name}: expected a count, found the end of the file", word.start())
     value = to_number(found.group())
     if value is None or value != int(value) or value < 0:
-        raise source.error(f"{name}: expected a count, found {shown(found.group())}", found.start())
+        raise source.error(
+            f"{name}: expected a count, found {quoted(found.group())}", found.start()
+        )
     # Even an entry of one letter needs white space before it.
     left = len(source.data) - found.end()
     if value * 2 > left + 1:
@@ -222,5 +225,7 @@ def _skip(source: Source, word: Word) -> int:
         if text == b"}" and depth == 0:
             return position
     if depth:
-        raise source.error(f"{shown(word.group())} is still open where the file ends", word.start())
+        raise source.error(
+            f"{quoted(word.group())} is still open where the file ends", word.start()
+        )
     return position

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from viewer.errors import FormatError
 from viewer.formats._skin.blocks import Block, block_numbers, opened, to_whole, word_at
-from viewer.formats._source import Source, shown
+from viewer.formats._source import Source
 from viewer.formats._tolerant import read_words
+from viewer.phrases import quoted
 from viewer.rig.arrays import Floats, Ints
 
 __all__ = ["find_heads", "read_weights"]
@@ -128,7 +129,7 @@ def _misstated(source: Source, block: Block, count: int) -> FormatError | None:
     if stated < 0 or stated % 1:
         return _error(source, block, vertex, head, "a number of influences")
     return source.error(
-        f"skinweights of vertex {vertex}: expected {shown(words.word(head))[1:-1]} pairs of joint "
+        f"skinweights of vertex {vertex}: expected {quoted(words.word(head))[1:-1]} pairs of joint "
         f"and weight, found {int(sizes[vertex]) - 1} numbers in the line",
         int(words.offsets[head]),
     )
@@ -137,7 +138,7 @@ def _misstated(source: Source, block: Block, count: int) -> FormatError | None:
 def _error(source: Source, block: Block, vertex: int, place: int, wanted: str) -> FormatError:
     offset, word = word_at(source, block, place)
     return source.error(
-        f"skinweights of vertex {vertex}: expected {wanted}, found {shown(word)}", offset
+        f"skinweights of vertex {vertex}: expected {wanted}, found {quoted(word)}", offset
     )
 
 

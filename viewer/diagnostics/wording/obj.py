@@ -1,0 +1,5 @@
+"""Messages about ``.obj`` files."""
+
+MESSAGES: dict[str, str] = {}
+
+PHRASES: dict[str, str] = {}

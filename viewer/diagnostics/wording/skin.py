@@ -1,0 +1,5 @@
+"""Messages about ``.skin`` files."""
+
+MESSAGES: dict[str, str] = {}
+
+PHRASES: dict[str, str] = {}
