@@ -31,6 +31,8 @@ def sample(spec: str) -> Any:
     """Return a value that a specification can show."""
     if spec[:1] in "#?" and spec:
         return 3
+    if spec == "word":
+        return b"x"
     if spec in ("list", "or"):
         return ["first", "second"]
     return 1.5 if re.fullmatch(r"[+,.\d]*[efg%]", spec) else 3 if spec == "d" else "x\ny"

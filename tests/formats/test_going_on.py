@@ -85,8 +85,8 @@ ONE: list[tuple[Any, str, str, str, str, str, str, list[int]]] = [
     (skin, "a.skin", SKIN, "1 1 1\n}", "1 0.5 1\n}",
      'a.skin:14: skinweights of vertex 2: expected a joint index, found "0.5"', "weights", [2]),
     (skin, "a.skin", SKIN, "1 1 1\n}", "2 1 1\n}",
-     "a.skin:14: skinweights of vertex 2: expected a count and as many pairs of joint and weight, "
-     'found "2" and 2 numbers', "weights", [2]),
+     "a.skin:14: skinweights of vertex 2: expected 2 pairs of joint and weight, found 2 numbers in "
+     "the line", "weights", [2]),
     (skin, "a.skin", SKIN, "  1 1 1\n}", "}",
      "a.skin:11: skinweights: expected 3 entries as in positions, found 2", "weights", [2]),
     (skin, "a.skin", SKIN, "0 1 2\n}", "0 1 7\n}",

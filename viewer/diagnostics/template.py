@@ -2,6 +2,7 @@
 
 =====================  ===========================================================================
 ``{word:quoted}``      a word in quotes; None is the end of the file
+``{word:word}``        the word without quotes
 ``{name:text}``        any text on one line, control characters escaped
 ``{names:list}``       the first few, and how many more
 ``{names:or}``         alternatives
@@ -58,8 +59,13 @@ def _word(word: bytes | str | None) -> str:
     return "the end of the file" if word is None else quoted(word)
 
 
+def _bare(word: bytes) -> str:
+    return printable(word.decode("utf-8", "replace"), 40)
+
+
 _PLAIN: dict[str, Callable[[Any], str]] = {
     "quoted": _word,
+    "word": _bare,
     "text": printable,
     "list": listed,
     "or": one_of,
