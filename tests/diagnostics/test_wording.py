@@ -33,9 +33,11 @@ def sample(spec: str) -> Any:
         return 3
     if spec == "word":
         return b"x"
-    if spec in ("list", "or"):
+    if spec.startswith("list") or spec in ("axes", "or"):
         return ["first", "second"]
-    return 1.5 if re.fullmatch(r"[+,.\d]*[efg%]", spec) else 3 if spec == "d" else "x\ny"
+    if re.fullmatch(r"[+,.\d]*[efg%]", spec):
+        return 1.5
+    return 3 if spec == "d" else "x\ny" if spec else "x"
 
 
 @pytest.mark.parametrize("key", MESSAGES)
@@ -45,7 +47,7 @@ def test_every_message_renders_on_one_line(key: str) -> None:
     found = Diagnostic(key, Path("a.skin"), 7, values=values)
     line = str(found)
     assert line.startswith("a.skin:7: ") and len(line) > len("a.skin:7: ")
-    assert "{" not in line.replace('"{"', "") and (line.isprintable() or "text" not in line)
+    assert "{" not in line.replace('"{"', "") and line.isprintable()
 
 
 @pytest.mark.parametrize("key", PHRASES)

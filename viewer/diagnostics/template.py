@@ -4,7 +4,8 @@
 ``{word:quoted}``      a word in quotes; None is the end of the file
 ``{word:word}``        the word without quotes
 ``{name:text}``        any text on one line, control characters escaped
-``{names:list}``       the first few, and how many more
+``{names:list}``       the first six and how many more, ``none``; ``list12`` for twelve
+``{shape:axes}``       the axes of an array: ``800 x 3``; letters stand for any number
 ``{names:or}``         alternatives
 ``{n:#vertex}``        a count with its noun: ``3 vertices``
 ``{n:#vertex|is|are}`` the same with a verb that agrees
@@ -16,7 +17,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from string import Formatter
 from typing import Any
 
@@ -47,6 +48,8 @@ class _Formatter(Formatter):
         if kind == "+":
             # An empty pair of braces in a specification has been filled with "" by now.
             return rest.replace("\0", printable(value, 300)) if value else ""
+        if format_spec.startswith("list"):
+            return listed([*map(printable, value)], int(format_spec[4:] or 6)) or "none"
         plain = _PLAIN.get(format_spec)
         return plain(value) if plain is not None else str(format(value, format_spec))
 
@@ -63,11 +66,18 @@ def _bare(word: bytes) -> str:
     return printable(word.decode("utf-8", "replace"), 40)
 
 
+def _axes(shape: Sequence[int | str | None]) -> str:
+    if not shape:
+        return "a single"
+    # Files may declare 32 axes of any size.
+    return printable(" x ".join("any" if axis is None else str(axis) for axis in shape), 80)
+
+
 _PLAIN: dict[str, Callable[[Any], str]] = {
     "quoted": _word,
     "word": _bare,
     "text": printable,
-    "list": listed,
+    "axes": _axes,
     "or": one_of,
 }
 _FORMATTER = _Formatter()

@@ -6,9 +6,20 @@ code the name is unique. ``PHRASES`` are parts of messages, by a name alone.
 
 from __future__ import annotations
 
-from viewer.diagnostics.wording import morph, obj, reading, skin, weights
+from viewer.diagnostics.wording import (
+    archives,
+    body_models,
+    easymocap,
+    morph,
+    obj,
+    pictures,
+    poses,
+    reading,
+    skin,
+    weights,
+)
 
-_TABLES = (reading, skin, morph, obj, weights)
+_TABLES = (reading, skin, morph, obj, archives, body_models, easymocap, poses, pictures, weights)
 
 MESSAGES: dict[str, str] = {
     key: template for table in _TABLES for key, template in table.MESSAGES.items()
