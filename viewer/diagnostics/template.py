@@ -3,7 +3,8 @@
 =====================  ===========================================================================
 ``{word:quoted}``      a word in quotes; None is the end of the file
 ``{word:word}``        the word without quotes
-``{name:text}``        any text on one line, control characters escaped
+``{name}``             numbers as they are, texts with control characters escaped
+``{name:text}``        the same, not more than 200 letters
 ``{names:list}``       the first six and how many more, ``none``; ``list12`` for twelve
 ``{shape:axes}``       the axes of an array: ``800 x 3``; letters stand for any number
 ``{names:or}``         alternatives
@@ -22,6 +23,9 @@ from string import Formatter
 from typing import Any
 
 from viewer.phrases import counted, listed, one_of, printable, quoted
+
+_PLACE = "\0"  # of a value inside its own specification
+_LONGEST = 1000  # letters of a text that is a value
 
 
 def rendered(template: str, values: Mapping[str, Any]) -> str:
@@ -47,15 +51,17 @@ class _Formatter(Formatter):
             return one if value == 1 else many
         if kind == "+":
             # An empty pair of braces in a specification has been filled with "" by now.
-            return rest.replace("\0", printable(value, 300)) if value else ""
+            return rest.replace(_PLACE, printable(value, 300)) if value else ""
         if format_spec.startswith("list"):
             return listed([*map(printable, value)], int(format_spec[4:] or 6)) or "none"
+        if not format_spec and isinstance(value, str) and value != _PLACE:
+            return printable(value, _LONGEST)
         plain = _PLAIN.get(format_spec)
         return plain(value) if plain is not None else str(format(value, format_spec))
 
     def get_value(self, key: int | str, args: Any, kwargs: Mapping[str, Any]) -> Any:
         """Return a value by name; the empty name inside a specification is a placeholder."""
-        return kwargs[key] if isinstance(key, str) and key else "\0"
+        return kwargs[key] if isinstance(key, str) and key else _PLACE
 
 
 def _word(word: bytes | str | None) -> str:

@@ -16,6 +16,8 @@ MESSAGES = {
     "F002.unclosed": 'expected "}}" to close {section} (line {line}), found {found:quoted}',
     "F002.open": "{word:quoted} is still open where the file ends",
     "F006.last-brace": 'the last "}}" is missing: {section} ends with the file',
+    "F006.unknown": "skipped unknown {found:quoted}",
+    "F007.no-faces": "no faces: {n} points, of which nothing is drawn",
     "F007.further-warnings": "further warnings are left out",
 }
 
