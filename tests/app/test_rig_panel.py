@@ -21,7 +21,7 @@ from viewer.app.rig_placing import as_similarity, move_by_hand, placing_now
 from viewer.app.rig_sources import current_template, target_mesh, template_texts
 from viewer.app.rig_steps import align_template
 from viewer.app.rig_work import start_adding, start_reading
-from viewer.autorig.alignment import Alignment, AlignmentSettings
+from viewer.autorig.alignment.surface_alignment import Alignment, AlignmentSettings
 from viewer.export import export
 from viewer.formats.rigged import save
 from viewer.rig.geometry.transform import apply_transform

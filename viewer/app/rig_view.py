@@ -14,9 +14,9 @@ from viewer.rig.arrays import Floats
 if TYPE_CHECKING:
     from viewer.app.jobs import CountedJob
     from viewer.app.state import AppState
-    from viewer.autorig.alignment import Alignment, AlignmentSettings
+    from viewer.autorig.alignment.similarity import Similarity
+    from viewer.autorig.alignment.surface_alignment import Alignment, AlignmentSettings
     from viewer.autorig.rigged import Rigged
-    from viewer.autorig.similarity import Similarity
     from viewer.rendering.passes.ghost_pass import Ghost
     from viewer.rig.figure import Figure
     from viewer.rig.geometry.ray_hit import RayHit

@@ -30,7 +30,7 @@ from viewer.app.rig_steps import (
 )
 from viewer.app.rig_view import Landmark, Placing, Result, RigChoices, Running, Template
 from viewer.app.state import AppState
-from viewer.autorig.alignment import AlignmentSettings
+from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.autorig.pipeline import transfer
 from viewer.autorig.settings import METHODS
 from viewer.errors import RigError, printable
