@@ -7,8 +7,8 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from drawn_figures import arm, bent, checker
-from golden_scenes import LINES, Shot, options, posed_fox
+from rendering.drawn_figures import arm, bent, checker
+from rendering.golden_scenes import LINES, Shot, options, posed_fox
 
 import viewer
 from viewer.loading import bundled_body

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn_figures import arm, bent, skeleton, square
-from front_view import PIXELS, grid_figure
+from rendering.drawn_figures import arm, bent, skeleton, square
+from rendering.front_view import PIXELS, grid_figure
 
 from viewer.rendering.camera import Camera
 from viewer.rendering.offscreen import Offscreen

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn_figures import arm, bent, scene_of, skeleton, square
 from family_models import family_figure
-from front_view import alone, drawn, front_view, grid_figure, pixel
+from rendering.drawn_figures import arm, bent, scene_of, skeleton, square
+from rendering.front_view import alone, drawn, front_view, grid_figure, pixel
 
 from viewer.rendering.camera import Camera
 from viewer.rendering.colormap import colormap

@@ -17,7 +17,7 @@ from viewer.rendering.gpu.context import check_errors, device_count, explain, he
 from viewer.rendering.gpu.upload import buffer
 from viewer.rendering.offscreen import Offscreen
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 LINUX = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="EGL is Linux's way")
 
 TINY_SKEL = """balljoint root {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from drawn_figures import sphere
+from rendering.drawn_figures import sphere
 
 from viewer.rendering.gpu.index_sets import curve_places, index_set
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from drawn_figures import skeleton
-from front_view import PIXELS, alone, drawn, front_view, grid_figure, pixel
+from rendering.drawn_figures import skeleton
+from rendering.front_view import PIXELS, alone, drawn, front_view, grid_figure, pixel
 
 from viewer.rendering.camera import Camera
 from viewer.rendering.offscreen import Offscreen

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from drawn_figures import skeleton
 from numpy.testing import assert_allclose
+from rendering.drawn_figures import skeleton
 
 from viewer.rendering.camera import Camera
 from viewer.rendering.overlay.joint_marks import (

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn_figures import skeleton
+from rendering.drawn_figures import skeleton
 
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.overlay.legend import Entry, Shown, legend_of, round_ticks

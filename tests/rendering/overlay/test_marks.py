@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from drawn_figures import square
-from front_view import PIXELS, drawn, front_view, pixel
+from rendering.drawn_figures import square
+from rendering.front_view import PIXELS, drawn, front_view, pixel
 
 from viewer.rendering.camera import Camera
 from viewer.rendering.offscreen import Offscreen

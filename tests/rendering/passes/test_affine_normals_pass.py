@@ -5,7 +5,7 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 import pytest
-from drawn_figures import random_pose, skeleton, sphere
+from rendering.drawn_figures import random_pose, skeleton, sphere
 
 import viewer
 from viewer.rendering.camera import Camera

@@ -5,8 +5,8 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 import pytest
-from drawn_figures import random_pose
 from family_models import family_figure
+from rendering.drawn_figures import random_pose
 
 import viewer
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers

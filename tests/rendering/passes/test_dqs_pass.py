@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn_figures import random_figure, random_pose
+from rendering.drawn_figures import random_figure, random_pose
 
 import viewer
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers

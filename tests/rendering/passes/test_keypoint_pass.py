@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from front_view import PIXELS, alone, drawn, front_view, grid_figure
+from rendering.front_view import PIXELS, alone, drawn, front_view, grid_figure
 
 from viewer.rendering.offscreen import Offscreen
 from viewer.rig.annotations import Keypoints

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn_figures import arm, square
-from front_view import drawn, front_view, pixel
+from rendering.drawn_figures import arm, square
+from rendering.front_view import drawn, front_view, pixel
 
 from viewer.rendering.camera import Camera
 from viewer.rendering.offscreen import Offscreen

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from drawn_figures import square
-from front_view import PIXELS, drawn, front_view, pixel
+from rendering.drawn_figures import square
+from rendering.front_view import PIXELS, drawn, front_view, pixel
 
 from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.passes.point_pass import point_radii

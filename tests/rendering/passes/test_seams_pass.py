@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from drawn_figures import random_pose, skeleton
 from family_models import family_figure
+from rendering.drawn_figures import random_pose, skeleton
 
 import viewer
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers

@@ -7,7 +7,7 @@ from dataclasses import replace
 import moderngl
 import numpy as np
 import pytest
-from drawn_figures import arm, random_figure, random_pose, square
+from rendering.drawn_figures import arm, random_figure, random_pose, square
 
 import viewer
 from viewer.rendering.camera import Camera, orbit

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from hand_made import mesh, skeleton
 from numpy.testing import assert_allclose
+from rig.hand_made import mesh, skeleton
 
 from viewer.rig.captures.fit_error import fitted_body, keypoint_distances
 from viewer.rig.captures.keypoint_layouts import keypoint_layout

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hand_made import skeleton
 from numpy.testing import assert_allclose
+from rig.hand_made import skeleton
 
 from viewer.errors import RigError
 from viewer.rig.comparison import compare, rotation_distance

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
-from hand_made import turn_x, turn_y, turn_z
 from numpy.testing import assert_allclose
+from rig.hand_made import turn_x, turn_y, turn_z
 
 from viewer.rig.geometry.rotation import axis_rotations, quaternion_to_matrix
 

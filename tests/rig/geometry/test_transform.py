@@ -1,5 +1,5 @@
 import numpy as np
-from hand_made import matrix, turn_z
+from rig.hand_made import matrix, turn_z
 
 from viewer.rig.geometry.transform import apply_transform, translation_matrix
 

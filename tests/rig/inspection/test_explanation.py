@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hand_made import matrix, mesh, skeleton, turn_z
 from numpy.testing import assert_allclose
+from rig.hand_made import matrix, mesh, skeleton, turn_z
 
 from viewer.errors import RigError
 from viewer.rig.blendshapes import BlendShapes, Correctives

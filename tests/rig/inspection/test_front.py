@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hand_made import matrix, mesh, turn_y, turn_z
+from rig.hand_made import matrix, mesh, turn_y, turn_z
 
 import viewer
 from viewer.loading import bundled_body

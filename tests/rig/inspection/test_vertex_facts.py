@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hand_made import mesh, skeleton
 from numpy.testing import assert_allclose
+from rig.hand_made import mesh, skeleton
 
 from viewer.errors import RigError
 from viewer.rig.annotations import BodyParts

@@ -5,8 +5,8 @@ import pytest
 from export.plain_smpl import rotation, smpl_forward
 from family_models import family_figure
 from formats.synthetic_smpl import model
-from hand_made import skeleton
 from numpy.testing import assert_allclose
+from rig.hand_made import skeleton
 
 from viewer.errors import RigError
 from viewer.rig.figure import Figure

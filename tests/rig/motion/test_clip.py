@@ -3,9 +3,9 @@
 import itertools
 from pathlib import Path
 
-import hand_made
 import numpy as np
 import pytest
+from rig import hand_made
 
 import viewer
 from viewer.errors import RigError
@@ -22,7 +22,7 @@ from viewer.rig.motion.clip import (
 from viewer.rig.motion.clip_sampling import evaluate
 from viewer.rig.skeleton import DOF_KINDS
 
-SHARED = Path(__file__).resolve().parents[2].parent / "shared" / "data" / "cse169"
+SHARED = Path(__file__).resolve().parents[3].parent / "shared" / "data" / "cse169"
 
 
 def channel(keys: list[tuple[float, float, object, object]], before="constant", after="constant"):

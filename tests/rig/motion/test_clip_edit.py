@@ -1,9 +1,9 @@
 """Editing of keys: what moves, what stays, and that the old channel is never touched."""
 
-import hand_made
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from rig import hand_made
 
 from viewer.errors import RigError
 from viewer.rig.motion.clip import Channel, Clip, slopes

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hand_made import skeleton
+from rig.hand_made import skeleton
 
 import viewer
 from viewer.loading import bundled_body

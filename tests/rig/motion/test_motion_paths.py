@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hand_made import skeleton
+from rig.hand_made import skeleton
 
 from viewer.errors import RigError
 from viewer.rig.captures.points import PointClip, PointLayout

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hand_made import skeleton as course_skeleton
 from numpy.testing import assert_allclose
+from rig.hand_made import skeleton as course_skeleton
 
 import viewer
 from viewer.loading import bundled_body

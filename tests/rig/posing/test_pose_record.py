@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from family_models import family_figure
 from formats.synthetic_smpl import model
-from hand_made import mesh, skeleton
 from numpy.testing import assert_allclose
+from rig.hand_made import mesh, skeleton
 
 from viewer.errors import RigError
 from viewer.rig.figure import Figure

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hand_made import matrix, mesh, skeleton, turn_x, turn_y, turn_z
 from numpy.testing import assert_allclose
+from rig.hand_made import matrix, mesh, skeleton, turn_x, turn_y, turn_z
 
 from viewer.errors import RigError
 from viewer.rig.figure import Figure

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hand_made import mesh, skeleton
 from numpy.testing import assert_allclose
+from rig.hand_made import mesh, skeleton
 
 from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.figure import Figure

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hand_made import mesh, skeleton
+from rig.hand_made import mesh, skeleton
 
 from viewer.rig.figure import Figure
 from viewer.rig.scalars import compute

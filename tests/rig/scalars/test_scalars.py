@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hand_made import mesh, skeleton
 from numpy.testing import assert_allclose
+from rig.hand_made import mesh, skeleton
 
 from viewer.errors import RigError
 from viewer.rig import scalars

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from hand_made import matrix, plain_skinning, skeleton, turn_x, turn_y
 from numpy.testing import assert_allclose
+from rig.hand_made import matrix, plain_skinning, skeleton, turn_x, turn_y
 
 from viewer.errors import RigError
 from viewer.rig.blendshapes import BlendShapes, Correctives

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from hand_made import matrix, mesh, skeleton, turn_x, turn_y, turn_z
 from numpy.testing import assert_allclose
+from rig.hand_made import matrix, mesh, skeleton, turn_x, turn_y, turn_z
 
 from viewer.rig.figure import Figure
 from viewer.rig.pose import rest_pose

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
-from hand_made import matrix, mesh, plain_skinning, skeleton, turn_x, turn_z
 from numpy.testing import assert_allclose
+from rig.hand_made import matrix, mesh, plain_skinning, skeleton, turn_x, turn_z
 
 from viewer.errors import RigError
 from viewer.rig.figure import Figure
