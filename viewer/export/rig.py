@@ -14,7 +14,7 @@ from viewer.formats import Source, all_or_none, keeping_written, read, write
 from viewer.rig.figure import Figure
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.mesh import Mesh, split_seams
-from viewer.rig.motion.pose_take import pose_frames
+from viewer.rig.motion.single_frame import pose_frames
 from viewer.rig.pose import Pose, rest_pose
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped

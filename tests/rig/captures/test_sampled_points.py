@@ -1,12 +1,12 @@
-"""Takes of captured points: frames, gaps, and worlds that hang head down."""
+"""Captured points at a fixed rate: frames, gaps, and worlds that are upside down."""
 
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
 from viewer.errors import RigError
-from viewer.rig.captures.point_take import upright_point_take
 from viewer.rig.captures.points import PointClip, PointLayout
+from viewer.rig.captures.sampled_points import sample_upright_points
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import rotation_transform
 from viewer.rig.motion.timing import Timing
@@ -30,44 +30,49 @@ def scene_of(up="z", rows=(0, -1, 1), placement=None):
 
 
 def test_frames_come_back_as_they_were_captured():
-    take, up = upright_point_take(*scene_of())
-    assert (take.name, take.layout, take.frame_rate, up) == ("two 4", LAYOUT, 10.0, "z")
-    assert (take.first_frame, take.times.tolist()) == (7, [0.0, 0.1, 0.2])
-    assert take.present.tolist() == [True, False, True]
-    assert take.confidences.tolist() == [[0.5, 0.0], [0.0, 0.0], [1.0, 0.25]]
+    animation, up = sample_upright_points(*scene_of())
+    assert (animation.name, animation.layout, animation.frame_rate, up) == (
+        "two 4",
+        LAYOUT,
+        10.0,
+        "z",
+    )
+    assert (animation.first_frame, animation.times.tolist()) == (7, [0.0, 0.1, 0.2])
+    assert animation.present.tolist() == [True, False, True]
+    assert animation.confidences.tolist() == [[0.5, 0.0], [0.0, 0.0], [1.0, 0.25]]
     expected = [[[1, 2, 3], [NAN] * 3], [[NAN] * 3] * 2, [[3, 2, 3], [4, 5, 6]]]
-    assert_array_equal(take.points, expected)
+    assert_array_equal(animation.points, expected)
 
 
 def test_range_and_bridged_gaps():
-    take, _ = upright_point_take(*scene_of(), frames=(1, 3), fill=True)
-    assert (take.first_frame, take.present.tolist()) == (8, [True, True])
-    assert_array_equal(take.points[0], [[2, 2, 3], [NAN] * 3])  # b is seen in one of the two
+    animation, _ = sample_upright_points(*scene_of(), frames=(1, 3), fill=True)
+    assert (animation.first_frame, animation.present.tolist()) == (8, [True, True])
+    assert_array_equal(animation.points[0], [[2, 2, 3], [NAN] * 3])  # b is seen in one of the two
 
 
 def test_another_rate_counts_from_zero():
-    take, _ = upright_point_take(*scene_of(rows=(0, 1)), rate=20.0)
-    assert (take.first_frame, take.frame_rate) == (0, 20.0)
-    assert take.points[:, 0, 0].tolist() == [1.0, 2.0, 3.0]
+    animation, _ = sample_upright_points(*scene_of(rows=(0, 1)), rate=20.0)
+    assert (animation.first_frame, animation.frame_rate) == (0, 20.0)
+    assert animation.points[:, 0, 0].tolist() == [1.0, 2.0, 3.0]
 
 
 def test_world_that_hangs_is_turned_over():
-    take, up = upright_point_take(*scene_of("y", placement=rotation_transform(0, np.pi)))
+    animation, up = sample_upright_points(*scene_of("y", placement=rotation_transform(0, np.pi)))
     assert up == "y"
-    assert_array_equal(take.points[2], [[3, -2, -3], [4, -5, -6]])
+    assert_array_equal(animation.points[2], [[3, -2, -3], [4, -5, -6]])
 
 
 def test_placement_between_axes_is_left_out():
     quarter = rotation_transform(0, -np.pi / 2)  # what stands along z stands along y in the scene
-    take, up = upright_point_take(*scene_of("y", placement=quarter))
+    animation, up = sample_upright_points(*scene_of("y", placement=quarter))
     assert up == "z"
-    assert_array_equal(take.points[2], POINTS[1, :, :3])
+    assert_array_equal(animation.points[2], POINTS[1, :, :3])
 
 
 def test_ranges_outside_and_actors_without_points_are_refused():
     scene, actor = scene_of()
     with pytest.raises(RigError, match=r"^frames: expected a range within 0 to 3, found 5 to 9$"):
-        upright_point_take(scene, actor, frames=(5, 9))
+        sample_upright_points(scene, actor, frames=(5, 9))
     actor.clip = None
     with pytest.raises(RigError, match=r"^two 4 has no motion of points$"):
-        upright_point_take(scene, actor)
+        sample_upright_points(scene, actor)

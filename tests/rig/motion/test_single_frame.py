@@ -1,4 +1,4 @@
-"""A pose as a take of one frame: where its joints are, what moves it, and what is up."""
+"""A pose as an animation of one frame: where its joints are, what moves it, and what is up."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from viewer.rig.geometry.transform import rotation_transform
 from viewer.rig.mesh import Mesh
 from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.evaluation import world_frames
-from viewer.rig.motion.pose_take import pose_take, posed_take
 from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.single_frame import single_frame, upright_single_frame
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skeleton import Skeleton, ball_skeleton
 
@@ -32,8 +32,8 @@ def arm() -> Figure:
     return Figure("arm", skeleton=skeleton)
 
 
-def places(take):
-    return world_frames(take.figure, take.frames)[0, :, :3, 3]
+def places(animation):
+    return world_frames(animation.figure, animation.frames)[0, :, :3, 3]
 
 
 def set_dof(actor, name, kind, value):
@@ -49,21 +49,25 @@ def test_joints_are_where_the_pose_has_them():
     actor.pose.translations[0] = [0.0, 0.0, 3.0]
     actor.pose.figure_translation[:] = [10.0, 0.0, 0.0]
     actor.pose.figure_scale = 2.0
-    take = pose_take(actor, rate=25.0, number=7, time=0.28)
+    animation = single_frame(actor, rate=25.0, number=7, time=0.28)
     # Twice as large, then moved by 10.
-    assert_allclose(places(take), [[10, 0, 6], [12, 0, 6], [12, 2, 6]], atol=ATOL)
-    assert (take.name, take.frame_rate, take.first_frame) == ("arm", 25.0, 7)
-    assert_array_equal(take.frames.times, [0.28])
-    assert take.frames.present.tolist() == [True]
+    assert_allclose(places(animation), [[10, 0, 6], [12, 0, 6], [12, 2, 6]], atol=ATOL)
+    assert (animation.name, animation.frame_rate, animation.first_frame) == ("arm", 25.0, 7)
+    assert_array_equal(animation.frames.times, [0.28])
+    assert animation.frames.present.tolist() == [True]
 
 
 def test_motion_holds_the_same_frame():
     actor = Actor(arm())
     set_dof(actor, "elbow", 5, 0.5)
-    take = pose_take(actor, number=3, time=0.1)
-    assert isinstance(take.motion, SampledClip)
-    assert (take.motion.start, take.motion.end, take.motion.timing.first_frame) == (0.1, 0.1, 3)
-    assert_array_equal(take.motion.rotations, take.frames.rotations)
+    animation = single_frame(actor, number=3, time=0.1)
+    assert isinstance(animation.motion, SampledClip)
+    assert (animation.motion.start, animation.motion.end, animation.motion.timing.first_frame) == (
+        0.1,
+        0.1,
+        3,
+    )
+    assert_array_equal(animation.motion.rotations, animation.frames.rotations)
 
 
 def course_rig() -> Figure:
@@ -88,28 +92,28 @@ def test_rigs_of_keys_get_their_own_numbers_as_keys():
     # No other angles would do: those that are nearest to zero lie outside of the limits.
     actor = Actor(course_rig())
     actor.pose.dofs[:] = [5.0, 0.0, 0.0, 0.25, 2.5, 0.0]
-    take = pose_take(actor, time=1.5)
-    assert isinstance(take.motion, Clip)
-    assert (take.motion.start, take.motion.end) == (1.5, 1.5)
-    keys = [(c.target, c.times.tolist(), c.values.tolist()) for c in take.motion.channels]
+    animation = single_frame(actor, time=1.5)
+    assert isinstance(animation.motion, Clip)
+    assert (animation.motion.start, animation.motion.end) == (1.5, 1.5)
+    keys = [(c.target, c.times.tolist(), c.values.tolist()) for c in animation.motion.channels]
     assert keys == [
         (row, [1.5], [value]) for row, value in enumerate([5.0, 0.0, 0.0, 0.25, 2.5, 0.0])
     ]
     turn = axis_rotations(1, np.array(2.5)) @ axis_rotations(0, np.array(0.25))
-    found = world_frames(take.figure, take.frames)[0, 0]
+    found = world_frames(animation.figure, animation.frames)[0, 0]
     assert_allclose(found[:3, :3], turn, atol=ATOL)
     assert_allclose(found[:3, 3], [5, 0, 0], atol=ATOL)
 
 
 def test_who_is_away_is_missing():
     actor = Actor(arm(), is_present=False)
-    assert pose_take(actor).frames.present.tolist() == [False]
+    assert single_frame(actor).frames.present.tolist() == [False]
 
 
 def test_scales_of_joints_are_kept():
     actor = Actor(arm())
     actor.pose.scales[0] = [3.0, 1.0, 1.0]
-    assert_allclose(places(pose_take(actor)), [[0, 0, 0], [3, 0, 0], [6, 0, 0]], atol=ATOL)
+    assert_allclose(places(single_frame(actor)), [[0, 0, 0], [3, 0, 0], [6, 0, 0]], atol=ATOL)
     assert_array_equal(actor.figure.skeleton.rest_scales, np.ones((3, 3)))
 
 
@@ -118,12 +122,12 @@ def test_shapes_that_the_pose_leaves_out_count_as_0():
     shapes = BlendShapes(("a", "b"), np.zeros((2, 3, 3)))
     actor = Actor(replace(arm(), mesh=mesh, blend_shapes=shapes))
     actor.pose.shape_weights = np.array([0.5])
-    assert_array_equal(pose_take(actor).frames.shape_weights, [[0.5, 0.0]])
+    assert_array_equal(single_frame(actor).frames.shape_weights, [[0.5, 0.0]])
 
 
 def test_figures_without_joints_are_refused():
     with pytest.raises(RigError, match=r"^figure stone has no joints to pose$"):
-        pose_take(Actor(Figure("stone", mesh=Mesh(np.eye(3), np.eye(3), np.array([[0, 1, 2]])))))
+        single_frame(Actor(Figure("stone", mesh=Mesh(np.eye(3), np.eye(3), np.array([[0, 1, 2]])))))
 
 
 def test_who_hangs_stands_up_unless_the_world_is_kept():
@@ -131,10 +135,10 @@ def test_who_hangs_stands_up_unless_the_world_is_kept():
     set_dof(actor, "elbow", 5, np.pi / 2)
     actor.pose.figure_translation[:] = [0.0, 4.0, 0.5]
     scene = Scene([actor], world_up="y")
-    take, up = posed_take(scene, actor)
+    animation, up = upright_single_frame(scene, actor)
     # Half a turn about x carries y to -y and z to -z.
-    assert up == "y" and take.figure is actor.figure
-    assert_allclose(places(take), [[0, -4, -0.5], [1, -4, -0.5], [1, -5, -0.5]], atol=ATOL)
-    kept, up = posed_take(scene, actor, keeps_world=True)
+    assert up == "y" and animation.figure is actor.figure
+    assert_allclose(places(animation), [[0, -4, -0.5], [1, -4, -0.5], [1, -5, -0.5]], atol=ATOL)
+    kept, up = upright_single_frame(scene, actor, keeps_world=True)
     assert up == "-y"
     assert_allclose(places(kept), [[0, 4, 0.5], [1, 4, 0.5], [1, 5, 0.5]], atol=ATOL)

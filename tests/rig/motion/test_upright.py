@@ -12,8 +12,8 @@ from viewer.loading import bundled_body
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import rotation_transform
 from viewer.rig.motion.evaluation import pose_of
+from viewer.rig.motion.sampled_animation import upright_animation
 from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.take import upright_take
 from viewer.rig.motion.timing import Timing
 from viewer.rig.motion.upright import own_up, upright_actor
 from viewer.rig.scene import Actor, Scene
@@ -115,11 +115,11 @@ def test_one_pose_is_the_frame_of_the_motion():
     actor.clip = SampledClip("a", Timing(30.0, np.arange(1)), turns, figure_translations=places)
     actor.placement = rotation_transform(0, np.pi)
     scene = Scene([actor], world_up="z")
-    take, up = upright_take(scene, actor)
+    animation, up = upright_animation(scene, actor)
     viewer.rig.motion.evaluation.pose_actor(actor, 0.0)
     found = upright_actor(scene, actor)
     assert (up, found.figure.up) == ("z", "z")
-    framed = pose_of(actor.figure, take.frames, 0)
+    framed = pose_of(actor.figure, animation.frames, 0)
     assert_allclose(
         deform(found.figure, found.pose)[0], deform(actor.figure, framed)[0], rtol=0, atol=1e-12
     )

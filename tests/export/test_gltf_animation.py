@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from family_animations import family_animation, family_motion, waves
 from family_models import family_figure
-from family_takes import family_motion, family_take, waves
 from gltf_files import AS_IS, EXACT, TO_Y, assert_drawn, corners
 from numpy.testing import assert_allclose, assert_array_equal
 from plain_gltf import Gltf
@@ -15,13 +15,13 @@ from small_rigs import clip_text, write_twist
 
 import viewer
 from viewer.errors import OutputError, RigError
-from viewer.export import EXPORTERS, MotionOptions, export_take
+from viewer.export import EXPORTERS, MotionOptions, export_animation
 from viewer.loading import bundled_body
 from viewer.rig.figure import Figure
 from viewer.rig.morph_target import MorphTarget, with_morphs
 from viewer.rig.motion.evaluation import pose_of, world_frames
+from viewer.rig.motion.sampled_animation import SampledAnimation, sample_animation
 from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.take import Take, take_of
 from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import ball_skeleton
@@ -37,7 +37,7 @@ def quaternions(vectors) -> np.ndarray:
     return np.concatenate([axes * np.sin(angles / 2), np.cos(angles / 2)], axis=-1)
 
 
-def roof_take(rows=None, count=4, rate=10.0, **tracks) -> Take:
+def roof_animation(rows=None, count=4, rate=10.0, **tracks) -> SampledAnimation:
     """Return the roof's joints turning more and more about z, on either side of the sphere."""
     vectors = np.zeros((count, 2, 3))
     vectors[:, 0, 2] = 0.5 * np.arange(count)
@@ -47,29 +47,29 @@ def roof_take(rows=None, count=4, rate=10.0, **tracks) -> Take:
     timing = Timing(rate, np.arange(count) if rows is None else rows, 7)
     figure = tracks.pop("figure", None) or seamed_actor(unit="m").figure
     clip = SampledClip("bend", timing, rotations, **tracks)
-    return take_of(Actor(figure, clip=clip))
+    return sample_animation(Actor(figure, clip=clip))
 
 
-def write(folder, take, name="out.glb", **options) -> tuple[Gltf, list[str]]:
-    notes = export_take(take, folder / name, "gltf", MotionOptions(**options))
+def write(folder, animation, name="out.glb", **options) -> tuple[Gltf, list[str]]:
+    notes = export_animation(animation, folder / name, "gltf", MotionOptions(**options))
     return Gltf(folder / name), notes
 
 
-def assert_played(gltf: Gltf, take: Take, turn=AS_IS, frames=None) -> None:
-    every = range(take.frames.n_frames) if frames is None else frames
+def assert_played(gltf: Gltf, animation: SampledAnimation, turn=AS_IS, frames=None) -> None:
+    every = range(animation.frames.n_frames) if frames is None else frames
     for frame in every:
-        pose = pose_of(take.figure, take.frames, frame)
-        assert_drawn(gltf, take.figure, pose, turn, frame / take.frame_rate)
+        pose = pose_of(animation.figure, animation.frames, frame)
+        assert_drawn(gltf, animation.figure, pose, turn, frame / animation.frame_rate)
 
 
 def test_frames_are_keys(tmp_path):
-    take = roof_take()
-    gltf, notes = write(tmp_path, take)
-    assert_played(gltf, take)
-    (animation,) = gltf.root["animations"]
-    assert animation["name"] == "bend"
-    assert [channel["target"]["path"] for channel in animation["channels"]] == ["rotation"] * 2
-    times = gltf.accessor(animation["samplers"][0]["input"])
+    animation = roof_animation()
+    gltf, notes = write(tmp_path, animation)
+    assert_played(gltf, animation)
+    (played,) = gltf.root["animations"]
+    assert played["name"] == "bend"
+    assert [channel["target"]["path"] for channel in played["channels"]] == ["rotation"] * 2
+    times = gltf.accessor(played["samplers"][0]["input"])
     assert_allclose(times, [0, 0.1, 0.2, 0.3], rtol=1e-7)
     # Half-way between two frames, on the shorter arc: the root has turned by 0.75.
     node = gltf.transforms(0.15)[gltf.named("root")]
@@ -81,7 +81,7 @@ def test_frames_are_keys(tmp_path):
         f"3 triangles, 2 joints, 4 frames (7 to 10) at 10 a second, {size} bytes"
     ]
     # Whoever does not play it sees the rest pose.
-    assert_drawn(gltf, take.figure, Actor(take.figure).pose)
+    assert_drawn(gltf, animation.figure, Actor(animation.figure).pose)
 
 
 def test_rows_that_move_get_channels(tmp_path):
@@ -90,9 +90,9 @@ def test_rows_that_move_get_channels(tmp_path):
     moves[:, 1] = 0, 0, 4  # shifted, but still
     places = np.arange(12.0).reshape(4, 3)
     scales = np.array([1.0, 2, 2, 3])
-    take = roof_take(translations=moves, figure_translations=places, figure_scales=scales)
-    gltf, notes = write(tmp_path, take)
-    assert_played(gltf, take)
+    animation = roof_animation(translations=moves, figure_translations=places, figure_scales=scales)
+    gltf, notes = write(tmp_path, animation)
+    assert_played(gltf, animation)
     found = [
         (gltf.nodes[channel["target"]["node"]]["name"], channel["target"]["path"])
         for channel in gltf.root["animations"][0]["channels"]
@@ -101,18 +101,18 @@ def test_rows_that_move_get_channels(tmp_path):
     assert gltf.nodes[gltf.named("tip")]["translation"] == [1, 0, 4]
     assert len(notes) == 1  # only joints below the root are worth a word
     moves[:, 1, 1] = [0, 1, 0, 1]
-    take = roof_take(translations=moves)
-    gltf, notes = write(tmp_path, take)
-    assert_played(gltf, take)
+    animation = roof_animation(translations=moves)
+    gltf, notes = write(tmp_path, animation)
+    assert_played(gltf, animation)
     assert notes[1:] == ["1 joint below the root moves within its parent: tip"]
 
 
 def test_place_that_stays_is_no_channel(tmp_path):
-    take = roof_take(figure_translations=np.tile([1.0, 2, 3], (4, 1)))
-    gltf, _ = write(tmp_path, take)
+    animation = roof_animation(figure_translations=np.tile([1.0, 2, 3], (4, 1)))
+    gltf, _ = write(tmp_path, animation)
     assert gltf.nodes[gltf.named("roof")]["translation"] == [1, 2, 3]
     assert len(gltf.root["animations"][0]["channels"]) == 2
-    assert_played(gltf, take)
+    assert_played(gltf, animation)
 
 
 @pytest.mark.parametrize(
@@ -123,18 +123,18 @@ def test_place_that_stays_is_no_channel(tmp_path):
     ],
 )
 def test_gaps_are_closed(tmp_path, gaps, angles, text):
-    take = roof_take(rows=[-1, 0, 1, -1, -1, 3, -1])
-    gltf, notes = write(tmp_path, take, gaps=gaps)
+    animation = roof_animation(rows=[-1, 0, 1, -1, -1, 3, -1])
+    gltf, notes = write(tmp_path, animation, gaps=gaps)
     for frame, angle in enumerate(angles):
         x, y, z, w = gltf.transforms(frame / 10)[gltf.named("root")]["rotation"]
         assert abs(2 * np.arctan2(z, w) - angle) % (2 * np.pi) < EXACT and x == y == 0
-    assert_played(gltf, take, frames=[1, 2, 5])
+    assert_played(gltf, animation, frames=[1, 2, 5])
     assert notes[1] == f"missing frames 7, 10 to 11, 13: {text}"
 
 
 def test_gaps_split_into_files(tmp_path):
-    take = roof_take(rows=[-1, 0, 1, -1, -1, 3, -1])
-    notes = export_take(take, tmp_path / "walk.gltf", "gltf", MotionOptions(gaps="split"))
+    animation = roof_animation(rows=[-1, 0, 1, -1, -1, 3, -1])
+    notes = export_animation(animation, tmp_path / "walk.gltf", "gltf", MotionOptions(gaps="split"))
     assert sorted(p.name for p in tmp_path.iterdir()) == [
         "walk-1.bin",
         "walk-1.gltf",
@@ -143,7 +143,9 @@ def test_gaps_split_into_files(tmp_path):
     ]
     first, second = (Gltf(tmp_path / f"walk-{number}.gltf") for number in (1, 2))
     for gltf, frame, time in ((first, 1, 0), (first, 2, 0.1), (second, 5, 0)):
-        assert_drawn(gltf, take.figure, pose_of(take.figure, take.frames, frame), time=time)
+        assert_drawn(
+            gltf, animation.figure, pose_of(animation.figure, animation.frames, frame), time=time
+        )
     assert abs(first.duration() - 0.1) < 1e-7 and second.duration() == 0
     assert "walk-1.gltf: 7 vertices" in notes[0] and "2 frames (8 to 9)" in notes[0]
     assert "walk-2.gltf: 7 vertices" in notes[2] and "1 frame (12)" in notes[2]
@@ -151,15 +153,15 @@ def test_gaps_split_into_files(tmp_path):
 
 
 def test_one_run_is_one_file(tmp_path):
-    gltf, _ = write(tmp_path, roof_take(rows=[-1, 0, 1, 2]), gaps="split")
+    gltf, _ = write(tmp_path, roof_animation(rows=[-1, 0, 1, 2]), gaps="split")
     assert abs(gltf.duration() - 0.2) < 1e-7
 
 
 def test_keyed_clip_is_sampled(tmp_path):
     (tmp_path / "twist.anim").write_text(clip_text())
     actor = viewer.load(*write_twist(tmp_path), tmp_path / "twist.anim").actors[0]
-    take = take_of(actor, rate=5.0)
-    gltf, notes = write(tmp_path, take)
+    animation = sample_animation(actor, rate=5.0)
+    gltf, notes = write(tmp_path, animation)
     assert "11 frames (0 to 10) at 5 a second" in notes[0]
     rest = gltf.vertices()[0]
     # Two a second along x, also between frames.
@@ -172,12 +174,12 @@ def test_fox_moves(tmp_path):
     figure = viewer.load().actors[0].figure
     rotations = quaternions(waves(6, figure.skeleton.n_joints, 3))
     clip = SampledClip("wave", Timing(24.0, np.arange(6)), rotations)
-    take = take_of(Actor(figure, clip=clip))
-    gltf, _ = write(tmp_path, take)
+    animation = sample_animation(Actor(figure, clip=clip))
+    gltf, _ = write(tmp_path, animation)
     played = 6 - 1
     # As the frames have it: the fox's own limits are not imposed on a motion.
     skin = figure.skin
-    palette = world_frames(figure, take.frames)[played] @ skin.inverse_bind
+    palette = world_frames(figure, animation.frames)[played] @ skin.inverse_bind
     owners = np.repeat(np.arange(skin.n_vertices), np.diff(skin.starts))
     blended, sums = np.zeros((skin.n_vertices, 4, 4)), np.zeros(skin.n_vertices)
     np.add.at(blended, owners, skin.weights[:, None, None] * palette[skin.joints])
@@ -191,11 +193,11 @@ def test_fox_moves(tmp_path):
 
 def test_body_with_correctives_and_shape(tmp_path):
     figure = viewer.load(bundled_body()).actors[0].figure
-    take = family_take(figure, family_motion(24, frames=40))
-    gltf, notes = write(tmp_path, take)
+    animation = family_animation(figure, family_motion(24, frames=40))
+    gltf, notes = write(tmp_path, animation)
     errors = []
     for frame in range(40):
-        pose = pose_of(figure, take.frames, frame)
+        pose = pose_of(figure, animation.frames, frame)
         plain = deform(figure, pose, Skinning(correctives=False))[0]
         errors.append(np.linalg.norm(deform(figure, pose)[0] - plain, axis=1))
         found = corners(gltf, gltf.vertices(frame / 50)[0])
@@ -213,12 +215,12 @@ def test_body_with_correctives_and_shape(tmp_path):
 def test_changing_shape_is_the_first_one(tmp_path):
     figure = replace(family_figure("smpl", tmp_path), correctives=None)
     motion = family_motion(24, frames=3, rows=[-1, 1, 2], shape=waves(3, 10))
-    take = family_take(figure, motion)
-    gltf, notes = write(tmp_path, take)
-    weights = take.frames.shape_weights
+    animation = family_animation(figure, motion)
+    gltf, notes = write(tmp_path, animation)
+    weights = animation.frames.shape_weights
     apart = []
     for frame in (1, 2):
-        pose = pose_of(figure, take.frames, frame)
+        pose = pose_of(figure, animation.frames, frame)
         own = deform(figure, pose)[0]
         pose.shape_weights[:10] = weights[1, :10]
         fixed = deform(figure, pose)[0]
@@ -238,29 +240,29 @@ def test_changing_morphs_are_animated(tmp_path):
     ]
     figure = with_morphs(seamed_actor(unit="m").figure, targets)
     weights = np.array([[0, 0, 1], [0.5, 0, 0], [1, 0, 0], [0.25, 0, 0.75]])
-    take = roof_take(figure=figure, shape_weights=weights)
-    gltf, notes = write(tmp_path, take)
-    assert_played(gltf, take)
+    animation = roof_animation(figure=figure, shape_weights=weights)
+    gltf, notes = write(tmp_path, animation)
+    assert_played(gltf, animation)
     assert gltf.transforms(0.15)[gltf.mesh_node]["weights"] == pytest.approx([0.75, 0], abs=1e-6)
     assert notes[1:] == ["2 blend shapes are morph targets", f"{LIMIT}: 1 blend shapes"]
-    still = roof_take(figure=figure, shape_weights=weights[1:2])
+    still = roof_animation(figure=figure, shape_weights=weights[1:2])
     gltf, _ = write(tmp_path, still)
     assert_played(gltf, still)
     assert gltf.root["meshes"][0]["weights"] == [0.5]
 
 
 def test_world_of_the_frames_says_what_is_up(tmp_path):
-    take = roof_take(figure_translations=np.arange(12.0).reshape(4, 3))
-    gltf, notes = write(tmp_path, take, world_up="z")
-    assert_played(gltf, take, TO_Y)
+    animation = roof_animation(figure_translations=np.arange(12.0).reshape(4, 3))
+    gltf, notes = write(tmp_path, animation, world_up="z")
+    assert_played(gltf, animation, TO_Y)
     assert notes[1:] == ["z is up: a node above the figure turns it by -90 degrees about x"]
 
 
 def test_skeleton_alone_moves(tmp_path):
     joints = np.array([[0, 1, 0], [0, 2, 0]], dtype=float)
     skeleton = ball_skeleton(("low", "high"), np.array([-1, 0]), joints)
-    take = roof_take(figure=Figure("bare", skeleton=skeleton, unit="m"))
-    gltf, _ = write(tmp_path, take, "bare.gltf")
+    animation = roof_animation(figure=Figure("bare", skeleton=skeleton, unit="m"))
+    gltf, _ = write(tmp_path, animation, "bare.gltf")
     assert "meshes" not in gltf.root
     # The lower joint turns by 0.5 a frame about z.
     place = gltf.world(0.2)[gltf.named("high"), :3, 3]
@@ -268,11 +270,13 @@ def test_skeleton_alone_moves(tmp_path):
 
 
 def test_other_skinning_is_compared_with(tmp_path):
-    take = roof_take(figure=seamed_actor(unit="m", mesh=seamed_mesh(uvs=False)).figure)
-    _, notes = write(tmp_path, take, skinning=Skinning("mix"))
+    animation = roof_animation(figure=seamed_actor(unit="m", mesh=seamed_mesh(uvs=False)).figure)
+    _, notes = write(tmp_path, animation, skinning=Skinning("mix"))
     apart = [
-        np.linalg.norm(deform(take.figure, pose, "mix")[0] - deform(take.figure, pose)[0], axis=1)
-        for pose in (pose_of(take.figure, take.frames, frame) for frame in range(4))
+        np.linalg.norm(
+            deform(animation.figure, pose, "mix")[0] - deform(animation.figure, pose)[0], axis=1
+        )
+        for pose in (pose_of(animation.figure, animation.frames, frame) for frame in range(4))
     ]
     worst = 1000 * np.max(apart)
     assert f"vertices differ from the motion by up to {worst:.3g} mm (vertex " in notes[1]
@@ -283,8 +287,8 @@ def test_long_takes_stay_small_and_exact(tmp_path):
     """Ten thousand frames: every key is at its place."""
     count = 10_000
     skeleton = ball_skeleton(("a", "b"), np.array([-1, 0]), np.eye(3)[:2])
-    take = roof_take(count=count, rate=120.0, figure=Figure("bare", skeleton=skeleton))
-    gltf, _ = write(tmp_path, take)
+    animation = roof_animation(count=count, rate=120.0, figure=Figure("bare", skeleton=skeleton))
+    gltf, _ = write(tmp_path, animation)
     samplers = gltf.root["animations"][0]["samplers"]
     times = gltf.accessor(samplers[0]["input"])
     assert_array_equal(times, (np.arange(count) / 120).astype(np.float32))
@@ -297,29 +301,29 @@ def test_long_takes_stay_small_and_exact(tmp_path):
 
 
 def test_malformed_takes(tmp_path):
-    def refused(take, message, **options):
+    def refused(animation, message, **options):
         with pytest.raises(RigError) as caught:
-            write(tmp_path, take, **options)
+            write(tmp_path, animation, **options)
         assert str(caught.value) == message
 
     text = "roof: every frame is missing, there is nothing to write"
-    refused(roof_take(rows=[-1, -1]), text)
-    refused(roof_take(), 'unit of glTF: expected m, found "cm"', unit="cm")
-    refused(roof_take(), 'up axis of glTF: expected y, found "z"', up="z")
+    refused(roof_animation(rows=[-1, -1]), text)
+    refused(roof_animation(), 'unit of glTF: expected m, found "cm"', unit="cm")
+    refused(roof_animation(), 'up axis of glTF: expected y, found "z"', up="z")
     text = 'way to close gaps of glTF: expected one of hold, interpolate, split, found "x"'
-    refused(roof_take(), text, gaps="x")
+    refused(roof_animation(), text, gaps="x")
     places = np.full((4, 3), 1e39)
     places[0] = 0
     text = "roof: expected numbers that fit glTF's single precision, found 1e+39"
-    refused(roof_take(figure_translations=places), text)
+    refused(roof_animation(figure_translations=places), text)
     with pytest.raises(OutputError, match=r"x\.glb: the folder .* does not exist$"):
-        write(tmp_path, roof_take(), "none/x.glb")
+        write(tmp_path, roof_animation(), "none/x.glb")
     assert list(tmp_path.iterdir()) == []
 
 
 def test_registry_offers_motion_and_pose(tmp_path):
     kind = EXPORTERS["gltf"]
     assert kind.suffixes == (".glb", ".gltf") and kind.writes_pose and kind.writes_motion
-    gltf, _ = write(tmp_path, roof_take(), "x.GLTF")
+    gltf, _ = write(tmp_path, roof_animation(), "x.GLTF")
     assert json.loads((tmp_path / "x.GLTF").read_text())["asset"]["version"] == "2.0"
     assert gltf.root["buffers"][0]["uri"] == "x.bin"

@@ -1,4 +1,4 @@
-"""A take of captured points: one person's frames, ready for an exporter."""
+"""Captured points at a fixed rate: one person's frames, ready for an exporter."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ import numpy as np
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.captures.points import PointClip, PointLayout, sample_points
-from viewer.rig.motion.take import frame_range
+from viewer.rig.motion.sampled_animation import frame_range
 from viewer.rig.motion.upright import own_up
 from viewer.rig.scene import Actor, Scene
 
-__all__ = ["PointTake", "upright_point_take"]
+__all__ = ["SampledPoints", "sample_upright_points"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PointTake:
+class SampledPoints:
     """Captured points at a fixed rate.
 
     Attributes
@@ -51,14 +51,14 @@ class PointTake:
     confidences: Floats
 
 
-def upright_point_take(
+def sample_upright_points(
     scene: Scene,
     actor: Actor,
     rate: float | None = None,
     frames: tuple[int, int | None] | None = None,
     fill: bool = False,
-) -> tuple[PointTake, Literal["y", "z"]]:
-    """Sample an actor's points, turned over where their own world hangs head down.
+) -> tuple[SampledPoints, Literal["y", "z"]]:
+    """Sample an actor's points, rotated upright where their own world is upside down.
 
     Parameters
     ----------
@@ -67,11 +67,11 @@ def upright_point_take(
     actor : Actor
         Captured points; where it stands in the scene is left out.
     rate, frames, fill
-        As for ``viewer.rig.motion.take.take_of``.
+        As for ``viewer.rig.motion.sampled_animation.sample_animation``.
 
     Returns
     -------
-    take : PointTake
+    animation : SampledPoints
         Its frames.
     up : "y" or "z"
         The axis that points up in them.
@@ -98,4 +98,4 @@ def upright_point_take(
     places = np.where(confidences[..., None] > 0.0, places, np.nan)
     present = np.array([row is not None for row in sampled], dtype=np.bool_)
     start = first + (motion.timing.first_frame if rate == own else 0)
-    return PointTake(actor.name, layout, rate, start, times, present, places, confidences), up
+    return SampledPoints(actor.name, layout, rate, start, times, present, places, confidences), up

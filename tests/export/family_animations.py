@@ -1,4 +1,4 @@
-"""Takes of made-up bodies of the SMPL family, and the plain formulas for what they show."""
+"""Animations of made-up bodies of the SMPL family, and the plain formulas for what they show."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from plain_smpl import rotation, smpl_forward
 
 from viewer.rig.figure import Figure
 from viewer.rig.motion.body_motion import BodyMotion, body_clip
+from viewer.rig.motion.sampled_animation import SampledAnimation, sample_animation
 from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.take import Take, take_of
 from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor
 from viewer.rig.smpl_family import FAMILY
@@ -30,15 +30,15 @@ def family_motion(count: int, frames: int = 4, rows=None, first_frame: int = 0, 
     return BodyMotion("walk", timing, FAMILY[count].names, vectors, moves, **words)
 
 
-def family_take(figure: Figure, motion: BodyMotion, fill: bool = False) -> Take:
-    """Return a figure's take of a motion, every frame of it."""
+def family_animation(figure: Figure, motion: BodyMotion, fill: bool = False) -> SampledAnimation:
+    """Return a figure's animation of a motion, every frame of it."""
     clip = body_clip(motion, figure)[0]
-    return take_of(Actor(figure, clip=clip), fill=fill)
+    return sample_animation(Actor(figure, clip=clip), fill=fill)
 
 
-def clip_take(figure: Figure, clip: SampledClip) -> Take:
-    """Return a figure's take of a clip."""
-    return take_of(Actor(figure, clip=clip))
+def clip_animation(figure: Figure, clip: SampledClip) -> SampledAnimation:
+    """Return a figure's animation of a clip."""
+    return sample_animation(Actor(figure, clip=clip))
 
 
 def vertices_about_origin(arrays, vectors, root, move, shape=()) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""A take of one frame: an actor as it is posed right now, for formats that hold motions."""
+"""Sampled animations of one frame: an actor's current pose, for formats that hold motions."""
 
 from __future__ import annotations
 
@@ -12,25 +12,27 @@ from viewer.rig.geometry.rotation import matrix_to_quaternion
 from viewer.rig.motion.clip import Clip, is_course_rig
 from viewer.rig.motion.clip_edit import clip_from_pose
 from viewer.rig.motion.evaluation import DEFAULT_RATE, Frames
+from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.take import Take
 from viewer.rig.motion.timing import Timing
 from viewer.rig.motion.upright import own_up, upright_actor
 from viewer.rig.pose import Pose, joint_rotations, local_matrices
 from viewer.rig.scene import Actor, Scene
 
-__all__ = ["pose_frames", "pose_take", "posed_take"]
+__all__ = ["pose_frames", "single_frame", "upright_single_frame"]
 
 
-def pose_take(actor: Actor, rate: float = DEFAULT_RATE, number: int = 0, time: float = 0.0) -> Take:
-    """Return an actor's present pose as a take of one frame.
+def single_frame(
+    actor: Actor, rate: float = DEFAULT_RATE, number: int = 0, time: float = 0.0
+) -> SampledAnimation:
+    """Return an actor's current pose as an animation of one frame.
 
     Parameters
     ----------
     actor : Actor
         With joints; whoever is not present has a frame that is missing.
     rate : float
-        Frames a second that the take says.
+        Frames a second that the animation says.
     number : int
         What the frame is called.
     time : float
@@ -38,7 +40,7 @@ def pose_take(actor: Actor, rate: float = DEFAULT_RATE, number: int = 0, time: f
 
     Returns
     -------
-    Take
+    SampledAnimation
         Its ``motion`` holds the frame too: of rigs that move by keys a key for each DOF.
 
     Raises
@@ -64,40 +66,40 @@ def pose_take(actor: Actor, rate: float = DEFAULT_RATE, number: int = 0, time: f
             frames.figure_scales,
             frames.shape_weights,
         )
-    return Take(actor.name, figure, rate, number, frames, motion)
+    return SampledAnimation(actor.name, figure, rate, number, frames, motion)
 
 
-def posed_take(
+def upright_single_frame(
     scene: Scene,
     actor: Actor,
     rate: float = DEFAULT_RATE,
     number: int = 0,
     time: float = 0.0,
     keeps_world: bool = False,
-) -> tuple[Take, str]:
-    """Return an actor's present pose as a take, stood up where its own world hangs head down.
+) -> tuple[SampledAnimation, str]:
+    """Return an actor's current pose, rotated upright where its own world is upside down.
 
     Parameters
     ----------
     scene : Scene
         Says what is up.
     actor, rate, number, time
-        As for ``pose_take``. Where the actor stands in the scene is left out.
+        As for ``single_frame``. Where the actor stands in the scene is left out.
     keeps_world : bool
-        Leave it as its own world has it, as ``viewer.rig.motion.take.upright_take`` does.
+        Leave it as its own world has it, as ``upright_animation`` does.
 
     Returns
     -------
-    take : Take
+    animation : SampledAnimation
         One frame.
     up : "y", "z", "-y" or "-z"
         The axis that points up in it; below only in worlds that are kept.
     """
     up, hangs = own_up(scene, actor)
     if keeps_world or not hangs:
-        return pose_take(actor, rate, number, time), f"-{up}" if hangs else up
+        return single_frame(actor, rate, number, time), f"-{up}" if hangs else up
     standing = replace(upright_actor(scene, actor), figure=actor.figure)
-    return pose_take(standing, rate, number, time), up
+    return single_frame(standing, rate, number, time), up
 
 
 def pose_frames(

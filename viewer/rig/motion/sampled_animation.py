@@ -1,4 +1,4 @@
-"""A take: one actor's frames, ready for an exporter."""
+"""Sampled animations: an actor's poses at a fixed rate, ready for an exporter."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from viewer.rig.motion.upright import own_up
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor, Motion, Scene
 
-__all__ = ["Take", "frame_range", "frames_at", "take_of", "upright_take"]
+__all__ = ["SampledAnimation", "frame_range", "frames_at", "sample_animation", "upright_animation"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Take:
+class SampledAnimation:
     """A figure in many poses.
 
     Attributes
@@ -47,8 +47,8 @@ class Take:
         What the frames were sampled from.
     base : Pose or None
         Gives what the motion leaves alone.
-    is_turned : bool
-        Whether the frames are turned over, see ``upright_take``; the motion never is.
+    is_rotated : bool
+        Whether the frames are rotated upright, see ``upright_animation``; the motion never is.
     """
 
     name: str
@@ -58,15 +58,15 @@ class Take:
     frames: Frames
     motion: Clip | SampledClip
     base: Pose | None = None
-    is_turned: bool = False
+    is_rotated: bool = False
 
 
-def take_of(
+def sample_animation(
     actor: Actor,
     rate: float | None = None,
     frames: tuple[int, int | None] | None = None,
     fill: bool = False,
-) -> Take:
+) -> SampledAnimation:
     """Sample an actor's clip at a fixed rate.
 
     Parameters
@@ -96,19 +96,19 @@ def take_of(
     shift = motion.timing.first_frame if isinstance(motion, SampledClip) and rate == own else 0
     sampled = frames_of(figure, motion, times, actor.pose, fill)
     base = None if actor.pose is None else actor.pose.copy()
-    return Take(actor.name, figure, rate, first + shift, sampled, motion, base)
+    return SampledAnimation(actor.name, figure, rate, first + shift, sampled, motion, base)
 
 
-def frames_at(take: Take, times: Floats) -> Frames:
-    """Return the poses of a take's motion at any times, turned over if its frames are: (T,) s."""
-    found = frames_of(take.figure, take.motion, times, take.base)
-    return _turned_over(take.figure, found) if take.is_turned else found
+def frames_at(animation: SampledAnimation, times: Floats) -> Frames:
+    """Sample an animation's motion at any times, rotated upright if its frames are: (T,) s."""
+    found = frames_of(animation.figure, animation.motion, times, animation.base)
+    return _rotated_upright(animation.figure, found) if animation.is_rotated else found
 
 
 def frame_range(
     motion: Motion, rate: float, frames: tuple[int, int | None] | None
 ) -> tuple[int, int]:
-    """Return the first frame and the one behind the last; arguments as for ``take_of``.
+    """Return the first frame and the one behind the last; arguments as for ``sample_animation``.
 
     Raises
     ------
@@ -126,49 +126,51 @@ def frame_range(
     return first, stop
 
 
-def upright_take(
+def upright_animation(
     scene: Scene,
     actor: Actor,
     rate: float | None = None,
     frames: tuple[int, int | None] | None = None,
     fill: bool = False,
     keeps_world: bool = False,
-) -> tuple[Take, str]:
-    """Sample an actor's clip, stood up where its own world hangs head down.
+) -> tuple[SampledAnimation, str]:
+    """Sample an actor's clip, rotated upright where its own world is upside down.
 
     Parameters
     ----------
     scene : Scene
         Says what is up.
     actor, rate, frames, fill
-        As for ``take_of``. Where the actor stands in the scene is left out.
+        As for ``sample_animation``. Where the actor stands in the scene is left out.
     keeps_world : bool
         Leave it as its own world has it, for formats that keep a capture's numbers.
 
     Returns
     -------
-    take : Take
+    animation : SampledAnimation
         Its frames.
     up : "y", "z", "-y" or "-z"
         The axis that points up in them; the last two only in a world that is kept.
     """
-    take = take_of(actor, rate, frames, fill)
+    animation = sample_animation(actor, rate, frames, fill)
     up, hangs = own_up(scene, actor)
     if not hangs:
-        return take, up
+        return animation, up
     if keeps_world:
-        return take, f"-{up}"
-    return replace(take, frames=_turned_over(take.figure, take.frames), is_turned=True), up
+        return animation, f"-{up}"
+    return replace(
+        animation, frames=_rotated_upright(animation.figure, animation.frames), is_rotated=True
+    ), up
 
 
-def _turned_over(figure: Figure, frames: Frames) -> Frames:
-    """Return the frames turned by half a turn about x: the root, and the way to it.
+def _rotated_upright(figure: Figure, frames: Frames) -> Frames:
+    """Return the frames rotated by 180 degrees about x: the root, and the way to it.
 
     With the root joint at p = s (rest + t) + T in the figure, R' = Q R and T' = Q p - s (rest + t).
     """
     half = np.array([1.0, 0.0, 0.0, 0.0])
     rotations = frames.rotations.copy()
-    assert figure.skeleton is not None  # whoever has a take has a skeleton
+    assert figure.skeleton is not None  # whoever has an animation has a skeleton
     roots = np.flatnonzero(figure.skeleton.parents < 0)
     rotations[:, roots] = multiply(half, rotations[:, roots])
     rest = rest_translations_of(figure, frames.shape_weights)[:, 0]
