@@ -108,13 +108,7 @@ def export_animation(animation: SampledAnimation, path: Path, options: MotionOpt
     notes, lost = [], []
     saved = _files(list(zip(paths, documents, strict=True)))
     for file, (start, stop), data, made in zip(paths, spans, saved, built, strict=True):
-        first = animation.first_frame + start
-        count = stop - start
-        motion = (
-            f"{count} frames ({first} to {first + count - 1})"
-            if count > 1
-            else f"1 frame ({first})"
-        )
+        motion = _frames_text(animation.first_frame + start, stop - start)
         rate = f"at {animation.frame_rate:g} a second"
         size = f"{len(data[file])} bytes"
         notes += [f"{printable(file, 300)}: {made.counts}, {motion} {rate}, {size}"]
@@ -134,6 +128,10 @@ def export_animation(animation: SampledAnimation, path: Path, options: MotionOpt
     notes += _remarks(body, options.world_up) + _motion_remarks(animation, body, frames, options)
     lost += resampling_losses(path, animation, options.skinning)
     return notes + lost + not_held(animation.figure, shape)
+
+
+def _frames_text(first: int, count: int) -> str:
+    return f"{count} frames ({first} to {first + count - 1})" if count > 1 else f"1 frame ({first})"
 
 
 def _check(animation: SampledAnimation, options: MotionOptions) -> None:
