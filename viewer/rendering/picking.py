@@ -207,16 +207,7 @@ class PickPass:
         view = in_front(view) if shows_mesh(actor.figure, options) else view
         program = self.passes.programs.drawing("joint", fragment="pick")
         self._number(program, lambda joint, _, point: Pick(index, joint, -1, -1, point))
-        draw_boxes(
-            program,
-            skeleton.array(program),
-            skeleton.n_joints,
-            skeleton.world,
-            placement_of(actor, options),
-            skeleton.center,
-            view,
-            options,
-        )
+        draw_boxes(program, skeleton.boxes, placement_of(actor, options), view, options)
 
     def _draw_markers(self, index: int, actor: Actor, view: View, options: DisplayOptions) -> None:
         assert actor.pose is not None  # it has markers
@@ -224,16 +215,7 @@ class PickPass:
         markers.update(actor.pose, options.skinning)
         program = self.passes.programs.drawing("joint", fragment="pick")
         self._number(program, lambda marker, _, point: Pick(index, -1, -1, marker, point), True)
-        draw_boxes(
-            program,
-            markers.array(program),
-            markers.count,
-            markers.world,
-            actor.placement,
-            markers.center,
-            in_front(view),
-            options,
-        )
+        draw_boxes(program, markers.boxes, actor.placement, in_front(view), options)
 
     def _draw_points(self, index: int, actor: Actor, view: View, options: DisplayOptions) -> None:
         points = self.passes.buffers.points_of(actor)

@@ -299,7 +299,7 @@ def test_skeletons_of_many_actors_are_those_of_each(offscreen):
     offscreen.render(scene, (50, 50), camera, options, box)
     with offscreen.context:
         for actor in scene.actors:
-            boxes = offscreen.renderer.buffers.skeleton(actor)
+            boxes = offscreen.renderer.buffers.skeleton(actor).boxes
             rows = np.frombuffer(boxes.world.read(), dtype="f4").reshape(-1, 3, 4)[:3]
             wanted = world_matrices(actor.figure.skeleton, actor.pose)[:, :3]
             assert np.allclose(rows[..., :3], wanted[..., :3], atol=1e-6)

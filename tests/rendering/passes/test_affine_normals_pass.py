@@ -130,8 +130,9 @@ def test_faces_of_sheared_boxes_have_the_inverse_transposed_normal(ctx):
     pose.scales[0] = 1.0, 4.0, -0.5
     pose.dofs[5] = 0.7  # of the second joint, about z
     joint_pass = JointPass(ctx, Programs(ctx))
-    boxes = SkeletonBuffers(ctx, figure, joint_pass.cube)
-    boxes.update(pose)
+    joints_on_gpu = SkeletonBuffers(ctx, figure, joint_pass.cube)
+    joints_on_gpu.update(pose)
+    boxes = joints_on_gpu.boxes
     program = joint_pass.programs.feedback("joint", "", ("v_normal",))
     program["u_normal_matrix"].write(np.eye(3, dtype="f4").tobytes())
     out = ctx.buffer(reserve=12 * 36 * 2)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING
 
 import moderngl
 
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
+from viewer.rendering.gpu.ownership import Kept
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.passes.joint_pass import SkeletonBuffers
 from viewer.rendering.passes.skin_pass import PosedMesh
@@ -20,49 +21,7 @@ if TYPE_CHECKING:
     from viewer.rendering.passes.motion_path_pass import TrailBuffers
     from viewer.rendering.passes.point_pass import PointBuffers
 
-__all__ = ["ActorBuffers", "Kept"]
-
-
-class _Releasable(Protocol):
-    def release(self) -> object: ...
-
-
-_Owner = TypeVar("_Owner")
-_Item = TypeVar("_Item", bound=_Releasable)
-
-
-class Kept(Generic[_Owner, _Item]):
-    """One item for each owner, told apart by identity, made when first asked for."""
-
-    def __init__(self) -> None:
-        # Owners are kept too, so that no other object can take over their identity.
-        self._items: dict[int, tuple[_Owner, _Item]] = {}
-
-    def __len__(self) -> int:
-        return len(self._items)
-
-    def get(self, owner: _Owner, make: Callable[[], _Item]) -> _Item:
-        """Return an owner's item, made now if there is none."""
-        if id(owner) not in self._items:
-            self._items[id(owner)] = (owner, make())
-        return self._items[id(owner)][1]
-
-    def drop(self, owner: _Owner, before: Callable[[_Item], object]) -> None:
-        """Free one owner's item; ``before`` is called with it."""
-        item = self._items.pop(id(owner))[1]
-        before(item)
-        item.release()
-
-    def keep_only(
-        self, owners: Sequence[_Owner], before: Callable[[_Item], object] | None = None
-    ) -> None:
-        """Free the items of all other owners; ``before`` is called with each."""
-        present = {id(owner) for owner in owners}
-        for key in [key for key in self._items if key not in present]:
-            item = self._items.pop(key)[1]
-            if before is not None:
-                before(item)
-            item.release()
+__all__ = ["ActorBuffers"]
 
 
 class _Crowds:

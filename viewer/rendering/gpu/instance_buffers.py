@@ -27,6 +27,7 @@ from viewer.rendering.gpu.upload import (
     rigid_texture,
     write_stacked,
 )
+from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rendering.passes.mesh_pass import SKIN_COLOR
 from viewer.rendering.passes.skin_pass import skinning_words
 from viewer.rendering.view import View
@@ -93,7 +94,7 @@ class CrowdBuffers:
         self._palette: moderngl.Texture | None = None
         self._rigid: moderngl.Texture | None = None
         self._instances: moderngl.Buffer | None = None
-        self._arrays: dict[tuple[int, ...], moderngl.VertexArray] = {}
+        self._arrays = VertexArrays(context)
 
     def update(self, poses: Sequence[Pose], how: Skinning) -> None:
         """Send the matrices of poses that changed.
@@ -220,36 +221,32 @@ class CrowdBuffers:
     ) -> moderngl.VertexArray:
         """Return the vertex array for a program; without indices it draws single vertices."""
         mesh, skin = self.mesh, self.mesh.skin(self._how)
-        key = (id(program), id(indices), id(skin), id(self._rest.positions))
-        if key not in self._arrays:
-            content: list[Any] = [
-                (buffer, layout, name)
-                for buffer, layout, name in (
-                    (self._rest.positions, "3f4", "in_position"),
-                    (self._rest.normals, "3f4", "in_normal"),
-                    (skin.bindings, "4u4", "in_bindings"),
-                    (mesh.uvs, "2f4", "in_uv"),
-                    (mesh.colors, "3f4", "in_color"),
-                )
-                if name in program and buffer is not None
-            ]
+        key = (id(indices), id(skin), id(self._rest.positions))
+
+        def content() -> list[Any]:
+            buffers = (
+                (self._rest.positions, "3f4", "in_position"),
+                (self._rest.normals, "3f4", "in_normal"),
+                (skin.bindings, "4u4", "in_bindings"),
+                (mesh.uvs, "2f4", "in_uv"),
+                (mesh.colors, "3f4", "in_color"),
+            )
+            found: list[Any] = [row for row in buffers if row[2] in program and row[0] is not None]
             # What the compiler dropped is skipped, four bytes a number.
             layout = " ".join(
                 f"{size}f4" if name in program else f"{4 * size}x" for name, size in _PER_INSTANCE
             )
             names = [name for name, _ in _PER_INSTANCE if name in program]
-            content.append((self._instances, f"{layout}/i", *names))
-            index_buffer = None if indices is None else indices.indices
-            self._arrays[key] = self.context.vertex_array(
-                program, content, index_buffer=index_buffer
-            )
-        return self._arrays[key]
+            return [*found, (self._instances, f"{layout}/i", *names)]
+
+        index_buffer = None if indices is None else indices.indices
+        return self._arrays.get(program, content, index_buffer, key)
 
     def _release_textures(self) -> None:
-        for item in (*self._arrays.values(), self._palette, self._rigid, self._instances):
+        self._arrays.release()
+        for item in (self._palette, self._rigid, self._instances):
             if item is not None:
                 item.release()
-        self._arrays.clear()
         self._palette = self._rigid = self._instances = None
 
     def release(self) -> None:

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from viewer.rendering.colormap import from_linear
+from viewer.rendering.gpu.box_buffers import joint_colors
 from viewer.rendering.overlay.segments import Segments, dots
-from viewer.rendering.passes.joint_pass import joint_colors
 from viewer.rendering.projection import picture_scale, project, project_segments
 from viewer.rendering.view import View
 from viewer.rig.arrays import Floats, Ints

@@ -8,9 +8,11 @@ from dataclasses import dataclass
 import moderngl
 import numpy as np
 
+from viewer.rendering.gpu.draw_state import opacities, without_depth_writes
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.upload import buffer
+from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rendering.view import View, set_model
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.points import PointClip
@@ -54,7 +56,7 @@ class TrailBuffers:
         self.count = 0
         self.center: Floats = np.zeros(3)
         self._owner = Owner()
-        self._arrays: dict[int, moderngl.VertexArray] = {}
+        self._arrays = VertexArrays(context)
         self._clip: Motion | None = None
         self._key: tuple[object, ...] | None = None
 
@@ -83,17 +85,13 @@ class TrailBuffers:
 
     def array(self, program: moderngl.Program) -> moderngl.VertexArray:
         """Return the segments as instances for a program."""
-        if id(program) not in self._arrays:
-            names = "in_start", "in_end", "in_times", "in_color"
-            content = [(self._segments, "3f4 3f4 2f4 3f4/i", *names)]
-            self._arrays[id(program)] = self.context.vertex_array(program, content)
-        return self._arrays[id(program)]
+        names = "in_start", "in_end", "in_times", "in_color"
+        content = [(self._segments, "3f4 3f4 2f4 3f4/i", *names)]
+        return self._arrays.get(program, lambda: content)
 
     def release(self) -> None:
         """Free the buffers."""
-        for array in self._arrays.values():
-            array.release()
-        self._arrays.clear()
+        self._arrays.release()
         self._owner.release()
 
 
@@ -161,14 +159,8 @@ class TrailPass:
             "u_reach": at.reach,
         }
         set_uniforms(program, values)
-        target = self.context.fbo
-        target.depth_mask = False  # lines over one another all count
-        target.use()  # moderngl hands masks to OpenGL only then
-        for order, opacity in ((">", _HIDDEN), ("<=", 1.0)):
-            self.context.depth_func = order
-            set_uniforms(program, {"u_opacity": opacity})
-            array = paths.array(program)
-            array.render(moderngl.TRIANGLE_STRIP, vertices=4, instances=paths.count)
-        self.context.depth_func = "<"
-        target.depth_mask = True
-        target.use()
+        array = paths.array(program)
+        with without_depth_writes(self.context):  # lines over one another all count
+            for opacity in opacities(self.context, _HIDDEN):
+                set_uniforms(program, {"u_opacity": opacity})
+                array.render(moderngl.TRIANGLE_STRIP, vertices=4, instances=paths.count)
