@@ -246,7 +246,7 @@ class AppState:
         restart_framing(self)
         # Body parts and levels of detail mean something else on another model.
         self.options.hidden_parts, self.options.reduced = (), False
-        self.options.trail_joints = ()
+        self.options.path_joints = ()
         self.followed = self.followed_from = None
         self.choose_actor(0)
         self.playback.show(scene)

@@ -12,15 +12,15 @@ import viewer
 from viewer.errors import RenderError
 from viewer.loading import bundled_body
 from viewer.rendering.camera import Camera
-from viewer.rendering.gpu import instance_buffers as crowd_buffers
-from viewer.rendering.gpu.instance_buffers import CrowdBuffers
+from viewer.rendering.gpu import instance_buffers
+from viewer.rendering.gpu.instance_buffers import InstanceBuffers
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.rest_buffers import WAYS
 from viewer.rendering.offscreen import Offscreen, default_camera
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.passes import instance_pass as crowd_pass
-from viewer.rendering.passes.instance_pass import FEWEST, crowds_of
+from viewer.rendering.passes import instance_pass
+from viewer.rendering.passes.instance_pass import FEWEST, instance_groups
 from viewer.rendering.view import View
 from viewer.rig.captures.points import PointLayout
 from viewer.rig.figure import Figure
@@ -33,26 +33,26 @@ TOLERANCE = 1e-5  # of the figure's size, as for single actors
 VARYINGS = "v_position", "v_normal"
 
 
-class Crowd:
-    """A crowd that is read back instead of drawn."""
+class Instances:
+    """Instances that are read back instead of drawn."""
 
     def __init__(self, ctx, figure: Figure, way: str = "") -> None:
         self.context, self.programs = ctx, Programs(ctx)
         self.mesh = MeshBuffers(ctx, figure, [])
-        self.crowd = CrowdBuffers(ctx, self.mesh, way)
+        self.instances = InstanceBuffers(ctx, self.mesh, way)
 
     def vertices(self, actors, how: Skinning, eye=(0.0, 0.0, 0.0)):
         """Return what the vertex shader of the picture writes, relative to the eye."""
         matrix = np.eye(4)
         matrix[:3, 3] = -np.asarray(eye)
         view = View(matrix, np.eye(4), Camera())
-        self.crowd.update([actor.pose for actor in actors], how)
-        program = self.programs.feedback("crowd", how.method, VARYINGS)
-        self.crowd.place(actors, view)
-        self.crowd.use(program, view)
+        self.instances.update([actor.pose for actor in actors], how)
+        program = self.programs.feedback("instance", how.method, VARYINGS)
+        self.instances.place(actors, view)
+        self.instances.use(program, view)
         count = self.mesh.n_vertices
         out = self.context.buffer(reserve=24 * count * len(actors))
-        array = self.crowd.array(program)
+        array = self.instances.array(program)
         array.transform(out, vertices=count, instances=len(actors))
         rows = np.frombuffer(out.read(), dtype="f4").reshape(len(actors), count, 6).astype(float)
         out.release()
@@ -60,7 +60,7 @@ class Crowd:
         return rows[..., :3], rows[..., 3:]
 
     def release(self) -> None:
-        for item in (self.crowd, self.mesh, self.programs):
+        for item in (self.instances, self.mesh, self.programs):
             item.release()
 
 
@@ -70,8 +70,8 @@ def cast(figure: Figure, count: int, seed: int = 0, reach: float = 1.0) -> list[
     return [Actor(figure, random_pose(figure.skeleton, rng, reach)) for _ in range(count)]
 
 
-def check(crowd: Crowd, actors, how: Skinning, eye=(0.0, 0.0, 0.0)) -> None:
-    positions, normals = crowd.vertices(actors, how, eye)
+def check(instances: Instances, actors, how: Skinning, eye=(0.0, 0.0, 0.0)) -> None:
+    positions, normals = instances.vertices(actors, how, eye)
     figure = actors[0].figure
     size = box_size(bounding_box(figure.mesh.positions))
     for actor, found, turned in zip(actors, positions, normals, strict=True):
@@ -91,9 +91,9 @@ assert {how.method for how in HOW} == set(METHODS)
 def test_every_instance_matches_the_reference(ctx, how, n_joints):
     rng = np.random.default_rng(n_joints)
     figure = random_figure(rng, n_joints, counts=(1, 13), empty=0.1)
-    crowd = Crowd(ctx, figure)
-    check(crowd, cast(figure, 9), how)
-    crowd.release()
+    instances = Instances(ctx, figure)
+    check(instances, cast(figure, 9), how)
+    instances.release()
 
 
 @pytest.mark.parametrize("how", HOW, ids=lambda how: how.method)
@@ -101,51 +101,51 @@ def test_every_instance_matches_the_reference(ctx, how, n_joints):
 def test_the_bundled_body_with_correctives_and_shape(ctx, how, way):
     figure = viewer.load(bundled_body()).actors[0].figure
     assert figure.correctives is not None
-    crowd = Crowd(ctx, figure, way)
+    instances = Instances(ctx, figure, way)
     actors = cast(figure, 5, reach=0.6)
     for actor in actors:
         actor.pose.shape_weights = np.zeros(figure.n_shapes)
-    check(crowd, actors, how)
+    check(instances, actors, how)
     for actor in actors:
         actor.pose.shape_weights[:2] = 1.5, -1.0
-    check(crowd, actors, how)
+    check(instances, actors, how)
     # Some rest, then all: their offsets must not stay.
     actors[1].pose = figure_pose(figure)
     actors[1].pose.shape_weights[:2] = 1.5, -1.0
-    check(crowd, actors, how)
+    check(instances, actors, how)
     for actor in actors:
         actor.pose.dofs[:] = 0.0
-    check(crowd, actors, how)
+    check(instances, actors, how)
     actors[2].pose.dofs[5] = 0.4
-    check(crowd, actors, how)
-    crowd.release()
+    check(instances, actors, how)
+    instances.release()
 
 
 @pytest.mark.parametrize("how", HOW, ids=lambda how: how.method)
 def test_figures_far_from_the_origin_keep_their_digits(ctx, how):
     origin = (1e4, -2e4, 5e3)
     figure = random_figure(np.random.default_rng(3), 20, origin=origin)
-    crowd = Crowd(ctx, figure)
+    instances = Instances(ctx, figure)
     actors = [Actor(figure) for _ in range(5)]
-    check(crowd, actors, how, origin)
-    crowd.release()
+    check(instances, actors, how, origin)
+    instances.release()
 
 
 @pytest.mark.parametrize("sums", [(0.5, 0.5), (0.0, 2.0), (-1.0, 1.0)])
 def test_weights_are_used_as_stored(ctx, sums):
     figure = random_figure(np.random.default_rng(3), 20, sums=sums)
-    crowd = Crowd(ctx, figure)
+    instances = Instances(ctx, figure)
     actors = cast(figure, 5)
-    positions, _ = crowd.vertices(actors, Skinning())
+    positions, _ = instances.vertices(actors, Skinning())
     size = box_size(bounding_box(figure.mesh.positions))
     for actor, found in zip(actors, positions, strict=True):
         assert np.abs(found - viewer.deform(figure, actor.pose)[0]).max() <= TOLERANCE * size
-    crowd.release()
+    instances.release()
 
 
-def test_a_crowd_grows_shrinks_and_changes_its_method(ctx):
+def test_instances_grow_shrink_and_change_their_method(ctx):
     figure = random_figure(np.random.default_rng(4), 12)
-    crowd, actors = Crowd(ctx, figure), cast(figure, 12)
+    instances, actors = Instances(ctx, figure), cast(figure, 12)
     for chosen, how in (
         (actors[:5], HOW[1]),
         (actors, HOW[1]),
@@ -153,24 +153,24 @@ def test_a_crowd_grows_shrinks_and_changes_its_method(ctx):
         (actors[2:], HOW[0]),
         (actors[::-1], HOW[1]),
     ):
-        check(crowd, chosen, how)
-    before = crowd.crowd.n_updates
-    check(crowd, actors[::-1], HOW[1])
-    assert crowd.crowd.n_updates == before
+        check(instances, chosen, how)
+    before = instances.instances.n_updates
+    check(instances, actors[::-1], HOW[1])
+    assert instances.instances.n_updates == before
     actors[4].pose.dofs[2] += 0.5
-    check(crowd, actors[::-1], HOW[1])
-    assert crowd.crowd.n_updates == before + 1
-    crowd.release()
+    check(instances, actors[::-1], HOW[1])
+    assert instances.instances.n_updates == before + 1
+    instances.release()
 
 
 def test_place_and_scale_of_each_actor_count(ctx):
     figure = random_figure(np.random.default_rng(5), 8)
-    crowd, actors = Crowd(ctx, figure), cast(figure, 4)
+    instances, actors = Instances(ctx, figure), cast(figure, 4)
     for number, actor in enumerate(actors):
         actor.pose.figure_scale = 1.0 + 0.5 * number
         actor.pose.figure_translation[:] = number, 0.0, -number
         actor.placement = np.array([[0, -1, 0, 3], [2, 0, 0, number], [0, 0, 1, 0], [0, 0, 0, 1.0]])
-    positions, normals = crowd.vertices(actors, Skinning())
+    positions, normals = instances.vertices(actors, Skinning())
     for actor, found, turned in zip(actors, positions, normals, strict=True):
         posed, directions = viewer.deform(figure, actor.pose)
         matrix = actor.placement[:3, :3]
@@ -180,7 +180,7 @@ def test_place_and_scale_of_each_actor_count(ctx):
         wanted /= np.linalg.norm(wanted, axis=1, keepdims=True)
         turned = turned / np.linalg.norm(turned, axis=1, keepdims=True)
         assert np.allclose(turned, wanted, atol=1e-4)
-    crowd.release()
+    instances.release()
 
 
 @pytest.fixture(scope="module")
@@ -215,14 +215,14 @@ def rows_of_arms(count: int, **parts) -> Scene:
     ],
     ids=str,
 )
-def test_a_crowd_looks_like_its_actors_drawn_one_by_one(offscreen, monkeypatch, changes):
+def test_instances_look_like_their_actors_drawn_one_by_one(offscreen, monkeypatch, changes):
     scene = rows_of_arms(FEWEST)
     options = DisplayOptions(**changes)
     camera, box = default_camera(scene, (200, 150)), scene_box(scene)
-    assert len(crowds_of(scene.actors, options)) == 1
+    assert len(instance_groups(scene.actors, options)) == 1
     together = offscreen.render(scene, (200, 150), camera, options, box)
-    monkeypatch.setattr(crowd_pass, "FEWEST", 100)
-    assert crowds_of(scene.actors, options) == []
+    monkeypatch.setattr(instance_pass, "FEWEST", 100)
+    assert instance_groups(scene.actors, options) == []
     alone = offscreen.render(scene, (200, 150), camera, options, box)
     difference = np.abs(together.astype(int) - alone).max(axis=-1)
     assert (difference > 2).mean() < 0.001
@@ -234,22 +234,22 @@ def test_only_actors_of_one_figure_and_shape_are_drawn_together():
     actors = [Actor(body) for _ in range(2 * FEWEST)] + [Actor(fox) for _ in range(FEWEST - 1)]
     for actor in actors[:FEWEST]:
         actor.pose.shape_weights[0] = 1.0
-    groups = crowds_of(actors, DisplayOptions())
+    groups = instance_groups(actors, DisplayOptions())
     assert groups == [actors[:FEWEST], actors[FEWEST : 2 * FEWEST]]
     actors[0].pose.shape_weights[0] = 2.0
-    assert crowds_of(actors, DisplayOptions()) == [actors[FEWEST : 2 * FEWEST]]
+    assert instance_groups(actors, DisplayOptions()) == [actors[FEWEST : 2 * FEWEST]]
 
 
 @pytest.mark.parametrize(
     "changes", [{"wireframe": True}, {"normals": True}, {"shading": "scalar"}, {"show": "binding"}]
 )
 def test_views_of_single_vertices_draw_actors_one_by_one(changes):
-    assert crowds_of(rows_of_arms(FEWEST).actors, DisplayOptions(**changes)) == []
+    assert instance_groups(rows_of_arms(FEWEST).actors, DisplayOptions(**changes)) == []
 
 
-def test_meshes_that_follow_no_skeleton_are_no_crowd():
+def test_meshes_that_follow_no_skeleton_are_no_instances():
     figure = replace(arm(3), skin=None)
-    assert crowds_of([Actor(figure) for _ in range(FEWEST)], DisplayOptions()) == []
+    assert instance_groups([Actor(figure) for _ in range(FEWEST)], DisplayOptions()) == []
 
 
 def test_absent_and_hidden_actors_are_not_drawn(offscreen):
@@ -266,29 +266,29 @@ def test_absent_and_hidden_actors_are_not_drawn(offscreen):
     assert not offscreen.render(scene, size, camera, options, box)[..., 3].any()
 
 
-def test_crowds_of_a_figure_that_left_are_freed(offscreen):
+def test_instances_of_a_figure_that_left_are_freed(offscreen):
     scene = rows_of_arms(FEWEST)
     camera, box = default_camera(scene, (50, 50)), scene_box(scene)
     offscreen.render(scene, (50, 50), camera, DisplayOptions(), box)
-    crowd = offscreen.renderer.buffers.crowds(scene.actors[0].figure, 1)[0]
+    instances = offscreen.renderer.buffers.instanced(scene.actors[0].figure, 1)[0]
     offscreen.render(rows_of_arms(2), (50, 50), camera, DisplayOptions(), box)
-    assert crowd._palette is None
-    assert len(offscreen.renderer.buffers._crowds) == 0
+    assert instances._palette is None
+    assert len(offscreen.renderer.buffers._instanced) == 0
 
 
 def test_a_refused_upload_is_tried_again(ctx, monkeypatch):
     figure = random_figure(np.random.default_rng(7), 6)
-    crowd, actors = Crowd(ctx, figure), cast(figure, 3)
+    instances, actors = Instances(ctx, figure), cast(figure, 3)
     poses = [actor.pose for actor in actors]
 
     def refuse(*_):
         raise RenderError("no room")
 
     with monkeypatch.context() as patch, pytest.raises(RenderError):
-        patch.setattr(crowd_buffers, "write_stacked", refuse)
-        crowd.crowd.update(poses, Skinning())
-    check(crowd, actors, Skinning())
-    crowd.release()
+        patch.setattr(instance_buffers, "write_stacked", refuse)
+        instances.instances.update(poses, Skinning())
+    check(instances, actors, Skinning())
+    instances.release()
 
 
 def test_skeletons_of_many_actors_are_those_of_each(offscreen):

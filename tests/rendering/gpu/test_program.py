@@ -28,14 +28,14 @@ def build(ctx, name: str):
     """Compile every program that a file takes part in."""
     programs = Programs(ctx)
     try:
-        if name.startswith("crowd"):
-            return programs.drawing("crowd", "phong", "mesh", skin="mix")
+        if name.startswith("instance"):
+            return programs.drawing("instance", "phong", "mesh", skin="mix")
         if name.startswith("point"):
             return programs.drawing("point", "phong", "mesh")
         if name.startswith("pick"):
-            return programs.drawing("crowd", fragment="pick", skin="dqs")
-        if name.startswith("trail"):
-            return programs.drawing("trail")
+            return programs.drawing("instance", fragment="pick", skin="dqs")
+        if name.startswith("motion_path"):
+            return programs.drawing("motion_path")
         if name.startswith(("skin", "include")):
             return programs.feedback("skin", "lbs", VARYINGS)
         if name.startswith(("corners", "shade/scalar")):
@@ -72,10 +72,10 @@ def lines_to_break(text: str) -> list[int]:
         "skin.vert",
         "skin/lbs.glsl",
         "include/skinning.glsl",
-        "crowd.vert",
+        "instance.vert",
         "point.vert",
-        "trail.vert",
-        "trail.frag",
+        "motion_path.vert",
+        "motion_path.frag",
         "pick.frag",
         "joint.vert",
         "line.vert",
@@ -138,7 +138,7 @@ def test_every_skinning_method_compiles(ctx, method):
     programs = Programs(ctx)
     assert "u_pairs" in programs.feedback("skin", method, VARYINGS)
     for shading in SHADING:
-        assert "u_pairs" in programs.drawing("crowd", shading, "mesh", skin=method)
+        assert "u_pairs" in programs.drawing("instance", shading, "mesh", skin=method)
     programs.release()
 
 

@@ -55,7 +55,7 @@ def test_colours_that_stand_for_numbers_stay_as_they_are(offscreen):
     assert pixel(plain, -1.2, -1.2) == pixel(xray, -1.2, -1.2)
 
 
-def test_crowds_are_translucent_too(offscreen):
+def test_overlapping_actors_are_translucent_too(offscreen):
     figure = grid_figure()
     actors = [Actor(figure) for _ in range(9)]
     for number, actor in enumerate(actors):

@@ -41,7 +41,7 @@ def test_ranges_are_spread_one_after_the_other():
     assert owners.tolist() == [0, 0, 2, 2, 2] and numbers.tolist() == [5, 6, 9, 10, 11]
 
 
-@pytest.fixture(params=[40, 6000], ids=["few", "crowd"])
+@pytest.fixture(params=[40, 6000], ids=["few", "instance"])
 def scene(request):
     """Return dots on a grid of quarter pixels, so that none is another, and rectangles."""
     rng = np.random.default_rng(1)

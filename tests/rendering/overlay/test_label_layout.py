@@ -79,7 +79,7 @@ def test_point_between_others_gets_a_line_to_its_label():
 WIDE = (1920, 1080)
 
 
-def crowd(n_across, step):
+def instances(n_across, step):
     """Return a square of points."""
     steps = np.arange(n_across) * step
     return np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2) + 300.0
@@ -97,7 +97,7 @@ LONELY = np.array([(1000.0, 200.0), (1000.0, 500.0), (1400.0, 300.0), (1500.0, 8
 
 @pytest.mark.parametrize(("n_across", "step"), [(16, 4.0), (50, 4.0), (50, 1.0), (50, 0.1)])
 def test_points_far_from_others_have_names_however_many_came_before(n_across, step):
-    near = crowd(n_across, step)
+    near = instances(n_across, step)
     found = drawn(np.concatenate([near, LONELY]))
     assert set(range(len(near), len(near) + 5)) <= set(found.tolist())
 

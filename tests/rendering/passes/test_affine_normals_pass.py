@@ -9,7 +9,7 @@ from rendering.drawn_figures import random_pose, skeleton, sphere
 
 import viewer
 from viewer.rendering.camera import Camera
-from viewer.rendering.gpu.instance_buffers import CrowdBuffers
+from viewer.rendering.gpu.instance_buffers import InstanceBuffers
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.passes.joint_pass import JointPass, SkeletonBuffers
@@ -98,28 +98,28 @@ def test_rigid_poses_never_compile_the_program_for_scaled_joints(ctx, monkeypatc
 
 
 @pytest.mark.parametrize("how", HOW, ids=lambda how: how.method)
-def test_crowd_tells_scaled_instances_from_rigid_ones(ctx, how):
+def test_buffers_tell_scaled_instances_from_rigid_ones(ctx, how):
     figure = ball()
     rng = np.random.default_rng(3)
     actors = [Actor(figure, random_pose(figure.skeleton, rng, reach=0.6)) for _ in range(5)]
     for actor, scales in zip(actors[1:4], SCALES[:3], strict=True):
         actor.pose.scales[1] = scales
     programs, buffers = Programs(ctx), MeshBuffers(ctx, figure, [])
-    crowd = CrowdBuffers(ctx, buffers)
-    crowd.update([actor.pose for actor in actors], how)
-    assert crowd.is_affine
-    program = programs.feedback("crowd", how.method, ("v_normal",), crowd.is_affine)
+    instances = InstanceBuffers(ctx, buffers)
+    instances.update([actor.pose for actor in actors], how)
+    assert instances.is_affine
+    program = programs.feedback("instance", how.method, ("v_normal",), instances.is_affine)
     view = View(np.eye(4), np.eye(4), Camera())
-    crowd.place(actors, view)
-    crowd.use(program, view)
+    instances.place(actors, view)
+    instances.use(program, view)
     count = buffers.n_vertices
     out = ctx.buffer(reserve=12 * count * len(actors))
-    crowd.array(program).transform(out, vertices=count, instances=len(actors))
+    instances.array(program).transform(out, vertices=count, instances=len(actors))
     normals = np.frombuffer(out.read(), "f4").reshape(len(actors), count, 3).astype(float)
     for actor, found in zip(actors, normals[:, buffers.copies], strict=True):
         wanted = viewer.deform(figure, actor.pose, how)[1]
         assert np.abs(unit(found) - wanted).max() <= TOLERANCE
-    for item in (out, crowd, buffers, programs):
+    for item in (out, instances, buffers, programs):
         item.release()
 
 

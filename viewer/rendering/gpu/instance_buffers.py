@@ -2,7 +2,7 @@
 
 No posed vertices are kept: the vertex shader skins each instance by its own row of matrices, which
 on a driver in software takes less time than to write posed vertices and to read them again
-(``tests/bench/bench_crowd.py``). Every draw skins anew, so a camera that moves is not free, and
+(``tests/bench/bench_instances.py``). Every draw skins anew, so a camera that moves is not free, and
 views that draw a mesh several times take the posed buffers of single actors.
 """
 
@@ -42,7 +42,7 @@ from viewer.rig.skin import bind_positions
 from viewer.rig.skinning import Skinning
 from viewer.rig.skinning.dqs import split_palette
 
-__all__ = ["CrowdBuffers"]
+__all__ = ["InstanceBuffers"]
 
 _PALETTE_UNIT, _PAIRS_UNIT, _RIGID_UNIT, _LIST_UNIT, _OFFSETS_UNIT = range(5)
 _PER_INSTANCE = (
@@ -57,7 +57,7 @@ _PER_INSTANCE = (
 _FLOATS = sum(count for _, count in _PER_INSTANCE)
 
 
-class CrowdBuffers:
+class InstanceBuffers:
     """Matrices, places and colours of actors that share figure and shape.
 
     Parameters
@@ -126,7 +126,7 @@ class CrowdBuffers:
         self._keys = keys
 
     def _reserve(self, count: int) -> None:
-        """Make room; textures grow by half, so that a growing crowd is not copied each time."""
+        """Make room; textures grow by half, so that growing numbers are not copied each time."""
         if self._palette is not None and count <= len(self._rows):
             return
         room = max(count, len(self._rows) * 3 // 2)
@@ -183,7 +183,7 @@ class CrowdBuffers:
         self._instances.write(float32(np.concatenate(rows, axis=1)))
 
     def use(self, program: moderngl.Program, view: View) -> None:
-        """Set what ``crowd.vert`` needs beside its attributes."""
+        """Set what ``instances.vert`` needs beside its attributes."""
         skin = self.mesh.skin(self._how)
         values = {
             "u_projection": as_uniform(view.projection),

@@ -3,7 +3,7 @@
 Both are one instanced draw of the same triangles with the same fragment shader, 1280 x 720; the
 copies' vertex shader places them and does nothing else. Alternating, so that the machine cancels
 out. The processor's part (kinematics, correctives, upload) is printed beside it, and so is how few
-actors are worth a crowd.
+actors are worth drawing as instances.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from measure import interleaved, median_ratio, report
 
 import viewer
 from viewer.loading import bundled_body
-from viewer.rendering.gpu.instance_buffers import CrowdBuffers
+from viewer.rendering.gpu.instance_buffers import InstanceBuffers
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.upload import as_uniform
 from viewer.rendering.offscreen import Offscreen, default_camera
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.passes import instance_pass as crowd_pass
+from viewer.rendering.passes import instance_pass
 from viewer.rendering.passes.mesh_pass import draw_runs, set_surface
 from viewer.rendering.view import View, set_lights, view_of
 from viewer.resources import resource
@@ -49,7 +49,7 @@ void main() {
     v_color = u_has_colors ? in_color : in_actor_color;
     gl_Position = u_projection * vec4(v_position, 1.0);
 }
-"""  # crowd.vert without skinning
+"""  # instance.vert without skinning
 
 
 def cast(figure: Figure, count: int) -> Scene:
@@ -89,10 +89,10 @@ def draws(figure: Figure, samples: int, rounds: int) -> None:
         target, box = offscreen.target(SIZE, samples), scene_box(scene)
         view = view_of(default_camera(scene, SIZE), SIZE, box)
         renderer = offscreen.renderer
-        crowd = renderer.buffers.crowds(figure, 1)[0]
-        crowd.update([actor.pose for actor in scene.actors if actor.pose], Skinning())
-        posed = posed_draw(renderer.programs, crowd, scene.actors, view, options)
-        still = still_draw(offscreen.context, crowd, view, options)
+        instances = renderer.buffers.instanced(figure, 1)[0]
+        instances.update([actor.pose for actor in scene.actors if actor.pose], Skinning())
+        posed = posed_draw(renderer.programs, instances, scene.actors, view, options)
+        still = still_draw(offscreen.context, instances, view, options)
 
         def timed(draw: Callable[[], object]) -> Callable[[], None]:
             def run() -> None:
@@ -110,17 +110,17 @@ def draws(figure: Figure, samples: int, rounds: int) -> None:
 
 def posed_draw(
     programs: Programs,
-    crowd: CrowdBuffers,
+    instances: InstanceBuffers,
     actors: list[Actor],
     view: View,
     options: DisplayOptions,
 ) -> Callable[[], None]:
-    """Return what draws the crowd as the renderer does."""
-    return lambda: crowd_pass.draw_crowd(programs, crowd, actors, view, options)
+    """Return what draws the instances as the renderer does."""
+    return lambda: instance_pass.draw_instances(programs, instances, actors, view, options)
 
 
 def still_draw(
-    context: moderngl.Context, crowd: CrowdBuffers, view: View, options: DisplayOptions
+    context: moderngl.Context, instances: InstanceBuffers, view: View, options: DisplayOptions
 ) -> Callable[[], None]:
     """Return what draws as many copies of the mesh at rest."""
     fragment = resource("shaders", "mesh.frag").read_text()
@@ -128,13 +128,13 @@ def still_draw(
     program = context.program(
         vertex_shader=_STILL, fragment_shader=fragment.replace("#pragma chunk", shade)
     )
-    mesh = crowd.mesh
+    mesh = instances.mesh
     indices = mesh.index_set(False, ())
     names = "in_model_x", "in_model_y", "in_model_z", "in_actor_color"
     content: list[Any] = [
         (mesh.positions, "3f4", "in_position"),
         (mesh.normals, "3f4", "in_normal"),
-        (crowd._instances, "4f4 4f4 4f4 3f4 24x/i", *names),
+        (instances._instances, "4f4 4f4 4f4 3f4 24x/i", *names),
     ]
     for values, layout, name in ((mesh.uvs, "2f4", "in_uv"), (mesh.colors, "3f4", "in_color")):
         if name in program and values is not None:
@@ -145,7 +145,7 @@ def still_draw(
         set_uniforms(program, {"u_projection": as_uniform(view.projection)})
         set_lights(program, view, options.lights)
         set_surface(program, mesh, options)
-        draw_runs(array, indices, options.texture, instances=crowd.count)
+        draw_runs(array, indices, options.texture, instances=instances.count)
 
     return draw
 
@@ -155,12 +155,12 @@ def processor(figure: Figure, rounds: int) -> None:
     actors, rng = cast(figure, COUNT).actors, np.random.default_rng(1)
     with Offscreen() as offscreen, offscreen.context:
         offscreen.target((16, 16), 1).framebuffer.use()
-        crowd = offscreen.renderer.buffers.crowds(figure, 1)[0]
+        instances = offscreen.renderer.buffers.instanced(figure, 1)[0]
         meshes = [offscreen.renderer.posed_mesh(actor) for actor in actors]
 
         def together(how: Skinning) -> None:
             change(actors, rng)
-            crowd.update([actor.pose for actor in actors if actor.pose], how)
+            instances.update([actor.pose for actor in actors if actor.pose], how)
 
         def alone(how: Skinning) -> None:
             change(actors, rng)
@@ -170,44 +170,45 @@ def processor(figure: Figure, rounds: int) -> None:
 
         plain = Skinning(correctives=False)
         work = {
-            "as a crowd": lambda: together(plain),
+            "as instances": lambda: together(plain),
             "one by one": lambda: alone(plain),
-            "as a crowd, with correctives": lambda: together(Skinning()),
+            "as instances, with correctives": lambda: together(Skinning()),
             "one by one, with correctives": lambda: alone(Skinning()),
         }
         times = interleaved(work, max(rounds // 3, 3))
-        report("the processor's part of a frame", times, ("as a crowd", "one by one"))
+        report("the processor's part of a frame", times, ("as instances", "one by one"))
         ratio = median_ratio(times, *list(work)[2:])
         print(f"  with correctives: {ratio:.2f}\n")
 
 
 def fewest(figure: Figure, rounds: int) -> None:
-    """Print whole frames as a crowd against one by one, played and of a camera that moves."""
-    normal = crowd_pass.FEWEST
+    """Print whole frames as instances against one by one, played and of a camera that moves."""
+    normal = instance_pass.FEWEST
     for count in (2, 4, 8, 16, 32):
-        with Offscreen() as crowded, Offscreen() as single:
-            frames = whole_frames(cast(figure, count), crowded, single)
+        with Offscreen() as together, Offscreen() as single:
+            frames = whole_frames(cast(figure, count), together, single)
             times = interleaved(frames, rounds)
         played, still = (
-            median_ratio(times, f"{kind}, crowd", f"{kind}, single") for kind in ("played", "still")
+            median_ratio(times, f"{kind}, instances", f"{kind}, single")
+            for kind in ("played", "still")
         )
-        middle = statistics.median(times["played, crowd"])
+        middle = statistics.median(times["played, instances"])
         print(
-            f"  {count:3} actors: played frame {middle:.1f} ms, crowd / single {played:.2f}; "
+            f"  {count:3} actors: played frame {middle:.1f} ms, instances / single {played:.2f}; "
             f"still figures {still:.2f}"
         )
-    crowd_pass.FEWEST = normal
+    instance_pass.FEWEST = normal
 
 
 def whole_frames(
-    scene: Scene, crowded: Offscreen, single: Offscreen
+    scene: Scene, together: Offscreen, single: Offscreen
 ) -> dict[str, Callable[[], None]]:
     """Return what draws frames in four ways."""
     rng, options, box = np.random.default_rng(2), DisplayOptions(), scene_box(scene)
     camera = default_camera(scene, SIZE)
 
     def frame(offscreen: Offscreen, least: int, moves: bool) -> None:
-        crowd_pass.FEWEST = least
+        instance_pass.FEWEST = least
         if moves:
             change(scene.actors, rng)
         with offscreen.context:
@@ -216,9 +217,9 @@ def whole_frames(
             offscreen.context.finish()
 
     return {
-        "played, crowd": lambda: frame(crowded, 2, True),
+        "played, instances": lambda: frame(together, 2, True),
         "played, single": lambda: frame(single, 1000, True),
-        "still, crowd": lambda: frame(crowded, 2, False),
+        "still, instances": lambda: frame(together, 2, False),
         "still, single": lambda: frame(single, 1000, False),
     }
 
