@@ -28,6 +28,7 @@ _PACKAGES = (
     "pillow",
     "platformdirs",
     "rich",
+    "shtab",
 )
 _WINDOW_SECONDS = 20
 _STYLES = {"ok": "green", "note": "yellow", "missing": "bold red"}
