@@ -8,8 +8,8 @@ import numpy as np
 from imgui_bundle import imgui
 
 import viewer
+from viewer.app.core.state import AppState
 from viewer.app.headless import HeadlessApp
-from viewer.app.state import AppState
 from viewer.rendering.camera import facing_camera, fit
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.inspection.front import guess_front

@@ -9,7 +9,7 @@ import pytest
 from app.captured import dots, people
 from imgui_bundle import imgui
 
-from viewer.app import reasons
+from viewer.app.core import reasons
 from viewer.app.window import _awaits_tooltip
 from viewer.rig.scene import Scene
 

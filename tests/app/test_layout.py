@@ -10,8 +10,8 @@ from app.tiny import FILE_POSE
 from imgui_bundle import imgui
 
 import viewer
+from viewer.app.features import PANELS
 from viewer.app.headless import HeadlessApp
-from viewer.app.panels import PANELS
 
 
 def test_closed_panel_leaves_and_the_menu_brings_it_back(hand):
@@ -143,7 +143,7 @@ def test_background_that_is_transparent_shows_no_older_frame(hand):
 
 
 def test_closed_panels_are_remembered(tmp_path, monkeypatch):
-    from viewer.app.recent import load_closed_panels, save_closed_panels
+    from viewer.app.files.recent import load_closed_panels, save_closed_panels
 
     assert load_closed_panels() == set()
     save_closed_panels({"stats", "joints"})

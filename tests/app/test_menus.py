@@ -11,8 +11,8 @@ from formats.synthetic_smpl import model
 from imgui_bundle import imgui
 
 import viewer.models
+from viewer.app.features import PANELS
 from viewer.app.keys import KEYS, MOUSE
-from viewer.app.panels import PANELS
 from viewer.models import load_model_folder, save_model_folder
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 from formats.capture_files import body, write_frames
 
-from viewer.app.clip_actions import ask_for_clip, new_clip
+from viewer.app.curves.clip_actions import ask_for_clip, new_clip
+from viewer.app.files.motion_dialog import ask_for_motion
 from viewer.app.menus import _ask_for_export, _ask_for_pose
-from viewer.app.motion_dialog import ask_for_motion
-from viewer.app.record_dialog import KINDS, RecordSettings, _ask_where
+from viewer.app.recording.record_dialog import KINDS, RecordSettings, _ask_where
 
 
 @pytest.fixture

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from PIL import Image, ImageFilter
 
-from viewer.app.lint_actions import check_rig
-from viewer.app.weights_actions import pin_vertex
+from viewer.app.linting.actions import check_rig
+from viewer.app.weights.actions import pin_vertex
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden"
 SIZE = (560, 420)

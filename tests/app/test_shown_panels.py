@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from viewer.app.panels import PANELS
+from viewer.app.features import PANELS
 from viewer.app.shown_panels import is_open, set_open
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from viewer.app.framing import fit_again, fit_shown
-from viewer.app.posing_actions import cancel_drag
-from viewer.app.reasons import no_motion
-from viewer.app.rig_tools import drop_rig_tool
-from viewer.app.selection import select_joint
-from viewer.app.state import AppState
-from viewer.app.weights_actions import unpin
+from viewer.app.core.framing import fit_again, fit_shown
+from viewer.app.core.reasons import no_motion
+from viewer.app.core.state import AppState
+from viewer.app.posing.joint_tree import select_joint
+from viewer.app.posing.tool_actions import cancel_drag
+from viewer.app.rigging.tools import drop_rig_tool
+from viewer.app.weights.actions import unpin
 from viewer.errors import ViewerError, printable
 from viewer.rendering.camera import Camera, camera_from_view, look_from
 from viewer.rendering.options import SHOWN, Lights

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from imgui_bundle import imgui
 
 from viewer.app.actions import follow_actor
-from viewer.app.gizmo import is_held
-from viewer.app.state import AppState
+from viewer.app.core.state import AppState
+from viewer.app.posing.gizmo import is_held
 from viewer.rig.scene import Actor, Scene
 
 __all__ = ["Clock"]

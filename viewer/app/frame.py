@@ -11,25 +11,25 @@ import moderngl
 from imgui_bundle import imgui
 
 from viewer.app.clock import Clock
-from viewer.app.explanation_lines import draw_hovered, pinned_annotations
-from viewer.app.file_dialog import PICTURES, FileDialog, draw_file_dialog, folder_of
-from viewer.app.framing import keep_fitting
-from viewer.app.gizmo_drawing import draw_gizmo
+from viewer.app.core.framing import keep_fitting
+from viewer.app.core.jobs import FrameJob
+from viewer.app.core.state import AppState
+from viewer.app.files.file_dialog import PICTURES, FileDialog, draw_file_dialog, folder_of
+from viewer.app.files.loader import Loader
+from viewer.app.files.recent import remember
+from viewer.app.files.stream import Stream
 from viewer.app.interface import draw_interface
-from viewer.app.jobs import FrameJob
 from viewer.app.keys import handle_keys
-from viewer.app.lint_marks import show_finding
-from viewer.app.loader import Loader
+from viewer.app.linting.marks import show_finding
 from viewer.app.mouse import drop_motion_before_press, handle_mouse
 from viewer.app.overlays import draw_hints
 from viewer.app.picture_key import picture_key
-from viewer.app.recent import remember
-from viewer.app.record_dialog import draw_record_dialog
-from viewer.app.rig_tools import draw_rig_tools, show_rig
-from viewer.app.shape_guard import drop_unreadable_shapes
-from viewer.app.state import AppState
-from viewer.app.stream import Stream
-from viewer.app.view_picks import answer_picks
+from viewer.app.posing.gizmo_drawing import draw_gizmo
+from viewer.app.posing.shape_guard import drop_unreadable_shapes
+from viewer.app.recording.record_dialog import draw_record_dialog
+from viewer.app.rigging.tools import draw_rig_tools, show_rig
+from viewer.app.view.picks import answer_picks
+from viewer.app.weights.explanation_lines import draw_hovered, pinned_annotations
 from viewer.errors import RenderError, ViewerError, printable
 from viewer.formats import FORMATS, free_path, save_image
 from viewer.loading import Contents, add_to_actor, bundled_body, bundled_files
@@ -283,7 +283,7 @@ class Frame:
         if "screenshot" in state.wants:
             self._save_screenshot()
         if state.wants_recording is not None and state.record is not None and state.job is None:
-            from viewer.app.recording import recording_steps
+            from viewer.app.recording.recording_steps import recording_steps
 
             path, settings = state.wants_recording, replace(state.record)
             ghost = self.renderer.ghost

@@ -6,8 +6,8 @@ import math
 
 from imgui_bundle import imgui, implot
 
+from viewer.app.core.state import AppState
 from viewer.app.frame import Frame
-from viewer.app.state import AppState
 from viewer.app.theme import apply_theme
 from viewer.rendering.gpu.context import headless_context
 from viewer.rendering.gpu.target import Target

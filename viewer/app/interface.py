@@ -6,13 +6,13 @@ from pathlib import Path
 
 from imgui_bundle import imgui
 
+from viewer.app.core.reasons import no_panel
+from viewer.app.core.state import AppState
+from viewer.app.features import PANELS, Panel, panel_module
 from viewer.app.menus import draw_menus
 from viewer.app.message_window import draw_error, draw_message_window
 from viewer.app.overlays import draw_overlays
-from viewer.app.panels import PANELS, Panel, panel_module
-from viewer.app.reasons import no_panel
 from viewer.app.shown_panels import is_open, set_open
-from viewer.app.state import AppState
 
 __all__ = ["draw_interface"]
 

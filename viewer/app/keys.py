@@ -7,9 +7,12 @@ from dataclasses import dataclass
 
 from imgui_bundle import imgui
 
-from viewer.app import actions, pose_actions, posing_actions, rig_results
-from viewer.app.state import AppState
-from viewer.app.weights_actions import toggle_weights
+from viewer.app import actions
+from viewer.app.core.state import AppState
+from viewer.app.posing import pose_actions
+from viewer.app.posing import tool_actions as posing_actions
+from viewer.app.rigging import results as rig_results
+from viewer.app.weights.actions import toggle_weights
 
 __all__ = ["KEYS", "Shortcut", "handle_keys"]
 

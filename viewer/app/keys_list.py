@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 from imgui_bundle import imgui
 
+from viewer.app.core.state import AppState
+from viewer.app.core.widgets import overlay_rect
 from viewer.app.keys import KEYS, MOUSE
-from viewer.app.state import AppState
-from viewer.app.widgets import overlay_rect
 
 __all__ = ["draw_keys"]
 

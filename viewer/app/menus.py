@@ -7,20 +7,7 @@ from pathlib import Path
 from imgui_bundle import imgui
 
 from viewer.app.actions import redo, reset_pose, undo
-from viewer.app.clip_actions import new_clip
-from viewer.app.file_dialog import FileDialog, folder_of
-from viewer.app.lint_actions import check_rig
-from viewer.app.motion_dialog import ask_for_motion
-from viewer.app.panels import PANELS
-from viewer.app.pose_actions import (
-    copy_numbers,
-    copy_pose,
-    mirror,
-    paste_pose,
-    save_export,
-    save_pose,
-)
-from viewer.app.reasons import (
+from viewer.app.core.reasons import (
     no_job_room,
     no_new_clip,
     no_panel,
@@ -29,11 +16,24 @@ from viewer.app.reasons import (
     no_undo,
     nothing_to_export,
 )
-from viewer.app.record_dialog import RecordSettings
+from viewer.app.core.state import AppState
+from viewer.app.core.widgets import begin_menu, menu_item, note_item
+from viewer.app.curves.clip_actions import new_clip
+from viewer.app.features import PANELS
+from viewer.app.files.file_dialog import FileDialog, folder_of
+from viewer.app.files.motion_dialog import ask_for_motion
+from viewer.app.linting.actions import check_rig
+from viewer.app.posing.pose_actions import (
+    copy_numbers,
+    copy_pose,
+    mirror,
+    paste_pose,
+    save_export,
+    save_pose,
+)
+from viewer.app.recording.record_dialog import RecordSettings
 from viewer.app.shown_panels import is_open, set_open
-from viewer.app.state import AppState
-from viewer.app.view_menu import draw_view_menu
-from viewer.app.widgets import begin_menu, menu_item, note_item
+from viewer.app.view.view_menu import draw_view_menu
 from viewer.errors import ViewerError, printable
 from viewer.export import EXPORTERS, files_written
 from viewer.formats import FORMATS, file_stem, opened_text

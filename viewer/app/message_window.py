@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from viewer.app.messages import Message, message_line
-from viewer.app.state import AppState
-from viewer.app.widgets import button, checkbox, explain, same_line_if_room
+from viewer.app.core.messages import Message, message_line
+from viewer.app.core.state import AppState
+from viewer.app.core.widgets import button, checkbox, explain, same_line_if_room
 from viewer.errors import printable
 
 __all__ = ["draw_error", "draw_message_window"]

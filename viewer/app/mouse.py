@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from viewer.app.gizmo import choose_joint, use_handles
-from viewer.app.rig_tools import holds_mouse
-from viewer.app.state import AppState
-from viewer.app.weights_view import wants_vertex
+from viewer.app.core.state import AppState
+from viewer.app.posing.gizmo import choose_joint, use_handles
+from viewer.app.rigging.tools import holds_mouse
+from viewer.app.weights.state import wants_vertex
 from viewer.rendering.camera import orbit, pan, zoom
 
 __all__ = ["drop_motion_before_press", "handle_mouse"]

@@ -12,12 +12,12 @@ from typing import NamedTuple
 from imgui_bundle import imgui
 
 from viewer.app.actions import cancel
-from viewer.app.hover_text import draw_hover_text
+from viewer.app.core.state import AppState
+from viewer.app.core.widgets import Rect, begin_overlay, button, overlay_rect
 from viewer.app.keys_list import draw_keys
-from viewer.app.legend import draw_legend
-from viewer.app.state import AppState
-from viewer.app.toolbar import draw_toolbar
-from viewer.app.widgets import Rect, begin_overlay, button, overlay_rect
+from viewer.app.posing.toolbar import draw_toolbar
+from viewer.app.weights.hover_text import draw_hover_text
+from viewer.app.weights.legend import draw_legend
 from viewer.errors import printable
 from viewer.rendering.passes.ground_pass import grid_step
 

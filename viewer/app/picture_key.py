@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 
-from viewer.app.state import AppState
+from viewer.app.core.state import AppState
 from viewer.rendering.renderer import Renderer
 from viewer.rig.pose import pose_key
 

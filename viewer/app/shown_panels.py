@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from viewer.app.panels import PANELS
-from viewer.app.state import AppState
+from viewer.app.core.state import AppState
+from viewer.app.features import PANELS
 
 __all__ = ["is_open", "set_open"]
 

@@ -14,20 +14,20 @@ glfw = import_glfw()
 import moderngl  # noqa: E402  after glfw, whose library imgui-bundle chooses
 from imgui_bundle import imgui, implot  # noqa: E402
 
+from viewer.app.core.jobs import FrameJob  # noqa: E402
+from viewer.app.core.state import AppState  # noqa: E402
 from viewer.app.display_loss import stop_watching  # noqa: E402
-from viewer.app.frame import Frame  # noqa: E402
-from viewer.app.jobs import FrameJob  # noqa: E402
-from viewer.app.recent import (  # noqa: E402
+from viewer.app.files.recent import (  # noqa: E402
     load_closed_panels,
     load_recent,
     remember,
     save_closed_panels,
     state_folder,
 )
-from viewer.app.state import AppState  # noqa: E402
+from viewer.app.frame import Frame  # noqa: E402
 from viewer.app.theme import apply_theme, change_scale  # noqa: E402
 from viewer.app.typed_keys import TypedKeys  # noqa: E402
-from viewer.app.weights_actions import start_heat_map  # noqa: E402
+from viewer.app.weights.actions import start_heat_map  # noqa: E402
 from viewer.errors import RenderError, printable  # noqa: E402
 from viewer.formats import opened_text  # noqa: E402
 from viewer.interrupts import hold, poll  # noqa: E402

@@ -1,0 +1,279 @@
+"""A dialog to choose files, drawn in the window: the same on every system, and testable.
+
+It opens files, chooses a folder, or asks where to save; what follows is up to who asked.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from imgui_bundle import imgui
+
+from viewer.app.core.state import AppState
+from viewer.app.core.widgets import button, note_item
+from viewer.errors import printable
+from viewer.formats import FORMATS
+
+__all__ = ["PICTURES", "FileDialog", "draw_file_dialog", "folder_of"]
+
+PICTURES = (".png", ".jpg", ".jpeg")
+"""Suffixes of textures."""
+
+_HINTS = {
+    "open": "Ctrl+click chooses several: a .skel and its .skin",
+    "folder": "",
+    "save": "",
+}
+
+
+def open_chosen(state: AppState, paths: list[Path]) -> None:
+    """Open what was chosen, after the frame."""
+    state.wants_open = paths
+
+
+class FileDialog:
+    """A folder being looked at and the files chosen in it.
+
+    Parameters
+    ----------
+    folder : Path
+        Where to start.
+    done : callable
+        Called with the state and what was chosen: files, one folder, or one file to write.
+        Opens them if omitted.
+    purpose : str
+        ``"open"``, ``"folder"`` or ``"save"``.
+    title : str
+        Of the dialog.
+    suffixes : tuple of str
+        Files that are listed; all that can be opened if empty.
+    name : str
+        Suggested name of the file to write; its suffix is added to names that have none.
+    more : callable, optional
+        Draws what else is asked for, given the state and the dialog.
+    written : callable, optional
+        Returns all files that are written for a name; that file alone if omitted.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        done: Callable[[AppState, list[Path]], None] = open_chosen,
+        purpose: str = "open",
+        title: str = "Open files",
+        suffixes: tuple[str, ...] = (),
+        name: str = "",
+        more: Callable[[AppState, FileDialog], None] | None = None,
+        written: Callable[[Path], list[Path]] | None = None,
+    ) -> None:
+        self.more, self.written = more, written
+        self.done, self.purpose, self.title, self.name = done, purpose, title, name
+        self.suffixes = set(suffixes or opened_suffixes())
+        self.suffix = Path(name).suffix
+        self.folder = folder
+        self.chosen: set[Path] = set()
+        self.shows_all = False
+        self.problem = ""
+        self.entries: list[Path] = []
+        self.is_new = True
+        self.enter(folder)
+
+    def enter(self, folder: Path) -> None:
+        """Look into a folder; one that cannot be read leaves the dialog where it was."""
+        try:
+            found = sorted(
+                folder.iterdir(), key=lambda path: (not path.is_dir(), path.name.lower())
+            )
+        except OSError as problem:
+            self.problem = f"{printable(folder)}: {problem.strerror}"
+            return
+        self.folder, self.entries, self.problem = folder, found, ""
+        self.chosen.clear()
+
+    def typed(self, text: str) -> Path | None:
+        """Return the file that a text names, or look into the folder that it names."""
+        try:
+            path = Path(text).expanduser()
+            if path.is_file():
+                return path
+        except (OSError, RuntimeError) as problem:  # too long; no such user
+            self.problem = f"{printable(text)}: {getattr(problem, 'strerror', None) or problem}"
+            return None
+        self.enter(path)
+        return None
+
+    def target(self) -> Path | None:
+        """Return the file to write, by its name with a suffix; None if it has no name."""
+        name = Path(self.name.strip())
+        if not name.name.strip("."):
+            return None
+        path = self.folder / name
+        return path if path.suffix else path.with_name(path.name + self.suffix)
+
+    def listed(self) -> list[Path]:
+        """Return folders, and the files that can be opened or all files."""
+        return [
+            path
+            for path in self.entries
+            if not path.name.startswith(".")
+            and (path.is_dir() or self.shows_all or path.suffix.lower() in self.suffixes)
+        ]
+
+
+def opened_suffixes() -> set[str]:
+    """Return the suffixes of files that can be opened, textures among them."""
+    suffixes = {suffix for kind in FORMATS.values() for suffix in kind.suffixes}
+    # Most .txt files are no poses; the check box lists them too.
+    return suffixes - {".txt"} | set(PICTURES)
+
+
+def draw_file_dialog(state: AppState) -> None:
+    """Draw the dialog if there is one; when the user has chosen, do what was asked for."""
+    dialog = state.dialog
+    if dialog is None:
+        return
+    if dialog.is_new:
+        imgui.open_popup(dialog.title)
+        dialog.is_new = False
+    size = imgui.get_main_viewport().size
+    room = (min(620.0, 0.95 * size.x), min(460.0, 0.92 * size.y))
+    imgui.set_next_window_size(room, imgui.Cond_.appearing)
+    center = imgui.get_main_viewport().get_center()
+    imgui.set_next_window_pos(center, imgui.Cond_.appearing, (0.5, 0.5))
+    result: list[Path] = []
+    opened, stays = imgui.begin_popup_modal(dialog.title, True)
+    if opened:
+        result = _draw_content(state, dialog)
+        imgui.end_popup()
+    if result or not stays:
+        state.dialog = None
+    if result:
+        dialog.done(state, result)
+
+
+def _draw_content(state: AppState, dialog: FileDialog) -> list[Path]:
+    imgui.set_next_item_width(-1.0)
+    entered, text = imgui.input_text(
+        "##folder", str(dialog.folder), imgui.InputTextFlags_.enter_returns_true
+    )
+    note_item(state, "Folder")
+    if entered:
+        path = dialog.typed(text)
+        if path is not None and dialog.purpose == "open":
+            return [path]
+    if button(state, "Up"):
+        dialog.enter(dialog.folder.parent)
+    imgui.same_line()
+    if button(state, "Home"):
+        dialog.enter(Path.home())
+    imgui.same_line()
+    dialog.shows_all = imgui.checkbox("All files", dialog.shows_all)[1]
+    if dialog.problem:
+        imgui.text_wrapped(dialog.problem)
+    result = _draw_list(state, dialog)
+    return result or _draw_buttons(state, dialog)
+
+
+def _draw_buttons(state: AppState, dialog: FileDialog) -> list[Path]:
+    """Draw what confirms and cancels; return what was confirmed."""
+    result: list[Path] = []
+    if dialog.more is not None:
+        dialog.more(state, dialog)
+    if dialog.purpose == "save":
+        imgui.set_next_item_width(0.5 * imgui.get_content_region_avail().x)
+        dialog.name = imgui.input_text("##name", dialog.name)[1]
+        note_item(state, "Name")
+        imgui.same_line()
+    count, label = _confirmation(dialog)
+    missing = "give it a name" if dialog.purpose == "save" else "choose a file"
+    pressed = button(state, label, "" if count else missing)
+    by_key = count and dialog.purpose == "open" and imgui.is_key_pressed(imgui.Key.enter, False)
+    if pressed or by_key:
+        result = _confirmed(dialog)
+    imgui.same_line()
+    if button(state, "Cancel"):
+        state.dialog = None
+    imgui.same_line()
+    imgui.text_disabled(_HINTS[dialog.purpose])
+    return result
+
+
+def _confirmation(dialog: FileDialog) -> tuple[int, str]:
+    """Return how many files would be confirmed, and the label of the button that does."""
+    if dialog.purpose == "folder":
+        return 1, "Use this folder"
+    if dialog.purpose == "save":
+        target = dialog.target()
+        files = [] if target is None else dialog.written(target) if dialog.written else [target]
+        # Path.exists() would raise for a name that is too long.
+        exists = any(map(os.path.exists, files))
+        return int(target is not None), "Replace###Save" if exists else "Save###Save"
+    count = len(dialog.chosen)
+    return count, f"Open {count} files###Open" if count > 1 else "Open###Open"
+
+
+def _confirmed(dialog: FileDialog) -> list[Path]:
+    if dialog.purpose == "folder":
+        return [dialog.folder]
+    if dialog.purpose == "save":
+        target = dialog.target()
+        return [] if target is None else [target]
+    return sorted(dialog.chosen)
+
+
+def _draw_list(state: AppState, dialog: FileDialog) -> list[Path]:
+    result: list[Path] = []
+    if imgui.begin_child("files", (0.0, -_foot_height(dialog)), imgui.ChildFlags_.borders):
+        for number, path in enumerate(dialog.listed()):
+            is_folder = path.is_dir()
+            name = printable(path.name, 90) + ("/" if is_folder else "")
+            flags = imgui.SelectableFlags_.allow_double_click
+            flags |= imgui.SelectableFlags_.no_auto_close_popups
+            # The name is drawn as text: "##" in a label would hide what follows.
+            pressed, _ = imgui.selectable(f"##file{number}", path in dialog.chosen, flags)
+            note_item(state, f"file {path.name}")
+            imgui.same_line(0.0, 0.0)
+            imgui.text_unformatted(name)
+            if not pressed:
+                continue
+            if is_folder and _is_model_folder(dialog, path):
+                dialog.chosen = {path}
+            elif is_folder:
+                dialog.enter(path)
+                break
+            elif dialog.purpose == "save":
+                dialog.name = path.name
+            elif dialog.purpose == "folder":
+                continue
+            elif imgui.is_mouse_double_clicked(imgui.MouseButton_.left):
+                result = [path]
+            elif imgui.get_io().key_ctrl:
+                dialog.chosen ^= {path}
+            else:
+                dialog.chosen = {path}
+    imgui.end_child()
+    return result
+
+
+def _foot_height(dialog: FileDialog) -> float:
+    """Return the height of what lies below the list."""
+    more = 0.0 if dialog.more is None else imgui.get_frame_height_with_spacing()
+    return 1.5 * imgui.get_frame_height() + more
+
+
+def _is_model_folder(dialog: FileDialog, path: Path) -> bool:
+    """Return whether a folder is itself what can be opened; a double click looks into it."""
+    if dialog.purpose != "open" or imgui.is_mouse_double_clicked(imgui.MouseButton_.left):
+        return False
+    names = {name for kind in FORMATS.values() for name in kind.files}
+    return path.name in names or any((path / name).exists() for name in names)
+
+
+def folder_of(paths: Sequence[Path]) -> Path:
+    """Return where a dialog begins: beside the first file, else the current folder, else home."""
+    try:
+        return paths[0].resolve().parent if paths else Path.cwd()
+    except (OSError, RuntimeError):  # the folder is gone
+        return Path.home()
