@@ -1,12 +1,13 @@
 """Each registry is exactly its folder, and what it names can be loaded."""
 
 from importlib import import_module
+from inspect import signature
 from pathlib import Path
 
 import pytest
 
 import viewer
-from viewer.app.features import PANELS, panel_module
+from viewer.app.features import KEYS, PANELS, panel_module
 from viewer.commands import COMMANDS
 from viewer.export import EXPORTERS
 from viewer.formats import FORMATS
@@ -67,6 +68,16 @@ def test_panels_can_draw() -> None:
         assert callable(panel_module(name).draw)
 
 
+def test_keys_run_functions_of_the_state() -> None:
+    labels = [key.label for key in KEYS]
+    assert len(labels) == len(set(labels))
+    for key in KEYS:
+        module, _, name = key.action.rpartition(".")
+        function = getattr(import_module(f"viewer.app.{module}"), name)
+        assert next(iter(signature(function).parameters)) == "state", key.label
+        signature(function).bind(None, *key.arguments)
+
+
 def test_commands_can_run() -> None:
     for name in COMMANDS:
         module = import_module(f"viewer.commands.{name}")
@@ -80,8 +91,6 @@ def test_public_names_exist_and_are_documented() -> None:
 
 
 def test_readme_lists_every_key_format_and_command() -> None:
-    from viewer.app.keys import KEYS
-
     readme = (PACKAGE.parent / "README.md").read_text()
     for key in KEYS:
         assert f"| {key.label} | {key.text} |" in readme, key.label

@@ -10,6 +10,8 @@ import copy
 import pytest
 from app.curves.test_curves_panel import clip_text
 
+from viewer.app.posing.state import Posing
+
 
 @pytest.fixture(params=[True, False], ids=["trickled", "at once"])
 def spread(request):
@@ -104,7 +106,7 @@ def test_handle_of_a_joint_turns_from_the_press(hand, spread):
     pose = hand.dofs()
     place = _ring(hand)
     leap(hand, place, 0, spread)
-    assert hand.state.posing.drag is not None and (hand.dofs() == pose).all()
+    assert hand.state.of(Posing).drag is not None and (hand.dofs() == pose).all()
     hand.let_go()
     assert (hand.dofs() == pose).all()
 

@@ -57,25 +57,25 @@ def test_warnings_of_a_scene_are_said_and_kept_from_the_start(rig):
     scene = viewer.load(*rig)
     scene.warnings = ("tiny.skin: 3 normals are 0", "tiny.skin: no texture")
     state = make_state(scene)
-    assert [note.text for note in state.notes] == list(scene.warnings)
-    assert [message.text for message in state.log] == list(scene.warnings)
+    assert [note.text for note in state.messages.notes] == list(scene.warnings)
+    assert [message.text for message in state.messages.log] == list(scene.warnings)
 
 
 def test_notes_go_but_stay_in_the_log(hand, monkeypatch):
     hand.state.say("three joints were left out")
     hand.step(1)
     assert hand.says("three joints")
-    monkeypatch.setattr("viewer.app.core.state.time.monotonic", lambda: 1e12)
+    monkeypatch.setattr("viewer.app.core.messages.time.monotonic", lambda: 1e12)
     hand.step(1)
-    assert not hand.state.notes
-    assert ("three joints were left out", 1) in texts_of(hand.state.log)
+    assert not hand.state.messages.notes
+    assert ("three joints were left out", 1) in texts_of(hand.state.messages.log)
 
 
 def test_note_that_is_said_again_is_shown_once(hand):
     for _ in range(5):
         hand.state.say("the driver has no such thing")
-    assert [note.text for note in hand.state.notes] == ["the driver has no such thing"]
-    assert texts_of(hand.state.log)[-1] == ("the driver has no such thing", 5)
+    assert [note.text for note in hand.state.messages.notes] == ["the driver has no such thing"]
+    assert texts_of(hand.state.messages.log)[-1] == ("the driver has no such thing", 5)
 
 
 def test_errors_are_kept_once_while_they_are_shown(hand):
@@ -84,7 +84,7 @@ def test_errors_are_kept_once_while_they_are_shown(hand):
         hand.step(5)
         hand.key("escape")
         hand.step(2)
-    errors = [message for message in hand.state.log if message.kind == "error"]
+    errors = [message for message in hand.state.messages.log if message.kind == "error"]
     assert [(m.text, m.count) for m in errors] == [("tube.skin:41: expected 3 numbers, found 2", 2)]
 
 
@@ -94,13 +94,13 @@ def test_key_and_menu_open_the_window_and_escape_closes_it(hand, texts):
     hand.step(2)
     texts.clear()
     hand.step(1)
-    assert hand.state.messages_visible and "three joints were left out" in texts
+    assert hand.state.messages.is_open and "three joints were left out" in texts
     hand.key("escape")
     hand.step(2)
-    assert not hand.state.messages_visible
+    assert not hand.state.messages.is_open
     hand.menu("menu Window", "Messages")
     hand.step(2)
-    assert hand.state.messages_visible
+    assert hand.state.messages.is_open
 
 
 def test_window_says_that_there_is_nothing(hand, texts):
@@ -150,7 +150,7 @@ def test_newest_messages_that_fit(heights, room, count):
 
 def test_more_than_eight_messages_are_counted(drive, rig, texts):
     hand = drive(*rig, size=(1280, 900))
-    hand.state.notes.clear()
+    hand.state.messages.notes.clear()
     hand.state.say(*(f"message {number}" for number in range(12)))
     texts.clear()
     hand.step(1)
@@ -189,7 +189,7 @@ def test_progress_messages_and_legend_never_overlap(drive, rig, size, has_legend
 
 def test_messages_without_room_are_only_counted(drive, rig, texts):
     hand = drive(*rig, size=(700, 250), samples=1)
-    hand.state.notes.clear()
+    hand.state.messages.notes.clear()
     hand.state.say(*("a long message, " + "and more " * 30 + str(n) for n in range(3)))
     hand.state.job = _job()
     hand.step(3)
@@ -204,10 +204,10 @@ def test_picture_of_the_interface_shows_warnings_however_long_it_takes(drive, ri
     scene = viewer.load(*rig)
     scene.warnings = ("tiny.skin: 3 normals are 0",)
     hand = drive(scene=scene, samples=1)
-    for note in hand.state.notes:
+    for note in hand.state.messages.notes:
         note.until = 1e11  # as if it had been said just before the next line
     plain = hand.app.picture()
-    monkeypatch.setattr("viewer.app.core.state.time.monotonic", lambda: 1e12)
+    monkeypatch.setattr("viewer.app.core.messages.time.monotonic", lambda: 1e12)
     late = hand.app.picture()
     assert "##notes" in hand.state.item_rects
     assert (late == plain).all()

@@ -12,10 +12,11 @@ from app.playback import test_timeline
 from app.playback.test_timeline import capture, finish
 
 import viewer
-from viewer.app import actions
-from viewer.app.core.framing import restart_framing
+from viewer.app.actors.following import start_following
 from viewer.app.core.view_frame import view_frame
 from viewer.app.curves.editing import place_key
+from viewer.app.files.state import Files
+from viewer.app.shown_panels import ShownPanels
 from viewer.rendering.camera import Camera, fit
 from viewer.rendering.framing import frame_motion
 from viewer.rendering.recorder import Recording
@@ -49,7 +50,7 @@ def resize(hand, width, height):
 def wide(drive, tmp_path):
     """A hand on a bar ten times as wide as high, just opened in a window."""
     hand = drive(bar(tmp_path / "bar.obj"), size=(1200, 700), samples=1)
-    restart_framing(hand.state)
+    hand.state.framing.restart()
     hand.step(2)
     return hand
 
@@ -66,7 +67,14 @@ def test_fit_keeps_up_with_window_and_panels(wide):
     wide.step(2)
     assert is_fitted(wide) and wide.state.camera.distance < distance
     wide.key("tab")
-    wide.state.closed_panels |= {"display", "skinning", "weights", "camera", "lights", "stats"}
+    wide.state.of(ShownPanels).closed |= {
+        "display",
+        "skinning",
+        "weights",
+        "camera",
+        "lights",
+        "stats",
+    }
     wide.step(4)
     assert is_fitted(wide)
 
@@ -107,7 +115,7 @@ def test_fit_is_over_when_somebody_moves_the_camera(wide, move):
 
 
 def test_following_ends_the_fit(wide):
-    actions.start_following(wide.state, 0, -1)
+    start_following(wide.state, 0, -1)
     before = wide.state.camera.copy()
     wide.key("tab")
     wide.step(2)
@@ -165,7 +173,7 @@ def test_named_views_count_from_the_front_and_the_panel_overrides_it(drive, tmp_
 def test_whole_motion_is_fitted_as_a_recording_is(drive, rig):
     scene = people(rig, [True] * 40)
     hand = drive(scene=scene, size=(1200, 700), samples=1)
-    restart_framing(hand.state)
+    hand.state.framing.restart()
     hand.step(3)
     assert hand.state.framing.is_settled
     times = np.arange(40) / 10.0
@@ -191,7 +199,7 @@ def test_fit_keeps_up_with_a_capture_that_is_read(streaming):
     finish(streaming)
     streaming.step(40)
     state = streaming.state
-    assert state.stream is None and state.framing.is_settled
+    assert state.of(Files).stream is None and state.framing.is_settled
     assert state.box[1, 0] - state.box[0, 0] > 99.0  # x is the frame's number
     recording = Recording(
         state.scene, np.arange(100) / 10.0, Camera(), (64, 36), state.options, moves=True
@@ -216,7 +224,7 @@ def test_fit_leaves_a_camera_that_was_moved_while_a_capture_is_read(streaming):
 def test_views_fit_the_motion_as_it_was_edited(drive, rig, tmp_path, edit):
     (tmp_path / "wave.anim").write_text(clip_text())
     hand = drive(*rig, tmp_path / "wave.anim", size=(1200, 700), samples=1)
-    restart_framing(hand.state)
+    hand.state.framing.restart()
     hand.step(3)
     before = hand.state.camera.distance
     if edit == "offset and key":
@@ -243,7 +251,7 @@ def test_tools_cover_nothing_that_is_fitted(drive, tmp_path):
     points = scene_points(hand.state.scene)
     fit(hand.state.camera, points, hand.state.aspect)
     assert _is_covered(hand, points)  # as it would be fitted to the whole view
-    restart_framing(hand.state)
+    hand.state.framing.restart()
     hand.step(3)
     assert not _is_covered(hand, points)
     assert reach(hand).max() > 0.7
@@ -256,7 +264,7 @@ def _is_covered(hand, points):
 
 
 def test_ground_stays_under_the_feet_of_another_shape(box):
-    restart_framing(box.state)
+    box.state.framing.restart()
     box.step(2)
     camera = box.state.camera.copy()
     assert box.state.box[0, 1] == -box_body.HEIGHT / 2
@@ -300,7 +308,7 @@ def test_ground_of_a_moving_figure_follows_its_shape(box):
     actor.clip.figure_translations.flags.writeable = True
     actor.clip.figure_translations[:, 1] = np.linspace(0.0, -1.9, 20)  # down
     actor.clip.figure_translations.flags.writeable = False
-    restart_framing(box.state)
+    box.state.framing.restart()
     box.step(3)
     half = box_body.HEIGHT / 2
     assert box.state.box[:, 1] == pytest.approx([-1.9 - half, half])

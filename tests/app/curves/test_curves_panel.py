@@ -11,6 +11,8 @@ from imgui_bundle import imgui
 from numpy.testing import assert_allclose, assert_array_equal
 
 import viewer
+from viewer.app.curves.state import Curves
+from viewer.app.files.state import Files
 from viewer.formats import Source, read
 from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.figure import Figure
@@ -81,25 +83,25 @@ def _at(hand, time, degrees):
 
 
 def _chosen(hand):
-    return sorted(hand.state.curves.keys)
+    return sorted(hand.state.of(Curves).keys)
 
 
 # What is shown
 
 
 def test_curves_follow_the_selected_joint_and_the_list(curves):
-    assert curves.state.curves.rows == (ARM_X,)
+    assert curves.state.of(Curves).rows == (ARM_X,)
     curves.state.selected_joint = 0
     curves.step(2)
-    assert curves.state.curves.rows == (0, 1, 2, 3, 4, 5)
+    assert curves.state.of(Curves).rows == (0, 1, 2, 3, 4, 5)
     curves.click("curve root.tx")
-    assert curves.state.curves.rows == (0,)
+    assert curves.state.of(Curves).rows == (0,)
     curves.click("curve root.y", held="ctrl")
-    assert curves.state.curves.rows == (0, 4)
+    assert curves.state.of(Curves).rows == (0, 4)
     curves.click("curve root.tx", held="ctrl")
-    assert curves.state.curves.rows == (4,)
+    assert curves.state.of(Curves).rows == (4,)
     curves.click("curves of root")
-    assert curves.state.curves.rows == (0, 1, 2, 3, 4, 5)
+    assert curves.state.of(Curves).rows == (0, 1, 2, 3, 4, 5)
     assert curves.undo_steps == 0
 
 
@@ -110,7 +112,7 @@ def test_filter_lists_only_what_has_it_in_its_name(curves):
     listed = {label for label in curves.state.item_rects if label.startswith("curve ")}
     assert listed == {"curve arm.z"}
     curves.click("curves of arm")
-    assert curves.state.curves.rows == (ARM_X + 2,)
+    assert curves.state.of(Curves).rows == (ARM_X + 2,)
     curves.click("Curve filter")
     curves.key("a", "ctrl")
     curves.type("nothing")
@@ -486,7 +488,7 @@ def test_edited_clip_is_saved_and_read_back(curves, tmp_path):
     curves.click("Delete")
     curves.click("Save clip…")
     curves.step(3)
-    assert curves.state.dialog.name == "tiny_edited.anim"
+    assert curves.state.of(Files).dialog.name == "tiny_edited.anim"
     curves.click("Save###Save")
     curves.step(3)
     saved = read(Source.open(tmp_path / "tiny_edited.anim"))
@@ -534,7 +536,7 @@ def test_frames_are_shown_and_nothing_about_them_can_be_changed(drive, rig):
     hand.state.selected_joint = 1
     hand.step(3)
     clip = _clip(hand)
-    assert hand.state.curves.rows == (6, 7, 8)
+    assert hand.state.of(Curves).rows == (6, 7, 8)
     assert not {"Add key", "Key pose", "Before"} & set(hand.state.item_rects)
     x0, y0, x1, y1 = hand.state.item_rects["plot"]
     hand.double_click(((x0 + x1) / 2, (y0 + y1) / 2))
@@ -557,10 +559,10 @@ def test_captured_points_have_curves_too(drive):
     hand = drive(scene=Scene([actor]), size=SIZE, samples=1)
     hand.show_panel("Curves")
     hand.step(3)
-    assert hand.state.curves.rows == (0, 1, 2)
+    assert hand.state.of(Curves).rows == (0, 1, 2)
     hand.click("curve right.x")
     hand.step(2)
-    assert hand.state.curves.rows == (3,) and not hand.state.error
+    assert hand.state.of(Curves).rows == (3,) and not hand.state.error
 
 
 def test_choice_starts_anew_with_another_actor(drive, rig, tmp_path):
@@ -573,10 +575,10 @@ def test_choice_starts_anew_with_another_actor(drive, rig, tmp_path):
     hand.click("curve root.tx")
     hand.state.choose_actor(1)
     hand.step(3)
-    assert hand.state.curves.rows == (0, 1, 2)
+    assert hand.state.of(Curves).rows == (0, 1, 2)
     hand.state.choose_actor(0)
     hand.step(3)
-    assert hand.state.curves.rows == (0, 1, 2, 3, 4, 5)
+    assert hand.state.of(Curves).rows == (0, 1, 2, 3, 4, 5)
 
 
 def test_thousands_of_keys_are_drawn_but_not_taken_hold_of(curves):
@@ -619,7 +621,7 @@ def test_panel_looks_as_it_did(curves):
     curves.click(_center(curves, "key arm.x 1"))
     _pick(curves, "After", 4)
     _pick(curves, "Out", 3)
-    curves.state.notes.clear()
+    curves.state.messages.notes.clear()
     curves.move((5.0, 5.0))
     top = imgui.internal.find_window_by_name("Curves").pos.y
     _compare(curves.screen()[round(top) :], "curves")

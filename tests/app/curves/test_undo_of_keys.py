@@ -21,6 +21,7 @@ from viewer.app.curves.editing import (
     set_clip_range,
     turn_tangent,
 )
+from viewer.app.curves.state import Curves
 from viewer.app.playback.frame_rate import set_rate
 from viewer.rig.motion.clip_sampling import evaluate
 from viewer.rig.scene import Actor, Scene
@@ -63,7 +64,7 @@ EDITS = {
 def test_undoing_a_key_edit_shows_the_restored_clip(curves, name, held, monkeypatch):
     state = curves.state
     old = state.actor.clip
-    state.curves.keys = frozenset({KEY})
+    state.of(Curves).keys = frozenset({KEY})
     # Extrapolation is seen outside of the keys alone.
     time = -0.25 if name == "extrapolation" else 0.75
     state.playback.mode = "run on"

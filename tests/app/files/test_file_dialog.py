@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 from app.tiny import write_rig
 
-from viewer.app.files.file_dialog import FileDialog
+from viewer.app.files.file_choice import FileDialog
+from viewer.app.files.state import Files
 
 
 @pytest.fixture
@@ -33,7 +34,7 @@ def test_dialog_opens_one_file(dialog, rig):
     dialog.click("file tiny.skel")
     dialog.click("Open###Open")
     dialog.wait_for_loader()
-    assert dialog.state.dialog is None and dialog.state.paths == (rig[0].resolve(),)
+    assert dialog.state.of(Files).dialog is None and dialog.state.paths == (rig[0].resolve(),)
 
 
 def test_dialog_opens_a_file_by_double_click(dialog, rig):
@@ -56,14 +57,14 @@ def test_dialog_chooses_several_with_ctrl(dialog):
 def test_dialog_plain_click_chooses_anew_and_ctrl_takes_back(dialog):
     dialog.click("file tiny.skel")
     dialog.click("file tiny.skin")
-    assert {path.name for path in dialog.state.dialog.chosen} == {"tiny.skin"}
+    assert {path.name for path in dialog.state.of(Files).dialog.chosen} == {"tiny.skin"}
     dialog.click("file tiny.skin", held="ctrl")
-    assert not dialog.state.dialog.chosen
+    assert not dialog.state.of(Files).dialog.chosen
 
 
 def test_dialog_goes_up(dialog, tmp_path):
     dialog.click("Up")
-    assert dialog.state.dialog.folder == tmp_path.resolve().parent
+    assert dialog.state.of(Files).dialog.folder == tmp_path.resolve().parent
     assert tmp_path.name in _listed(dialog)
 
 
@@ -72,8 +73,8 @@ def test_dialog_cancel_leaves_the_scene(dialog):
     dialog.click("file tiny.skel")
     dialog.click("Cancel")
     dialog.step(3)
-    assert dialog.state.dialog is None and dialog.state.scene is scene
-    assert dialog.state.loader is None
+    assert dialog.state.of(Files).dialog is None and dialog.state.scene is scene
+    assert dialog.state.of(Files).loader is None
 
 
 def test_dialog_opens_again_after_cancel(dialog):
@@ -86,7 +87,7 @@ def test_dialog_opens_again_after_cancel(dialog):
 def test_dialog_opens_from_the_menu(hand):
     hand.menu("menu File", "Open…")
     hand.step(4)
-    assert hand.state.dialog is not None and _listed(hand)
+    assert hand.state.of(Files).dialog is not None and _listed(hand)
 
 
 def _type_folder(hand, text):
@@ -107,8 +108,8 @@ def test_dialog_follows_a_typed_folder(dialog, tmp_path):
 )
 def test_dialog_says_what_is_wrong_with_a_typed_folder(dialog, tmp_path, text):
     _type_folder(dialog, text)
-    assert dialog.state.dialog.problem
-    assert dialog.state.dialog.folder == tmp_path.resolve()
+    assert dialog.state.of(Files).dialog.problem
+    assert dialog.state.of(Files).dialog.folder == tmp_path.resolve()
 
 
 def test_dialog_opens_a_typed_file(dialog, rig):
@@ -136,8 +137,8 @@ def test_dialog_starts_in_a_folder_that_is_gone(tmp_path):
 def test_dialog_shows_strange_names(dialog, tmp_path):
     for name in ("a\nb.skel", "100% {x}.skel", "##id.skel", "bad\udcff.skel", "a###b.skel"):
         (tmp_path / name).write_text("balljoint a {}")
-    dialog.state.dialog.enter(tmp_path)
+    dialog.state.of(Files).dialog.enter(tmp_path)
     dialog.step(3)
     assert len(_listed(dialog)) == 8
     dialog.click("file ##id.skel")
-    assert {path.name for path in dialog.state.dialog.chosen} == {"##id.skel"}
+    assert {path.name for path in dialog.state.of(Files).dialog.chosen} == {"##id.skel"}

@@ -9,6 +9,7 @@ import pytest
 from app.captured import dots, people, walk
 
 from viewer.app.files.motion_export import FOLDER, motion_files, motion_suffixes, save_motion
+from viewer.app.files.state import Files
 from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.scene import Actor, Scene
 
@@ -51,12 +52,14 @@ def test_menu_asks_where_and_says_what_was_written(moving, tmp_path):
     moving.click("menu File")
     moving.click("Export motion…")
     moving.step(2)
-    assert moving.state.dialog is not None and moving.state.dialog.name.endswith(".bvh")
+    assert moving.state.of(Files).dialog is not None and moving.state.of(
+        Files
+    ).dialog.name.endswith(".bvh")
     moving.key("escape")
-    moving.state.notes.clear()
+    moving.state.messages.notes.clear()
     save_motion(moving.state, tmp_path / "slide.bvh")
     finish(moving)
-    assert any("slide.bvh" in note.text for note in moving.state.notes)
+    assert any("slide.bvh" in note.text for note in moving.state.messages.notes)
 
 
 def test_files_that_are_open_are_never_replaced(moving, tmp_path):
@@ -218,13 +221,13 @@ def _ask(hand, folder):
     hand.click("menu File")
     hand.click("Export motion…")
     hand.step(2)
-    hand.state.dialog.enter(folder)
+    hand.state.of(Files).dialog.enter(folder)
     hand.step(2)
 
 
 def test_dialog_exports_all_actors_unless_told_otherwise(crowd, tmp_path):
     _ask(crowd, tmp_path)
-    assert crowd.state.dialog.name == "tiny.bvh"
+    assert crowd.state.of(Files).dialog.name == "tiny.bvh"
     crowd.click("Save###Save")
     finish(crowd)
     assert len(list(tmp_path.glob("*.bvh"))) == 3
@@ -245,7 +248,7 @@ def test_dialog_warns_of_any_file_that_would_be_replaced(crowd, tmp_path):
 
 def test_dialog_changes_the_suffix_with_the_kind(crowd, tmp_path):
     _ask(crowd, tmp_path)
-    dialog = crowd.state.dialog
+    dialog = crowd.state.of(Files).dialog
     kinds = [*motion_suffixes(), FOLDER]
     crowd.pick("As", kinds.index(".glb"))
     assert (dialog.name, dialog.target()) == ("tiny.glb", tmp_path / "tiny.glb")

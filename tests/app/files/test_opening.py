@@ -10,6 +10,7 @@ from app.tiny import SKEL, skin_text, write_rig
 
 import viewer.app.files.loader
 from viewer.app.files.recent import load_recent, remember, state_folder
+from viewer.app.files.state import Files
 from viewer.errors import RenderError
 from viewer.loading import load, read_files
 
@@ -132,7 +133,7 @@ def test_warnings_of_a_file_are_shown(hand, tmp_path):
     warnings = load(odd).warnings
     assert warnings
     _open(hand, odd)
-    assert [note.text for note in hand.state.notes][-len(warnings) :] == list(warnings)
+    assert [note.text for note in hand.state.messages.notes][-len(warnings) :] == list(warnings)
 
 
 def test_slow_reading_can_be_cancelled(hand, rig, monkeypatch):
@@ -145,14 +146,14 @@ def test_slow_reading_can_be_cancelled(hand, rig, monkeypatch):
     monkeypatch.setattr(viewer.app.files.loader, "read_files", slow)
     scene = hand.state.scene
     hand.app.frame.open(list(rig))
-    loader = hand.state.loader
+    loader = hand.state.of(Files).loader
     loader._started -= 5.0
     hand.step(3)
     assert "Cancel opening" in hand.state.item_rects
     hand.drag("arm.x", 0.9)  # the window still answers
     assert hand.dof("arm.x") != 0.2
     hand.click("Cancel opening")
-    assert hand.state.loader is None
+    assert hand.state.of(Files).loader is None
     gate.set()
     loader.wait()
     hand.step(3)
@@ -167,9 +168,9 @@ def test_escape_cancels_reading(hand, rig, monkeypatch):
         lambda paths, **_: (gate.wait(10), read_files(paths))[1],
     )
     hand.app.frame.open(list(rig))
-    loader = hand.state.loader
+    loader = hand.state.of(Files).loader
     hand.key("escape")
-    assert hand.state.loader is None
+    assert hand.state.of(Files).loader is None
     gate.set()
     loader.wait()
 
@@ -210,7 +211,7 @@ def test_opened_files_are_remembered_latest_first(hand, rig, tmp_path):
     _open(hand, *rig)
     _open(hand, rig[0])
     groups = [(str(rig[0].resolve()),), tuple(str(path.resolve()) for path in rig)]
-    assert hand.state.recent == groups == load_recent()
+    assert hand.state.of(Files).recent == groups == load_recent()
 
 
 def test_bad_file_is_not_remembered(hand, tmp_path):
@@ -220,7 +221,7 @@ def test_bad_file_is_not_remembered(hand, tmp_path):
 
 
 def test_recent_files_open_from_the_menu(hand, rig):
-    hand.state.recent = [(str(rig[0]),)]
+    hand.state.of(Files).recent = [(str(rig[0]),)]
     hand.menu("menu File", "menu Open recent", "recent 0")
     hand.wait_for_loader()
     assert hand.state.actor.figure.mesh is None and hand.state.paths == (rig[0],)
@@ -233,7 +234,7 @@ def test_broken_list_of_recent_files_is_empty_or_harmless(hand, text):
     state_folder().mkdir(parents=True)
     (state_folder() / "recent.json").write_text(text)
     recent = load_recent()
-    hand.state.recent = recent
+    hand.state.of(Files).recent = recent
     hand.menu("menu File")
     hand.step(2)
     assert all(isinstance(path, str) for group in recent for path in group)

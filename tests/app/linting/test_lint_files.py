@@ -12,6 +12,7 @@ from imgui_bundle import imgui
 from lint.sound import FRAMES, RATE, column, keypoints, scene_of, standing
 from lint.test_again import TEXTS
 
+from viewer.app.linting.state import Linting
 from viewer.cli import run
 from viewer.loading import bundled_files
 from viewer.rig.motion.timing import Timing
@@ -41,14 +42,14 @@ def lint(drive):
 
 
 def finish(hand):
-    running = hand.state.lint.running
+    running = hand.state.of(Linting).running
     if running is not None:
         running.job.wait()
     hand.step(3)
 
 
 def row_of(hand, code):
-    codes = [finding.code for finding in hand.state.lint.checked.findings]
+    codes = [finding.code for finding in hand.state.of(Linting).checked.findings]
     return f"finding {codes.index(code)}"
 
 
@@ -85,8 +86,8 @@ def test_rows_say_file_and_line_and_can_be_filtered_by_them(lint, files, texts):
 def test_a_reader_s_finding_leads_to_its_vertex(lint, files):
     hand = lint(*files)
     hand.click(row_of(hand, "M007"))
-    assert hand.state.lint.marks.points.shape == (1, 3)
-    assert hand.state.camera.target == pytest.approx(hand.state.lint.marks.points[0])
+    assert hand.state.of(Linting).marks.points.shape == (1, 3)
+    assert hand.state.camera.target == pytest.approx(hand.state.of(Linting).marks.points[0])
 
 
 def test_files_that_are_gone_or_changed_are_said(lint, files, texts):
@@ -109,7 +110,7 @@ def test_a_finding_of_the_file_alone_says_so_and_copies_its_place(lint, files, t
     hand.click("Recheck")
     finish(hand)
     row = row_of(hand, "F003")
-    assert hand.state.lint.checked.findings[int(row.split()[1])].actor is None
+    assert hand.state.of(Linting).checked.findings[int(row.split()[1])].actor is None
     texts.clear()
     hand.move(row)
     hand.step(60)
@@ -118,7 +119,7 @@ def test_a_finding_of_the_file_alone_says_so_and_copies_its_place(lint, files, t
     target = hand.state.camera.target.copy()
     hand.click(row)
     assert copied == [f"{files[1]}:3"] and hand.says(f"Copied {files[1]}:3")
-    assert hand.state.lint.chosen == -1 and (hand.state.camera.target == target).all()
+    assert hand.state.of(Linting).chosen == -1 and (hand.state.camera.target == target).all()
 
 
 def test_rows_say_what_a_click_does(lint, files, texts):
@@ -150,7 +151,7 @@ def gappy() -> Scene:
 def test_a_gap_leads_to_the_frame_before_it(lint):
     hand = lint(scene=gappy())
     hand.click(row_of(hand, "C005"))
-    playback, view = hand.state.playback, hand.state.lint
+    playback, view = hand.state.playback, hand.state.of(Linting)
     assert playback.frame + playback.first_frame == 109
     assert view.finding.message == "3 of 60 frames are missing in 1 gap: frames 110 to 112"
     assert hand.state.actor.is_present
@@ -168,7 +169,7 @@ def test_a_gap_of_captured_points_marks_their_middle(lint):
     hand.click(row_of(hand, "C005"))
     assert hand.state.playback.frame == 29
     # The points are at heights 1, 0.5 and 0.
-    np.testing.assert_allclose(hand.state.lint.marks.points, [[0.0, 0.5, 0.0]])
+    np.testing.assert_allclose(hand.state.of(Linting).marks.points, [[0.0, 0.5, 0.0]])
 
 
 def test_the_ground_is_a_limit(lint):
@@ -176,21 +177,21 @@ def test_the_ground_is_a_limit(lint):
     hand.click("Limits…")
     hand.step(2)
     assert "Ground height" not in hand.state.item_rects
-    hand.state.lint.options = replace(hand.state.lint.options, ground=0.0)
+    hand.state.of(Linting).options = replace(hand.state.of(Linting).options, ground=0.0)
     hand.step(2)
     hand.enter_value("Ground height", "1.25")
-    assert hand.state.lint.options.ground == pytest.approx(1.25)
-    hand.state.lint.options = replace(hand.state.lint.options, ground="none")
+    assert hand.state.of(Linting).options.ground == pytest.approx(1.25)
+    hand.state.of(Linting).options = replace(hand.state.of(Linting).options, ground="none")
     hand.step(2)
-    assert hand.state.lint.options.ground == "none"
+    assert hand.state.of(Linting).options.ground == "none"
     assert "Ground height" not in hand.state.item_rects
 
 
 def test_keys_are_counted_as_the_timeline_counts(lint, files):
     hand = lint(*files)
-    assert hand.state.lint.checked.options.frame_rate == 30.0
+    assert hand.state.of(Linting).checked.options.frame_rate == 30.0
     hand.state.playback.count_by(24.0)
     hand.step(2)
     hand.click("Recheck")
     finish(hand)
-    assert hand.state.lint.checked.options.frame_rate == 24.0
+    assert hand.state.of(Linting).checked.options.frame_rate == 24.0

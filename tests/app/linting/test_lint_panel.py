@@ -13,6 +13,8 @@ from lint.test_planted_faults import weighted
 
 from viewer.app.linting.actions import check_rig, start_check
 from viewer.app.linting.marks import marks_of
+from viewer.app.linting.state import Linting
+from viewer.app.shown_panels import ShownPanels
 from viewer.lint import CODES, Places, describe, lint_scene
 from viewer.rendering.camera import camera_axes
 from viewer.rendering.overlay.marks import MARK_COLOR
@@ -56,14 +58,14 @@ def lint(drive):
 
 def finish(hand):
     """Run frames until the check has ended and is shown."""
-    running = hand.state.lint.running
+    running = hand.state.of(Linting).running
     if running is not None:
         running.job.wait()
     hand.step(3)
 
 
 def codes(hand):
-    return [finding.code for finding in hand.state.lint.checked.findings]
+    return [finding.code for finding in hand.state.of(Linting).checked.findings]
 
 
 def row_of(hand, code):
@@ -78,35 +80,38 @@ def marked(hand):
 
 def test_menu_entry_opens_the_panel_and_checks(lint):
     hand = lint(LIGHT)
-    assert hand.state.opened_panels == {"lint"}
+    assert hand.state.of(ShownPanels).opened == {"lint"}
     assert codes(hand) == ["W001"]
     assert hand.says("Checked: 0 errors, 1 warning, 0 notes")
 
 
 def test_panel_is_closed_until_it_is_asked_for_and_checks_when_first_shown(drive):
     hand = drive(scene=scene_of(LIGHT), size=SIZE, samples=1)
-    assert imgui.internal.find_window_by_name("Lint") is None and hand.state.lint.checked is None
+    assert (
+        imgui.internal.find_window_by_name("Lint") is None
+        and hand.state.of(Linting).checked is None
+    )
     hand.menu("menu Window", "Lint")
     finish(hand)
     assert codes(hand) == ["W001"]
-    first = hand.state.lint.checked
+    first = hand.state.of(Linting).checked
     hand.menu("menu Window", "Lint")
-    assert not hand.state.opened_panels and "Recheck" not in hand.state.item_rects
+    assert not hand.state.of(ShownPanels).opened and "Recheck" not in hand.state.item_rects
     hand.menu("menu Window", "Lint")
     finish(hand)
-    assert hand.state.lint.checked is first  # only the first time by itself
+    assert hand.state.of(Linting).checked is first  # only the first time by itself
 
 
 def test_reset_layout_closes_it(lint):
     hand = lint(LIGHT)
     hand.menu("menu Window", "Reset layout")
     hand.step(3)
-    assert not hand.state.opened_panels and "Recheck" not in hand.state.item_rects
+    assert not hand.state.of(ShownPanels).opened and "Recheck" not in hand.state.item_rects
 
 
 def test_worst_comes_first_and_all_words_are_there(lint, texts):
     hand = lint(several())
-    findings = hand.state.lint.checked.findings
+    findings = hand.state.of(Linting).checked.findings
     assert findings[0].severity == "error" and findings[0].code == "B006"
     order = [finding.severity for finding in findings]
     assert order == sorted(order, key=["error", "warning", "note"].index)
@@ -118,7 +123,7 @@ def test_worst_comes_first_and_all_words_are_there(lint, texts):
 
 def test_severities_and_words_filter_the_list(lint):
     hand = lint(several())
-    kinds = {finding.severity for finding in hand.state.lint.checked.findings}
+    kinds = {finding.severity for finding in hand.state.of(Linting).checked.findings}
     assert {"error", "warning"} <= kinds
     count = len(codes(hand))
     hand.click("lint warning")
@@ -133,7 +138,7 @@ def test_severities_and_words_filter_the_list(lint):
 
 def test_filter_without_a_match_says_so(lint, texts):
     hand = lint(LIGHT)
-    hand.state.lint.text = "zebra"
+    hand.state.of(Linting).text = "zebra"
     hand.step(2)
     assert "no finding is like this" in texts
 
@@ -150,7 +155,7 @@ def test_click_marks_the_vertex_and_aims_there(lint):
     assert marked(hand) == 0
     hand.click(row_of(hand, "W001"))
     assert hand.state.camera.target == pytest.approx([-0.9, 0.9, 0.9])
-    assert hand.state.lint.marks.points == pytest.approx(np.array([[-0.9, 0.9, 0.9]]))
+    assert hand.state.of(Linting).marks.points == pytest.approx(np.array([[-0.9, 0.9, 0.9]]))
     picture = hand.scene_picture()
     height, width = picture.shape[:2]
     middle = picture[height // 2, width // 2, :3].astype(int)
@@ -161,11 +166,11 @@ def test_click_marks_the_vertex_and_aims_there(lint):
 def test_mark_follows_the_pose(lint):
     hand = lint(LIGHT)
     hand.click(row_of(hand, "W001"))
-    before = hand.state.lint.marks.points[0].copy()
+    before = hand.state.of(Linting).marks.points[0].copy()
     hand.state.actor.pose.dofs[0] = 1.5  # the root, along x
     hand.step(2)
     # The vertex weighs 0.9.
-    assert hand.state.lint.marks.points[0] - before == pytest.approx([1.35, 0.0, 0.0])
+    assert hand.state.of(Linting).marks.points[0] - before == pytest.approx([1.35, 0.0, 0.0])
 
 
 @pytest.mark.parametrize("end", ["same row", "escape"])
@@ -178,23 +183,23 @@ def test_marks_end_with_the_row_or_escape(lint, end):
     else:
         hand.click(row_of(hand, "W001"))
     hand.step(2)
-    assert hand.state.lint.chosen == -1 and not marked(hand)
+    assert hand.state.of(Linting).chosen == -1 and not marked(hand)
 
 
 def test_another_row_takes_the_marks_over(lint):
     hand = lint(several())
     hand.click(row_of(hand, "W002"))
-    (first,) = hand.state.lint.marks.points.tolist()[:1]
+    (first,) = hand.state.of(Linting).marks.points.tolist()[:1]
     hand.click(row_of(hand, "B006"))
-    assert hand.state.lint.chosen == 0
-    assert hand.state.lint.marks.points.tolist() != [first]
+    assert hand.state.of(Linting).chosen == 0
+    assert hand.state.of(Linting).marks.points.tolist() != [first]
 
 
 def test_finding_of_a_joint_selects_it(lint):
     hand = lint(several())
     hand.click(row_of(hand, "B006"))
     assert hand.state.selected_joint == 1
-    assert hand.state.lint.marks.points.tolist() == [[0.0, 2.0, 0.0]]
+    assert hand.state.of(Linting).marks.points.tolist() == [[0.0, 2.0, 0.0]]
 
 
 def test_flipped_triangle_has_its_edges_marked(lint):
@@ -203,7 +208,7 @@ def test_flipped_triangle_has_its_edges_marked(lint):
     triangles[3] = triangles[3][::-1]
     hand = lint(replace(figure, mesh=replace(figure.mesh, triangles=triangles)))
     hand.click(row_of(hand, "M002"))
-    corners = hand.state.lint.marks.lines[:, 0]
+    corners = hand.state.of(Linting).marks.lines[:, 0]
     expected = figure.mesh.positions[triangles[3]]
     assert len(corners) == 3
     assert sorted(map(tuple, corners.round(6))) == sorted(map(tuple, expected))
@@ -232,7 +237,7 @@ def test_finding_of_a_clip_goes_to_its_time(lint):
     hand = lint(jump())
     hand.state.playback.playing = True
     hand.click(row_of(hand, "C003"))
-    finding = hand.state.lint.checked.findings[codes(hand).index("C003")]
+    finding = hand.state.of(Linting).checked.findings[codes(hand).index("C003")]
     assert not hand.state.playback.playing
     assert hand.state.playback.time == pytest.approx(finding.times[0])
     assert finding.times[0] == pytest.approx(30 / RATE)
@@ -248,7 +253,7 @@ def test_captured_points_are_marked(lint):
     hand = lint(scene_of(figure, replace(clip, points=points)))
     hand.click(row_of(hand, "C011"))
     assert hand.state.playback.time >= 40 / RATE - 1e-9
-    assert hand.state.lint.marks.points.tolist() == [[0.0, 0.0, 0.0]]
+    assert hand.state.of(Linting).marks.points.tolist() == [[0.0, 0.0, 0.0]]
 
 
 def test_camera_turns_to_the_side_that_faces_it(lint):
@@ -299,7 +304,7 @@ def test_time_makes_nothing_stale_but_posing_does(lint, texts):
 def test_recheck_sees_the_pose_and_other_limits(lint, texts):
     hand = lint(column())
     assert codes(hand) == []
-    hand.state.lint.options = replace(hand.state.lint.options, max_turn=1.0)
+    hand.state.of(Linting).options = replace(hand.state.of(Linting).options, max_turn=1.0)
     assert stale(hand, texts)
     hand.state.actor.pose.dofs[4] = 3.5  # its limits are -3 and 3
     hand.click("Recheck")
@@ -312,18 +317,18 @@ def test_limits_are_set_in_their_window(lint):
     hand.click("Limits…")
     hand.step(2)
     hand.enter_value("Largest turn", "180")
-    assert hand.state.lint.options.max_turn == pytest.approx(np.pi)
+    assert hand.state.of(Linting).options.max_turn == pytest.approx(np.pi)
     hand.enter_value("Low confidence", "0.5")
-    assert hand.state.lint.options.confidence == pytest.approx(0.5)
+    assert hand.state.of(Linting).options.confidence == pytest.approx(0.5)
     hand.enter_value("Largest speed", "2.5")
-    assert hand.state.lint.options.max_speed == pytest.approx(2.5)
+    assert hand.state.of(Linting).options.max_speed == pytest.approx(2.5)
     hand.enter_value("Largest speed", "0")
-    assert hand.state.lint.options.max_speed is None
+    assert hand.state.of(Linting).options.max_speed is None
     for text in ("nan", "-5", "1e39"):
         hand.enter_value("Largest turn", text)
-        assert 0.0 <= hand.state.lint.options.max_turn < np.inf
+        assert 0.0 <= hand.state.of(Linting).options.max_turn < np.inf
     hand.click("Usual limits")
-    assert hand.state.lint.options == type(hand.state.lint.options)()
+    assert hand.state.of(Linting).options == type(hand.state.of(Linting).options)()
 
 
 def test_all_are_copied_as_text_and_json(lint, monkeypatch):
@@ -350,12 +355,12 @@ def test_another_scene_has_not_been_checked(lint, rig, texts):
     hand.open(*rig)
     texts.clear()
     hand.step(2)
-    assert hand.state.lint.checked is None and hand.state.lint.marks is None
+    assert hand.state.of(Linting).checked is None and hand.state.of(Linting).marks is None
     assert "This scene has not been checked yet." in texts
     assert not marked(hand)
     hand.click("Check")
     finish(hand)
-    assert hand.state.lint.checked.source is hand.state.scene
+    assert hand.state.of(Linting).checked.source is hand.state.scene
 
 
 def test_marks_go_with_the_figure_they_are_on(lint, texts):
@@ -363,7 +368,7 @@ def test_marks_go_with_the_figure_they_are_on(lint, texts):
     hand.click(row_of(hand, "W001"))
     hand.state.scene.actors[0] = Actor(column())
     assert stale(hand, texts)
-    assert hand.state.lint.marks is None and not marked(hand)
+    assert hand.state.of(Linting).marks is None and not marked(hand)
 
 
 def test_posing_while_it_checks_changes_nothing_of_it(drive, monkeypatch):
@@ -377,8 +382,8 @@ def test_posing_while_it_checks_changes_nothing_of_it(drive, monkeypatch):
     hand.step()
     started.set()
     finish(hand)
-    assert seen and hand.state.lint.checked.findings == ()
-    assert hand.state.lint.checked.scene.actors[0].pose.dofs[4] == 0.0
+    assert seen and hand.state.of(Linting).checked.findings == ()
+    assert hand.state.of(Linting).checked.scene.actors[0].pose.dofs[4] == 0.0
 
 
 def hold_checks(monkeypatch):
@@ -406,24 +411,24 @@ def test_check_is_cancelled_between_steps(drive, monkeypatch, how):
     check_rig(hand.state)
     assert is_held.wait(30)
     hand.step(3)
-    running = hand.state.lint.running
+    running = hand.state.of(Linting).running
     if how == "escape":
         hand.key("escape")
     else:
         hand.click(how)
     hand.step(3)
-    assert hand.state.job is None and hand.state.lint.running is None
+    assert hand.state.job is None and hand.state.of(Linting).running is None
     go.set()
     running.job.wait()
     hand.step(2)
-    assert not seen and hand.state.lint.checked is None
+    assert not seen and hand.state.of(Linting).checked is None
     assert hand.says("Cancelled")
 
 
 def test_check_waits_for_other_work(lint, monkeypatch):
     hand = lint(LIGHT)
     go, _, is_held = hold_checks(monkeypatch)
-    first = hand.state.lint.checked
+    first = hand.state.of(Linting).checked
     start_check(hand.state)
     assert is_held.wait(30)
     hand.step(2)
@@ -432,7 +437,7 @@ def test_check_waits_for_other_work(lint, monkeypatch):
     assert hand.state.job is job
     go.set()
     finish(hand)
-    assert hand.state.lint.checked is not first
+    assert hand.state.of(Linting).checked is not first
 
 
 def test_too_many_marks_are_cut_and_said():

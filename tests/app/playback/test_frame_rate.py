@@ -10,9 +10,10 @@ from numpy.testing import assert_array_equal
 import viewer
 from viewer.app.core.history import History
 from viewer.app.files.stream import _keep_rate
-from viewer.app.playback.frame_rate import foreign_rate, rate_of, set_rate, with_rate
+from viewer.app.playback.frame_rate import foreign_rate, rate_of, set_rate
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.motion.clip import Channel, Clip
+from viewer.rig.motion.retimed import with_rate
 from viewer.rig.scene import Actor, Scene
 
 SIZE = (1280, 800)

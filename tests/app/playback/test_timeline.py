@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from viewer.app.files.state import Files
 from viewer.app.files.stream import Stream
+from viewer.app.shown_panels import ShownPanels
 from viewer.loading.capturing import Builder
 from viewer.rig.captures.capture import Capture, CapturePart
 from viewer.rig.motion.body_motion import BodyMotion
@@ -183,9 +185,9 @@ def streaming(drive_body):
 def finish(hand):
     for _ in range(2000):
         hand.step(1)
-        if hand.state.stream is None:
+        if hand.state.of(Files).stream is None:
             return
-        hand.state.stream._thread.join(0.005)
+        hand.state.of(Files).stream._thread.join(0.005)
     raise AssertionError("the capture was not read to its end")
 
 
@@ -224,18 +226,18 @@ def test_reading_is_cancelled_by_escape_and_what_was_read_stays(streaming, monke
         streaming.step(1)
         if streaming.state.scene.actors[0].clip.n_rows == 10:
             break
-        streaming.state.stream._thread.join(0.005)
+        streaming.state.of(Files).stream._thread.join(0.005)
     assert "Cancel reading" in streaming.state.item_rects
     streaming.key("escape")
     gate.set()
     streaming.step(3)
-    assert streaming.state.stream is None
+    assert streaming.state.of(Files).stream is None
     assert streaming.state.scene.actors[0].clip.n_rows == 10
 
 
 def test_editing_while_reading_keeps_its_undo(streaming):
     builder = streaming.start(capture(60, 5, 2))
-    assert isinstance(streaming.state.stream, Stream | type(None))
+    assert isinstance(streaming.state.of(Files).stream, Stream | type(None))
     streaming.state.options.wireframe = True
     streaming.step(1)
     finish(streaming)
@@ -268,7 +270,7 @@ def test_error_while_reading_is_said_and_the_scene_stays(streaming):
 
 def test_actors_are_hidden_and_chosen_by_clicks(streaming):
     streaming.start(capture(60, 60, 2))
-    streaming.state.closed_panels.add("stats")
+    streaming.state.of(ShownPanels).closed.add("stats")
     streaming.step(4)
     streaming.click("actor 1")
     assert streaming.state.chosen_actor == 1
@@ -283,7 +285,7 @@ def test_actors_are_hidden_and_chosen_by_clicks(streaming):
 
 def test_camera_follows_an_actor_as_far_as_before(streaming):
     streaming.start(capture(60, 60, 1))
-    streaming.state.closed_panels.add("stats")
+    streaming.state.of(ShownPanels).closed.add("stats")
     streaming.step(4)
     streaming.click("Actor##follow")
     before = streaming.state.camera.target.copy()

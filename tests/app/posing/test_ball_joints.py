@@ -9,6 +9,8 @@ import pytest
 from formats.pig_text import write as write_pig
 from numpy.testing import assert_allclose
 
+from viewer.app.posing.state import Posing
+
 
 def rodrigues(vector):
     """Return I + sin K + (1 - cos) K^2 with K the cross product with the axis."""
@@ -42,7 +44,7 @@ def _enter_vector(hand, joint, *degrees):
 def vectors(box):
     """A hand on the box, its joints edited as rotation vectors."""
     box.click("Rotation vectors")
-    assert box.state.as_vectors
+    assert box.state.of(Posing).as_vectors
     return box
 
 
@@ -87,7 +89,7 @@ def test_drag_passes_half_a_turn_without_a_jump(vectors):
     for share in np.linspace(0.5, 1.0, 25):
         vectors.move((x0 + share * (x1 - x0), y))
         vectors.step()
-        vector, found = vectors.state.held_vector.vector, _rotation(vectors, "joint_1")
+        vector, found = vectors.state.of(Posing).held_vector.vector, _rotation(vectors, "joint_1")
         assert vector[0] == pytest.approx(math.radians(150), abs=1e-12) and vector[2] == 0
         assert_allclose(found, rodrigues(vector), atol=1e-12)
         assert np.abs(found - before).max() < 0.3
@@ -96,7 +98,7 @@ def test_drag_passes_half_a_turn_without_a_jump(vectors):
     vectors.let_go()
     assert lengths[0] < math.pi < lengths[-1] and lengths == sorted(lengths)
     vectors.step(3)
-    assert np.linalg.norm(vectors.state.held_vector.vector) == lengths[-1]
+    assert np.linalg.norm(vectors.state.of(Posing).held_vector.vector) == lengths[-1]
 
 
 @pytest.mark.parametrize("key", ["undo", "reset"])
@@ -104,7 +106,7 @@ def test_held_vector_ends_with_another_pose(vectors, key):
     vectors.enter_value("joint_1.rz", "270")
     vectors.key("z", "ctrl") if key == "undo" else vectors.key("r")
     vectors.step(2)
-    assert vectors.state.held_vector is None
+    assert vectors.state.of(Posing).held_vector is None
     vectors.enter_value("joint_1.ry", "30")
     wanted = rodrigues((0, math.radians(30), 0))
     assert_allclose(_rotation(vectors, "joint_1"), wanted, atol=1e-12)

@@ -8,8 +8,10 @@ from app.posing_rigs import SIZE, arm_figure, arm_scene, around, drag_along, joi
 from app.tiny import write_rig
 from numpy.testing import assert_allclose, assert_array_equal
 
+from viewer.app.posing.joint_tree import joint_tree
 from viewer.app.posing.posed_joint import posed_joint
 from viewer.app.posing.rotate_tool import RADIUS
+from viewer.app.posing.state import Posing
 from viewer.rendering.camera import camera_axes
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 from viewer.rig.scene import Actor, Scene
@@ -81,7 +83,7 @@ def test_click_on_a_ring_chooses_the_joint_whose_dot_lies_there(arm):
     place = joint_seen(arm, 1)
     arm.move(place)
     arm.press()
-    assert arm.state.posing.drag is not None  # the ring is held
+    assert arm.state.of(Posing).drag is not None  # the ring is held
     arm.let_go()
     arm.step(2)
     assert arm.state.selected_joint == 1
@@ -115,7 +117,7 @@ def test_cancelled_drag_restores_the_pose_and_leaves_no_step(arm, way):
     arm.let_go()
     if way == "right button":
         arm.let_go(1)
-    assert arm.state.posing.drag is None and arm.undo_steps == steps
+    assert arm.state.of(Posing).drag is None and arm.undo_steps == steps
     assert arm.says("Drag cancelled")
 
 
@@ -154,7 +156,7 @@ def test_select_tool_leaves_the_rings_alone(arm):
 def test_click_on_a_joint_selects_it_though_the_skin_hides_it(arm):
     arm.click(joint_seen(arm, 2))
     assert arm.state.selected_joint == 2
-    assert {0, 1, 2} <= arm.state.opened_joints
+    assert {0, 1, 2} <= joint_tree(arm.state).opened
 
 
 def test_reset_during_a_drag_ends_it(arm):
@@ -167,7 +169,7 @@ def test_reset_during_a_drag_ends_it(arm):
     arm.move(places[-1])
     assert not arm.dofs().any()
     arm.let_go()
-    assert arm.state.posing.drag is None
+    assert arm.state.of(Posing).drag is None
 
 
 def test_ik_brings_the_hand_to_the_pointer(drive):
@@ -176,7 +178,7 @@ def test_ik_brings_the_hand_to_the_pointer(drive):
     hand = framed(drive, scene)
     hand.state.selected_joint = 2
     hand.key("d")
-    hand.state.posing.chain_length = 2
+    hand.state.of(Posing).chain_length = 2
     depth = _depth(hand, world_of(hand, 2)[:3, 3])
     x, y = joint_seen(hand, 2)
     end, steps = (x - 60, y + 20), hand.undo_steps
@@ -244,7 +246,7 @@ def test_binding_space_and_hidden_actors_have_no_handles(arm):
 def test_drag_may_end_over_a_panel(arm):
     places = around(joint_seen(arm, 0), VIEW_RADIUS, 0.3, 1.1)
     drag_along(arm, [*places, (5.0, 300.0)])
-    assert arm.state.posing.drag is None and arm.dofs().any() and arm.undo_steps == 1
+    assert arm.state.of(Posing).drag is None and arm.dofs().any() and arm.undo_steps == 1
     azimuth = arm.state.camera.azimuth
     arm.move(places[0])
     assert arm.state.camera.azimuth == azimuth
@@ -267,4 +269,4 @@ def test_other_scene_ends_a_drag(arm, tmp_path):
     arm.move(places[-1])
     arm.let_go()
     assert_array_equal(arm.dofs(), before)
-    assert arm.state.posing.drag is None
+    assert arm.state.of(Posing).drag is None

@@ -10,6 +10,7 @@ from app.posing_rigs import around, joint_seen
 from app.test_panel_pictures import _compare, _is_like
 
 from viewer.app.posing.rotate_tool import RADIUS
+from viewer.app.posing.state import Posing
 from viewer.loading import bundled_files
 
 
@@ -21,7 +22,7 @@ def _posed(drive, joint, key):
     hand.step(3)
     hand.key("f")
     hand.state.selected_joint = hand.state.actor.figure.skeleton.names.index(joint)
-    hand.state.notes.clear()
+    hand.state.messages.notes.clear()
     return hand
 
 
@@ -44,7 +45,7 @@ def _turning(drive):
 
 def _moving(drive):
     hand = _posed(drive, "head", "d")
-    hand.state.posing.chain_length = 3
+    hand.state.of(Posing).chain_length = 3
     x, y = joint_seen(hand, hand.state.selected_joint)
     hand.move((x, y))
     hand.press()
@@ -58,7 +59,7 @@ PICTURES = {"gizmo_rotate": _rotate, "gizmo_turning": _turning, "gizmo_moving": 
 @pytest.mark.parametrize("name", PICTURES)
 def test_handles_look_as_they_did(drive, name):
     hand = PICTURES[name](drive)
-    hand.state.notes.clear()
+    hand.state.messages.notes.clear()
     _compare(hand.screen(), name)
 
 
@@ -66,5 +67,5 @@ def test_comparison_sees_the_handles(drive):
     hand = _rotate(drive)
     with_rings = hand.screen()
     hand.key("q")
-    hand.state.notes.clear()
+    hand.state.messages.notes.clear()
     assert not _is_like(with_rings, hand.screen())

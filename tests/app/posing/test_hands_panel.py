@@ -6,6 +6,8 @@ from driver import Driver
 from family_models import family_figure
 from numpy.testing import assert_allclose
 
+from viewer.app.posing.state import Posing
+from viewer.app.shown_panels import ShownPanels
 from viewer.rig.geometry.rotation import matrix_to_rotation_vector
 from viewer.rig.pose import joint_rotations
 from viewer.rig.scene import Actor, Scene
@@ -15,7 +17,7 @@ from viewer.rig.scene import Actor, Scene
 def hand(tmp_path):
     scene = Scene([Actor(family_figure("smplx", tmp_path))])
     driver = Driver(scene=scene, size=(1280, 800))
-    driver.state.closed_panels |= {"joints", "shape"}
+    driver.state.of(ShownPanels).closed |= {"joints", "shape"}
     driver.step(3)
     yield driver
     driver.close()
@@ -52,7 +54,7 @@ def test_component_adds_its_row_to_the_rotation_vectors(hand):
 def test_number_of_components_is_the_number_of_sliders(hand):
     assert "left component 5" in hand.state.item_rects
     assert "left component 6" not in hand.state.item_rects
-    hand.state.n_hand_components = 12
+    hand.state.of(Posing).n_hand_components = 12
     hand.step(2)
     assert "left component 11" in hand.state.item_rects
 

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from app.tiny import FILE_POSE, LABELS, chain, comb
 
+from viewer.app.keys import Keyboard
+from viewer.app.posing.joint_tree import joint_tree
 from viewer.app.posing.joints_panel import rows
 
 SLIDERS = [label for label in LABELS if label != "root.z"]  # root.z is locked
@@ -177,10 +179,10 @@ def test_filter_takes_letters_that_are_shortcuts(hand):
     hand.type("rskwntgf1375h?")
     for name in ("tab", "f1"):
         hand.key(name)
-    assert hand.state.joint_filter == "rskwntgf1375h?"
+    assert joint_tree(hand.state).filter == "rskwntgf1375h?"
     assert (hand.dofs() == before).all() and hand.undo_steps == steps
     assert (hand.state.camera.azimuth, hand.state.camera.orthographic) == view
-    assert hand.state.panels_visible and not hand.state.keys_visible
+    assert hand.state.panels_visible and not hand.state.of(Keyboard).is_listed
 
 
 def test_filter_without_a_match_lists_nothing_and_can_be_emptied(hand):
@@ -229,7 +231,7 @@ def test_thousands_of_joints_stay_usable(drive, tmp_path, text):
     path = tmp_path / "many.skel"
     path.write_text(text)
     hand = drive(path, size=(640, 480))
-    hand.state.opened_joints = set(range(hand.state.actor.figure.skeleton.n_joints))
+    joint_tree(hand.state).opened = set(range(hand.state.actor.figure.skeleton.n_joints))
     hand.step(2)
     assert len(hand.state.item_rects) < 150  # rows out of sight are not drawn
     started = time.perf_counter()
@@ -276,8 +278,8 @@ def test_escape_closes_a_context_menu_and_keeps_the_pose(hand):
     hand.key("escape")
     hand.click("Filter")
     hand.type("root")
-    assert hand.state.joint_filter == "root"
-    assert (hand.dofs() == before).all() and not hand.state.keys_visible
+    assert joint_tree(hand.state).filter == "root"
+    assert (hand.dofs() == before).all() and not hand.state.of(Keyboard).is_listed
 
 
 def test_filter_without_a_match_says_so_and_draws_no_row(hand):

@@ -10,6 +10,8 @@ from app.posing_rigs import arm_figure
 from imgui_bundle import imgui
 from numpy.testing import assert_allclose, assert_array_equal
 
+from viewer.app.files.state import Files
+from viewer.app.posing.joint_tree import joint_tree
 from viewer.formats.pose import pose_text
 from viewer.rig.pose import joint_rotations, pose_key, rest_pose
 from viewer.rig.posing.pose_record import record_of
@@ -147,7 +149,7 @@ def test_pasting_into_the_filter_is_no_pose(hand):
     before = hand.dofs()
     hand.click("Filter")
     _paste(hand, "arm")
-    assert hand.state.joint_filter == "arm" and not hand.state.error
+    assert joint_tree(hand.state).filter == "arm" and not hand.state.error
     assert (hand.dofs() == before).all()
 
 
@@ -249,7 +251,7 @@ def test_saved_pose_opens_again(posed, tmp_path, suffix):
     before = posed.state.actor.pose.copy()
     _save_as(posed, "Save pose…", f"stand{suffix}")
     path = tmp_path / f"stand{suffix}"
-    assert path.is_file() and posed.says("Saved") and posed.state.dialog is None
+    assert path.is_file() and posed.says("Saved") and posed.state.of(Files).dialog is None
     posed.key("r")
     posed.open(path)
     after = posed.state.actor.pose
@@ -262,7 +264,7 @@ def test_saved_pose_opens_again(posed, tmp_path, suffix):
 def test_save_dialog_suggests_a_name_and_adds_its_suffix(box, tmp_path):
     box.menu("menu File", "Save pose…")
     box.step(3)
-    assert box.state.dialog.name == "box_pose.json"
+    assert box.state.of(Files).dialog.name == "box_pose.json"
     _name(box, "bare")
     box.click("Save###Save")
     assert (tmp_path / "bare.json").is_file()
@@ -303,7 +305,7 @@ def test_click_on_a_file_takes_its_name(box, tmp_path):
     box.menu("menu File", "Save pose…")
     box.step(3)
     box.click("file old.json")
-    assert box.state.dialog.name == "old.json"
+    assert box.state.of(Files).dialog.name == "old.json"
 
 
 REFUSED = {
@@ -327,7 +329,7 @@ def test_name_of_no_file_cannot_be_saved(box, tmp_path):
     files = sorted(tmp_path.iterdir())
     for name in ("", "   ", "/", ".", "..", "../"):
         _save_as(box, "Save pose…", name)
-        assert box.state.dialog is not None and not box.state.error
+        assert box.state.of(Files).dialog is not None and not box.state.error
         box.click("Cancel")
         assert sorted(tmp_path.iterdir()) == files
 

@@ -9,6 +9,7 @@ from imgui_bundle import imgui
 from numpy.testing import assert_allclose, assert_array_equal
 
 import viewer
+from viewer.app.posing.state import Posing
 from viewer.rig.inspection.measure import measure
 from viewer.rig.morph_target import MorphTarget, with_morphs
 from viewer.rig.scene import Actor
@@ -96,12 +97,12 @@ def test_drag_is_one_step_that_comes_back(shape):
 
 def test_random_draws_the_shape_of_the_seed_that_is_shown(shape):
     shape.click("Random")
-    assert shape.state.shape_seed == 1
+    assert shape.state.of(Posing).shape_seed == 1
     first = _weights(shape).copy()
     # The numbers that a person gets who writes the seed down.
     assert_array_equal(first, np.random.default_rng(1).standard_normal(2))
     shape.click("Random")
-    assert shape.state.shape_seed == 2 and (_weights(shape) != first).all()
+    assert shape.state.of(Posing).shape_seed == 2 and (_weights(shape) != first).all()
     assert shape.undo_steps == 2 and shape.says("seed 2")
 
 
@@ -117,7 +118,7 @@ def test_typed_seed_draws_the_same_shape_again(shape):
     for _ in range(3):
         shape.click("Random")
     _type_seed(shape, "1")
-    assert shape.state.shape_seed == 1
+    assert shape.state.of(Posing).shape_seed == 1
     assert_array_equal(_weights(shape), np.random.default_rng(1).standard_normal(2))
 
 
@@ -125,7 +126,7 @@ def test_odd_seeds_are_taken_as_the_nearest_that_can_be(shape):
     shape.click("Random")
     for text, seed in (("-7", 0), ("2147483647", 2**31 - 1), ("x", 2**31 - 1)):
         _type_seed(shape, text)
-        assert shape.state.shape_seed == seed
+        assert shape.state.of(Posing).shape_seed == seed
         assert np.isfinite(_weights(shape)).all()
 
 

@@ -9,6 +9,7 @@ from imgui_bundle import imgui
 from numpy.testing import assert_allclose, assert_array_equal
 
 from viewer.app.posing.rotate_tool import RADIUS
+from viewer.app.posing.state import Posing
 from viewer.app.posing.tool_actions import no_chain, no_keys, no_orientation, no_tool
 from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.pose import joint_rotations
@@ -48,10 +49,10 @@ def test_buttons_and_keys_take_tools_in_hand(arm):
     seen = []
     for name in ("Rotate", "Move", "Select"):
         arm.click(f"tool {name}")
-        seen.append(arm.state.posing.tool)
+        seen.append(arm.state.of(Posing).tool)
     for key in "edq":
         arm.key(key)
-        seen.append(arm.state.posing.tool)
+        seen.append(arm.state.of(Posing).tool)
     assert seen == ["rotate", "move", "select"] * 2
 
 
@@ -71,11 +72,11 @@ def test_axes_by_key_and_by_list(arm):
     seen = []
     for _ in range(3):
         arm.key("x")
-        seen.append(arm.state.posing.orientation)
+        seen.append(arm.state.of(Posing).orientation)
     assert seen == ["parent", "world", "local"]
     arm.step(2)
     arm.pick("##axes", 2)
-    assert arm.state.posing.orientation == "world"
+    assert arm.state.of(Posing).orientation == "world"
 
 
 def test_chain_goes_from_one_to_the_depth(arm):
@@ -83,9 +84,9 @@ def test_chain_goes_from_one_to_the_depth(arm):
     arm.state.selected_joint = 2
     arm.step(2)
     arm.pull(arm.place("Chain", 0.9), arm.place("Chain", 0.02))
-    assert arm.state.posing.chain_length == 1
+    assert arm.state.of(Posing).chain_length == 1
     arm.pull(arm.place("Chain", 0.1), arm.place("Chain", 1.5))
-    assert arm.state.posing.chain_length == 2
+    assert arm.state.of(Posing).chain_length == 2
 
 
 def test_reasons_of_what_is_greyed(arm):
@@ -118,7 +119,7 @@ def test_figure_without_joints_has_no_tools(drive, rig):
     hand = drive(rig[1], size=SIZE, samples=1)
     assert "##tools" not in hand.state.item_rects
     hand.key("e")
-    assert hand.state.posing.tool == "select"
+    assert hand.state.of(Posing).tool == "select"
     assert hand.says("Rotate: this figure has no joints to pose")
 
 
@@ -165,7 +166,7 @@ def test_click_on_a_handle_does_not_pause(moved, shake):
     x, y = around(joint_seen(moved, 0), 1.2 * RADIUS, 0.3, 1.1)[0]
     moved.move((x, y))
     moved.press()
-    assert moved.state.posing.drag is not None
+    assert moved.state.of(Posing).drag is not None
     time = moved.state.playback.time
     moved.move((x + shake, y))
     moved.step(3)

@@ -7,8 +7,9 @@ import pytest
 from numpy.testing import assert_allclose
 from PIL import Image
 
-from viewer.app.recording.record_dialog import RecordSettings
+from viewer.app.files.state import Files
 from viewer.app.recording.recorded_marks import RecordedMarks
+from viewer.app.recording.state import Recording, RecordSettings
 from viewer.app.weights.actions import pin_vertex, unpin
 from viewer.rendering.overlay.joint_marks import HIGHLIGHT
 from viewer.rendering.recorder import copied
@@ -27,8 +28,8 @@ def moving(drive, rig):
 
 
 def start(hand, path, **settings):
-    hand.state.record = RecordSettings(**settings)
-    hand.state.wants_recording = path
+    hand.state.of(Recording).settings = RecordSettings(**settings)
+    hand.state.of(Recording).wanted = path
     hand.step(1)
 
 
@@ -46,11 +47,13 @@ def test_menu_opens_the_dialog_and_escape_closes_it(moving):
     moving.step(2)
     assert "Save as…" in moving.state.item_rects
     moving.click("Save as…")
-    assert moving.state.dialog is not None and moving.state.dialog.name.endswith(".mp4")
+    assert moving.state.of(Files).dialog is not None and moving.state.of(
+        Files
+    ).dialog.name.endswith(".mp4")
     moving.key("escape")
     moving.key("escape")
     moving.step(2)
-    assert moving.state.record is None
+    assert moving.state.of(Recording).settings is None
 
 
 def test_numbered_pictures_show_what_the_window_shows(moving, tmp_path):
@@ -122,7 +125,7 @@ def test_annotations_are_those_of_the_frames_pose(moving):
 
 
 def test_dialog_offers_the_legend_where_there_is_one(moving):
-    moving.state.record = RecordSettings()
+    moving.state.of(Recording).settings = RecordSettings()
     moving.step(2)
     assert "Legend in pictures" not in moving.state.item_rects
     moving.state.options.shading = "scalar"

@@ -23,6 +23,7 @@ from viewer.app.rigging.placing import (
     similarity_now,
 )
 from viewer.app.rigging.sources import current_template, target_mesh
+from viewer.app.rigging.state import Rigging
 from viewer.app.rigging.steps import align_template
 from viewer.app.rigging.template_gizmo import RADIUS
 from viewer.rig.geometry.transform import apply_transform, translation_matrix
@@ -48,7 +49,7 @@ def similarity(hand):
 def middle(hand):
     """Return where the gizmo is in the scene, and on the screen."""
     template = current_template(hand.state)
-    box = bounding_box(posed_template(hand.state.rig, template).positions)
+    box = bounding_box(posed_template(hand.state.of(Rigging), template).positions)
     point = apply_transform(ghost_place(hand.state, template), box.mean(axis=0)[None])[0]
     return point, np.array(view_frame(hand.state).place(point))
 
@@ -65,7 +66,9 @@ def test_template_begins_box_on_box(hand):
     boxes = [
         bounding_box(points)
         for points in (
-            start.apply(posed_template(hand.state.rig, current_template(hand.state)).positions),
+            start.apply(
+                posed_template(hand.state.of(Rigging), current_template(hand.state)).positions
+            ),
             target_mesh(hand.state).positions,
         )
     ]
@@ -89,7 +92,7 @@ def test_arrow_moves_the_template_along_its_axis_and_does_not_orbit(hand):
     assert after.scale == pytest.approx(before.scale, rel=1e-6)
     assert hand.state.camera.azimuth == camera
     finish(hand)  # once it was let go of its error is measured
-    alignment = hand.state.rig.placing.alignment
+    alignment = hand.state.of(Rigging).placing.alignment
     assert alignment.how == "given" and alignment.error > 0.01
 
 
@@ -127,17 +130,19 @@ def test_drag_is_one_step_of_undoing_with_its_error(hand):
     before, steps = similarity(hand), hand.undo_steps
     pull_along_x(hand, 2.5)
     finish(hand)
-    first, error = similarity(hand), hand.state.rig.placing.alignment.error
+    first, error = similarity(hand), hand.state.of(Rigging).placing.alignment.error
     pull_along_x(hand, -1.0)
     finish(hand)
     assert hand.undo_steps == steps + 2
     hand.key("z", "ctrl")
     hand.step(2)
     assert_allclose(similarity(hand).matrix, first.matrix)
-    assert hand.state.rig.placing.alignment.error == error  # measured before, and known again
+    assert (
+        hand.state.of(Rigging).placing.alignment.error == error
+    )  # measured before, and known again
     hand.key("z", "ctrl")
     hand.step(2)
-    assert hand.state.rig.placing is None
+    assert hand.state.of(Rigging).placing is None
     assert_allclose(similarity(hand).matrix, before.matrix)
     hand.key("y", "ctrl")
     hand.step(2)
@@ -150,13 +155,13 @@ def test_moved_template_keeps_its_fitted_pose_and_not_the_gap_it_left(hand):
     hand.step(2)
     hand.click("Align")
     finish(hand)
-    pose, gap = hand.state.rig.placing.lines
+    pose, gap = hand.state.of(Rigging).placing.lines
     assert pose.startswith("pose: ") and gap.startswith("that leaves a gap of ")
     laid = laid_template(hand.state)
     away = translation_matrix(np.array([2.5, 0.0, 0.0])) @ similarity_now(hand.state, laid).matrix
     move_by_hand(hand.state, laid, as_similarity(away))
-    assert hand.state.rig.placing.lines == (pose,)
-    assert hand.state.rig.placing.fitted is laid
+    assert hand.state.of(Rigging).placing.lines == (pose,)
+    assert hand.state.of(Rigging).placing.fitted is laid
 
 
 def test_drag_undone_while_its_error_is_measured_stays_undone(hand, monkeypatch):
@@ -175,10 +180,10 @@ def test_drag_undone_while_its_error_is_measured_stays_undone(hand, monkeypatch)
     hand.step(2)
     gate.set()
     finish(hand)
-    assert hand.state.rig.placing is None
+    assert hand.state.of(Rigging).placing is None
     hand.key("y", "ctrl")
     hand.step(2)
-    assert hand.state.rig.placing.alignment.error > 0.01
+    assert hand.state.of(Rigging).placing.alignment.error > 0.01
 
 
 def pull_along_x(hand, way):
@@ -192,7 +197,7 @@ def pull_along_x(hand, way):
 
 def hovers(hand, place):
     hand.move(tuple(place))
-    return hand.state.rig.holds_mouse
+    return hand.state.of(Rigging).holds_mouse
 
 
 def test_ring_scales_the_template_as_a_whole(hand):
@@ -230,7 +235,7 @@ def test_numbers_place_the_template(hand):
     hand.enter_value("Scale by", "-3")
     assert similarity(hand).scale == pytest.approx(30.0)
     finish(hand)
-    assert hand.state.rig.placing.alignment is not None and hand.state.error == ""
+    assert hand.state.of(Rigging).placing.alignment is not None and hand.state.error == ""
     assert x1 > x0
 
 
@@ -243,7 +248,7 @@ def test_refining_finds_the_place_from_near_by(hand):
     hand.click("Refine")
     finish(hand)
     assert_allclose(similarity(hand).matrix, TRUE, atol=1e-3)
-    assert hand.state.rig.placing.alignment.how == "landmarks"
+    assert hand.state.of(Rigging).placing.alignment.how == "landmarks"
 
 
 def test_run_keeps_what_was_placed_by_hand(hand):
@@ -252,7 +257,7 @@ def test_run_keeps_what_was_placed_by_hand(hand):
     hand.step(2)
     hand.click("Run")
     finish(hand)
-    rigged = hand.state.rig.results["robust"].rigged
+    rigged = hand.state.of(Rigging).results["robust"].rigged
     assert rigged.alignment.how == "given"
     assert_allclose(rigged.alignment.placed.matrix, TRUE, atol=1e-9)
 
@@ -265,7 +270,7 @@ def middles(mesh, matrix):
 def click_pair(hand, triangle):
     """Click the middle of the same triangle on the template and on the target."""
     state, template = hand.state, current_template(hand.state)
-    posed = posed_template(state.rig, template)
+    posed = posed_template(state.of(Rigging), template)
     hand.click(view_frame(state).place(middles(posed, ghost_place(state, template))[triangle]))
     hand.click(view_frame(state).place(middles(target_mesh(state), np.eye(4))[triangle]))
 
@@ -292,7 +297,7 @@ def test_landmarks_are_clicked_listed_deleted_and_fitted(hand, texts):
     hand.click("rig tool landmarks")
     hand.step(2)
     state, template = hand.state, current_template(hand.state)
-    ghost, posed = ghost_place(state, template), posed_template(state.rig, template)
+    ghost, posed = ghost_place(state, template), posed_template(state.of(Rigging), template)
     wanted = [
         triangle
         for triangle in range(0, 640, 3)
@@ -307,39 +312,39 @@ def test_landmarks_are_clicked_listed_deleted_and_fitted(hand, texts):
             hand.click("Align by landmarks")  # greyed: one more is needed
             assert state.job is None
         click_pair(hand, triangle)
-        assert len(state.rig.landmarks) == number and state.rig.pending is None
+        assert len(state.of(Rigging).landmarks) == number and state.of(Rigging).pending is None
     assert state.camera.azimuth == orbit and state.chosen_actor == 0
     hand.click("Closest points refine it")
     hand.click("Align by landmarks")
     finish(hand)
-    assert state.error == "" and state.rig.placing.alignment.how == "landmarks"
+    assert state.error == "" and state.of(Rigging).placing.alignment.how == "landmarks"
     # A click hits a point to half a pixel, of some 15 to a unit of a mesh 60 units long.
     assert similarity(hand).scale == pytest.approx(30.0, rel=0.03)
     assert_allclose(similarity(hand).rotation, TRUE[:3, :3] / 30.0, atol=0.05)
     hand.click("delete landmark 1")
     hand.step(2)
-    assert len(state.rig.landmarks) == 3
+    assert len(state.of(Rigging).landmarks) == 3
     hand.click("Delete all")
-    assert state.rig.landmarks == []
+    assert state.of(Rigging).landmarks == []
 
 
 def test_clicks_beside_the_meshes_and_escape(hand):
     hand.click("rig tool landmarks")
     x, y, _, height = hand.state.view_rect
     hand.click((x + 5, y + height - 5))
-    assert hand.says("Landmarks: click on the template") and hand.state.rig.pending is None
+    assert hand.says("Landmarks: click on the template") and hand.state.of(Rigging).pending is None
     template = current_template(hand.state)
     place = ghost_place(hand.state, template)
-    mesh = posed_template(hand.state.rig, template)
+    mesh = posed_template(hand.state.of(Rigging), template)
     center = apply_transform(place, mesh.positions.mean(axis=0)[None])[0]
     hand.click(view_frame(hand.state).place(center))
-    assert hand.state.rig.pending is not None
+    assert hand.state.of(Rigging).pending is not None
     hand.click((x + 5, y + height - 5))
     assert hand.says("Landmarks: click on the target")
     hand.key("escape")
-    assert hand.state.rig.pending is None and hand.state.rig.tool == "landmarks"
+    assert hand.state.of(Rigging).pending is None and hand.state.of(Rigging).tool == "landmarks"
     hand.key("escape")
-    assert hand.state.rig.tool == ""
+    assert hand.state.of(Rigging).tool == ""
 
 
 def test_matrices_become_similarities():

@@ -17,8 +17,10 @@ from numpy.testing import assert_allclose
 pytest.importorskip("scipy")
 
 import viewer
+from viewer.app.files.state import Files
 from viewer.app.rigging.placing import as_similarity, move_by_hand, placing_now
 from viewer.app.rigging.sources import current_template, target_mesh, template_texts
+from viewer.app.rigging.state import Rigging
 from viewer.app.rigging.steps import align_template
 from viewer.app.rigging.work import start_adding, start_reading
 from viewer.autorig.alignment import Alignment, AlignmentSettings
@@ -68,8 +70,8 @@ def test_scene_without_a_bare_mesh_greys_all_but_adding_one(drive, texts):
     assert "Every mesh here has a rig: add one without, an .obj or .ply." in texts
     for label in ("Align", "Run", "Compare methods", "rig tool move"):
         hand.click(label)
-    assert hand.state.job is None and hand.state.rig.tool == "" and not hand.state.error
-    assert hand.state.rig.target is None
+    assert hand.state.job is None and hand.state.of(Rigging).tool == "" and not hand.state.error
+    assert hand.state.of(Rigging).target is None
 
 
 def test_alignment_is_found_and_shown_with_its_error(rigging, texts):
@@ -77,7 +79,7 @@ def test_alignment_is_found_and_shown_with_its_error(rigging, texts):
     steps = hand.undo_steps
     hand.click("Align")
     finish(hand)
-    assert_allclose(hand.state.rig.placing.similarity.matrix, TRUE, atol=1e-6)
+    assert_allclose(hand.state.of(Rigging).placing.similarity.matrix, TRUE, atol=1e-6)
     texts.clear()
     hand.step()
     assert "error 0.00 % (by closest points)" in texts
@@ -87,7 +89,7 @@ def test_alignment_is_found_and_shown_with_its_error(rigging, texts):
     assert hand.undo_steps == steps + 1
     hand.key("z", "ctrl")
     hand.step(2)
-    assert hand.state.rig.placing is None and hand.app.frame.renderer.ghost is None
+    assert hand.state.of(Rigging).placing is None and hand.app.frame.renderer.ghost is None
 
 
 @pytest.mark.parametrize(
@@ -104,7 +106,7 @@ def test_words_beside_the_error_say_what_was_done(rigging, texts, factors, own, 
     placing = placing_now(hand.state)
     where = replace(placing.similarity, factors=np.array(factors), own_factors=np.array(own))
     found = Alignment(where, 0.0015, 0.002, (0.001, 0.001), "fit")
-    hand.state.rig.placing = replace(placing, similarity=where, alignment=found)
+    hand.state.of(Rigging).placing = replace(placing, similarity=where, alignment=found)
     texts.clear()
     hand.step()
     assert f"error 0.15 % ({words})" in texts
@@ -116,7 +118,7 @@ def test_align_says_what_it_does(rigging, monkeypatch, fits):
     monkeypatch.setattr(imgui, "set_tooltip", lambda text: said.append(text) or show(text))
     hand = rigging()
     finish(hand)
-    hand.state.rig.choices.fits = fits
+    hand.state.of(Rigging).choices.fits = fits
     also = "; joints are turned and limbs resized{} where that fits much better" if fits else ""
     for label, words in (
         ("Align", "found by closest points" + also.format(", or all of it stretched,")),
@@ -146,7 +148,7 @@ def test_match_is_coloured_before_anything_is_rigged(rigging, texts):
     finish(hand)
     state = hand.state
     assert (state.options.shading, state.options.scalar) == ("scalar", "class:match")
-    assert state.rig.match_share == 1.0 and state.error == ""
+    assert state.of(Rigging).match_share == 1.0 and state.error == ""
     fields = {field.name: field for field in state.scene.actors[0].figure.fields}
     assert fields["match"].names == ("matched", "unmatched")
     assert fields["match"].values.tolist() == [0.0] * state.scene.actors[0].figure.mesh.n_vertices
@@ -163,15 +165,15 @@ def test_match_is_coloured_before_anything_is_rigged(rigging, texts):
 def test_match_counts_what_is_near_enough_and_faces_alike(rigging):
     hand = rigging()
     # The template a tenth of the target's size beside it: nothing is within 1 %.
-    placing = hand.state.rig.placing.similarity
+    placing = hand.state.of(Rigging).placing.similarity
     away = placing.matrix.copy()
     away[:3, 3] += 10.0
     move_by_hand(hand.state, current_template(hand.state), as_similarity(away))
     hand.enter_value("Max. distance", "1")
-    assert hand.state.rig.choices.max_distance == pytest.approx(0.01)
+    assert hand.state.of(Rigging).choices.max_distance == pytest.approx(0.01)
     hand.click("Show match")
     finish(hand)
-    assert hand.state.rig.match_share < 0.35
+    assert hand.state.of(Rigging).match_share < 0.35
 
 
 def test_stretch_is_kept_when_the_template_is_moved_and_run(rigging):
@@ -192,7 +194,7 @@ def test_stretch_is_kept_when_the_template_is_moved_and_run(rigging):
     finish(hand)
     hand.click("Run")
     finish(hand)
-    placed = hand.state.rig.results["robust"].rigged.alignment.placed
+    placed = hand.state.of(Rigging).results["robust"].rigged.alignment.placed
     assert_allclose(placed.own_factors, stretch, atol=1e-9)
 
 
@@ -228,10 +230,10 @@ def test_report_says_how_the_alignment_was_found(rigging, texts):
     finish(hand)
     hand.click("Run")
     finish(hand)
-    rigged = hand.state.rig.results["robust"].rigged
+    rigged = hand.state.of(Rigging).results["robust"].rigged
     assert rigged.lines[0].startswith("alignment: found by fitting pose and proportions; scale ")
     assert rigged.lines[1].startswith("alignment error: ")
-    assert rigged.lines[2:4] == hand.state.rig.placing.lines
+    assert rigged.lines[2:4] == hand.state.of(Rigging).placing.lines
     assert rigged.lines[2].startswith("pose: ") and rigged.lines[4].startswith("matched ")
 
 
@@ -276,7 +278,7 @@ def test_both_methods_are_compared(rigging, texts):
     finish(hand)
     assert names(hand) == ["scan rigged", "arm", "scan", "scan rigged (nearest)"]
     assert visible(hand) == ["scan rigged", "arm"]
-    results = hand.state.rig.results
+    results = hand.state.of(Rigging).results
     assert list(results) == ["robust", "nearest"]
     # An independent sum over dense rows.
     dense = []
@@ -286,7 +288,7 @@ def test_both_methods_are_compared(rigging, texts):
         np.add.at(rows, (np.repeat(np.arange(len(rows)), np.diff(skin.starts)), skin.joints),
                   skin.weights)  # fmt: skip
         dense.append(rows)
-    comparison = hand.state.rig.comparison
+    comparison = hand.state.of(Rigging).comparison
     assert comparison.weights == pytest.approx(np.abs(dense[0] - dense[1]).sum(axis=1).mean())
     clear = np.abs(np.diff(dense[0])[:, 0]) > 1e-9
     same = dense[0].argmax(axis=1) == dense[1].argmax(axis=1)
@@ -358,7 +360,7 @@ def test_cancelled_work_changes_nothing(rigging):
     finish(hand)
     assert hand.says("Cancelled")
     hand.step(5)
-    running = hand.state.rig.running
+    running = hand.state.of(Rigging).running
     assert running is None and names(hand) == before and hand.state.error == ""
 
 
@@ -381,8 +383,8 @@ def test_new_scene_forgets_everything_but_the_choices(rigging, rig):
     finish(hand)
     assert names(hand)[0] == "scan rigged (nearest)"
     hand.open(*rig)
-    assert hand.state.rig.results == {} and hand.state.rig.target is None
-    assert hand.state.rig.choices.method == "nearest"
+    assert hand.state.of(Rigging).results == {} and hand.state.of(Rigging).target is None
+    assert hand.state.of(Rigging).choices.method == "nearest"
 
 
 def test_missing_scipy_is_a_message(rigging, monkeypatch):
@@ -441,7 +443,7 @@ def test_advanced_settings_are_folded_away_and_counted(rigging, texts, monkeypat
     monkeypatch.setattr(imgui, "tree_node", lambda text: titles.append(text) or draw(text))
     hand = rigging(placed=False)
     assert titles[-1] == "Advanced###rig advanced" and "Smoothing" not in hand.state.item_rects
-    hand.state.rig.choices.smoothing, hand.state.rig.choices.joints = 3, "copied"
+    hand.state.of(Rigging).choices.smoothing, hand.state.of(Rigging).choices.joints = 3, "copied"
     hand.step(2)
     assert titles[-1] == "Advanced (2 changed)###rig advanced"
     hand.click("rig advanced")
@@ -479,7 +481,7 @@ def test_template_in_another_pose_is_turned_to_fit_and_shown_so(rigging, texts):
     hand.click("Align")
     finish(hand)
     state = hand.state
-    assert state.rig.placing.fitted is not None
+    assert state.of(Rigging).placing.fitted is not None
     texts.clear()
     hand.step()
     assert any(text.startswith("pose: the template's joints turned") for text in texts)
@@ -502,25 +504,25 @@ def test_mesh_is_added_by_the_dialog_and_the_body_is_read_when_needed(drive, tmp
     hand = drive(size=SIZE, samples=1)
     hand.menu("menu Window", "Rig")
     hand.click("Add mesh…")
-    hand.state.dialog.enter(tmp_path)
+    hand.state.of(Files).dialog.enter(tmp_path)
     hand.step()
     hand.click("file scan.obj")
     hand.click("Open###Open")
     finish(hand)
-    assert hand.state.actor.name == "scan" and hand.state.rig.target is hand.state.actor
+    assert hand.state.actor.name == "scan" and hand.state.of(Rigging).target is hand.state.actor
     assert hand.state.paths[-1] == tmp_path / "scan.obj"
     assert hand.undo_steps == 1
     assert [*template_names(hand)][1:] == ["Bundled body", "Bundled fox"]
     hand.pick("Template", 2)
-    assert hand.state.rig.template_key == "fox"
+    assert hand.state.of(Rigging).template_key == "fox"
     hand.click("rig tool move")  # the template has to be there to be moved
     finish(hand)
-    assert hand.state.rig.template.figure.name == "fox"
+    assert hand.state.of(Rigging).template.figure.name == "fox"
     hand.click("Pose it…")
     hand.step(2)
     assert names(hand) == ["fox", "scan", "fox-2"]
     chosen = hand.state.scene.actors[2]
-    assert hand.state.rig.template_key == f"actor {id(chosen)}"
+    assert hand.state.of(Rigging).template_key == f"actor {id(chosen)}"
     assert seen(hand, 2)[:, 0].min() > seen(hand, 1)[:, 0].max()  # beside the others
     hand.key("z", "ctrl")
     hand.step(2)
@@ -535,18 +537,18 @@ def test_template_of_a_file_stays_itself_when_it_is_fitted(drive, tmp_path):
     hand = drive(scene=rig_scene.scene(with_template=False), size=SIZE, samples=1)
     hand.menu("menu Window", "Rig")
     hand.step(2)
-    assert hand.state.rig.template_key == "body"  # there is no other
+    assert hand.state.of(Rigging).template_key == "body"  # there is no other
     save(rig_scene.bent()[0], tmp_path / "arm.npz")
     start_reading(hand.state, (tmp_path / "arm.npz",))
     finish(hand)
-    template = hand.state.rig.template
+    template = hand.state.of(Rigging).template
     hand.click("Run")  # aligns, and turns the joints of the template, which is at rest
     finish(hand)
-    assert hand.state.rig.template is template
+    assert hand.state.of(Rigging).template is template
     assert placing_now(hand.state).fitted is not None
     hand.click("Run")
     finish(hand)
-    assert hand.state.rig.template is template and placing_now(hand.state) is not None
+    assert hand.state.of(Rigging).template is template and placing_now(hand.state) is not None
     assert names(hand) == ["scan rigged", "scan"] and hand.state.error == ""
 
 
@@ -554,7 +556,7 @@ def test_files_that_do_not_fit_are_messages(rigging, tmp_path):
     hand = rigging()
     skel, skin = write_rig(tmp_path)
     hand.click("Template file…")
-    hand.state.dialog.enter(tmp_path)
+    hand.state.of(Files).dialog.enter(tmp_path)
     hand.step()
     hand.click("file tiny.skel")
     hand.click("Open###Open")
@@ -563,13 +565,13 @@ def test_files_that_do_not_fit_are_messages(rigging, tmp_path):
     assert hand.state.error == wanted
     hand.key("escape")
     hand.click("Template file…")
-    hand.state.dialog.enter(tmp_path)
-    hand.state.dialog.chosen = {skel, skin}
+    hand.state.of(Files).dialog.enter(tmp_path)
+    hand.state.of(Files).dialog.chosen = {skel, skin}
     hand.step()
     hand.click("Open 2 files###Open")
     finish(hand)
-    assert hand.state.rig.template.figure.name == "tiny" and hand.state.error == ""
-    assert hand.state.rig.template_key == "file"
+    assert hand.state.of(Rigging).template.figure.name == "tiny" and hand.state.error == ""
+    assert hand.state.of(Rigging).template_key == "file"
 
 
 def test_rigged_mesh_without_a_bare_one_is_refused(drive, tmp_path):
@@ -588,25 +590,25 @@ def test_result_is_saved_and_opens_again(rigging, tmp_path):
     hand.click("Run")
     finish(hand)
     hand.click("Save rigged…")
-    hand.state.dialog.enter(tmp_path)
+    hand.state.of(Files).dialog.enter(tmp_path)
     hand.step()
-    assert hand.state.dialog.name == "scan_rigged.npz"
+    assert hand.state.of(Files).dialog.name == "scan_rigged.npz"
     hand.click("Save###Save")
     finish(hand)
     assert hand.says("Saved") and hand.state.error == ""
     again = viewer.load(tmp_path / "scan_rigged.npz").actors[0].figure
     assert again.is_attached and again.fields[0].name == "confidence"
     hand.click("Save rigged…")
-    hand.state.dialog.enter(tmp_path)
-    hand.state.dialog.name = "arm2.skel"
+    hand.state.of(Files).dialog.enter(tmp_path)
+    hand.state.of(Files).dialog.name = "arm2.skel"
     hand.step()
     hand.click("Save###Save")
     finish(hand)
     found = sorted(path.name for path in tmp_path.glob("arm2.*"))
     assert found == ["arm2.json", "arm2.obj", "arm2.skel", "arm2.skin"]
     hand.click("Save rigged…")
-    hand.state.dialog.enter(tmp_path)
-    hand.state.dialog.name = "arm3.glb"
+    hand.state.of(Files).dialog.enter(tmp_path)
+    hand.state.of(Files).dialog.name = "arm3.glb"
     hand.step()
     hand.click("Save###Save")
     finish(hand)
@@ -617,7 +619,7 @@ def test_report_is_copied(rigging, texts):
     hand = rigging()
     hand.click("Run")
     finish(hand)
-    lines = hand.state.rig.results["robust"].rigged.lines
+    lines = hand.state.of(Rigging).results["robust"].rigged.lines
     hand.click("Copy report")
     assert imgui.get_clipboard_text() == "\n".join(lines)
     texts.clear()

@@ -7,6 +7,8 @@ from app import rig_scene
 from app.rig_scene import finish
 from app.test_panel_pictures import _compare, _shown
 
+from viewer.app.shown_panels import ShownPanels
+
 pytest.importorskip("scipy")
 
 SIZE = (1000, 1100)
@@ -29,7 +31,7 @@ def _result(hand):
 @pytest.mark.parametrize(("name", "prepare"), [("rig", _aligned), ("rigged", _result)])
 def test_rig_panel_looks_as_it_did(drive, name, prepare):
     hand = drive(scene=rig_scene.scene(), size=SIZE, samples=1)
-    hand.state.closed_panels.add("stats")  # times are others every time
+    hand.state.of(ShownPanels).closed.add("stats")  # times are others every time
     hand.menu("menu Window", "Rig")
     hand.step(2)
     _compare(_shown(hand, prepare), name)

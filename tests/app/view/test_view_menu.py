@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from viewer.app.view.view_menu import JOINT_TOGGLES
+from viewer.app.weights.state import Weights
 
 KEYS = {"xray": ("b", ""), "joint_names": ("j", ""), "joint_axes": ("j", "shift")}
 
@@ -43,9 +44,9 @@ def test_menu_shows_weights_and_lets_go_of_them(hand):
 
 def test_menu_picks_vertices(hand):
     hand.menu("menu View", "Pick vertices")
-    assert hand.state.weights.picks_vertices and hand.says("Click a vertex")
+    assert hand.state.of(Weights).picks_vertices and hand.says("Click a vertex")
     hand.menu("menu View", "Pick vertices")
-    assert not hand.state.weights.picks_vertices
+    assert not hand.state.of(Weights).picks_vertices
 
 
 def test_skin_alone_has_no_joints_to_show(drive, rig):
@@ -61,4 +62,4 @@ def test_skeleton_alone_has_no_vertices_to_show(drive, rig):
     for text in ("Weights of the selected joint", "Pick vertices", "Vertex under the mouse"):
         lone.menu("menu View", text)
         lone.key("escape")
-    assert lone.state.options.shading == "phong" and not lone.state.weights.picks_vertices
+    assert lone.state.options.shading == "phong" and not lone.state.of(Weights).picks_vertices

@@ -7,8 +7,10 @@ import pytest
 from imgui_bundle import imgui
 from numpy.testing import assert_allclose
 
+from viewer.app.shown_panels import ShownPanels
 from viewer.app.weights.actions import pin_vertex
 from viewer.app.weights.explanation_lines import influence_colors, vertex_annotation
+from viewer.app.weights.state import Weights
 from viewer.app.weights.vertex_panel import matrix_text
 from viewer.rendering.projection import project
 from viewer.rendering.view import view_of
@@ -118,7 +120,7 @@ def test_text_is_copied_in_full(pinned, clipboard):
 def test_matrix_is_copied_with_all_digits(pinned, clipboard):
     pinned.click("Copy M2")
     rows = [list(map(float, line.split())) for line in clipboard[0].splitlines()]
-    explanation = pinned.state.weights.explanation
+    explanation = pinned.state.of(Weights).explanation
     np.testing.assert_array_equal(rows, explanation.matrices[1])
     assert_allclose(rows, palette(pinned)[explanation.joints[1]], atol=1e-15)
 
@@ -129,7 +131,7 @@ def test_matrix_text_is_a_row_a_line():
 
 def test_click_on_an_influence_selects_its_joint(pinned):
     pinned.click(pinned.place("influence 2", 0.5))
-    assert pinned.state.selected_joint == pinned.state.weights.explanation.joints[1]
+    assert pinned.state.selected_joint == pinned.state.of(Weights).explanation.joints[1]
 
 
 def test_lines_lead_to_the_rigid_images(pinned):
@@ -139,14 +141,14 @@ def test_lines_lead_to_the_rigid_images(pinned):
     without = pinned.screen()
     assert (with_lines != without)[:, 310:900].any()
     pinned.state.options.show = "binding"
-    assert pinned.state.weights.pinned is not None
+    assert pinned.state.of(Weights).pinned is not None
     pinned.step(2)
 
 
 def beside(hand, picture, weight_place):
     """Return the pixels around a share of the way from the vertex to its first rigid image."""
     size = picture.shape[1], picture.shape[0]
-    explanation = hand.state.weights.explanation
+    explanation = hand.state.of(Weights).explanation
     start, end = explanation.position, explanation.images[0]
     point = start + weight_place * (end - start)
     view = view_of(hand.state.camera, size, hand.state.box)
@@ -156,7 +158,7 @@ def beside(hand, picture, weight_place):
 
 def test_screenshot_has_the_lines_while_they_are_shown(pinned):
     shown = pinned.scene_picture()
-    explanation = pinned.state.weights.explanation
+    explanation = pinned.state.of(Weights).explanation
     skeleton = pinned.state.actor.figure.skeleton
     color = 255 * influence_colors(explanation, skeleton)[0]
     # In the middle of the line the colour of its joint, at its end a white dot.
@@ -174,12 +176,12 @@ def test_screenshot_has_the_lines_while_they_are_shown(pinned):
 
 
 def test_annotation_is_made_anew_only_when_something_changed(pinned):
-    before = pinned.state.weights.annotations
+    before = pinned.state.of(Weights).annotations
     pinned.step(3)
-    assert pinned.state.weights.annotations is before
+    assert pinned.state.of(Weights).annotations is before
     pinned.state.actor.pose.dofs[pinned.dof_index("arm.z")] = 0.5
     pinned.step(2)
-    after = pinned.state.weights.annotations
+    after = pinned.state.of(Weights).annotations
     assert after is not before
     pinned.state.actor.visible = False
     pinned.step(2)
@@ -187,7 +189,7 @@ def test_annotation_is_made_anew_only_when_something_changed(pinned):
 
 
 def test_every_influence_has_a_line_a_dot_and_a_word(pinned):
-    explanation, actor = pinned.state.weights.explanation, pinned.state.actor
+    explanation, actor = pinned.state.of(Weights).explanation, pinned.state.actor
     actor.placement[:3, 3] = 10.0, 0.0, 0.0
     found = vertex_annotation(explanation, actor, True, (960, 720))  # scale 1
     assert found.manner.on_top
@@ -225,14 +227,14 @@ def test_vertex_is_let_go_of(pinned, way):
     else:
         pinned.menu("menu Window", "Vertex")
     pinned.step(2)
-    assert pinned.state.weights.pinned is None
-    assert "vertex" not in pinned.state.opened_panels
+    assert pinned.state.of(Weights).pinned is None
+    assert "vertex" not in pinned.state.of(ShownPanels).opened
 
 
 def test_vertex_goes_with_its_figure(pinned, rig):
     pinned.open(*rig)
     pinned.step(2)
-    assert pinned.state.weights.pinned is None and not pinned.state.error
+    assert pinned.state.of(Weights).pinned is None and not pinned.state.error
 
 
 def test_panel_without_a_vertex_says_how_to_pick_one(hand, texts):
@@ -240,13 +242,13 @@ def test_panel_without_a_vertex_says_how_to_pick_one(hand, texts):
     hand.step(2)
     assert "Alt+click a vertex: here is said why it is where it is." in said(hand, texts)
     hand.click("Click without Alt")
-    assert hand.state.weights.picks_vertices
+    assert hand.state.of(Weights).picks_vertices
 
 
 def test_figure_without_a_skin_has_nothing_to_explain(drive, rig):
     hand = drive(rig[1])
     pin_vertex(hand.state, 0, 3)
-    assert hand.state.weights.pinned is None
+    assert hand.state.of(Weights).pinned is None
     assert hand.says("nothing moves a vertex")
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from imgui_bundle import imgui
 
-from viewer.app.actions import start_following, stop_following
+from viewer.app.actors.following import Following, start_following, stop_following
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import (
     button,
@@ -102,7 +102,7 @@ def _draw_following(state: AppState) -> None:
     """Let the camera go with the chosen actor or joint."""
     imgui.text_unformatted("Camera follows")
     same_line_if_room("Actor")
-    target = state.followed
+    target = state.of(Following).target
     index, joint = state.chosen_actor, state.selected_joint
     if checkbox(state, "Actor##follow", target == (index, -1)) != (target == (index, -1)):
         stop_following(state) if target == (index, -1) else start_following(state, index, -1)

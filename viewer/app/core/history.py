@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from viewer.app.core.snapshot import (
     Snapshot,
@@ -18,19 +18,26 @@ from viewer.app.core.snapshot import (
     restore_motion,
     same_pose,
 )
-from viewer.app.playback.frame_rate import with_rate
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.captures.points import PointClip
+from viewer.rig.motion.retimed import with_rate
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor, Motion, Scene
 
-if TYPE_CHECKING:
-    from viewer.app.rigging.state import Placing, RigView
-
-__all__ = ["History"]
+__all__ = ["History", "Undoable"]
 
 _MOST = 500  # steps kept
+
+
+class Undoable(Protocol):
+    """A feature's state of which one value is undone with the scene."""
+
+    def kept(self) -> object | None:
+        """Return that value, which is never changed, only replaced; None if there is none."""
+
+    def restore(self, kept: object | None) -> None:
+        """Bring back a value that was kept."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,13 +66,13 @@ class History:
         Seconds that are shown.
     has_restored : bool
         Whether clips and poses were restored and the clock has yet to follow.
-    rig : RigView or None
-        Says where the template of a rig lies, which is undone with the scene.
+    feature : Undoable or None
+        Has a value that is undone with the scene.
     """
 
     time: float = 0.0
     has_restored: bool = False
-    rig: RigView | None = None
+    feature: Undoable | None = None
     _seen: Snapshot | None = None  # the state of the last frame
     _before: Snapshot | None = None  # the state before an edit that still goes on
     _clocked: dict[Actor, tuple[Motion, float, Pose | None]] = field(default_factory=dict)
@@ -74,7 +81,7 @@ class History:
 
     def start(self, scene: Scene, options: DisplayOptions) -> None:
         """Forget everything; the scene as it is becomes the first state."""
-        self.rig = None  # it was about another scene
+        self.feature = None  # it was about another scene
         self.has_restored = False
         self._clocked.clear()
         self._seen, self._before = self._take(scene, options), None
@@ -85,7 +92,7 @@ class History:
         """Keep a step if something changed and no widget is held; return whether it did."""
         if self._seen is None:
             return False
-        if not is_current(self._seen, scene, options) or self._is_laid_elsewhere():
+        if not is_current(self._seen, scene, options) or self._has_another_value():
             self._before = self._before or self._seen
             self._seen = self._take(scene, options)
         if busy or self._before is None:
@@ -103,11 +110,11 @@ class History:
         if self._seen is not None:
             self._seen = self._take(scene, options)
 
-    def measured(self, placing: Placing, known: Placing) -> None:
-        """Put a placing whose error is known in the place of the same one without, in all steps."""
+    def exchange(self, old: object, new: object) -> None:
+        """Put a feature's value about which more is known in the place of an older one."""
 
         def exchanged(one: Snapshot) -> Snapshot:
-            return replace(one, placing=known) if one.placing is placing else one
+            return replace(one, kept=new) if one.kept is old else one
 
         self._replace(exchanged)
 
@@ -205,12 +212,12 @@ class History:
             self.time, self.has_restored = there.time, True
             self._seen = there
         restore_display(there, options)
-        if self.rig is not None:
-            self.rig.placing = there.placing
+        if self.feature is not None:
+            self.feature.restore(there.kept)
         if self._seen is not None and self._seen is not there:
             looks = tuple(map(look_of, scene.actors))
             kept = copy.deepcopy(options)
-            self._seen = replace(self._seen, looks=looks, options=kept, placing=self._placing())
+            self._seen = replace(self._seen, looks=looks, options=kept, kept=self._kept())
 
     def _replace(self, change: Callable[[Snapshot], Snapshot]) -> None:
         """Replace every state that is kept."""
@@ -224,7 +231,7 @@ class History:
         actors = tuple(scene.actors)
         poses, by_hand = copied_poses(actors), tuple(map(self._is_by_hand, actors))
         looks, kept = tuple(map(look_of, actors)), copy.deepcopy(options)
-        return Snapshot(actors, poses, by_hand, looks, kept, self.time, self._placing())
+        return Snapshot(actors, poses, by_hand, looks, kept, self.time, self._kept())
 
     def _is_by_hand(self, actor: Actor) -> bool:
         """Return whether an actor's pose is another than the clock gave it by its present clip.
@@ -236,13 +243,13 @@ class History:
             return False
         return not same_pose(pose, actor.pose)
 
-    def _placing(self) -> Placing | None:
-        return None if self.rig is None else self.rig.placing
+    def _kept(self) -> object | None:
+        return None if self.feature is None else self.feature.kept()
 
-    def _is_laid_elsewhere(self) -> bool:
-        """Return whether a template was laid; forgetting it with another choice is no edit."""
-        placing = self._placing()
-        return placing is not None and (self._seen is None or placing is not self._seen.placing)
+    def _has_another_value(self) -> bool:
+        """Return whether a feature's value is another; that it has none any more is no edit."""
+        kept = self._kept()
+        return kept is not None and (self._seen is None or kept is not self._seen.kept)
 
 
 def _grown(old: Motion | None, new: Motion | None) -> Motion | None:

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from viewer.app.core.state import AppState
-from viewer.rig.memo import Memo
 from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.scene import Motion
 
 __all__ = [
-    "no_gaps",
     "no_job_room",
     "no_mesh",
     "no_motion",
@@ -23,8 +20,6 @@ __all__ = [
     "no_undo",
     "nothing_to_export",
 ]
-
-_gaps: Memo[Motion, bool] = Memo()
 
 
 def no_motion(state: AppState) -> str:
@@ -47,21 +42,6 @@ def no_panel(state: AppState, needs: str) -> str:
     if needs in ("", "actors") or getattr(state.actor.figure, needs) not in (None, ()):
         return ""
     return f"this figure has no {needs.replace('_', ' ')}"
-
-
-def no_gaps(state: AppState) -> str:
-    """Say why gaps cannot be filled; while a capture is read some may still come."""
-    if state.stream is not None or any(
-        _has_gaps(actor.clip) for actor in state.scene.actors if actor.clip is not None
-    ):
-        return ""
-    return "no frame of any motion is missing"
-
-
-def _has_gaps(clip: Motion) -> bool:
-    if isinstance(clip, Clip):
-        return False
-    return _gaps.get(clip, None, lambda: not clip.timing.holds or not clip.timing.present.all())
 
 
 def no_pose(state: AppState) -> str:

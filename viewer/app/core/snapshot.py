@@ -5,16 +5,12 @@ from __future__ import annotations
 import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.pose import Pose, pose_key
 from viewer.rig.scene import Actor, Motion, Scene
-
-if TYPE_CHECKING:
-    from viewer.app.rigging.state import Placing
 
 __all__ = [
     "Look",
@@ -59,8 +55,8 @@ class Snapshot:
         How the scene is shown.
     time : float
         Seconds of the scene's clock.
-    placing : Placing or None
-        Where the template of a rig lies, None where that is not known.
+    kept : object or None
+        A feature's value that is undone with the scene; compared by identity.
     """
 
     actors: tuple[Actor, ...]
@@ -69,7 +65,7 @@ class Snapshot:
     looks: tuple[Look, ...]
     options: DisplayOptions
     time: float
-    placing: Placing | None = None
+    kept: object | None = None
 
 
 def copied_poses(actors: Sequence[Actor]) -> tuple[Pose | None, ...]:
@@ -108,7 +104,7 @@ def is_same(one: Snapshot, other: Snapshot) -> bool:
     """Return whether nothing would change by going from one state to the other."""
     if (one.options, one.looks) != (other.options, other.looks):
         return False
-    return one.placing is other.placing and have_same_motion(one, other)
+    return one.kept is other.kept and have_same_motion(one, other)
 
 
 def have_same_motion(one: Snapshot, other: Snapshot) -> bool:

@@ -9,7 +9,7 @@ from imgui_bundle import implot
 
 from viewer.app.core.state import AppState
 from viewer.app.curves.data import Curve
-from viewer.app.curves.state import CurveView
+from viewer.app.curves.state import Curves
 
 __all__ = ["Color", "Plot", "curve_color", "factor_of", "measured"]
 
@@ -41,9 +41,9 @@ class Plot:
     scale: tuple[float, float]
 
     @property
-    def view(self) -> CurveView:
+    def view(self) -> Curves:
         """What the panel shows."""
-        return self.state.curves
+        return self.state.of(Curves)
 
     def factor(self, row: int) -> float:
         """Return what a curve's values are multiplied by to be shown."""
@@ -74,7 +74,7 @@ def factor_of(state: AppState, curve: Curve) -> float:
     return math.degrees(1.0) if curve.is_angle and state.in_degrees else 1.0
 
 
-def curve_color(view: CurveView, curves: tuple[Curve, ...], row: int) -> Color:
+def curve_color(view: Curves, curves: tuple[Curve, ...], row: int) -> Color:
     """Return a curve's colour: red, green or blue for x, y, z, other shades for other joints."""
     groups = list(dict.fromkeys(curves[other].number for other in view.rows))
     number = curves[row].number

@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from viewer.app.core.state import AppState
-from viewer.app.files.file_dialog import FileDialog, folder_of
-from viewer.app.posing.pose_actions import save_files
+from viewer.app.files.file_choice import FileDialog, folder_of
+from viewer.app.files.saving import save_files
+from viewer.app.files.state import Files
 from viewer.formats import FORMATS, file_stem, write
 from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.clip_edit import clip_from_pose, key_pose
@@ -45,7 +46,7 @@ def key_present_pose(state: AppState, only_changed: bool = False) -> None:
 
 def ask_for_clip(state: AppState) -> None:
     """Ask where to save the chosen actor's clip."""
-    state.dialog = FileDialog(
+    state.of(Files).dialog = FileDialog(
         folder_of(state.paths),
         lambda state, paths: save_clip(state, paths[0]),
         "save",

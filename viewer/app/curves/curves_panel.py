@@ -29,7 +29,7 @@ from viewer.app.curves.editing import (
     turn_tangent,
 )
 from viewer.app.curves.plot import draw_plot
-from viewer.app.curves.state import KeyPlace
+from viewer.app.curves.state import Curves, KeyPlace
 from viewer.rig.motion.clip import EXTRAPOLATIONS, TANGENT_RULES, Channel, Clip, slopes
 
 __all__ = ["draw"]
@@ -76,7 +76,7 @@ def draw(state: AppState) -> None:
 
 def _follow(state: AppState, curves: tuple[Curve, ...]) -> None:
     """Keep the choice to what there is, and follow the joint that is selected elsewhere."""
-    view, clip = state.curves, state.actor.clip
+    view, clip = state.of(Curves), state.actor.clip
     owner = (id(state.actor), type(clip).__name__, len(curves))
     if owner != view.owner:
         view.owner, view.joint = owner, -1
@@ -99,7 +99,7 @@ def _rows_of(curves: tuple[Curve, ...], number: int) -> tuple[int, ...]:
 
 
 def _draw_list(state: AppState, curves: tuple[Curve, ...]) -> None:
-    view = state.curves
+    view = state.of(Curves)
     imgui.set_next_item_width(-1.0)
     view.filter = imgui.input_text_with_hint("##curve filter", "Filter", view.filter)[1]
     note_item(state, "Curve filter")
@@ -145,14 +145,14 @@ def _draw_heading(
     """Draw a joint's name; a click chooses those of its curves that are listed."""
     rows = tuple(row for row in shown if isinstance(row, int) and curves[row].number == int(entry))
     name = curves[rows[0]].group
-    is_chosen = set(rows) <= set(state.curves.rows)
+    is_chosen = set(rows) <= set(state.of(Curves).rows)
     if imgui.selectable(f"{name}##group {entry}", is_chosen)[0]:
         _choose(state, rows)
     note_item(state, f"curves of {name}")
 
 
 def _draw_entry(state: AppState, curves: tuple[Curve, ...], row: int) -> None:
-    curve, view = curves[row], state.curves
+    curve, view = curves[row], state.of(Curves)
     is_chosen = row in view.rows
     imgui.push_style_color(imgui.Col_.text, curve_color(view, curves, row))
     if imgui.selectable(f"    {curve.name}{_key_count(state, row)}##row {row}", is_chosen)[0]:
@@ -169,7 +169,7 @@ def _key_count(state: AppState, row: int) -> str:
 
 def _choose(state: AppState, rows: tuple[int, ...]) -> None:
     """Show only these curves, or with Ctrl or Shift these too, or no more."""
-    view, io = state.curves, imgui.get_io()
+    view, io = state.of(Curves), imgui.get_io()
     if io.key_ctrl or io.key_shift:
         if set(rows) <= set(view.rows):
             rows = tuple(row for row in view.rows if row not in rows)
@@ -182,7 +182,7 @@ def _choose(state: AppState, rows: tuple[int, ...]) -> None:
 
 
 def _draw_tools(state: AppState) -> None:
-    view = state.curves
+    view = state.of(Curves)
     if button(state, "Fit"):
         view.wants_fit = True
     explain("show the chosen curves whole")
@@ -212,7 +212,7 @@ def _button_beside(state: AppState, text: str, words: str) -> bool:
 
 def _draw_modes(state: AppState) -> None:
     """Draw what the curves in focus do before their first and after their last key."""
-    rows, clip = focused_rows(state.curves), clip_of(state)
+    rows, clip = focused_rows(state.of(Curves)), clip_of(state)
     channel = channel_of(clip, rows[0]) if rows and clip is not None else None
     if channel is None:
         return
@@ -229,7 +229,7 @@ def _draw_modes(state: AppState) -> None:
 
 def _draw_key_fields(state: AppState, curves: tuple[Curve, ...]) -> None:
     """Draw numbers and tangents of the chosen keys."""
-    view, clip = state.curves, clip_of(state)
+    view, clip = state.of(Curves), clip_of(state)
     place = min(view.keys, default=None)
     channel = None if clip is None or place is None else channel_of(clip, place[0])
     if channel is None or place is None:
@@ -284,7 +284,7 @@ def _draw_rule(state: AppState, channel: Channel, place: KeyPlace, side: int, te
         turn_tangent(state, [place], side, float(slopes(channel)[place[1], side]))
     for rule in TANGENT_RULES:
         if new == rule != now:
-            turn_tangent(state, state.curves.keys, side, rule)
+            turn_tangent(state, state.of(Curves).keys, side, rule)
 
 
 def _draw_slopes(state: AppState, channel: Channel, place: KeyPlace, factor: float) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from viewer.app.core.state import AppState
 from viewer.app.curves.data import channel_of, keyed_values
-from viewer.app.curves.state import CurveView, KeyPlace
+from viewer.app.curves.state import Curves, KeyPlace
 from viewer.rig.motion.clip import Channel, Clip, Extrapolation, Tangent
 from viewer.rig.motion.clip_edit import (
     add_key,
@@ -54,13 +54,13 @@ def _change(state: AppState, rows: Iterable[int], change: Callable[[Channel], Ch
     state.actor.clip = clip
 
 
-def drop_missing(view: CurveView, clip: Clip) -> None:
+def drop_missing(view: Curves, clip: Clip) -> None:
     """Forget chosen keys that are there no more: undone, or deleted."""
     counts = {channel.target: len(channel.times) for channel in clip.channels}
     view.keys = frozenset(place for place in view.keys if place[1] < counts.get(place[0], 0))
 
 
-def focused_rows(view: CurveView) -> tuple[int, ...]:
+def focused_rows(view: Curves) -> tuple[int, ...]:
     """Return the curves that have chosen keys, or else all that are shown."""
     return tuple(sorted({row for row, _ in view.keys})) or view.rows
 
@@ -68,7 +68,7 @@ def focused_rows(view: CurveView) -> tuple[int, ...]:
 def move_chosen(state: AppState, dt: float, dv: float) -> None:
     """Move the chosen keys of all curves; they stop at keys that stay."""
     keys: dict[int, list[int]] = {}
-    for row, key in state.curves.keys:
+    for row, key in state.of(Curves).keys:
         keys.setdefault(row, []).append(key)
     for row, chosen in keys.items():
         _change(state, [row], partial(move_keys, keys=chosen, dt=dt, dv=dv, gap=_GAP))
@@ -92,16 +92,14 @@ def add_key_at(state: AppState, rows: Iterable[int], time: float) -> None:
         new, key = add_key(old, time)
         clip = with_channel(clip, row, partial(_instead, new))
         places.add((row, key))
-    state.actor.clip, state.curves.keys = clip, frozenset(places)
+    state.actor.clip, state.of(Curves).keys = clip, frozenset(places)
 
 
 def _instead(new: Channel, _: Channel) -> Channel:
     return new
 
 
-def nearest_row(
-    clip: Clip, view: CurveView, time: float, value: float, factors: list[float]
-) -> int:
+def nearest_row(clip: Clip, view: Curves, time: float, value: float, factors: list[float]) -> int:
     """Return the shown curve that is nearest to a value at a time, -1 if none is shown."""
     if not view.rows:
         return -1
@@ -111,10 +109,11 @@ def nearest_row(
 
 def delete_chosen(state: AppState) -> None:
     """Delete the chosen keys."""
-    for row in {row for row, _ in state.curves.keys}:
-        keys = [key for place, key in state.curves.keys if place == row]
+    curves = state.of(Curves)
+    for row in {row for row, _ in curves.keys}:
+        keys = [key for place, key in curves.keys if place == row]
         _change(state, [row], partial(delete_keys, keys=keys))
-    state.curves.keys = frozenset()
+    curves.keys = frozenset()
 
 
 def turn_tangent(state: AppState, places: Iterable[KeyPlace], side: int, to: Tangent) -> None:
@@ -125,7 +124,7 @@ def turn_tangent(state: AppState, places: Iterable[KeyPlace], side: int, to: Tan
 
 def extrapolate(state: AppState, side: int, mode: Extrapolation) -> None:
     """Set what the curves in focus do before (0) or after (1) their keys."""
-    _change(state, focused_rows(state.curves), lambda old: set_extrapolation(old, side, mode))
+    _change(state, focused_rows(state.of(Curves)), lambda old: set_extrapolation(old, side, mode))
 
 
 def set_clip_range(state: AppState, start: float, end: float) -> None:

@@ -15,6 +15,7 @@ from viewer.app.curves.axes import Color, Plot, factor_of, measured
 from viewer.app.curves.data import Curve, channel_of, keyed_values, sampled_points
 from viewer.app.curves.editing import set_clip_range
 from viewer.app.curves.plotted_keys import draw_keys, edit
+from viewer.app.curves.state import Curves
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.clip import Clip
@@ -47,7 +48,7 @@ def draw_plot(state: AppState, curves: tuple[Curve, ...]) -> None:
 
 
 def _draw(state: AppState, curves: tuple[Curve, ...]) -> None:
-    view, no_label = state.curves, implot.AxisFlags_.no_label
+    view, no_label = state.of(Curves), implot.AxisFlags_.no_label
     implot.setup_axes("seconds", "values", no_label, no_label)
     implot.setup_axis_format(implot.ImAxis_.x1, "%g s")
     for axis in (implot.ImAxis_.x1, implot.ImAxis_.y1):
@@ -80,7 +81,7 @@ def _draw_units(plot: Plot) -> None:
 
 def _fitting(state: AppState, curves: tuple[Curve, ...]) -> tuple[float, float, float, float]:
     """Return axes that show the chosen curves from their first to their last key or frame."""
-    clip, rows = state.actor.clip, state.curves.rows
+    clip, rows = state.actor.clip, state.of(Curves).rows
     low, high = (0.0, 1.0) if clip is None else (clip.start, clip.end)
     if isinstance(clip, Clip):
         channels = [channel_of(clip, row) for row in rows]

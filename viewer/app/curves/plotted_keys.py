@@ -18,6 +18,7 @@ from viewer.app.curves.editing import (
     turn_tangent,
 )
 from viewer.app.curves.state import KeyPlace
+from viewer.app.files.state import Files
 from viewer.rig.arrays import Floats
 from viewer.rig.motion.clip import Channel, Clip, slopes
 from viewer.rig.number_text import number_text
@@ -171,7 +172,7 @@ def edit(plot: Plot, touched: bool) -> None:
         Whether the mouse is at a key or tangent, so that a click is not meant for the plot.
     """
     state, view, clip = plot.state, plot.view, clip_of(plot.state)
-    if clip is None or state.error or state.dialog is not None or not _is_mouse_inside():
+    if clip is None or state.error or state.of(Files).dialog is not None or not _is_mouse_inside():
         return
     left, io = imgui.MouseButton_.left, imgui.get_io()
     # Keys and lines that can be dragged hide the plot from the mouse, but not from the keyboard.

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["CurveView", "KeyPlace"]
+__all__ = ["Curves", "KeyPlace"]
 
 KeyPlace = tuple[int, int]
 """A curve's row and the index of one of its keys."""
 
 
 @dataclass(slots=True)
-class CurveView:
+class Curves:
     """The Curves panel's own state; what it edits is the actor's clip.
 
     Attributes

@@ -6,20 +6,18 @@ It opens files, chooses a folder, or asks where to save; what follows is up to w
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import button, note_item
+from viewer.app.files.file_choice import FileDialog
+from viewer.app.files.state import Files
 from viewer.errors import printable
 from viewer.formats import FORMATS
 
-__all__ = ["PICTURES", "FileDialog", "draw_file_dialog", "folder_of"]
-
-PICTURES = (".png", ".jpg", ".jpeg")
-"""Suffixes of textures."""
+__all__ = ["draw_file_dialog"]
 
 _HINTS = {
     "open": "Ctrl+click chooses several: a .skel and its .skin",
@@ -28,110 +26,10 @@ _HINTS = {
 }
 
 
-def open_chosen(state: AppState, paths: list[Path]) -> None:
-    """Open what was chosen, after the frame."""
-    state.wants_open = paths
-
-
-class FileDialog:
-    """A folder being looked at and the files chosen in it.
-
-    Parameters
-    ----------
-    folder : Path
-        Where to start.
-    done : callable
-        Called with the state and what was chosen: files, one folder, or one file to write.
-        Opens them if omitted.
-    purpose : str
-        ``"open"``, ``"folder"`` or ``"save"``.
-    title : str
-        Of the dialog.
-    suffixes : tuple of str
-        Files that are listed; all that can be opened if empty.
-    name : str
-        Suggested name of the file to write; its suffix is added to names that have none.
-    more : callable, optional
-        Draws what else is asked for, given the state and the dialog.
-    written : callable, optional
-        Returns all files that are written for a name; that file alone if omitted.
-    """
-
-    def __init__(
-        self,
-        folder: Path,
-        done: Callable[[AppState, list[Path]], None] = open_chosen,
-        purpose: str = "open",
-        title: str = "Open files",
-        suffixes: tuple[str, ...] = (),
-        name: str = "",
-        more: Callable[[AppState, FileDialog], None] | None = None,
-        written: Callable[[Path], list[Path]] | None = None,
-    ) -> None:
-        self.more, self.written = more, written
-        self.done, self.purpose, self.title, self.name = done, purpose, title, name
-        self.suffixes = set(suffixes or opened_suffixes())
-        self.suffix = Path(name).suffix
-        self.folder = folder
-        self.chosen: set[Path] = set()
-        self.shows_all = False
-        self.problem = ""
-        self.entries: list[Path] = []
-        self.is_new = True
-        self.enter(folder)
-
-    def enter(self, folder: Path) -> None:
-        """Look into a folder; one that cannot be read leaves the dialog where it was."""
-        try:
-            found = sorted(
-                folder.iterdir(), key=lambda path: (not path.is_dir(), path.name.lower())
-            )
-        except OSError as problem:
-            self.problem = f"{printable(folder)}: {problem.strerror}"
-            return
-        self.folder, self.entries, self.problem = folder, found, ""
-        self.chosen.clear()
-
-    def typed(self, text: str) -> Path | None:
-        """Return the file that a text names, or look into the folder that it names."""
-        try:
-            path = Path(text).expanduser()
-            if path.is_file():
-                return path
-        except (OSError, RuntimeError) as problem:  # too long; no such user
-            self.problem = f"{printable(text)}: {getattr(problem, 'strerror', None) or problem}"
-            return None
-        self.enter(path)
-        return None
-
-    def target(self) -> Path | None:
-        """Return the file to write, by its name with a suffix; None if it has no name."""
-        name = Path(self.name.strip())
-        if not name.name.strip("."):
-            return None
-        path = self.folder / name
-        return path if path.suffix else path.with_name(path.name + self.suffix)
-
-    def listed(self) -> list[Path]:
-        """Return folders, and the files that can be opened or all files."""
-        return [
-            path
-            for path in self.entries
-            if not path.name.startswith(".")
-            and (path.is_dir() or self.shows_all or path.suffix.lower() in self.suffixes)
-        ]
-
-
-def opened_suffixes() -> set[str]:
-    """Return the suffixes of files that can be opened, textures among them."""
-    suffixes = {suffix for kind in FORMATS.values() for suffix in kind.suffixes}
-    # Most .txt files are no poses; the check box lists them too.
-    return suffixes - {".txt"} | set(PICTURES)
-
-
 def draw_file_dialog(state: AppState) -> None:
     """Draw the dialog if there is one; when the user has chosen, do what was asked for."""
-    dialog = state.dialog
+    files = state.of(Files)
+    dialog = files.dialog
     if dialog is None:
         return
     if dialog.is_new:
@@ -148,8 +46,10 @@ def draw_file_dialog(state: AppState) -> None:
         result = _draw_content(state, dialog)
         imgui.end_popup()
     if result or not stays:
-        state.dialog = None
-    if result:
+        files.dialog = None
+    if result and dialog.done is None:
+        files.wants_open = result
+    elif result and dialog.done is not None:
         dialog.done(state, result)
 
 
@@ -194,7 +94,7 @@ def _draw_buttons(state: AppState, dialog: FileDialog) -> list[Path]:
         result = _confirmed(dialog)
     imgui.same_line()
     if button(state, "Cancel"):
-        state.dialog = None
+        state.of(Files).dialog = None
     imgui.same_line()
     imgui.text_disabled(_HINTS[dialog.purpose])
     return result
@@ -269,11 +169,3 @@ def _is_model_folder(dialog: FileDialog, path: Path) -> bool:
         return False
     names = {name for kind in FORMATS.values() for name in kind.files}
     return path.name in names or any((path / name).exists() for name in names)
-
-
-def folder_of(paths: Sequence[Path]) -> Path:
-    """Return where a dialog begins: beside the first file, else the current folder, else home."""
-    try:
-        return paths[0].resolve().parent if paths else Path.cwd()
-    except (OSError, RuntimeError):  # the folder is gone
-        return Path.home()

@@ -9,7 +9,7 @@ from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import choice, explain
-from viewer.app.files.file_dialog import FileDialog, folder_of
+from viewer.app.files.file_choice import FileDialog, folder_of
 from viewer.app.files.motion_export import (
     FOLDER,
     motion_files,
@@ -17,6 +17,7 @@ from viewer.app.files.motion_export import (
     moving_actors,
     save_motion,
 )
+from viewer.app.files.state import Files
 from viewer.errors import printable
 from viewer.export import EXPORTERS
 from viewer.formats import file_stem
@@ -39,7 +40,7 @@ def ask_for_motion(state: AppState) -> None:
     # People's numbers are put behind the name when there are several files.
     stem = file_stem(first.title if len(moving) > 1 else first.name)
     suffixes = motion_suffixes()
-    state.dialog = FileDialog(
+    state.of(Files).dialog = FileDialog(
         folder_of(state.paths),
         lambda state, paths: save_motion(state, paths[0], wish.everyone),
         "save",

@@ -6,12 +6,12 @@ import queue
 import threading
 from collections.abc import Callable, Sequence
 
-from viewer.app.playback.frame_rate import with_rate
 from viewer.errors import ViewerError
 from viewer.loading.capturing import Builder
 from viewer.rig.captures.capture import CapturePart
 from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.evaluation import frame_rate
+from viewer.rig.motion.retimed import with_rate
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.scene import Actor
 

@@ -8,12 +8,12 @@ from pathlib import Path
 
 from imgui_bundle import imgui
 
-from viewer.app.actions import take_pick
 from viewer.app.core.jobs import CountedJob, Report
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.state import AppState
-from viewer.app.linting.state import Checked, Running
+from viewer.app.linting.state import Checked, Linting, Running
 from viewer.app.shown_panels import set_open
+from viewer.app.view.picks import take_pick
 from viewer.errors import counted, printable
 from viewer.lint import (
     Finding,
@@ -49,7 +49,7 @@ def check_rig(state: AppState) -> None:
     """Show the Lint panel and check the scene."""
     set_open(state, "lint", True)
     imgui.set_window_focus("Lint")
-    state.lint.was_shown = True
+    state.of(Linting).was_shown = True
     start_check(state)
 
 
@@ -58,8 +58,8 @@ def start_check(state: AppState) -> None:
     if no_job_room(state):
         return
     source, options, running = state.scene, _options(state), Running()
-    copy, paths, view = _copied(source), state.paths, state.lint
-    settings, since = view.settings, view.opened_at
+    copy, paths = _copied(source), state.paths
+    settings, since = state.motion_settings, state.opened_at
 
     def check(report: Report) -> list[str]:
         # The figure that is shown without files comes from some as well.
@@ -70,12 +70,12 @@ def start_check(state: AppState) -> None:
         return [f"Checked: {summary(findings)}"]
 
     running.job = state.job = CountedJob(_TITLE, check)
-    state.lint.running = running
+    state.of(Linting).running = running
 
 
 def _options(state: AppState) -> LintOptions:
     """Return what counts as a fault; frames are those of the timeline."""
-    return replace(state.lint.options, frame_rate=state.playback.keyed_rate)
+    return replace(state.of(Linting).options, frame_rate=state.playback.keyed_rate)
 
 
 def _copied(scene: Scene) -> Scene:
@@ -85,7 +85,8 @@ def _copied(scene: Scene) -> Scene:
 
 def take_findings(state: AppState) -> None:
     """Show the findings of a check that has ended; those of another scene are forgotten."""
-    view, running = state.lint, state.lint.running
+    view = state.of(Linting)
+    running = view.running
     if running is not None and running.job is not state.job:
         view.running = None
         # A check that was cancelled, or of a scene that is gone, has nothing to show.
@@ -101,7 +102,8 @@ def is_stale(state: AppState) -> bool:
 
     That time moves on, and poses with it, changes nothing. To be asked once a frame.
     """
-    view, known = state.lint, state.lint.checked
+    view = state.of(Linting)
+    known = view.checked
     if known is None:
         return False
     before, view.seen = view.seen, _moving(state)
@@ -141,9 +143,9 @@ def choose_finding(state: AppState, index: int) -> None:
     state : AppState
         The camera goes there with the next picture.
     index : int
-        Of ``state.lint.checked.findings``.
+        Of ``state.of(Linting).checked.findings``.
     """
-    view = state.lint
+    view = state.of(Linting)
     view.chosen = -1 if index == view.chosen else index
     finding = view.finding
     if finding is None or finding.actor is None or not is_in_scene(state, finding):
@@ -179,7 +181,7 @@ def is_known_there(state: AppState, finding: Finding) -> bool:
     finding : Finding
         Of its last check.
     """
-    known, index = state.lint.checked, finding.actor
+    known, index = state.of(Linting).checked, finding.actor
     if known is None or index is None or not is_in_scene(state, finding):
         return False
     return state.scene.actors[index].figure is known.scene.actors[index].figure
@@ -204,7 +206,7 @@ def copy_place(state: AppState, finding: Finding) -> None:
 
 def copy_findings(state: AppState, as_json: bool) -> None:
     """Put all findings on the clipboard, as ``viewer lint`` prints them."""
-    known = state.lint.checked
+    known = state.of(Linting).checked
     if known is None:
         return
     if as_json:

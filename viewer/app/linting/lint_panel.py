@@ -23,7 +23,7 @@ from viewer.app.linting.actions import (
     start_check,
     take_findings,
 )
-from viewer.app.linting.state import Checked
+from viewer.app.linting.state import Checked, Linting
 from viewer.errors import printable
 from viewer.lint import SEVERITIES, Finding, LintOptions
 from viewer.lint.captures import LOW_FRAMES, LOW_SHARE
@@ -49,7 +49,7 @@ _TIP_WIDTH = 30.0  # letters' heights
 
 def draw(state: AppState) -> None:
     """Draw the panel; the first time it is shown it checks by itself."""
-    view = state.lint
+    view = state.of(Linting)
     take_findings(state)
     if not view.was_shown:
         view.was_shown = True
@@ -101,7 +101,8 @@ def _draw_limits(state: AppState) -> None:
     """Draw what only the person who asks can know."""
     if not imgui.begin_popup("lint limits"):
         return
-    view, options = state.lint, state.lint.options
+    view = state.of(Linting)
+    options = view.options
     turn = np.degrees(options.max_turn)
     moved = slider(state, "Largest turn", turn, 90.0, 10_000.0, "%.0f\N{DEGREE SIGN}/s")
     explain("of a joint against its parent between two frames")
@@ -129,7 +130,8 @@ def _draw_limits(state: AppState) -> None:
 
 def _draw_ground(state: AppState) -> None:
     """Draw where the ground is: found out, at a height, or nowhere."""
-    view, ground = state.lint, state.lint.options.ground
+    view = state.of(Linting)
+    ground = view.options.ground
     is_given = not isinstance(ground, str)
     chosen = choice(state, "Ground", "height" if is_given else str(ground), _GROUNDS)
     explain("no foot may be below by more than 1 % of the figure's height")
@@ -146,7 +148,7 @@ def _draw_ground(state: AppState) -> None:
 
 
 def _draw_progress(state: AppState) -> None:
-    running = state.lint.running
+    running = state.of(Linting).running
     if running is None or running.job is None or running.job is not state.job:
         return
     job = running.job
@@ -159,7 +161,7 @@ def _draw_progress(state: AppState) -> None:
 
 
 def _draw_filters(state: AppState, known: Checked) -> None:
-    view = state.lint
+    view = state.of(Linting)
     counts = Counter(finding.severity for finding in known.findings)
     for severity in reversed(SEVERITIES):
         text = f"{counts[severity]:,} {severity}{'s' * (counts[severity] != 1)}"
@@ -177,7 +179,7 @@ def _draw_filters(state: AppState, known: Checked) -> None:
 
 
 def _draw_list(state: AppState, known: Checked) -> None:
-    view = state.lint
+    view = state.of(Linting)
     shown = [
         index
         for index, finding in enumerate(known.findings)
@@ -232,7 +234,7 @@ def _draw_row(state: AppState, index: int, finding: Finding, several: bool) -> N
     place = imgui.get_cursor_screen_pos()
     flags = imgui.SelectableFlags_.span_all_columns
     size = (0.0, sum(heights) + imgui.get_style().item_spacing.y)
-    if imgui.selectable("##finding", index == state.lint.chosen, flags, size)[0]:
+    if imgui.selectable("##finding", index == state.of(Linting).chosen, flags, size)[0]:
         if is_in_scene(state, finding):
             choose_finding(state, index)
         else:

@@ -7,8 +7,9 @@ from dataclasses import astuple
 
 import numpy as np
 
-from viewer.app.core.framing import fit_points
+from viewer.app.core.fitting import fit_points
 from viewer.app.core.state import AppState
+from viewer.app.linting.state import Linting
 from viewer.errors import ViewerError
 from viewer.lint import Places, places_of, points_of
 from viewer.rendering.camera import Camera, camera_axes
@@ -34,7 +35,8 @@ def show_finding(state: AppState) -> Marks | None:
 
     To be called when the scene has been posed, before it is drawn.
     """
-    view, finding = state.lint, state.lint.finding
+    view = state.of(Linting)
+    finding = view.finding
     wants_aim, view.wants_aim = view.wants_aim, False
     key = _key(state)
     if finding is None or key is None:
@@ -60,7 +62,8 @@ def show_finding(state: AppState) -> Marks | None:
 
 def _key(state: AppState) -> object:
     """Return all that the marks depend on; None if their actor is there no more."""
-    known, finding = state.lint.checked, state.lint.finding
+    linting = state.of(Linting)
+    known, finding = linting.checked, linting.finding
     if known is None or known.source is not state.scene:
         return None
     if finding is None or finding.actor is None or finding.actor >= len(state.scene.actors):
@@ -141,11 +144,11 @@ def aim(state: AppState, points: Floats, facing: Floats, around: float) -> None:
     around : float
         How much around their middle is seen at least, as a share of the actor's size.
     """
-    points, camera = _finite(points), state.camera
-    if not len(points) or state.lint.finding is None:
+    linting = state.of(Linting)
+    points, camera, finding = _finite(points), state.camera, linting.finding
+    if not len(points) or finding is None or finding.actor is None:
         return
-    assert state.lint.finding.actor is not None  # it has places
-    whole = _finite(actor_points(state.scene.actors[state.lint.finding.actor]))
+    whole = _finite(actor_points(state.scene.actors[finding.actor]))
     size = box_size(bounding_box(whole if len(whole) else points)) or box_size(state.box) or 1.0
     room = bounding_box(points).mean(axis=0) + around * size * np.array([[-1.0], [1.0]])
     _turn(camera, facing)

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
+from viewer.app.core.jobs import CountedJob
 from viewer.lint import SEVERITIES, Finding, LintOptions
+from viewer.rendering.overlay.marks import Marks
+from viewer.rig.scene import Scene
 
-if TYPE_CHECKING:
-    from viewer.app.core.jobs import CountedJob
-    from viewer.loading import MotionSettings
-    from viewer.rendering.overlay.marks import Marks
-    from viewer.rig.scene import Scene
-
-__all__ = ["Checked", "LintView", "Running"]
+__all__ = ["Checked", "Linting", "Running"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,17 +49,13 @@ class Running:
 
 
 @dataclass(slots=True)
-class LintView:
+class Linting:
     """The Lint panel's own state.
 
     Attributes
     ----------
     options : LintOptions
         What counts as a fault when it is checked next.
-    opened_at : float
-        When the scene was opened, seconds since the epoch.
-    settings : MotionSettings or None
-        How its motions were taken, if it was asked for.
     checked : Checked or None
         The last check that ended.
     running : Running or None
@@ -92,8 +83,6 @@ class LintView:
     """
 
     options: LintOptions = field(default_factory=LintOptions)
-    opened_at: float = 0.0
-    settings: MotionSettings | None = None
     checked: Checked | None = None
     running: Running | None = None
     was_shown: bool = False
@@ -106,10 +95,6 @@ class LintView:
     marks: Marks | None = None
     marks_key: object = None
     marks_note: str = ""
-
-    def note_opened(self) -> None:
-        """Remember that another scene was opened now."""
-        self.opened_at, self.settings = time.time(), None
 
     @property
     def finding(self) -> Finding | None:

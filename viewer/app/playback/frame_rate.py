@@ -3,27 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from typing import TYPE_CHECKING
 
+from viewer.app.core.state import AppState
 from viewer.rig.captures.points import PointClip
+from viewer.rig.motion.retimed import with_rate
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.scene import Actor
 
-if TYPE_CHECKING:
-    from viewer.app.core.state import AppState
-
-__all__ = ["LIMITS", "foreign_rate", "rate_of", "set_rate", "with_rate"]
+__all__ = ["LIMITS", "foreign_rate", "rate_of", "set_rate"]
 
 LIMITS = (0.01, 1000.0)
 """Slowest and fastest rate that can be set, frames a second."""
-
-
-def with_rate(clip: SampledClip | PointClip, rate: float) -> SampledClip | PointClip:
-    """Return a clip with the same frames at another rate; its first frame stays when it is."""
-    if clip.timing.frame_rate == rate:
-        return clip
-    return replace(clip, timing=replace(clip.timing, frame_rate=rate))
 
 
 def rate_of(state: AppState) -> float:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from viewer.app.actions import go_to_end, play, step
 from viewer.app.core.playback import FASTEST, MODES
-from viewer.app.core.reasons import no_gaps, no_motion
+from viewer.app.core.reasons import no_motion
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import (
     button,
@@ -18,7 +17,9 @@ from viewer.app.core.widgets import (
     same_line_if_room,
     slider,
 )
+from viewer.app.playback.actions import go_to_end, play, step
 from viewer.app.playback.frame_rate import foreign_rate, rate_of, set_rate
+from viewer.app.playback.gaps import no_gaps
 from viewer.app.playback.tracks import draw_tracks
 from viewer.rig.number_text import number_text
 

@@ -7,8 +7,9 @@ import math
 import numpy as np
 from imgui_bundle import imgui
 
-from viewer.app.core.state import AppState, HeldVector
+from viewer.app.core.state import AppState
 from viewer.app.core.widgets import note_item, plain_zero
+from viewer.app.posing.state import HeldVector, Posing
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import matrix_to_rotation_vector, rotation_vector_to_matrix
@@ -60,18 +61,19 @@ def draw_vector_component(
         rotation = rotation_vector_to_matrix(vector)
         joints = np.array([joint], dtype=np.int32)
         set_joint_rotations(skeleton, pose, joints, rotation[None])
-        state.held_vector = HeldVector(joint, vector, rotation)
+        state.of(Posing).held_vector = HeldVector(joint, vector, rotation, state.n_choices)
 
 
 def _shown_vector(state: AppState, figure: Figure, pose: Pose, joint: int) -> Floats:
     """Return a joint's rotation vector: the one being edited, as long as it is its rotation."""
+    posing = state.of(Posing)
     assert figure.skeleton is not None  # the caller looked
     rotation = joint_rotations(figure.skeleton, pose)[joint]
-    held = state.held_vector
-    if held is not None and held.joint == joint:
+    held = posing.held_vector
+    if held is not None and (held.joint, held.n_choices) == (joint, state.n_choices):
         if np.abs(held.rotation - rotation).max() < _SAME:
             return held.vector.copy()
-        state.held_vector = None
+        posing.held_vector = None
     return matrix_to_rotation_vector(rotation)
 
 

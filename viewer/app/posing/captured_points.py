@@ -6,6 +6,7 @@ from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import note_item
+from viewer.app.posing.joint_tree import joint_tree
 from viewer.errors import printable
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.points import PointLayout
@@ -38,11 +39,11 @@ def draw_captured_points(state: AppState, actor: Actor, layout: PointLayout) -> 
     imgui.text_disabled(_seen_text(state, points))
     imgui.pop_text_wrap_pos()
     imgui.set_next_item_width(-1.0)
-    state.joint_filter = imgui.input_text_with_hint(
-        "##filter", "Filter points", state.joint_filter
+    joint_tree(state).filter = imgui.input_text_with_hint(
+        "##filter", "Filter points", joint_tree(state).filter
     )[1]
     note_item(state, "Filter")
-    wanted = state.joint_filter.lower()
+    wanted = joint_tree(state).filter.lower()
     shown = [row for row, name in enumerate(layout.names) if wanted in name.lower()]
     if imgui.begin_child("points", (0.0, 0.0)):
         if not shown:

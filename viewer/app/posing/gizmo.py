@@ -23,7 +23,7 @@ from viewer.app.posing.move_tool import (
 )
 from viewer.app.posing.posed_joint import PosedJoint, posed_joint
 from viewer.app.posing.rotate_tool import TurnHandle, grab_ring, rings
-from viewer.app.posing.state import Drag, Handle, Outcome
+from viewer.app.posing.state import Drag, Handle, Outcome, Posing
 from viewer.app.posing.tool_actions import cancel_drag, no_tool, selected
 from viewer.rig.arrays import Floats
 from viewer.rig.pose import Pose
@@ -33,7 +33,6 @@ __all__ = [
     "DOT_REACH",
     "choose_joint",
     "handle_at",
-    "is_held",
     "joint_at",
     "joint_places",
     "use_handles",
@@ -46,21 +45,14 @@ _STILL = 2.0  # window coordinates by which a hand that clicks may shake
 _LEFT, _RIGHT = imgui.MouseButton_.left, imgui.MouseButton_.right
 
 
-def is_held(state: AppState) -> bool:
-    """Return whether an edit is going on: a widget or a handle is held."""
-    drag = state.posing.drag
-    is_dragged = drag is not None and not drag.is_over
-    moves_template = state.rig.holds_mouse and imgui.is_mouse_down(_LEFT)
-    return imgui.is_any_item_active() or is_dragged or moves_template
-
-
 def use_handles(state: AppState) -> bool:
     """Begin, go on with or end a drag; return whether the mouse belongs to a handle."""
+    posing = state.of(Posing)
     io = imgui.get_io()
     place = (io.mouse_pos.x, io.mouse_pos.y)
-    if state.posing.drag is not None:
-        return _go_on(state, state.posing.drag, place)
-    if not state.posing.is_on or io.want_capture_mouse or no_tool(state):
+    if posing.drag is not None:
+        return _go_on(state, posing.drag, place)
+    if not posing.is_on or io.want_capture_mouse or no_tool(state):
         return False
     if io.key_shift or io.key_alt:  # these pan, and ask for vertices
         return False
@@ -69,18 +61,19 @@ def use_handles(state: AppState) -> bool:
     handle = _grabbed(state, place)
     if handle is None:
         return False
-    state.posing.drag = Drag(state.actor, handle, Outcome(_pose(state), ""))
+    posing.drag = Drag(state.actor, handle, Outcome(_pose(state), ""))
     return True
 
 
 def _go_on(state: AppState, drag: Drag, place: Place) -> bool:
     """Pose by where the pointer is; let go with the button, give up with the other one."""
+    posing = state.of(Posing)
     if state.actor is not drag.actor or drag.actor.pose is not drag.outcome.pose:
         drag.is_over = True  # undone, reset or closed meanwhile: that stays
     if imgui.is_mouse_clicked(_RIGHT):
         cancel_drag(state)
     if drag.is_over:
-        state.posing.drag = drag if imgui.is_mouse_down(_LEFT) else None
+        posing.drag = drag if imgui.is_mouse_down(_LEFT) else None
         return True
     frame, snaps = view_frame(state), imgui.get_io().key_ctrl
     if not drag.has_moved and _apart(place, drag.handle.place) > _STILL:
@@ -92,7 +85,7 @@ def _go_on(state: AppState, drag: Drag, place: Place) -> bool:
         drag.outcome = drag.handle.follow(frame, place, snaps)
         drag.actor.pose = drag.outcome.pose
     if not imgui.is_mouse_down(_LEFT):
-        state.posing.drag = None
+        posing.drag = None
         if not drag.has_moved:
             choose_joint(state)  # its dot lies under a ring or an arrow
     return True
@@ -111,7 +104,7 @@ def _pose(state: AppState) -> Pose:
 def _grabbed(state: AppState, place: Place) -> Handle | None:
     """Return the handle under the pointer; with the tool Move any joint is one."""
     handle = handle_at(state, view_frame(state), place)
-    if handle is not None or state.posing.tool != "move":
+    if handle is not None or state.of(Posing).tool != "move":
         return handle
     joint = joint_at(state, place)
     if joint < 0:
@@ -133,16 +126,17 @@ def handle_at(state: AppState, frame: ViewFrame, place: Place) -> Handle | None:
     place : (float, float)
         The pointer.
     """
+    posing = state.of(Posing)
     posed, pose = selected(state), state.actor.pose
     if posed is None or pose is None:
         return None
-    if state.posing.tool == "rotate":
-        found = rings(posed, pose, state.posing.orientation, frame)
+    if posing.tool == "rotate":
+        found = rings(posed, pose, posing.orientation, frame)
         held = grab_ring(found, posed.center, frame, place)
         return None if held is None else TurnHandle(posed, pose, *held, place, state.in_degrees)
-    if state.posing.tool != "move":
+    if posing.tool != "move":
         return None
-    arrow = grab_arrow(arrows(posed, state.posing.orientation), posed.center, frame, place)
+    arrow = grab_arrow(arrows(posed, posing.orientation), posed.center, frame, place)
     if arrow is not None:
         return ShiftHandle(posed, pose, place, arrow)
     center = frame.place(posed.center)
@@ -154,7 +148,7 @@ def handle_at(state: AppState, frame: ViewFrame, place: Place) -> Handle | None:
 def _middle(state: AppState, posed: PosedJoint, place: Place) -> Handle | None:
     """Return what dragging a joint itself does: its chain follows, or it is shifted."""
     pose, skeleton = _pose(state), posed.skeleton
-    length = len(used_chain(skeleton, posed.joint, state.posing.chain_length))
+    length = len(used_chain(skeleton, posed.joint, state.of(Posing).chain_length))
     if length:
         return ReachHandle(posed, pose, place, length)
     if shifts(skeleton, posed.joint):
@@ -181,7 +175,7 @@ def joint_at(state: AppState, place: Place) -> int:
 
 def choose_joint(state: AppState) -> bool:
     """Select the joint whose dot was clicked; return whether there was one."""
-    if not state.posing.is_on or no_tool(state):
+    if not state.of(Posing).is_on or no_tool(state):
         return False
     mouse = imgui.get_io().mouse_pos
     joint = joint_at(state, (mouse.x, mouse.y))

@@ -28,7 +28,7 @@ from viewer.app.posing.rotate_tool import (
     rings,
     toward_eye,
 )
-from viewer.app.posing.state import Drag, Handle
+from viewer.app.posing.state import Drag, Handle, Posing
 from viewer.app.posing.tool_actions import no_tool, selected
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
@@ -83,15 +83,16 @@ class _Pen:
 
 def draw_gizmo(state: AppState) -> None:
     """Draw what the chosen tool needs over the scene."""
+    posing = state.of(Posing)
     x, y, width, height = state.view_rect
-    if not state.posing.is_on or min(width, height) < 40.0 or no_tool(state):
+    if not posing.is_on or min(width, height) < 40.0 or no_tool(state):
         return
     pen, posed = _Pen(view_frame(state)), selected(state)
     pen.list.push_clip_rect((x, y), (x + width, y + height), True)
     hot = None if _drag(state) else _hovered(state, pen.frame)
     _draw_joints(state, pen)
     if posed is not None:
-        if state.posing.tool == "rotate":
+        if posing.tool == "rotate":
             _draw_arcs(state, pen, posed)
             _draw_rings(state, pen, posed, hot)
         else:
@@ -103,7 +104,7 @@ def draw_gizmo(state: AppState) -> None:
 
 def _drag(state: AppState) -> Drag | None:
     """Return what is held, None once it was cancelled."""
-    drag = state.posing.drag
+    drag = state.of(Posing).drag
     return None if drag is None or drag.is_over else drag
 
 
@@ -165,7 +166,7 @@ def _draw_rings(state: AppState, pen: _Pen, posed: PosedJoint, hot: Handle | Non
         return
     assert pose is not None  # there is a posed joint
     under = hot.ring if isinstance(hot, TurnHandle) else None
-    for ring in rings(posed, pose, state.posing.orientation, pen.frame):
+    for ring in rings(posed, pose, state.of(Posing).orientation, pen.frame):
         is_hot = under is not None and (ring.color, ring.dof) == (under.color, under.dof)
         _draw_ring(pen, posed.center, ring, is_hot)
 
@@ -209,7 +210,7 @@ def _draw_turn(pen: _Pen, posed: PosedJoint, handle: TurnHandle, angle: float) -
 def _draw_chain(state: AppState, pen: _Pen, posed: PosedJoint) -> None:
     """Draw the joints between the selected one and the highest that may turn."""
     skeleton, drag = posed.skeleton, _drag(state)
-    chain = used_chain(skeleton, posed.joint, state.posing.chain_length).tolist()
+    chain = used_chain(skeleton, posed.joint, state.of(Posing).chain_length).tolist()
     if not chain:
         return
     limited = set(drag.outcome.limited) if drag is not None else set()
@@ -237,7 +238,7 @@ def _draw_arrows(state: AppState, pen: _Pen, posed: PosedJoint, hot: Handle | No
     arrow = held.arrow if isinstance(held, ShiftHandle) else None
     is_middle = isinstance(held, ReachHandle) or (isinstance(held, ShiftHandle) and arrow is None)
     pen.dot(posed.center, 8.0, (*(_HOT if is_middle else _AXES[3]), 1.0), filled=False)
-    for one in arrows(posed, state.posing.orientation):
+    for one in arrows(posed, state.of(Posing).orientation):
         is_hot = arrow is not None and arrow.color == one.color
         _draw_arrow(pen, posed.center, one, is_hot)
 
@@ -269,7 +270,7 @@ def _draw_text(state: AppState, pen: _Pen, posed: PosedJoint) -> None:
     limits = limit_text(posed.skeleton, drag.outcome.limited)
     if limits:
         lines.append((limits, (*_LIMIT, 1.0)))
-    away = 1.2 * RADIUS + _GAP if state.posing.tool == "rotate" else 2.0 * _GAP
+    away = 1.2 * RADIUS + _GAP if state.of(Posing).tool == "rotate" else 2.0 * _GAP
     _text_box(state, pen, (center[0] + away, center[1] - 2.0 * _GAP), lines)
 
 

@@ -9,6 +9,7 @@ from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import button, note_item, plain_zero, same_line_if_room
+from viewer.app.posing.state import Posing
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import matrix_to_rotation_vector, rotation_vector_to_matrix
@@ -26,6 +27,7 @@ _coefficients: Memo[Hand, Floats] = Memo()
 
 def draw(state: AppState) -> None:
     """Draw the panel for the chosen actor."""
+    posing = state.of(Posing)
     figure, pose = state.actor.figure, state.actor.pose
     if not figure.hands or pose is None:
         imgui.text_wrapped("This figure has no hand components.")
@@ -33,11 +35,11 @@ def draw(state: AppState) -> None:
     most = min(len(hand.components) for hand in figure.hands)
     imgui.set_next_item_width(8.0 * imgui.get_font_size())
     changed, count = imgui.slider_int(
-        "components", min(state.n_hand_components, most), 1, most, "%d", _CLAMP
+        "components", min(posing.n_hand_components, most), 1, most, "%d", _CLAMP
     )
     note_item(state, "components")
     if changed:
-        state.n_hand_components = count
+        posing.n_hand_components = count
     if imgui.begin_child("hands", (0.0, 0.0)):
         for hand in figure.hands:
             _draw_hand(state, figure, pose, hand)
@@ -56,7 +58,7 @@ def _draw_hand(state: AppState, figure: Figure, pose: Pose, hand: Hand) -> None:
     imgui.push_item_width(-6.0 * imgui.get_font_size())
     vectors = _vectors(figure, pose, hand)
     values = _values(hand, vectors)
-    for index in range(min(state.n_hand_components, len(hand.components))):
+    for index in range(min(state.of(Posing).n_hand_components, len(hand.components))):
         changed, value = imgui.slider_float(
             f"{side} {index}", plain_zero(float(values[index]), "%.2f"), -_REACH, _REACH, "%.2f"
         )

@@ -8,7 +8,6 @@ from typing import TypeAlias
 import numpy as np
 from imgui_bundle import imgui
 
-from viewer.app.actions import reset_pose
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import (
     button,
@@ -18,11 +17,14 @@ from viewer.app.core.widgets import (
     plain_zero,
     same_line_if_room,
 )
+from viewer.app.curves.state import Curves
 from viewer.app.posing.ball_joint import draw_own_numbers, draw_vector_component, is_ball
 from viewer.app.posing.captured_points import draw_captured_points
 from viewer.app.posing.clip_pause import pause_for_edit
 from viewer.app.posing.figure_place import draw_figure_place
-from viewer.app.posing.pose_actions import copy_numbers, copy_pose, mirror, paste_pose
+from viewer.app.posing.joint_tree import joint_tree
+from viewer.app.posing.pose_actions import copy_numbers, copy_pose, mirror, paste_pose, reset_pose
+from viewer.app.posing.state import Posing
 from viewer.errors import printable
 from viewer.rig.memo import Memo
 from viewer.rig.mesh import box_size
@@ -66,7 +68,7 @@ def draw(state: AppState) -> None:
         return
     draw_figure_place(state, actor.pose)
     has_own = actor.figure.pose_layout is not None
-    shown = rows(skeleton, frozenset(state.opened_joints), state.joint_filter, has_own)
+    shown = rows(skeleton, frozenset(joint_tree(state).opened), joint_tree(state).filter, has_own)
     labels = _labels(skeleton)
     if not shown:
         imgui.text_disabled("no joint has this in its name")
@@ -88,8 +90,8 @@ def draw(state: AppState) -> None:
 
 def _include_wanted(state: AppState, clipper: imgui.ListClipper, shown: Rows) -> None:
     """Let the row of a joint that was chosen elsewhere be drawn, so that it can be scrolled to."""
-    for row, (joint, dof, _) in enumerate(shown if state.weights.scrolls_to >= 0 else ()):
-        if joint == state.weights.scrolls_to and dof == -1:
+    for row, (joint, dof, _) in enumerate(shown if joint_tree(state).scrolls_to >= 0 else ()):
+        if joint == joint_tree(state).scrolls_to and dof == -1:
             clipper.include_item_by_index(row)
 
 
@@ -109,9 +111,10 @@ def _draw_actor_choice(state: AppState) -> None:
 
 
 def _draw_head(state: AppState) -> None:
+    posing = state.of(Posing)
     imgui.set_next_item_width(-1.0)
-    state.joint_filter = imgui.input_text_with_hint(
-        "##filter", "Filter joints", state.joint_filter
+    joint_tree(state).filter = imgui.input_text_with_hint(
+        "##filter", "Filter joints", joint_tree(state).filter
     )[1]
     note_item(state, "Filter")
     if button(state, "Reset (R)"):
@@ -129,12 +132,12 @@ def _draw_head(state: AppState) -> None:
         _show_angles(state, in_degrees=False)
     note_item(state, "radians")
     if state.actor.figure.pose_layout is not None:
-        state.as_vectors = checkbox(state, "Rotation vectors", state.as_vectors)
+        posing.as_vectors = checkbox(state, "Rotation vectors", posing.as_vectors)
 
 
 def _show_angles(state: AppState, in_degrees: bool) -> None:
     """Choose the unit of angles; curves are fitted again, as their axis has other numbers."""
-    state.curves.wants_fit |= in_degrees != state.in_degrees
+    state.of(Curves).wants_fit |= in_degrees != state.in_degrees
     state.in_degrees = in_degrees
 
 
@@ -223,14 +226,14 @@ def _draw_joint(state: AppState, skeleton: Skeleton, joint: int, depth: int, lab
     flags |= imgui.TreeNodeFlags_.span_avail_width
     if joint == state.selected_joint:
         flags |= imgui.TreeNodeFlags_.selected
-    imgui.set_next_item_open(joint in state.opened_joints or bool(state.joint_filter))
+    imgui.set_next_item_open(joint in joint_tree(state).opened or bool(joint_tree(state).filter))
     imgui.tree_node_ex(f"{label}##joint{joint}", flags)
     note_item(state, f"joint {label}")
-    if joint == state.weights.scrolls_to:
+    if joint == joint_tree(state).scrolls_to:
         imgui.set_scroll_here_y(0.5)
-        state.weights.scrolls_to = -1
+        joint_tree(state).scrolls_to = -1
     if imgui.is_item_toggled_open():
-        state.opened_joints ^= {joint}
+        joint_tree(state).opened ^= {joint}
     elif imgui.is_item_clicked():
         state.selected_joint = -1 if state.selected_joint == joint else joint
     if imgui.begin_popup_context_item(f"menu of joint {joint}"):
@@ -256,7 +259,7 @@ def _draw_dof(
     low, high = skeleton.dof_limits[dof]
     locked = low == high
     joint, figure = int(skeleton.dof_joints[dof]), state.actor.figure
-    if state.as_vectors and kind >= _FIRST_ROTATION and is_ball(figure, joint):
+    if state.of(Posing).as_vectors and kind >= _FIRST_ROTATION and is_ball(figure, joint):
         draw_vector_component(state, figure, pose, joint, kind - _FIRST_ROTATION, label)
         return
     imgui.begin_disabled(bool(locked))

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
+from viewer.app.files.saving import save_files
 from viewer.app.posing.clip_pause import pause_for_edit
-from viewer.errors import ViewerError, printable
+from viewer.app.posing.state import Posing
+from viewer.errors import ViewerError
 from viewer.export import export, files_written
-from viewer.formats import Source, check_targets, write
+from viewer.formats import Source, write
 from viewer.rig.motion.upright import upright_actor
+from viewer.rig.pose import rest_pose
 from viewer.rig.posing.pose_record import PosePartError, PoseRecord, apply_record, record_of
 from viewer.rig.posing.pose_vector import write_vector
 from viewer.rig.retargeting.mirror import mirror_pose
@@ -26,9 +28,9 @@ __all__ = [
     "mirror",
     "paste_pose",
     "random_shape",
+    "reset_pose",
     "reset_shape",
     "save_export",
-    "save_files",
     "save_pose",
 ]
 
@@ -109,17 +111,6 @@ def save_export(state: AppState, path: Path) -> None:
     save_files(state, lambda: state.say(*export(actor, path, state.options.skinning)), files)
 
 
-def save_files(state: AppState, act: Callable[[], None], files: list[Path]) -> None:
-    """Write files unless one of them was opened, and say which, or why not."""
-    try:
-        # The dialog has asked what becomes of files that are there.
-        check_targets(files, state.inputs, force=True)
-        act()
-        state.say(f"Saved {', '.join(printable(file, 200) for file in files)}")
-    except ViewerError as problem:
-        state.error = str(problem)
-
-
 def mirror(state: AppState) -> None:
     """Exchange left and right of the chosen actor's pose."""
     actor = state.actor
@@ -133,8 +124,19 @@ def mirror(state: AppState) -> None:
         state.say(str(problem))
 
 
+def reset_pose(state: AppState) -> None:
+    """Set every DOF of every actor back to the file's pose; shapes stay."""
+    for actor in state.scene.actors:
+        if actor.figure.skeleton is not None and actor.pose is not None:
+            weights = actor.pose.shape_weights
+            actor.pose = rest_pose(actor.figure.skeleton)
+            actor.pose.shape_weights = weights
+    state.say_status("Pose reset")
+
+
 def random_shape(state: AppState) -> None:
     """Draw the first shape coefficients from a normal distribution; expressions stay."""
+    posing = state.of(Posing)
     actor = state.actor
     shapes = actor.figure.blend_shapes
     if shapes is None or actor.pose is None:
@@ -143,9 +145,9 @@ def random_shape(state: AppState) -> None:
     rows = [row for row, group in enumerate(shapes.groups) if group == "shape"]
     chosen = rows[:_RANDOM]
     weights[rows] = 0.0
-    weights[chosen] = np.random.default_rng(state.shape_seed).standard_normal(len(chosen))
+    weights[chosen] = np.random.default_rng(posing.shape_seed).standard_normal(len(chosen))
     actor.pose.shape_weights = weights
-    state.say_status(f"Random shape, seed {state.shape_seed}")
+    state.say_status(f"Random shape, seed {posing.shape_seed}")
 
 
 def reset_shape(state: AppState) -> None:

@@ -8,6 +8,7 @@ from imgui_bundle import imgui
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import button, checkbox, note_item, plain_zero, same_line_if_room
 from viewer.app.posing.pose_actions import random_shape, reset_shape
+from viewer.app.posing.state import Posing
 from viewer.errors import printable
 from viewer.rig.figure import Figure
 from viewer.rig.inspection.measure import measure
@@ -33,7 +34,7 @@ def draw(state: AppState) -> None:
     _draw_measures(figure, pose)
     varies = "shape" in figure.blend_shapes.groups
     if varies and button(state, "Random"):
-        state.shape_seed += 1
+        state.of(Posing).shape_seed += 1
         random_shape(state)
     if varies:
         same_line_if_room("Reset shape")
@@ -55,10 +56,10 @@ def draw(state: AppState) -> None:
 
 def _draw_seed(state: AppState) -> None:
     imgui.set_next_item_width(_width_beside("seed", 8.0))
-    changed, seed = imgui.input_int("seed", state.shape_seed)
+    changed, seed = imgui.input_int("seed", state.of(Posing).shape_seed)
     note_item(state, "seed")
-    if changed and seed != state.shape_seed:
-        state.shape_seed = max(seed, 0)
+    if changed and seed != state.of(Posing).shape_seed:
+        state.of(Posing).shape_seed = max(seed, 0)
         random_shape(state)
 
 

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
+from viewer.app.core.view_frame import ViewFrame
 from viewer.rig.arrays import Floats
 from viewer.rig.pose import Pose
+from viewer.rig.scene import Actor
 
-if TYPE_CHECKING:
-    from viewer.app.core.view_frame import ViewFrame
-    from viewer.rig.scene import Actor
-
-__all__ = ["ORIENTATIONS", "TOOLS", "Drag", "Handle", "Outcome", "Posing"]
+__all__ = ["ORIENTATIONS", "TOOLS", "Drag", "Handle", "HeldVector", "Outcome", "Posing"]
 
 TOOLS = {
     "select": ("Select", "Q", "click chooses, drag orbits"),
@@ -109,8 +107,30 @@ class Drag:
 
 
 @dataclass(slots=True)
+class HeldVector:
+    """A joint's rotation vector as it was typed: beyond half a turn its rotation has another.
+
+    Attributes
+    ----------
+    joint : int
+        Of the actor that was chosen then.
+    vector : (3,)
+        As it was typed.
+    rotation : (3, 3)
+        That of the joint.
+    n_choices : int
+        That of the state: of another actor the joint means nothing.
+    """
+
+    joint: int
+    vector: Floats
+    rotation: Floats
+    n_choices: int
+
+
+@dataclass(slots=True)
 class Posing:
-    """The tools' state.
+    """The state of tools and panels that pose.
 
     Attributes
     ----------
@@ -122,12 +142,24 @@ class Posing:
         How many joints above a dragged one may turn; 0 until it is chosen: two, without the root.
     drag : Drag or None
         The handle that is held.
+    as_vectors : bool
+        Whether ball joints are edited as rotation vectors instead of angles about x, y, z.
+    held_vector : HeldVector or None
+        The rotation vector being edited.
+    shape_seed : int
+        Of the random shape drawn last.
+    n_hand_components : int
+        How many principal components of the hands have sliders.
     """
 
     tool: str = "select"
     orientation: str = "local"
     chain_length: int = 0
     drag: Drag | None = None
+    as_vectors: bool = False
+    held_vector: HeldVector | None = None
+    shape_seed: int = 0
+    n_hand_components: int = 6
 
     @property
     def is_on(self) -> bool:

@@ -7,7 +7,7 @@ from viewer.app.core.state import AppState
 from viewer.app.curves.clip_actions import key_present_pose
 from viewer.app.posing.move_tool import longest_chain, shifts, used_chain
 from viewer.app.posing.posed_joint import PosedJoint, posed_joint
-from viewer.app.posing.state import ORIENTATIONS, TOOLS
+from viewer.app.posing.state import ORIENTATIONS, TOOLS, Posing
 from viewer.rig.motion.clip import Clip
 from viewer.rig.posing.joint_rotation import rotation_dofs, turns_freely
 from viewer.rig.skeleton import joint_label
@@ -34,7 +34,7 @@ def choose_tool(state: AppState, tool: str) -> None:
         state.say_status(f"{TOOLS[tool][0]}: {why}")
         return
     cancel_drag(state)
-    state.posing.tool = tool
+    state.of(Posing).tool = tool
     name, _, text = TOOLS[tool]
     hint = "; select a joint first" if tool != "select" and state.selected_joint < 0 else ""
     state.say_status(f"{name}: {text}{hint}")
@@ -42,15 +42,16 @@ def choose_tool(state: AppState, tool: str) -> None:
 
 def next_orientation(state: AppState) -> None:
     """Go on to the next of local, parent and world axes."""
+    posing = state.of(Posing)
     names = list(ORIENTATIONS)
-    following = names[(names.index(state.posing.orientation) + 1) % len(names)]
-    state.posing.orientation = following
+    following = names[(names.index(posing.orientation) + 1) % len(names)]
+    posing.orientation = following
     state.say_status(ORIENTATIONS[following])
 
 
 def cancel_drag(state: AppState) -> bool:
     """Let go of a handle and restore the pose of before; return whether one was held."""
-    drag = state.posing.drag
+    drag = state.of(Posing).drag
     if drag is None or drag.is_over:
         return False
     drag.is_over = True
@@ -88,7 +89,7 @@ def no_orientation(state: AppState) -> str:
     skeleton, joint = state.actor.figure.skeleton, state.selected_joint
     if skeleton is None or joint < 0:
         return ""
-    if state.posing.tool != "rotate":
+    if state.of(Posing).tool != "rotate":
         return "" if shifts(skeleton, joint) else "it is dragged in the plane of the picture"
     if turns_freely(skeleton, joint):
         return ""
@@ -105,15 +106,16 @@ def chain_limit(state: AppState) -> int:
 
 def chain_length(state: AppState) -> int:
     """Return how many joints would follow the selected one if it was dragged; at least 1."""
+    posing = state.of(Posing)
     skeleton = state.actor.figure.skeleton
     if skeleton is None or state.selected_joint < 0:
-        return max(state.posing.chain_length, 1)
-    return max(len(used_chain(skeleton, state.selected_joint, state.posing.chain_length)), 1)
+        return max(posing.chain_length, 1)
+    return max(len(used_chain(skeleton, state.selected_joint, posing.chain_length)), 1)
 
 
 def no_chain(state: AppState) -> str:
     """Say why there is no chain to choose the length of."""
-    if state.posing.tool != "move":
+    if state.of(Posing).tool != "move":
         return "the tool Move (D) has chains"
     skeleton = state.actor.figure.skeleton
     if skeleton is None or state.selected_joint < 0:

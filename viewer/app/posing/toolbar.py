@@ -8,7 +8,7 @@ from viewer.app.core.reasons import no_pose
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import Rect, choice, disabled, explain, note_item, overlay_rect
 from viewer.app.posing.pose_actions import copy_pose, mirror, paste_pose
-from viewer.app.posing.state import ORIENTATIONS, TOOLS
+from viewer.app.posing.state import ORIENTATIONS, TOOLS, Posing
 from viewer.app.posing.tool_actions import (
     chain_length,
     chain_limit,
@@ -54,7 +54,7 @@ def draw_toolbar(state: AppState, legend: Rect | None) -> Rect | None:
     flags |= imgui.WindowFlags_.no_bring_to_front_on_focus
     if imgui.begin("##tools", None, flags)[0]:
         _draw_tools(state)
-        if state.posing.is_on:
+        if state.of(Posing).is_on:
             _draw_settings(state)
             _draw_actions(state)
     rect = overlay_rect(state, "##tools")
@@ -69,7 +69,7 @@ def _draw_tools(state: AppState) -> None:
         why = no_tool(state) if tool != "select" else ""
         if number:
             imgui.same_line()
-        is_on = state.posing.tool == tool
+        is_on = state.of(Posing).tool == tool
         if is_on:
             imgui.push_style_color(imgui.Col_.button, _ACCENT)
         pressed = _button(state, name, width, f"{text} ({key})", why)
@@ -95,7 +95,7 @@ def _button(state: AppState, name: str, width: float, text: str, why: str) -> bo
 
 def _draw_settings(state: AppState) -> None:
     """Draw the choice of axes, and the length of the chain for the tool that has one."""
-    posing, has_chain = state.posing, state.posing.tool == "move"
+    posing, has_chain = state.of(Posing), state.of(Posing).tool == "move"
     why = no_orientation(state)
     with disabled(why):
         imgui.set_next_item_width(_share(2 if has_chain else 1))
@@ -117,7 +117,7 @@ def _draw_chain(state: AppState) -> None:
         note_item(state, "Chain")
         explain("how many joints above the dragged one may turn", why)
     if changed:
-        state.posing.chain_length = min(max(length, 1), longest)
+        state.of(Posing).chain_length = min(max(length, 1), longest)
 
 
 def _draw_actions(state: AppState) -> None:

@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import button, checkbox, choice, note_item
-from viewer.app.files.file_dialog import FileDialog, folder_of
+from viewer.app.files.file_choice import FileDialog, folder_of
+from viewer.app.files.state import Files
+from viewer.app.recording.state import KINDS, LEAST_PIXELS, Recording, RecordSettings
 from viewer.formats import file_stem
 from viewer.rig.number_text import number_text
 
-__all__ = ["KINDS", "RecordSettings", "draw_record_dialog"]
+__all__ = ["draw_record_dialog"]
 
-KINDS = {
-    ".mp4": "MP4 video (H.264)",
-    ".webm": "WebM video (VP9)",
-    ".gif": "Animated GIF",
-    "pictures": "Numbered pictures (PNG)",
-    "sheet": "Contact sheet (PNG)",
-}
 _SIZES = {
     "view": "as the view",
     "1280x720": "1280 x 720",
@@ -31,60 +25,13 @@ _SIZES = {
     "own": "own size",
 }
 _TITLE = "Record"
-_MOST_PIXELS, _LEAST_PIXELS = 16384, 16
-
-
-@dataclass(slots=True)
-class RecordSettings:
-    """What is recorded, and how.
-
-    Attributes
-    ----------
-    kind : str
-        A key of ``KINDS``.
-    size : str
-        A key of the sizes offered.
-    own_size : (int, int)
-        For ``"own"``.
-    rate : float
-        Frames a second; 0 for the scene's own.
-    turntable : bool
-        Whether the camera turns once around.
-    seconds : float
-        How long a turn takes if nothing moves.
-    transparent : bool
-        Whether the background is left out.
-    n_cells : int
-        Frames of a contact sheet.
-    quality : int
-        Of videos, 0 to 100.
-    """
-
-    kind: str = ".mp4"
-    size: str = "view"
-    own_size: tuple[int, int] = (1280, 720)
-    rate: float = 0.0
-    turntable: bool = False
-    seconds: float = 6.0
-    transparent: bool = False
-    n_cells: int = 12
-    quality: int = 75
-
-    def pixels(self, view: tuple[float, float]) -> tuple[int, int]:
-        """Return width and height, of a view of that size."""
-        if self.size == "view":
-            wide, high = (max(round(side), _LEAST_PIXELS) for side in view)
-            # Videos want even sizes; nobody misses a row of the view.
-            return wide - wide % 2, high - high % 2
-        if self.size == "own":
-            return self.own_size
-        width, _, height = self.size.partition("x")
-        return int(width), int(height)
+_MOST_PIXELS = 16384
 
 
 def draw_record_dialog(state: AppState) -> None:
     """Draw the window if it is open."""
-    settings = state.record
+    recording = state.of(Recording)
+    settings = recording.settings
     if settings is None:
         return
     center = imgui.get_main_viewport().get_center()
@@ -103,7 +50,7 @@ def draw_record_dialog(state: AppState) -> None:
             stays = False
     imgui.end()
     if not stays:
-        state.record = None
+        recording.settings = None
 
 
 def _draw_settings(state: AppState, settings: RecordSettings) -> None:
@@ -113,7 +60,7 @@ def _draw_settings(state: AppState, settings: RecordSettings) -> None:
         changed, size = imgui.input_int2("Pixels", list(settings.own_size))
         note_item(state, "Pixels")
         if changed:
-            width, height = (min(max(side, _LEAST_PIXELS), _MOST_PIXELS) for side in size)
+            width, height = (min(max(side, LEAST_PIXELS), _MOST_PIXELS) for side in size)
             settings.own_size = width, height
     if settings.kind == "sheet":
         changed, count = imgui.slider_int("Frames##sheet", settings.n_cells, 2, 60)
@@ -154,11 +101,11 @@ def _ask_where(state: AppState, settings: RecordSettings) -> None:
     stem = file_stem(state.scene.title)
     names = {"pictures": f"{stem}_{{frame:05}}.png", "sheet": f"{stem}_sheet.png"}
     name = names.get(settings.kind, f"{stem}{settings.kind}")
-    state.dialog = FileDialog(
+    state.of(Files).dialog = FileDialog(
         folder_of(state.paths), _start, "save", f"Record: {KINDS[settings.kind]}",
         (Path(name).suffix,), name,
     )  # fmt: skip
 
 
 def _start(state: AppState, paths: list[Path]) -> None:
-    state.wants_recording = paths[0]
+    state.of(Recording).wanted = paths[0]

@@ -7,7 +7,9 @@ from copy import deepcopy
 
 from viewer.app.core.state import AppState
 from viewer.app.linting.marks import marks_of
+from viewer.app.linting.state import Linting
 from viewer.app.weights.explanation_lines import vertex_annotation
+from viewer.app.weights.state import Weights
 from viewer.lint import Finding, places_of
 from viewer.rendering.overlay.annotation import Annotation
 from viewer.rendering.overlay.marks import mark_annotation
@@ -27,8 +29,10 @@ class RecordedMarks:
     """
 
     def __init__(self, state: AppState) -> None:
-        self._pinned, self._draws_lines = state.weights.pinned, state.weights.draws_lines
-        self._finding: Finding | None = state.lint.finding if state.lint.marks else None
+        weights = state.of(Weights)
+        linting = state.of(Linting)
+        self._pinned, self._draws_lines = weights.pinned, weights.draws_lines
+        self._finding: Finding | None = linting.finding if linting.marks else None
         self._skinning = deepcopy(state.options.skinning)
         self._binding = state.options.show == "binding"
 

@@ -12,9 +12,10 @@ from pathlib import Path
 import moderngl
 import numpy as np
 
+from viewer.app.actors.following import Following
 from viewer.app.core.state import AppState
-from viewer.app.recording.record_dialog import RecordSettings
 from viewer.app.recording.recorded_marks import RecordedMarks
+from viewer.app.recording.state import RecordSettings
 from viewer.errors import OutputError, printable
 from viewer.formats import check_targets
 from viewer.media.video_kinds import MOST_GIF_RATE
@@ -94,12 +95,13 @@ def _recording(
     state: AppState, settings: RecordSettings, times: Floats, size: tuple[int, int]
 ) -> Recording:
     """Return what is recorded: all that the view shows, but tools and panels."""
+    following = state.of(Following)
     options = copy.deepcopy(state.options)
     if settings.transparent and settings.kind != ".mp4":
         options.background = "transparent"
     follow = None
-    if state.followed is not None and state.followed_from is not None:
-        follow = Follow(*state.followed, state.followed_from)
+    if following.target is not None and following.place is not None:
+        follow = Follow(*following.target, following.place)
     return Recording(
         replace(state.scene, actors=[replace(actor) for actor in state.scene.actors]),
         times,

@@ -30,7 +30,7 @@ from viewer.app.rigging.placing import (
     similarity_now,
 )
 from viewer.app.rigging.sources import target_mesh
-from viewer.app.rigging.state import GHOSTS, TOOLS, Placing, Template
+from viewer.app.rigging.state import GHOSTS, TOOLS, Placing, Rigging, Template
 from viewer.app.rigging.tools import choose_rig_tool
 from viewer.app.rigging.work import landmark_settings, start_align
 from viewer.autorig.alignment import SCALES, Alignment, AlignmentSettings
@@ -61,7 +61,8 @@ _SCALE_TEXTS = {"uniform": "one scale", "axes": "one along each axis", "none": "
 
 def draw_alignment(state: AppState) -> None:
     """Draw how the template is aligned, how well it is, and how to move it by hand."""
-    choices, why = state.rig.choices, no_job_room(state)
+    rigging, why = state.of(Rigging), no_job_room(state)
+    choices = rigging.choices
     axes = {"": "searched", **{axis: axis for axis in AXES}}
     choices.up = choice(state, "Up", choices.up, axes)
     explain("the target's axis that points up")
@@ -81,12 +82,12 @@ def draw_alignment(state: AppState) -> None:
     if not refuses:
         explain(f"from where it lies, by closest points{_POSES if choices.fits else ''}")
     _draw_placing(placing_now(state))
-    state.rig.ghost = choice(state, "Template shown", state.rig.ghost, GHOSTS)
+    rigging.ghost = choice(state, "Template shown", rigging.ghost, GHOSTS)
     _draw_tools(state)
     template = laid_template(state)
-    if template is not None and state.rig.tool not in ("", "landmarks"):
+    if template is not None and rigging.tool not in ("", "landmarks"):
         _draw_numbers(state, template)
-    if template is not None and (state.rig.tool == "landmarks" or state.rig.landmarks):
+    if template is not None and (rigging.tool == "landmarks" or rigging.landmarks):
         _draw_landmarks(state, template)
     placing = placing_now(state)
     # What comes and goes stands below the controls, which stay where they are.
@@ -130,14 +131,15 @@ def _how(found: Alignment) -> str:
 
 def _refine(state: AppState) -> None:
     """Let closest points improve on where the template lies: corners of its box are landmarks."""
+    rigging = state.of(Rigging)
     template = laid_template(state)
     if template is None:
         return
-    low, high = (f(posed_template(state.rig, template).positions, axis=0) for f in (np.min, np.max))
+    low, high = (f(posed_template(rigging, template).positions, axis=0) for f in (np.min, np.max))
     corners = np.array([low, *(np.where(np.eye(3)[axis] > 0, high, low) for axis in range(3))])
     corners[1:] += (high == low) * np.eye(3)  # flat meshes have corners too
     pairs = np.stack([corners, similarity_now(state, template).apply(corners)], axis=1)
-    start_align(state, AlignmentSettings(landmarks=pairs, scale=state.rig.choices.scale))
+    start_align(state, AlignmentSettings(landmarks=pairs, scale=rigging.choices.scale))
 
 
 def _draw_tools(state: AppState) -> None:
@@ -146,7 +148,7 @@ def _draw_tools(state: AppState) -> None:
     for number, (tool, (name, text)) in enumerate(TOOLS.items()):
         if number:
             same_line_if_room(name)
-        if imgui.radio_button(f"{name}###rig tool {tool}", state.rig.tool == tool):
+        if imgui.radio_button(f"{name}###rig tool {tool}", state.of(Rigging).tool == tool):
             choose_rig_tool(state, tool)
         note_item(state, f"rig tool {tool}")
         explain(text)
@@ -159,7 +161,7 @@ def _draw_numbers(state: AppState, template: Template) -> None:
     shift, angle, scale = _inputs(state, now.shift, angles, now.scale)
     if shift is None and angle is None and scale is None:
         if button(state, "Lay box on box"):
-            fit = box_fit(posed_template(state.rig, template), target_mesh(state))
+            fit = box_fit(posed_template(state.of(Rigging), template), target_mesh(state))
             _move(state, template, fit)
         return
     rotation = now.rotation
@@ -196,12 +198,12 @@ def _inputs(
 
 def _move(state: AppState, template: Template, similarity: Similarity) -> None:
     move_by_hand(state, template, similarity)
-    state.rig.was_dragged = True
+    state.of(Rigging).was_dragged = True
 
 
 def _draw_landmarks(state: AppState, template: Template) -> None:
     """Draw the list of pairs, and the button that aligns by them."""
-    view = state.rig
+    view = state.of(Rigging)
     if view.tool == "landmarks":
         side = "the same point of the target" if view.pending else "a point of the blue template"
         imgui.text_wrapped(f"Click {side}.")

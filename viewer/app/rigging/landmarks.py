@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from imgui_bundle import imgui
 
-from viewer.app.core.framing import fit_points
+from viewer.app.core.fitting import fit_points
 from viewer.app.core.state import AppState
 from viewer.app.core.view_frame import ViewFrame, view_frame
 from viewer.app.rigging.placing import (
@@ -16,7 +16,8 @@ from viewer.app.rigging.placing import (
     target_place,
 )
 from viewer.app.rigging.sources import target_mesh
-from viewer.app.rigging.state import Landmark, Template
+from viewer.app.rigging.state import Landmark, Rigging, Template
+from viewer.app.view.state import Picking
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.ray_hit import RayHit, first_hit, surface_point
 from viewer.rig.geometry.transform import apply_transform
@@ -31,7 +32,7 @@ _DOT = 5.0  # radius, window coordinates
 
 def show_both(state: AppState) -> None:
     """Show the template beside the target, and both whole."""
-    view, template = state.rig, laid_template(state)
+    view, template = state.of(Rigging), laid_template(state)
     if template is None or view.target is None:
         return
     set_aside(state)
@@ -45,10 +46,11 @@ def show_both(state: AppState) -> None:
 
 def take_click(state: AppState) -> None:
     """Take a click for a landmark: on the template first, then on the target."""
-    wanted, view, template = state.wants_pick, state.rig, laid_template(state)
+    picking, view, template = state.of(Picking), state.of(Rigging), laid_template(state)
+    wanted = picking.wanted
     if wanted is None or wanted[2] or template is None:
         return
-    state.wants_pick = None
+    picking.wanted = None
     x, y, _, _ = state.view_rect
     place = (wanted[0] + x, wanted[1] + y)
     if view.pending is None:
@@ -87,7 +89,7 @@ def _hit(frame: ViewFrame, mesh: Mesh, matrix: Floats, place: tuple[float, float
 
 def draw_landmarks(state: AppState, template: Template) -> None:
     """Draw all pairs as numbered dots, and the one that lacks its other half."""
-    view = state.rig
+    view = state.of(Rigging)
     assert view.target is not None  # the caller looked
     posed, place = posed_template(view, template), ghost_place(state, template)
     for number, pair in enumerate(view.landmarks, start=1):

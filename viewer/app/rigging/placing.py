@@ -6,7 +6,7 @@ import numpy as np
 
 from viewer.app.core.state import AppState
 from viewer.app.rigging.sources import current_template, target_mesh
-from viewer.app.rigging.state import Placing, RigView, Template
+from viewer.app.rigging.state import Placing, Rigging, Template
 from viewer.autorig.alignment import AlignmentSettings
 from viewer.autorig.similarity import Similarity
 from viewer.rendering.camera import camera_axes
@@ -43,7 +43,7 @@ def target_place(actor: Actor) -> Floats:
     return actor.placement @ placement_matrix(actor.pose) if actor.pose else actor.placement
 
 
-def posed_template(view: RigView, template: Template) -> Mesh:
+def posed_template(view: Rigging, template: Template) -> Mesh:
     """Return the template as it is posed now, as a mesh; remembered until the pose changes."""
     key = (template.figure, pose_key(template.pose))
     if view.ghost_figure is None or view.ghost_key != key:
@@ -66,8 +66,9 @@ def box_fit(template: Mesh, target: Mesh) -> Similarity:
 
 def placing_now(state: AppState) -> Placing | None:
     """Return where the template was laid, None if that was for another target or template."""
-    placing, template = state.rig.placing, current_template(state)
-    if placing is None or template is None or state.rig.target is None:
+    rigging, template = state.of(Rigging), current_template(state)
+    placing = rigging.placing
+    if placing is None or template is None or rigging.target is None:
         return None
     mesh, figure = placing.meshes
     return placing if mesh is target_mesh(state) and figure is template.figure else None
@@ -92,7 +93,7 @@ def similarity_now(state: AppState, template: Template) -> Similarity:
     placing = placing_now(state)
     if placing is not None:
         return placing.similarity
-    return box_fit(posed_template(state.rig, template), target_mesh(state))
+    return box_fit(posed_template(state.of(Rigging), template), target_mesh(state))
 
 
 def as_similarity(matrix: Floats, like: Similarity | None = None) -> Similarity:
@@ -123,7 +124,7 @@ def move_by_hand(state: AppState, template: Template, similarity: Similarity) ->
     own, before = current_template(state), placing_now(state)
     assert own is not None  # it is moved
     fitted = template if before is not None and before.fitted is template else None
-    state.rig.placing = Placing(
+    state.of(Rigging).placing = Placing(
         similarity=similarity,
         alignment=None,
         settings=AlignmentSettings(matrix=similarity.matrix),
@@ -141,7 +142,7 @@ def _still_true(lines: tuple[str, ...]) -> tuple[str, ...]:
 
 def set_aside(state: AppState) -> None:
     """Show the template to the right of the target, as the camera sees it."""
-    view, template = state.rig, laid_template(state)
+    view, template = state.of(Rigging), laid_template(state)
     view.aside = np.zeros(3)
     if template is None or view.target is None:
         return
@@ -158,7 +159,7 @@ def set_aside(state: AppState) -> None:
 
 def ghost_of(state: AppState) -> Ghost | None:
     """Return the template as it is to be drawn over the scene, None if it is not."""
-    view, template = state.rig, laid_template(state)
+    view, template = state.of(Rigging), laid_template(state)
     if template is None or view.target is None:
         return None
     if view.tool == "landmarks":
@@ -179,7 +180,7 @@ def ghost_of(state: AppState) -> Ghost | None:
 
 def ghost_place(state: AppState, template: Template) -> Floats:
     """Return where the template is shown: (4, 4), from its posed mesh to the scene."""
-    view = state.rig
+    view = state.of(Rigging)
     assert view.target is not None  # the callers looked
     matrix = target_place(view.target) @ similarity_now(state, template).matrix
     if view.tool == "landmarks":

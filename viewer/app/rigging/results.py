@@ -10,7 +10,7 @@ import numpy as np
 from viewer.app.core.jobs import ThreadJob
 from viewer.app.core.state import AppState
 from viewer.app.rigging.placing import target_place
-from viewer.app.rigging.state import Comparison, Result
+from viewer.app.rigging.state import Comparison, Result, Rigging
 from viewer.autorig.rigged import clip_for
 from viewer.errors import RigError, ViewerError, printable
 from viewer.export._rigged_files import files_of, write_rigged
@@ -84,7 +84,7 @@ def _dominant(skin: Skin) -> Ints:
 
 def put_results(state: AppState, results: list[Result], comparison: Comparison | None) -> None:
     """Put rigged meshes into the scene: the first is seen in place of the target."""
-    view, actors = state.rig, state.scene.actors
+    view, actors = state.of(Rigging), state.scene.actors
     target = results[0].target
     if not any(actor is target for actor in actors):
         state.say("The mesh that was rigged is there no more")
@@ -123,7 +123,7 @@ def _row(actors: list[Actor], actor: Actor) -> int:
 
 def versions(state: AppState) -> dict[str, Actor]:
     """Return what A/B goes through: the target and its results that are in the scene."""
-    view, actors = state.rig, state.scene.actors
+    view, actors = state.of(Rigging), state.scene.actors
     if view.target is None:
         return {}
     found = {TARGET: view.target} | {name: one.actor for name, one in view.results.items()}
@@ -138,7 +138,7 @@ def shown_version(state: AppState) -> str:
 def shown_result(state: AppState) -> Result | None:
     """Return the result that is seen, else the last one that is in the scene."""
     known = versions(state)
-    there = [one for name, one in state.rig.results.items() if name in known]
+    there = [one for name, one in state.of(Rigging).results.items() if name in known]
     seen = [one for one in there if one.actor.visible]
     return (seen or there)[-1] if there else None
 
@@ -182,10 +182,11 @@ def show_match(
     state: AppState, actor: Actor, fields: tuple[VertexField, ...], share: float
 ) -> None:
     """Colour the target by where it meets the template."""
+    rigging = state.of(Rigging)
     names = {field.name for field in fields}
     kept = tuple(field for field in actor.figure.fields if field.name not in names)
     actor.figure = replace(actor.figure, fields=(*fields, *kept))
-    state.rig.match_share, state.rig.ghost = share, ""
+    rigging.match_share, rigging.ghost = share, ""
     if not actor.visible:
         _look(state, TARGET)
     show_colors(state, "class:match")

@@ -9,7 +9,8 @@ from imgui_bundle import imgui
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import button, checkbox, explain, note_item, same_line_if_room
-from viewer.app.files.file_dialog import FileDialog, folder_of
+from viewer.app.files.file_choice import FileDialog, folder_of
+from viewer.app.files.state import Files
 from viewer.app.rigging.results import (
     RESULT_COLORS,
     TARGET,
@@ -24,7 +25,7 @@ from viewer.app.rigging.results import (
     versions,
 )
 from viewer.app.rigging.sources import no_results
-from viewer.app.rigging.state import Result
+from viewer.app.rigging.state import Result, Rigging
 from viewer.errors import printable
 from viewer.export._rigged_files import RIGGED_SUFFIXES, files_of
 from viewer.formats import file_stem
@@ -88,7 +89,7 @@ def _draw_colors(state: AppState) -> None:
 
 def _draw_table(state: AppState) -> None:
     """Draw the numbers of each method side by side."""
-    view, known = state.rig, versions(state)
+    view, known = state.of(Rigging), versions(state)
     found = [one for name, one in view.results.items() if name in known]
     if not imgui.begin_table("methods", 1 + len(found), imgui.TableFlags_.sizing_stretch_same):
         return
@@ -148,7 +149,7 @@ def _draw_lines(state: AppState, result: Result) -> None:
 
 def _ask_where(state: AppState, result: Result) -> None:
     name = f"{file_stem(result.target.name)}_rigged.npz"
-    state.dialog = FileDialog(
+    state.of(Files).dialog = FileDialog(
         folder_of(state.paths),
         lambda state, paths: save_rigged(state, result, paths[0]),
         "save",

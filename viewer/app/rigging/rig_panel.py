@@ -19,7 +19,8 @@ from viewer.app.core.widgets import (
     same_line_if_room,
     slider,
 )
-from viewer.app.files.file_dialog import FileDialog, folder_of
+from viewer.app.files.file_choice import FileDialog, folder_of
+from viewer.app.files.state import Files
 from viewer.app.rigging.alignment_section import draw_alignment
 from viewer.app.rigging.placing import placing_now
 from viewer.app.rigging.results import MATCH_COLORS, show_colors
@@ -33,7 +34,7 @@ from viewer.app.rigging.sources import (
     targets,
     template_texts,
 )
-from viewer.app.rigging.state import RigChoices, Template
+from viewer.app.rigging.state import RigChoices, Rigging, Template
 from viewer.app.rigging.work import start_adding, start_match, start_reading, start_run
 from viewer.autorig.settings import JOINTS, METHODS
 from viewer.errors import printable
@@ -52,6 +53,7 @@ _GAP = 1.2  # of the template's width, between it and the target
 
 def draw(state: AppState) -> None:
     """Draw the panel."""
+    rigging = state.of(Rigging)
     refresh(state)
     _draw_sources(state)
     why = no_target(state)
@@ -64,11 +66,11 @@ def draw(state: AppState) -> None:
             _draw_match(state)
         if _section("Rig", "weights, joints and the rest pose"):
             _draw_run(state)
-    if not state.rig.results:
+    if not rigging.results:
         return
-    if state.rig.scrolls:
+    if rigging.scrolls:
         # Its height counts from the second frame on.
-        state.rig.scrolls -= 1
+        rigging.scrolls -= 1
         imgui.set_scroll_here_y(0.0)
     if _section("Result", "the rigged mesh in place of the target"):
         draw_results(state)
@@ -84,7 +86,7 @@ def _section(title: str, text: str) -> bool:
 
 def _draw_sources(state: AppState) -> None:
     """Draw what is rigged, and from what."""
-    view, found, why = state.rig, targets(state), no_job_room(state)
+    view, found, why = state.of(Rigging), targets(state), no_job_room(state)
     names = {str(row): printable(actor.name, 60) for row, actor in enumerate(found)}
     rows = [str(row) for row, actor in enumerate(found) if actor is view.target]
     with disabled("" if found else "no mesh without a rig"):
@@ -132,7 +134,7 @@ def _template_text(template: Template | None) -> str:
 
 def _ask(state: AppState, done: object, title: str, suffixes: tuple[str, ...]) -> None:
     assert callable(done)
-    state.dialog = FileDialog(folder_of(state.paths), done, "open", title, suffixes)
+    state.of(Files).dialog = FileDialog(folder_of(state.paths), done, "open", title, suffixes)
 
 
 def _add_mesh(state: AppState, paths: list[Path]) -> None:
@@ -163,7 +165,8 @@ def _add_template(state: AppState) -> None:
 
 def _draw_match(state: AppState) -> None:
     """Draw when a vertex matches, and what that gives."""
-    view, choices = state.rig, state.rig.choices
+    view = state.of(Rigging)
+    choices = view.choices
     why = _NEAREST_WHY if choices.method == "nearest" else ""
     with disabled(why):
         percent = 100.0 * choices.max_distance
@@ -193,7 +196,7 @@ def _draw_colors(state: AppState, views: dict[str, str], label: str) -> None:
 
 def _draw_run(state: AppState) -> None:
     """Draw how the rig is carried over, and the buttons that do it."""
-    choices = state.rig.choices
+    choices = state.of(Rigging).choices
     choices.method = choice(state, "Method", choices.method, {name: name for name in METHODS})
     explain(METHODS[choices.method])
     _draw_advanced(state, choices)

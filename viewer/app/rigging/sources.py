@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from viewer.app.core.state import AppState
-from viewer.app.rigging.state import RigView, Template
+from viewer.app.rigging.state import Rigging, Template
 from viewer.errors import RigError, printable
 from viewer.loading import bundled_body, bundled_files, load
 from viewer.rig.mesh import Mesh
@@ -42,16 +42,16 @@ def targets(state: AppState) -> list[Actor]:
 
 def templates(state: AppState) -> list[Actor]:
     """Return the actors of the scene that have a rig of their own."""
-    made = {id(result.actor) for result in state.rig.results.values()}
+    made = {id(result.actor) for result in state.of(Rigging).results.values()}
     return [a for a in state.scene.actors if a.figure.is_attached and id(a) not in made]
 
 
 def refresh(state: AppState) -> None:
     """Forget what belongs to another scene, and choose what is there; to be called each frame."""
-    view = state.rig
+    view = state.of(Rigging)
     if view.scene is not state.scene:
-        state.rig = view = RigView(scene=state.scene, choices=view.choices)
-    state.history.rig = view
+        view = state.put(Rigging(scene=state.scene, choices=view.choices))
+    state.history.feature = view
     found = targets(state)
     if view.target not in found:
         choose_target(state, found[0] if found else None)
@@ -62,14 +62,14 @@ def refresh(state: AppState) -> None:
 
 def target_mesh(state: AppState) -> Mesh:
     """Return the mesh that is to be rigged; there must be a target."""
-    target = state.rig.target
+    target = state.of(Rigging).target
     assert target is not None and target.figure.mesh is not None  # it was chosen for it
     return target.figure.mesh
 
 
 def choose_target(state: AppState, target: Actor | None) -> None:
     """Take another mesh to rig; what was found for the one before means nothing to it."""
-    view = state.rig
+    view = state.of(Rigging)
     if target is not view.target:
         view.target, view.placing, view.match_share = target, None, None
         view.landmarks, view.pending, view.tool = [], None, ""
@@ -81,7 +81,7 @@ def template_texts(state: AppState) -> dict[str, str]:
     """Return the entries of the list of templates: keys and names."""
     texts = {_actor_key(actor): printable(actor.name, 60) for actor in templates(state)}
     texts |= _BUNDLED
-    read = state.rig.template
+    read = state.of(Rigging).template
     if read is not None and read.key == _FILE:
         texts[_FILE] = printable(read.paths[0].name, 60)
     return texts
@@ -93,7 +93,7 @@ def _actor_key(actor: Actor) -> str:
 
 def choose_template(state: AppState, key: str) -> None:
     """Take another template, a key of ``template_texts``."""
-    view = state.rig
+    view = state.of(Rigging)
     if key != view.template_key:
         view.template_key, view.placing = key, None
         view.landmarks, view.pending, view.tool = [], None, ""
@@ -101,7 +101,7 @@ def choose_template(state: AppState, key: str) -> None:
 
 def current_template(state: AppState) -> Template | None:
     """Return the chosen template as it is now; None if it is still to be read."""
-    view = state.rig
+    view = state.of(Rigging)
     for actor in templates(state):
         if _actor_key(actor) == view.template_key and actor.pose is not None:
             return Template(view.template_key, actor.figure, actor.pose, actor.clip, actor)
@@ -134,7 +134,7 @@ def read_template(paths: tuple[Path, ...], key: str = _FILE) -> Template:
 
 def no_target(state: AppState) -> str:
     """Say why there is nothing to rig."""
-    if state.rig.target is not None:
+    if state.of(Rigging).target is not None:
         return ""
     return "every mesh here has a rig: add one without, an .obj or .ply"
 
@@ -142,6 +142,6 @@ def no_target(state: AppState) -> str:
 def no_results(state: AppState) -> str:
     """Say why there is no rigged mesh to look at."""
     there = {id(actor) for actor in state.scene.actors}
-    if any(id(result.actor) in there for result in state.rig.results.values()):
+    if any(id(result.actor) in there for result in state.of(Rigging).results.values()):
         return ""
     return "nothing was rigged yet: Run"

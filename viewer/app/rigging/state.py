@@ -5,23 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from viewer.app.core.jobs import CountedJob
+from viewer.app.core.state import AppState
+from viewer.autorig.alignment import Alignment, AlignmentSettings
+from viewer.autorig.rigged import Rigged
+from viewer.autorig.similarity import Similarity
+from viewer.rendering.passes.ghost_pass import Ghost
 from viewer.rig.arrays import Floats
-
-if TYPE_CHECKING:
-    from viewer.app.core.jobs import CountedJob
-    from viewer.app.core.state import AppState
-    from viewer.autorig.alignment import Alignment, AlignmentSettings
-    from viewer.autorig.rigged import Rigged
-    from viewer.autorig.similarity import Similarity
-    from viewer.rendering.passes.ghost_pass import Ghost
-    from viewer.rig.figure import Figure
-    from viewer.rig.geometry.ray_hit import RayHit
-    from viewer.rig.pose import Pose
-    from viewer.rig.scene import Actor, Motion, Scene
+from viewer.rig.figure import Figure
+from viewer.rig.geometry.ray_hit import RayHit
+from viewer.rig.pose import Pose
+from viewer.rig.scene import Actor, Motion, Scene
 
 __all__ = [
     "GHOSTS",
@@ -31,7 +28,7 @@ __all__ = [
     "Placing",
     "Result",
     "RigChoices",
-    "RigView",
+    "Rigging",
     "Running",
     "Template",
 ]
@@ -209,7 +206,7 @@ class RigChoices:
 
 
 @dataclass(slots=True)
-class RigView:
+class Rigging:
     """The Rig panel's own state.
 
     Attributes
@@ -281,3 +278,11 @@ class RigView:
     ghost_key: object = None
     ghost_figure: Figure | None = None
     shown: Ghost | None = None
+
+    def kept(self) -> object | None:
+        """Return the template's placement, which is undone with the scene."""
+        return self.placing
+
+    def restore(self, kept: object | None) -> None:
+        """Put the template where it was."""
+        self.placing = kept if isinstance(kept, Placing) else None

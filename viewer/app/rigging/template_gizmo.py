@@ -21,7 +21,7 @@ from viewer.app.rigging.placing import (
     similarity_now,
     target_place,
 )
-from viewer.app.rigging.state import Template
+from viewer.app.rigging.state import Rigging, Template
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.transform import apply_transform, translation_matrix
 from viewer.rig.mesh import bounding_box
@@ -50,7 +50,7 @@ def use_gizmo(state: AppState, template: Template) -> None:
     template : Template
         As it is now.
     """
-    view = state.rig
+    view = state.of(Rigging)
     assert view.target is not None  # the caller looked
     place = target_place(view.target)
     middle = bounding_box(posed_template(view, template).positions).mean(axis=0)
@@ -68,7 +68,7 @@ def use_gizmo(state: AppState, template: Template) -> None:
 
 def _manipulated(state: AppState, before: Floats) -> Floats | None:
     """Return where ImGuizmo has moved a matrix, None if it stays."""
-    view = state.rig
+    view = state.of(Rigging)
     size = float(np.cbrt(np.linalg.det(before[:3, :3])))
     rigid = before.copy()
     rigid[:3, :3] /= size  # the handles' reach must not grow with the template
@@ -117,7 +117,7 @@ def _matrix(values: Floats) -> imguizmo.im_guizmo.Matrix16:
 
 def _scaled(state: AppState, before: Floats) -> Floats | None:
     """Return a matrix scaled by what the ring around its middle was drawn out; None if it stays."""
-    view, io, frame = state.rig, imgui.get_io(), view_frame(state)
+    view, io, frame = state.of(Rigging), imgui.get_io(), view_frame(state)
     center = frame.place(before[:3, 3])
     if center is None:
         view.holds_mouse, view.scaling = False, None

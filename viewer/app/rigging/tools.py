@@ -6,10 +6,11 @@ from imgui_bundle import imgui
 
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.state import AppState
+from viewer.app.posing.state import Posing
 from viewer.app.rigging.landmarks import draw_landmarks, show_both, take_click
 from viewer.app.rigging.placing import ghost_of, laid_template, placing_now
 from viewer.app.rigging.sources import refresh
-from viewer.app.rigging.state import TOOLS
+from viewer.app.rigging.state import TOOLS, Rigging
 from viewer.app.rigging.template_gizmo import use_gizmo
 from viewer.app.rigging.work import start_align, start_reading, take_finished
 from viewer.rendering.passes.ghost_pass import Ghost
@@ -19,11 +20,11 @@ __all__ = ["choose_rig_tool", "draw_rig_tools", "drop_rig_tool", "holds_mouse", 
 
 def choose_rig_tool(state: AppState, tool: str) -> None:
     """Take a way to move the template in hand, a key of ``TOOLS``."""
-    view = state.rig
+    view = state.of(Rigging)
     if tool and laid_template(state) is None:
         start_reading(state)
         return
-    state.posing.tool = "select"
+    state.of(Posing).tool = "select"
     view.tool, view.pending, view.holds_mouse = tool, None, False
     if tool == "landmarks":
         show_both(state)
@@ -33,7 +34,7 @@ def choose_rig_tool(state: AppState, tool: str) -> None:
 
 def drop_rig_tool(state: AppState) -> bool:
     """Put the tool, or the half of a pair of landmarks, away; return whether there was one."""
-    view = state.rig
+    view = state.of(Rigging)
     if view.pending is not None:
         view.pending = None
         return True
@@ -43,7 +44,7 @@ def drop_rig_tool(state: AppState) -> bool:
 
 def holds_mouse(state: AppState) -> bool:
     """Return whether the mouse belongs to the gizmo: on a handle a drag does not orbit."""
-    return state.rig.holds_mouse
+    return state.of(Rigging).holds_mouse
 
 
 def show_rig(state: AppState) -> Ghost | None:
@@ -53,7 +54,7 @@ def show_rig(state: AppState) -> Ghost | None:
     """
     refresh(state)
     take_finished(state)
-    view = state.rig
+    view = state.of(Rigging)
     if view.target is None or laid_template(state) is None:
         view.tool = ""
     if not view.tool:
@@ -67,7 +68,7 @@ def show_rig(state: AppState) -> Ghost | None:
 
 def _measure(state: AppState) -> None:
     """Measure how well the template lies once it was let go of."""
-    view, placing = state.rig, placing_now(state)
+    view, placing = state.of(Rigging), placing_now(state)
     if not view.was_dragged or imgui.is_mouse_down(imgui.MouseButton_.left):
         return
     if placing is None:
@@ -79,7 +80,7 @@ def _measure(state: AppState) -> None:
 
 def draw_rig_tools(state: AppState) -> None:
     """Draw the gizmo or the landmarks over the picture of the scene, and drag by the gizmo."""
-    view, template = state.rig, laid_template(state)
+    view, template = state.of(Rigging), laid_template(state)
     x, y, width, height = state.view_rect
     if not view.tool or template is None or view.target is None or min(width, height) < 40.0:
         return

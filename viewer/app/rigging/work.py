@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.app.core.framing import restart_framing
 from viewer.app.core.jobs import CountedJob, Report
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.state import AppState
@@ -22,7 +21,15 @@ from viewer.app.rigging.sources import (
     target_mesh,
     template_files,
 )
-from viewer.app.rigging.state import Landmark, Placing, Result, RigChoices, Running, Template
+from viewer.app.rigging.state import (
+    Landmark,
+    Placing,
+    Result,
+    RigChoices,
+    Rigging,
+    Running,
+    Template,
+)
 from viewer.app.rigging.steps import (
     align_template,
     match_fields,
@@ -75,15 +82,16 @@ def _begin(state: AppState, title: str, act: Callable[[Report], _Finish]) -> Non
         return []
 
     running.job = state.job = CountedJob(title, work)
-    state.rig.running = running
+    state.of(Rigging).running = running
 
 
 def take_finished(state: AppState) -> None:
     """Do what follows from work that has ended; of a scene that is gone nothing does."""
-    running = state.rig.running
+    rigging = state.of(Rigging)
+    running = rigging.running
     if running is None or running.job is state.job:
         return
-    state.rig.running = None
+    rigging.running = None
     if running.finish is not None and running.source is state.scene:
         running.finish(state)
 
@@ -107,7 +115,7 @@ def start_adding(state: AppState, path: Path) -> None:
             actor.called = free_title(state.scene.actors, actor.title)
             state.scene.actors.append(actor)
             state.paths = (*state.paths, path)
-            state.rig.target = None  # so that the panel chooses anew
+            state.of(Rigging).target = None  # so that the panel chooses anew
             state.say(*scene.warnings)
             _show_added(state, actor)
 
@@ -120,7 +128,7 @@ def _show_added(state: AppState, actor: Actor) -> None:
     """Choose a mesh that came to the scene, and bring it into view."""
     choose_target(state, actor)
     state.choose_actor(len(state.scene.actors) - 1)
-    restart_framing(state)
+    state.framing.restart()
 
 
 def start_reading(
@@ -137,15 +145,15 @@ def start_reading(
     then : callable, optional
         Goes on with it.
     """
-    key = "file" if paths else state.rig.template_key
+    key = "file" if paths else state.of(Rigging).template_key
 
     def act(report: Report) -> _Finish:
         report(0, 0, "Reading the template")
         template = read_template(paths or template_files(key), key)
 
         def finish(state: AppState) -> None:
-            state.rig.template = template
-            state.rig.template_key = ""  # another file has the same key
+            state.of(Rigging).template = template
+            state.of(Rigging).template_key = ""  # another file has the same key
             choose_template(state, key)
             if then is not None:
                 then(state)
@@ -160,7 +168,10 @@ def _snapshot(state: AppState, laid: bool) -> Callable[[Report], Template]:
 
     It is read there if it has to be.
     """
-    known, key = laid_template(state) if laid else current_template(state), state.rig.template_key
+    known, key = (
+        laid_template(state) if laid else current_template(state),
+        state.of(Rigging).template_key,
+    )
     if known is not None:
         taken = replace(known, pose=known.pose.copy())
         return lambda report: taken
@@ -174,7 +185,7 @@ def _snapshot(state: AppState, laid: bool) -> Callable[[Report], Template]:
 
 def _keep(state: AppState, template: Template) -> None:
     """Remember a template that was read on the way."""
-    view = state.rig
+    view = state.of(Rigging)
     is_new = view.template is None or view.template.key != template.key
     if is_new and template.actor is None and view.template_key == template.key:
         view.template = template
@@ -194,12 +205,12 @@ def _shares(
 
 def start_align(state: AppState, settings: AlignmentSettings | None = None) -> None:
     """Lay the template onto the target: by searching, or from where it lies as the settings say."""
-    choices, target = state.rig.choices, target_mesh(state)
+    choices, target = state.of(Rigging).choices, target_mesh(state)
     take = _snapshot(state, laid=settings is not None)
     how = settings or _search_settings(choices)
     own = current_template(state)
     fits = choices.fits and how.matrix is None
-    asked = state.rig.placing
+    asked = state.of(Rigging).placing
 
     def act(report: Report) -> _Finish:
         template = take(report)
@@ -210,9 +221,9 @@ def start_align(state: AppState, settings: AlignmentSettings | None = None) -> N
             if asked is not None and how.matrix is not None:
                 _take_measured(state, asked, found)
                 return
-            state.rig.placing = found
-            if state.rig.tool == "landmarks":
-                state.rig.tool = ""  # so that the template is seen where it lies
+            state.of(Rigging).placing = found
+            if state.of(Rigging).tool == "landmarks":
+                state.of(Rigging).tool = ""  # so that the template is seen where it lies
 
         return finish
 
@@ -221,10 +232,11 @@ def start_align(state: AppState, settings: AlignmentSettings | None = None) -> N
 
 def _take_measured(state: AppState, asked: Placing, found: Placing) -> None:
     """Take over the error of a template that was laid by hand, and may lie elsewhere by now."""
+    rigging = state.of(Rigging)
     known = replace(found, lines=asked.lines) if found.fitted is not None else found
-    if state.rig.placing is asked:
-        state.rig.placing = known
-    state.history.measured(asked, known)
+    if rigging.placing is asked:
+        rigging.placing = known
+    state.history.exchange(asked, known)
 
 
 def _search_settings(choices: RigChoices) -> AlignmentSettings:
@@ -256,19 +268,20 @@ def landmark_settings(state: AppState, mesh: Mesh, refines: bool) -> AlignmentSe
             surface_point(target.positions, target.triangles, landmark.target),
         ]
 
-    pairs = np.array([pair(landmark) for landmark in state.rig.landmarks])
+    pairs = np.array([pair(landmark) for landmark in state.of(Rigging).landmarks])
     return AlignmentSettings(
-        landmarks=pairs.reshape(-1, 2, 3), scale=state.rig.choices.scale, refines=refines
+        landmarks=pairs.reshape(-1, 2, 3), scale=state.of(Rigging).choices.scale, refines=refines
     )
 
 
 def start_match(state: AppState) -> None:
     """Find which vertices of the target lie on the template, and show them as colours."""
-    placing, settings = placing_now(state), match_settings(state.rig.choices)
-    if placing is None or state.rig.target is None:
+    rigging, placing = state.of(Rigging), placing_now(state)
+    settings, actor = match_settings(rigging.choices), rigging.target
+    if placing is None or actor is None:
         return
     take, similarity = _snapshot(state, laid=True), placing.similarity
-    mesh, actor = target_mesh(state), state.rig.target
+    mesh = target_mesh(state)
 
     def act(report: Report) -> _Finish:
         template = take(report)
@@ -284,7 +297,11 @@ def start_run(state: AppState, methods: tuple[str, ...]) -> None:
 
     The template is aligned first if it was not, and taken as it is shown if it was.
     """
-    target, choices, placing = state.rig.target, replace(state.rig.choices), placing_now(state)
+    target, choices, placing = (
+        state.of(Rigging).target,
+        replace(state.of(Rigging).choices),
+        placing_now(state),
+    )
     if target is None:
         return
     take, mesh, name = _snapshot(state, laid=True), target_mesh(state), target.title
@@ -316,5 +333,5 @@ def start_run(state: AppState, methods: tuple[str, ...]) -> None:
 def _put(state: AppState, results: list[Result], placing: Placing | None) -> None:
     """Take over what a run has made."""
     _keep(state, results[0].template)
-    state.rig.placing = placing
+    state.of(Rigging).placing = placing
     put_results(state, results, compare(*results) if len(results) == len(METHODS) else None)

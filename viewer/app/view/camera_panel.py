@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from viewer.app.actions import face, fit_view, look, look_through, toggle_projection
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import button, checkbox, choice, explain, note_item, slider
+from viewer.app.view.camera_actions import face, fit_view, look, look_through, toggle_projection
 from viewer.errors import printable
 from viewer.rendering.camera import VIEWS, front_azimuth
 from viewer.rig.inspection.front import front_axes

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from viewer.app.actions import show
 from viewer.app.core.reasons import no_mesh, no_skeleton, no_skin, no_texture
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import (
@@ -16,6 +15,7 @@ from viewer.app.core.widgets import (
     same_line_if_room,
     slider,
 )
+from viewer.app.view.display_actions import show
 from viewer.app.view.view_menu import JOINT_TOGGLES
 from viewer.app.weights.actions import start_heat_map
 from viewer.errors import printable

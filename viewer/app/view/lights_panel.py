@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from viewer.app.actions import reset_lights
 from viewer.app.core.srgb import decode_srgb, encode_srgb
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import button, checkbox, note_item, plain_zero, slider
+from viewer.app.view.display_actions import reset_lights
 from viewer.rendering.options import Light
 
 __all__ = ["draw"]

@@ -8,14 +8,16 @@ from typing import NamedTuple
 import numpy as np
 from imgui_bundle import imgui
 
-from viewer.app.actions import take_pick
 from viewer.app.core.state import AppState
 from viewer.app.features import PANELS
 from viewer.app.posing.gizmo import joint_at
 from viewer.app.posing.joint_tree import select_joint
+from viewer.app.posing.state import Posing
 from viewer.app.posing.tool_actions import no_tool
+from viewer.app.view.state import Picking
 from viewer.app.weights.actions import pin_vertex
-from viewer.app.weights.state import Hover, wants_vertex
+from viewer.app.weights.hover_text import tells_vertices
+from viewer.app.weights.state import Hover, Weights, wants_vertex
 from viewer.errors import ViewerError, printable
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.picking import Pick
@@ -28,7 +30,7 @@ from viewer.rig.scene import Actor
 from viewer.rig.skeleton import joint_label
 from viewer.rig.skinning import Skinning
 
-__all__ = ["answer_picks", "tells_vertices", "vertex_at"]
+__all__ = ["answer_picks", "take_pick", "vertex_at"]
 
 _LONGEST = 40  # letters of a name
 _REST = 0.2  # seconds for which the mouse must lie still
@@ -52,7 +54,8 @@ def answer_picks(
     picture : object
         Equal as long as the picture of the scene is the same.
     """
-    wanted, state.wants_pick = state.wants_pick, None
+    picking = state.of(Picking)
+    wanted, picking.wanted = picking.wanted, None
     try:
         if wanted is not None:
             x, y, aims = wanted
@@ -73,7 +76,7 @@ def _take_click(
 
     On a skin the joint is chosen that moves it most there, on the background none.
     """
-    if not aims and wants_vertex(state.weights):
+    if not aims and wants_vertex(state.of(Weights)):
         found = vertex_at(state, renderer, size, pixel)
         if found is not None:
             pin_vertex(state, found[0], found[1])
@@ -120,6 +123,18 @@ def _pick(
     options: DisplayOptions,
 ) -> Pick | None:
     return renderer.pick(state.scene, state.camera, options, size, *pixel, state.box)
+
+
+def take_pick(state: AppState, found: Pick, aims: bool) -> None:
+    """Choose the actor and joint that were clicked; a double click aims the camera there."""
+    if found.actor != state.chosen_actor:
+        state.choose_actor(found.actor)
+        state.say_status(printable(state.actor.name, 60))
+    if found.joint >= 0:
+        select_joint(state, found.joint)
+    if aims:
+        state.camera.fixed = None
+        state.camera.target = found.point.copy()
 
 
 def vertex_at(
@@ -178,20 +193,11 @@ def _drawn_positions(actor: Actor, options: DisplayOptions, vertices: Ints) -> F
     return deform_vertices(actor.figure, actor.pose, options.skinning, vertices)[0]
 
 
-def tells_vertices(state: AppState) -> bool:
-    """Return whether the vertex under the mouse is described right now."""
-    view, io = state.weights, imgui.get_io()
-    shows_panel = view.panel_frame == imgui.get_frame_count()
-    is_covered = bool(state.error) or state.dialog is not None or io.want_capture_mouse
-    is_held = any(io.mouse_down[button] for button in range(3))
-    return (view.tells_always or shows_panel) and not is_covered and not is_held
-
-
 def _look_under_mouse(
     state: AppState, renderer: Renderer, size: tuple[int, int], scale: float, picture: object
 ) -> None:
     """Describe the vertex under the mouse once mouse and picture have come to rest."""
-    view, io = state.weights, imgui.get_io()
+    view, io = state.of(Weights), imgui.get_io()
     x, y, width, height = state.view_rect
     place = (io.mouse_pos.x, io.mouse_pos.y)
     is_inside = x <= place[0] < x + width and y <= place[1] < y + height
@@ -221,9 +227,11 @@ def _look_under_mouse(
 def _click_text(state: AppState, pick: Pick | None) -> tuple[str, ...]:
     """Return a line on what a click would choose here, if it would choose a joint."""
     mouse = imgui.get_io().mouse_pos
-    if wants_vertex(state.weights) or pick is None:
+    if wants_vertex(state.of(Weights)) or pick is None:
         return ()
-    over = joint_at(state, (mouse.x, mouse.y)) if state.posing.is_on and not no_tool(state) else -1
+    over = (
+        joint_at(state, (mouse.x, mouse.y)) if state.of(Posing).is_on and not no_tool(state) else -1
+    )
     whose = state.actor if over >= 0 else state.scene.actors[pick.actor]
     joint, skeleton = over if over >= 0 else pick.joint, whose.figure.skeleton
     if joint >= 0 and skeleton is not None:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from viewer.app.actions import toggle_option
 from viewer.app.core.reasons import no_mesh, no_skeleton
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import begin_menu, menu_item
+from viewer.app.view.display_actions import toggle_option
 from viewer.app.weights.actions import (
     no_view,
     toggle_picking,
@@ -15,6 +15,7 @@ from viewer.app.weights.actions import (
     toggle_weights,
     unpin,
 )
+from viewer.app.weights.state import Weights
 
 __all__ = ["JOINT_TOGGLES", "draw_view_menu"]
 
@@ -30,7 +31,7 @@ def draw_view_menu(state: AppState) -> None:
     """Draw the menu in the menu bar."""
     if not begin_menu(state, "View"):
         return
-    options, view = state.options, state.weights
+    options, view = state.options, state.of(Weights)
     for name, (text, key) in JOINT_TOGGLES.items():
         if menu_item(state, text, key, getattr(options, name), no_skeleton(state)):
             toggle_option(state, name, text)

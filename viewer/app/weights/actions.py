@@ -5,7 +5,7 @@ from __future__ import annotations
 from viewer.app.core.state import AppState
 from viewer.app.posing.joint_tree import select_joint
 from viewer.app.shown_panels import is_open, set_open
-from viewer.app.weights.state import Pinned
+from viewer.app.weights.state import Pinned, Weights
 from viewer.errors import printable
 from viewer.rig.inspection.explanation import Explanation, explain
 from viewer.rig.pose import pose_key
@@ -128,14 +128,14 @@ def toggle_weights(state: AppState) -> None:
 
 def toggle_telling(state: AppState) -> None:
     """Describe the vertex under the mouse, also without the Weights panel, or only with it."""
-    view = state.weights
+    view = state.of(Weights)
     view.tells_always = not view.tells_always
     state.say_status(f"Vertex under the mouse {'on' if view.tells_always else 'off'}")
 
 
 def toggle_picking(state: AppState) -> None:
     """Let clicks pin vertices, or choose actors and joints again."""
-    view = state.weights
+    view = state.of(Weights)
     view.picks_vertices = not view.picks_vertices
     state.say_status("Click a vertex" if view.picks_vertices else "Clicks choose again")
 
@@ -156,14 +156,14 @@ def pin_vertex(state: AppState, actor: int, vertex: int) -> None:
     if not figure.is_attached:
         state.say_status("This figure has no skin that follows a skeleton: nothing moves a vertex")
         return
-    state.weights.pinned = Pinned(actor, figure, vertex)
+    state.of(Weights).pinned = Pinned(actor, figure, vertex)
     set_open(state, "vertex", True)
 
 
 def unpin(state: AppState) -> None:
     """Explain no vertex any more; the panel that did so goes."""
     set_open(state, "vertex", False)
-    view = state.weights
+    view = state.of(Weights)
     view.pinned = view.explanation = view.explanation_key = None
     view.annotations, view.annotation_key = (), None
 
@@ -176,7 +176,8 @@ def explained(state: AppState) -> Explanation | None:
     ViewerError
         If the figure's shapes cannot be read.
     """
-    view, pinned, actors = state.weights, state.weights.pinned, state.scene.actors
+    view, actors = state.of(Weights), state.scene.actors
+    pinned = view.pinned
     if pinned is None:
         return None
     if not is_open(state, "vertex"):

@@ -7,6 +7,7 @@ from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
 from viewer.app.weights.actions import explained, unpin
+from viewer.app.weights.state import Weights
 from viewer.errors import ViewerError, printable
 from viewer.rendering.overlay.annotation import LABEL_COLOR, Annotation, Labels
 from viewer.rendering.overlay.segments import Manner, Segments, dots, joined
@@ -55,7 +56,8 @@ def pinned_annotations(state: AppState, size: tuple[int, int]) -> tuple[Annotati
     size : (int, int)
         Width and height of the picture, pixels.
     """
-    view, pinned = state.weights, state.weights.pinned
+    view = state.of(Weights)
+    pinned = view.pinned
     if pinned is None or state.options.show == "binding":
         return ()
     try:
@@ -138,7 +140,7 @@ def _image_lines(
 
 def draw_hovered(state: AppState) -> None:
     """Mark the vertex that is described, if one is; it is no part of pictures."""
-    hover = state.weights.hover
+    hover = state.of(Weights).hover
     if not hover.lines:
         return
     x, y, width, height = state.view_rect

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 from imgui_bundle import imgui
 
+from viewer.rendering.overlay.annotation import Annotation
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
+from viewer.rig.inspection.explanation import Explanation
 
-if TYPE_CHECKING:
-    from viewer.rendering.overlay.annotation import Annotation
-    from viewer.rig.inspection.explanation import Explanation
-
-__all__ = ["Hover", "Pinned", "WeightsView", "wants_vertex"]
+__all__ = ["Hover", "Pinned", "Weights", "wants_vertex"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,7 +63,7 @@ class Hover:
 
 
 @dataclass(slots=True)
-class WeightsView:
+class Weights:
     """The state of the Weights panel and of what shows vertices.
 
     Attributes
@@ -93,8 +90,6 @@ class WeightsView:
         What is drawn of it; at most one.
     annotation_key : object
         What that depends on.
-    scrolls_to : int
-        The joint that the tree is to bring into view, -1 for none.
     """
 
     panel_frame: int = -1
@@ -108,9 +103,8 @@ class WeightsView:
     explanation_key: object = None
     annotations: tuple[Annotation, ...] = ()
     annotation_key: object = None
-    scrolls_to: int = -1
 
 
-def wants_vertex(view: WeightsView) -> bool:
+def wants_vertex(view: Weights) -> bool:
     """Return whether a click is meant for a vertex: with Alt, or while vertices are picked."""
     return view.picks_vertices or imgui.get_io().key_alt

@@ -10,8 +10,10 @@ from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import button, checkbox, explain, note_item, same_line_if_room
+from viewer.app.posing.joint_tree import joint_tree
 from viewer.app.weights.actions import explained, toggle_picking, unpin
 from viewer.app.weights.explanation_lines import influence_colors
+from viewer.app.weights.state import Weights
 from viewer.errors import ViewerError, printable
 from viewer.rig.arrays import Floats
 from viewer.rig.inspection.explanation import DualTerms, Explanation
@@ -33,17 +35,18 @@ _SPARE = 6.0  # points: heights of letters are whole pixels
 
 def draw(state: AppState) -> None:
     """Draw the panel."""
+    weights = state.of(Weights)
     try:
         explanation = explained(state)
     except ViewerError as problem:
         state.error = str(problem)
         unpin(state)
         return
-    pinned = state.weights.pinned
+    pinned = weights.pinned
     if explanation is None or pinned is None or pinned.figure.skeleton is None:
         imgui.text_wrapped("Alt+click a vertex: here is said why it is where it is.")
         text = "Click without Alt"
-        if checkbox(state, text, state.weights.picks_vertices) != state.weights.picks_vertices:
+        if checkbox(state, text, weights.picks_vertices) != weights.picks_vertices:
             toggle_picking(state)
         return
     _draw_head(state, explanation)
@@ -116,7 +119,8 @@ def _draw_steps(sheet: _Sheet, one: Explanation, colors: Floats) -> None:
 
 
 def _draw_head(state: AppState, one: Explanation) -> None:
-    pinned = state.weights.pinned
+    weights = state.of(Weights)
+    pinned = weights.pinned
     assert pinned is not None  # it is explained
     name = printable(state.scene.actors[pinned.actor].name, _LONGEST)
     imgui.text_wrapped(f"Vertex {one.vertex} of {name}: {METHODS[one.skinning.method]}")
@@ -128,7 +132,7 @@ def _draw_head(state: AppState, one: Explanation) -> None:
         unpin(state)
     explain("let go of the vertex (Esc)")
     same_line_if_room("Lines")
-    state.weights.draws_lines = checkbox(state, "Lines", state.weights.draws_lines)
+    weights.draws_lines = checkbox(state, "Lines", weights.draws_lines)
     explain("to where each joint alone would carry the vertex; thicker for larger weights")
 
 
@@ -147,7 +151,7 @@ def _draw_influence(sheet: _Sheet, one: Explanation, index: int, color: Floats) 
     state, number = sheet.state, index + 1
     imgui.separator()
     _draw_swatch(color)
-    pinned = state.weights.pinned
+    pinned = state.of(Weights).pinned
     is_chosen = pinned is not None and state.chosen_actor == pinned.actor
     joint, name = int(one.joints[index]), printable(one.names[index], _LONGEST)
     room, head = imgui.get_content_region_avail().x, f"{number}. {name}"
@@ -158,7 +162,7 @@ def _draw_influence(sheet: _Sheet, one: Explanation, index: int, color: Floats) 
     if imgui.selectable(f"{text}###influence{number}", is_chosen, 0, (room, 0.0))[0]:
         if pinned is not None and state.chosen_actor != pinned.actor:
             state.choose_actor(pinned.actor)
-        state.selected_joint = state.weights.scrolls_to = joint
+        state.selected_joint = joint_tree(state).scrolls_to = joint
     note_item(state, f"influence {number}")
     explain("select this joint" if fits else f"select {name}")
     if not fits:

@@ -19,6 +19,7 @@ from viewer.app.core.widgets import (
     same_line_if_room,
 )
 from viewer.app.weights.actions import no_view, show_scalar, shown_joint, start_heat_map, unpin
+from viewer.app.weights.state import Weights
 from viewer.errors import printable
 from viewer.rendering.scalar_look import TYPICAL
 from viewer.rig.figure import Figure
@@ -33,7 +34,7 @@ _WHOLE = ("discrete", "categorical")
 
 def draw(state: AppState) -> None:
     """Draw the panel."""
-    state.weights.panel_frame = imgui.get_frame_count()
+    state.of(Weights).panel_frame = imgui.get_frame_count()
     options, why = state.options, no_mesh(state)
     shows = options.shading == "scalar"
     if checkbox(state, "Heat map", shows, why) != shows:
@@ -182,7 +183,7 @@ def _draw_marks(state: AppState, key: str) -> None:
 
 def _draw_vertex_tools(state: AppState) -> None:
     """Draw what describes and explains single vertices."""
-    view, why = state.weights, no_mesh(state)
+    view, why = state.of(Weights), no_mesh(state)
     imgui.text_wrapped("Rest the mouse on a surface: its vertex is described.")
     text = "Also without this panel"
     view.tells_always = checkbox(state, text, view.tells_always, why)
