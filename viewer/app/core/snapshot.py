@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.pose import Pose, pose_key
+from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor, Motion, Scene
 
 __all__ = [
@@ -83,7 +83,7 @@ def same_pose(old: Pose | None, new: Pose | None) -> bool:
     """Return whether two poses have the same numbers."""
     if old is None or new is None:
         return old is new
-    return pose_key(old) == pose_key(new)
+    return new.is_like(old)
 
 
 def is_current(snapshot: Snapshot, scene: Scene, options: DisplayOptions) -> bool:

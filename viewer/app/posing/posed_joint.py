@@ -9,7 +9,7 @@ import numpy as np
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.rotation import nearest_rotations
 from viewer.rig.geometry.vectors import unit
-from viewer.rig.kinematics import world_matrices
+from viewer.rig.kinematics import posed_skeleton
 from viewer.rig.pose import Pose, placement_matrix
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
@@ -120,4 +120,4 @@ def posed_joint(actor: Actor, joint: int, pose: Pose | None = None) -> PosedJoin
     if skeleton is None or joint >= skeleton.n_joints:
         return None
     placement = actor.placement @ placement_matrix(pose)
-    return PosedJoint(skeleton, joint, placement, placement @ world_matrices(skeleton, pose))
+    return PosedJoint(skeleton, joint, placement, placement @ posed_skeleton(skeleton, pose).world)

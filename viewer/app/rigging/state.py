@@ -92,7 +92,7 @@ class Placing:
         What was done to it.
     meshes : tuple of object
         The target's mesh and the template's figure: for others it means nothing.
-    pose : tuple of bytes
+    pose : tuple
         Key of the template's pose that it was found for.
     """
 
@@ -102,7 +102,7 @@ class Placing:
     fitted: Template | None
     lines: tuple[str, ...]
     meshes: tuple[object, object]
-    pose: tuple[bytes, ...]
+    pose: tuple[object, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
