@@ -26,7 +26,7 @@ from viewer.app.keys import handle_keys
 from viewer.app.linting.marks import show_finding
 from viewer.app.mouse import drop_motion_before_press, handle_mouse
 from viewer.app.overlays import draw_hints
-from viewer.app.picture_key import picture_key
+from viewer.app.picture_key import PictureKeys
 from viewer.app.posing.gizmo_drawing import draw_gizmo
 from viewer.app.posing.shape_guard import drop_unreadable_shapes
 from viewer.app.recording.record_dialog import draw_record_dialog
@@ -76,6 +76,7 @@ class Frame:
         self.renderer = Renderer(context)
         self.target: Target | None = None
         self._drawn: object = None
+        self._keys = PictureKeys()
         self.clock = Clock(state)
         state.stats.renderer = context.info["GL_RENDERER"]
         state.stats.version = context.info["GL_VERSION"]
@@ -162,8 +163,9 @@ class Frame:
         size = (round(width * scale), round(height * scale))
         if min(size) < 1:
             return
-        self.renderer.annotations = pinned_annotations(state, size)
-        key = picture_key(state, self.renderer, size)
+        renderer = self.renderer
+        renderer.annotations = pinned_annotations(state, size)
+        key = self._keys.key(state, size, renderer.marks, renderer.ghost, renderer.annotations)
         if key != self._drawn:
             self._drawn = key  # also if it fails: not again before something has changed
             self._draw_target(size)
