@@ -15,9 +15,10 @@ from viewer.rendering.passes.see_through import draw_nearest
 from viewer.rendering.view import View, in_front, set_lights, set_model
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
-from viewer.rig.kinematics import world_matrices
+from viewer.rig.kinematics import posed_skeleton, world_matrices
 from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.pose import Pose, rest_pose, skinning_key
+from viewer.rig.number_key import NumberKey
+from viewer.rig.pose import Pose, rest_pose
 from viewer.rig.shape import shaped
 from viewer.rig.skeleton import Skeleton
 
@@ -37,30 +38,26 @@ class SkeletonBuffers:
         assert skeleton is not None  # only figures with a skeleton come here
         self.figure = figure
         self.boxes = BoxBuffers(context, cube, _joint_boxes(skeleton))
-        self._key: tuple[bytes, ...] | None = None
+        self._key: NumberKey | None = None
 
     def is_current(self, pose: Pose) -> bool:
         """Return whether the joints' matrices are those of a pose."""
-        return self._key == skinning_key(pose)
+        return self._key == pose.skinning_key
 
-    def update(self, pose: Pose, world: Floats | None = None) -> None:
+    def update(self, pose: Pose) -> None:
         """Upload the joints' matrices if the pose changed.
 
         Parameters
         ----------
         pose : Pose
             DOFs in lengths and radians.
-        world : (J, 4, 4), optional
-            Its joint-to-figure matrices, if they are known; they are changed.
         """
-        key = skinning_key(pose)
+        key = pose.skinning_key
         if key == self._key:
             return
-        if world is None:
-            skeleton = shaped(self.figure, pose.shape_weights).skeleton
-            assert skeleton is not None  # shaping keeps it
-            world = world_matrices(skeleton, pose)
-        self.boxes.move(world)
+        skeleton = shaped(self.figure, pose.shape_weights).skeleton
+        assert skeleton is not None  # shaping keeps it
+        self.boxes.move(posed_skeleton(skeleton, pose).world.copy())
         self._key = key
 
     def release(self) -> None:

@@ -45,7 +45,7 @@ class KeypointBuffers:
 
     def update(self, pose: Pose, skinning: Skinning) -> None:
         """Follow the pose."""
-        key = (repr(skinning), *pose_key(pose))
+        key = (repr(skinning), pose_key(pose))
         if key != self._key:
             self.boxes.move(translation_matrix(posed_keypoints(self.figure, pose, skinning)))
             self._key = key
