@@ -47,6 +47,7 @@ ALLOWED = {
         "resources",
     },
     "lint": {"lint", "loading", "formats", "rig", "errors", "near_names"},
+    "manual": {"errors", "near_names", "resources"},
     "models": {"formats", "errors", "interrupts", "near_names"},
     "errors": set(),
     "interrupts": set(),
@@ -66,6 +67,7 @@ HOMES = {
         "rendering/overlay/lettering.py",
     },
     "av": {"media/video.py"},
+    "rich": {"commands"},
 }
 
 

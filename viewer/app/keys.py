@@ -1,4 +1,4 @@
-"""The keyboard: one table for what keys do, the help that lists them, and the README."""
+"""The keyboard: one table for what keys do, the help that lists them, and the manual."""
 
 from __future__ import annotations
 

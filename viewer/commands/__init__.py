@@ -13,5 +13,6 @@ COMMANDS = {
     "diff": "hold figures or motions against a reference, and say how far they are apart",
     "lint": "check rigs and motions: what is wrong, where, and what to do about it",
     "doctor": "say what this machine offers, and the cure for what it lacks",
+    "help": "show a page of the manual",
 }
 """Modules in this folder, each with ``add_arguments(parser)`` and ``run(arguments)``."""

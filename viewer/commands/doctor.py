@@ -26,6 +26,7 @@ _PACKAGES = (
     "pyrr",
     "pillow",
     "platformdirs",
+    "rich",
 )
 _WINDOW_SECONDS = 20
 

@@ -89,7 +89,7 @@ class Format:
     Attributes
     ----------
     title : str
-        For menus and the README.
+        For menus and the manual.
     suffixes : tuple of str
         With their dots; the first is what files are called that we write.
     signature : bytes
