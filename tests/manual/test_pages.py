@@ -20,7 +20,8 @@ from viewer.lint import CODES
 from viewer.manual import PAGES, page_text
 
 ROOT = Path(__file__).resolve().parents[2]
-PATHS = sorted(FOLDER.glob("*.md"))
+README = ROOT / "README.md"
+PATHS = [README, *sorted(FOLDER.glob("*.md"))]
 _BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 _LINK = re.compile(r"\]\(([^)#:]+)\)")
 
@@ -92,6 +93,10 @@ def test_reference_names_all_there_is() -> None:
     everything = "".join(map(page_text, PAGES))
     shown = set(COMMANDS) - {"view"}  # it is what happens without a command
     assert all(f"viewer {command}" in everything for command in shown)
+
+
+def test_the_readme_is_short() -> None:
+    assert len(README.read_text("utf-8").split()) <= 900
 
 
 def test_an_unknown_topic_offers_the_nearest_and_lists_all() -> None:
