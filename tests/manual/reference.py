@@ -97,7 +97,7 @@ def scalars() -> str:
 
 def methods() -> str:
     return table(
-        ("method", "skinning"), [(f"`{name}`", str(kind)) for name, kind in METHODS.items()]
+        ("method", "skinning"), [(f"`{name}`", kind.title) for name, kind in METHODS.items()]
     )
 
 

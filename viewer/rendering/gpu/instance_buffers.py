@@ -9,6 +9,7 @@ views that draw a mesh several times take the posed buffers of single actors.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import moderngl
@@ -38,7 +39,7 @@ from viewer.rig.pose import Pose, skinning_key
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
 from viewer.rig.skin import bind_positions
-from viewer.rig.skinning import Skinning
+from viewer.rig.skinning import METHODS, Skinning
 from viewer.rig.skinning.dqs import split_palette
 
 __all__ = ["CrowdBuffers"]
@@ -119,7 +120,8 @@ class CrowdBuffers:
         if changed:
             self._keys = []  # a refusal leaves nothing that passes for done
             self._reserve(len(poses))
-            self._rest.update(figure, poses[0], correct=False)
+            # The sums of pose correctives differ from actor to actor and are sent apart.
+            self._rest.update(figure, poses[0], replace(how, correctives=False))
             self._write(figure, [poses[row] for row in changed], np.array(changed))
             self.n_updates += 1
         self._keys = keys
@@ -151,10 +153,11 @@ class CrowdBuffers:
         moved = np.einsum("j,aji->ai", shares, palette[..., :3, 3])
         self._centers[rows] = moved if shares.any() else self.mesh.center
         palette[..., :3, 3] -= self._centers[rows, None]
-        if how.method != "dqs":
+        method = METHODS[how.method]
+        if method.uses_matrices:
             self._rows[rows] = palette[..., :3, :]
             write_stacked(self._palette, self._rows[: self.count])
-        if how.method != "lbs":
+        if method.uses_quaternions:
             if self._rigid is None:
                 self._rigid = rigid_texture(self.context, len(self._rows) * self._n_joints)
             binds = np.tile(bind_positions(skin) - self.mesh.center, (len(poses), 1))
@@ -222,12 +225,10 @@ class CrowdBuffers:
         mesh, skin = self.mesh, self.mesh.skin(self._how)
         key = (id(program), id(indices), id(skin), id(self._rest.positions))
         if key not in self._arrays:
-            content: list[Any] = [
+            content: list[Any] = self._rest.attributes(program, skin)
+            content += [
                 (buffer, layout, name)
                 for buffer, layout, name in (
-                    (self._rest.positions, "3f4", "in_position"),
-                    (self._rest.normals, "3f4", "in_normal"),
-                    (skin.bindings, "4u4", "in_bindings"),
                     (mesh.uvs, "2f4", "in_uv"),
                     (mesh.colors, "3f4", "in_color"),
                 )
