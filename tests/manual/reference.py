@@ -105,6 +105,12 @@ def shading() -> str:
     return table(("shading", "surface"), [(f"`{name}`", text) for name, text in SHADING.items()])
 
 
+def commands() -> str:
+    return table(
+        ("command", "purpose"), [(f"`viewer {key}`", text) for key, text in COMMANDS.items()]
+    )
+
+
 def options() -> str:
     """Return a table for each group of options, with the commands that have them."""
     groups: dict[str, dict[tuple[str, str], list[str]]] = {}
@@ -149,6 +155,7 @@ def _names(action: argparse.Action) -> str:
 
 TABLES = {
     "codes": codes,
+    "commands": commands,
     "keys": keys,
     "methods": methods,
     "mouse": mouse,

@@ -24,7 +24,7 @@ PAGES = {
     "troubleshooting": "installation, drawing, exit codes",
     "keys": "reference: keys and shortcuts",
     "codes": "reference: findings of lint",
-    "options": "reference: options of all commands",
+    "options": "reference: all commands and their options",
 }
 """Pages in this folder, without their suffix, and what they are about."""
 
