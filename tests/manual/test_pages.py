@@ -21,7 +21,7 @@ from viewer.manual import PAGES, page_text
 
 ROOT = Path(__file__).resolve().parents[2]
 README = ROOT / "README.md"
-PATHS = [README, *sorted(FOLDER.glob("*.md"))]
+PATHS = [README, ROOT / "CONTRIBUTING.md", *sorted(FOLDER.glob("*.md"))]
 _BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 _LINK = re.compile(r"\]\(([^)#:]+)\)")
 
@@ -103,3 +103,18 @@ def test_an_unknown_topic_offers_the_nearest_and_lists_all() -> None:
         page_text("wieghts")
     assert "did you mean weights?" in str(caught.value)
     assert all(topic in str(caught.value) for topic in PAGES)
+
+
+@pytest.mark.parametrize("name", ["CONTRIBUTING.md", "viewer/ARCHITECTURE.md"])
+def test_paths_that_contributors_are_sent_to_exist(name: str) -> None:
+    text = (ROOT / name).read_text("utf-8")
+    paths = re.findall(r"`((?:viewer|shaders|tests|assets)/[\w/.]+)`", text)
+    assert paths
+    assert not [path for path in paths if not (ROOT / path).exists()]
+
+
+def test_contributors_are_told_of_every_registry() -> None:
+    text = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
+    for name, home in re.findall(r"\| `([A-Z]+)` in `([\w/.]+)` \|", text):
+        assert re.search(rf"^{name}\b.*=", (ROOT / home).read_text("utf-8"), re.MULTILINE), name
+    assert text.count(" in `viewer/") >= 11
