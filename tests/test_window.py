@@ -21,7 +21,7 @@ from imgui_bundle import imgui
 from PIL import Image, ImageGrab
 
 import viewer
-from viewer.app.view_picks import vertex_at
+from viewer.app.view.picks import vertex_at
 from viewer.app.window import _Rest
 from viewer.rendering.camera import facing_camera, fit
 from viewer.rig.inspection.front import guess_front

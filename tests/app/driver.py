@@ -8,8 +8,9 @@ import numpy as np
 from imgui_bundle import imgui
 
 import viewer
+from viewer.app.core.state import AppState
+from viewer.app.files.state import Files
 from viewer.app.headless import HeadlessApp
-from viewer.app.state import AppState
 from viewer.rendering.camera import facing_camera, fit
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.inspection.front import guess_front
@@ -198,7 +199,7 @@ class Driver:
 
     def says(self, text):
         """Return whether a message that goes away by itself contains a text."""
-        return any(text in note.text for note in self.state.notes)
+        return any(text in note.text for note in self.state.messages.notes)
 
     # What is shown
 
@@ -218,7 +219,7 @@ class Driver:
 
     def wait_for_loader(self):
         """Run frames until the file that is being read is shown or refused."""
-        loader = self.state.loader
+        loader = self.state.of(Files).loader
         if loader is not None:
             loader.wait()
         self.step(3)

@@ -8,7 +8,9 @@ from __future__ import annotations
 import copy
 
 import pytest
-from app.test_curves_panel import clip_text
+from app.curves.test_curves_panel import clip_text
+
+from viewer.app.posing.state import Posing
 
 
 @pytest.fixture(params=[True, False], ids=["trickled", "at once"])
@@ -104,15 +106,15 @@ def test_handle_of_a_joint_turns_from_the_press(hand, spread):
     pose = hand.dofs()
     place = _ring(hand)
     leap(hand, place, 0, spread)
-    assert hand.state.posing.drag is not None and (hand.dofs() == pose).all()
+    assert hand.state.of(Posing).drag is not None and (hand.dofs() == pose).all()
     hand.let_go()
     assert (hand.dofs() == pose).all()
 
 
 def _ring(hand):
     """Return a place on a ring of the tool Rotate."""
-    from viewer.app.gizmo import handle_at
-    from viewer.app.view_frame import view_frame
+    from viewer.app.core.view_frame import view_frame
+    from viewer.app.posing.gizmo import handle_at
 
     x, y, width, height = map(round, hand.state.view_rect)
     frame = view_frame(hand.state)

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import viewer
-from viewer.app.keys import KEYS, MOUSE
+from viewer.app.features import KEYS, MOUSE
 from viewer.commands import COMMANDS
 from viewer.commands._usage import command_parser
 from viewer.export import EXPORTERS

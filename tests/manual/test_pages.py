@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from manual.reference import FOLDER, with_tables
 
-from viewer.app.keys import KEYS
+from viewer.app.features import KEYS
 from viewer.cli import _protect_numbers
 from viewer.commands import COMMANDS
 from viewer.commands._usage import command_parser

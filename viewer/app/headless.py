@@ -6,8 +6,9 @@ import math
 
 from imgui_bundle import imgui, implot
 
+from viewer.app.core.state import AppState
+from viewer.app.files.state import Files
 from viewer.app.frame import Frame
-from viewer.app.state import AppState
 from viewer.app.theme import apply_theme
 from viewer.rendering.gpu.context import headless_context
 from viewer.rendering.gpu.target import Target
@@ -76,11 +77,11 @@ class HeadlessApp:
 
         Messages do not time out, however long drawing takes.
         """
-        for note in self.state.notes:
+        for note in self.state.messages.notes:
             note.until = math.inf
         self.state.framing.is_fitting = fits
         self.step(_SETTLE_FRAMES)
-        while self.state.stream is None and not self.state.framing.is_settled:
+        while self.state.of(Files).stream is None and not self.state.framing.is_settled:
             self.step(1)
         self.state.stats.frame_ms = 0.0  # the same picture every time
         self.step(1)

@@ -157,7 +157,7 @@ def _examine_window() -> Finding:
 
 
 def _examine_state_folder() -> Finding:
-    from viewer.app.recent import state_folder
+    from viewer.app.files.recent import state_folder
 
     folder = state_folder()
     existing = next((path for path in (folder, *folder.parents) if path.exists()), Path("/"))

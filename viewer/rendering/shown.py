@@ -125,13 +125,14 @@ def update_skeletons(
             key = id(actor.figure), pose.shape_weights.tobytes()
             groups.setdefault(key, []).append((actor, pose))
     for group in groups.values():
-        from viewer.rig.motion.instances import worlds
+        from viewer.rig.motion.instances import posed_worlds
 
         poses = [pose for _, pose in group]
         skeleton = shaped(group[0][0].figure, poses[0].shape_weights).skeleton
         assert skeleton is not None  # it is shown
-        for (actor, pose), world in zip(group, worlds(skeleton, poses), strict=True):
-            buffers.skeleton(actor).update(pose, world)
+        posed_worlds(skeleton, poses)  # together; each pose keeps its own
+        for actor, pose in group:
+            buffers.skeleton(actor).update(pose)
 
 
 def shows_mesh(figure: Figure, options: DisplayOptions) -> bool:

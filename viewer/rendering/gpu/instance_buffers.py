@@ -34,8 +34,9 @@ from viewer.rendering.view import View
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure
 from viewer.rig.kinematics import is_rigid, skinning_matrices
-from viewer.rig.motion.instances import local_rotations, placements, worlds
-from viewer.rig.pose import Pose, skinning_key
+from viewer.rig.motion.instances import local_rotations, placements, posed_worlds
+from viewer.rig.number_key import NumberKey
+from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
 from viewer.rig.skin import bind_positions
@@ -86,7 +87,7 @@ class CrowdBuffers:
         self._offsets = SummedOffsets(context, mesh, self._rest.way)
         self._how = Skinning()
         self._words: tuple[object, ...] = ()
-        self._keys: list[tuple[bytes, ...]] = []
+        self._keys: list[NumberKey] = []
         self._centers: Floats = np.zeros((0, 3))
         self._is_rigid: Bools = np.ones(0, dtype=np.bool_)
         self._rows: NDArray[np.float32] = np.zeros((0, self._n_joints, 3, 4), "f4")
@@ -113,7 +114,7 @@ class CrowdBuffers:
         """
         figure = shaped(self.mesh.figure, poses[0].shape_weights)
         words = (*skinning_words(how), poses[0].shape_weights.tobytes())
-        keys = [skinning_key(pose) for pose in poses]
+        keys = [pose.skinning_key for pose in poses]
         old = self._keys if words == self._words else []
         changed = [row for row, key in enumerate(keys) if row >= len(old) or key != old[row]]
         self._how, self._words, self.count = how, words, len(poses)
@@ -146,7 +147,7 @@ class CrowdBuffers:
         skeleton, skin, how = figure.skeleton, figure.skin, self._how
         assert skeleton is not None and skin is not None and self._palette is not None
         rotations = local_rotations(skeleton, poses)
-        palette = skinning_matrices(worlds(skeleton, poses, rotations), skin.inverse_bind)
+        palette = skinning_matrices(posed_worlds(skeleton, poses, rotations), skin.inverse_bind)
         self._is_rigid[rows] = is_rigid(palette)
         palette[..., :3, 3] += palette[..., :3, :3] @ self.mesh.center
         shares = self.mesh.skin(how).joint_shares

@@ -15,9 +15,10 @@ from viewer.rendering.options import Color, DisplayOptions
 from viewer.rendering.view import View, in_front, set_lights, set_model
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure
-from viewer.rig.kinematics import world_matrices
+from viewer.rig.kinematics import posed_skeleton, world_matrices
 from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.pose import Pose, rest_pose, skinning_key
+from viewer.rig.number_key import NumberKey
+from viewer.rig.pose import Pose, rest_pose
 from viewer.rig.shape import shaped
 from viewer.rig.skeleton import Skeleton
 
@@ -62,29 +63,26 @@ class SkeletonBuffers:
             self.world = keep(matrix_texture(context, skeleton.n_joints))
         self.center: Floats = np.zeros(3)
         self._arrays: dict[int, moderngl.VertexArray] = {}
-        self._key: tuple[bytes, ...] | None = None
+        self._key: NumberKey | None = None
 
     def is_current(self, pose: Pose) -> bool:
         """Return whether the joints' matrices are those of a pose."""
-        return self._key == skinning_key(pose)
+        return self._key == pose.skinning_key
 
-    def update(self, pose: Pose, world: Floats | None = None) -> None:
+    def update(self, pose: Pose) -> None:
         """Upload the joints' matrices if the pose changed.
 
         Parameters
         ----------
         pose : Pose
             DOFs in lengths and radians.
-        world : (J, 4, 4), optional
-            Its joint-to-figure matrices, if they are known; they are changed.
         """
-        key = skinning_key(pose)
+        key = pose.skinning_key
         if key == self._key:
             return
-        if world is None:
-            skeleton = shaped(self.figure, pose.shape_weights).skeleton
-            assert skeleton is not None  # shaping keeps it
-            world = world_matrices(skeleton, pose)
+        skeleton = shaped(self.figure, pose.shape_weights).skeleton
+        assert skeleton is not None  # shaping keeps it
+        world = posed_skeleton(skeleton, pose).world.copy()
         self.center = bounding_box(world[:, :3, 3]).mean(axis=0)
         world[:, :3, 3] -= self.center
         if self.n_joints > _CROWD:

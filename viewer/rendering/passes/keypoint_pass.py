@@ -54,7 +54,7 @@ class KeypointBuffers:
 
     def update(self, pose: Pose, skinning: Skinning) -> None:
         """Follow the pose."""
-        key = (repr(skinning), *pose_key(pose))
+        key = (repr(skinning), pose_key(pose))
         if key != self._key:
             points = posed_keypoints(self.figure, pose, skinning)
             self.center = bounding_box(points).mean(axis=0)

@@ -24,8 +24,8 @@ from viewer.rendering.gpu.upload import (
 )
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
-from viewer.rig.kinematics import is_rigid, skinning_matrices, world_matrices
-from viewer.rig.pose import Pose, skinning_key
+from viewer.rig.kinematics import is_rigid, posed_skeleton
+from viewer.rig.pose import Pose
 from viewer.rig.shape import shaped
 from viewer.rig.skin import bind_positions
 from viewer.rig.skinning import METHODS, Skinning
@@ -96,7 +96,7 @@ class PosedMesh:
         """
         how = Skinning(skinning) if isinstance(skinning, str) else skinning
         attached = self.mesh.figure.is_attached and pose is not None
-        key = (*skinning_words(how), *skinning_key(pose)) if attached and pose else ("binding",)
+        key = (*skinning_words(how), pose.skinning_key) if attached and pose else ("binding",)
         if key == self._key:
             return
         self.center = self.mesh.center
@@ -142,7 +142,7 @@ class PosedMesh:
         """Upload T(-center') M T(center): the shader sees small numbers on both sides."""
         skeleton, skin = figure.skeleton, figure.skin
         assert skeleton is not None and skin is not None  # the caller looked
-        palette = skinning_matrices(world_matrices(skeleton, pose), skin.inverse_bind)
+        palette = posed_skeleton(skeleton, pose).palette(skin).copy()
         self._is_affine = not is_rigid(palette)
         palette[:, :3, 3] += palette[:, :3, :3] @ self.mesh.center
         if buffers.joint_shares.any():

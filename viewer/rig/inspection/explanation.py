@@ -12,7 +12,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.inspection.single_vertices import check_vertices, rest_vertices
-from viewer.rig.kinematics import skinning_matrices, world_matrices
+from viewer.rig.kinematics import posed_skeleton
 from viewer.rig.pose import Pose, placement_matrix
 from viewer.rig.scalars import joint_text
 from viewer.rig.shape import shaped
@@ -159,7 +159,7 @@ def explain(figure: Figure, pose: Pose, skinning: Skinning, vertex: int) -> Expl
     assert mesh is not None and skeleton is not None and skin is not None  # it is attached
     rest = rest_vertices(figure, pose, chosen, skinning.correctives)[0]
     row = strongest_first(skin_rows(skin_used(skin, skinning), chosen))
-    palette = skinning_matrices(world_matrices(skeleton, pose), skin.inverse_bind)
+    palette = posed_skeleton(skeleton, pose).palette(skin)
     matrices = palette[row.joints]
     images = matrices[:, :3, :3] @ rest + matrices[:, :3, 3]
     terms = row.weights[:, None] * images

@@ -10,7 +10,7 @@ from viewer.rig.blendshapes import corrective_weights
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.geometry.vectors import unit
-from viewer.rig.kinematics import skinning_matrices, world_matrices
+from viewer.rig.kinematics import posed_skeleton
 from viewer.rig.pose import Pose, joint_rotations, placement_matrix, rest_pose
 from viewer.rig.shape import shaped
 from viewer.rig.skinning import Skinning, skinned
@@ -53,7 +53,7 @@ def deform_vertices(
         moved, normals = mesh.positions[vertices], unit(mesh.normals[vertices])
         return moved if pose is None else apply_transform(placement_matrix(pose), moved), normals
     pose = rest_pose(skeleton) if pose is None else pose
-    palette = skinning_matrices(world_matrices(skeleton, pose), skin.inverse_bind)
+    palette = posed_skeleton(skeleton, pose).palette(skin)
     rest = rest_vertices(figure, pose, vertices, skinning.correctives)
     moved, normals = skinned(mesh, skin, rest, palette, skinning, vertices)
     return apply_transform(placement_matrix(pose), moved), normals

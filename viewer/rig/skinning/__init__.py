@@ -14,7 +14,7 @@ from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.geometry.vectors import unit
-from viewer.rig.kinematics import skinning_matrices, world_matrices
+from viewer.rig.kinematics import posed_skeleton, skinning_matrices, world_matrices
 from viewer.rig.memo import Memo
 from viewer.rig.mesh import Mesh
 from viewer.rig.pose import Pose, placement_matrix, rest_pose
@@ -152,7 +152,7 @@ def deform(
         moved, normals = mesh.positions, unit(mesh.normals)
     else:
         pose = rest_pose(figure.skeleton) if pose is None else pose
-        palette = skinning_matrices(world_matrices(figure.skeleton, pose), figure.skin.inverse_bind)
+        palette = posed_skeleton(figure.skeleton, pose).palette(figure.skin)
         rest = rest_positions(figure, mesh, pose, how.correctives)
         moved, normals = skinned(mesh, figure.skin, rest, palette, how)
     return moved.copy() if pose is None else apply_transform(placement_matrix(pose), moved), normals
@@ -255,7 +255,7 @@ def joint_matrices(figure: Figure, pose: Pose) -> Floats:
     """
     skeleton = shaped(figure, pose.shape_weights).skeleton
     assert skeleton is not None  # shaping keeps it
-    return placement_matrix(pose) @ world_matrices(skeleton, pose)
+    return placement_matrix(pose) @ posed_skeleton(skeleton, pose).world
 
 
 _varied: Memo[Skin, Skin] = Memo(kept=4)
