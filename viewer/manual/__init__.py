@@ -58,6 +58,6 @@ def page_text(topic: str) -> str:
 
 
 def _topic_of_link(link: re.Match[str]) -> str:
-    """Name the topic where the label of a link does not."""
+    """Return the label of a link and the topic of its page, which is named once."""
     label, topic = link[1], link[2]
-    return label if label.lower() == topic else f"{label} (topic {topic})"
+    return f"topic {topic}" if label == topic else f"{label} (topic {topic})"
