@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 
 from imgui_bundle import imgui
@@ -19,6 +20,7 @@ _TOPICS = 8.5  # letters' heights across
 _TITLE = 1.35  # times the usual letters
 _TITLE_COLOR = (1.0, 0.78, 0.45, 1.0)
 _CODE_COLOR = (0.72, 0.85, 0.95, 1.0)
+_ALIGNED = re.compile(" {2,}#")
 _NARROWEST, _WIDEST = 6, 60  # letters that a column is given room for
 
 
@@ -133,7 +135,8 @@ def _draw_code(text: str, number: int) -> None:
     scrolls = imgui.WindowFlags_.horizontal_scrollbar
     if imgui.begin_child(f"##code {number}", (0.0, 0.0), flags, scrolls):
         imgui.push_style_color(imgui.Col_.text, _CODE_COLOR)
-        imgui.text_unformatted(text)
+        # Blanks that align comments do so only where all letters are equally wide.
+        imgui.text_unformatted(_ALIGNED.sub("   #", text))
         imgui.pop_style_color()
     imgui.end_child()
 
