@@ -1,7 +1,7 @@
 # Two commands for a fresh machine with python3 and make:
 #   make run    open the bundled figure (without a display: write its picture here)
 #   make test   run all tests
-# Others: make lint, make bench, make golden, make figure, make clean.
+# Others: make lint, make bench, make golden, make manual, make figure, make clean.
 
 PYTHON ?= python3
 VENV ?= .venv
@@ -9,7 +9,7 @@ WORKERS ?= auto
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: run test lint bench golden figure system clean
+.PHONY: run test lint bench golden manual figure system clean
 
 # A window may open even where pictures cannot be drawn without one: go on either way.
 run: $(READY)
@@ -34,6 +34,10 @@ bench: $(READY) system
 
 golden: $(READY) system
 	@VIEWER_UPDATE_GOLDEN=1 $(BIN)/python -m pytest -q tests/rendering tests/app
+
+# Writes the reference tables of the manual anew, from the registries.
+manual: $(READY)
+	@$(BIN)/python tests/manual/reference.py
 
 # Makes the bundled figures anew; they need scipy and scikit-image beside the rest.
 figure: $(READY)

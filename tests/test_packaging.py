@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from viewer.manual import PAGES
+
 ROOT = Path(__file__).resolve().parent.parent
 
 
@@ -35,12 +37,13 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return next(folder.glob("*.whl"))
 
 
-def test_wheel_ships_shaders_and_assets_but_no_generators(wheel: Path) -> None:
+def test_wheel_ships_shaders_assets_and_manual_but_no_generators(wheel: Path) -> None:
     names = zipfile.ZipFile(wheel).namelist()
     assert "viewer/shaders/skin.vert" in names
     assert "viewer/shaders/skin/lbs.glsl" in names
     assert "viewer/assets/samples/fox.skin" in names
     assert "viewer/assets/samples/fox.png" in names
+    assert {f"viewer/manual/{topic}.md" for topic in PAGES} <= set(names)
     assert not [name for name in names if "assets/" in name and name.endswith(".py")]
     assert not [name for name in names if name.startswith(("tests/", "shaders/", "assets/"))]
 
@@ -56,6 +59,7 @@ def test_wheel_draws_the_bundled_figure_in_an_empty_environment(
     viewer = tmp_path / "venv" / "bin" / "viewer"
     printed = call(viewer, "render", "-o", picture, "--size", "320x240", cwd=tmp_path)
     assert printed.startswith(str(picture))
+    assert call(viewer, "help", "keys", cwd=tmp_path).startswith("# Keys")
     where = call(python, "-c", "import viewer; print(viewer.__file__)", cwd=tmp_path)
     assert str(tmp_path) in where
     from PIL import Image

@@ -88,13 +88,3 @@ def test_public_names_exist_and_are_documented() -> None:
     for name in viewer.__all__:
         value = getattr(viewer, name)
         assert value.__doc__ and value.__doc__.strip(), name
-
-
-def test_readme_lists_every_key_format_and_command() -> None:
-    readme = (PACKAGE.parent / "README.md").read_text()
-    for key in KEYS:
-        assert f"| {key.label} | {key.text} |" in readme, key.label
-    for kind in FORMATS.values():
-        assert all(f"`{suffix}`" in readme for suffix in kind.suffixes)
-    for command in COMMANDS:
-        assert f"viewer {command}" in readme or command == "view"

@@ -6,6 +6,7 @@ from viewer.app.core.state import AppState
 from viewer.app.files.state import Files
 from viewer.app.keys import Keyboard
 from viewer.app.linting.state import Linting
+from viewer.app.manual.manual_window import Manual
 from viewer.app.posing.tool_actions import cancel_drag
 from viewer.app.recording.state import Recording
 from viewer.app.rigging.tools import drop_rig_tool
@@ -21,6 +22,7 @@ def cancel(state: AppState) -> None:
     recording = state.of(Recording)
     keyboard = state.of(Keyboard)
     linting = state.of(Linting)
+    manual = state.of(Manual)
     if cancel_drag(state):
         return
     if state.error:
@@ -29,6 +31,8 @@ def cancel(state: AppState) -> None:
         files.dialog = None
     elif state.messages.is_open:
         state.messages.is_open = False
+    elif manual.topic:
+        manual.topic = ""
     elif files.loader is not None:
         files.loader = None
         state.say_status("Opening was cancelled")

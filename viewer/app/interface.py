@@ -9,6 +9,7 @@ from imgui_bundle import imgui
 from viewer.app.core.reasons import no_panel
 from viewer.app.core.state import AppState
 from viewer.app.features import PANELS, Panel, panel_module
+from viewer.app.manual.manual_window import draw_manual
 from viewer.app.menus import draw_menus
 from viewer.app.message_window import draw_error, draw_message_window
 from viewer.app.overlays import draw_overlays
@@ -45,6 +46,7 @@ def draw_interface(state: AppState) -> list[Path]:
         state.view_rect = (viewport.pos.x, viewport.pos.y, viewport.size.x, viewport.size.y)
     draw_overlays(state)
     draw_message_window(state)
+    draw_manual(state)
     draw_error(state)
     return chosen
 

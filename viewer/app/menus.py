@@ -25,6 +25,7 @@ from viewer.app.files.motion_dialog import ask_for_motion
 from viewer.app.files.state import Files
 from viewer.app.keys import Keyboard
 from viewer.app.linting.actions import check_rig
+from viewer.app.manual.manual_window import draw_manual_menu
 from viewer.app.posing.pose_actions import (
     copy_numbers,
     copy_pose,
@@ -73,6 +74,7 @@ def draw_menus(state: AppState) -> list[Path]:
     if begin_menu(state, "Help"):
         if menu_item(state, "Keys", "H", keyboard.is_listed):
             keyboard.is_listed = not keyboard.is_listed
+        draw_manual_menu(state)
         imgui.end_menu()
     imgui.end_main_menu_bar()
     return chosen

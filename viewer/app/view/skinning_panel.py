@@ -12,7 +12,6 @@ from viewer.rig.skinning import METHODS, Skinning
 
 __all__ = ["draw"]
 
-_SHORT = {"lbs": "LBS", "dqs": "DQS", "mix": "Mixed"}
 _CLAMP = imgui.SliderFlags_.always_clamp
 _ENGINE = 4  # influences of most engines
 
@@ -31,18 +30,25 @@ def draw(state: AppState) -> None:
 
 
 def _draw_method(state: AppState, skinning: Skinning) -> None:
-    for number, (key, text) in enumerate(_SHORT.items()):
+    for number, (key, method) in enumerate(METHODS.items()):
         if number:
             imgui.same_line()
-        if imgui.radio_button(text, skinning.method == key):
+        if imgui.radio_button(method.short, skinning.method == key):
             skinning.method = key
-        note_item(state, text)
+        note_item(state, method.short)
         if imgui.is_item_hovered():
-            imgui.set_tooltip(METHODS[key])
-    shown = {"lbs": 0.0, "dqs": 1.0}.get(skinning.method, skinning.share)
-    share = slider(state, "DQS share", shown, 0.0, 1.0, flags=_CLAMP)
+            imgui.set_tooltip(method.title)
+    for key, method in METHODS.items():
+        if method.ends:
+            _draw_share(state, skinning, key, method.ends)
+
+
+def _draw_share(state: AppState, skinning: Skinning, key: str, ends: tuple[str, ...]) -> None:
+    """Draw the blend factor of a method between two others; moving it selects the method."""
+    shown = dict(zip(ends, (0.0, 1.0), strict=True)).get(skinning.method, skinning.share)
+    share = slider(state, f"{METHODS[ends[1]].short} share", shown, 0.0, 1.0, flags=_CLAMP)
     if share != shown:
-        skinning.method, skinning.share = "mix", share
+        skinning.method, skinning.share = key, share
 
 
 def _draw_influences(state: AppState, figure: Figure, skinning: Skinning) -> None:

@@ -123,7 +123,7 @@ def _draw_head(state: AppState, one: Explanation) -> None:
     pinned = weights.pinned
     assert pinned is not None  # it is explained
     name = printable(state.scene.actors[pinned.actor].name, _LONGEST)
-    imgui.text_wrapped(f"Vertex {one.vertex} of {name}: {METHODS[one.skinning.method]}")
+    imgui.text_wrapped(f"Vertex {one.vertex} of {name}: {METHODS[one.skinning.method].title}")
     if button(state, "Copy as text"):
         imgui.set_clipboard_text("\n".join(explanation_text(one, _COPIED_DIGITS)))
         state.say_status("The explanation was copied")
@@ -228,9 +228,12 @@ def _draw_quaternions(sheet: _Sheet, name: str, values: Floats) -> None:
 def _draw_end(sheet: _Sheet, one: Explanation) -> None:
     """Draw where the vertex ends up."""
     imgui.separator()
-    if one.skinning.method == "mix":
-        imgui.text_wrapped(f"{one.skinning.share:.2f} of the way from LBS to DQS")
-        _draw_rows(sheet, "mixed", [("skinned", one.skinned)])
+    method = METHODS[one.skinning.method]
+    if method.result:
+        ends = " to ".join(METHODS[end].short for end in method.ends)
+        text = method.result.format(share=f"{one.skinning.share:.2f}")
+        imgui.text_wrapped(f"{text} from {ends}" if ends else text)
+        _draw_rows(sheet, "result", [("skinned", one.skinned)])
     if not np.array_equal(one.placement, np.eye(4)):
         factor = one.placement[0, :1]
         _draw_rows(sheet, "placed", [("times", factor), ("plus", one.placement[:3, 3])])

@@ -9,6 +9,7 @@ views that draw a mesh several times take the posed buffers of single actors.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import moderngl
@@ -40,7 +41,7 @@ from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
 from viewer.rig.skin import bind_positions
-from viewer.rig.skinning import Skinning
+from viewer.rig.skinning import METHODS, Skinning
 from viewer.rig.skinning.dqs import split_palette
 
 __all__ = ["InstanceBuffers"]
@@ -121,7 +122,8 @@ class InstanceBuffers:
         if changed:
             self._keys = []  # a refusal leaves nothing that passes for done
             self._reserve(len(poses))
-            self._rest.update(figure, poses[0], correct=False)
+            # The sums of pose correctives differ from actor to actor and are sent apart.
+            self._rest.update(figure, poses[0], replace(how, correctives=False))
             self._write(figure, [poses[row] for row in changed], np.array(changed))
             self.n_updates += 1
         self._keys = keys
@@ -153,10 +155,11 @@ class InstanceBuffers:
         moved = np.einsum("j,aji->ai", shares, palette[..., :3, 3])
         self._centers[rows] = moved if shares.any() else self.mesh.center
         palette[..., :3, 3] -= self._centers[rows, None]
-        if how.method != "dqs":
+        method = METHODS[how.method]
+        if method.uses_matrices:
             self._rows[rows] = palette[..., :3, :]
             write_stacked(self._palette, self._rows[: self.count])
-        if how.method != "lbs":
+        if method.uses_quaternions:
             if self._rigid is None:
                 self._rigid = rigid_texture(self.context, len(self._rows) * self._n_joints)
             binds = np.tile(bind_positions(skin) - self.mesh.center, (len(poses), 1))
@@ -225,14 +228,15 @@ class InstanceBuffers:
         key = (id(indices), id(skin), id(self._rest.positions))
 
         def content() -> list[Any]:
-            buffers = (
-                (self._rest.positions, "3f4", "in_position"),
-                (self._rest.normals, "3f4", "in_normal"),
-                (skin.bindings, "4u4", "in_bindings"),
-                (mesh.uvs, "2f4", "in_uv"),
-                (mesh.colors, "3f4", "in_color"),
-            )
-            found: list[Any] = [row for row in buffers if row[2] in program and row[0] is not None]
+            found: list[Any] = self._rest.attributes(program, skin)
+            found += [
+                (buffer, layout, name)
+                for buffer, layout, name in (
+                    (mesh.uvs, "2f4", "in_uv"),
+                    (mesh.colors, "3f4", "in_color"),
+                )
+                if name in program and buffer is not None
+            ]
             # What the compiler dropped is skipped, four bytes a number.
             layout = " ".join(
                 f"{size}f4" if name in program else f"{4 * size}x" for name, size in _PER_INSTANCE

@@ -29,7 +29,7 @@ from viewer.rig.kinematics import is_rigid, posed_skeleton
 from viewer.rig.pose import Pose
 from viewer.rig.shape import shaped
 from viewer.rig.skin import bind_positions
-from viewer.rig.skinning import Skinning
+from viewer.rig.skinning import METHODS, Skinning
 from viewer.rig.skinning.dqs import split_palette
 
 __all__ = ["PosedMesh", "skinning_words"]
@@ -110,7 +110,7 @@ class PosedMesh:
     def upload(self, pose: Pose, how: Skinning) -> None:
         """Send what a pose needs and skin nothing: the processor's part of ``update``."""
         figure = shaped(self.mesh.figure, pose.shape_weights)
-        self._rest.update(figure, pose, how.correctives)
+        self._rest.update(figure, pose, how)
         self._write_palette(figure, pose, how, self.mesh.skin(how))
 
     def _run(self, skin: SkinBuffers, how: Skinning, attached: bool) -> None:
@@ -149,27 +149,23 @@ class PosedMesh:
         if buffers.joint_shares.any():
             self.center = buffers.joint_shares @ palette[:, :3, 3]
         palette[:, :3, 3] -= self.center
-        if how.method != "dqs":
+        method = METHODS[how.method]
+        if method.uses_matrices:
             write_matrices(self._palette, palette)
-        if how.method != "lbs":
+        if method.uses_quaternions:
             if self._rigid is None:
                 self._rigid = self._owner.keep(rigid_texture(self.context, self._n_joints))
             centers = bind_positions(skin) - self.mesh.center
             write_rigid(self._rigid, *split_palette(palette, centers))
 
     def _array(self, method: str, skin: SkinBuffers, attached: bool) -> moderngl.VertexArray:
-        mesh, rest = self.mesh, self._rest
-        positions = rest.positions if attached else mesh.positions
-        normals = rest.normals if attached else mesh.normals
         # Rigid joints, by far the most common, get a program that does not pay for the others.
         affine = attached and self._is_affine
         program = self.programs.feedback("skin", method, ("v_position", "v_normal"), affine)
-        attributes = [
-            (positions, "3f4", "in_position"),
-            (normals, "3f4", "in_normal"),
-            (skin.bindings, "4u4", "in_bindings"),
-        ]
-        return self._arrays.get(program, lambda: attributes, key=(id(skin), id(positions)))
+        key = (id(skin), attached and id(self._rest.positions))
+        return self._arrays.get(
+            program, lambda: self._rest.attributes(program, skin, attached), key=key
+        )
 
     def read(self) -> tuple[Floats, Floats]:
         """Return what was drawn last: positions in figure space and normals, (V, 3) each.
