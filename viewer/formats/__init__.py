@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from viewer.errors import FormatError, UnsupportedFormatError, printable
-from viewer.formats._faults import Fault
 from viewer.formats._references import referenced_path
 from viewer.formats._source import MAX_SIZE, Source
 from viewer.formats._texture import read_picture
@@ -54,7 +53,6 @@ __all__ = [
     "MAX_SIZE",
     "MESHES",
     "SUFFIXES",
-    "Fault",
     "Format",
     "Source",
     "all_or_none",

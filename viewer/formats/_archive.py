@@ -15,8 +15,8 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from viewer.diagnostics import Part
 from viewer.errors import FormatError, counted, printable
-from viewer.formats._faults import Part
 from viewer.formats._floats import in_double, widened
 from viewer.formats._source import Source
 from viewer.rig.arrays import Deferred
@@ -267,7 +267,7 @@ class Archive:
         """Raise an error, or note it, as ``Source.refuse`` does."""
         if self.source is None:
             raise error
-        self.source.refuse(error, count, part, places)
+        self.source.refuse_error(error, count, part, places)
 
     def error(self, key: str, message: str) -> FormatError:
         """Return an error that names the file and the key."""

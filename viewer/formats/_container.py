@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.diagnostics import Part
 from viewer.formats._archive import Archive
 from viewer.formats._archive_opening import open_archive
-from viewer.formats._faults import Part
 from viewer.formats._numbers import LARGEST
 from viewer.formats._source import Source
 from viewer.formats._tolerant import mended_corners

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.diagnostics import Part
 from viewer.errors import FormatError
-from viewer.formats._faults import Part
 from viewer.formats._numbers import parse_numbers
 from viewer.formats._source import Source, no_number
 from viewer.formats._tolerant import read_words, refuse_words
@@ -113,7 +113,7 @@ def read_broken_table(source: Source, columns: int, part: Part) -> tuple[Floats,
             f"expected {columns} numbers in a row, found {sizes[wrong[0]]}",
             int(words.offsets[begins[wrong[0]]]),
         )
-        source.refuse(error, len(wrong), part, wrong)
+        source.refuse_error(error, len(wrong), part, wrong)
     rows = np.full((len(begins), columns), np.nan)
     rows[fits] = words.values[begins[fits, None] + np.arange(columns)]
     return rows, words.offsets[begins]

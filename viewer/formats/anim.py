@@ -23,8 +23,9 @@ import numpy as np
 from viewer.errors import FormatError, UnsupportedFormatError
 from viewer.formats._numbers import to_number
 from viewer.formats._reach import FARTHEST, within_text
-from viewer.formats._source import Source, no_number, shown
+from viewer.formats._source import Source, no_number
 from viewer.media.saving import save_text
+from viewer.phrases import quoted
 from viewer.rig.figure import Figure
 from viewer.rig.motion.clip import (
     EXTRAPOLATIONS,
@@ -98,7 +99,7 @@ class _Parser:
             elif text == b"channel":
                 channels.append(self._channel(len(channels)))
             else:
-                raise self._error(f"expected a channel, found {shown(text)}")
+                raise self._error(f"expected a channel, found {quoted(text)}")
         self._finish(count, stated, len(channels))
         self.source.remember("channels", self.starts.__getitem__)
         return Clip(self.source.path.stem, tuple(channels), *(span or self._key_span(channels)))
@@ -124,11 +125,11 @@ class _Parser:
             self.source.warn('the last "}" is missing')
         if count != found:
             wanted = "numchannels" if count is None else f"{count} channels as numchannels says"
-            self.source.refuse(self._error(f"expected {wanted}, found {found}", stated))
+            self.source.refuse_error(self._error(f"expected {wanted}, found {found}", stated))
         self._advance()
         if self.word is not None:
             self.source.warn(
-                f"ignored what follows the animation, {shown(self.word.group())}",
+                f"ignored what follows the animation, {quoted(self.word.group())}",
                 self.word.start(),
             )
 
@@ -154,7 +155,7 @@ class _Parser:
                 self._advance()
                 rows = self._keys()
             else:
-                raise self._error(f"expected extrapolate or keys, found {shown(text)}")
+                raise self._error(f"expected extrapolate or keys, found {quoted(text)}")
         self._expect(b"}")
         return self._make_channel(index, rows or [], extrapolation)
 
@@ -198,7 +199,7 @@ class _Parser:
         self.what = self.what.split(",")[0]
         if len(rows) + lost != count:
             found = f"expected {count} keys, found {len(rows) + lost}"
-            self.source.refuse(self._error(found, stated))
+            self.source.refuse_error(self._error(found, stated))
         self._expect(b"}")
         return rows
 
@@ -217,7 +218,7 @@ class _Parser:
         )
 
     def _found(self) -> str:
-        return "the end of the file" if self.word is None else shown(self.word.group())
+        return "the end of the file" if self.word is None else quoted(self.word.group())
 
     def _expect(self, text: bytes) -> None:
         if self.word is None or self.word.group() != text:
@@ -234,10 +235,10 @@ class _Parser:
             error = self._error(f"{item}: {no_number(word)}")
             if not of_key or self.word is None or self.word.group() in (b"{", b"}"):
                 raise error
-            self.source.refuse(error)
+            self.source.refuse_error(error)
             value = math.nan
         elif item == "value" and abs(value) > FARTHEST:
-            self.source.refuse(self._error(f"{item}: {within_text(value)}"))
+            self.source.refuse_error(self._error(f"{item}: {within_text(value)}"))
             value = math.nan
         self._advance()
         return value
@@ -271,7 +272,7 @@ class _Parser:
             )
             if self.word is None or text in (b"{", b"}"):
                 raise error
-            self.source.refuse(error)
+            self.source.refuse_error(error)
             tangent = "smooth"
         self._advance()
         return tangent

@@ -258,5 +258,5 @@ def _within_reach(source: Source, shifts: Floats, names: list[str]) -> Floats:
         at = int(np.abs(shifts[frame]).argmax())
         text = f"frame {frame}: {printable(names[at], 80)}: {within_text(shifts[frame, at])}"
         error = source.error(text, source.offset_of("frames", frame))
-        source.refuse(error, int(is_far.sum()), "frames", np.flatnonzero(is_far))
+        source.refuse_error(error, int(is_far.sum()), "frames", np.flatnonzero(is_far))
     return held_rows(shifts, is_far)

@@ -137,7 +137,7 @@ def _columns(part: Part, columns: slice, end: int, what: str, rows_of: Part | No
         found = f"found {values[row, column]:.16g}{proof}"
         error = part.error(f"expected a {what} from 0 to {end - 1}, {found}", row)
         is_mesh = part.name.startswith("faces_vert")
-        part.source.refuse(error, len(wrong), "triangles" if is_mesh else "", wrong[:, 0])
+        part.source.refuse_error(error, len(wrong), "triangles" if is_mesh else "", wrong[:, 0])
     if fits.all():
         return values.astype(np.int32)
     if values.shape[1] == 3:
@@ -151,7 +151,7 @@ def _parents(part: Part) -> Ints:
     for joint, parent in enumerate(parents.tolist()):
         problem = _parent_error(part, parents, joint, parent)
         if problem is not None:
-            part.source.refuse(problem, 1, "joints", [joint])
+            part.source.refuse_error(problem, 1, "joints", [joint])
         if problem is not None or np.isnan(parent):
             result[joint] = 0.0 if joint else -1.0
     return result.astype(np.int32)
@@ -211,7 +211,7 @@ def _skin(source: Source, parts: dict[str, Part], joints: Floats, n_vertices: in
             f"expected each pair once, found joint {columns[row]} and vertex {vertices[row]} again",
             int(rows[row]),
         )
-        part.source.refuse(error, len(twice))
+        part.source.refuse_error(error, len(twice))
     skin = skin_from_entries(n_vertices, vertices, columns, weights, translation_matrix(-joints))
     if source.faults is None:  # whoever wants all faults looks at the weights in full
         _check_weights(source, part, skin)
@@ -228,7 +228,7 @@ def _note_lost(part: Part, vertices: Ints, usable: Bools) -> None:
     """Note whose weights are not all there; what is wrong with their rows was said already."""
     lost = np.flatnonzero(~usable & (vertices >= 0))
     error = part.error("rows that cannot be used", None)
-    part.source.refuse(error, 0, "weights", vertices[lost])
+    part.source.refuse_error(error, 0, "weights", vertices[lost])
 
 
 def _check_weights(source: Source, part: Part, skin: Skin) -> None:

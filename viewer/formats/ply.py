@@ -133,7 +133,7 @@ def _columns(source: Source, table: Table, names: tuple[str, ...]) -> Floats | N
         message = f"{table.element.name} {odd[0]}: expected finite {' '.join(names)}"
         error = source.error(f"{message}, found {worst:g}", table.offset(int(odd[0])))
         count = int((~(np.abs(values) <= LARGEST)).sum())
-        source.refuse(error, count, "positions" if names == ("x", "y", "z") else "", odd)
+        source.refuse_error(error, count, "positions" if names == ("x", "y", "z") else "", odd)
         values[odd] = np.nan
     return values
 
@@ -165,7 +165,7 @@ def _faces(
             faces.offset(face),
         )
         owners = np.repeat(np.arange(len(counts)), counts)
-        source.refuse(error, len(wrong), "triangles", triangles_of(counts, owners[wrong]))
+        source.refuse_error(error, len(wrong), "triangles", triangles_of(counts, owners[wrong]))
         corners[wrong] = -1
         corners = first_known(corners, counts, owners)
     small = counts < 3
@@ -197,7 +197,7 @@ def _wedges(source: Source, faces: Table, counts: Indices) -> Floats | None:
     odd = np.flatnonzero(~(np.abs(uvs) <= LARGEST).all(axis=1))
     if len(odd):
         face = int(np.searchsorted(np.cumsum(counts), odd[0], side="right"))
-        source.refuse(
+        source.refuse_error(
             source.error(f"face {face}: expected finite texcoord, found {uvs[odd[0]].max():g}"),
             len(odd),
         )
@@ -245,7 +245,7 @@ def _note_words(source: Source, table: Table, names: list[str]) -> None:
             continue
         row, count = int(np.isnan(column).argmax()), int(np.isnan(column).sum())
         message = f"{table.element.name} {row}: expected a number for {printable(name, 40)}"
-        source.refuse(source.error(f"{message}, found a word", table.offset(row)), count)
+        source.refuse_error(source.error(f"{message}, found a word", table.offset(row)), count)
 
 
 def _report(source: Source, tables: dict[str, Table], uses_wedges: bool) -> None:

@@ -18,7 +18,8 @@ from pathlib import Path
 from viewer.errors import FormatError
 from viewer.formats._numbers import to_number
 from viewer.formats._references import referenced_path
-from viewer.formats._source import Source, shown
+from viewer.formats._source import Source
+from viewer.phrases import quoted
 
 __all__ = ["NamedFiles", "read"]
 
@@ -69,7 +70,7 @@ def read(source: Source) -> NamedFiles:
     if not words:
         source.warn('the last "}" is missing')
     elif len(words) > 1:
-        source.warn(f"ignored what follows the rig, {shown(words[-2].group())}", words[-2].start())
+        source.warn(f"ignored what follows the rig, {quoted(words[-2].group())}", words[-2].start())
     if not files:
         where = words[-1].start() if words else source.end
         raise source.error("expected a skeleton or a skin, found no name of a file", where)
@@ -82,7 +83,7 @@ def _item(source: Source, words: Words) -> list[Path]:
         return [_file(source, words, word.group().decode())]
     if word.group() != b"morphs":
         raise source.error(
-            f"expected skeleton, skin or morphs, found {shown(word.group())}", word.start()
+            f"expected skeleton, skin or morphs, found {quoted(word.group())}", word.start()
         )
     count = to_number(words[-1].group()) if words else None
     if count is None or count != int(count) or count < 0:
@@ -105,7 +106,7 @@ def _file(source: Source, words: Words, what: str) -> Path:
     path = referenced_path(source.path.parent, _text(word))
     if path is None:
         raise source.error(
-            f"{what}: expected a file below the folder of the .rig, found {shown(word.group())}",
+            f"{what}: expected a file below the folder of the .rig, found {quoted(word.group())}",
             word.start(),
         )
     return path
@@ -123,6 +124,6 @@ def _expect(source: Source, words: Words, text: bytes) -> None:
 
 def _wrong(source: Source, words: Words, expected: str) -> FormatError:
     """Return an error at the next word."""
-    there = shown(words[-1].group()) if words else "the end of the file"
+    there = quoted(words[-1].group()) if words else "the end of the file"
     where = words[-1].start() if words else source.end
     return source.error(f"{expected}, found {there}", where)

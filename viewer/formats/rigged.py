@@ -29,10 +29,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.diagnostics import Part
 from viewer.errors import RigError
 from viewer.formats._archive import Archive
 from viewer.formats._container import archive_of, corners_of, finite
-from viewer.formats._faults import Part
 from viewer.formats._source import Source
 from viewer.formats._tolerant import mended_positions
 from viewer.media.saving import save_arrays

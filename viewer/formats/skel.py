@@ -24,7 +24,8 @@ import numpy as np
 from viewer.errors import FormatError, counted
 from viewer.formats._numbers import is_infinite, is_number, to_number
 from viewer.formats._skel.writing import KEYWORDS, UNLIMITED, write
-from viewer.formats._source import Source, no_number, shown
+from viewer.formats._source import Source, no_number
+from viewer.phrases import quoted
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.posing.dof_text import beyond_text
@@ -137,7 +138,7 @@ class _Parser:
             self._advance()
         joint = _Joint(" ".join(name), self.open[-1] if self.open else -1, start)
         if self.word is None or self.word.group() != b"{":
-            found = "the end of the file" if self.word is None else shown(self.word.group())
+            found = "the end of the file" if self.word is None else quoted(self.word.group())
             where = start if self.word is None else self.word.start()
             raise self.source.error(f'joint {_called(joint)}: expected "{{", found {found}', where)
         self.open.append(len(self.found))
@@ -177,7 +178,7 @@ class _Parser:
         if self.word is not None and is_number(self.word.group()):
             error = self.source.error(
                 f"{self._item(keyword)}: expected {count} numbers, found more: "
-                f"{shown(self.word.group())}",
+                f"{quoted(self.word.group())}",
                 self.word.start(),
             )
             self._refuse(error, keyword)
@@ -187,7 +188,9 @@ class _Parser:
     def _refuse(self, error: FormatError, keyword: Word) -> None:
         """Refuse an item; where faults are noted, go on behind it."""
         moves = keyword.group() == b"offset"
-        self.source.refuse(error, 1, "joints" if moves else "", [self.open[-1]] if moves else ())
+        self.source.refuse_error(
+            error, 1, "joints" if moves else "", [self.open[-1]] if moves else ()
+        )
         self._skip_item()
 
     def _skip_item(self, on_line: bool = True) -> None:
@@ -224,7 +227,7 @@ class _Parser:
         """Skip a word we do not know with its line and numbers, or its whole balanced block."""
         assert self.word is not None  # the caller looked at it
         keyword = self.word
-        self.source.warn(f"skipped unknown {shown(keyword.group())}", keyword.start())
+        self.source.warn(f"skipped unknown {quoted(keyword.group())}", keyword.start())
         if keyword.group() != b"{":
             self._advance()
             # One warning for its whole line: "colour red" is one thing that we do not know.
@@ -238,7 +241,7 @@ class _Parser:
             if depth == 0:
                 return
         raise self.source.error(
-            f"{shown(keyword.group())} is still open where the file ends", keyword.start()
+            f"{quoted(keyword.group())} is still open where the file ends", keyword.start()
         )
 
     def _finds_block(self) -> bool:
@@ -268,7 +271,7 @@ class _Parser:
 
 
 def _called(joint: _Joint) -> str:
-    return shown(joint.name.encode("utf-8", "surrogateescape"))[1:-1] or "without a name"
+    return quoted(joint.name.encode("utf-8", "surrogateescape"))[1:-1] or "without a name"
 
 
 def _skeleton(source: Source, joints: list[_Joint]) -> tuple[Skeleton, Floats]:

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 
 from viewer.errors import FormatError, printable
 from viewer.formats._numbers import to_number
-from viewer.formats._source import Source, no_number, shown
+from viewer.formats._source import Source, no_number
+from viewer.phrases import quoted
 
 __all__ = ["CHANNELS", "BvhJoint", "Hierarchy", "read_hierarchy"]
 
@@ -187,7 +188,7 @@ class _Parser:
 
     def _refuse_offset(self, joint: BvhJoint, error: FormatError) -> None:
         """Refuse an OFFSET; where faults are noted it is 0 0 0, and reading goes on behind it."""
-        self.source.refuse(error, 1, "joints", () if joint.is_end else [self.n_joints - 1])
+        self.source.refuse_error(error, 1, "joints", () if joint.is_end else [self.n_joints - 1])
         joint.offset = [0.0, 0.0, 0.0]
         while self.word is not None and self.keyword not in (b"{", b"}", *_ITEMS):
             self._advance()
@@ -233,7 +234,7 @@ class _Parser:
         self.keyword = b"" if self.word is None else self.word.group().upper()
 
     def _shown(self) -> str:
-        return "the end of the file" if self.word is None else shown(self.word.group())
+        return "the end of the file" if self.word is None else quoted(self.word.group())
 
     def _error(self, message: str) -> FormatError:
         where = len(self.source.data.rstrip()) if self.word is None else self.word.start()

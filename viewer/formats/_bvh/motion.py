@@ -9,8 +9,9 @@ import numpy as np
 
 from viewer.errors import FormatError, counted
 from viewer.formats._numbers import parse_numbers, to_number
-from viewer.formats._source import Source, no_number, shown
+from viewer.formats._source import Source, no_number
 from viewer.formats._tolerant import held_rows, read_words, refuse_words
+from viewer.phrases import quoted
 from viewer.rig.arrays import Floats
 
 __all__ = ["Motion", "read_motion"]
@@ -99,7 +100,7 @@ def _seconds(source: Source, match: re.Match[bytes]) -> bytes:
 
 
 def _found(word: bytes) -> str:
-    return shown(word) if word else "the end of the file"
+    return quoted(word) if word else "the end of the file"
 
 
 def _mended(source: Source, start: int, width: int, declared: int | None) -> Floats | None:
@@ -131,7 +132,7 @@ def _mended(source: Source, start: int, width: int, declared: int | None) -> Flo
         first = int(wrong[0])
         place = int(words.offsets[begins[first]]), int(sizes[first])
         error = _wrong_row(source, first, width, place)
-        source.refuse(error, len(wrong), "frames", wrong)
+        source.refuse_error(error, len(wrong), "frames", wrong)
     rows = np.full((len(begins), width), np.nan)
     rows[fits] = words.values[begins[fits, None] + np.arange(width)]
     if declared is not None and len(rows) != declared:
@@ -152,7 +153,7 @@ def _rows(source: Source, start: int, width: int, declared: int | None) -> Float
     if bad >= 0:
         offset = source.word_offset(start, bad)
         word = source.next_word(offset)
-        found = shown(word.group()) if word else "the end of the file"
+        found = quoted(word.group()) if word else "the end of the file"
         if declared is None or bad < declared * width:
             text = no_number(word.group() if word else None)
             raise source.error(f"frame {bad // width}: {text}", offset)

@@ -29,7 +29,8 @@ import numpy as np
 
 from viewer.errors import FormatError, printable
 from viewer.formats._numbers import to_number
-from viewer.formats._source import Source, no_number, shown
+from viewer.formats._source import Source, no_number
+from viewer.phrases import quoted
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.camera_view import CameraView
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
@@ -241,7 +242,7 @@ def read_storage(source: Source) -> Storage:
         elif listed is not None and (item := _ITEM.fullmatch(line)):
             listed.append(_text(item[1]))
         else:
-            found = shown(line.strip())
+            found = quoted(line.strip())
             raise FormatError(source.path, f"expected name: value, found {found}", number)
     _close(source, matrix, values)
     return file
@@ -264,13 +265,13 @@ def _continue(source: Source, matrix: _Matrix, line: bytes, number: int) -> None
     part = None if matrix.is_open else _PART.fullmatch(line)
     if part is None and not matrix.is_open:
         raise FormatError(
-            source.path, f"expected rows, cols, dt or data, found {shown(line.strip())}", number
+            source.path, f"expected rows, cols, dt or data, found {quoted(line.strip())}", number
         )
     text = line.strip() if part is None else part[2].strip()
     if part is not None and part[1] in (b"rows", b"cols"):
         size = to_number(text)
         if size is None or size != int(size) or not 0 <= size <= _MOST:
-            raise FormatError(source.path, f"expected a size, found {shown(text)}", number)
+            raise FormatError(source.path, f"expected a size, found {quoted(text)}", number)
         if part[1] == b"rows":
             matrix.rows = int(size)
         else:
@@ -280,7 +281,7 @@ def _continue(source: Source, matrix: _Matrix, line: bytes, number: int) -> None
         return
     if part is not None:
         if not text.startswith(b"["):
-            raise FormatError(source.path, f"expected [ numbers ], found {shown(text)}", number)
+            raise FormatError(source.path, f"expected [ numbers ], found {quoted(text)}", number)
         text, matrix.is_open = text[1:], True
     numbers, bracket, _ = text.partition(b"]")
     matrix.is_open = not bracket

@@ -11,7 +11,8 @@ import re
 
 from viewer.errors import FormatError
 from viewer.formats._pickle.values import Span
-from viewer.formats._source import Source, shown
+from viewer.formats._source import Source
+from viewer.phrases import quoted
 
 __all__ = ["Machine"]
 
@@ -104,7 +105,7 @@ class Machine:
     def decimal(self, word: bytes) -> int:
         """Return a number of the text protocols; their length is bounded already."""
         if not _INTEGER.fullmatch(word):
-            raise self.fail(f"expected a whole number, found {shown(word)}")
+            raise self.fail(f"expected a whole number, found {quoted(word)}")
         return int(word)
 
     def cut_short(self, wanted: int, found: int) -> FormatError:

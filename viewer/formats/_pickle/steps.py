@@ -16,7 +16,7 @@ from typing import TypeVar
 from viewer.formats._pickle import names as names
 from viewer.formats._pickle.machine import Machine
 from viewer.formats._pickle.values import Span, noun
-from viewer.formats._source import shown
+from viewer.phrases import quoted
 
 __all__ = ["run"]
 
@@ -44,7 +44,7 @@ def run(machine: Machine) -> object:
     while code != _STOP:
         step = _STEPS.get(code)
         if step is None:
-            raise machine.fail(f"expected a step of a pickle, found {shown(bytes([code]))}")
+            raise machine.fail(f"expected a step of a pickle, found {quoted(bytes([code]))}")
         step(machine)
         code = machine.next_step()
     return machine.pop()
@@ -109,7 +109,7 @@ def _long_decimal(machine: Machine) -> None:
 def _float_text(machine: Machine) -> None:
     word = machine.word()
     if not _FLOAT.fullmatch(word):
-        raise machine.fail(f"expected a number, found {shown(word)}")
+        raise machine.fail(f"expected a number, found {quoted(word)}")
     machine.push(float(word))
 
 
@@ -126,7 +126,7 @@ def _quoted(machine: Machine) -> None:
     if text.endswith(b"\r"):
         raise machine.damaged_line_ends()
     if len(text) < 2 or text[:1] not in (b"'", b'"') or text[-1:] != text[:1]:
-        raise machine.fail(f"expected a text in quotes, found {shown(text)}")
+        raise machine.fail(f"expected a text in quotes, found {quoted(text)}")
     if b"\\" not in text:
         machine.push(Span(machine.data, start + 1, end - 1, "latin-1"))
         return

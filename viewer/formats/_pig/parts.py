@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.diagnostics import Part as FaultPart
 from viewer.errors import FormatError, printable
 from viewer.formats._archive import Archive
 from viewer.formats._container import archive_of, finite
-from viewer.formats._faults import Part as FaultPart
 from viewer.formats._source import Source
 from viewer.formats._table import read_broken_table, read_table, row_error
 from viewer.rig.arrays import Floats

@@ -6,7 +6,8 @@ import re
 from dataclasses import dataclass, field
 
 from viewer.errors import FormatError, printable
-from viewer.formats._source import Source, shown
+from viewer.formats._source import Source
+from viewer.phrases import quoted
 
 __all__ = ["Element", "Header", "Property", "read_header"]
 
@@ -81,7 +82,7 @@ def read_header(source: Source) -> Header:
         assert match is not None  # the pattern matches anything
         words = match[1].decode("utf-8", "surrogateescape").split()
         if number == 0 and words != ["ply"]:
-            looks = source.looks_like() or shown(match[1][:40])
+            looks = source.looks_like() or quoted(match[1][:40])
             raise source.error(f'expected "ply" in the first line, found {looks}', 0)
         if words == ["end_header"]:
             if not has_format:

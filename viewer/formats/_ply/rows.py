@@ -156,7 +156,7 @@ class _Text:
             if len(words):  # only where faults are noted: others were refused at the start
                 offset = self._offset(int(self.firsts[self.line] + words[0]))
                 message = "expected numbers, found words after the last element"
-                self.source.refuse(self.source.error(message, offset), len(words))
+                self.source.refuse_error(self.source.error(message, offset), len(words))
 
     def _need(self, cursor: Places) -> None:
         short = np.flatnonzero(cursor > self.rows_left)
