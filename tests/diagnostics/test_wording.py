@@ -33,9 +33,11 @@ def sample(spec: str) -> Any:
         return 3
     if spec == "word":
         return b"x"
-    if spec in ("list", "or"):
-        return ["first", "second"]
-    return 1.5 if re.fullmatch(r"[+,.\d]*[efg%]", spec) else 3 if spec == "d" else "x\ny"
+    if spec.startswith("list") or spec == "or":
+        return ["first", "second\n"]
+    if spec in ("text", "name", "quoted") or spec.startswith("+"):
+        return "x\ny"  # may come from a file
+    return 1.5 if re.fullmatch(r"[+,.\d]*[efg%]", spec) else 3 if spec == "d" else "x"
 
 
 @pytest.mark.parametrize("key", MESSAGES)

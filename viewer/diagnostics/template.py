@@ -5,7 +5,8 @@
 ``{word:word}``        the word without quotes
 ``{name}``             numbers as they are, texts with control characters escaped
 ``{name:text}``        the same, not more than 200 letters
-``{names:list}``       the first few, and how many more
+``{name:name}``        a name in a file, cut after 60 characters; bytes that are no text show as �
+``{names:list}``       the first six on one line, and how many more; ``list12`` for twelve
 ``{names:or}``         alternatives
 ``{n:#vertex}``        a count with its noun: ``3 vertices``
 ``{n:#vertex|is|are}`` the same with a verb that agrees
@@ -17,6 +18,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from string import Formatter
 from typing import Any
@@ -25,6 +27,8 @@ from viewer.phrases import counted, listed, one_of, printable, quoted
 
 _PLACE = "\0"  # of a value inside its own specification
 _LONGEST = 1000  # letters of a text that is a value
+_LONGEST_NAME = 60
+_NO_TEXT = re.compile("[\udc80-\udcff]")  # bytes that were decoded with "surrogateescape"
 
 
 def rendered(template: str, values: Mapping[str, Any]) -> str:
@@ -53,6 +57,8 @@ class _Formatter(Formatter):
             return rest.replace(_PLACE, printable(value, 300)) if value else ""
         if not format_spec and isinstance(value, str) and value != _PLACE:
             return printable(value, _LONGEST)
+        if format_spec.startswith("list"):
+            return listed([printable(name) for name in value], int(format_spec[4:] or 6))
         plain = _PLAIN.get(format_spec)
         return plain(value) if plain is not None else str(format(value, format_spec))
 
@@ -69,11 +75,15 @@ def _bare(word: bytes) -> str:
     return printable(word.decode("utf-8", "replace"), 40)
 
 
+def _name(name: str) -> str:
+    return printable(_NO_TEXT.sub("\ufffd", name[: _LONGEST_NAME + 1]), _LONGEST_NAME)
+
+
 _PLAIN: dict[str, Callable[[Any], str]] = {
     "quoted": _word,
     "word": _bare,
     "text": printable,
-    "list": listed,
+    "name": _name,
     "or": one_of,
 }
 _FORMATTER = _Formatter()

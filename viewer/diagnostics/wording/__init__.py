@@ -6,9 +6,21 @@ code the name is unique. ``PHRASES`` are parts of messages, by a name alone.
 
 from __future__ import annotations
 
-from viewer.diagnostics.wording import morph, obj, reading, skin, weights
+from viewer.diagnostics.wording import (
+    anim,
+    bvh,
+    joints,
+    kinds,
+    morph,
+    obj,
+    ply,
+    reading,
+    rig,
+    skin,
+    weights,
+)
 
-_TABLES = (reading, skin, morph, obj, weights)
+_TABLES = (reading, kinds, skin, obj, ply, morph, rig, joints, bvh, anim, weights)
 
 MESSAGES: dict[str, str] = {
     key: template for table in _TABLES for key, template in table.MESSAGES.items()
@@ -26,6 +38,7 @@ PLACES = {
     "triangles": "triangles",
     "bindings": "joints",
     "joints": "joints",
+    "items": "joints",
     "frames": "frames",
 }
 """What the places of a part are called."""
