@@ -34,10 +34,10 @@ def sample(spec: str) -> Any:
     if spec == "word":
         return b"x"
     if spec.startswith("list") or spec in ("axes", "or"):
-        return ["first", "second"]
-    if re.fullmatch(r"[+,.\d]*[efg%]", spec):
-        return 1.5
-    return 3 if spec == "d" else "x\ny" if spec else "x"
+        return ["first", "second\n"]
+    if spec in ("text", "name", "quoted") or spec.startswith("+"):
+        return "x\ny"  # may come from a file
+    return 1.5 if re.fullmatch(r"[+,.\d]*[efg%]", spec) else 3 if spec == "d" else "x"
 
 
 @pytest.mark.parametrize("key", MESSAGES)

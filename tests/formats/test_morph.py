@@ -1,7 +1,7 @@
 """The .morph reader: grammar, quirks, exact messages."""
 
 import pytest
-from faults import refusal_of
+from faults import refusal_of, warnings_of
 
 from viewer.diagnostics import Phrase
 from viewer.errors import FormatError, UnsupportedFormatError
@@ -17,7 +17,7 @@ def parse(text, path="smile.morph"):
     source = Source(path, text.encode())
     target = read(source)
     assert isinstance(target, MorphTarget)
-    return target, source.warnings
+    return target, warnings_of(source.diagnostics)
 
 
 def assert_good(target):
@@ -50,25 +50,25 @@ def test_reads_every_part_without_a_word(text):
 def test_missing_last_brace_warns():
     target, warnings = parse(GOOD.rstrip("}\n"))
     assert_good(target)
-    assert warnings == ['smile.morph: the last "}" is missing: normals ends with the file']
+    assert warnings == [("F006.last-brace", None, {"section": "normals"})]
 
 
 def test_missing_normals_warn():
     target, warnings = parse(POSITIONS)
     assert target.normals is None
-    assert warnings == ["smile.morph: no normals section: normals stay as they are"]
+    assert warnings == [("F007.morph-normals", None, {})]
 
 
 def test_empty_target_warns():
     target, warnings = parse("positions 0 { } normals 0 { }")
-    assert len(target.vertices) == 0 and warnings == ["smile.morph: moves no vertex"]
+    assert len(target.vertices) == 0 and warnings == [("F007.morph-empty", None, {})]
 
 
 @pytest.mark.parametrize(
     ("text", "fault"),
     [
         (NORMALS, ("F002.morph-positions", 4, {"looks": None})),
-        ("", ("F002.plain", None, {"message": "expected a .morph file, found an empty file"})),
+        ("", ("F002.kind", None, {"wanted": ".morph", "looks": "an empty file"})),
         (
             GOOD.replace("-1", "up"),
             (
@@ -162,5 +162,6 @@ def test_morph_is_told_from_a_skin_by_its_suffix():
 
 def test_morphs_are_not_written(tmp_path):
     target, _ = parse(GOOD)
-    with pytest.raises(UnsupportedFormatError, match=r'no writer for "\.morph"'):
+    with pytest.raises(UnsupportedFormatError, match=r'no writer for "\.morph"') as caught:
         write(target, tmp_path / "copy.morph")
+    assert caught.value.diagnostic.key == "F002.no-writer"

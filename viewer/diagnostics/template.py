@@ -5,6 +5,7 @@
 ``{word:word}``        the word without quotes
 ``{name}``             numbers as they are, texts with control characters escaped
 ``{name:text}``        the same, not more than 200 letters
+``{name:name}``        a name in a file, cut after 60 characters; bytes that are no text show as �
 ``{names:list}``       the first six and how many more, ``none``; ``list12`` for twelve
 ``{shape:axes}``       the axes of an array: ``800 x 3``; letters stand for any number
 ``{names:or}``         alternatives
@@ -18,6 +19,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from string import Formatter
 from typing import Any
@@ -26,6 +28,8 @@ from viewer.phrases import counted, listed, one_of, printable, quoted
 
 _PLACE = "\0"  # of a value inside its own specification
 _LONGEST = 1000  # letters of a text that is a value
+_LONGEST_NAME = 60
+_NO_TEXT = re.compile("[\udc80-\udcff]")  # bytes that were decoded with "surrogateescape"
 
 
 def rendered(template: str, values: Mapping[str, Any]) -> str:
@@ -52,10 +56,10 @@ class _Formatter(Formatter):
         if kind == "+":
             # An empty pair of braces in a specification has been filled with "" by now.
             return rest.replace(_PLACE, printable(value, 300)) if value else ""
-        if format_spec.startswith("list"):
-            return listed([*map(printable, value)], int(format_spec[4:] or 6)) or "none"
         if not format_spec and isinstance(value, str) and value != _PLACE:
             return printable(value, _LONGEST)
+        if format_spec.startswith("list"):
+            return listed([*map(printable, value)], int(format_spec[4:] or 6)) or "none"
         plain = _PLAIN.get(format_spec)
         return plain(value) if plain is not None else str(format(value, format_spec))
 
@@ -72,6 +76,10 @@ def _bare(word: bytes) -> str:
     return printable(word.decode("utf-8", "replace"), 40)
 
 
+def _name(name: str) -> str:
+    return printable(_NO_TEXT.sub("\ufffd", name[: _LONGEST_NAME + 1]), _LONGEST_NAME)
+
+
 def _axes(shape: Sequence[int | str | None]) -> str:
     if not shape:
         return "a single"
@@ -83,6 +91,7 @@ _PLAIN: dict[str, Callable[[Any], str]] = {
     "quoted": _word,
     "word": _bare,
     "text": printable,
+    "name": _name,
     "axes": _axes,
     "or": one_of,
 }

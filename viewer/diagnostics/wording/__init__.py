@@ -7,19 +7,28 @@ code the name is unique. ``PHRASES`` are parts of messages, by a name alone.
 from __future__ import annotations
 
 from viewer.diagnostics.wording import (
+    anim,
     archives,
     body_models,
+    bvh,
     easymocap,
+    joints,
+    kinds,
     morph,
     obj,
     pictures,
+    ply,
     poses,
     reading,
+    rig,
     skin,
     weights,
 )
 
-_TABLES = (reading, skin, morph, obj, archives, body_models, easymocap, poses, pictures, weights)
+_TABLES = (
+    *(reading, kinds, skin, obj, ply, morph, rig, joints, bvh, anim, weights),
+    *(archives, body_models, easymocap, poses, pictures),
+)
 
 MESSAGES: dict[str, str] = {
     key: template for table in _TABLES for key, template in table.MESSAGES.items()
@@ -37,6 +46,7 @@ PLACES = {
     "triangles": "triangles",
     "bindings": "joints",
     "joints": "joints",
+    "items": "joints",
     "frames": "frames",
 }
 """What the places of a part are called."""

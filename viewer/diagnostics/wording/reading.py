@@ -14,7 +14,15 @@ MESSAGES = {
     "W003.too-large": _BELOW,
     "F002.width": "{item}: expected {expected:#number}, found {found}",
     "F002.unclosed": 'expected "}}" to close {section} (line {line}), found {found:quoted}',
+    "F002.width-end": "{item}: expected {expected:#number}, found {found}, then the end of the "
+    "file",
+    "F002.more": "{item}: expected {expected:#number}, found more: {found:quoted}",
+    "F002.count": "{item}: expected a count, found {found:quoted}",
     "F002.open": "{word:quoted} is still open where the file ends",
+    "F003.beyond": "{item}: expected numbers up to {most:.2g}, found {found:g}",
+    "M007.normals": "{n:#normal} of length 0, first of vertex {vertex}: computed from the "
+    "triangles",
+    "F006.closing": 'the last "}}" is missing',
     "F006.last-brace": 'the last "}}" is missing: {section} ends with the file',
     "F006.unknown": "skipped unknown {found:quoted}",
     "F007.no-faces": "no faces: {n} points, of which nothing is drawn",
