@@ -93,6 +93,6 @@ _PLAIN: dict[str, Callable[[Any], str]] = {
     "text": printable,
     "name": _name,
     "axes": _axes,
-    "or": one_of,
+    "or": lambda values: one_of([*map(printable, values)]),
 }
 _FORMATTER = _Formatter()
