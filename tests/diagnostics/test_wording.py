@@ -33,7 +33,7 @@ def sample(spec: str) -> Any:
         return 3
     if spec == "word":
         return b"x"
-    if spec.startswith("list") or spec == "or":
+    if spec.startswith("list") or spec in ("axes", "or"):
         return ["first", "second\n"]
     if spec in ("text", "name", "quoted") or spec.startswith("+"):
         return "x\ny"  # may come from a file

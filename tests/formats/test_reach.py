@@ -41,9 +41,9 @@ def motion_file(path, far, key="trans", **more):
 @pytest.mark.parametrize("key", ["trans", "transl"])
 def test_far_translation_is_refused_with_its_key(tmp_path, far, key):
     path = motion_file(tmp_path / "a.npz", far, key)
-    assert str(refusal(amass.read, path)) == (
-        f"{path}: {key}: expected numbers up to 1e+09, found {far:g} in frame 1"
-    )
+    values = {"item": key, "limit": 1e9, "found": far, "frame": 1}
+    error = refusal(amass.read, path)
+    assert (error.path, fault_of(error.diagnostic)) == (path, ("F003.motion-reach", None, values))
 
 
 def test_translation_is_measured_as_scaled(tmp_path):
@@ -62,10 +62,12 @@ def test_far_person_is_a_gap(tmp_path, far):
     folder = write_frames(tmp_path / "smpl", {0: bad, 1: good, 2: bad, 3: good})
     _, parts, _ = opened(tmp_path)
     assert rows_of(parts, 0) == [1, 3]
-    text = f"json:1: person 0: Th: expected numbers up to 1e+09, found {far:g}"
-    assert [text for part in parts for text in part.warnings] == [
-        f"{folder}/000000.{text}",
-        f"{folder}/000002.{text}",
+    problem = Phrase("beyond-limit", limit=1e9, found=far)
+    fault = ("F003.record", None, {"item": "person 0: Th", "problem": problem})
+    warnings = [found for part in parts for found in part.warnings]
+    assert [(found.path, *fault_of(found)) for found in warnings] == [
+        (folder / "000000.json", "F007.record", 1, {"problem": fault}),
+        (folder / "000002.json", "F007.record", 1, {"problem": fault}),
     ]
 
 

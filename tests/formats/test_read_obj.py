@@ -128,10 +128,10 @@ def test_a_polygon_of_very_many_corners_takes_no_time() -> None:
     radii = 1.0 + 0.1 * np.cos(9 * angles)  # not convex: nine dents
     points = np.stack([radii * np.cos(angles), radii * np.sin(angles)], axis=1)
     text = "".join(f"v {x} {y} 0\n" for x, y in points.tolist())
-    start = time.perf_counter()
+    start = time.process_time()
     mesh = silent(text + "f " + " ".join(map(str, range(1, 60_001)))).mesh
     assert mesh.n_triangles == 59_998
-    assert time.perf_counter() - start < 5.0
+    assert time.process_time() - start < 5.0
 
 
 def test_triangles_of_a_closed_box_of_quads_enclose_its_volume() -> None:

@@ -6,7 +6,8 @@
 ``{name}``             numbers as they are, texts with control characters escaped
 ``{name:text}``        the same, not more than 200 letters
 ``{name:name}``        a name in a file, cut after 60 characters; bytes that are no text show as �
-``{names:list}``       the first six on one line, and how many more; ``list12`` for twelve
+``{names:list}``       the first six and how many more, ``none``; ``list12`` for twelve
+``{shape:axes}``       the axes of an array: ``800 x 3``; letters stand for any number
 ``{names:or}``         alternatives
 ``{n:#vertex}``        a count with its noun: ``3 vertices``
 ``{n:#vertex|is|are}`` the same with a verb that agrees
@@ -19,7 +20,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from string import Formatter
 from typing import Any
 
@@ -58,7 +59,7 @@ class _Formatter(Formatter):
         if not format_spec and isinstance(value, str) and value != _PLACE:
             return printable(value, _LONGEST)
         if format_spec.startswith("list"):
-            return listed([printable(name) for name in value], int(format_spec[4:] or 6))
+            return listed([*map(printable, value)], int(format_spec[4:] or 6)) or "none"
         plain = _PLAIN.get(format_spec)
         return plain(value) if plain is not None else str(format(value, format_spec))
 
@@ -79,11 +80,19 @@ def _name(name: str) -> str:
     return printable(_NO_TEXT.sub("\ufffd", name[: _LONGEST_NAME + 1]), _LONGEST_NAME)
 
 
+def _axes(shape: Sequence[int | str | None]) -> str:
+    if not shape:
+        return "a single"
+    # Files may declare 32 axes of any size.
+    return printable(" x ".join("any" if axis is None else str(axis) for axis in shape), 80)
+
+
 _PLAIN: dict[str, Callable[[Any], str]] = {
     "quoted": _word,
     "word": _bare,
     "text": printable,
     "name": _name,
+    "axes": _axes,
     "or": one_of,
 }
 _FORMATTER = _Formatter()

@@ -53,6 +53,8 @@ __all__ = [
     "FORMATS",
     "KNOWN",
     "MAX_SIZE",
+    "MESHES",
+    "SUFFIXES",
     "Format",
     "Source",
     "all_or_none",
@@ -89,7 +91,7 @@ class Format:
     Attributes
     ----------
     title : str
-        For menus and the README.
+        For menus and the manual.
     suffixes : tuple of str
         With their dots; the first is what files are called that we write.
     signature : bytes
@@ -100,6 +102,8 @@ class Format:
         What a folder of this kind holds: any of them tells it.
     writes : bool
         Whether there is a writer.
+    is_bare_mesh : bool
+        Whether such files hold a mesh alone, without skeleton and skin.
     """
 
     title: str
@@ -108,6 +112,7 @@ class Format:
     keys: tuple[str, ...] = ()
     files: tuple[str, ...] = ()
     writes: bool = True
+    is_bare_mesh: bool = False
 
 
 FORMATS = {
@@ -128,8 +133,9 @@ FORMATS = {
         (".obj",),
         rb"(?:^|[\r\n])[ \t]*v[ \t]+[-+.\d]\S*[ \t]+[-+.\d]\S*[ \t]+[-+.\d]",
         writes=False,
+        is_bare_mesh=True,
     ),
-    "ply": Format("mesh (PLY)", (".ply",), rb"\Aply[ \t]*[\r\n]", writes=False),
+    "ply": Format("mesh (PLY)", (".ply",), rb"\Aply[ \t]*[\r\n]", writes=False, is_bare_mesh=True),
     "bvh": Format("BVH motion", (".bvh",), rb"(?i:\A\s*HIERARCHY\b)", writes=False),
     "smpl": Format(
         "SMPL family",
@@ -216,8 +222,14 @@ def detect(source: Source) -> str:
     raise source.fault("F002.kind", wanted=wanted, looks=looks)
 
 
-KNOWN = " or ".join(dict.fromkeys(suffix for kind in FORMATS.values() for suffix in kind.suffixes))
+SUFFIXES = tuple(dict.fromkeys(suffix for kind in FORMATS.values() for suffix in kind.suffixes))
+"""All suffixes, each once."""
+
+KNOWN = " or ".join(SUFFIXES)
 """All suffixes, for messages."""
+
+MESHES = tuple(s for kind in FORMATS.values() if kind.is_bare_mesh for s in kind.suffixes)
+"""Suffixes of meshes without a rig."""
 
 
 def claims(suffix: str) -> bool:

@@ -8,19 +8,27 @@ from __future__ import annotations
 
 from viewer.diagnostics.wording import (
     anim,
+    archives,
+    body_models,
     bvh,
+    easymocap,
     joints,
     kinds,
     morph,
     obj,
+    pictures,
     ply,
+    poses,
     reading,
     rig,
     skin,
     weights,
 )
 
-_TABLES = (reading, kinds, skin, obj, ply, morph, rig, joints, bvh, anim, weights)
+_TABLES = (
+    *(reading, kinds, skin, obj, ply, morph, rig, joints, bvh, anim, weights),
+    *(archives, body_models, easymocap, poses, pictures),
+)
 
 MESSAGES: dict[str, str] = {
     key: template for table in _TABLES for key, template in table.MESSAGES.items()
