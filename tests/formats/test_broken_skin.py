@@ -37,12 +37,12 @@ from viewer.formats import Source, skin
         ),
         ("\npositions 0 { }" + TRIANGLES,
          ("F002.skin-no-vertex", 2, {})),
-        ("positions", ("F002.skin-count", 1, {'section': 'positions', 'found': None})),
-        ("positions {", ("F002.skin-count", 1, {'section': 'positions', 'found': b'{'})),
-        ("positions\n-3 {", ("F002.skin-count", 2, {'section': 'positions', 'found': b'-3'})),
-        ("positions 1.5 {", ("F002.skin-count", 1, {'section': 'positions', 'found': b'1.5'})),
-        ("positions nan {", ("F002.skin-count", 1, {'section': 'positions', 'found': b'nan'})),
-        ("positions 1e999 {", ("F002.skin-count", 1, {'section': 'positions', 'found': b'1e999'})),
+        ("positions", ('F002.count', 1, {'item': 'positions', 'found': None})),
+        ("positions {", ('F002.count', 1, {'item': 'positions', 'found': b'{'})),
+        ("positions\n-3 {", ('F002.count', 2, {'item': 'positions', 'found': b'-3'})),
+        ("positions 1.5 {", ('F002.count', 1, {'item': 'positions', 'found': b'1.5'})),
+        ("positions nan {", ('F002.count', 1, {'item': 'positions', 'found': b'nan'})),
+        ("positions 1e999 {", ('F002.count', 1, {'item': 'positions', 'found': b'1e999'})),
         (
             "positions 99999999999 { 0 0 0 }",
             ("F002.skin-too-many", 1, {'section': 'positions', 'found': 99999999999, 'size': 10}),
@@ -215,8 +215,8 @@ def test_absurd_count_is_refused_without_memory(name, count):
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
-    assert key in ("F002.skin-count", "F002.skin-too-many")
-    assert (line, values["section"]) == (14, name)
+    assert key in ("F002.count", "F002.skin-too-many")
+    assert (line, values["item" if key == "F002.count" else "section"]) == (14, name)
     assert peak < 200_000
 
 
@@ -237,8 +237,8 @@ def test_absurd_number_of_influences_is_refused_without_memory():
 def test_5_million_blank_lines_are_counted(end):
     line = 1 if end == " " else 5_000_001
     text = end * 5_000_000 + "positions up"
-    values = {"section": "positions", "found": b"up"}
-    assert refusal_of(lambda: read(text)) == ("F002.skin-count", line, values)
+    values = {"item": "positions", "found": b"up"}
+    assert refusal_of(lambda: read(text)) == ("F002.count", line, values)
     rows = f"positions 1 {{ {end * 5_000_000} 0 0 up }}"
     assert refusal_of(lambda: read(rows)) == ("F002.number", line, number(0, b"up"))
 

@@ -1,6 +1,7 @@
 import gzip
 from pathlib import Path
 
+import numpy as np
 import pytest
 from faults import fault_of, refusal_of, warnings_of
 
@@ -110,3 +111,19 @@ def test_text_with_a_known_suffix_goes_to_its_reader(name, key):
 def test_broken_archive_under_a_text_suffix_is_named(data, kind):
     fault = refusal_of(lambda: detect(Source("a.skel", data)))
     assert fault == ("F002.kind", None, {"wanted": ".skel", "looks": kind})
+
+
+def test_folder_of_other_files_is_refused(tmp_path):
+    (tmp_path / "a.txt").write_text("hello")
+    fault = refusal_of(lambda: detect(Source.open(tmp_path)))
+    assert fault == ("F002.unknown-folder", None, {})
+
+
+@pytest.mark.parametrize(
+    ("arrays", "key", "found"),
+    [({"a": 1, "b": 2}, "F002.unknown-archive", ["a", "b"]), ({}, "F002.empty-archive", None)],
+)
+def test_archive_of_other_keys_is_refused(tmp_path, arrays, key, found):
+    np.savez(tmp_path / "a.npz", **arrays)
+    other, line, values = refusal_of(lambda: detect(Source.open(tmp_path / "a.npz")))
+    assert (other, line, values.get("found")) == (key, None, found)

@@ -115,7 +115,7 @@ def test_empty_target_warns():
         ),
         (
             GOOD.replace("positions 2", "positions -2"),
-            ("F002.skin-count", 1, {"section": "positions", "found": b"-2"}),
+            ("F002.count", 1, {"item": "positions", "found": b"-2"}),
         ),
         (
             GOOD.replace("  3 0 1 2\n", "  3 0 1\n"),
@@ -138,7 +138,7 @@ def test_empty_target_warns():
             POSITIONS + "normals 2 { 3 0 0 1",
             ("F002.skin-rows-end", 5, {"section": "normals", "line": 5, "found": 1, "expected": 2}),
         ),
-        ("positions", ("F002.skin-count", 1, {"section": "positions", "found": None})),
+        ("positions", ("F002.count", 1, {"item": "positions", "found": None})),
     ],
 )
 def test_malformed_files_are_refused_with_their_line(text, fault):

@@ -11,6 +11,7 @@ from viewer.diagnostics import Phrase
 from viewer.errors import FormatError, RigError, UnsupportedFormatError
 from viewer.formats import Source, detect, read, write
 from viewer.loading import load
+from viewer.rig.figure import Figure
 from viewer.rig.motion.clip import Channel, Clip
 
 ONE = "channel { extrapolate cycle bounce keys 2 { 0 1 flat smooth 2 3 linear -0.5 } }"
@@ -248,6 +249,31 @@ def test_channel_without_keys_warns() -> None:
         ),
         ("", ("F002.kind", None, {"wanted": ".anim", "looks": "an empty file"})),
         (
+            GOOD.replace("extrapolate", "extrapolates"),
+            (
+                "F002.anim-channel-item",
+                1,
+                {
+                    "where": Phrase("anim-channel", channel=0),
+                    "found": b"extrapolates",
+                    "begins": None,
+                },
+            ),
+        ),
+        (
+            "animation {\nrange 0",
+            (
+                "F002.anim-end",
+                2,
+                {
+                    "where": Phrase("animation"),
+                    "found": None,
+                    "begins": Phrase("anim-begins", where=Phrase("animation"), line=1),
+                    "item": Phrase("anim-item", where=Phrase("animation"), item="range"),
+                },
+            ),
+        ),
+        (
             GOOD.replace("numchannels 1 ", ""),
             ("F002.anim-no-count", 1, {"where": Phrase("animation"), "found": 1, "begins": None}),
         ),
@@ -314,6 +340,10 @@ def test_reversed_range_is_put_in_order_with_a_warning() -> None:
     assert warnings == [("F007.anim-reversed", 1, {"start": "-1", "end": "4"})]
 
 
+def test_what_follows_the_animation_is_ignored_with_a_warning() -> None:
+    assert parse(f"{GOOD} more")[1] == [("F006.anim-after", 1, {"found": b"more"})]
+
+
 def test_missing_range_is_that_of_the_keys() -> None:
     clip, warnings = parse(GOOD.replace("range -1 4 ", ""))
     assert (clip.start, clip.end) == (0.0, 2.0)
@@ -336,6 +366,14 @@ def test_write_refuses_channels_out_of_order(tmp_path: Path) -> None:
     with pytest.raises(UnsupportedFormatError) as caught:
         write(clip, tmp_path / "odd.anim")
     assert fault_of(caught.value.diagnostic) == ("F002.anim-order", None, {})
+
+
+def test_write_refuses_a_figure(tmp_path: Path) -> None:
+    figure = read(Source("a.skel", SKEL.encode()))
+    assert isinstance(figure, Figure)
+    with pytest.raises(UnsupportedFormatError) as caught:
+        write(figure, tmp_path / "a.anim")
+    assert fault_of(caught.value.diagnostic) == ("F002.anim-figure", None, {})
 
 
 def test_clip_is_recognised_by_content() -> None:

@@ -210,6 +210,7 @@ def changed(old: str, new: str) -> str:
     ("text", "fault"),
     [
         ("", ("F002.ply-no-end", 1, {})),
+        ("\0\0\0\0", ("F002.ply-looks", 1, {"looks": "zeros"})),
         ("plx\n", ("F002.ply-start", 1, {"found": b"plx"})),
         ("ply\n\n", ("F002.ply-no-end", 3, {})),
         (changed("format ascii 1.0\n", ""), ("F002.ply-no-format", 8, {})),

@@ -67,6 +67,10 @@ def test_odd_ends_warn(text, fault):
         (GOOD.replace("0 {", "many {"), ("F002.count", 4, {"item": "morphs", "found": b"many"})),
         (GOOD.replace("0 {", "0"), ("F002.rig-word", 5, {"expected": "{", "found": b"}"})),
         ("rig a { skeleton", ("F002.rig-name", 1, {"item": "skeleton", "found": None})),
+        (
+            "rig a { skin ../a.skin }",
+            ("F002.rig-outside", 1, {"item": "skin", "found": b"../a.skin"}),
+        ),
         ("rig a { skin {", ("F002.rig-name", 1, {"item": "skin", "found": b"{"})),
     ],
 )

@@ -87,12 +87,16 @@ def _axes(shape: Sequence[int | str | None]) -> str:
     return printable(" x ".join("any" if axis is None else str(axis) for axis in shape), 80)
 
 
+def _alternatives(values: Sequence[object]) -> str:
+    return one_of([printable(value) for value in values])
+
+
 _PLAIN: dict[str, Callable[[Any], str]] = {
     "quoted": _word,
     "word": _bare,
     "text": printable,
     "name": _name,
     "axes": _axes,
-    "or": lambda values: one_of([*map(printable, values)]),
+    "or": _alternatives,
 }
 _FORMATTER = _Formatter()

@@ -7,7 +7,6 @@ MESSAGES = {
     "F002.skin-triangles": "expected triangles, found no `triangles` section",
     "F002.skin-no-triangle": "expected at least one triangle, found none",
     "F002.skin-no-vertex": "expected at least one vertex, found positions 0",
-    "F002.skin-count": "{section}: expected a count, found {found:quoted}",
     "F002.skin-too-many": "{section}: expected a count that the file can hold, found {found} "
     "entries in {size} bytes",
     "F002.skin-brace": '{section}: expected "{{", found {found:quoted}',
@@ -49,8 +48,6 @@ MESSAGES = {
     "with determinant {determinant:.3g}",
     "B003.skin-matrix": "matrix {matrix} of bindings can hardly be inverted (condition number "
     "{condition:.2g})",
-    "M007.skin-normals": "{n:#normal} of length 0, first of vertex {vertex}: computed from the "
-    "triangles",
     "M010.skin-vertex": "vertex {vertex} is {distance:.2g} units away from the others",
     "F006.skin-section": "skipped unknown section {found:quoted}",
     "F006.skin-material": "skipped unknown {found:quoted} in a material",

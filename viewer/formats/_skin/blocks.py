@@ -74,7 +74,7 @@ def read_count(source: Source, name: str, word: Word) -> tuple[int, int]:
     value = None if found is None else to_number(found.group())
     if found is None or value is None or value != int(value) or value < 0:
         at = word.start() if found is None else found.start()
-        raise source.fault("F002.skin-count", at, section=name, found=found and found.group())
+        raise source.fault("F002.count", at, item=name, found=found and found.group())
     # Even an entry of one letter needs white space before it.
     left = len(source.data) - found.end()
     if value * 2 > left + 1:
