@@ -31,9 +31,9 @@ def sample(spec: str) -> Any:
     """Return a value that a specification can show."""
     if spec[:1] in "#?" and spec:
         return 3
-    if spec in ("list", "or"):
+    if spec in ("list", "all", "or"):
         return ["first", "second"]
-    return 1.5 if re.fullmatch(r"[+,.\d]*[efg%]", spec) else 3 if spec == "d" else "x\ny"
+    return 1.5 if re.fullmatch(r"[+,z.\d]*[efg%]", spec) else 3 if spec == "d" else "x\ny"
 
 
 @pytest.mark.parametrize("key", MESSAGES)

@@ -4,6 +4,7 @@
 ``{word:quoted}``      a word in quotes; None is the end of the file
 ``{name:text}``        any text on one line, control characters escaped
 ``{names:list}``       the first few, and how many more
+``{names:all}``        every name
 ``{names:or}``         alternatives
 ``{n:#vertex}``        a count with its noun: ``3 vertices``
 ``{n:#vertex|is|are}`` the same with a verb that agrees
@@ -29,7 +30,12 @@ def rendered(template: str, values: Mapping[str, Any]) -> str:
 
 def fields(template: str) -> dict[str, str]:
     """Return the names of the values that a template shows, each with its specification."""
-    return {name: spec or "" for _, name, spec, _ in Formatter().parse(template) if name}
+    found = {}
+    for _, name, spec, _ in Formatter().parse(template):
+        if name:
+            found[name] = spec or ""
+            found |= dict.fromkeys(fields(found[name]), "d")  # totals of counts
+    return found
 
 
 class _Formatter(Formatter):
@@ -62,6 +68,7 @@ _PLAIN: dict[str, Callable[[Any], str]] = {
     "quoted": _word,
     "text": printable,
     "list": listed,
+    "all": lambda names: ", ".join(map(str, names)),
     "or": one_of,
 }
 _FORMATTER = _Formatter()

@@ -150,7 +150,7 @@ def agree_on_units(cast: Cast, lone: list[Lone]) -> None:
     for one in lone:
         if one in chosen:
             unit, facts = one.motion.figure.unit, dict(one.motion.figure.facts)
-            scaled = _in_metres(one.motion, unit, facts.get("unit", unit))
+            scaled = _in_metres(one.motion, unit, str(facts.get("unit", unit)))
             place = next(n for n, actor in enumerate(cast.actors) if actor is one.actor)
             cast.actors[place] = replace(
                 one.actor, figure=scaled.figure, clip=scaled.clip, pose=None

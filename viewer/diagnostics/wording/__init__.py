@@ -6,9 +6,18 @@ code the name is unique. ``PHRASES`` are parts of messages, by a name alone.
 
 from __future__ import annotations
 
-from viewer.diagnostics.wording import obj, reading, skin, weights
+from viewer.diagnostics.wording import (
+    bindings,
+    clips,
+    meshes,
+    obj,
+    reading,
+    skeletons,
+    skin,
+    weights,
+)
 
-_TABLES = (reading, skin, obj, weights)
+_TABLES = (reading, skin, obj, weights, bindings, skeletons, meshes, clips)
 
 MESSAGES: dict[str, str] = {
     key: template for table in _TABLES for key, template in table.MESSAGES.items()
