@@ -154,10 +154,6 @@ def test_nothing_touches_the_environment_of_the_process() -> None:
         assert not re.search(r"os\.environ\[[^]]+\]\s*=|putenv|environ\.update", path.read_text())
 
 
-# Circles that are still there; new ones are not added.
-CIRCLES = {frozenset({"viewer.lint", "viewer.lint._again"})}
-
-
 def runtime_imports() -> dict[str, set[str]]:
     """Return which of our modules each one imports, also within functions."""
     modules = {module_name(path): path for path in SOURCES}
@@ -203,4 +199,4 @@ def test_modules_do_not_import_each_other_in_a_circle() -> None:
         for name in graph
         if name in behind[name]
     }
-    assert circles == CIRCLES
+    assert circles == set()

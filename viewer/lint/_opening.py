@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,6 +17,7 @@ from viewer.formats import MAX_SIZE, Source
 from viewer.lint._finding import Finding
 from viewer.lint._messages import CHECKED, of_diagnostic, of_error, of_refusal
 from viewer.lint._named import aimed_at
+from viewer.lint._running import Progress
 from viewer.loading import Contents, MotionSettings, begin, read_source
 from viewer.rig.arrays import Ints
 from viewer.rig.figure import Figure
@@ -26,8 +27,6 @@ if TYPE_CHECKING:
     from viewer.loading.capturing import Builder
 
 __all__ = ["Opened", "Owners", "open_files", "spoiled_parts", "with_files"]
-
-Progress = Callable[[int, int, str], None]
 
 Owners = dict[str, int]
 """For the parts of an actor, which actor of what was opened has the same: by ``Finding.part``."""
