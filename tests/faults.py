@@ -29,3 +29,8 @@ def refusal_of(work: Callable[[], Any]) -> Fault:
 def warnings_of(found: Iterable[Diagnostic]) -> list[Fault]:
     """Return the warnings among diagnostics."""
     return [fault_of(one) for one in found if not one.is_refusal]
+
+
+def lines(found: Iterable[Diagnostic]) -> list[str]:
+    """Return diagnostics as they are shown."""
+    return list(map(str, found))

@@ -31,7 +31,7 @@ def sample(spec: str) -> Any:
     """Return a value that a specification can show."""
     if spec[:1] in "#?" and spec:
         return 3
-    if spec in ("list", "all", "or"):
+    if spec.startswith("list") or spec in ("all", "or"):
         return ["first", "second"]
     return 1.5 if re.fullmatch(r"[+,z.\d]*[efg%]", spec) else 3 if spec == "d" else "x\ny"
 

@@ -19,6 +19,7 @@ from viewer.app.playback import Playback
 from viewer.app.posing import Posing
 from viewer.app.rig_view import RigView
 from viewer.app.weights_view import WeightsView
+from viewer.diagnostics import Diagnostic
 from viewer.rendering.camera import Camera, front_azimuth, orbit
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.overlay.legend import Legend
@@ -208,7 +209,7 @@ class AppState:
         self.history.time = self.playback.time
         self.history.start(self.scene, self.options)
         self.opened_joints = _first_opened(self.actor)
-        self.say(*self.scene.warnings)
+        self.say(*self.scene.diagnostics)
 
     @property
     def actor(self) -> Actor:
@@ -252,7 +253,7 @@ class AppState:
         self.playback.show(scene)
         self.history.time = self.playback.time
         self.history.start(scene, self.options)
-        self.say(*scene.warnings)
+        self.say(*scene.diagnostics)
 
     def set_front(self, front: Front) -> None:
         """Say which axis the figures face, or let it be guessed; the camera turns as far.
@@ -276,10 +277,10 @@ class AppState:
         if length > _FARTHEST * size:
             camera.target = center + away * (_FARTHEST * size / length)
 
-    def say(self, *texts: str) -> None:
+    def say(self, *messages: str | Diagnostic) -> None:
         """Show messages that go away by themselves; longer ones stay longer."""
-        for text in texts:
-            self._note(text)
+        for message in messages:
+            self._note(str(message))
 
     def say_status(self, text: str) -> None:
         """Show what a key did, in place of what the key before did."""

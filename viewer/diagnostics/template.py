@@ -4,6 +4,7 @@
 ``{word:quoted}``      a word in quotes; None is the end of the file
 ``{name:text}``        any text on one line, control characters escaped
 ``{names:list}``       the first few, and how many more
+``{names:list60}``     the first 60, and how many more
 ``{names:all}``        every name
 ``{names:or}``         alternatives
 ``{n:#vertex}``        a count with its noun: ``3 vertices``
@@ -52,6 +53,8 @@ class _Formatter(Formatter):
         if kind == "+":
             # An empty pair of braces in a specification has been filled with "" by now.
             return rest.replace("\0", printable(value, 300)) if value else ""
+        if format_spec.startswith("list") and format_spec != "list":
+            return listed(value, int(format_spec.removeprefix("list")))
         plain = _PLAIN.get(format_spec)
         return plain(value) if plain is not None else str(format(value, format_spec))
 

@@ -174,7 +174,7 @@ def _assemble(opened: Opened, settings: MotionSettings | None, progress: Progres
         else:
             alone += _take_out(contents, culprit)
     opened.findings += [
-        of_diagnostic(_of_scene(text, opened.contents)) for text in opened.scene.warnings
+        of_diagnostic(_of_scene(found, opened.contents)) for found in opened.scene.diagnostics
     ]
     opened.scene.actors += [Actor(figure) for figure in alone]
 
@@ -192,7 +192,7 @@ def _read_on(
             except ViewerError as problem:
                 return problem
             scene.actors += new
-            scene.warnings += tuple(notes)
+            scene.diagnostics += tuple(notes)
     return None
 
 
@@ -208,16 +208,15 @@ def _is_unbound(figure: Figure, source: Source) -> bool:
 
 
 def _culprit(problem: ViewerError, contents: Contents) -> Path | None:
-    """Return the file that an error is about: the one it names first, or else the last read.
+    """Return the file that an error is about, or the last one read if it does not say.
 
     None if it is about a file that was not among them.
     """
     paths = [path for name in _LISTS for path, _ in getattr(contents, name)]
-    if isinstance(problem, FormatError):
-        return problem.path if problem.path in paths else None
-    named = [(str(problem).find(printable(path, 300)), path) for path in paths]
-    found = [pair for pair in named if pair[0] >= 0]
-    return min(found, key=lambda pair: pair[0])[1] if found else paths[-1]
+    found = problem.diagnostic
+    if found is None or found.path is None:
+        return paths[-1]
+    return found.path if found.path in paths else None
 
 
 def _take_out(contents: Contents, culprit: Path) -> list[Figure]:
@@ -228,8 +227,12 @@ def _take_out(contents: Contents, culprit: Path) -> list[Figure]:
     return figures
 
 
-def _of_scene(text: str, contents: Contents) -> Diagnostic:
-    """Return a remark about the scene as a diagnostic, until loading records them so."""
+def _of_scene(found: Diagnostic, contents: Contents) -> Diagnostic:
+    """Return a remark about the scene with its file, until captures record theirs so."""
+    return found if found.key != "F007.plain" else _of_text(found.message, contents)
+
+
+def _of_text(text: str, contents: Contents) -> Diagnostic:
     path = _owner(text, contents)
     start = printable(path, 300)
     found = re.fullmatch(r"(?::(\d+))?: (.*)", text[len(start) :], re.DOTALL)

@@ -9,7 +9,9 @@ from __future__ import annotations
 from viewer.diagnostics.wording import (
     bindings,
     clips,
+    loading,
     meshes,
+    motion,
     obj,
     reading,
     skeletons,
@@ -17,7 +19,18 @@ from viewer.diagnostics.wording import (
     weights,
 )
 
-_TABLES = (reading, skin, obj, weights, bindings, skeletons, meshes, clips)
+_TABLES = (
+    reading,
+    skin,
+    obj,
+    weights,
+    bindings,
+    skeletons,
+    meshes,
+    clips,
+    motion,
+    loading,
+)
 
 MESSAGES: dict[str, str] = {
     key: template for table in _TABLES for key, template in table.MESSAGES.items()
