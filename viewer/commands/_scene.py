@@ -187,7 +187,7 @@ def begin_scene(arguments: argparse.Namespace) -> tuple[Scene, list[Builder]]:
     except FormatError as problem:
         named = [*arguments.files, *filter(None, [arguments.model])]
         raise _with_models(problem, named) from None
-    print_warnings(scene.warnings)
+    print_warnings(scene.diagnostics)
     return scene, builders
 
 
