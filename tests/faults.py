@@ -34,3 +34,8 @@ def warnings_of(found: Iterable[Diagnostic]) -> list[Fault]:
 def lines(found: Iterable[Diagnostic]) -> list[str]:
     """Return diagnostics as they are shown."""
     return list(map(str, found))
+
+
+def told(found: Iterable[Diagnostic]) -> list[tuple[str, dict[str, Any]]]:
+    """Return the keys and values of diagnostics."""
+    return [(one.key, dict(one.values)) for one in found]

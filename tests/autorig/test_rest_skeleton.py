@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from faults import told
 from numpy.testing import assert_allclose
 from rigged_shapes import arm, turn
 
@@ -88,7 +89,7 @@ def test_limits_of_the_root_make_room_and_lengths_are_scaled():
     assert_allclose(limits[6:], np.tile([-0.8, 0.8], (3, 1)))  # the tip's angles
     angles = found.pose.dofs[3:6]
     assert (limits[3:6, 0] <= angles).all() and (angles <= limits[3:6, 1]).all()
-    assert found.lines == ("limits of base widened to hold the target's pose",)
+    assert told(found.lines) == [("R008.limits-widened", {"joint": "base"})]
 
 
 def test_root_without_ball_joint_turns_by_its_quaternion():

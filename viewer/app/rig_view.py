@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from viewer.diagnostics import Diagnostic
 from viewer.rig.arrays import Floats
 
 if TYPE_CHECKING:
@@ -91,7 +92,7 @@ class Placing:
         How to come there again.
     fitted : Template or None
         The template with its joints turned and its limbs resized; None where it fits as it is.
-    lines : tuple of str
+    lines : tuple of Diagnostic
         What was done to it.
     meshes : tuple of object
         The target's mesh and the template's figure: for others it means nothing.
@@ -103,7 +104,7 @@ class Placing:
     alignment: Alignment | None
     settings: AlignmentSettings
     fitted: Template | None
-    lines: tuple[str, ...]
+    lines: tuple[Diagnostic, ...]
     meshes: tuple[object, object]
     pose: tuple[bytes, ...]
 

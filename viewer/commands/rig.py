@@ -312,10 +312,9 @@ def _settings(
 
 def _tell(rigged: Rigged, stream: TextIO) -> None:
     """Print what was found, and warnings where errors go."""
-    mark = "warning: "
-    print_warnings([line.removeprefix(mark) for line in rigged.lines if line.startswith(mark)])
-    found = [line for line in rigged.lines if not line.startswith(mark)]
-    print("\n".join(found), file=stream)
+    print_warnings(line for line in rigged.lines if line.severity == "warning")
+    notes = [str(line) for line in rigged.lines if line.severity == "note"]
+    print("\n".join(notes), file=stream)
 
 
 def _show(rigged: Rigged, target: Figure) -> None:

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from viewer.diagnostics import CODES, SEVERITIES, Code
+from viewer.diagnostics import CODES as ALL_CODES
+from viewer.diagnostics import SEVERITIES, Code
 from viewer.lint._again import Again, lint_again
 from viewer.lint._aim import Places, places_of, points_of
 from viewer.lint._finding import MAX_TURN, Finding, LintOptions, Subject
@@ -40,6 +41,9 @@ __all__ = [
     "summary",
     "worst_first",
 ]
+
+CODES = {name: code for name, code in ALL_CODES.items() if name[0] in "FWBSMYC"}
+"""By code: files, weights, bindings, skeletons, meshes, symmetry and clips; see ``diagnostics``."""
 
 
 def lint_files(

@@ -14,6 +14,7 @@ from viewer.diagnostics.wording import (
     motion,
     obj,
     reading,
+    rigging,
     skeletons,
     skin,
     weights,
@@ -30,6 +31,7 @@ _TABLES = (
     clips,
     motion,
     loading,
+    rigging,
 )
 
 MESSAGES: dict[str, str] = {
