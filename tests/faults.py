@@ -12,10 +12,19 @@ from viewer.errors import ViewerError
 
 Fault = tuple[str, int | None, dict[str, Any]]
 
+NAN = pytest.approx(float("nan"), nan_ok=True)
+"""Equals NaN, as values of faults."""
+
+INF = float("inf")
+
 
 def fault_of(found: Diagnostic) -> Fault:
-    """Return the key, line and values of a diagnostic."""
-    return found.key, found.line, dict(found.values)
+    """Return the key, line and values of a diagnostic; a diagnostic among these likewise."""
+    values = {
+        name: fault_of(value) if isinstance(value, Diagnostic) else value
+        for name, value in found.values.items()
+    }
+    return found.key, found.line, values
 
 
 def refusal_of(work: Callable[[], Any]) -> Fault:

@@ -1,12 +1,13 @@
 """Each registry is exactly its folder, and what it names can be loaded."""
 
 from importlib import import_module
+from inspect import signature
 from pathlib import Path
 
 import pytest
 
 import viewer
-from viewer.app.panels import PANELS
+from viewer.app.features import KEYS, PANELS, panel_module
 from viewer.commands import COMMANDS
 from viewer.export import EXPORTERS
 from viewer.formats import FORMATS
@@ -26,11 +27,10 @@ def modules(folder: str) -> set[str]:
     [
         ("formats", FORMATS),
         ("rig/skinning", METHODS),
-        ("app/panels", PANELS),
         ("commands", COMMANDS),
         ("export", EXPORTERS),
     ],
-    ids=["formats", "skinning", "panels", "commands", "export"],
+    ids=["formats", "skinning", "commands", "export"],
 )
 def test_registry_is_exactly_its_folder(folder: str, registry: dict[str, object]) -> None:
     assert modules(folder) == set(registry)
@@ -54,12 +54,28 @@ def test_exporters_write_what_they_say() -> None:
     for name, kind in EXPORTERS.items():
         module = import_module(f"viewer.export.{name}")
         assert hasattr(module, "export") == kind.writes_pose
-        assert hasattr(module, "export_take") == kind.writes_motion
+        assert hasattr(module, "export_animation") == kind.writes_motion
+
+
+def test_table_of_panels_is_exactly_the_panels_of_all_features() -> None:
+    found = {(path.parent.name, path.stem) for path in (PACKAGE / "app").rglob("*_panel.py")}
+    assert found == {(panel.feature, f"{name}_panel") for name, panel in PANELS.items()}
+    assert all(path.parent.parent == PACKAGE / "app" for path in PACKAGE.rglob("*_panel.py"))
 
 
 def test_panels_can_draw() -> None:
     for name in PANELS:
-        assert callable(import_module(f"viewer.app.panels.{name}").draw)
+        assert callable(panel_module(name).draw)
+
+
+def test_keys_run_functions_of_the_state() -> None:
+    labels = [key.label for key in KEYS]
+    assert len(labels) == len(set(labels))
+    for key in KEYS:
+        module, _, name = key.action.rpartition(".")
+        function = getattr(import_module(f"viewer.app.{module}"), name)
+        assert next(iter(signature(function).parameters)) == "state", key.label
+        signature(function).bind(None, *key.arguments)
 
 
 def test_commands_can_run() -> None:
@@ -72,15 +88,3 @@ def test_public_names_exist_and_are_documented() -> None:
     for name in viewer.__all__:
         value = getattr(viewer, name)
         assert value.__doc__ and value.__doc__.strip(), name
-
-
-def test_readme_lists_every_key_format_and_command() -> None:
-    from viewer.app.keys import KEYS
-
-    readme = (PACKAGE.parent / "README.md").read_text()
-    for key in KEYS:
-        assert f"| {key.label} | {key.text} |" in readme, key.label
-    for kind in FORMATS.values():
-        assert all(f"`{suffix}`" in readme for suffix in kind.suffixes)
-    for command in COMMANDS:
-        assert f"viewer {command}" in readme or command == "view"

@@ -21,7 +21,7 @@ from imgui_bundle import imgui
 from PIL import Image, ImageGrab
 
 import viewer
-from viewer.app.view_picks import vertex_at
+from viewer.app.view.picks import vertex_at
 from viewer.app.window import _Rest
 from viewer.rendering.camera import facing_camera, fit
 from viewer.rig.inspection.front import guess_front
@@ -30,7 +30,7 @@ from viewer.rig.scene import scene_points
 ROOT = Path(__file__).resolve().parents[1]
 SHARED = ROOT.parent / "shared" / "data" / "cse169"
 SIZE = (1280, 800)
-PATIENCE = 20.0  # seconds until something that should happen counts as missing
+PATIENCE = 60.0  # seconds until something that should happen counts as missing
 
 
 def _wait_for(condition, what):
@@ -165,7 +165,7 @@ class Window:
     def tell(self, *words, check=True):
         done = subprocess.run(
             ["xdotool", *map(str, words)],
-            env=self.environment, capture_output=True, text=True, timeout=20, check=check,
+            env=self.environment, capture_output=True, text=True, timeout=PATIENCE, check=check,
         )  # fmt: skip
         return done.stdout.strip()
 

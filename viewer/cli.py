@@ -12,7 +12,7 @@ from importlib import import_module
 
 import viewer
 from viewer.commands import COMMANDS
-from viewer.commands._usage import Parser, check_command
+from viewer.commands._usage import Parser, check_command, command_parser
 from viewer.errors import FormatError, ViewerError, printable
 from viewer.interrupts import Interrupted, watched
 from viewer.streams import standard_streams
@@ -21,7 +21,7 @@ __all__ = ["run"]
 
 _EPILOG = """\
 Without a command, FILES open in a window; without files, the bundled figure does.
-"viewer COMMAND --help" lists a command's options.
+"viewer COMMAND --help" lists a command's options, "viewer help" the pages of the manual.
 
 exit codes: 0 done, 1 lint found or diff measured too much, 2 bad input, 4 no usable OpenGL,
 5 output could not be written, 129 hung up, 130 interrupted (Ctrl-C), 143 terminated; a signal that
@@ -93,9 +93,7 @@ def _dispatch(arguments: list[str]) -> int:
         name = arguments.pop(0)
     elif arguments:
         check_command(arguments[0])
-    command = import_module(f"viewer.commands.{name}")
-    parser = Parser(prog=f"viewer {name}", description=COMMANDS[name])
-    command.add_arguments(parser)
+    parser = command_parser(name)
     # What follows "--" are files, whatever they are called.
     end = arguments.index("--") if "--" in arguments else len(arguments)
     before_end = _protect_numbers(arguments[:end])
@@ -103,7 +101,7 @@ def _dispatch(arguments: list[str]) -> int:
     parsed = parser.parse_intermixed_args(before_end)
     if arguments[end + 1 :]:
         parsed.files = [*getattr(parsed, "files", []), *arguments[end + 1 :]]
-    return command.run(parsed)
+    return import_module(f"viewer.commands.{name}").run(parsed)
 
 
 def _protect_numbers(arguments: list[str]) -> list[str]:

@@ -1,4 +1,4 @@
-"""Find the folders ``shaders/`` and ``assets/``, in a checkout and in an installed wheel."""
+"""Location of ``shaders/``, ``assets/`` and ``manual/``, in a checkout and in a wheel."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def resource(kind: str, *parts: str) -> Path:
     Parameters
     ----------
     kind : str
-        ``"shaders"`` or ``"assets"``.
+        ``"shaders"``, ``"assets"`` or ``"manual"``.
     *parts : str
         Path inside that folder.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.app.posed_joint import posed_joint
+from viewer.app.posing.posed_joint import posed_joint
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skeleton import Skeleton

@@ -18,7 +18,7 @@ PROGRAM = """
 import os, signal, sys
 from pathlib import Path
 from viewer.app import window
-from viewer.app.record_dialog import RecordSettings
+from viewer.app.recording.state import Recording, RecordSettings
 from viewer.cli import run
 
 server, folder = int(sys.argv[1]), sys.argv[2]
@@ -27,8 +27,9 @@ draw, drawn = window._Window._draw, []
 def watched(self):
     drawn.append(1)
     if len(drawn) == 3 and folder:
-        self.state.record = RecordSettings(kind=".gif", turntable=True, seconds=60.0)
-        self.state.wants_recording = Path(folder, "turn.gif")
+        settings = RecordSettings(kind=".gif", turntable=True, seconds=60.0)
+        self.state.of(Recording).settings = settings
+        self.state.of(Recording).wanted = Path(folder, "turn.gif")
     if len(drawn) >= 3 and (not folder or os.listdir(folder)):
         os.kill(server, signal.SIGKILL)
     return draw(self)

@@ -9,7 +9,8 @@ import pytest
 from app.captured import dots, people
 from imgui_bundle import imgui
 
-from viewer.app import reasons
+from viewer.app.core import reasons
+from viewer.app.shown_panels import ShownPanels
 from viewer.app.window import _awaits_tooltip
 from viewer.rig.scene import Scene
 
@@ -46,7 +47,7 @@ def rest(hand, label):
 )
 def test_panels_that_have_nothing_to_show_are_greyed(hand, tooltips, title, why):
     hand.menu("menu Window", title)
-    assert hand.state.closed_panels == set()
+    assert hand.state.of(ShownPanels).closed == set()
     if title not in hand.state.item_rects:
         hand.click("menu Window")
     rest(hand, title)

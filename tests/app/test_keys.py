@@ -8,7 +8,9 @@ from app.tiny import FILE_POSE
 from imgui_bundle import imgui
 from PIL import Image
 
-from viewer.app.keys import KEYS
+from viewer.app.features import KEYS
+from viewer.app.files.state import Files
+from viewer.app.keys import Keyboard
 
 OPTION_KEYS = {"w": "wireframe", "n": "normals", "t": "texture", "g": "grid"}
 
@@ -106,10 +108,10 @@ def test_h_and_question_mark_list_the_keys(hand):
     quiet = hand.screen()
     for key, held in (("h", ""), ("slash", "shift"), ("f1", "")):
         hand.key(key, held)
-        assert hand.state.keys_visible
+        assert hand.state.of(Keyboard).is_listed
         assert (hand.screen() != quiet).any()
         hand.key(key, held)
-        assert not hand.state.keys_visible
+        assert not hand.state.of(Keyboard).is_listed
 
 
 def test_escape_closes_in_order_and_never_quits(hand):
@@ -127,7 +129,12 @@ def test_escape_closes_in_order_and_never_quits(hand):
         hand.key("escape")
         hand.step(2)
         seen.append(
-            (bool(state.error), state.dialog is not None, state.keys_visible, state.selected_joint)
+            (
+                bool(state.error),
+                state.of(Files).dialog is not None,
+                state.of(Keyboard).is_listed,
+                state.selected_joint,
+            )
         )
     assert seen == [
         (False, False, True, 1),
@@ -165,7 +172,7 @@ def test_f12_saves_what_is_shown_and_never_replaces(hand, tmp_path, monkeypatch)
     hand.key("f12")
     assert sorted(path.name for path in folder.iterdir()) == ["tiny-2.png", "tiny.png"]
     assert first.read_bytes() == kept
-    assert any("tiny-2.png" in note.text for note in hand.state.notes)
+    assert any("tiny-2.png" in note.text for note in hand.state.messages.notes)
     assert hand.undo_steps == 1  # only the wireframe
 
 
@@ -179,7 +186,7 @@ def test_f12_says_that_the_legend_is_not_in_the_picture(hand, tmp_path, monkeypa
     without = hand.scene_picture()
     hand.key("f12")
     assert hand.says(text)
-    hand.state.notes.clear()
+    hand.state.messages.notes.clear()
     hand.state.options.legend = True
     hand.step(3)
     hand.key("f12")
@@ -196,7 +203,7 @@ def test_f12_without_a_current_folder_shows_a_message(hand, tmp_path, monkeypatc
     hand.key("escape")
     hand.state.paths = ()
     hand.key("o", "ctrl")
-    assert hand.state.dialog is not None
+    assert hand.state.of(Files).dialog is not None
 
 
 def test_ctrl_q_asks_to_quit(hand):
@@ -206,7 +213,7 @@ def test_ctrl_q_asks_to_quit(hand):
 
 def test_ctrl_o_opens_the_file_dialog_in_the_figures_folder(hand, tmp_path):
     hand.key("o", "ctrl")
-    assert hand.state.dialog.folder == tmp_path.resolve()
+    assert hand.state.of(Files).dialog.folder == tmp_path.resolve()
 
 
 @pytest.mark.parametrize("redo", [("z", "ctrl shift"), ("y", "ctrl")])
@@ -250,7 +257,7 @@ def test_new_change_after_undo_forgets_redo(hand):
 def test_ctrl_letters_are_not_plain_letters(hand):
     for key in ("s", "w", "r", "h", "g"):
         hand.key(key, "ctrl")
-    assert hand.undo_steps == 0 and not hand.state.keys_visible
+    assert hand.undo_steps == 0 and not hand.state.of(Keyboard).is_listed
 
 
 def test_menu_entries_act(hand):
@@ -263,7 +270,7 @@ def test_menu_entries_act(hand):
     hand.menu("menu Edit", "Reset pose")
     assert hand.dof("arm.x") == FILE_POSE["arm.x"]
     hand.menu("menu Help", "Keys")
-    assert hand.state.keys_visible
+    assert hand.state.of(Keyboard).is_listed
     hand.menu("menu File", "Quit")
     assert "quit" in hand.state.wants
 

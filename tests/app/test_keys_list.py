@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 from imgui_bundle import imgui
 
-from viewer.app.keys import KEYS, MOUSE
+from viewer.app.features import KEYS, MOUSE
+from viewer.app.keys import Keyboard
 from viewer.app.keys_list import _columns
 
 N_LINES = len(KEYS) + len(MOUSE)
@@ -66,4 +67,4 @@ def test_wheel_scrolls_where_there_is_no_room(drive, rig):
     assert window.scroll.y == window.scroll_max.y > 0
     assert hand.state.camera.distance == distance
     hand.key("escape")
-    assert not hand.state.keys_visible
+    assert not hand.state.of(Keyboard).is_listed

@@ -10,14 +10,15 @@ from app.tiny import FILE_POSE
 from imgui_bundle import imgui
 
 import viewer
+from viewer.app.features import PANELS
 from viewer.app.headless import HeadlessApp
-from viewer.app.panels import PANELS
+from viewer.app.shown_panels import ShownPanels
 
 
 def test_closed_panel_leaves_and_the_menu_brings_it_back(hand):
     hand.menu("menu Window", "Joints")
     hand.step(3)
-    assert hand.state.closed_panels == {"joints"} and "Filter" not in hand.state.item_rects
+    assert hand.state.of(ShownPanels).closed == {"joints"} and "Filter" not in hand.state.item_rects
     assert hand.state.view_rect[0] == 0
     hand.menu("menu Window", "Joints")
     hand.step(3)
@@ -28,7 +29,7 @@ def test_panel_closes_by_its_cross(hand):
     right = hand.state.view_rect[0]
     hand.click((right - 13, hand.state.view_rect[1] + 10))
     hand.step(3)
-    assert hand.state.closed_panels == {"joints"}
+    assert hand.state.of(ShownPanels).closed == {"joints"}
 
 
 def test_all_panels_closed_leave_the_view(hand):
@@ -47,7 +48,7 @@ def test_reset_layout_opens_every_panel_where_it_was(hand):
     hand.menu("menu Window", "Stats")
     hand.menu("menu Window", "Reset layout")
     hand.step(4)
-    assert not hand.state.closed_panels
+    assert not hand.state.of(ShownPanels).closed
     assert hand.state.view_rect == rect and set(hand.state.item_rects) == labels
 
 
@@ -126,7 +127,7 @@ def test_scene_fills_exactly_its_place_in_the_window(drive, rig):
     hand.state.panels_visible = False
     screen, scene = hand.screen(), hand.scene_picture()
     assert scene.shape[:2] == screen.shape[:2]
-    notes = len(hand.state.notes)
+    notes = len(hand.state.messages.notes)
     assert notes or np.abs(screen.astype(int) - scene[..., :3]).max() <= 1
 
 
@@ -138,12 +139,12 @@ def test_background_that_is_transparent_shows_no_older_frame(hand):
     hand.state.camera.azimuth += 90
     hand.screen()
     hand.state.camera.azimuth -= 90
-    hand.state.notes.clear()
+    hand.state.messages.notes.clear()
     assert (hand.screen() == first).mean() > 0.99
 
 
 def test_closed_panels_are_remembered(tmp_path, monkeypatch):
-    from viewer.app.recent import load_closed_panels, save_closed_panels
+    from viewer.app.files.recent import load_closed_panels, save_closed_panels
 
     assert load_closed_panels() == set()
     save_closed_panels({"stats", "joints"})

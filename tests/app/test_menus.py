@@ -11,8 +11,8 @@ from formats.synthetic_smpl import model
 from imgui_bundle import imgui
 
 import viewer.models
-from viewer.app.keys import KEYS, MOUSE
-from viewer.app.panels import PANELS
+from viewer.app.features import KEYS, MOUSE, PANELS
+from viewer.app.files.state import Files
 from viewer.models import load_model_folder, save_model_folder
 
 
@@ -34,7 +34,7 @@ def _open_models(hand):
 
 
 def _listed(hand):
-    return [label for label in hand.state.item_rects if label in hand.state.models]
+    return [label for label in hand.state.item_rects if label in hand.state.of(Files).models]
 
 
 def test_bundled_body_opens(hand):
@@ -111,19 +111,19 @@ def _choose_folder(hand):
 
 def test_folder_of_models_is_chosen_and_remembered(hand, models):
     _choose_folder(hand)
-    assert hand.state.dialog.purpose == "folder"
+    assert hand.state.of(Files).dialog.purpose == "folder"
     hand.click("file body models")  # a folder is entered, not chosen
-    assert hand.state.dialog.folder == models
+    assert hand.state.of(Files).dialog.folder == models
     hand.click("Use this folder")
     hand.step(2)
-    assert hand.state.dialog is None and not hand.state.error
+    assert hand.state.of(Files).dialog is None and not hand.state.error
     assert load_model_folder() == models.resolve()
     assert hand.says("3 body models in")
     _open_models(hand)
     assert _listed(hand) == ["flame:male", "smpl:neutral", "smplx:female"]
     hand.click("Choose model folder…")
     hand.step(3)
-    assert hand.state.dialog.folder == models.resolve()
+    assert hand.state.of(Files).dialog.folder == models.resolve()
 
 
 def test_cancelled_dialog_keeps_the_folder_that_was_remembered(hand, models, tmp_path):
@@ -132,14 +132,14 @@ def test_cancelled_dialog_keeps_the_folder_that_was_remembered(hand, models, tmp
     hand.click("file body models")
     hand.click("Cancel")
     hand.step(2)
-    assert hand.state.dialog is None and load_model_folder() == tmp_path.resolve()
+    assert hand.state.of(Files).dialog is None and load_model_folder() == tmp_path.resolve()
 
 
 def test_dialog_starts_somewhere_if_the_remembered_folder_is_gone(hand, models, tmp_path):
     save_model_folder(models)
     models.rename(tmp_path / "moved")
     _choose_folder(hand)
-    dialog = hand.state.dialog
+    dialog = hand.state.of(Files).dialog
     assert dialog.problem and not dialog.entries
     hand.click("Up")
     assert dialog.folder == tmp_path.resolve() and not dialog.problem
@@ -196,7 +196,11 @@ def test_edits_of_a_pose_are_grey_without_one(drive, rig):
             hand.key("escape")
     hand.menu("menu File", "Save pose…")
     assert imgui.get_clipboard_text() == "kept"
-    assert hand.state.dialog is None and not hand.state.error and not hand.state.notes
+    assert (
+        hand.state.of(Files).dialog is None
+        and not hand.state.error
+        and not hand.state.messages.notes
+    )
 
 
 def test_window_menu_closes_and_opens_the_new_panels(box):

@@ -5,10 +5,12 @@ from __future__ import annotations
 import pytest
 from formats.capture_files import body, write_frames
 
-from viewer.app.clip_actions import ask_for_clip, new_clip
+from viewer.app.curves.clip_actions import ask_for_clip, new_clip
+from viewer.app.files.motion_dialog import ask_for_motion
+from viewer.app.files.state import Files
 from viewer.app.menus import _ask_for_export, _ask_for_pose
-from viewer.app.motion_dialog import ask_for_motion
-from viewer.app.record_dialog import KINDS, RecordSettings, _ask_where
+from viewer.app.recording.record_dialog import _ask_where
+from viewer.app.recording.state import KINDS, RecordSettings
 
 
 @pytest.fixture
@@ -22,7 +24,7 @@ def test_recordings_are_called_after_the_sequence(recorded):
     offered = {}
     for kind in KINDS:
         _ask_where(recorded.state, RecordSettings(kind=kind))
-        offered[kind] = recorded.state.dialog.name
+        offered[kind] = recorded.state.of(Files).dialog.name
     assert offered.pop("pictures") == "seq_smpl_{frame:05}.png"
     assert offered.pop("sheet") == "seq_smpl_sheet.png"
     assert offered and offered == {kind: f"seq_smpl{kind}" for kind in offered}
@@ -32,14 +34,14 @@ def test_what_one_person_gives_is_called_after_that_person(recorded):
     state = recorded.state
     state.choose_actor(1)
     _ask_for_pose(state)
-    assert state.dialog.name == "seq_smpl_7_pose.json"
+    assert state.of(Files).dialog.name == "seq_smpl_7_pose.json"
     _ask_for_export(state)
-    assert state.dialog.name == "seq_smpl_7.obj"
+    assert state.of(Files).dialog.name == "seq_smpl_7.obj"
 
 
 def test_motions_of_all_are_called_after_the_sequence(recorded):
     ask_for_motion(recorded.state)
-    assert recorded.state.dialog.name.startswith("seq_smpl.")
+    assert recorded.state.of(Files).dialog.name.startswith("seq_smpl.")
 
 
 def test_screenshot_is_called_after_the_sequence(recorded, tmp_path, monkeypatch):
@@ -55,12 +57,12 @@ def test_figure_and_its_clip_are_called_after_the_figure(hand):
     hand.step(2)
     assert state.actor.clip.name == "tiny"
     ask_for_clip(state)
-    assert state.dialog.name == "tiny_edited.anim"
+    assert state.of(Files).dialog.name == "tiny_edited.anim"
     _ask_where(state, RecordSettings(kind="sheet"))
-    assert state.dialog.name == "tiny_sheet.png"
+    assert state.of(Files).dialog.name == "tiny_sheet.png"
 
 
 def test_name_with_a_slash_offers_no_folder(hand):
     hand.state.actor.called = "../a b"
     _ask_for_export(hand.state)
-    assert hand.state.dialog.name == ".._a_b.obj"
+    assert hand.state.of(Files).dialog.name == ".._a_b.obj"

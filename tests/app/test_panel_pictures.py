@@ -1,21 +1,24 @@
 """Golden pictures of the interface, compared coarsely: letters differ between machines.
 
-VIEWER_UPDATE_GOLDEN=1 draws them anew; look at them before they are committed.
+``make golden NAME…`` draws them anew; look at them before they are committed.
 """
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image, ImageFilter
+from stored_pictures import GOLDEN, is_redrawn
 
-from viewer.app.lint_actions import check_rig
-from viewer.app.weights_actions import pin_vertex
+from viewer.app.files.state import Files
+from viewer.app.linting.actions import check_rig
+from viewer.app.linting.state import Linting
+from viewer.app.posing.state import Posing
+from viewer.app.shown_panels import ShownPanels
+from viewer.app.weights.actions import pin_vertex
 
-GOLDEN = Path(__file__).resolve().parents[1] / "golden"
 SIZE = (560, 420)
 BODY_SIZE = (760, 680)
 MOST_MEAN, MOST_LOCAL = 3.0, 40.0  # of 255, after blurring away letters and hinting
@@ -46,12 +49,12 @@ def _message(hand):
 
 def _dialog(hand):
     hand.key("o", "ctrl")
-    hand.state.dialog.folder = Path("/figures")
+    hand.state.of(Files).dialog.folder = Path("/figures")
 
 
 def _lint(hand):
     check_rig(hand.state)
-    hand.state.lint.running.job.wait()
+    hand.state.of(Linting).running.job.wait()
     hand.step(3)
     hand.click("finding 0")
 
@@ -72,7 +75,7 @@ def _shape(hand):
     pose = hand.state.actor.pose
     pose.shape_weights[[0, 1, 2, 10]] = 1.0, -2.0, 2.5, -5.0
     pose.dofs[hand.dof_index("neck.y")] = 0.5
-    hand.state.shape_seed = 7
+    hand.state.of(Posing).shape_seed = 7
 
 
 def _skinning(hand):
@@ -132,43 +135,45 @@ def _is_like(first, second):
 def _shown(hand, prepare):
     prepare(hand)
     hand.step(3)
-    hand.state.notes.clear()
+    hand.state.messages.notes.clear()
     hand.state.stats.renderer = hand.state.stats.version = "driver"
     hand.key("f")
-    hand.state.notes.clear()
+    hand.state.messages.notes.clear()
     return hand.screen()
 
 
+@pytest.mark.golden("app_{name}")
 @pytest.mark.parametrize("name", STATES)
 def test_interface_looks_as_it_did(drive, rig, name):
-    _compare(_shown(drive(*rig, size=SIZE), STATES[name]), name)
+    _compare(_shown(drive(*rig, size=SIZE, samples=4), STATES[name]), name)
 
 
+@pytest.mark.golden("app_{name}")
 @pytest.mark.parametrize("name", BODIES)
 def test_panels_of_bodies_look_as_they_did(drive_body, name):
     kind, prepare = BODIES[name]
     hand = drive_body(kind, size=BODY_SIZE)
-    hand.state.closed_panels.add("stats")  # its times are others every time
+    hand.state.of(ShownPanels).closed.add("stats")  # its times are others every time
     hand.step(2)
     _compare(_shown(hand, prepare), name)
 
 
 def _compare(pixels, name):
     path = GOLDEN / f"app_{name}.png"
-    if os.environ.get("VIEWER_UPDATE_GOLDEN") == "1":
+    if is_redrawn(path.stem):
         Image.fromarray(pixels).save(path)
-    assert path.is_file(), f"{path} is missing: VIEWER_UPDATE_GOLDEN=1 draws it"
+    assert path.is_file(), f"{path} is missing: make golden {path.stem} draws it"
     with Image.open(path) as golden:
         wanted = np.array(golden.convert("RGB"))
     assert _is_like(pixels, wanted), _difference(pixels, wanted)
 
 
 def test_comparison_tells_states_apart(drive, rig):
-    hand = drive(*rig, size=SIZE)
+    hand = drive(*rig, size=SIZE, samples=4)
     start = _shown(hand, _nothing)
-    hand.state.closed_panels.add("stats")
+    hand.state.of(ShownPanels).closed.add("stats")
     without_panel = hand.screen()
-    hand.state.closed_panels.clear()
+    hand.state.of(ShownPanels).closed.clear()
     hand.state.options.show = "skeleton"
     without_skin = hand.screen()
     assert _is_like(start, start)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from viewer.app.panels import PANELS
-from viewer.app.shown_panels import is_open, set_open
+from viewer.app.features import PANELS
+from viewer.app.shown_panels import ShownPanels, is_open, set_open
 
 
 def test_panels_on_demand_are_closed_at_first(hand):
@@ -21,7 +21,7 @@ def test_opening_and_closing(hand):
         for opened in (True, True, False, False, True):
             set_open(state, name, opened)
             assert is_open(state, name) == opened
-    assert state.opened_panels == {"lint"} and not state.closed_panels
+    assert state.of(ShownPanels).opened == {"lint"} and not state.of(ShownPanels).closed
 
 
 def test_cross_of_its_tab_closes_a_panel_on_demand(hand):
@@ -31,4 +31,4 @@ def test_cross_of_its_tab_closes_a_panel_on_demand(hand):
     tab = imgui.internal.find_window_by_name("Lint").dc.dock_tab_item_rect
     hand.click((tab.max.x - 12, 0.5 * (tab.min.y + tab.max.y)))
     hand.step(3)
-    assert not hand.state.opened_panels and not hand.state.closed_panels
+    assert not hand.state.of(ShownPanels).opened and not hand.state.of(ShownPanels).closed

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from imgui_bundle import imgui
 
+from viewer.app.posing.joint_tree import joint_tree
 from viewer.app.typed_keys import TypedKeys
 
 A, ENTER, BACKSPACE, KEYPAD_1, KEYPAD_ENTER = 65, 257, 259, 321, 335
@@ -34,7 +35,7 @@ def test_text_that_is_typed_between_two_frames_arrives_whole(hand, type_at_once)
     hand.click("Filter")
     type_at_once("abba cadabra".replace(" ", ""))
     hand.step(1)
-    assert hand.state.joint_filter == "abbacadabra"
+    assert joint_tree(hand.state).filter == "abbacadabra"
 
 
 def test_enter_and_backspace_between_two_frames_keep_their_order(hand, type_at_once):
@@ -43,7 +44,7 @@ def test_enter_and_backspace_between_two_frames_keep_their_order(hand, type_at_o
     for is_down in (True, False):
         hand.io.add_key_event(imgui.Key.backspace, is_down)
     hand.step(3)
-    assert hand.state.joint_filter == "arm"
+    assert joint_tree(hand.state).filter == "arm"
 
 
 def test_click_between_two_frames_acts_also_while_text_is_entered(hand, type_at_once):

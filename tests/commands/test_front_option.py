@@ -85,9 +85,9 @@ def test_picture_with_panels_fits_the_view_between_them_for_the_whole_motion(tmp
     from app.captured import people
     from app.tiny import write_rig
 
+    from viewer.app.core.state import AppState
+    from viewer.app.core.view_frame import view_frame
     from viewer.app.headless import HeadlessApp
-    from viewer.app.state import AppState
-    from viewer.app.view_frame import view_frame
     from viewer.rendering.framing import frame_motion
     from viewer.rendering.options import DisplayOptions
     from viewer.rendering.recorder import Recording

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from lint.sound import column, legs, scene_of, standing
 
-from viewer.app.playback import Playback
+from viewer.app.core.playback import Playback
 from viewer.lint import Finding, LintOptions, lint_scene
 from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.scene import Actor, Scene

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from viewer.app.widgets import plain_zero
+from viewer.app.core.widgets import plain_zero
 from viewer.rig.number_text import angle_text, number_text, short_number
 
 

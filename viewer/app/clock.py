@@ -6,12 +6,21 @@ from collections.abc import Sequence
 
 from imgui_bundle import imgui
 
-from viewer.app.actions import follow_actor
-from viewer.app.gizmo import is_held
-from viewer.app.state import AppState
+from viewer.app.actors.following import follow_actor
+from viewer.app.core.state import AppState
+from viewer.app.posing.state import Posing
+from viewer.app.rigging.state import Rigging
 from viewer.rig.scene import Actor, Scene
 
 __all__ = ["Clock"]
+
+
+def is_held(state: AppState) -> bool:
+    """Return whether an edit is going on: a widget or a handle is held."""
+    drag = state.of(Posing).drag
+    is_dragged = drag is not None and not drag.is_over
+    moves_template = state.of(Rigging).holds_mouse and imgui.is_mouse_down(imgui.MouseButton_.left)
+    return imgui.is_any_item_active() or is_dragged or moves_template
 
 
 class Clock:
@@ -33,7 +42,7 @@ class Clock:
         It waits while a handle is held that has not been dragged yet: a click must not pause, and
         the pose in which a drag began must stay.
         """
-        drag = self.state.posing.drag
+        drag = self.state.of(Posing).drag
         if drag is None or drag.has_moved:
             self.state.playback.advance(imgui.get_io().delta_time)
 

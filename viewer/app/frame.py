@@ -10,26 +10,30 @@ from pathlib import Path
 import moderngl
 from imgui_bundle import imgui
 
+from viewer.app.actors.following import stop_following
 from viewer.app.clock import Clock
-from viewer.app.explanation_lines import draw_hovered, pinned_annotations
-from viewer.app.file_dialog import PICTURES, FileDialog, draw_file_dialog, folder_of
-from viewer.app.framing import keep_fitting
-from viewer.app.gizmo_drawing import draw_gizmo
+from viewer.app.core.fitting import keep_fitting
+from viewer.app.core.jobs import FrameJob
+from viewer.app.core.state import AppState
+from viewer.app.files.file_choice import PICTURES, FileDialog, folder_of
+from viewer.app.files.file_dialog import draw_file_dialog
+from viewer.app.files.loader import Loader
+from viewer.app.files.recent import remember
+from viewer.app.files.state import Files
+from viewer.app.files.stream import Stream
 from viewer.app.interface import draw_interface
-from viewer.app.jobs import FrameJob
 from viewer.app.keys import handle_keys
-from viewer.app.lint_marks import show_finding
-from viewer.app.loader import Loader
+from viewer.app.linting.marks import show_finding
 from viewer.app.mouse import drop_motion_before_press, handle_mouse
 from viewer.app.overlays import draw_hints
-from viewer.app.picture_key import picture_key
-from viewer.app.recent import remember
-from viewer.app.record_dialog import draw_record_dialog
-from viewer.app.rig_tools import draw_rig_tools, show_rig
-from viewer.app.shape_guard import drop_unreadable_shapes
-from viewer.app.state import AppState
-from viewer.app.stream import Stream
-from viewer.app.view_picks import answer_picks
+from viewer.app.picture_key import PictureKeys
+from viewer.app.posing.gizmo_drawing import draw_gizmo
+from viewer.app.posing.shape_guard import drop_unreadable_shapes
+from viewer.app.recording.record_dialog import draw_record_dialog
+from viewer.app.recording.state import Recording
+from viewer.app.rigging.tools import draw_rig_tools, show_rig
+from viewer.app.view.picks import answer_picks
+from viewer.app.weights.explanation_lines import draw_hovered, pinned_annotations
 from viewer.errors import RenderError, ViewerError, printable
 from viewer.formats import FORMATS, free_path, save_image
 from viewer.loading import Contents, add_to_actor, bundled_body, bundled_files
@@ -72,12 +76,13 @@ class Frame:
         self.renderer = Renderer(context)
         self.target: Target | None = None
         self._drawn: object = None
+        self._keys = PictureKeys()
         self.clock = Clock(state)
         state.stats.renderer = context.info["GL_RENDERER"]
         state.stats.version = context.info["GL_VERSION"]
 
     def draw(self, framebuffer: moderngl.Framebuffer, size: tuple[int, int], scale: float) -> None:
-        """Draw one frame between ``imgui.new_frame`` and the swap of buffers.
+        """Run one frame between ``imgui.new_frame`` and the swap of buffers, and paint it.
 
         Parameters
         ----------
@@ -89,6 +94,12 @@ class Frame:
             Pixels per window coordinate.
         """
         started = time.perf_counter()
+        self.run(scale)
+        self.paint(framebuffer, size)
+        self.state.stats.frame_ms = 1e3 * (time.perf_counter() - started)
+
+    def run(self, scale: float) -> None:
+        """Do all of a frame but the painting of its panels, which only a screen needs."""
         state = self.state
         drop_motion_before_press()
         self.clock.advance()
@@ -96,8 +107,9 @@ class Frame:
         self.open(draw_interface(state))
         draw_record_dialog(state)
         draw_file_dialog(state)
-        self.open(state.wants_open)
-        state.wants_open = []
+        files = state.of(Files)
+        self.open(files.wants_open)
+        files.wants_open = []
         handle_keys(state)
         handle_mouse(state)
         state.limit_camera()
@@ -107,17 +119,19 @@ class Frame:
         self.clock.keep_edits()
         self._take_streamed()
         self.clock.pose()
-        keep_fitting(state)
+        keep_fitting(state, files.stream is not None)
         self.renderer.marks, self.renderer.ghost = show_finding(state), show_rig(state)
         self._draw_scene(scale)
         if self.target is not None:
             answer_picks(state, self.renderer, self.target.size, scale, self._drawn)
         imgui.render()
+
+    def paint(self, framebuffer: moderngl.Framebuffer, size: tuple[int, int]) -> None:
+        """Paint the panels of the frame that was run last, and the scene behind them."""
         framebuffer.use()
         self.context.viewport = (0, 0, *size)
         framebuffer.clear(0.10, 0.11, 0.12, 1.0)
         imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
-        state.stats.frame_ms = 1e3 * (time.perf_counter() - started)
 
     def _work(self) -> None:
         """Go on with what takes longer than a frame, and say how it ended."""
@@ -132,20 +146,21 @@ class Frame:
 
     def _take_streamed(self) -> None:
         """Add what was read of captures since the last frame."""
-        state, stream = self.state, self.state.stream
+        state, files = self.state, self.state.of(Files)
+        stream = files.stream
         if stream is None:
             return
         try:
             new, notes, grew = stream.take()
         except ViewerError as problem:
-            state.error, state.stream = str(problem), None
+            state.error, files.stream = str(problem), None
             stream.cancel()
             return
         if grew:
             self.clock.add(new)
         state.say(*notes)
         if stream.is_done:
-            state.stream = None
+            files.stream = None
             if stream.error:
                 state.error = stream.error
 
@@ -156,8 +171,9 @@ class Frame:
         size = (round(width * scale), round(height * scale))
         if min(size) < 1:
             return
-        self.renderer.annotations = pinned_annotations(state, size)
-        key = picture_key(state, self.renderer, size)
+        renderer = self.renderer
+        renderer.annotations = pinned_annotations(state, size)
+        key = self._keys.key(state, size, renderer.marks, renderer.ghost, renderer.annotations)
         if key != self._drawn:
             self._drawn = key  # also if it fails: not again before something has changed
             self._draw_target(size)
@@ -219,14 +235,14 @@ class Frame:
         if is_part and paths[0].suffix.lower() not in _ADDED:
             attempts.insert(0, [*state.paths, *paths])
         opened = state.paths or bundled_files()
-        state.loader = Loader(paths, attempts, self.wake, opened=opened)
+        state.of(Files).loader = Loader(paths, attempts, self.wake, opened=opened)
 
     def _take_loaded(self) -> None:
         """Show what was read, or say why it was not."""
-        state, loader = self.state, self.state.loader
+        state, loader = self.state, self.state.of(Files).loader
         if loader is None or not loader.is_done:
             return
-        state.loader = None
+        state.of(Files).loader = None
         if loader.addition is not None:
             self._add(loader.addition)
         elif loader.scene is None:
@@ -243,20 +259,22 @@ class Frame:
         except RenderError as problem:
             state.error = str(problem)
             return
-        if state.stream is not None:
-            state.stream.cancel()
+        files = state.of(Files)
+        if files.stream is not None:
+            files.stream.cancel()
         state.show_scene(scene, paths)
+        stop_following(state)
         self.clock.is_first = True
         self.stream(builders)
         if self.keeps_recent:
-            problem_text = remember(state.recent, paths)
+            problem_text = remember(files.recent, paths)
             if problem_text:
                 state.say(problem_text)
 
     def stream(self, builders: Sequence[Builder]) -> None:
         """Read on what is left of captures."""
         left = [builder for builder in builders if not builder.is_done]
-        self.state.stream = Stream(left, self.wake) if left else None
+        self.state.of(Files).stream = Stream(left, self.wake) if left else None
 
     def _add(self, contents: Contents) -> None:
         """Apply poses and pictures to the chosen actor."""
@@ -275,23 +293,28 @@ class Frame:
     def _do_wanted(self) -> None:
         state = self.state
         if "open dialog" in state.wants:
-            state.dialog = FileDialog(folder_of(state.paths))
+            state.of(Files).dialog = FileDialog(folder_of(state.paths))
         if "open bundled" in state.wants:
             self.open(bundled_files())
         if "open body" in state.wants:
             self.open([bundled_body()])
         if "screenshot" in state.wants:
             self._save_screenshot()
-        if state.wants_recording is not None and state.record is not None and state.job is None:
-            from viewer.app.recording import recording_steps
-
-            path, settings = state.wants_recording, replace(state.record)
-            ghost = self.renderer.ghost
-            steps = recording_steps(state, self.context, settings, path, ghost)
-            state.job = FrameJob(f"Recording {printable(path.name, 60)}", steps)
-            state.playback.playing, state.record = False, None
-        state.wants_recording = None
+        self._start_recording()
         state.wants -= {"open dialog", "open bundled", "open body", "screenshot"}
+
+    def _start_recording(self) -> None:
+        """Begin to record if that is wanted and nothing else goes on."""
+        state, recording = self.state, self.state.of(Recording)
+        path, settings, recording.wanted = recording.wanted, recording.settings, None
+        if path is None or settings is None or state.job is not None:
+            return
+        from viewer.app.recording.recording_steps import recording_steps
+
+        ghost = self.renderer.ghost
+        steps = recording_steps(state, self.context, replace(settings), path, ghost)
+        state.job = FrameJob(f"Recording {printable(path.name, 60)}", steps)
+        state.playback.playing, recording.settings = False, None
 
     def _save_screenshot(self) -> None:
         """Save the scene, without panels, under a new name in the current folder."""
@@ -316,7 +339,7 @@ class Frame:
 
     def release(self) -> None:
         """Free everything that was made for drawing; what goes on beside ends."""
-        for work in (self.state.job, self.state.stream):
+        for work in (self.state.job, self.state.of(Files).stream):
             if work is not None:
                 work.cancel()
         if self.target is not None:

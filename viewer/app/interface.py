@@ -6,13 +6,14 @@ from pathlib import Path
 
 from imgui_bundle import imgui
 
+from viewer.app.core.reasons import no_panel
+from viewer.app.core.state import AppState
+from viewer.app.features import PANELS, Panel, panel_module
+from viewer.app.manual.manual_window import draw_manual
 from viewer.app.menus import draw_menus
 from viewer.app.message_window import draw_error, draw_message_window
 from viewer.app.overlays import draw_overlays
-from viewer.app.panels import PANELS, Panel, panel_module
-from viewer.app.reasons import no_panel
-from viewer.app.shown_panels import is_open, set_open
-from viewer.app.state import AppState
+from viewer.app.shown_panels import ShownPanels, is_open, set_open
 
 __all__ = ["draw_interface"]
 
@@ -45,19 +46,21 @@ def draw_interface(state: AppState) -> list[Path]:
         state.view_rect = (viewport.pos.x, viewport.pos.y, viewport.size.x, viewport.size.y)
     draw_overlays(state)
     draw_message_window(state)
+    draw_manual(state)
     draw_error(state)
     return chosen
 
 
 def _draw_dock(state: AppState) -> int:
     """Draw the dock space, with the first layout if none was remembered."""
+    shown = state.of(ShownPanels)
     dock = imgui.get_id(_DOCK)
     is_new = imgui.internal.dock_builder_get_node(dock) is None
-    if is_new or state.wants_layout_reset:
+    if is_new or shown.wants_reset:
         _build_layout(dock)
-        state.wants_layout_reset = False
-        state.closed_panels.clear()
-        state.opened_panels.clear()
+        shown.wants_reset = False
+        shown.closed.clear()
+        shown.opened.clear()
     flags = imgui.DockNodeFlags_.passthru_central_node
     flags |= imgui.DockNodeFlags_.no_docking_over_central_node
     imgui.dock_space_over_viewport(dock, imgui.get_main_viewport(), flags)

@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 from imgui_bundle import imgui
 
-from viewer.app.keys import KEYS, MOUSE
-from viewer.app.state import AppState
-from viewer.app.widgets import overlay_rect
+from viewer.app.core.state import AppState
+from viewer.app.core.widgets import overlay_rect
+from viewer.app.features import KEYS, MOUSE
+from viewer.app.keys import Keyboard
 
 __all__ = ["draw_keys"]
 
@@ -28,7 +29,7 @@ class _Columns(NamedTuple):
 
 def draw_keys(state: AppState) -> None:
     """Draw the list if it is wanted; the wheel moves what a small window has no room for."""
-    if not state.keys_visible:
+    if not state.of(Keyboard).is_listed:
         return
     lines = [*((key.label, key.text) for key in KEYS), *MOUSE]
     style, viewport = imgui.get_style(), imgui.get_main_viewport()

@@ -6,21 +6,7 @@ from pathlib import Path
 
 from imgui_bundle import imgui
 
-from viewer.app.actions import redo, reset_pose, undo
-from viewer.app.clip_actions import new_clip
-from viewer.app.file_dialog import FileDialog, folder_of
-from viewer.app.lint_actions import check_rig
-from viewer.app.motion_dialog import ask_for_motion
-from viewer.app.panels import PANELS
-from viewer.app.pose_actions import (
-    copy_numbers,
-    copy_pose,
-    mirror,
-    paste_pose,
-    save_export,
-    save_pose,
-)
-from viewer.app.reasons import (
+from viewer.app.core.reasons import (
     no_job_room,
     no_new_clip,
     no_panel,
@@ -29,11 +15,29 @@ from viewer.app.reasons import (
     no_undo,
     nothing_to_export,
 )
-from viewer.app.record_dialog import RecordSettings
-from viewer.app.shown_panels import is_open, set_open
-from viewer.app.state import AppState
-from viewer.app.view_menu import draw_view_menu
-from viewer.app.widgets import begin_menu, menu_item, note_item
+from viewer.app.core.state import AppState
+from viewer.app.core.undo import redo, undo
+from viewer.app.core.widgets import begin_menu, menu_item, note_item
+from viewer.app.curves.clip_actions import new_clip
+from viewer.app.features import PANELS
+from viewer.app.files.file_choice import FileDialog, folder_of
+from viewer.app.files.motion_dialog import ask_for_motion
+from viewer.app.files.state import Files
+from viewer.app.keys import Keyboard
+from viewer.app.linting.actions import check_rig
+from viewer.app.manual.manual_window import draw_manual_menu
+from viewer.app.posing.pose_actions import (
+    copy_numbers,
+    copy_pose,
+    mirror,
+    paste_pose,
+    reset_pose,
+    save_export,
+    save_pose,
+)
+from viewer.app.recording.state import Recording, RecordSettings
+from viewer.app.shown_panels import ShownPanels, is_open, set_open
+from viewer.app.view.view_menu import draw_view_menu
 from viewer.errors import ViewerError, printable
 from viewer.export import EXPORTERS, files_written
 from viewer.formats import FORMATS, file_stem, opened_text
@@ -44,6 +48,7 @@ __all__ = ["draw_menus"]
 
 def draw_menus(state: AppState) -> list[Path]:
     """Draw the menu bar; return files that were asked for."""
+    keyboard = state.of(Keyboard)
     chosen: list[Path] = []
     if not imgui.begin_main_menu_bar():
         return chosen
@@ -61,25 +66,27 @@ def draw_menus(state: AppState) -> list[Path]:
             if menu_item(state, panel.title, "", shown, why):
                 set_open(state, name, not shown)
         imgui.separator()
-        if menu_item(state, "Messages", "Ctrl+M", state.messages_visible):
-            state.messages_visible = not state.messages_visible
+        if menu_item(state, "Messages", "Ctrl+M", state.messages.is_open):
+            state.messages.is_open = not state.messages.is_open
         if menu_item(state, "Reset layout"):
-            state.wants_layout_reset = True
+            state.of(ShownPanels).wants_reset = True
         imgui.end_menu()
     if begin_menu(state, "Help"):
-        if menu_item(state, "Keys", "H", state.keys_visible):
-            state.keys_visible = not state.keys_visible
+        if menu_item(state, "Keys", "H", keyboard.is_listed):
+            keyboard.is_listed = not keyboard.is_listed
+        draw_manual_menu(state)
         imgui.end_menu()
     imgui.end_main_menu_bar()
     return chosen
 
 
 def _draw_file_menu(state: AppState) -> list[Path]:
+    files = state.of(Files)
     chosen: list[Path] = []
     if menu_item(state, "Open…", "Ctrl+O"):
         state.wants.add("open dialog")
-    if begin_menu(state, "Open recent", bool(state.recent)):
-        for number, group in enumerate(state.recent):
+    if begin_menu(state, "Open recent", bool(files.recent)):
+        for number, group in enumerate(files.recent):
             text = printable(" + ".join(opened_text(Path(path)) for path in group), 80)
             if imgui.menu_item(f"{text}##recent{number}", "", False)[0]:
                 chosen = [Path(path) for path in group]
@@ -102,7 +109,7 @@ def _draw_file_menu(state: AppState) -> list[Path]:
     if menu_item(state, "Export motion…", why=nothing_to_export(state) or no_job_room(state)):
         ask_for_motion(state)
     if menu_item(state, "Record pictures or video…", why=no_job_room(state)):
-        state.record = RecordSettings()
+        state.of(Recording).settings = RecordSettings()
     if menu_item(state, "Save screenshot", "F12"):
         state.wants.add("screenshot")
     imgui.separator()
@@ -113,21 +120,22 @@ def _draw_file_menu(state: AppState) -> list[Path]:
 
 def _draw_models(state: AppState) -> list[Path]:
     """Draw the models of the model folder, looked for when the menu opens."""
+    files = state.of(Files)
     if imgui.is_window_appearing():
         folder = load_model_folder()
-        state.models = known_models(folder) if folder is not None and folder.is_dir() else {}
+        files.models = known_models(folder) if folder is not None and folder.is_dir() else {}
     chosen: list[Path] = []
-    for name, path in state.models.items():
+    for name, path in files.models.items():
         if menu_item(state, name):
             chosen = [path]
         if imgui.is_item_hovered():
             imgui.set_tooltip(printable(path, 200))
-    if not state.models:
+    if not files.models:
         imgui.text_disabled("none found; choose the folder where they are")
     imgui.separator()
     if menu_item(state, "Choose model folder…"):
         start = load_model_folder() or folder_of(state.paths)
-        state.dialog = FileDialog(start, _set_model_folder, "folder", "Folder of body models")
+        files.dialog = FileDialog(start, _set_model_folder, "folder", "Folder of body models")
     return chosen
 
 
@@ -144,7 +152,7 @@ def _set_model_folder(state: AppState, paths: list[Path]) -> None:
 def _ask_for_pose(state: AppState) -> None:
     name = f"{file_stem(state.actor.name)}_pose.json"
     suffixes = FORMATS["pose"].suffixes
-    state.dialog = FileDialog(
+    state.of(Files).dialog = FileDialog(
         folder_of(state.paths),
         lambda state, paths: save_pose(state, paths[0]),
         "save",
@@ -157,7 +165,7 @@ def _ask_for_pose(state: AppState) -> None:
 def _ask_for_export(state: AppState) -> None:
     kinds = [kind for kind in EXPORTERS.values() if kind.writes_pose]
     suffixes = tuple(suffix for kind in kinds for suffix in kind.suffixes)
-    state.dialog = FileDialog(
+    state.of(Files).dialog = FileDialog(
         folder_of(state.paths),
         lambda state, paths: save_export(state, paths[0]),
         "save",

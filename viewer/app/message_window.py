@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from viewer.app.messages import Message, message_line
-from viewer.app.state import AppState
-from viewer.app.widgets import button, checkbox, explain, same_line_if_room
+from viewer.app.core.messages import Message, message_line
+from viewer.app.core.state import AppState
+from viewer.app.core.widgets import button, checkbox, explain, same_line_if_room
 from viewer.errors import printable
 
 __all__ = ["draw_error", "draw_message_window"]
@@ -20,7 +20,7 @@ _LONGEST = 1000  # characters shown of one message
 
 def draw_message_window(state: AppState) -> None:
     """Draw the window if it is open."""
-    if not state.messages_visible:
+    if not state.messages.is_open:
         return
     size, viewport = imgui.get_font_size(), imgui.get_main_viewport()
     room = (
@@ -35,17 +35,17 @@ def draw_message_window(state: AppState) -> None:
     if shown:
         _draw_content(state)
     imgui.end()
-    state.messages_visible = bool(stays)
+    state.messages.is_open = bool(stays)
 
 
 def _draw_content(state: AppState) -> None:
-    listed = state.log.listed(state.logs_status)
+    listed = state.messages.log.listed(state.messages.lists_status)
     if button(state, "Copy all", "" if listed else "nothing was said yet"):
         imgui.set_clipboard_text("\n".join(map(message_line, listed)))
     explain("to the clipboard, a line each")
     text = "What keys and buttons did"
     same_line_if_room(text)
-    state.logs_status = checkbox(state, text, state.logs_status)
+    state.messages.lists_status = checkbox(state, text, state.messages.lists_status)
     if imgui.begin_child("##messages", (0.0, 0.0), imgui.ChildFlags_.borders):
         # New messages come at the end, which stays in view unless one has scrolled away from it.
         follows = imgui.get_scroll_y() >= imgui.get_scroll_max_y()
@@ -69,7 +69,7 @@ def _draw_message(message: Message) -> None:
 
 def draw_error(state: AppState) -> None:
     """Draw the message that something did not work, over everything, if there is one."""
-    state.log_error()
+    state.messages.log_error(state.error)
     if not state.error:
         return
     imgui.open_popup(_ERROR_TITLE)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from viewer.app.gizmo import choose_joint, use_handles
-from viewer.app.rig_tools import holds_mouse
-from viewer.app.state import AppState
-from viewer.app.weights_view import wants_vertex
+from viewer.app.core.state import AppState
+from viewer.app.posing.gizmo import choose_joint, use_handles
+from viewer.app.rigging.tools import holds_mouse
+from viewer.app.view.state import Picking
+from viewer.app.weights.state import Weights, wants_vertex
 from viewer.rendering.camera import orbit, pan, zoom
 
 __all__ = ["drop_motion_before_press", "handle_mouse"]
@@ -33,6 +34,7 @@ def drop_motion_before_press() -> None:
 
 def handle_mouse(state: AppState) -> None:
     """Move the camera by what the mouse did in this frame outside all panels."""
+    picking = state.of(Picking)
     io = imgui.get_io()
     x, y, width, height = state.view_rect
     if use_handles(state) or holds_mouse(state):
@@ -49,13 +51,13 @@ def handle_mouse(state: AppState) -> None:
         orbit(state.camera, -_DEGREES_PER_POINT * delta.x, _DEGREES_PER_POINT * delta.y)
     place = (io.mouse_pos.x - x, io.mouse_pos.y - y)
     if imgui.is_mouse_double_clicked(_LEFT):
-        state.wants_pick = (*place, True)
+        picking.wanted = (*place, True)
     elif (
         imgui.is_mouse_released(_LEFT)
         and _is_click()
-        and (wants_vertex(state.weights) or not choose_joint(state))
+        and (wants_vertex(state.of(Weights)) or not choose_joint(state))
     ):
-        state.wants_pick = (*place, False)
+        picking.wanted = (*place, False)
     if io.mouse_wheel and imgui.is_mouse_pos_valid():
         across = (io.mouse_pos.x - x - width / 2) / height
         upward = -(io.mouse_pos.y - y - height / 2) / height

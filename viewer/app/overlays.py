@@ -11,13 +11,14 @@ from typing import NamedTuple
 
 from imgui_bundle import imgui
 
-from viewer.app.actions import cancel
-from viewer.app.hover_text import draw_hover_text
+from viewer.app.cancel import cancel
+from viewer.app.core.state import AppState
+from viewer.app.core.widgets import Rect, begin_overlay, button, overlay_rect
+from viewer.app.files.state import Files
 from viewer.app.keys_list import draw_keys
-from viewer.app.legend import draw_legend
-from viewer.app.state import AppState
-from viewer.app.toolbar import draw_toolbar
-from viewer.app.widgets import Rect, begin_overlay, button, overlay_rect
+from viewer.app.posing.toolbar import draw_toolbar
+from viewer.app.weights.hover_text import draw_hover_text
+from viewer.app.weights.legend import draw_legend
 from viewer.errors import printable
 from viewer.rendering.passes.ground_pass import grid_step
 
@@ -69,7 +70,8 @@ class _Progress(NamedTuple):
 
 def _progress(state: AppState) -> _Progress | None:
     """Return what is going on, if anything is."""
-    loader, stream, job = state.loader, state.stream, state.job
+    files, job = state.of(Files), state.job
+    loader, stream = files.loader, files.stream
     if loader is not None and loader.seconds >= _SHOW_PROGRESS_AFTER:
         title = f"Opening {printable(loader.paths[-1].name, 60)}"
         return _Progress(title, -loader.seconds, f"{loader.seconds:.0f} s", "Cancel opening")
@@ -122,13 +124,13 @@ def _draw_progress(state: AppState, legend: Rect | None, tools: Rect | None) -> 
 
 def _draw_notes(state: AppState, above: Sequence[Rect]) -> None:
     """Draw the newest messages for which there is room, and say how many more there are."""
-    state.drop_old_notes()
+    state.messages.drop_old()
     x, y, width, height = state.view_rect
-    if not state.notes or width <= 40:
+    if not state.messages.notes or width <= 40:
         return
     style = imgui.get_style()
     wrap = max(width - 40.0, 50.0)
-    texts = [printable(note.text, _LONGEST_NOTE) for note in state.notes]
+    texts = [printable(note.text, _LONGEST_NOTE) for note in state.messages.notes]
     line = imgui.get_text_line_height_with_spacing()
     heights = [imgui.calc_text_size(text, False, wrap).y + style.item_spacing.y for text in texts]
     top = max((rect[3] + _BETWEEN for rect in above), default=y + _GAP)

@@ -3,42 +3,74 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Sequence
 
-from viewer.app.state import AppState
-from viewer.rendering.renderer import Renderer
+from viewer.app.core.state import AppState
+from viewer.rendering.options import DisplayOptions
+from viewer.rendering.overlay.annotation import Annotation
+from viewer.rendering.overlay.marks import Marks
+from viewer.rendering.passes.ghost_pass import Ghost
+from viewer.rig.number_key import NumberKey
 from viewer.rig.pose import pose_key
+from viewer.rig.scene import Actor
 
-__all__ = ["picture_key"]
+__all__ = ["PictureKeys"]
 
 
-def picture_key(state: AppState, renderer: Renderer, size: tuple[int, int]) -> object:
-    """Return everything the picture of the scene depends on.
+class PictureKeys:
+    """Makes a key a frame; what is large is copied only when it has changed.
 
-    Parameters
-    ----------
-    state : AppState
-        What is shown.
-    renderer : Renderer
-        With the marks, the template and the annotations of this frame.
-    size : (int, int)
-        Width and height in pixels.
+    The keys of poses are kept by the poses themselves, those of options and of the actors' places
+    here. Figures and clips are told apart by identity: they are replaced and never changed.
     """
-    camera = state.camera
-    poses = tuple(
-        (
-            id(actor),
-            id(actor.figure),
-            actor.is_drawn,
-            actor.color,
-            b"" if actor.points is None else actor.points.tobytes(),
-            actor.placement.tobytes(),
-            *(pose_key(actor.pose) if actor.pose else ()),
-        )
-        for actor in state.scene.actors
-    )
-    selected = (state.chosen_actor, state.selected_joint)
-    place = (camera.target.tobytes(), camera.distance, camera.azimuth, camera.inclination)
-    lens = (camera.fov, camera.orthographic, camera.up, id(camera.fixed))
-    ground, options = state.box.tobytes(), copy.deepcopy(state.options)
-    drawn_over = renderer.marks, renderer.ghost, renderer.annotations
-    return (size, place, lens, ground, options, poses, *selected, *drawn_over)
+
+    def __init__(self) -> None:
+        self._options: DisplayOptions | None = None
+        self._places: list[NumberKey] = []
+
+    def key(
+        self,
+        state: AppState,
+        size: tuple[int, int],
+        marks: Marks | None = None,
+        ghost: Ghost | None = None,
+        annotations: Sequence[Annotation] = (),
+    ) -> tuple[object, ...]:
+        """Return everything the picture of the scene depends on.
+
+        Parameters
+        ----------
+        state : AppState
+            What is shown.
+        size : (int, int)
+            Width and height in pixels.
+        marks, ghost, annotations : Marks or None, Ghost or None, sequence of Annotation
+            What is drawn over the scene in this frame; told apart by identity.
+        """
+        camera, options = state.camera, state.options
+        if options != self._options:
+            self._options = copy.deepcopy(options)
+        place = (camera.target.tobytes(), camera.distance, camera.azimuth, camera.inclination)
+        lens = (camera.fov, camera.orthographic, camera.up, id(camera.fixed))
+        # Motion paths show a part of the motion that goes along with time.
+        time = state.scene.time if options.path_joints else None
+        actors = self._actors(state.scene.actors)
+        selected = (state.chosen_actor, state.selected_joint)
+        drawn_over = marks, ghost, *annotations
+        ground = state.box.tobytes()
+        return (size, place, lens, ground, self._options, time, actors, selected, drawn_over)
+
+    def _actors(self, actors: Sequence[Actor]) -> tuple[object, ...]:
+        """Return the key of what is seen of all actors."""
+        del self._places[len(actors) :]
+        found = []
+        for row, actor in enumerate(actors):
+            arrays = [actor.placement] if actor.points is None else [actor.placement, actor.points]
+            if row == len(self._places):
+                self._places.append(NumberKey(*arrays))
+            elif not self._places[row].is_of(*arrays):
+                self._places[row] = NumberKey(*arrays)
+            look = (actor, actor.figure, actor.is_drawn, actor.color, actor.clip, actor.offset)
+            pose = None if actor.pose is None else pose_key(actor.pose)
+            found.append((look, self._places[row], pose))
+        return tuple(found)

@@ -8,26 +8,29 @@ from pathlib import Path
 from typing import Any
 
 from viewer.app.display import find_display, import_glfw, window_error
+from viewer.app.files.state import Files
+from viewer.app.shown_panels import ShownPanels
+from viewer.app.weights.state import Weights
 
 glfw = import_glfw()
 
 import moderngl  # noqa: E402  after glfw, whose library imgui-bundle chooses
 from imgui_bundle import imgui, implot  # noqa: E402
 
+from viewer.app.core.jobs import FrameJob  # noqa: E402
+from viewer.app.core.state import AppState  # noqa: E402
 from viewer.app.display_loss import stop_watching  # noqa: E402
-from viewer.app.frame import Frame  # noqa: E402
-from viewer.app.jobs import FrameJob  # noqa: E402
-from viewer.app.recent import (  # noqa: E402
+from viewer.app.files.recent import (  # noqa: E402
     load_closed_panels,
     load_recent,
     remember,
     save_closed_panels,
     state_folder,
 )
-from viewer.app.state import AppState  # noqa: E402
+from viewer.app.frame import Frame  # noqa: E402
 from viewer.app.theme import apply_theme, change_scale  # noqa: E402
 from viewer.app.typed_keys import TypedKeys  # noqa: E402
-from viewer.app.weights_actions import start_heat_map  # noqa: E402
+from viewer.app.weights.actions import start_heat_map  # noqa: E402
 from viewer.errors import RenderError, printable  # noqa: E402
 from viewer.formats import opened_text  # noqa: E402
 from viewer.interrupts import hold, poll  # noqa: E402
@@ -96,13 +99,14 @@ def show(
     files = tuple(map(Path, paths))
     hold()  # callbacks of GLFW swallow what is raised in them
     state = AppState(scene, camera, options, bounding_box(points), files)
-    state.lint.settings = motion
+    state.motion_settings = motion
     state.framing.is_fitting = fit_distance
     if options.shading == "scalar":
         start_heat_map(state)
-    state.recent = load_recent()
-    state.closed_panels = load_closed_panels()
-    state.say(*filter(None, [remember(state.recent, files)]))
+    opened = state.of(Files)
+    opened.recent = load_recent()
+    state.of(ShownPanels).closed = load_closed_panels()
+    state.say(*filter(None, [remember(opened.recent, files)]))
     state.playback.playing = plays and state.playback.has_motion
     window = _Window(state, scale)
     try:
@@ -227,16 +231,17 @@ class _Window:
             moves = self._awaits() or state.job is not None
             glfw.wait_events_timeout(_BUSY_SECONDS if moves else _IDLE_SECONDS)
             # Messages that time out, the bar of a file being read, a text cursor that blinks.
-            self._is_dirty |= moves or bool(state.notes or imgui.get_io().want_text_input)
+            self._is_dirty |= moves or bool(state.messages.notes or imgui.get_io().want_text_input)
         self._is_dirty |= state.playback.playing or state.job is not None
         return self._is_dirty or bool(self._dropped) or len(self._imgui.input_events_queue) > 0
 
     def _awaits(self) -> bool:
         """Return whether something comes without an event: files, the extent of a motion, texts."""
         state = self.state
-        is_read = state.loader is not None or state.stream is not None
+        files = state.of(Files)
+        is_read = files.loader is not None or files.stream is not None
         is_read |= not state.framing.is_settled
-        return is_read or state.weights.is_waiting or _awaits_tooltip(self._imgui)
+        return is_read or state.of(Weights).is_waiting or _awaits_tooltip(self._imgui)
 
     def _draw(self) -> bool:
         """Draw one frame; return False if the window has no pixels at present."""
@@ -267,7 +272,7 @@ class _Window:
 
     def release(self) -> None:
         """Close the window and free everything; the layout is saved."""
-        save_closed_panels(self.state.closed_panels)
+        save_closed_panels(self.state.of(ShownPanels).closed)
         imgui.backends.opengl3_shutdown()
         imgui.backends.glfw_shutdown()
         implot.destroy_context(self._implot)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from viewer.autorig.joint_carrying import outside
+from viewer.autorig.transfer.joint_transfer import outside
 from viewer.diagnostics import Diagnostic
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure

@@ -16,7 +16,7 @@ from viewer.rig.retargeting.mirror import asymmetry
 from viewer.rig.scalars import compute, length_text, strongest
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
-from viewer.rig.skinning import Skinning
+from viewer.rig.skinning import METHODS, PURE, Skinning
 
 __all__ = ["describe_model", "model_lines"]
 
@@ -96,7 +96,10 @@ def _effects(figure: Figure, pose: Pose | None, skinning: Skinning) -> dict[str,
             effects[f"cut to {count} influences"] = float(compute("cut", figure, pose, cut).max())
     for name, text in (("normalized", "normalised weights"), ("correctives", "pose correctives")):
         effects[text] = float(compute(name, figure, pose, skinning).max())
-    effects["DQS against LBS"] = float(compute("methods", figure, pose, skinning).max())
+    first, *others = (METHODS[name].short for name in PURE)
+    effects[f"{' or '.join(others)} against {first}"] = float(
+        compute("methods", figure, pose, skinning).max()
+    )
     return {text: value for text, value in effects.items() if value > 0.0}
 
 

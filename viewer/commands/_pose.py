@@ -77,7 +77,8 @@ def add_skinning_arguments(parser: argparse.ArgumentParser) -> None:
         "--method",
         choices=METHODS,
         default="lbs",
-        help="linear blend skinning, dual quaternions, or between the two (default: lbs)",
+        help="; ".join(f"{key}: {method.title}" for key, method in METHODS.items())
+        + " (default: lbs)",
     )
     group.add_argument(
         "--dqs-share",

@@ -15,6 +15,7 @@ from viewer.commands._pose import add_pose_arguments, apply_pose
 from viewer.commands._progress import Progress
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, ViewerError, printable
+from viewer.formats import SUFFIXES
 from viewer.loading import MotionSettings, begin, bundled_body, bundled_files, read_files
 from viewer.models import known_models, load_model_folder, resolve, save_model_folder
 from viewer.near_names import did_you_mean
@@ -69,9 +70,8 @@ def add_file_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT)
         "files",
         nargs="*",
         metavar="FILES",
-        help=".skel, .skin, .anim, .morph, .rig files; .obj and .ply meshes; body models (.npz, "
-        ".pkl) or their names in the model folder, as smplx:neutral; PIG folders; EasyMocap "
-        "folders, AMASS and BVH files; poses; a texture picture"
+        help=f"files ({', '.join(SUFFIXES)}), folders of PIG or EasyMocap, names of body models in "
+        "the model folder, as smplx:neutral, a texture picture; see viewer help formats"
         f"{f' (default: {default})' if default else ''}",
     )
     group.add_argument("--body", action="store_true", help="open the bundled human body too")

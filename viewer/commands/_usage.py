@@ -7,6 +7,7 @@ import os
 import re
 import sys
 from collections.abc import Iterable
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from viewer.commands import COMMANDS
@@ -17,7 +18,7 @@ from viewer.near_names import did_you_mean, near_names, question
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite
 
-__all__ = ["Parser", "check_command", "require_files"]
+__all__ = ["Parser", "check_command", "command_parser", "require_files"]
 
 _NUMBER = re.compile(r"-\.?\d")  # begins a value or the name of a file, not an option
 _WORD = re.compile(r"[^\W\d_]+")  # as commands are; files mostly have a suffix or a folder
@@ -76,6 +77,19 @@ class Parser(argparse.ArgumentParser):
         near = did_you_mean(str(value), choices)
         wrong = f'expected one of {", ".join(choices)}, found "{printable(value, _LONGEST)}"'
         raise argparse.ArgumentError(action, f"{wrong}; {near}" if near else wrong)
+
+
+def command_parser(name: str) -> Parser:
+    """Return the parser of a command, with all of its options.
+
+    Parameters
+    ----------
+    name : str
+        A key of ``COMMANDS``.
+    """
+    parser = Parser(prog=f"viewer {name}", description=COMMANDS[name])
+    import_module(f"viewer.commands.{name}").add_arguments(parser)
+    return parser
 
 
 def check_command(word: str) -> None:

@@ -175,8 +175,8 @@ def _draw_panels(
     device: int | None,
     fits: bool,
 ) -> Bytes:
+    from viewer.app.core.state import AppState
     from viewer.app.headless import HeadlessApp
-    from viewer.app.state import AppState
 
     if min(size) < 200:
         raise ViewerError(f"--panels needs at least 200 x 200 pixels, found {size[0]} x {size[1]}")

@@ -11,13 +11,13 @@ from typing import TextIO
 
 import numpy as np
 
-from viewer.autorig.alignment import SCALES, AlignmentSettings
-from viewer.autorig.matching import MatchSettings
-from viewer.autorig.orientation_search import AXES
+from viewer.autorig.alignment.orientation_search import AXES
+from viewer.autorig.alignment.surface_alignment import SCALES, AlignmentSettings
+from viewer.autorig.correspondence.matching import MatchSettings
 from viewer.autorig.pipeline import transfer
 from viewer.autorig.rigged import Rigged
 from viewer.autorig.settings import JOINTS, METHODS, TransferSettings
-from viewer.autorig.weights import WeightSettings
+from viewer.autorig.weights.weight_transfer import WeightSettings
 from viewer.commands._carried_clips import add_clip_argument, read_clips, write_clips
 from viewer.commands._frame_numbers import add_frame_arguments
 from viewer.commands._landmarks import read_landmarks
@@ -27,7 +27,7 @@ from viewer.commands._progress import Progress
 from viewer.commands._scene import print_warnings
 from viewer.errors import FormatError, RigError, ViewerError, printable
 from viewer.export._rigged_files import files_of, write_rigged
-from viewer.formats import Source, all_or_none, check_targets
+from viewer.formats import MESHES, Source, all_or_none, check_targets
 from viewer.loading import MotionSettings, bundled_body, bundled_files, load
 from viewer.models import resolve
 from viewer.near_names import did_you_mean
@@ -45,7 +45,10 @@ _SMOOTHING = 10  # rounds, where --smooth gives no number
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument(
-        "files", nargs="+", metavar="TARGET", help="the mesh: .obj, .ply; and its texture picture"
+        "files",
+        nargs="+",
+        metavar="TARGET",
+        help=f"the mesh: {', '.join(MESHES)}; and its texture picture",
     )
     parser.add_argument(
         "--from",

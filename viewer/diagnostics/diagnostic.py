@@ -16,7 +16,17 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-Part = Literal["", "positions", "weights", "triangles", "bindings", "joints", "channels", "frames"]
+Part = Literal[
+    "",
+    "positions",
+    "weights",
+    "triangles",
+    "bindings",
+    "joints",
+    "items",
+    "channels",
+    "frames",
+]
 """The data of a figure or motion that a fault is in."""
 
 
@@ -35,8 +45,8 @@ class Diagnostic:
     part : str
         The data that ``places`` index. A reader replaces them with neutral values.
     places : (N,) int32 or None
-        Vertices (of positions and weights), triangles, joints (of bindings and joints), channels
-        of a clip, or rows of frames, ascending.
+        Vertices (of positions and weights), triangles, joints (of bindings, of joints, and of
+        items: their boxes, limits and poses), channels of a clip, or rows of frames, ascending.
     values : mapping of str to object
         What the template shows.
     count : int

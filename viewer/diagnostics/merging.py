@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from viewer.diagnostics.diagnostic import Diagnostic
+from viewer.diagnostics.phrase import Phrase
 
 
 def merged(found: Iterable[Diagnostic]) -> list[Diagnostic]:
@@ -20,9 +22,16 @@ def merged(found: Iterable[Diagnostic]) -> list[Diagnostic]:
     for one in found:
         if one.count == 0:
             continue
-        names = (item for item in sorted(one.values.items()) if isinstance(item[1], str))
-        kinds.setdefault((one.key, one.path, one.part, *names), []).append(one)
+        kinds.setdefault((one.key, one.path, one.part, *_names(one.values)), []).append(one)
     return [_joined(alike) for alike in kinds.values()]
+
+
+def _names(values: Mapping[str, Any]) -> Iterator[tuple[object, ...]]:
+    for name, value in sorted(values.items()):
+        if isinstance(value, Phrase):
+            yield (name, value.key, *_names(value.values))
+        elif isinstance(value, str):
+            yield name, value
 
 
 def _joined(alike: list[Diagnostic]) -> Diagnostic:

@@ -29,6 +29,11 @@ class Phrase:
         """Return the rendered template."""
         return rendered(PHRASES[self.key], self.values)
 
+    def __repr__(self) -> str:
+        """Return the call that makes it."""
+        values = "".join(f", {name}={value!r}" for name, value in self.values.items())
+        return f"Phrase({self.key!r}{values})"
+
     def __eq__(self, other: object) -> bool:
         """Return whether the other has the same key and values."""
         return isinstance(other, Phrase) and (self.key, self.values) == (other.key, other.values)

@@ -2,10 +2,13 @@
 
 =====================  ===========================================================================
 ``{word:quoted}``      a word in quotes; None is the end of the file
-``{name:text}``        any text on one line, control characters escaped
-``{names:list}``       the first few, and how many more
-``{names:list60}``     the first 60, and how many more
+``{word:word}``        the word without quotes
+``{name}``             numbers as they are, texts with control characters escaped
+``{name:text}``        the same, not more than 200 letters
+``{name:name}``        a name in a file, cut after 60 characters; bytes that are no text show as �
+``{names:list}``       the first six and how many more, ``none``; ``list12`` for twelve
 ``{names:all}``        every name
+``{shape:axes}``       the axes of an array: ``800 x 3``; letters stand for any number
 ``{names:or}``         alternatives
 ``{n:#vertex}``        a count with its noun: ``3 vertices``
 ``{n:#vertex|is|are}`` the same with a verb that agrees
@@ -17,11 +20,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Mapping, Sequence
 from string import Formatter
 from typing import Any
 
 from viewer.phrases import counted, listed, one_of, printable, quoted
+
+_PLACE = "\0"  # of a value inside its own specification
+_LONGEST = 1000  # letters of a text that is a value
+_LONGEST_NAME = 60
+_NO_TEXT = re.compile("[\udc80-\udcff]")  # bytes that were decoded with "surrogateescape"
 
 
 def rendered(template: str, values: Mapping[str, Any]) -> str:
@@ -52,26 +61,45 @@ class _Formatter(Formatter):
             return one if value == 1 else many
         if kind == "+":
             # An empty pair of braces in a specification has been filled with "" by now.
-            return rest.replace("\0", printable(value, 300)) if value else ""
-        if format_spec.startswith("list") and format_spec != "list":
-            return listed(value, int(format_spec.removeprefix("list")))
+            return rest.replace(_PLACE, printable(value, 300)) if value else ""
+        if not format_spec and isinstance(value, str) and value != _PLACE:
+            return printable(value, _LONGEST)
+        if format_spec.startswith("list"):
+            return listed([*map(printable, value)], int(format_spec[4:] or 6)) or "none"
         plain = _PLAIN.get(format_spec)
         return plain(value) if plain is not None else str(format(value, format_spec))
 
     def get_value(self, key: int | str, args: Any, kwargs: Mapping[str, Any]) -> Any:
         """Return a value by name; the empty name inside a specification is a placeholder."""
-        return kwargs[key] if isinstance(key, str) and key else "\0"
+        return kwargs[key] if isinstance(key, str) and key else _PLACE
 
 
 def _word(word: bytes | str | None) -> str:
     return "the end of the file" if word is None else quoted(word)
 
 
+def _bare(word: bytes) -> str:
+    return printable(word.decode("utf-8", "replace"), 40)
+
+
+def _name(name: str) -> str:
+    return printable(_NO_TEXT.sub("\ufffd", name[: _LONGEST_NAME + 1]), _LONGEST_NAME)
+
+
+def _axes(shape: Sequence[int | str | None]) -> str:
+    if not shape:
+        return "a single"
+    # Files may declare 32 axes of any size.
+    return printable(" x ".join("any" if axis is None else str(axis) for axis in shape), 80)
+
+
 _PLAIN: dict[str, Callable[[Any], str]] = {
     "quoted": _word,
+    "word": _bare,
     "text": printable,
-    "list": listed,
-    "all": lambda names: ", ".join(map(str, names)),
-    "or": one_of,
+    "name": _name,
+    "axes": _axes,
+    "all": lambda names: ", ".join(map(printable, names)),
+    "or": lambda names: one_of([*map(printable, names)]),
 }
 _FORMATTER = _Formatter()

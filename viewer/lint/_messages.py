@@ -70,6 +70,7 @@ _FIELDS = {
     "triangles": "triangles",
     "bindings": "joints",
     "joints": "joints",
+    "items": "joints",
     "frames": "frames",
 }
 """Fields of a finding by the part of a diagnostic."""

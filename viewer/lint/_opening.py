@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from viewer.diagnostics import SEVERITIES, Collector, Diagnostic
+from viewer.diagnostics import SEVERITIES, Collector
 from viewer.diagnostics.merging import merged
 from viewer.errors import FormatError, ViewerError, printable
 from viewer.formats import MAX_SIZE, Source
@@ -173,9 +172,7 @@ def _assemble(opened: Opened, settings: MotionSettings | None, progress: Progres
             contents = Contents(figures=contents.figures, clips=contents.clips)
         else:
             alone += _take_out(contents, culprit)
-    opened.findings += [
-        of_diagnostic(_of_scene(found, opened.contents)) for found in opened.scene.diagnostics
-    ]
+    opened.findings += [of_diagnostic(found) for found in opened.scene.diagnostics]
     opened.scene.actors += [Actor(figure) for figure in alone]
 
 
@@ -225,27 +222,6 @@ def _take_out(contents: Contents, culprit: Path) -> list[Figure]:
     for name in _LISTS:
         setattr(contents, name, [item for item in getattr(contents, name) if item[0] != culprit])
     return figures
-
-
-def _of_scene(found: Diagnostic, contents: Contents) -> Diagnostic:
-    """Return a remark about the scene with its file, until captures record theirs so."""
-    return found if found.key != "F007.plain" else _of_text(found.message, contents)
-
-
-def _of_text(text: str, contents: Contents) -> Diagnostic:
-    path = _owner(text, contents)
-    start = printable(path, 300)
-    found = re.fullmatch(r"(?::(\d+))?: (.*)", text[len(start) :], re.DOTALL)
-    if not text.startswith(start) or found is None:
-        return Diagnostic("F007.plain", path, values={"message": text})
-    line = None if found[1] is None else int(found[1])
-    return Diagnostic("F007.plain", path, line, values={"message": found[2]})
-
-
-def _owner(text: str, contents: Contents) -> Path:
-    """Return the file that a remark about the scene begins with."""
-    paths = [path for name in _LISTS for path, _ in getattr(contents, name)]
-    return next((path for path in paths if text.startswith(printable(path, 300))), Path())
 
 
 def with_files(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
@@ -23,7 +23,7 @@ from viewer.rig.motion.sampled_clip import SampledClip, joined
 from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor
 
-__all__ = ["Builder", "joined_points", "joined_timing", "recorded"]
+__all__ = ["Builder", "joined_points", "joined_timing"]
 
 _COLORS = (
     (0.85, 0.42, 0.28),
@@ -118,7 +118,7 @@ class Builder:
             If the bodies do not fit the model.
         """
         new: list[Actor] = []
-        notes = recorded(part.warnings)
+        notes = [*part.warnings]
         for person, motion in sorted(part.bodies.items(), key=_order):
             notes += self._add_body(person, motion, new)
         for person, (layout, clip) in sorted(part.points.items(), key=_order):
@@ -211,14 +211,6 @@ class Builder:
         values = {"problem": str(problem), "member": self.capture.model}
         key = "F004.capture-of-member" if self.capture.model else "F004.capture"
         return RigError(Diagnostic(key, self.path, values=values))
-
-
-def recorded(notes: Iterable[str | Diagnostic]) -> list[Diagnostic]:
-    """Return what a reader of captures noticed as diagnostics."""
-    return [
-        note if isinstance(note, Diagnostic) else Diagnostic("F007.plain", values={"message": note})
-        for note in notes
-    ]
 
 
 def _order(item: tuple[int, object]) -> tuple[bool, int]:

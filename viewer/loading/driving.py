@@ -13,7 +13,7 @@ from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.formats import Source, read
 from viewer.loading.bundled import bundled_body
-from viewer.loading.capturing import Builder, recorded
+from viewer.loading.capturing import Builder
 from viewer.loading.cast import Cast
 from viewer.loading.contents import Contents
 from viewer.loading.settings import MotionSettings
@@ -199,7 +199,7 @@ def _begin_capture(
     """Read a capture until somebody is seen; the rest is read later."""
     called = cast.free_title(capture.name)
     builder = Builder(capture, model, called=called, keeps_shape=not is_bundled, path=path)
-    cast.diagnostics += recorded(capture.warnings)
+    cast.diagnostics += capture.warnings
     while not builder.actors and not builder.is_done:
         try:
             cast.diagnostics += builder.read_some()[1]

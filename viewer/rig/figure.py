@@ -13,7 +13,7 @@ from viewer.rig.annotations import BodyParts, Keypoints, ReducedMesh, VertexFiel
 from viewer.rig.arrays import Floats, Ints, frozen
 from viewer.rig.blendshapes import BlendShapes, Correctives, JointRegressor
 from viewer.rig.hands import Hand
-from viewer.rig.kinematics import world_matrices
+from viewer.rig.kinematics import posed_skeleton
 from viewer.rig.mesh import Mesh
 from viewer.rig.pose import Pose
 from viewer.rig.posing.pose_vector import PoseLayout
@@ -159,7 +159,7 @@ def skeleton_points(skeleton: Skeleton, pose: Pose) -> Floats:
     (N, 3)
         Figure space.
     """
-    world = world_matrices(skeleton, pose)
+    world = posed_skeleton(skeleton, pose).world
     if skeleton.boxes is None:
         return world[:, :3, 3]
     choice = np.array([[i >> axis & 1 for axis in range(3)] for i in range(8)])

@@ -6,9 +6,17 @@ import numpy as np
 
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.pose import Pose, local_matrices
+from viewer.rig.posed_skeleton import PosedSkeleton
 from viewer.rig.skeleton import Skeleton
 
-__all__ = ["forward_kinematics", "is_rigid", "skinning_matrices", "world_matrices"]
+__all__ = [
+    "forward_kinematics",
+    "is_posed",
+    "is_rigid",
+    "posed_skeleton",
+    "skinning_matrices",
+    "world_matrices",
+]
 
 _RIGID = 1e-5  # relative; normals taken for rigid are off by half as many radians at most
 
@@ -65,6 +73,36 @@ def world_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
         Joint-to-figure matrices.
     """
     return forward_kinematics(skeleton.parents, local_matrices(skeleton, pose))
+
+
+def posed_skeleton(skeleton: Skeleton, pose: Pose) -> PosedSkeleton:
+    """Return world and skinning matrices of a pose, computed once until a number of it changes.
+
+    The pose keeps the result: whatever draws or describes it in one frame shares one run of forward
+    kinematics.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Of the shaped figure; told apart by identity.
+    pose : Pose
+        DOFs in lengths and radians.
+
+    Returns
+    -------
+    PosedSkeleton
+        With read-only matrices.
+    """
+    known, key = pose.posed, pose.skinning_key
+    if known is None or known.skeleton is not skeleton or known.key is not key:
+        known = pose.posed = PosedSkeleton(skeleton, key, world_matrices(skeleton, pose))
+    return known
+
+
+def is_posed(skeleton: Skeleton, pose: Pose) -> bool:
+    """Return whether a pose keeps the ``posed_skeleton`` of its present numbers."""
+    known = pose.posed
+    return known is not None and known.skeleton is skeleton and known.key is pose.skinning_key
 
 
 def skinning_matrices(world: Floats, inverse_bind: Floats) -> Floats:

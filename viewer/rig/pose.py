@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.rotation import axis_rotations, quaternion_to_matrix
+from viewer.rig.number_key import NumberKey
+from viewer.rig.posed_skeleton import PosedSkeleton
 from viewer.rig.skeleton import Skeleton, clamp_dofs
 
 __all__ = [
@@ -19,7 +21,6 @@ __all__ = [
     "placement_matrix",
     "pose_key",
     "rest_pose",
-    "skinning_key",
 ]
 
 _FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
@@ -43,6 +44,8 @@ class Pose:
         Of the whole skinned figure about its origin, after everything else.
     figure_translation : (3,)
         Of the whole skinned figure, after its scale; not weighted by the skin.
+    posed : PosedSkeleton or None
+        What was made of the pose last; its key tells whether that is of the present numbers.
     """
 
     dofs: Floats
@@ -52,6 +55,30 @@ class Pose:
     shape_weights: Floats = field(default_factory=lambda: np.zeros(0))
     figure_scale: float = 1.0
     figure_translation: Floats = field(default_factory=lambda: np.zeros(3))
+    posed: PosedSkeleton | None = field(default=None, init=False, repr=False)
+    _key: NumberKey | None = field(default=None, init=False, repr=False)
+
+    @property
+    def skinning_key(self) -> NumberKey:
+        """The key of all numbers but the figure's place, the same object until one of them changes.
+
+        Whoever has the same key has the same joints, and need not skin again.
+        """
+        key, arrays = self._key, self._arrays
+        if key is None or not key.is_of(*arrays):
+            key = self._key = NumberKey(*arrays)
+        return key
+
+    @property
+    def _arrays(self) -> tuple[Floats, ...]:
+        return self.dofs, self.translations, self.rotations, self.scales, self.shape_weights
+
+    def is_like(self, other: Pose) -> bool:
+        """Return whether another pose has the same numbers; of the two, this one keeps a key."""
+        places = (self.figure_scale, *self.figure_translation.tolist())
+        if places != (other.figure_scale, *other.figure_translation.tolist()):
+            return False
+        return self.skinning_key.is_of(*other._arrays)
 
     def copy(self) -> Pose:
         """Return a pose that shares no array with this one."""
@@ -66,16 +93,9 @@ class Pose:
         )
 
 
-def pose_key(pose: Pose) -> tuple[bytes, ...]:
+def pose_key(pose: Pose) -> tuple[object, ...]:
     """Return what changes if and only if a pose does: to know when to draw again."""
-    place = np.append(pose.figure_translation, pose.figure_scale)
-    return (*skinning_key(pose), place.tobytes())
-
-
-def skinning_key(pose: Pose) -> tuple[bytes, ...]:
-    """Return what changes if and only if the figure has to be skinned again: all but its place."""
-    arrays = (pose.dofs, pose.translations, pose.rotations, pose.scales, pose.shape_weights)
-    return tuple(array.tobytes() for array in arrays)
+    return pose.skinning_key, pose.figure_scale, *pose.figure_translation.tolist()
 
 
 def placement_matrix(pose: Pose) -> Floats:

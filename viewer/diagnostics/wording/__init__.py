@@ -7,13 +7,25 @@ code the name is unique. ``PHRASES`` are parts of messages, by a name alone.
 from __future__ import annotations
 
 from viewer.diagnostics.wording import (
+    anim,
+    archives,
     bindings,
+    body_models,
+    bvh,
     clips,
+    easymocap,
+    joints,
+    kinds,
     loading,
     meshes,
+    morph,
     motion,
     obj,
+    pictures,
+    ply,
+    poses,
     reading,
+    rig,
     rigging,
     skeletons,
     skin,
@@ -21,17 +33,9 @@ from viewer.diagnostics.wording import (
 )
 
 _TABLES = (
-    reading,
-    skin,
-    obj,
-    weights,
-    bindings,
-    skeletons,
-    meshes,
-    clips,
-    motion,
-    loading,
-    rigging,
+    *(reading, kinds, skin, obj, ply, morph, rig, joints, bvh, anim, weights),
+    *(archives, body_models, easymocap, poses, pictures),
+    *(bindings, skeletons, meshes, clips, motion, loading, rigging),
 )
 
 MESSAGES: dict[str, str] = {
@@ -50,6 +54,7 @@ PLACES = {
     "triangles": "triangles",
     "bindings": "joints",
     "joints": "joints",
+    "items": "joints",
     "frames": "frames",
 }
 """What the places of a part are called."""

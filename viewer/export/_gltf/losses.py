@@ -138,7 +138,7 @@ def _reasons(
     if influences is not None and (influences.n_scaled or influences.n_negative):
         found.append(_weights_text(influences))
     if influences is not None and how.method != "lbs":
-        found.append(f"{METHODS[how.method]} skinning cannot be held, glTF blends linearly")
+        found.append(f"{METHODS[how.method].title} skinning cannot be held, glTF blends linearly")
     if influences is not None and figure.correctives is not None and how.correctives:
         found.append("pose correctives cannot be held")
     weights = frames.shape_weights

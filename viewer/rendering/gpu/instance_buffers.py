@@ -2,13 +2,14 @@
 
 No posed vertices are kept: the vertex shader skins each instance by its own row of matrices, which
 on a driver in software takes less time than to write posed vertices and to read them again
-(``tests/bench/bench_crowd.py``). Every draw skins anew, so a camera that moves is not free, and
+(``tests/bench/bench_instances.py``). Every draw skins anew, so a camera that moves is not free, and
 views that draw a mesh several times take the posed buffers of single actors.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import moderngl
@@ -27,21 +28,23 @@ from viewer.rendering.gpu.upload import (
     rigid_texture,
     write_stacked,
 )
+from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rendering.passes.mesh_pass import SKIN_COLOR
 from viewer.rendering.passes.skin_pass import skinning_words
 from viewer.rendering.view import View
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure
 from viewer.rig.kinematics import is_rigid, skinning_matrices
-from viewer.rig.motion.instances import local_rotations, placements, worlds
-from viewer.rig.pose import Pose, skinning_key
+from viewer.rig.motion.instances import local_rotations, placements, posed_worlds
+from viewer.rig.number_key import NumberKey
+from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
 from viewer.rig.skin import bind_positions
-from viewer.rig.skinning import Skinning
+from viewer.rig.skinning import METHODS, Skinning
 from viewer.rig.skinning.dqs import split_palette
 
-__all__ = ["CrowdBuffers"]
+__all__ = ["InstanceBuffers"]
 
 _PALETTE_UNIT, _PAIRS_UNIT, _RIGID_UNIT, _LIST_UNIT, _OFFSETS_UNIT = range(5)
 _PER_INSTANCE = (
@@ -56,7 +59,7 @@ _PER_INSTANCE = (
 _FLOATS = sum(count for _, count in _PER_INSTANCE)
 
 
-class CrowdBuffers:
+class InstanceBuffers:
     """Matrices, places and colours of actors that share figure and shape.
 
     Parameters
@@ -85,7 +88,7 @@ class CrowdBuffers:
         self._offsets = SummedOffsets(context, mesh, self._rest.way)
         self._how = Skinning()
         self._words: tuple[object, ...] = ()
-        self._keys: list[tuple[bytes, ...]] = []
+        self._keys: list[NumberKey] = []
         self._centers: Floats = np.zeros((0, 3))
         self._is_rigid: Bools = np.ones(0, dtype=np.bool_)
         self._rows: NDArray[np.float32] = np.zeros((0, self._n_joints, 3, 4), "f4")
@@ -93,7 +96,7 @@ class CrowdBuffers:
         self._palette: moderngl.Texture | None = None
         self._rigid: moderngl.Texture | None = None
         self._instances: moderngl.Buffer | None = None
-        self._arrays: dict[tuple[int, ...], moderngl.VertexArray] = {}
+        self._arrays = VertexArrays(context)
 
     def update(self, poses: Sequence[Pose], how: Skinning) -> None:
         """Send the matrices of poses that changed.
@@ -112,20 +115,21 @@ class CrowdBuffers:
         """
         figure = shaped(self.mesh.figure, poses[0].shape_weights)
         words = (*skinning_words(how), poses[0].shape_weights.tobytes())
-        keys = [skinning_key(pose) for pose in poses]
+        keys = [pose.skinning_key for pose in poses]
         old = self._keys if words == self._words else []
         changed = [row for row, key in enumerate(keys) if row >= len(old) or key != old[row]]
         self._how, self._words, self.count = how, words, len(poses)
         if changed:
             self._keys = []  # a refusal leaves nothing that passes for done
             self._reserve(len(poses))
-            self._rest.update(figure, poses[0], correct=False)
+            # The sums of pose correctives differ from actor to actor and are sent apart.
+            self._rest.update(figure, poses[0], replace(how, correctives=False))
             self._write(figure, [poses[row] for row in changed], np.array(changed))
             self.n_updates += 1
         self._keys = keys
 
     def _reserve(self, count: int) -> None:
-        """Make room; textures grow by half, so that a growing crowd is not copied each time."""
+        """Make room; textures grow by half, so that growing numbers are not copied each time."""
         if self._palette is not None and count <= len(self._rows):
             return
         room = max(count, len(self._rows) * 3 // 2)
@@ -144,17 +148,18 @@ class CrowdBuffers:
         skeleton, skin, how = figure.skeleton, figure.skin, self._how
         assert skeleton is not None and skin is not None and self._palette is not None
         rotations = local_rotations(skeleton, poses)
-        palette = skinning_matrices(worlds(skeleton, poses, rotations), skin.inverse_bind)
+        palette = skinning_matrices(posed_worlds(skeleton, poses, rotations), skin.inverse_bind)
         self._is_rigid[rows] = is_rigid(palette)
         palette[..., :3, 3] += palette[..., :3, :3] @ self.mesh.center
         shares = self.mesh.skin(how).joint_shares
         moved = np.einsum("j,aji->ai", shares, palette[..., :3, 3])
         self._centers[rows] = moved if shares.any() else self.mesh.center
         palette[..., :3, 3] -= self._centers[rows, None]
-        if how.method != "dqs":
+        method = METHODS[how.method]
+        if method.uses_matrices:
             self._rows[rows] = palette[..., :3, :]
             write_stacked(self._palette, self._rows[: self.count])
-        if how.method != "lbs":
+        if method.uses_quaternions:
             if self._rigid is None:
                 self._rigid = rigid_texture(self.context, len(self._rows) * self._n_joints)
             binds = np.tile(bind_positions(skin) - self.mesh.center, (len(poses), 1))
@@ -182,7 +187,7 @@ class CrowdBuffers:
         self._instances.write(float32(np.concatenate(rows, axis=1)))
 
     def use(self, program: moderngl.Program, view: View) -> None:
-        """Set what ``crowd.vert`` needs beside its attributes."""
+        """Set what ``instances.vert`` needs beside its attributes."""
         skin = self.mesh.skin(self._how)
         values = {
             "u_projection": as_uniform(view.projection),
@@ -220,14 +225,13 @@ class CrowdBuffers:
     ) -> moderngl.VertexArray:
         """Return the vertex array for a program; without indices it draws single vertices."""
         mesh, skin = self.mesh, self.mesh.skin(self._how)
-        key = (id(program), id(indices), id(skin), id(self._rest.positions))
-        if key not in self._arrays:
-            content: list[Any] = [
+        key = (id(indices), id(skin), id(self._rest.positions))
+
+        def content() -> list[Any]:
+            found: list[Any] = self._rest.attributes(program, skin)
+            found += [
                 (buffer, layout, name)
                 for buffer, layout, name in (
-                    (self._rest.positions, "3f4", "in_position"),
-                    (self._rest.normals, "3f4", "in_normal"),
-                    (skin.bindings, "4u4", "in_bindings"),
                     (mesh.uvs, "2f4", "in_uv"),
                     (mesh.colors, "3f4", "in_color"),
                 )
@@ -238,18 +242,16 @@ class CrowdBuffers:
                 f"{size}f4" if name in program else f"{4 * size}x" for name, size in _PER_INSTANCE
             )
             names = [name for name, _ in _PER_INSTANCE if name in program]
-            content.append((self._instances, f"{layout}/i", *names))
-            index_buffer = None if indices is None else indices.indices
-            self._arrays[key] = self.context.vertex_array(
-                program, content, index_buffer=index_buffer
-            )
-        return self._arrays[key]
+            return [*found, (self._instances, f"{layout}/i", *names)]
+
+        index_buffer = None if indices is None else indices.indices
+        return self._arrays.get(program, content, index_buffer, key)
 
     def _release_textures(self) -> None:
-        for item in (*self._arrays.values(), self._palette, self._rigid, self._instances):
+        self._arrays.release()
+        for item in (self._palette, self._rigid, self._instances):
             if item is not None:
                 item.release()
-        self._arrays.clear()
         self._palette = self._rigid = self._instances = None
 
     def release(self) -> None:

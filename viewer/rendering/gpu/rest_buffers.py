@@ -12,11 +12,13 @@ import numpy as np
 
 from viewer.rendering.gpu.context import is_software
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
+from viewer.rendering.gpu.skin_buffers import SkinBuffers
 from viewer.rendering.gpu.upload import float32, pair_texture, write_pairs
 from viewer.rig.arrays import Floats
 from viewer.rig.blendshapes import active_rows, corrective_weights
 from viewer.rig.figure import Figure
 from viewer.rig.pose import Pose, joint_rotations
+from viewer.rig.skinning import Skinning
 
 __all__ = ["WAYS", "RestBuffers"]
 
@@ -53,7 +55,7 @@ class RestBuffers:
         self._list: moderngl.Texture | None = None
         self._key: tuple[bytes, bytes] = b"", b""
 
-    def update(self, figure: Figure, pose: Pose, correct: bool) -> None:
+    def update(self, figure: Figure, pose: Pose, how: Skinning) -> None:
         """Follow shape and pose.
 
         Parameters
@@ -62,10 +64,10 @@ class RestBuffers:
             Already shaped.
         pose : Pose
             DOFs in lengths and radians.
-        correct : bool
+        how : Skinning
             Whether pose correctives are added.
         """
-        weights = self._weights(figure, pose) if correct else np.zeros(0)
+        weights = self._weights(figure, pose) if how.correctives else np.zeros(0)
         active = weights.any()
         self.n_offsets = 0
         if active and self.way == "texture":
@@ -108,6 +110,28 @@ class RestBuffers:
         self.positions.write(rest[self.mesh.sources])
         if normals:
             self.normals.write(float32(shape.normals[self.mesh.sources]))
+
+    def attributes(
+        self, program: moderngl.Program, skin: SkinBuffers, attached: bool = True
+    ) -> list[tuple[moderngl.Buffer, str, str]]:
+        """Return what ``include/skinning.glsl`` reads of each vertex, as vertex arrays take it.
+
+        Parameters
+        ----------
+        program : moderngl.Program
+            Attributes that its compiler dropped are left out.
+        skin : SkinBuffers
+            Influences.
+        attached : bool
+            Whether shape and correctives count; otherwise the mesh as stored.
+        """
+        rest = self if attached else self.mesh
+        found = [
+            (rest.positions, "3f4", "in_position"),
+            (rest.normals, "3f4", "in_normal"),
+            (skin.bindings, "4u4", "in_bindings"),
+        ]
+        return [row for row in found if row[2] in program]
 
     def use(self, list_unit: int, offsets_unit: int) -> None:
         """Bind what the shader needs to sum correctives, if it has to."""

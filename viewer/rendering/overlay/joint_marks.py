@@ -7,18 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from viewer.rendering.colormap import from_linear
+from viewer.rendering.gpu.box_buffers import joint_colors
 from viewer.rendering.overlay.segments import Segments, dots
-from viewer.rendering.passes.joint_pass import joint_colors
 from viewer.rendering.projection import picture_scale, project, project_segments
+from viewer.rendering.srgb import encode_srgb
 from viewer.rendering.view import View
 from viewer.rig.arrays import Floats, Ints
-from viewer.rig.figure import Figure
 from viewer.rig.geometry.vectors import unit
-from viewer.rig.kinematics import world_matrices
-from viewer.rig.memo import Memo
+from viewer.rig.kinematics import posed_skeleton
 from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.pose import placement_matrix, pose_key
+from viewer.rig.pose import placement_matrix
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
 from viewer.rig.skeleton import Skeleton
@@ -43,7 +41,6 @@ _DOT, _BONE, _AXIS = 7.0, 3.0, 2.0  # pixels of a picture of usual height
 _OUTLINE = 2.0
 _DARK = (0.05, 0.06, 0.08, 0.85)
 _DOT_REACH, _BONE_REACH = 8.0, 4.0  # pixels
-_known: Memo[Figure, Floats] = Memo(kept=64)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,22 +74,12 @@ def marks_of(actors: Sequence[Actor]) -> list[JointMarks]:
         skeleton, pose = actor.figure.skeleton, actor.pose
         if skeleton is None or pose is None or not actor.is_drawn:
             continue
+        shape = shaped(actor.figure, pose.shape_weights).skeleton
+        assert shape is not None  # shaping keeps it
         placement = actor.placement @ placement_matrix(pose)
-        found.append(JointMarks(index, skeleton, placement @ _worlds(actor)))
+        matrices = placement @ posed_skeleton(shape, pose).world
+        found.append(JointMarks(index, skeleton, matrices))
     return found
-
-
-def _worlds(actor: Actor) -> Floats:
-    """Return joint-to-figure matrices, remembered for a camera that moves: (J, 4, 4)."""
-    figure, pose = actor.figure, actor.pose
-    assert pose is not None  # the caller looked
-
-    def make() -> Floats:
-        skeleton = shaped(figure, pose.shape_weights).skeleton
-        assert skeleton is not None  # shaping keeps it
-        return world_matrices(skeleton, pose)
-
-    return _known.get(figure, pose_key(pose), make)
 
 
 def bone_segments(marks: JointMarks, selected: int, scale: float) -> Segments:
@@ -172,7 +159,7 @@ def _axis_lengths(points: Floats, skeleton: Skeleton) -> Floats:
 def _colors(skeleton: Skeleton, selected: int) -> Floats:
     """Return the colours of the joints' boxes: (J, 4), sRGB and opacity."""
     colors = np.ones((skeleton.n_joints, 4))
-    colors[:, :3] = from_linear(joint_colors(skeleton.n_joints))
+    colors[:, :3] = encode_srgb(joint_colors(skeleton.n_joints))
     if selected >= 0:
         colors[selected] = HIGHLIGHT
     return colors

@@ -22,13 +22,14 @@ from viewer.rendering.gpu.upload import (
     write_matrices,
     write_rigid,
 )
+from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
-from viewer.rig.kinematics import is_rigid, skinning_matrices, world_matrices
-from viewer.rig.pose import Pose, skinning_key
+from viewer.rig.kinematics import is_rigid, posed_skeleton
+from viewer.rig.pose import Pose
 from viewer.rig.shape import shaped
 from viewer.rig.skin import bind_positions
-from viewer.rig.skinning import Skinning
+from viewer.rig.skinning import METHODS, Skinning
 from viewer.rig.skinning.dqs import split_palette
 
 __all__ = ["PosedMesh", "skinning_words"]
@@ -79,7 +80,7 @@ class PosedMesh:
         self._rigid: moderngl.Texture | None = None
         self._rest = self._owner.keep(RestBuffers(context, mesh, way))
         self.scalars = self._owner.keep(ScalarBuffer(context, mesh))
-        self._arrays: dict[tuple[object, ...], moderngl.VertexArray] = {}
+        self._arrays = self._owner.keep(VertexArrays(context))
         self._key: tuple[object, ...] | None = None
         self._is_affine = False
         self.n_updates = 0
@@ -96,7 +97,7 @@ class PosedMesh:
         """
         how = Skinning(skinning) if isinstance(skinning, str) else skinning
         attached = self.mesh.figure.is_attached and pose is not None
-        key = (*skinning_words(how), *skinning_key(pose)) if attached and pose else ("binding",)
+        key = (*skinning_words(how), pose.skinning_key) if attached and pose else ("binding",)
         if key == self._key:
             return
         self.center = self.mesh.center
@@ -109,7 +110,7 @@ class PosedMesh:
     def upload(self, pose: Pose, how: Skinning) -> None:
         """Send what a pose needs and skin nothing: the processor's part of ``update``."""
         figure = shaped(self.mesh.figure, pose.shape_weights)
-        self._rest.update(figure, pose, how.correctives)
+        self._rest.update(figure, pose, how)
         self._write_palette(figure, pose, how, self.mesh.skin(how))
 
     def _run(self, skin: SkinBuffers, how: Skinning, attached: bool) -> None:
@@ -142,36 +143,29 @@ class PosedMesh:
         """Upload T(-center') M T(center): the shader sees small numbers on both sides."""
         skeleton, skin = figure.skeleton, figure.skin
         assert skeleton is not None and skin is not None  # the caller looked
-        palette = skinning_matrices(world_matrices(skeleton, pose), skin.inverse_bind)
+        palette = posed_skeleton(skeleton, pose).palette(skin).copy()
         self._is_affine = not is_rigid(palette)
         palette[:, :3, 3] += palette[:, :3, :3] @ self.mesh.center
         if buffers.joint_shares.any():
             self.center = buffers.joint_shares @ palette[:, :3, 3]
         palette[:, :3, 3] -= self.center
-        if how.method != "dqs":
+        method = METHODS[how.method]
+        if method.uses_matrices:
             write_matrices(self._palette, palette)
-        if how.method != "lbs":
+        if method.uses_quaternions:
             if self._rigid is None:
                 self._rigid = self._owner.keep(rigid_texture(self.context, self._n_joints))
             centers = bind_positions(skin) - self.mesh.center
             write_rigid(self._rigid, *split_palette(palette, centers))
 
     def _array(self, method: str, skin: SkinBuffers, attached: bool) -> moderngl.VertexArray:
-        mesh, rest = self.mesh, self._rest
-        positions = rest.positions if attached else mesh.positions
-        normals = rest.normals if attached else mesh.normals
         # Rigid joints, by far the most common, get a program that does not pay for the others.
         affine = attached and self._is_affine
-        key = (method, affine, id(skin), id(positions))
-        if key not in self._arrays:
-            program = self.programs.feedback("skin", method, ("v_position", "v_normal"), affine)
-            attributes = [
-                (positions, "3f4", "in_position"),
-                (normals, "3f4", "in_normal"),
-                (skin.bindings, "4u4", "in_bindings"),
-            ]
-            self._arrays[key] = self.context.vertex_array(program, attributes)
-        return self._arrays[key]
+        program = self.programs.feedback("skin", method, ("v_position", "v_normal"), affine)
+        key = (id(skin), attached and id(self._rest.positions))
+        return self._arrays.get(
+            program, lambda: self._rest.attributes(program, skin, attached), key=key
+        )
 
     def read(self) -> tuple[Floats, Floats]:
         """Return what was drawn last: positions in figure space and normals, (V, 3) each.
@@ -184,8 +178,6 @@ class PosedMesh:
 
     def release(self) -> None:
         """Free what belongs to this actor alone."""
-        for array in self._arrays.values():
-            array.release()
         self._owner.release()
 
 

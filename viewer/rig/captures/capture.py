@@ -25,14 +25,14 @@ class CapturePart:
         Only the rows of this part; their ``timing`` spans the whole capture, -1 elsewhere.
     points : mapping of person to (PointLayout, PointClip)
         The same for keypoints.
-    warnings : tuple of str or Diagnostic
+    warnings : tuple of Diagnostic
         What the reader noticed in these frames.
     """
 
     stop: int
     bodies: dict[int, BodyMotion] = field(default_factory=dict)
     points: dict[int, tuple[PointLayout, PointClip]] = field(default_factory=dict)
-    warnings: tuple[str | Diagnostic, ...] = ()
+    warnings: tuple[Diagnostic, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,7 +56,7 @@ class Capture:
         Calibrated cameras.
     model : str
         The member of the SMPL family that its bodies are, e.g. ``"SMPL+H"``; empty for none.
-    warnings : tuple of str or Diagnostic
+    warnings : tuple of Diagnostic
         What was noticed when looking.
     """
 
@@ -67,4 +67,4 @@ class Capture:
     up: str = ""
     views: tuple[CameraView, ...] = ()
     model: str = ""
-    warnings: tuple[str | Diagnostic, ...] = ()
+    warnings: tuple[Diagnostic, ...] = ()

@@ -12,12 +12,12 @@ from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.inspection.single_vertices import check_vertices, rest_vertices
-from viewer.rig.kinematics import skinning_matrices, world_matrices
+from viewer.rig.kinematics import posed_skeleton
 from viewer.rig.pose import Pose, placement_matrix
 from viewer.rig.scalars import joint_text
 from viewer.rig.shape import shaped
 from viewer.rig.skin import Skin, bind_positions, has_influence, skin_rows, strongest_first
-from viewer.rig.skinning import Skinning, skin_used
+from viewer.rig.skinning import METHODS, Skinning, skin_used, skinned
 from viewer.rig.skinning.dqs import split_palette
 
 __all__ = ["DualTerms", "Explanation", "explain"]
@@ -126,7 +126,7 @@ def explain(figure: Figure, pose: Pose, skinning: Skinning, vertex: int) -> Expl
     """Return every number that puts a vertex where it is.
 
     Linear blend skinning: v' = sum_i w_i M_i [p 1]. Dual quaternion skinning: q = sum_i s_i q_i
-    w_i / sum_j w_j, v' = (q / |q|) applied to the stretched p. Between them: the share of both.
+    w_i / sum_j w_j, v' = (q / |q|) applied to the stretched p.
 
     Parameters
     ----------
@@ -159,16 +159,14 @@ def explain(figure: Figure, pose: Pose, skinning: Skinning, vertex: int) -> Expl
     assert mesh is not None and skeleton is not None and skin is not None  # it is attached
     rest = rest_vertices(figure, pose, chosen, skinning.correctives)[0]
     row = strongest_first(skin_rows(skin_used(skin, skinning), chosen))
-    palette = skinning_matrices(world_matrices(skeleton, pose), skin.inverse_bind)
+    palette = posed_skeleton(skeleton, pose).palette(skin)
     matrices = palette[row.joints]
     images = matrices[:, :3, :3] @ rest + matrices[:, :3, 3]
     terms = row.weights[:, None] * images
     linear = terms.sum(axis=0) if has_influence(row)[0] else rest
-    dual = None if skinning.method == "lbs" else _dual_terms(row, palette, rest)
-    skinned = linear
-    if dual is not None:
-        share = 1.0 if skinning.method == "dqs" else skinning.share
-        skinned = (1.0 - share) * linear + share * dual.position
+    uses_quaternions = METHODS[skinning.method].uses_quaternions
+    dual = _dual_terms(row, palette, rest) if uses_quaternions else None
+    moved = skinned(mesh, skin, rest[None], palette, skinning, chosen)[0][0]
     placement = placement_matrix(pose)
     return Explanation(
         vertex,
@@ -184,9 +182,9 @@ def explain(figure: Figure, pose: Pose, skinning: Skinning, vertex: int) -> Expl
         terms,
         linear,
         dual,
-        skinned,
+        moved,
         placement,
-        apply_transform(placement, skinned),
+        apply_transform(placement, moved),
     )
 
 

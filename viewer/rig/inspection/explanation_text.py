@@ -50,10 +50,11 @@ class _Text:
 
     def __init__(self, explanation: Explanation, digits: int) -> None:
         self.one, self.digits = explanation, digits
+        self.method = METHODS[explanation.skinning.method]
         parts = [explanation.stored, explanation.matrices, explanation.images, explanation.position]
         largest = max(float(np.abs(part).max(initial=1.0)) for part in parts)
         self.width = len(f"{-largest:.{digits}f}")
-        self.lines = [f"vertex {explanation.vertex}: {METHODS[explanation.skinning.method]}"]
+        self.lines = [f"vertex {explanation.vertex}: {self.method.title}"]
 
     def rest(self) -> None:
         """Say where the vertex is before joints move it."""
@@ -102,8 +103,9 @@ class _Text:
     def end(self) -> None:
         """Say where the vertex ends up."""
         one = self.one
-        if one.skinning.method == "mix":
-            self._vector(f"{one.skinning.share:.{self.digits}f} of the way", one.skinned)
+        if self.method.result:
+            share = f"{one.skinning.share:.{self.digits}f}"
+            self._vector(self.method.result.format(share=share), one.skinned)
         if not np.array_equal(one.placement, np.eye(4)):
             self.lines.append(f"figure: times {one.placement[0, 0]:.{self.digits}f}, plus")
             self._vector("", one.placement[:3, 3])

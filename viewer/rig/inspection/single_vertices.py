@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-
 import numpy as np
 
 from viewer.errors import RigError
@@ -12,11 +10,10 @@ from viewer.rig.blendshapes import corrective_weights
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.geometry.vectors import unit
-from viewer.rig.kinematics import skinning_matrices, world_matrices
+from viewer.rig.kinematics import posed_skeleton
 from viewer.rig.pose import Pose, joint_rotations, placement_matrix, rest_pose
 from viewer.rig.shape import shaped
-from viewer.rig.skin import skin_rows
-from viewer.rig.skinning import Skinning, skin_used
+from viewer.rig.skinning import Skinning, skinned
 
 __all__ = ["check_vertices", "deform_vertices", "rest_vertices"]
 
@@ -52,16 +49,13 @@ def deform_vertices(
         figure = shaped(figure, pose.shape_weights)
     mesh, skeleton, skin = figure.mesh, figure.skeleton, figure.skin
     assert mesh is not None  # it has such vertices
-    normals = mesh.normals[vertices]
     if skeleton is None or skin is None:
-        moved, normals = mesh.positions[vertices], unit(normals)
+        moved, normals = mesh.positions[vertices], unit(mesh.normals[vertices])
         return moved if pose is None else apply_transform(placement_matrix(pose), moved), normals
     pose = rest_pose(skeleton) if pose is None else pose
-    palette = skinning_matrices(world_matrices(skeleton, pose), skin.inverse_bind)
-    rows = skin_rows(skin_used(skin, skinning), vertices)
+    palette = posed_skeleton(skeleton, pose).palette(skin)
     rest = rest_vertices(figure, pose, vertices, skinning.correctives)
-    method = import_module(f"viewer.rig.skinning.{skinning.method}")
-    moved, normals = method.deform(rest, normals, rows, palette, skinning.share)
+    moved, normals = skinned(mesh, skin, rest, palette, skinning, vertices)
     return apply_transform(placement_matrix(pose), moved), normals
 
 

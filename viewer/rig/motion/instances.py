@@ -12,18 +12,31 @@ import numpy as np
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import matrix_to_euler, quaternion_to_matrix
-from viewer.rig.kinematics import forward_kinematics, skinning_matrices
+from viewer.rig.kinematics import (
+    forward_kinematics,
+    is_posed,
+    posed_skeleton,
+    skinning_matrices,
+)
 from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.clip_table import evaluate_all
 from viewer.rig.motion.evaluation import place_pose, pose_actor
 from viewer.rig.motion.sampled_clip import SampledClip, sample_rows
 from viewer.rig.pose import Pose, dof_rotations
+from viewer.rig.posed_skeleton import PosedSkeleton
 from viewer.rig.posing.pose_vector import rotation_rows
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
 from viewer.rig.skeleton import Skeleton, clamp_dofs
 
-__all__ = ["local_rotations", "palettes", "placements", "pose_actors", "worlds"]
+__all__ = [
+    "local_rotations",
+    "palettes",
+    "placements",
+    "pose_actors",
+    "posed_worlds",
+    "worlds",
+]
 
 _FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
 
@@ -143,6 +156,36 @@ def worlds(skeleton: Skeleton, poses: Sequence[Pose], rotations: Floats | None =
         np.add.at(shifts, (every, skeleton.dof_joints[moves], skeleton.dof_kinds[moves]), dofs)
     local[..., :3, 3] = np.swapaxes(skeleton.rest_translations + shifts, 0, 1)
     return np.swapaxes(forward_kinematics(skeleton.parents, local), 0, 1)
+
+
+def posed_worlds(
+    skeleton: Skeleton, poses: Sequence[Pose], rotations: Floats | None = None
+) -> Floats:
+    """Return ``worlds``, computed together for poses that do not keep their own, which then do.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Of the figure, already shaped; all poses have this shape.
+    poses : sequence of A Pose
+        At least one; DOFs in lengths and radians.
+    rotations : (A, J, 3, 3), optional
+        Their ``local_rotations``, if they are known.
+
+    Returns
+    -------
+    (A, J, 4, 4)
+        Joint-to-figure matrices.
+    """
+    rows = [row for row, pose in enumerate(poses) if not is_posed(skeleton, pose)]
+    missing = [poses[row] for row in rows]
+    if missing:
+        found = worlds(skeleton, missing, None if rotations is None else rotations[rows])
+        for pose, world in zip(missing, found, strict=True):
+            pose.posed = PosedSkeleton(skeleton, pose.skinning_key, world)
+        if len(missing) == len(poses):
+            return found
+    return np.stack([posed_skeleton(skeleton, pose).world for pose in poses])
 
 
 def palettes(figure: Figure, poses: Sequence[Pose]) -> Floats:

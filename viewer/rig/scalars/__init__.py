@@ -24,7 +24,7 @@ from viewer.rig.scalars._joints import joint_of, joint_text
 from viewer.rig.scalars._lengths import length_text, length_unit
 from viewer.rig.scalars._start import joint_influences, most_influential, telling_view
 from viewer.rig.skeleton import joint_labels
-from viewer.rig.skinning import Skinning
+from viewer.rig.skinning import METHODS, PURE, Skinning
 
 __all__ = [
     "SCALARS",
@@ -108,6 +108,8 @@ class Scalar:
         return min(low, 0.0), most if most > 0.0 else 1.0
 
 
+_FIRST, *_OTHERS = (METHODS[name].short for name in PURE)
+
 SCALARS = {
     "weight": Scalar(
         "Weight of a joint", "weights", "weights", unit="", moves=False, about="joint",
@@ -122,7 +124,7 @@ SCALARS = {
     "stretch": Scalar("Edge stretch, largest", "strain", "a skin", "diverging", "%", robust=True),
     "stretch-mean": Scalar("Edge stretch, mean", "strain", "a skin", "diverging", "%", robust=True),
     "area": Scalar("Area change", "strain", "a skin", "diverging", "%", robust=True),
-    "methods": Scalar("Distance LBS to DQS", "distances", "a skin"),
+    "methods": Scalar(f"Distance {_FIRST} to {' or '.join(_OTHERS)}", "distances", "a skin"),
     "cut": Scalar("Distance to few influences", "distances", "a skin"),
     "normalized": Scalar("Effect of normalising weights", "distances", "a skin"),
     "correctives": Scalar("Effect of pose correctives", "distances", "pose correctives"),

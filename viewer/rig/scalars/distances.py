@@ -9,7 +9,7 @@ import numpy as np
 from viewer.rig.arrays import Floats
 from viewer.rig.retargeting.mirror import mirror_axis
 from viewer.rig.scalars._asked import Asked, influences_kept
-from viewer.rig.skinning import Skinning, deform
+from viewer.rig.skinning import PURE, Skinning, deform
 
 __all__ = ["asymmetry", "correctives", "cut", "methods", "normalized"]
 
@@ -29,9 +29,9 @@ def normalized(asked: Asked) -> Floats:
 
 
 def methods(asked: Asked) -> Floats:
-    """Return the distance between linear blend and dual quaternion skinning: (V,)."""
-    how = asked.skinning
-    return _distance(asked, replace(how, method="lbs"), replace(how, method="dqs"))
+    """Return the largest distance of another method from the reference: (V,), figure units."""
+    first, *others = (replace(asked.skinning, method=name) for name in PURE)
+    return np.max([_distance(asked, first, other) for other in others], axis=0)
 
 
 def correctives(asked: Asked) -> Floats:

@@ -10,24 +10,75 @@ import numpy as np
 
 from viewer.errors import RigError
 from viewer.near_names import name_hint
-from viewer.rig.arrays import Floats
+from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.geometry.vectors import unit
-from viewer.rig.kinematics import skinning_matrices, world_matrices
+from viewer.rig.kinematics import posed_skeleton, skinning_matrices, world_matrices
 from viewer.rig.memo import Memo
+from viewer.rig.mesh import Mesh
 from viewer.rig.pose import Pose, placement_matrix, rest_pose
 from viewer.rig.shape import rest_positions, shaped
-from viewer.rig.skin import Skin, limit_influences, normalized
+from viewer.rig.skin import Skin, limit_influences, normalized, skin_rows
 
-__all__ = ["METHODS", "Skinning", "deform", "deform_frames", "joint_matrices", "skin_used"]
+__all__ = [
+    "METHODS",
+    "PURE",
+    "Method",
+    "Skinning",
+    "deform",
+    "deform_frames",
+    "joint_matrices",
+    "skin_used",
+    "skinned",
+]
+
+
+@dataclass(frozen=True, slots=True)
+class Method:
+    """Properties of a skinning method that are needed before its module is imported.
+
+    Attributes
+    ----------
+    title : str
+        For menus.
+    short : str
+        For buttons and legends.
+    uses_matrices : bool
+        Whether it blends skinning matrices: its shader reads ``u_palette``.
+    uses_quaternions : bool
+        Whether it blends dual quaternions: its shader reads ``u_rigid``.
+    ends : tuple of str
+        The two methods between which ``Skinning.share`` interpolates; empty for methods of
+        their own.
+    result : str
+        Label of the result in an explanation of a vertex, where it is not the last sum that is
+        shown anyway; ``{share}`` stands for the blend factor.
+    """
+
+    title: str
+    short: str
+    uses_matrices: bool = True
+    uses_quaternions: bool = False
+    ends: tuple[str, ...] = ()
+    result: str = ""
+
 
 METHODS = {
-    "lbs": "Linear blend (LBS)",
-    "dqs": "Dual quaternion (DQS)",
-    "mix": "Between LBS and DQS",
+    "lbs": Method("Linear blend (LBS)", "LBS"),
+    "dqs": Method("Dual quaternion (DQS)", "DQS", uses_matrices=False, uses_quaternions=True),
+    "mix": Method(
+        "Between LBS and DQS",
+        "Mixed",
+        uses_quaternions=True,
+        ends=("lbs", "dqs"),
+        result="{share} of the way",
+    ),
 }
-"""Module in this folder and GLSL chunk in ``shaders/skin``, with the name that menus show."""
+"""Modules in this folder, each with ``deform`` and a GLSL chunk in ``shaders/skin``."""
+
+PURE = tuple(name for name, method in METHODS.items() if not method.ends)
+"""Methods that are not interpolated between others; the first is the reference."""
 
 
 @dataclass(slots=True)
@@ -39,7 +90,7 @@ class Skinning:
     method : str
         A key of ``METHODS``.
     share : float
-        Of DQS in the method ``"mix"``, 0 to 1.
+        Blend factor of methods between two others, 0 to 1; of DQS in the method ``"mix"``.
     max_influences : int
         Only so many of the strongest, scaled to a sum of 1; 0 for all, as stored.
     normalize : bool
@@ -101,13 +152,48 @@ def deform(
         moved, normals = mesh.positions, unit(mesh.normals)
     else:
         pose = rest_pose(figure.skeleton) if pose is None else pose
-        palette = skinning_matrices(world_matrices(figure.skeleton, pose), figure.skin.inverse_bind)
+        palette = posed_skeleton(figure.skeleton, pose).palette(figure.skin)
         rest = rest_positions(figure, mesh, pose, how.correctives)
-        module = import_module(f"{__name__}.{how.method}")
-        moved, normals = module.deform(
-            rest, mesh.normals, skin_used(figure.skin, how), palette, how.share
-        )
+        moved, normals = skinned(mesh, figure.skin, rest, palette, how)
     return moved.copy() if pose is None else apply_transform(placement_matrix(pose), moved), normals
+
+
+def skinned(
+    mesh: Mesh,
+    skin: Skin,
+    rest: Floats,
+    palette: Floats,
+    skinning: Skinning,
+    vertices: Ints | None = None,
+) -> tuple[Floats, Floats]:
+    """Move vertices by skinning matrices.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Already shaped.
+    skin : Skin
+        As stored.
+    rest : (N, 3)
+        The vertices in binding space, with pose correctives.
+    palette : (J, 4, 4)
+        Skinning matrices.
+    skinning : Skinning
+        Method and influences.
+    vertices : (N,), optional
+        Their indices; all if omitted.
+
+    Returns
+    -------
+    positions, normals : (N, 3)
+        Figure units, before the figure's own placement; unit length.
+    """
+    used, normals = skin_used(skin, skinning), mesh.normals
+    if vertices is not None:
+        used, normals = skin_rows(used, vertices), normals[vertices]
+    module = import_module(f"{__name__}.{skinning.method}")
+    moved: tuple[Floats, Floats] = module.deform(rest, normals, used, palette, skinning.share)
+    return moved
 
 
 def deform_frames(
@@ -169,7 +255,7 @@ def joint_matrices(figure: Figure, pose: Pose) -> Floats:
     """
     skeleton = shaped(figure, pose.shape_weights).skeleton
     assert skeleton is not None  # shaping keeps it
-    return placement_matrix(pose) @ world_matrices(skeleton, pose)
+    return placement_matrix(pose) @ posed_skeleton(skeleton, pose).world
 
 
 _varied: Memo[Skin, Skin] = Memo(kept=4)

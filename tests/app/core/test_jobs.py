@@ -1,0 +1,68 @@
+"""Work in a thread that counts its steps: progress, lines, errors, and being cancelled."""
+
+from __future__ import annotations
+
+import threading
+
+from viewer.app.core.jobs import CountedJob, Report
+from viewer.errors import RigError
+
+
+def test_counted_job_says_how_far_it_is_and_what_was_done() -> None:
+    reached, go = threading.Event(), threading.Event()
+
+    def act(report: Report) -> list[str]:
+        report(2, 5, "weights")
+        reached.set()
+        go.wait(10)
+        return ["done"]
+
+    job = CountedJob("Checking", act)
+    reached.wait(10)
+    assert (job.progress, job.title, job.is_done) == ((2, 5), "weights", False)
+    go.set()
+    job.wait()
+    assert job.is_done and job.lines == ["done"] and job.error == ""
+
+
+def test_counted_job_keeps_its_title_where_the_work_says_nothing() -> None:
+    def act(report: Report) -> list[str]:
+        report(0, 1, "")
+        return []
+
+    job = CountedJob("Checking", act)
+    job.wait()
+    assert job.title == "Checking"
+
+
+def test_cancelled_job_is_done_at_once_and_ends_before_its_next_step() -> None:
+    reached, go, after = threading.Event(), threading.Event(), []
+
+    def act(report: Report) -> list[str]:
+        report(0, 2, "first")
+        reached.set()
+        go.wait(10)
+        report(1, 2, "second")
+        after.append(1)
+        return ["never"]
+
+    job = CountedJob("Checking", act)
+    reached.wait(10)
+    job.cancel()
+    assert job.is_done
+    go.set()
+    job.wait()
+    assert not after and job.lines == [] and job.error == "" and job.title == "first"
+
+
+def test_refusals_are_kept_as_words() -> None:
+    def refuse(report: Report) -> list[str]:
+        raise RigError("figure box has no mesh")
+
+    def grow(report: Report) -> list[str]:
+        raise MemoryError
+
+    jobs = [CountedJob("Checking", act) for act in (refuse, grow)]
+    for job in jobs:
+        job.wait()
+    assert [job.error for job in jobs] == ["figure box has no mesh", "Checking: not enough memory"]

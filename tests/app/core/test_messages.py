@@ -1,0 +1,219 @@
+"""What was said is kept, counted and bounded; the window that lists it; its place in the view."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from app.driver import make_state
+from imgui_bundle import imgui
+
+import viewer
+from viewer.app.core.messages import Message, MessageLog, message_line
+from viewer.app.overlays import _newest
+from viewer.diagnostics import Diagnostic
+
+
+def texts_of(log):
+    return [(message.text, message.count) for message in log]
+
+
+def test_log_counts_what_is_said_again_and_moves_it_to_the_end():
+    log = MessageLog()
+    for text in ("a", "b", "a", "c", "a"):
+        log.add(text)
+    assert texts_of(log) == [("b", 1), ("c", 1), ("a", 3)]
+
+
+def test_log_keeps_the_latest_thousand():
+    log = MessageLog()
+    for number in range(1003):
+        log.add(f"message {number}")
+    assert len(log) == 1000
+    assert texts_of(log)[0] == ("message 3", 1) and texts_of(log)[-1] == ("message 1002", 1)
+
+
+def test_log_tells_what_keys_did_from_the_rest():
+    log = MessageLog()
+    log.add("no normals")
+    log.add("Wireframe on", "status")
+    log.add("tube.skin:41: expected 3 numbers, found 2", "error")
+    assert [m.text for m in log.listed(True)] == [m.text for m in log]
+    assert [m.kind for m in log.listed(False)] == ["note", "error"]
+
+
+@pytest.mark.parametrize(
+    ("message", "line"),
+    [
+        (Message("no normals", "note"), "no normals"),
+        (Message("no normals", "note", 1200), "no normals (1,200 times)"),
+        (Message("bad file", "error", 2), "error: bad file (2 times)"),
+    ],
+)
+def test_message_line(message, line):
+    assert message_line(message) == line
+
+
+def test_warnings_of_a_scene_are_said_and_kept_from_the_start(rig):
+    scene = viewer.load(*rig)
+    scene.diagnostics = (
+        Diagnostic("M007.normals", Path("tiny.skin"), values={"n": 3, "vertex": 0}),
+        Diagnostic("F007.several-pictures", Path("tiny"), values={"n": 2}),
+    )
+    state = make_state(scene)
+    assert [note.text for note in state.messages.notes] == list(scene.warnings)
+    assert [message.text for message in state.messages.log] == list(scene.warnings)
+
+
+def test_notes_go_but_stay_in_the_log(hand, monkeypatch):
+    hand.state.say("three joints were left out")
+    hand.step(1)
+    assert hand.says("three joints")
+    monkeypatch.setattr("viewer.app.core.messages.time.monotonic", lambda: 1e12)
+    hand.step(1)
+    assert not hand.state.messages.notes
+    assert ("three joints were left out", 1) in texts_of(hand.state.messages.log)
+
+
+def test_note_that_is_said_again_is_shown_once(hand):
+    for _ in range(5):
+        hand.state.say("the driver has no such thing")
+    assert [note.text for note in hand.state.messages.notes] == ["the driver has no such thing"]
+    assert texts_of(hand.state.messages.log)[-1] == ("the driver has no such thing", 5)
+
+
+def test_errors_are_kept_once_while_they_are_shown(hand):
+    for _ in range(2):
+        hand.state.error = "tube.skin:41: expected 3 numbers, found 2"
+        hand.step(5)
+        hand.key("escape")
+        hand.step(2)
+    errors = [message for message in hand.state.messages.log if message.kind == "error"]
+    assert [(m.text, m.count) for m in errors] == [("tube.skin:41: expected 3 numbers, found 2", 2)]
+
+
+def test_key_and_menu_open_the_window_and_escape_closes_it(hand, texts):
+    hand.state.say("three joints were left out")
+    hand.key("m", "ctrl")
+    hand.step(2)
+    texts.clear()
+    hand.step(1)
+    assert hand.state.messages.is_open and "three joints were left out" in texts
+    hand.key("escape")
+    hand.step(2)
+    assert not hand.state.messages.is_open
+    hand.menu("menu Window", "Messages")
+    hand.step(2)
+    assert hand.state.messages.is_open
+
+
+def test_window_says_that_there_is_nothing(hand, texts):
+    hand.key("m", "ctrl")
+    hand.step(2)
+    assert "nothing was said yet" in texts
+
+
+def test_copy_puts_every_listed_message_on_the_clipboard(hand):
+    hand.state.say("no normals", "no texture", "no normals")
+    hand.state.say_status("Wireframe on")
+    hand.key("m", "ctrl")
+    hand.step(3)
+    hand.click("Copy all")
+    assert imgui.get_clipboard_text() == "no texture\nno normals (2 times)"
+    hand.click("What keys and buttons did")
+    hand.click("Copy all")
+    copied = imgui.get_clipboard_text()
+    assert copied == "no texture\nno normals (2 times)\nWireframe on"
+
+
+def test_keys_act_while_the_window_is_open(hand):
+    hand.key("m", "ctrl")
+    hand.key("w")
+    assert hand.state.options.wireframe
+
+
+# In the view
+
+
+@pytest.mark.parametrize(
+    ("heights", "room", "count"),
+    [
+        ([10, 10, 10], 30, 3),
+        ([10, 10, 10], 29, 1),  # one, and the line that tells of the other two
+        ([10, 10, 10], 19, 0),
+        ([10] * 20, 1000, 8),
+        ([10] * 8, 1000, 8),
+        ([500, 10], 100, 1),
+        ([10, 500], 100, 0),
+        ([], 100, 0),
+    ],
+)
+def test_newest_messages_that_fit(heights, room, count):
+    assert _newest(heights, 10, room) == count
+
+
+def test_more_than_eight_messages_are_counted(drive, rig, texts):
+    hand = drive(*rig, size=(1280, 900))
+    hand.state.messages.notes.clear()
+    hand.state.say(*(f"message {number}" for number in range(12)))
+    texts.clear()
+    hand.step(1)
+    shown = [text for text in texts if text.startswith("message ")]
+    assert shown == [f"message {number}" for number in range(4, 12)]
+    assert "and 4 more (Window > Messages)" in texts
+
+
+def _job():
+    return SimpleNamespace(
+        title="Writing walk.bvh and 3 more", progress=(3, 9), can_cancel=True, is_done=False,
+        error="", lines=[], step=lambda: None, cancel=lambda: None,
+    )  # fmt: skip
+
+
+def _overlap(a, b):
+    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
+
+
+@pytest.mark.parametrize("size", [(1280, 800), (900, 640), (640, 480), (480, 400), (400, 900)])
+@pytest.mark.parametrize("has_legend", [False, True])
+def test_progress_messages_and_legend_never_overlap(drive, rig, size, has_legend):
+    hand = drive(*rig, size=size, samples=1)
+    if has_legend:
+        hand.state.options.shading = "scalar"
+    hand.state.say(*(f"{number}: a long message, {'and more ' * 30}" for number in range(12)))
+    hand.state.job = _job()
+    hand.step(4)
+    rects = [hand.state.item_rects.get(f"##{name}") for name in ("legend", "progress", "notes")]
+    shown = [rect for rect in rects if rect is not None]
+    assert rects[1] is not None
+    for number, rect in enumerate(shown):
+        assert not any(_overlap(rect, other) for other in shown[number + 1 :])
+    hand.state.job = None
+
+
+def test_messages_without_room_are_only_counted(drive, rig, texts):
+    hand = drive(*rig, size=(700, 250), samples=1)
+    hand.state.messages.notes.clear()
+    hand.state.say(*("a long message, " + "and more " * 30 + str(n) for n in range(3)))
+    hand.state.job = _job()
+    hand.step(3)
+    texts.clear()
+    hand.step(1)
+    hand.state.job = None
+    assert not [text for text in texts if text.startswith("a long message")]
+    assert "3 messages (Window > Messages)" in texts
+
+
+def test_picture_of_the_interface_shows_warnings_however_long_it_takes(drive, rig, monkeypatch):
+    scene = viewer.load(*rig)
+    values = {"n": 3, "vertex": 0}
+    scene.diagnostics = (Diagnostic("M007.normals", Path("tiny.skin"), values=values),)
+    hand = drive(scene=scene, samples=1)
+    for note in hand.state.messages.notes:
+        note.until = 1e11  # as if it had been said just before the next line
+    plain = hand.app.picture()
+    monkeypatch.setattr("viewer.app.core.messages.time.monotonic", lambda: 1e12)
+    late = hand.app.picture()
+    assert "##notes" in hand.state.item_rects
+    assert (late == plain).all()

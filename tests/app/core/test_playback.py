@@ -1,0 +1,188 @@
+"""The scene's clock: what time is shown after so much wall clock time, in every mode."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from viewer.app.core.playback import Playback
+from viewer.rig.captures.points import PointClip, PointLayout
+from viewer.rig.figure import Figure
+from viewer.rig.motion.clip import Channel, Clip
+from viewer.rig.motion.timing import Timing
+from viewer.rig.scene import Actor, Scene
+
+
+def keyed(start=1.0, end=5.0):
+    return Clip(
+        "walk", (Channel(0, np.array([0.0]), np.array([0.0]), (("flat", "flat"),)),), start, end
+    )
+
+
+def captured(frames=9, rate=4.0, first=100):
+    timing = Timing(rate, np.arange(frames), first_frame=first, holds=False)
+    return PointClip("dots", timing, np.ones((frames, 1, 4)))
+
+
+def actor(clip):
+    layout = PointLayout("one", ("a",), np.zeros((0, 2)), np.zeros(1))
+    return Actor(Figure("f", points=layout), clip=clip)
+
+
+def clock(clip, **settings):
+    playback = Playback()
+    playback.show(Scene([actor(clip)]))
+    for name, value in settings.items():
+        setattr(playback, name, value)
+    playback.playing = True
+    return playback
+
+
+def test_shows_the_start_of_all_clips_and_ends_with_the_longest():
+    late = actor(captured())
+    late.offset = 10.0
+    playback = Playback()
+    playback.show(Scene([actor(keyed()), late]))
+    assert playback.time == 1.0
+    assert playback.whole == (1.0, 12.0)  # nine frames at 4 a second last 2 s, from second 10 on
+    assert (playback.frame_rate, playback.first_frame) == (4.0, 100)
+    assert not playback.playing
+
+
+def test_scene_that_says_its_time_is_shown_there():
+    scene = Scene([actor(keyed())])
+    scene.time = 2.5
+    playback = Playback()
+    playback.show(scene)
+    assert playback.time == 2.5
+
+
+@pytest.mark.parametrize(
+    ("mode", "speed", "seconds", "shown", "playing"),
+    [
+        ("loop", 1.0, 1.5, 2.5, True),
+        ("loop", 1.0, 4.5, 1.5, True),  # range 1 to 5: 4.5 s on is half a second past the start
+        ("loop", 2.0, 4.5, 2.0, True),
+        ("loop", -1.0, 0.5, 4.5, True),
+        ("once", 1.0, 3.0, 4.0, True),
+        ("once", 1.0, 9.0, 5.0, False),
+        ("once", -1.0, 0.5, 1.0, False),
+        ("ping-pong", 1.0, 3.0, 4.0, True),
+        ("ping-pong", 1.0, 5.0, 4.0, True),
+        ("ping-pong", 1.0, 9.0, 2.0, True),
+        ("ping-pong", -1.0, 1.0, 2.0, True),
+        ("run on", 1.0, 100.0, 101.0, True),
+        ("run on", -4.0, 1.0, -3.0, True),
+    ],
+)
+def test_time_moves_by_the_mode(mode, speed, seconds, shown, playing):
+    playback = clock(keyed(), mode=mode, speed=speed)
+    for _ in range(10):
+        playback.advance(seconds / 10)
+    assert playback.time == pytest.approx(shown, abs=1e-9)
+    assert playback.playing is playing
+
+
+def test_slow_frames_drop_no_time():
+    fine, coarse = clock(keyed()), clock(keyed())
+    for _ in range(370):
+        fine.advance(0.01)
+    coarse.advance(3.7)
+    assert fine.time == pytest.approx(coarse.time, abs=1e-9)
+
+
+def test_last_captured_frame_lasts_as_long_as_the_others():
+    playback = clock(captured())  # frames at 0, 0.25 ... 2.0
+    playback.advance(2.2)
+    assert (playback.time, playback.frame) == (2.0, 8)
+    playback.advance(0.1)  # 2.3 s of 2.25 s
+    assert playback.time == pytest.approx(0.05)
+
+
+def test_steps_go_to_whole_frames_and_stop():
+    playback = clock(captured())
+    playback.advance(0.6)  # between frames 2 and 3
+    playback.step(1)
+    assert (playback.time, playback.playing) == (0.75, False)
+    playback.step(-1)
+    assert playback.time == 0.5
+    playback.seek(0.6)
+    playback.step(-1)
+    assert playback.time == 0.5
+    playback.step(-10)
+    assert playback.time == 0.0
+    playback.step(100)
+    assert playback.time == 2.0
+
+
+def test_range_keeps_to_the_clips_and_to_order():
+    playback = clock(keyed())
+    playback.set_range(9.0, 2.0)
+    assert (playback.start, playback.end) == (2.0, 5.0)
+    playback.seek(2.0)
+    playback.advance(3.5)
+    assert playback.time == pytest.approx(2.5)
+
+
+def test_playing_once_again_starts_over():
+    playback = clock(keyed(), mode="once")
+    playback.advance(100.0)
+    assert (playback.time, playback.playing) == (5.0, False)
+    playback.toggle()
+    assert (playback.time, playback.playing) == (1.0, True)
+    backwards = clock(keyed(), mode="once", speed=-1.0)
+    backwards.advance(1.0)
+    backwards.toggle()
+    assert backwards.time == 5.0
+
+
+def test_one_frame_neither_moves_nor_divides_by_zero():
+    for mode in ("loop", "once", "ping-pong"):
+        playback = clock(captured(frames=1), mode=mode)
+        playback.advance(1.0)
+        assert playback.time == 0.0
+
+
+def test_whole_range_grows_with_captures_but_a_chosen_one_stays():
+    scene = Scene([actor(captured(frames=5))])
+    playback = Playback()
+    playback.show(scene)
+    scene.actors[0].clip = captured(frames=9)
+    playback.follow(scene.actors)
+    assert (playback.start, playback.end) == (0.0, 2.0)
+    playback.set_range(0.5, 1.0)
+    scene.actors[0].clip = captured(frames=13)
+    playback.follow(scene.actors)
+    assert (playback.whole, playback.start, playback.end) == ((0.0, 3.0), 0.5, 1.0)
+
+
+def test_nothing_that_moves_does_not_play():
+    playback = Playback()
+    playback.show(Scene([actor(None)]))
+    playback.playing = True
+    playback.advance(1.0)
+    assert playback.time == 0.0
+
+
+def test_frames_are_those_of_the_chosen_actor_so_that_each_can_be_reached():
+    one, other = actor(captured(4, 30.0, 0)), actor(captured(5, 50.0, 0))
+    other.offset = 0.005
+    scene = Scene([one, other])
+    playback = Playback()
+    playback.show(scene)
+    playback.step(1)
+    assert playback.time == pytest.approx(1 / 30)
+    playback.follow(scene.actors, other)
+    assert playback.frame_rate == 50.0
+    assert playback.time == pytest.approx(1 / 30)  # another choice moves nothing
+    playback.seek(0.0)
+    times = []
+    for _ in range(3):
+        playback.step(1)
+        times.append(playback.time)
+    assert times == pytest.approx([0.005, 0.025, 0.045])
+    assert playback.frame == 2
+    # From 0 to 0.1 s: frames 0 to 4 of that actor lie within.
+    assert playback.whole == pytest.approx((0.0, 0.1)) and playback.frame_range == (0, 4)
+    playback.follow(scene.actors, one)
+    assert playback.frame_range == (0, 3) and playback.frame == 1

@@ -1,0 +1,329 @@
+"""The camera fits the free view until somebody moves it; the ground follows shapes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from app import box_body
+from app.captured import people, walk
+from app.curves.test_curves_panel import clip_text
+from app.hand_made_figures import bar, sided_skel
+from app.playback import test_timeline
+from app.playback.test_timeline import capture, finish
+
+import viewer
+from viewer.app.actors.following import start_following
+from viewer.app.core.view_frame import view_frame
+from viewer.app.curves.editing import place_key
+from viewer.app.files.state import Files
+from viewer.app.shown_panels import ShownPanels
+from viewer.rendering.camera import Camera, fit
+from viewer.rendering.framing import frame_motion
+from viewer.rendering.recorder import Recording
+from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.scene import scene_points
+
+streaming = test_timeline.streaming  # the fixture
+
+ROOM = 1.08  # around a fitted figure
+
+
+def reach(hand, points=None):
+    """Return how far points come to the edges of the view: 1 is at an edge, across and up."""
+    points = scene_points(hand.state.scene) if points is None else points
+    x, y, width, height = hand.state.view_rect
+    seen = view_frame(hand.state).project(points) - (x + width / 2, y + height / 2)
+    return np.abs(seen).max(axis=0) / (width / 2, height / 2)
+
+
+def is_fitted(hand, points=None):
+    return reach(hand, points).max() == pytest.approx(1 / ROOM, abs=1e-6)
+
+
+def resize(hand, width, height):
+    """Let the window have another size; the framebuffer of the tests is large enough."""
+    hand.io.display_size = (width, height)
+    hand.step(4)
+
+
+@pytest.fixture
+def wide(drive, tmp_path):
+    """A hand on a bar ten times as wide as high, just opened in a window."""
+    hand = drive(bar(tmp_path / "bar.obj"), size=(1200, 700), samples=1)
+    hand.state.framing.restart()
+    hand.step(2)
+    return hand
+
+
+def test_first_view_fits_between_the_panels(wide):
+    assert is_fitted(wide)
+
+
+def test_fit_keeps_up_with_window_and_panels(wide):
+    distance = wide.state.camera.distance
+    resize(wide, 900, 700)
+    assert is_fitted(wide) and wide.state.camera.distance > distance
+    wide.key("tab")
+    wide.step(2)
+    assert is_fitted(wide) and wide.state.camera.distance < distance
+    wide.key("tab")
+    wide.state.of(ShownPanels).closed |= {
+        "display",
+        "skinning",
+        "weights",
+        "camera",
+        "lights",
+        "stats",
+    }
+    wide.step(4)
+    assert is_fitted(wide)
+
+
+def _orbit(hand):
+    x, y = hand.middle
+    hand.pull((x, y), (x + 30, y))
+
+
+def _zoom(hand):
+    hand.wheel(2, hand.middle)
+
+
+def _pan(hand):
+    x, y = hand.middle
+    hand.pull((x, y), (x + 30, y), button=1)
+
+
+def _slide(hand):
+    hand.drag("Distance", 0.7)
+
+
+@pytest.mark.parametrize("move", [_orbit, _zoom, _pan, _slide])
+def test_fit_is_over_when_somebody_moves_the_camera(wide, move):
+    move(wide)
+    camera = wide.state.camera.copy()
+    wide.key("tab")
+    wide.step(3)
+    now = wide.state.camera
+    assert (now.distance, now.azimuth) == (camera.distance, camera.azimuth)
+    assert (now.target == camera.target).all()
+    wide.key("f")
+    wide.step(2)
+    assert is_fitted(wide)
+    wide.key("tab")
+    wide.step(3)
+    assert is_fitted(wide)  # F has taken it up again
+
+
+def test_following_ends_the_fit(wide):
+    start_following(wide.state, 0, -1)
+    before = wide.state.camera.copy()
+    wide.key("tab")
+    wide.step(2)
+    assert wide.state.camera.distance == before.distance
+
+
+@pytest.mark.parametrize(
+    ("key", "azimuth", "inclination"), [("_1", 0, 0), ("_3", 90, 0), ("_7", 0, 90)]
+)
+def test_keys_of_views_fit_again(wide, key, azimuth, inclination):
+    wide.wheel(8, wide.middle)
+    wide.key(key)
+    wide.step(2)
+    camera = wide.state.camera
+    assert (camera.azimuth, camera.inclination) == (azimuth, inclination)
+    assert is_fitted(wide)
+
+
+@pytest.mark.parametrize("name", ["Front", "Back", "Right", "Left", "Top", "Bottom"])
+def test_buttons_of_views_fit_again(wide, name):
+    wide.wheel(-5, wide.middle)
+    wide.click(name)
+    wide.step(2)
+    assert is_fitted(wide)
+
+
+def test_second_file_is_fitted_and_seen_from_its_front(wide, tmp_path):
+    _orbit(wide)
+    wide.state.camera.azimuth = 20.0
+    wide.open(sided_skel(tmp_path / "turned.skel", "-z"))
+    wide.step(3)
+    assert wide.state.camera.front == 180
+    assert wide.state.camera.azimuth == pytest.approx(-160)  # 20 degrees from ahead, as before
+    assert is_fitted(wide)
+    resize(wide, 1000, 700)
+    assert is_fitted(wide)
+
+
+def test_named_views_count_from_the_front_and_the_panel_overrides_it(drive, tmp_path):
+    hand = drive(sided_skel(tmp_path / "turned.skel", "-z"), size=(1200, 900), samples=1)
+    hand.state.set_front("auto")
+    hand.key("_1")
+    assert abs(hand.state.camera.azimuth) == 180
+    hand.key("_3")
+    assert hand.state.camera.azimuth == -90
+    hand.pick("Front axis", 0)
+    assert hand.state.camera.front == 90  # +x is ahead now
+    assert abs(hand.state.camera.azimuth) == 180  # and its left hand is seen as before
+    hand.key("_1")
+    assert hand.state.camera.azimuth == 90
+    hand.pick("Front axis", 4)
+    assert hand.state.camera.front == 180
+
+
+def test_whole_motion_is_fitted_as_a_recording_is(drive, rig):
+    scene = people(rig, [True] * 40)
+    hand = drive(scene=scene, size=(1200, 700), samples=1)
+    hand.state.framing.restart()
+    hand.step(3)
+    assert hand.state.framing.is_settled
+    times = np.arange(40) / 10.0
+    points, box = frame_motion(
+        Recording(scene, times, Camera(), (64, 36), hand.state.options, moves=True)
+    )
+    np.testing.assert_allclose(hand.state.box, box, atol=1e-12)
+    assert is_fitted(hand, points)
+    actor = scene.actors[0].copy()
+    for time in times:
+        pose_actor(actor, float(time))
+        assert reach(hand, scene_points(viewer.Scene([actor]))).max() < 1.0
+    hand.key("space")
+    camera = hand.state.camera.copy()
+    hand.step(20)
+    assert hand.state.playback.time > 0
+    assert (hand.state.camera.target == camera.target).all()
+    assert hand.state.camera.distance == camera.distance
+
+
+def test_fit_keeps_up_with_a_capture_that_is_read(streaming):
+    streaming.start(capture(100, 5, 3))
+    finish(streaming)
+    streaming.step(40)
+    state = streaming.state
+    assert state.of(Files).stream is None and state.framing.is_settled
+    assert state.box[1, 0] - state.box[0, 0] > 99.0  # x is the frame's number
+    recording = Recording(
+        state.scene, np.arange(100) / 10.0, Camera(), (64, 36), state.options, moves=True
+    )
+    points, box = frame_motion(recording)
+    np.testing.assert_allclose(state.box, box, atol=1e-12)
+    assert is_fitted(streaming, points)
+
+
+def test_fit_leaves_a_camera_that_was_moved_while_a_capture_is_read(streaming):
+    streaming.start(capture(100, 5, 3))
+    _zoom(streaming)
+    camera = streaming.state.camera.copy()
+    finish(streaming)
+    streaming.step(40)
+    assert streaming.state.camera.distance == camera.distance
+    assert (streaming.state.camera.target == camera.target).all()
+    assert streaming.state.box[1, 0] > 98.0  # the ground reaches as far all the same
+
+
+@pytest.mark.parametrize("edit", ["key", "offset and key", "undo"])
+def test_views_fit_the_motion_as_it_was_edited(drive, rig, tmp_path, edit):
+    (tmp_path / "wave.anim").write_text(clip_text())
+    hand = drive(*rig, tmp_path / "wave.anim", size=(1200, 700), samples=1)
+    hand.state.framing.restart()
+    hand.step(3)
+    before = hand.state.camera.distance
+    if edit == "offset and key":
+        hand.state.actor.offset = 0.5
+        hand.step(3)
+    place_key(hand.state, (0, 1), value=20.0)  # root x, at its end
+    hand.step(3)
+    assert hand.state.camera.distance == before  # the edit is to be seen
+    if edit == "undo":
+        hand.key("z", "ctrl")
+        hand.step(3)
+    hand.key("_1")
+    reach_at_most = 20.0 if edit != "undo" else 1.0
+    wide = hand.state.framing.extent.box[1, 0] - hand.state.framing.extent.box[0, 0]
+    assert reach_at_most < wide < reach_at_most + 3.0
+    actor = hand.state.actor.copy()
+    for time in np.linspace(0.0, 2.0, 21) + actor.offset:
+        pose_actor(actor, float(time))
+        assert reach(hand, scene_points(viewer.Scene([actor]))).max() < 1.0
+
+
+def test_tools_cover_nothing_that_is_fitted(drive, tmp_path):
+    hand = drive(sided_skel(tmp_path / "tall.skel", "+z", 3.0), size=(1200, 700), samples=1)
+    points = scene_points(hand.state.scene)
+    fit(hand.state.camera, points, hand.state.aspect)
+    assert _is_covered(hand, points)  # as it would be fitted to the whole view
+    hand.state.framing.restart()
+    hand.step(3)
+    assert not _is_covered(hand, points)
+    assert reach(hand).max() > 0.7
+
+
+def _is_covered(hand, points):
+    x0, _, _, y1 = hand.state.item_rects["##tools"]
+    seen = view_frame(hand.state).project(points)
+    return ((seen[:, 0] > x0) & (seen[:, 1] < y1)).any()
+
+
+def test_ground_stays_under_the_feet_of_another_shape(box):
+    box.state.framing.restart()
+    box.step(2)
+    camera = box.state.camera.copy()
+    assert box.state.box[0, 1] == -box_body.HEIGHT / 2
+    box.state.actor.pose.shape_weights[0] = 3.0
+    box.step(2)
+    taller = box_body.HEIGHT * (1 + 3.0 * box_body.STATURE)
+    assert box.state.box[:, 1] == pytest.approx([-taller / 2, taller / 2])
+    # The camera stays: that the figure grew is to be seen.
+    assert box.state.camera.distance == camera.distance
+    box.state.actor.pose.shape_weights[0] = 0.0
+    box.step(2)
+    assert box.state.box[0, 1] == -box_body.HEIGHT / 2
+
+
+def test_ground_does_not_follow_poses(box):
+    box.step(2)
+    before = box.state.box.copy()
+    box.state.actor.pose.dofs[box.dof_index("joint_0.x")] = 1.0
+    box.state.actor.pose.figure_translation[1] = 0.7
+    box.step(2)
+    box.state.actor.pose.shape_weights[0] = 1.0
+    box.step(2)
+    taller = box_body.HEIGHT * (1 + box_body.STATURE)
+    assert before[0, 1] == -box_body.HEIGHT / 2
+    assert box.state.box[0, 1] == pytest.approx(-taller / 2)
+
+
+def test_picture_is_drawn_anew_when_the_ground_moves(box):
+    box.step(2)
+    before = box.scene_picture()
+    box.state.actor.pose.shape_weights[0] = 3.0
+    box.step(2)
+    assert (box.scene_picture() != before).any()
+
+
+def test_ground_of_a_moving_figure_follows_its_shape(box):
+    """The lowest frame is looked at first, the others after it."""
+    actor = box.state.actor
+    count = actor.figure.skeleton.n_joints
+    actor.clip = walk([True] * 20, count)
+    actor.clip.figure_translations.flags.writeable = True
+    actor.clip.figure_translations[:, 1] = np.linspace(0.0, -1.9, 20)  # down
+    actor.clip.figure_translations.flags.writeable = False
+    box.state.framing.restart()
+    box.step(3)
+    half = box_body.HEIGHT / 2
+    assert box.state.box[:, 1] == pytest.approx([-1.9 - half, half])
+    camera = box.state.camera.copy()
+    actor.pose.shape_weights[0] = 2.0
+    box.step(3)
+    half *= 1 + 2.0 * box_body.STATURE
+    assert box.state.box[:, 1] == pytest.approx([-1.9 - half, half])
+    assert box.state.camera.distance == camera.distance
+
+
+def test_another_figure_in_place_of_one_is_looked_at_as_it_is(box, rig):
+    box.step(2)
+    other = viewer.load(*rig).actors[0]
+    box.state.actor.figure, box.state.actor.pose = other.figure, other.pose
+    box.step(3)
+    assert box.state.box[1, 1] > 1.5  # the arm's upper end
+    box.assert_sane()

@@ -1,0 +1,635 @@
+"""The Curves panel: keys, tangents and modes edited by mouse and keys; what is read-only is."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from app.test_panel_pictures import _compare
+from imgui_bundle import imgui
+from numpy.testing import assert_allclose, assert_array_equal
+
+import viewer
+from viewer.app.curves.state import Curves
+from viewer.app.files.state import Files
+from viewer.formats import Source, read
+from viewer.rig.captures.points import PointClip, PointLayout
+from viewer.rig.figure import Figure
+from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.clip_sampling import evaluate
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.timing import Timing
+from viewer.rig.scene import Actor, Scene
+
+ARM_X = 6  # rows of the tiny rig: three translations, three rotations of the root, then the arm
+SIZE = (1180, 900)
+
+
+def _channel(mode, keys):
+    words = " ".join(f"{time} {value} {rule} {rule}" for time, value, rule in keys)
+    return f"channel {{ extrapolate {mode} {mode} keys {len(keys)} {{ {words} }} }}\n"
+
+
+def clip_text():
+    """Root x slides, the arm waves about x; everything else has one key."""
+    still = [_channel("constant", [(0, value, "flat")]) for value in (0, 0, 0, 0.6, 0.3)]
+    slide = _channel("linear", [(0, 0, "linear"), (2, 1, "linear")])
+    wave = _channel("cycle", [(0, 0.2, "smooth"), (1, 0.6, "smooth"), (2, -0.2, "smooth")])
+    rest = [_channel("constant", [(0, value, "flat")]) for value in (0, -0.1)]
+    return f"animation {{ range 0 2 numchannels 9\n{slide}{''.join(still)}{wave}{''.join(rest)}}}"
+
+
+@pytest.fixture
+def curves(drive, rig, tmp_path):
+    """A hand on the Curves panel of the tiny rig; the arm's curves are shown."""
+    (tmp_path / "wave.anim").write_text(clip_text())
+    hand = drive(*rig, tmp_path / "wave.anim", size=SIZE, samples=1)
+    hand.show_panel("Curves")
+    hand.state.selected_joint = 1
+    hand.step(3)
+    hand.click("curve arm.x")
+    hand.step(3)
+    return hand
+
+
+def _clip(hand) -> Clip:
+    return hand.state.actor.clip
+
+
+def _arm(hand):
+    return _clip(hand).channels[ARM_X]
+
+
+def _center(hand, label):
+    x0, y0, x1, y1 = hand.state.item_rects[label]
+    return (x0 + x1) / 2, (y0 + y1) / 2
+
+
+def _scale(hand):
+    """Pixels per second and per degree, from where two keys are drawn."""
+    (x0, y0), (x1, y1) = _center(hand, "key arm.x 0"), _center(hand, "key arm.x 1")
+    times, values = _arm(hand).times, np.degrees(_arm(hand).values)
+    return (x1 - x0) / (times[1] - times[0]), (y1 - y0) / (values[1] - values[0])
+
+
+def _at(hand, time, degrees):
+    """Return where a time and a value are on the screen."""
+    (x0, y0), (across, up) = _center(hand, "key arm.x 0"), _scale(hand)
+    return (
+        x0 + across * (time - _arm(hand).times[0]),
+        y0 + up * (degrees - math.degrees(_arm(hand).values[0])),
+    )
+
+
+def _chosen(hand):
+    return sorted(hand.state.of(Curves).keys)
+
+
+# What is shown
+
+
+def test_curves_follow_the_selected_joint_and_the_list(curves):
+    assert curves.state.of(Curves).rows == (ARM_X,)
+    curves.state.selected_joint = 0
+    curves.step(2)
+    assert curves.state.of(Curves).rows == (0, 1, 2, 3, 4, 5)
+    curves.click("curve root.tx")
+    assert curves.state.of(Curves).rows == (0,)
+    curves.click("curve root.y", held="ctrl")
+    assert curves.state.of(Curves).rows == (0, 4)
+    curves.click("curve root.tx", held="ctrl")
+    assert curves.state.of(Curves).rows == (4,)
+    curves.click("curves of root")
+    assert curves.state.of(Curves).rows == (0, 1, 2, 3, 4, 5)
+    assert curves.undo_steps == 0
+
+
+def test_filter_lists_only_what_has_it_in_its_name(curves):
+    curves.click("Curve filter")
+    curves.type("m.z")
+    curves.step(2)
+    listed = {label for label in curves.state.item_rects if label.startswith("curve ")}
+    assert listed == {"curve arm.z"}
+    curves.click("curves of arm")
+    assert curves.state.of(Curves).rows == (ARM_X + 2,)
+    curves.click("Curve filter")
+    curves.key("a", "ctrl")
+    curves.type("nothing")
+    curves.step(2)
+    assert not [label for label in curves.state.item_rects if label.startswith("curve ")]
+
+
+def test_all_keys_of_the_shown_curves_are_drawn_where_they_are(curves):
+    shown = [label for label in curves.state.item_rects if label.startswith("key ")]
+    assert sorted(shown) == ["key arm.x 0", "key arm.x 1", "key arm.x 2"]
+    x, y = _center(curves, "key arm.x 2")
+    assert (x, y) == pytest.approx(_at(curves, 2.0, math.degrees(-0.2)), abs=1.0)
+    x0, y0, x1, y1 = curves.state.item_rects["plot"]
+    assert x0 < x < x1 and y0 < y < y1
+
+
+def test_wheel_zooms_drag_pans_and_fit_shows_all_again(curves):
+    before = _scale(curves)[0]
+    x, y = _center(curves, "key arm.x 1")
+    for _ in range(6):
+        curves.wheel(2, (x, y + 15))
+    curves.step(2)
+    assert "key arm.x 0" not in curves.state.item_rects
+    assert "key arm.x 1" in curves.state.item_rects
+    x, y = _center(curves, "key arm.x 1")
+    curves.pull((x + 20, y + 15), (x + 60, y + 15))
+    moved = _center(curves, "key arm.x 1")[0] - x
+    assert moved == pytest.approx(40, abs=8) and curves.undo_steps == 0
+    curves.click("Fit")
+    curves.step(2)
+    assert _scale(curves)[0] == pytest.approx(before, rel=1e-3)
+
+
+# Keys by mouse
+
+
+def test_dragged_key_goes_where_the_mouse_is_as_one_step(curves):
+    old, (across, up) = _clip(curves), _scale(curves)
+    x, y = _center(curves, "key arm.x 1")
+    curves.pull((x, y), (x + 60, y - 24))
+    assert _arm(curves).times[1] == pytest.approx(1.0 + 60 / across, abs=2 / across)
+    wanted = 0.6 + math.radians(-24 / up)
+    assert _arm(curves).values[1] == pytest.approx(wanted, abs=math.radians(2 / abs(up)))
+    assert_array_equal(_arm(curves).times[[0, 2]], [0, 2])
+    assert _chosen(curves) == [(ARM_X, 1)] and curves.undo_steps == 1
+    curves.key("z", "ctrl")
+    assert _clip(curves) is old
+    curves.key("z", "ctrl shift")
+    assert _arm(curves).times[1] > 1.0
+
+
+def test_dragged_key_poses_the_figure_at_once(curves):
+    curves.state.playback.seek(1.0)
+    curves.step(2)
+    assert curves.dof("arm.x") == pytest.approx(0.6)
+    x, y = _center(curves, "key arm.x 1")
+    curves.pull((x, y), (x, y + 30))
+    curves.step()
+    # The mouse may have moved the key in time by part of a pixel.
+    assert curves.dof("arm.x") == pytest.approx(float(_arm(curves).values[1]), abs=0.01)
+    assert curves.dof("arm.x") < 0.55
+
+
+def test_dragged_key_stops_at_its_neighbours(curves):
+    x, y = _center(curves, "key arm.x 1")
+    end = _at(curves, 2.3, math.degrees(0.6))
+    curves.pull((x, y), (end[0], y))
+    assert 1.9 < _arm(curves).times[1] < 2.0
+    assert _arm(curves).times[2] == 2.0
+
+
+def test_shift_takes_more_keys_and_they_move_together(curves):
+    curves.click(_center(curves, "key arm.x 0"))
+    curves.click(_center(curves, "key arm.x 1"), held="shift")
+    assert _chosen(curves) == [(ARM_X, 0), (ARM_X, 1)]
+    x, y = _center(curves, "key arm.x 1")
+    curves.pull((x, y), (x - 50, y))
+    times = _arm(curves).times
+    assert times[0] < -0.05 and times[1] - times[0] == pytest.approx(1.0, abs=1e-9)
+    assert times[2] == 2.0
+
+
+def test_click_on_nothing_drops_the_choice(curves):
+    curves.click(_center(curves, "key arm.x 1"))
+    assert _chosen(curves) == [(ARM_X, 1)]
+    curves.click(_at(curves, 1.5, -15.0))
+    assert _chosen(curves) == [] and curves.undo_steps == 0
+
+
+def test_double_click_adds_a_key_on_the_curve(curves):
+    old = _arm(curves)
+    curves.double_click(_at(curves, 0.5, 12.0))
+    assert len(_arm(curves).times) == 4 and _chosen(curves) == [(ARM_X, 1)]
+    assert _arm(curves).times[1] == pytest.approx(0.5, abs=0.02)
+    times = np.linspace(-3, 5, 81)
+    assert_allclose(evaluate(_arm(curves), times), evaluate(old, times), atol=1e-12)
+    assert curves.undo_steps == 1
+    curves.key("z", "ctrl")
+    assert _arm(curves) is old
+
+
+def test_insert_adds_a_key_to_the_nearest_curve(curves):
+    curves.click("curve arm.z", held="ctrl")
+    curves.step(2)
+    # arm.z lies at -0.1 all the time, far below the wave at 1 s.
+    curves.move(_at(curves, 1.2, math.degrees(-0.08)))
+    curves.key("insert")
+    curves.step()
+    arm_z = _clip(curves).channels[ARM_X + 2]
+    assert len(_arm(curves).times) == 3
+    assert arm_z.times == pytest.approx([0, 1.2], abs=0.02) and arm_z.values[1] == -0.1
+
+
+def test_add_key_adds_one_to_each_shown_curve_at_the_present_time(curves):
+    curves.click("curves of arm")
+    curves.state.playback.seek(0.5)
+    curves.click("Add key")
+    for row in (ARM_X, ARM_X + 1, ARM_X + 2):
+        assert 0.5 in _clip(curves).channels[row].times
+    assert _chosen(curves) == [(ARM_X, 1), (ARM_X + 1, 1), (ARM_X + 2, 1)]
+    assert curves.undo_steps == 1
+
+
+def test_keys_work_while_the_mouse_is_on_a_key_or_line(curves):
+    curves.click(_center(curves, "key arm.x 1"))
+    assert _chosen(curves) == [(ARM_X, 1)]
+    curves.key("delete")  # the mouse is still there
+    curves.step(2)
+    assert_array_equal(_arm(curves).times, [0.0, 2.0])
+    curves.state.playback.seek(1.3)
+    curves.step(2)
+    curves.move(_at(curves, 1.3, 5.0))  # on the line of the present time
+    curves.key("insert")
+    curves.step(2)
+    assert _arm(curves).times == pytest.approx([0.0, 1.3, 2.0], abs=0.02)
+
+
+def test_insert_on_a_key_chooses_it_and_makes_no_second_one(curves):
+    curves.move(_center(curves, "key arm.x 1"))
+    curves.key("insert")
+    curves.step(2)
+    assert_array_equal(_arm(curves).times, [0.0, 1.0, 2.0])
+    assert _chosen(curves) == [(ARM_X, 1)]
+    assert curves.says("There is a key at 1 s already") and curves.undo_steps == 0
+
+
+def test_delete_does_nothing_while_a_key_is_dragged(curves):
+    curves.move(_center(curves, "key arm.x 1"))
+    curves.press()
+    curves.key("delete")
+    curves.let_go()
+    curves.step(2)
+    assert len(_arm(curves).times) == 3
+
+
+def test_delete_removes_the_chosen_keys(curves):
+    curves.click(_center(curves, "key arm.x 1"))
+    curves.move(_at(curves, 1.5, 10.0))
+    curves.key("delete")
+    curves.step()
+    assert _arm(curves).times.tolist() == [0, 2] and _chosen(curves) == []
+    curves.key("z", "ctrl")
+    assert len(_arm(curves).times) == 3
+    curves.click(_center(curves, "key arm.x 2"))
+    curves.click("Delete")
+    assert _arm(curves).times.tolist() == [0, 1]
+
+
+def test_last_key_may_go_and_come_again(curves):
+    curves.click("curve arm.y")
+    curves.step(2)
+    curves.click(_center(curves, "key arm.y 0"))
+    curves.click("Delete")
+    assert len(_clip(curves).channels[ARM_X + 1].times) == 0
+    curves.step(2)
+    curves.click("Add key")
+    assert len(_clip(curves).channels[ARM_X + 1].times) == 1
+    curves.assert_sane()
+
+
+# Tangents
+
+
+def _pick(hand, label, number):
+    """Choose an entry of a drop-down list, which opens above its widget if there is no room."""
+    hand.click(label)
+    hand.step(2)
+    popup = imgui.internal.find_window_by_name("##Combo_00")
+    line = imgui.get_style().item_spacing.y + imgui.get_font_size()
+    hand.click((popup.pos.x + 12, popup.pos.y + 8 + (number + 0.4) * line))
+    hand.step(2)
+
+
+def _knob(hand, side):
+    x, y = _center(hand, f"tangent {side}")
+    key = _center(hand, "key arm.x 1")
+    return x, y, key
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_dragged_tangent_becomes_the_slope_of_its_line(curves, side):
+    curves.click(_center(curves, "key arm.x 1"))
+    curves.step(2)
+    across, up = _scale(curves)
+    x, y, key = _knob(curves, side)
+    # The smooth slope from 0.2 to -0.2 in two seconds.
+    slope = math.radians(((y - key[1]) / up) / ((x - key[0]) / across))
+    assert slope == pytest.approx(-0.2, abs=0.01)
+    goal = key[0] + (1, -1)[side == 0] * 50, key[1] + 20
+    curves.pull((x, y), goal)
+    wanted = math.radians((20 / up) / (goal[0] - key[0]) * across)
+    pair = _arm(curves).tangents[1]
+    assert pair[side] == pytest.approx(wanted, rel=0.08) and pair[1 - side] == "smooth"
+    assert curves.undo_steps == 1
+    curves.key("z", "ctrl")
+    assert _arm(curves).tangents[1] == ("smooth", "smooth")
+
+
+def test_shift_turns_both_tangents(curves):
+    curves.click(_center(curves, "key arm.x 1"))
+    curves.step(2)
+    x, y, key = _knob(curves, 1)
+    curves.pull((x, y), (key[0] + 50, key[1] + 20), held="shift")
+    incoming, outgoing = _arm(curves).tangents[1]
+    assert incoming == outgoing and isinstance(incoming, float)
+
+
+def test_tangent_pulled_to_the_other_side_stays_finite(curves):
+    curves.click(_center(curves, "key arm.x 1"))
+    curves.step(2)
+    x, y, key = _knob(curves, 1)
+    curves.pull((x, y), (key[0] - 80, key[1] + 30))
+    outgoing = _arm(curves).tangents[1][1]
+    assert math.isfinite(outgoing) and abs(outgoing) > 10
+    curves.assert_sane()
+
+
+def test_rules_are_chosen_from_lists(curves):
+    curves.click(_center(curves, "key arm.x 1"))
+    curves.step(2)
+    _pick(curves, "In", 0)
+    assert _arm(curves).tangents[1] == ("flat", "smooth")
+    _pick(curves, "Out", 1)
+    assert _arm(curves).tangents[1] == ("flat", "linear")
+    # A number keeps the slope that the rule gave: -0.8 in a second.
+    _pick(curves, "Out", 3)
+    assert _arm(curves).tangents[1] == ("flat", pytest.approx(-0.8))
+    assert curves.undo_steps == 3
+
+
+def _type_into(hand, label, text):
+    hand.click(hand.place(label, 0.3))
+    hand.key("a", "ctrl")
+    hand.type(text)
+    hand.key("enter")
+    hand.step(2)
+
+
+def test_numbers_are_typed_in_the_shown_unit(curves):
+    curves.click(_center(curves, "key arm.x 1"))
+    curves.step(2)
+    _type_into(curves, "Time", "0.75")
+    _type_into(curves, "Value", "45")
+    assert _arm(curves).times[1] == 0.75
+    assert _arm(curves).values[1] == pytest.approx(math.pi / 4, rel=1e-12)
+    _pick(curves, "In", 3)
+    _type_into(curves, "In slope", "90")
+    assert _arm(curves).tangents[1][0] == pytest.approx(math.pi / 2, rel=1e-12)
+    curves.click("radians")
+    curves.step(2)
+    _type_into(curves, "Value", "0.25")
+    assert _arm(curves).values[1] == 0.25
+
+
+@pytest.mark.parametrize("text", ["nan", "inf", "-1e300", "1e999", "", "abc"])
+def test_typed_nonsense_changes_nothing(curves, text):
+    curves.click(_center(curves, "key arm.x 1"))
+    curves.step(2)
+    for label in ("Time", "Value"):
+        _type_into(curves, label, text)
+    assert np.isfinite(_arm(curves).values).all() and np.abs(_arm(curves).values).max() <= 0.6
+    assert np.abs(_arm(curves).times).max() <= 2.0
+    curves.assert_sane()
+
+
+# Extrapolation, range and time
+
+
+def test_extrapolation_is_chosen_per_side(curves):
+    _pick(curves, "Before", 4)
+    assert _arm(curves).extrapolation == ("bounce", "cycle")
+    _pick(curves, "After", 1)
+    assert _arm(curves).extrapolation == ("bounce", "linear")
+    others = [channel.extrapolation for channel in _clip(curves).channels[1:ARM_X]]
+    assert set(others) == {("constant", "constant")} and curves.undo_steps == 2
+
+
+def test_range_lines_are_dragged(curves):
+    x, y = _center(curves, "range end")
+    curves.pull((x, y), (_at(curves, 1.5, 0)[0], y))
+    assert _clip(curves).end == pytest.approx(1.5, abs=0.02) and _clip(curves).start == 0.0
+    assert curves.undo_steps == 1
+    curves.state.playback.seek(1.0)
+    curves.step(2)
+    x, y = _center(curves, "range start")
+    y += 25  # a key lies on the middle of the line
+    curves.pull((x, y), (_at(curves, 0.25, 0)[0], y))
+    assert _clip(curves).start == pytest.approx(0.25, abs=0.02)
+    # Not past the other end.
+    x, y = _center(curves, "range start")
+    curves.pull((x, y), (_at(curves, 1.9, 0)[0], y))
+    assert _clip(curves).start == _clip(curves).end
+
+
+def test_time_line_moves_the_clock(curves):
+    curves.state.playback.seek(0.5)
+    curves.step(2)
+    x, y = _center(curves, "time line")
+    curves.pull((x, y), (_at(curves, 1.25, 0)[0], y))
+    curves.step()
+    time = curves.state.playback.time
+    assert time == pytest.approx(1.25, abs=0.02)
+    assert curves.dof("arm.x") == pytest.approx(float(evaluate(_arm(curves), np.array(time))))
+    assert curves.undo_steps == 0
+
+
+def test_offset_of_the_actor_moves_its_time_line(curves):
+    curves.state.actor.offset = 1.0
+    curves.step()
+    curves.state.playback.seek(1.5)
+    curves.step(2)
+    assert _center(curves, "time line")[0] == pytest.approx(_at(curves, 0.5, 0)[0], abs=1.5)
+    curves.click("Add key")
+    assert 0.5 in _arm(curves).times
+
+
+# Whole poses, and files
+
+
+def test_key_pose_and_key_changes(curves):
+    curves.state.playback.seek(0.5)
+    curves.step(2)
+    curves.state.actor.pose.dofs[curves.dof_index("arm.y")] = 0.75
+    curves.step(2)
+    curves.click("Key changes")
+    assert _clip(curves).channels[ARM_X + 1].times.tolist() == [0.0, 0.5]
+    assert len(_arm(curves).times) == 3
+    curves.step(2)
+    assert curves.dof("arm.y") == 0.75
+    curves.click("Key pose")
+    assert all(0.5 in channel.times for channel in _clip(curves).channels)
+    assert curves.dof("arm.y") == 0.75
+
+
+def test_new_clip_gives_a_still_figure_keys(drive, rig):
+    hand = drive(*rig, size=SIZE, samples=1)
+    assert "curves" not in hand.state.item_rects and hand.state.actor.clip is None
+    before = hand.dofs()
+    hand.menu("menu Edit", "New clip")
+    assert [len(channel.times) for channel in _clip(hand).channels] == [1] * 9
+    assert (_clip(hand).start, _clip(hand).end) == (0.0, 2.0)
+    hand.step(3)
+    assert_array_equal(hand.dofs(), before)
+    hand.show_panel("Curves")
+    assert "plot" in hand.state.item_rects
+    hand.key("z", "ctrl")
+    hand.step(2)
+    assert hand.state.actor.clip is None
+
+
+def test_edited_clip_is_saved_and_read_back(curves, tmp_path):
+    curves.click(_center(curves, "key arm.x 1"))
+    curves.click("Delete")
+    curves.click("Save clip…")
+    curves.step(3)
+    assert curves.state.of(Files).dialog.name == "tiny_edited.anim"
+    curves.click("Save###Save")
+    curves.step(3)
+    saved = read(Source.open(tmp_path / "tiny_edited.anim"))
+    assert saved.channels[ARM_X].times.tolist() == [0, 2]
+    assert saved.channels[ARM_X].extrapolation == ("cycle", "cycle")
+    assert curves.says("Saved")
+
+
+def test_opened_clip_is_never_replaced(curves, tmp_path):
+    from viewer.app.curves.clip_actions import save_clip
+
+    save_clip(curves.state, tmp_path / "wave.anim")
+    assert "is an input file, which is never replaced" in curves.state.error
+    assert (tmp_path / "wave.anim").read_text() == clip_text()
+
+
+def test_keys_are_left_alone_while_something_is_typed(curves):
+    curves.click(_center(curves, "key arm.x 1"))
+    curves.click("Curve filter")
+    curves.type("arm")
+    curves.key("delete")
+    curves.key("insert")
+    curves.step(2)
+    assert len(_arm(curves).times) == 3
+
+
+# Motions without keys
+
+
+def _sampled(rig):
+    scene = viewer.load(*rig)
+    angles = np.linspace(0, 6.0, 31)
+    turns = np.zeros((31, 2, 4))
+    turns[:, :, 3] = 1.0
+    turns[:, 1, 0], turns[:, 1, 3] = np.sin(angles / 2), np.cos(angles / 2)
+    rows = np.arange(31)
+    rows[10:13] = -1
+    scene.actors[0].clip = SampledClip("turn", Timing(15.0, rows), turns)
+    return scene
+
+
+def test_frames_are_shown_and_nothing_about_them_can_be_changed(drive, rig):
+    hand = drive(scene=_sampled(rig), size=SIZE, samples=1)
+    hand.show_panel("Curves")
+    hand.state.selected_joint = 1
+    hand.step(3)
+    clip = _clip(hand)
+    assert hand.state.of(Curves).rows == (6, 7, 8)
+    assert not {"Add key", "Key pose", "Before"} & set(hand.state.item_rects)
+    x0, y0, x1, y1 = hand.state.item_rects["plot"]
+    hand.double_click(((x0 + x1) / 2, (y0 + y1) / 2))
+    hand.key("insert")
+    hand.key("delete")
+    end = _center(hand, "range end")
+    hand.pull(end, (end[0] - 90, end[1]))
+    assert _clip(hand) is clip and hand.undo_steps == 0
+
+
+def test_captured_points_have_curves_too(drive):
+    layout = PointLayout("pair", ("left", "right"), np.array([[0, 1]]), np.array([1, -1]))
+    points = np.zeros((20, 2, 4))
+    points[..., 3] = 1.0
+    points[:, 1, 0] = np.linspace(0, 1, 20)
+    points[5:8, 1, 3] = 0.0
+    actor = Actor(
+        Figure("pair", points=layout), clip=PointClip("p", Timing(10.0, np.arange(20)), points)
+    )
+    hand = drive(scene=Scene([actor]), size=SIZE, samples=1)
+    hand.show_panel("Curves")
+    hand.step(3)
+    assert hand.state.of(Curves).rows == (0, 1, 2)
+    hand.click("curve right.x")
+    hand.step(2)
+    assert hand.state.of(Curves).rows == (3,) and not hand.state.error
+
+
+def test_choice_starts_anew_with_another_actor(drive, rig, tmp_path):
+    (tmp_path / "wave.anim").write_text(clip_text())
+    scene = viewer.load(*rig, tmp_path / "wave.anim")
+    scene.actors += _sampled(rig).actors
+    hand = drive(scene=scene, size=SIZE, samples=1)
+    hand.show_panel("Curves")
+    hand.step(2)
+    hand.click("curve root.tx")
+    hand.state.choose_actor(1)
+    hand.step(3)
+    assert hand.state.of(Curves).rows == (0, 1, 2)
+    hand.state.choose_actor(0)
+    hand.step(3)
+    assert hand.state.of(Curves).rows == (0, 1, 2, 3, 4, 5)
+
+
+def test_thousands_of_keys_are_drawn_but_not_taken_hold_of(curves):
+    from viewer.rig.motion.clip_edit import clip_from_frames
+
+    times = np.linspace(0, 2, 4000)
+    dofs = np.tile(curves.dofs(), (4000, 1))
+    dofs[:, ARM_X] = np.sin(9 * times)
+    curves.state.actor.clip = clip_from_frames("baked", dofs, times)
+    curves.click("Fit")
+    curves.step(3)
+    assert not [label for label in curves.state.item_rects if label.startswith("key ")]
+    x0, y0, x1, y1 = curves.state.item_rects["plot"]
+    for _ in range(4):
+        curves.wheel(9, ((x0 + x1) / 2, (y0 + y1) / 2))
+    curves.step(2)
+    shown = [label for label in curves.state.item_rects if label.startswith("key ")]
+    assert len(shown) < 300
+    curves.assert_sane()
+
+
+def test_far_times_and_values_do_no_harm(curves):
+    curves.click(_center(curves, "key arm.x 1"))
+    curves.step(2)
+    _type_into(curves, "Value", "900000000")
+    curves.click("Fit")
+    for _ in range(3):
+        curves.wheel(-9, "plot")
+    curves.step(3)
+    curves.assert_sane()
+    assert curves.screen().any()
+
+
+@pytest.mark.golden("app_curves")
+def test_panel_looks_as_it_did(curves):
+    curves.click("curves of arm")
+    curves.state.playback.seek(0.5)
+    curves.step(3)
+    for _ in range(4):
+        curves.wheel(-2, "plot")
+    curves.click(_center(curves, "key arm.x 1"))
+    _pick(curves, "After", 4)
+    _pick(curves, "Out", 3)
+    curves.state.messages.notes.clear()
+    curves.move((5.0, 5.0))
+    top = imgui.internal.find_window_by_name("Curves").pos.y
+    _compare(curves.screen()[round(top) :], "curves")
+
+
+def test_window_appears_only_with_a_motion(drive, rig):
+    hand = drive(*rig, size=SIZE, samples=1)
+    window = imgui.internal.find_window_by_name("Curves")
+    assert window is None or not window.active
+    assert hand.state.actor.clip is None

@@ -1,0 +1,268 @@
+"""Motions exported from the window: beside the frame loop, never over what is open."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from app.captured import dots, people, walk
+
+from viewer.app.files.motion_export import FOLDER, motion_files, motion_suffixes, save_motion
+from viewer.app.files.state import Files
+from viewer.rig.motion.clip import Channel, Clip
+from viewer.rig.scene import Actor, Scene
+
+
+@pytest.fixture
+def moving(drive, rig):
+    hand = drive(*rig, size=(1000, 700), samples=1)
+    still = hand.state.actor.figure.skeleton.n_dofs
+    moved = Channel(0, np.array([0.0, 1.0]), np.array([0.0, 0.5]), (("linear", "linear"),) * 2)
+    rest = [Channel(n, np.zeros(1), np.zeros(1), (("flat", "flat"),)) for n in range(1, still)]
+    hand.state.actor.clip = Clip("slide", (moved, *rest), 0.0, 1.0)
+    hand.step(3)
+    return hand
+
+
+def finish(hand):
+    while hand.state.job is not None:
+        hand.step(1)
+
+
+def test_every_suffix_offered_is_written(moving, tmp_path):
+    for suffix in motion_suffixes():
+        save_motion(moving.state, tmp_path / f"slide{suffix}")
+        finish(moving)
+        assert moving.state.error == "", suffix
+        assert (tmp_path / f"slide{suffix}").stat().st_size > 0
+    assert motion_suffixes()[0] == ".bvh"
+    assert (tmp_path / "slide.bvh").read_text().startswith("HIERARCHY")
+
+
+def test_only_the_range_that_is_played_is_written(moving, tmp_path):
+    moving.state.playback.set_range(0.2, 0.5)
+    save_motion(moving.state, tmp_path / "part.bvh")
+    finish(moving)
+    text = (tmp_path / "part.bvh").read_text()
+    assert "Frames: 10\n" in text  # 6 to 15 of 30 a second
+
+
+def test_menu_asks_where_and_says_what_was_written(moving, tmp_path):
+    moving.click("menu File")
+    moving.click("Export motion…")
+    moving.step(2)
+    assert moving.state.of(Files).dialog is not None and moving.state.of(
+        Files
+    ).dialog.name.endswith(".bvh")
+    moving.key("escape")
+    moving.state.messages.notes.clear()
+    save_motion(moving.state, tmp_path / "slide.bvh")
+    finish(moving)
+    assert any("slide.bvh" in note.text for note in moving.state.messages.notes)
+
+
+def test_files_that_are_open_are_never_replaced(moving, tmp_path):
+    path = tmp_path / "open.bvh"
+    path.write_text("precious")
+    moving.state.paths = (*moving.state.paths, path)
+    save_motion(moving.state, path)
+    assert moving.state.error == f"{path}: is an input file, which is never replaced"
+    assert path.read_text() == "precious"
+
+
+def test_folder_that_does_not_exist_is_one_message(moving, tmp_path):
+    save_motion(moving.state, tmp_path / "no" / "slide.bvh")
+    folder = tmp_path / "no"
+    assert moving.state.error == f"{folder / 'slide.bvh'}: the folder {folder} does not exist"
+    assert moving.state.job is None
+
+
+def test_keys_are_written_at_the_frame_rate_that_is_shown(moving, tmp_path):
+    moving.state.playback.count_by(10.0)
+    save_motion(moving.state, tmp_path / "slide.bvh")
+    finish(moving)
+    text = (tmp_path / "slide.bvh").read_text()
+    assert "Frames: 11\n" in text and "Frame Time: 0.1" in text
+
+
+# Everybody
+
+
+@pytest.fixture
+def crowd(drive, rig):
+    """A hand on three people of one capture: the third is there only at its end; and points."""
+    there = np.ones(21, dtype=bool)
+    late = np.arange(21) >= 15
+    scene = people(rig, there, there, late)
+    scene.actors.append(dots([1, 1, 1, 1]))
+    return drive(scene=scene, size=(1000, 700), samples=1)
+
+
+def frames_of(path):
+    lines = path.read_text().splitlines()
+    return next(int(line.split()[1]) for line in lines if line.startswith("Frames:"))
+
+
+def test_everybody_is_written_a_file_each_as_convert_names_them(crowd, tmp_path):
+    save_motion(crowd.state, tmp_path / "walk.bvh", everyone=True)
+    assert crowd.state.job.title == "Writing walk-0.bvh and 2 more"
+    finish(crowd)
+    assert crowd.state.error == ""
+    assert sorted(path.name for path in tmp_path.glob("*.bvh")) == [
+        "walk-0.bvh",
+        "walk-1.bvh",
+        "walk-2.bvh",
+    ]
+    assert frames_of(tmp_path / "walk-0.bvh") == 21
+    assert crowd.says("captured points are not written: face4 0")
+
+
+def test_only_the_chosen_actor_is_written_if_asked_for(crowd, tmp_path):
+    crowd.state.choose_actor(1)
+    save_motion(crowd.state, tmp_path / "walk.bvh")
+    finish(crowd)
+    assert [path.name for path in tmp_path.glob("*.bvh")] == ["walk.bvh"]
+
+
+def test_nobody_there_in_the_range_is_said(drive, rig, tmp_path):
+    scene = people(rig, [True] * 21, [True] * 21)
+    scene.actors[1].offset = 10.0
+    hand = drive(scene=scene, size=(1000, 700), samples=1)
+    hand.state.playback.set_range(0.0, 1.0)
+    save_motion(hand.state, tmp_path / "walk.bvh", everyone=True)
+    finish(hand)
+    assert [path.name for path in tmp_path.glob("*.bvh")] == ["walk-0.bvh"]
+    assert frames_of(tmp_path / "walk-0.bvh") == 11
+    assert hand.says("tiny 1: not there in the range, and not written")
+    hand.state.playback.set_range(5.0, 6.0)
+    save_motion(hand.state, tmp_path / "none.bvh", everyone=True)
+    assert hand.state.error == (
+        "nobody is there in the range that is played: there is nothing to write"
+    )
+
+
+def test_all_files_appear_or_none(crowd, tmp_path):
+    (tmp_path / "walk-0.bvh").write_text("before")
+    (tmp_path / "walk-2.bvh").mkdir()  # cannot be replaced by a file
+    save_motion(crowd.state, tmp_path / "walk.bvh", everyone=True)
+    finish(crowd)
+    assert "walk-2.bvh" in crowd.state.error
+    assert (tmp_path / "walk-0.bvh").read_text() == "before"
+    assert not (tmp_path / "walk-1.bvh").exists()
+
+
+def test_files_of_everybody_that_are_open_are_never_replaced(crowd, tmp_path):
+    path = tmp_path / "walk-1.bvh"
+    path.write_text("precious")
+    crowd.state.paths = (path,)
+    save_motion(crowd.state, tmp_path / "walk.bvh", everyone=True)
+    assert crowd.state.error == f"{path}: is an input file, which is never replaced"
+    assert path.read_text() == "precious" and crowd.state.job is None
+
+
+def test_files_of_a_name(crowd, tmp_path):
+    assert motion_files(crowd.state, tmp_path / "a.gltf", True) == [
+        *(tmp_path / f"a-{person}.gltf" for person in range(3)),
+        *(tmp_path / f"a-{person}.bin" for person in range(3)),
+    ]
+    assert motion_files(crowd.state, tmp_path / "a.bvh", False) == [tmp_path / "a.bvh"]
+    assert motion_files(crowd.state, tmp_path / "out", True) == [tmp_path / "out" / "smpl"]
+
+
+@pytest.fixture
+def bodies(drive_body):
+    """A hand on two bodies of the SMPL family in one capture; the second misses a frame."""
+    hand = drive_body("smpl", size=(1000, 700))
+    figure = hand.state.actor.figure
+    count = figure.skeleton.n_joints
+    presences = ([True] * 5, [True, True, False, True, True])
+    scene = Scene(
+        [
+            Actor(figure, clip=walk(present, count), person=person)
+            for person, present in zip((3, 7), presences, strict=True)
+        ]
+    )
+    hand.state.show_scene(scene, hand.state.paths)
+    hand.step(3)
+    return hand
+
+
+def test_everybody_goes_into_one_easymocap_folder(bodies, tmp_path):
+    save_motion(bodies.state, tmp_path / "out", everyone=True)
+    finish(bodies)
+    assert bodies.state.error == ""
+    frames = sorted((tmp_path / "out" / "smpl").glob("*.json"))
+    found = [[record["id"] for record in json.loads(frame.read_text())] for frame in frames]
+    assert found == [[3, 7], [3, 7], [3], [3, 7], [3, 7]]
+
+
+def test_amass_is_a_file_each(bodies, tmp_path):
+    save_motion(bodies.state, tmp_path / "take.npz", everyone=True)
+    finish(bodies)
+    assert bodies.state.error == ""
+    with np.load(tmp_path / "take-7.npz") as arrays:
+        assert arrays["poses"].shape[0] == 5
+    assert (tmp_path / "take-3.npz").exists()
+
+
+def test_folder_that_was_opened_is_never_replaced(bodies, tmp_path):
+    (tmp_path / "out" / "smpl").mkdir(parents=True)
+    bodies.state.paths = (tmp_path / "out",)
+    save_motion(bodies.state, tmp_path / "out", everyone=True)
+    assert bodies.state.error.startswith(f"{tmp_path / 'out' / 'smpl'}: is an input folder")
+    assert bodies.state.job is None
+
+
+# The dialog
+
+
+def _ask(hand, folder):
+    hand.click("menu File")
+    hand.click("Export motion…")
+    hand.step(2)
+    hand.state.of(Files).dialog.enter(folder)
+    hand.step(2)
+
+
+def test_dialog_exports_all_actors_unless_told_otherwise(crowd, tmp_path):
+    _ask(crowd, tmp_path)
+    assert crowd.state.of(Files).dialog.name == "tiny.bvh"
+    crowd.click("Save###Save")
+    finish(crowd)
+    assert len(list(tmp_path.glob("*.bvh"))) == 3
+    _ask(crowd, tmp_path / ".")
+    crowd.pick("Whose", 1)
+    crowd.click("Save###Save")
+    finish(crowd)
+    assert (tmp_path / "tiny.bvh").exists()
+
+
+def test_dialog_warns_of_any_file_that_would_be_replaced(crowd, tmp_path):
+    (tmp_path / "tiny-2.bvh").write_text("before")
+    _ask(crowd, tmp_path)
+    assert "Replace###Save" in crowd.state.item_rects
+    crowd.pick("Whose", 1)
+    assert "Save###Save" in crowd.state.item_rects
+
+
+def test_dialog_changes_the_suffix_with_the_kind(crowd, tmp_path):
+    _ask(crowd, tmp_path)
+    dialog = crowd.state.of(Files).dialog
+    kinds = [*motion_suffixes(), FOLDER]
+    crowd.pick("As", kinds.index(".glb"))
+    assert (dialog.name, dialog.target()) == ("tiny.glb", tmp_path / "tiny.glb")
+    crowd.pick("As", kinds.index(FOLDER))
+    assert (dialog.name, dialog.target()) == ("tiny", tmp_path / "tiny")
+    dialog.name = "hand.made.npz"  # a suffix that is typed counts
+    crowd.step(2)
+    crowd.pick("As", 0)
+    assert dialog.name == "hand.made.bvh"
+
+
+def test_dialog_for_one_actor_does_not_ask_whose(moving, tmp_path):
+    _ask(moving, tmp_path)
+    assert "Whose" not in moving.state.item_rects and "As" in moving.state.item_rects
+    moving.click("Save###Save")
+    finish(moving)
+    assert (tmp_path / "tiny.bvh").exists()

@@ -1,0 +1,287 @@
+"""Opening files in the window: what stays, what is replaced, what is said."""
+
+from __future__ import annotations
+
+import json
+import threading
+
+import pytest
+from app.tiny import SKEL, skin_text, write_rig
+
+import viewer.app.files.loader
+from viewer.app.files.recent import load_recent, remember, state_folder
+from viewer.app.files.state import Files
+from viewer.errors import RenderError
+from viewer.loading import load, read_files
+
+
+def _open(hand, *paths):
+    hand.app.frame.open(list(paths))
+    hand.wait_for_loader()
+
+
+def test_bad_file_shows_its_message_and_keeps_everything(hand, tmp_path):
+    bad = tmp_path / "bad.skel"
+    bad.write_text("balljoint root {\n offset 1 2\n}\n")
+    hand.drag("arm.x", 0.9)
+    scene, pose, picture = hand.state.scene, hand.dofs(), hand.scene_picture()
+    _open(hand, bad)
+    assert hand.state.error.startswith(f"{bad}:") and "\n" not in hand.state.error
+    assert hand.state.scene is scene and (hand.dofs() == pose).all()
+    assert hand.undo_steps == 1
+    hand.click("OK")
+    assert hand.state.error == ""
+    assert (hand.scene_picture() == picture).all()
+    hand.key("z", "ctrl")
+    assert hand.dof("arm.x") == 0.2
+
+
+def test_message_is_copied_by_its_button(hand):
+    from imgui_bundle import imgui
+
+    hand.state.error = "tube.skin:41: expected 3 numbers, found 2"
+    hand.step(3)
+    hand.click("Copy")
+    assert imgui.get_clipboard_text() == "tube.skin:41: expected 3 numbers, found 2"
+    assert hand.state.error
+
+
+def test_view_answers_again_after_a_message_or_dialog(hand):
+    for close in ("escape", "button"):
+        hand.state.error = "something"
+        hand.step(3)
+        hand.key("escape") if close == "escape" else hand.click("OK")
+        hand.step(3)
+        before = hand.state.camera.azimuth
+        hand.pull(hand.middle, (hand.middle[0] + 50, hand.middle[1]))
+        assert hand.state.camera.azimuth != before
+        hand.key("o", "ctrl")
+        hand.step(3)
+        hand.key("escape") if close == "escape" else hand.click("Cancel")
+        hand.step(3)
+        before = hand.state.camera.azimuth
+        hand.pull(hand.middle, (hand.middle[0] + 50, hand.middle[1]))
+        assert hand.state.camera.azimuth != before
+
+
+@pytest.mark.parametrize("name", ["missing.skel", "folder.skel"])
+def test_missing_file_or_folder_shows_a_message(hand, tmp_path, name):
+    (tmp_path / "folder.skel").mkdir()
+    _open(hand, tmp_path / name)
+    assert name in hand.state.error
+
+
+def test_good_files_replace_the_scene_and_its_history(hand, tmp_path):
+    hand.drag("arm.x", 0.9)
+    other = tmp_path / "other"
+    other.mkdir()
+    _open(hand, *write_rig(other, "second"))
+    assert hand.state.scene.actors[0].figure.name == "second"
+    assert hand.dof("arm.x") == 0.2 and hand.undo_steps == 0
+    assert [path.name for path in hand.state.paths] == ["second.skel", "second.skin"]
+    hand.assert_sane()
+
+
+def test_camera_keeps_its_direction_for_a_new_figure(hand, tmp_path):
+    hand.state.camera.azimuth = 77.0
+    big = tmp_path / "big.skel"
+    big.write_text("balljoint root { offset 0 500 0 boxmin -100 -100 -100 boxmax 100 100 100 }")
+    _open(hand, big)
+    assert hand.state.camera.azimuth == 77.0
+    assert hand.state.camera.distance > 200
+    assert hand.state.camera.target[1] == pytest.approx(500)
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_dropped_part_joins_its_partner(drive, rig, order):
+    hand = drive(rig[order[0]])
+    _open(hand, rig[order[1]])
+    assert hand.state.actor.figure.is_attached
+    assert {path.suffix for path in hand.state.paths} == {".skel", ".skin"}
+
+
+def test_dropped_skin_that_does_not_fit_opens_alone(drive, rig, tmp_path):
+    other = tmp_path / "three.skin"
+    other.write_text(skin_text(3))
+    hand = drive(rig[0])
+    _open(hand, other)
+    assert hand.state.actor.figure.skeleton is None and not hand.state.error
+
+
+def test_dropped_skeleton_replaces_a_whole_figure(hand, rig):
+    _open(hand, rig[0])
+    assert hand.state.actor.figure.mesh is None
+
+
+def test_several_pairs_open_side_by_side(hand, tmp_path):
+    folders = [tmp_path / name for name in "ab"]
+    paths = []
+    for folder in folders:
+        folder.mkdir()
+        paths += write_rig(folder, folder.name)
+    _open(hand, *paths)
+    assert len(hand.state.scene.actors) == 2
+    hand.drag("arm.x", 0.9)
+    hand.key("z", "ctrl")
+    hand.key("r")
+    hand.assert_sane()
+
+
+def test_warnings_of_a_file_are_shown(hand, tmp_path):
+    odd = tmp_path / "odd.skel"
+    odd.write_text("balljoint a { rotxlimit 2 1 }")
+    warnings = load(odd).warnings
+    assert warnings
+    _open(hand, odd)
+    assert [note.text for note in hand.state.messages.notes][-len(warnings) :] == list(warnings)
+
+
+def test_slow_reading_can_be_cancelled(hand, rig, monkeypatch):
+    gate = threading.Event()
+
+    def slow(paths, **_):
+        gate.wait(10)
+        return read_files(paths)
+
+    monkeypatch.setattr(viewer.app.files.loader, "read_files", slow)
+    scene = hand.state.scene
+    hand.app.frame.open(list(rig))
+    loader = hand.state.of(Files).loader
+    loader._started -= 5.0
+    hand.step(3)
+    assert "Cancel opening" in hand.state.item_rects
+    hand.drag("arm.x", 0.9)  # the window still answers
+    assert hand.dof("arm.x") != 0.2
+    hand.click("Cancel opening")
+    assert hand.state.of(Files).loader is None
+    gate.set()
+    loader.wait()
+    hand.step(3)
+    assert hand.state.scene is scene
+
+
+def test_escape_cancels_reading(hand, rig, monkeypatch):
+    gate = threading.Event()
+    monkeypatch.setattr(
+        viewer.app.files.loader,
+        "read_files",
+        lambda paths, **_: (gate.wait(10), read_files(paths))[1],
+    )
+    hand.app.frame.open(list(rig))
+    loader = hand.state.of(Files).loader
+    hand.key("escape")
+    assert hand.state.of(Files).loader is None
+    gate.set()
+    loader.wait()
+
+
+def test_figure_that_the_driver_refuses_keeps_the_scene(hand, tmp_path, monkeypatch):
+    other = tmp_path / "other.skel"
+    other.write_text(SKEL)
+    scene, picture = hand.state.scene, hand.scene_picture()
+
+    def refuse(scene):
+        raise RenderError("mesh needs 3.2 GB of graphics memory")
+
+    monkeypatch.setattr(hand.app.frame.renderer, "prepare", refuse, raising=True) if not hasattr(
+        type(hand.app.frame.renderer), "__slots__"
+    ) else monkeypatch.setattr(type(hand.app.frame.renderer), "prepare", lambda s, x: refuse(x))
+    _open(hand, other)
+    assert hand.state.error == "mesh needs 3.2 GB of graphics memory"
+    assert hand.state.scene is scene
+    hand.click("OK")
+    hand.key("w")
+    hand.key("w")
+    hand.step(2)
+    assert (hand.scene_picture() == picture).all()
+
+
+def test_bundled_figure_opens_from_the_menu(hand):
+    hand.menu("menu File", "Bundled figure")
+    hand.wait_for_loader()
+    assert hand.state.actor.figure.name == "fox"
+
+
+# Recent files
+
+
+def test_opened_files_are_remembered_latest_first(hand, rig, tmp_path):
+    hand.app.frame.keeps_recent = True
+    _open(hand, rig[0])
+    _open(hand, *rig)
+    _open(hand, rig[0])
+    groups = [(str(rig[0].resolve()),), tuple(str(path.resolve()) for path in rig)]
+    assert hand.state.of(Files).recent == groups == load_recent()
+
+
+def test_bad_file_is_not_remembered(hand, tmp_path):
+    hand.app.frame.keeps_recent = True
+    _open(hand, tmp_path / "missing.skel")
+    assert load_recent() == []
+
+
+def test_recent_files_open_from_the_menu(hand, rig):
+    hand.state.of(Files).recent = [(str(rig[0]),)]
+    hand.menu("menu File", "menu Open recent", "recent 0")
+    hand.wait_for_loader()
+    assert hand.state.actor.figure.mesh is None and hand.state.paths == (rig[0],)
+
+
+@pytest.mark.parametrize(
+    "text", ["", "{", "[]", "5", "null", '{"a": 1}', "[1, null]", "[" * 20000, "\x00", "[[[]]]"]
+)
+def test_broken_list_of_recent_files_is_empty_or_harmless(hand, text):
+    state_folder().mkdir(parents=True)
+    (state_folder() / "recent.json").write_text(text)
+    recent = load_recent()
+    hand.state.of(Files).recent = recent
+    hand.menu("menu File")
+    hand.step(2)
+    assert all(isinstance(path, str) for group in recent for path in group)
+
+
+def test_at_most_twelve_groups_are_remembered(tmp_path):
+    recent = []
+    for number in range(20):
+        assert remember(recent, [tmp_path / f"{number}.skel"]) == ""
+    assert len(recent) == 12 and load_recent() == recent
+    assert recent[0] == (str((tmp_path / "19.skel").resolve()),)
+
+
+def test_unwritable_state_folder_is_said(tmp_path, monkeypatch):
+    blocker = tmp_path / "file"
+    blocker.write_text("")
+    monkeypatch.setenv("XDG_STATE_HOME", str(blocker))
+    assert "recent files could not be saved" in remember([], [tmp_path / "a.skel"])
+
+
+def test_undecodable_names_survive_the_list(tmp_path):
+    odd = tmp_path / "a\udcff.skel"
+    recent = []
+    assert remember(recent, [odd]) == ""
+    assert load_recent() == [(str(odd.resolve()),)]
+    json.loads((state_folder() / "recent.json").read_text("utf-8"))
+
+
+def test_driver_that_refuses_while_drawing_becomes_a_message(hand, monkeypatch):
+    pose = hand.dofs()
+
+    def refuse(*arguments, **settings):
+        raise RenderError("the driver refused a shader")
+
+    monkeypatch.setattr(hand.app.frame.renderer, "draw", refuse)
+    hand.state.options.wireframe = True
+    hand.step(3)
+    assert hand.state.error == "the driver refused a shader"
+    monkeypatch.undo()
+    hand.key("escape")
+    hand.state.options.wireframe = False
+    hand.step(3)
+    assert hand.state.error == "" and (hand.dofs() == pose).all()
+
+
+def test_parts_hidden_on_one_model_hide_nothing_of_the_next(hand, rig):
+    hand.state.options.hidden_parts, hand.state.options.reduced = (1,), True
+    _open(hand, *rig)
+    assert hand.state.options.hidden_parts == ()
+    assert hand.state.options.reduced is False

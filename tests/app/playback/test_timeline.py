@@ -1,0 +1,298 @@
+"""The timeline by mouse and keys: play, step, scrub, range, tracks; captures that stream in."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from viewer.app.files.state import Files
+from viewer.app.files.stream import Stream
+from viewer.app.shown_panels import ShownPanels
+from viewer.loading.capturing import Builder
+from viewer.rig.captures.capture import Capture, CapturePart
+from viewer.rig.motion.body_motion import BodyMotion
+from viewer.rig.motion.clip import Channel, Clip
+from viewer.rig.motion.timing import Timing
+
+ARM = 0  # the DOF that the test's clip moves
+
+
+@pytest.fixture
+def moving(drive, rig):
+    """A hand on the tiny figure with a clip: its last DOF rises by 0.1 a second, from 0 to 0.4."""
+    hand = drive(*rig, size=(1280, 800))
+    actor = hand.state.actor
+    dof = int(np.flatnonzero(actor.figure.skeleton.dof_kinds >= 3)[0])
+    low = actor.figure.skeleton.dof_limits[dof, 0]
+    start = max(low, 0.0)
+    channel = Channel(
+        dof, np.array([0.0, 4.0]), np.array([start, start + 0.4]), (("linear", "linear"),) * 2
+    )
+    actor.clip = Clip("rise", (channel,), 0.0, 4.0)
+    hand.dof_row, hand.dof_start = dof, start
+    assert "Scrubber" not in hand.state.item_rects  # nothing moved so far
+    hand.step(3)
+    hand.state.history.start(hand.state.scene, hand.state.options)
+    return hand
+
+
+def value(hand):
+    return hand.state.actor.pose.dofs[hand.dof_row] - hand.dof_start
+
+
+def test_timeline_appears_with_a_clip(moving):
+    assert "Scrubber" in moving.state.item_rects
+
+
+def test_space_plays_and_pauses_at_the_pace_of_the_clock(moving):
+    moving.key("space")
+    before = moving.state.playback.time
+    moving.step(60)  # frames of a sixtieth of a second
+    assert moving.state.playback.time - before == pytest.approx(1.0, abs=1e-6)
+    assert value(moving) == pytest.approx(0.1 * moving.state.playback.time)
+    moving.key("space")
+    stopped = moving.state.playback.time
+    moving.step(10)
+    assert moving.state.playback.time == stopped
+
+
+def test_arrows_home_and_end_go_to_frames(moving):
+    moving.key("right_arrow")
+    moving.key("right_arrow")
+    assert moving.state.playback.time == pytest.approx(2 / 30)
+    assert value(moving) == pytest.approx(0.1 * 2 / 30)
+    moving.key("left_arrow")
+    assert moving.state.playback.frame == 1
+    moving.key("end")
+    moving.step(1)
+    assert (moving.state.playback.time, value(moving)) == (4.0, pytest.approx(0.4))
+    moving.key("home")
+    assert moving.state.playback.time == 0.0
+
+
+def test_scrubbing_follows_the_mouse_also_while_playing(moving):
+    x0, y0, x1, _ = moving.state.item_rects["Scrubber"]
+    middle = ((x0 + x1) / 2, y0 + 5)
+    moving.pull(middle, ((x0 + 3 * x1) / 4, y0 + 5))
+    assert moving.state.playback.time == pytest.approx(3.0, abs=0.05)
+    assert value(moving) == pytest.approx(0.1 * moving.state.playback.time)
+    moving.key("space")
+    moving.pull(middle, middle)
+    assert moving.state.playback.playing
+    assert moving.state.playback.time == pytest.approx(2.0, abs=0.3)
+
+
+def test_buttons_do_what_the_keys_do(moving):
+    moving.click(">")
+    assert moving.state.playback.frame == 1
+    moving.click("Play")
+    assert moving.state.playback.playing
+    moving.click(">|")
+    moving.step(1)
+    moving.click("Play")
+    assert not moving.state.playback.playing
+
+
+def test_range_by_keys_is_what_loops(moving):
+    moving.state.playback.seek(1.0)
+    moving.key("i")
+    moving.state.playback.seek(2.0)
+    moving.key("o")
+    playback = moving.state.playback
+    assert (playback.start, playback.end) == (1.0, 2.0)
+    moving.key("space")
+    moving.step(90)
+    assert 1.0 <= playback.time <= 2.0
+
+
+def test_playing_leaves_no_steps_to_undo_but_edits_do(moving):
+    moving.key("space")
+    moving.step(30)
+    moving.key("space")
+    assert moving.undo_steps == 0
+    time, dofs = moving.state.playback.time, moving.dofs()
+    moving.state.actor.pose.dofs[moving.dof_row] = moving.dof_start + 0.01
+    moving.step(1)
+    assert moving.undo_steps == 1
+    moving.key("right_arrow")
+    moving.key("right_arrow")
+    assert moving.undo_steps == 1
+    moving.key("z", "ctrl")
+    moving.step(2)
+    assert moving.state.playback.time == time
+    assert_allclose(moving.dofs(), dofs)
+
+
+def test_another_clip_is_undone(moving):
+    old = moving.state.actor.clip
+    moving.state.actor.clip = Clip("other", old.channels, 0.0, 2.0)
+    moving.step(2)
+    assert moving.state.playback.whole == (0.0, 2.0)
+    moving.key("z", "ctrl")
+    moving.step(2)
+    assert moving.state.actor.clip is old
+    assert moving.state.playback.whole == (0.0, 4.0)
+
+
+# Captures
+
+
+def capture(n_frames, part, people, name="take"):
+    """A capture of boxes: person p is there from frame 10 p on; x is the frame's number."""
+
+    def parts():
+        for first in range(0, n_frames, part):
+            stop = min(first + part, n_frames)
+            bodies = {}
+            for person in range(people):
+                frames = np.arange(max(first, 10 * person), stop)
+                if not len(frames):
+                    continue
+                rows = np.full(n_frames, -1)
+                rows[frames] = np.arange(len(frames))
+                place = np.zeros((len(frames), 3))
+                place[:, 0] = frames
+                bodies[person] = BodyMotion(
+                    name, Timing(10.0, rows, holds=False), ("pelvis",),
+                    np.zeros((len(frames), 1, 3)), place,
+                )  # fmt: skip
+            yield CapturePart(stop, bodies)
+
+    return Capture(name, n_frames, 0, parts, up="y")
+
+
+@pytest.fixture
+def streaming(drive_body):
+    """A function that streams a capture into an app with a body."""
+    hand = drive_body("smpl", size=(1280, 800))
+
+    def start(taken):
+        figure = hand.state.actor.figure
+        builder = Builder(taken, figure)
+        builder.read_some()
+        from viewer.rig.scene import Scene
+
+        scene = Scene(list(builder.actors))
+        hand.app.frame._show(scene, (), [builder])
+        hand.step(2)
+        return builder
+
+    hand.start = start
+    return hand
+
+
+def finish(hand):
+    for _ in range(2000):
+        hand.step(1)
+        if hand.state.of(Files).stream is None:
+            return
+        hand.state.of(Files).stream._thread.join(0.005)
+    raise AssertionError("the capture was not read to its end")
+
+
+def test_people_appear_while_a_capture_is_read(streaming):
+    streaming.start(capture(100, 5, 3))
+    assert len(streaming.state.scene.actors) >= 1
+    finish(streaming)
+    actors = streaming.state.scene.actors
+    assert [actor.person for actor in actors] == [0, 1, 2]
+    assert [actor.clip.n_rows for actor in actors] == [100, 90, 80]
+    for frame in (0, 9, 10, 57, 99):
+        streaming.state.playback.seek(frame / 10.0)
+        streaming.step(2)
+        assert [a.is_present for a in actors] == [frame >= 0, frame >= 10, frame >= 20]
+        for actor in actors:
+            if actor.is_present:
+                assert actor.pose.figure_translation[0] == frame
+    assert streaming.state.playback.whole == (0.0, 9.9)
+
+
+def test_reading_is_cancelled_by_escape_and_what_was_read_stays(streaming, monkeypatch):
+    import threading
+
+    gate = threading.Event()
+    whole = capture(100, 5, 1)
+
+    def parts():
+        for part in whole.parts():
+            yield part
+            if part.stop >= 10:
+                gate.wait(10)
+
+    slow = Capture("slow", 100, 0, parts, up="y")
+    streaming.start(slow)
+    for _ in range(200):
+        streaming.step(1)
+        if streaming.state.scene.actors[0].clip.n_rows == 10:
+            break
+        streaming.state.of(Files).stream._thread.join(0.005)
+    assert "Cancel reading" in streaming.state.item_rects
+    streaming.key("escape")
+    gate.set()
+    streaming.step(3)
+    assert streaming.state.of(Files).stream is None
+    assert streaming.state.scene.actors[0].clip.n_rows == 10
+
+
+def test_editing_while_reading_keeps_its_undo(streaming):
+    builder = streaming.start(capture(60, 5, 2))
+    assert isinstance(streaming.state.of(Files).stream, Stream | type(None))
+    streaming.state.options.wireframe = True
+    streaming.step(1)
+    finish(streaming)
+    assert builder.n_read == 60
+    streaming.key("z", "ctrl")
+    streaming.step(2)
+    assert not streaming.state.options.wireframe
+    assert streaming.state.scene.actors[0].clip.n_rows == 60
+
+
+def test_error_while_reading_is_said_and_the_scene_stays(streaming):
+    from viewer.errors import FormatError
+
+    good = capture(100, 5, 1)
+
+    def parts():
+        for part in good.parts():
+            if part.stop > 20:
+                raise FormatError("take/000020.json", "cannot be read: Input/output error")
+            yield part
+
+    streaming.start(Capture("bad", 100, 0, parts, up="y"))
+    finish(streaming)
+    assert streaming.state.error == "take/000020.json: cannot be read: Input/output error"
+    assert streaming.state.scene.actors[0].clip.n_rows == 20
+
+
+# Actors
+
+
+def test_actors_are_hidden_and_chosen_by_clicks(streaming):
+    streaming.start(capture(60, 60, 2))
+    streaming.state.of(ShownPanels).closed.add("stats")
+    streaming.step(4)
+    streaming.click("actor 1")
+    assert streaming.state.chosen_actor == 1
+    streaming.click("visible 0")
+    streaming.step(1)
+    assert not streaming.state.scene.actors[0].visible
+    streaming.key("z", "ctrl")
+    assert streaming.state.scene.actors[0].visible
+    streaming.click("track 0")
+    assert streaming.state.chosen_actor == 0
+
+
+def test_camera_follows_an_actor_as_far_as_before(streaming):
+    streaming.start(capture(60, 60, 1))
+    streaming.state.of(ShownPanels).closed.add("stats")
+    streaming.step(4)
+    streaming.click("Actor##follow")
+    before = streaming.state.camera.target.copy()
+    streaming.state.playback.seek(3.0)
+    streaming.step(2)
+    assert_allclose(streaming.state.camera.target - before, [30.0, 0.0, 0.0], atol=1e-9)
+    streaming.click("Nobody")
+    streaming.state.playback.seek(5.0)
+    streaming.step(2)
+    assert_allclose(streaming.state.camera.target - before, [30.0, 0.0, 0.0], atol=1e-9)

@@ -1,0 +1,272 @@
+"""Handles in the view, dragged by a synthetic mouse."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from app.posing_rigs import SIZE, arm_figure, arm_scene, around, drag_along, joint_seen
+from app.tiny import write_rig
+from numpy.testing import assert_allclose, assert_array_equal
+
+from viewer.app.posing.joint_tree import joint_tree
+from viewer.app.posing.posed_joint import posed_joint
+from viewer.app.posing.rotate_tool import RADIUS
+from viewer.app.posing.state import Posing
+from viewer.rendering.camera import camera_axes
+from viewer.rig.geometry.rotation import rotation_vector_to_matrix
+from viewer.rig.scene import Actor, Scene
+
+VIEW_RADIUS = 1.2 * RADIUS
+
+
+def framed(drive, scene):
+    """Return a hand on a scene with all of its joints well within the view."""
+    hand = drive(scene=scene, size=SIZE, samples=1)
+    hand.key("f")
+    hand.state.camera.distance *= 1.5
+    hand.step()
+    return hand
+
+
+@pytest.fixture
+def arm(drive):
+    """A hand on an arm whose shoulder is selected, with the tool Rotate."""
+    hand = framed(drive, arm_scene())
+    hand.state.selected_joint = 0
+    hand.key("e")
+    hand.step(2)
+    return hand
+
+
+def world_of(hand, joint):
+    return posed_joint(hand.state.actor, joint).world[joint]
+
+
+def test_view_ring_turns_the_joint_by_the_angle_on_screen(arm):
+    center, before = joint_seen(arm, 0), world_of(arm, 0)[:3, :3]
+    to_eye = _to_eye(arm, world_of(arm, 0)[:3, 3])
+    drag_along(arm, around(center, VIEW_RADIUS, 0.3, 1.1))
+    wanted = rotation_vector_to_matrix(0.8 * to_eye) @ before
+    # ImGui knows the pointer by whole points: half a point at both ends of 94 from the middle.
+    assert_allclose(world_of(arm, 0)[:3, :3], wanted, atol=0.012)
+
+
+def _to_eye(hand, point):
+    from viewer.rendering.camera import eye
+
+    away = eye(hand.state.camera) - point
+    return away / np.linalg.norm(away)
+
+
+def test_drag_is_one_step_and_undone_at_once(arm):
+    before, steps = arm.dofs(), arm.undo_steps
+    camera = arm.state.camera.azimuth, arm.state.camera.distance
+    drag_along(arm, around(joint_seen(arm, 0), VIEW_RADIUS, 0.3, 1.1))
+    after = arm.dofs()
+    assert arm.undo_steps == steps + 1 and (after != before).any()
+    assert (arm.state.camera.azimuth, arm.state.camera.distance) == camera
+    arm.key("z", "ctrl")
+    assert_array_equal(arm.dofs(), before)
+    arm.key("z", "ctrl shift")
+    assert_array_equal(arm.dofs(), after)
+
+
+def test_click_on_a_ring_chooses_the_joint_whose_dot_lies_there(arm):
+    camera = arm.state.camera
+    camera.orthographic = True
+    arm.step(2)
+    for _ in range(3):  # until the elbow is as far from the shoulder as the outer ring
+        apart = np.subtract(joint_seen(arm, 1), joint_seen(arm, 0))
+        camera.distance *= np.linalg.norm(apart) / VIEW_RADIUS
+        arm.step(2)
+    before, steps = arm.dofs(), arm.undo_steps
+    place = joint_seen(arm, 1)
+    arm.move(place)
+    arm.press()
+    assert arm.state.of(Posing).drag is not None  # the ring is held
+    arm.let_go()
+    arm.step(2)
+    assert arm.state.selected_joint == 1
+    assert_array_equal(arm.dofs(), before)
+    assert arm.undo_steps == steps
+    # A drag from there turns the joint that has the ring.
+    arm.state.selected_joint = 0
+    arm.step(2)
+    drag_along(arm, around(joint_seen(arm, 0), VIEW_RADIUS, 0.0, 0.8))
+    assert arm.state.selected_joint == 0 and (arm.dofs() != before).any()
+
+
+@pytest.mark.parametrize("way", ["escape", "right button"])
+def test_cancelled_drag_restores_the_pose_and_leaves_no_step(arm, way):
+    before, steps = arm.dofs(), arm.undo_steps
+    places = around(joint_seen(arm, 0), VIEW_RADIUS, 0.3, 1.1)
+    arm.move(places[0])
+    arm.press()
+    arm.move(places[3])
+    assert (arm.dofs() != before).any()
+    if way == "escape":
+        arm.key("escape")
+    else:
+        arm.press(1)
+    assert_array_equal(arm.dofs(), before)
+    # Until the button comes up nothing else happens: no orbit, no drag.
+    azimuth = arm.state.camera.azimuth
+    arm.move(places[-1])
+    assert_array_equal(arm.dofs(), before)
+    assert arm.state.camera.azimuth == azimuth and arm.state.selected_joint == 0
+    arm.let_go()
+    if way == "right button":
+        arm.let_go(1)
+    assert arm.state.of(Posing).drag is None and arm.undo_steps == steps
+    assert arm.says("Drag cancelled")
+
+
+def test_click_on_a_ring_changes_nothing(arm):
+    before, steps = arm.dofs(), arm.undo_steps
+    place = around(joint_seen(arm, 0), VIEW_RADIUS, 0.3, 0.3, 1)[0]
+    drag_along(arm, [place, place])
+    assert_array_equal(arm.dofs(), before)
+    assert arm.undo_steps == steps and arm.state.selected_joint == 0
+
+
+def test_ctrl_snaps_to_fifteen_degrees(arm):
+    to_eye = _to_eye(arm, world_of(arm, 0)[:3, 3])
+    drag_along(arm, around(joint_seen(arm, 0), VIEW_RADIUS, 0.3, 1.1), held="ctrl")
+    # 0.8 radians are 45.8 degrees.
+    wanted = rotation_vector_to_matrix(np.radians(45) * to_eye)
+    assert_allclose(world_of(arm, 0)[:3, :3], wanted, atol=1e-6)
+
+
+def test_drag_beside_the_rings_orbits_as_ever(arm):
+    azimuth, before = arm.state.camera.azimuth, arm.dofs()
+    x, y = joint_seen(arm, 0)
+    arm.pull((x + 30, y + 200), (x + 90, y + 200))
+    assert arm.state.camera.azimuth != azimuth
+    assert_array_equal(arm.dofs(), before)
+
+
+def test_select_tool_leaves_the_rings_alone(arm):
+    arm.key("q")
+    before, azimuth = arm.dofs(), arm.state.camera.azimuth
+    drag_along(arm, around(joint_seen(arm, 0), VIEW_RADIUS, 0.3, 1.1))
+    assert_array_equal(arm.dofs(), before)
+    assert arm.state.camera.azimuth != azimuth
+
+
+def test_click_on_a_joint_selects_it_though_the_skin_hides_it(arm):
+    arm.click(joint_seen(arm, 2))
+    assert arm.state.selected_joint == 2
+    assert {0, 1, 2} <= joint_tree(arm.state).opened
+
+
+def test_reset_during_a_drag_ends_it(arm):
+    places = around(joint_seen(arm, 0), VIEW_RADIUS, 0.3, 1.1)
+    arm.move(places[0])
+    arm.press()
+    arm.move(places[2])
+    arm.key("r")
+    assert not arm.dofs().any()
+    arm.move(places[-1])
+    assert not arm.dofs().any()
+    arm.let_go()
+    assert arm.state.of(Posing).drag is None
+
+
+def test_ik_brings_the_hand_to_the_pointer(drive):
+    scene = Scene([Actor(arm_figure(orders=("xyz", "xyz", "xyz")))])
+    scene.actors[0].pose.dofs[5] = 0.8
+    hand = framed(drive, scene)
+    hand.state.selected_joint = 2
+    hand.key("d")
+    hand.state.of(Posing).chain_length = 2
+    depth = _depth(hand, world_of(hand, 2)[:3, 3])
+    x, y = joint_seen(hand, 2)
+    end, steps = (x - 60, y + 20), hand.undo_steps
+    drag_along(hand, [(x, y), (x - 10, y), (x - 40, y + 30), end])
+    assert_allclose(joint_seen(hand, 2), end, atol=0.5)
+    assert _depth(hand, world_of(hand, 2)[:3, 3]) == pytest.approx(depth, abs=1e-3)
+    assert hand.undo_steps == steps + 1
+
+
+def _depth(hand, point):
+    return (point - hand.state.camera.target) @ camera_axes(hand.state.camera)[2]
+
+
+def test_any_joint_can_be_dragged_without_selecting_it_first(drive):
+    hand = framed(drive, arm_scene())
+    hand.key("d")
+    assert hand.state.selected_joint == -1
+    x, y = joint_seen(hand, 2)
+    drag_along(hand, [(x, y), (x - 20, y - 30)])
+    assert hand.state.selected_joint == 2 and hand.dofs().any()
+
+
+def test_root_is_dragged_with_the_figure_and_by_its_arrow(drive):
+    hand = framed(drive, arm_scene())
+    hand.state.selected_joint = 0
+    hand.key("d")
+    x, y = joint_seen(hand, 0)
+    drag_along(hand, [(x, y), (x + 10, y), (x + 40, y - 25)])
+    assert_allclose(joint_seen(hand, 0), (x + 40, y - 25), atol=0.01)
+    first = hand.state.actor.pose.figure_translation.copy()
+    x, y = joint_seen(hand, 0)
+    drag_along(hand, [(x, y - 45), (x, y - 60), (x + 7, y - 90)])  # the arrow up
+    moved = hand.state.actor.pose.figure_translation - first
+    assert moved[1] > 0.05 and and_zero(moved[[0, 2]])
+    assert not hand.dofs().any() and hand.undo_steps == 2
+
+
+def and_zero(values):
+    return bool((np.abs(values) < 1e-9).all())
+
+
+def test_limits_hold_during_random_drags(drive, tmp_path):
+    hand = drive(*write_rig(tmp_path), size=SIZE, samples=1)
+    random = np.random.default_rng(3)
+    for number in range(24):
+        hand.state.selected_joint = number % 2
+        hand.key("e" if number % 3 else "d")
+        x, y = joint_seen(hand, number % 2)
+        angle = random.uniform(0, 6.28)
+        radius = RADIUS if number % 3 else random.uniform(0, 60)
+        start = (x + radius * np.cos(angle), y + radius * np.sin(angle))
+        drag_along(hand, [start, *(random.uniform(0, SIZE) for _ in range(4))])
+        hand.assert_sane()
+    locked = hand.dof("root.z")
+    assert locked == 0.3
+
+
+def test_binding_space_and_hidden_actors_have_no_handles(arm):
+    arm.state.actor.visible = False
+    before = arm.dofs()
+    drag_along(arm, around(joint_seen(arm, 0), VIEW_RADIUS, 0.3, 1.1))
+    assert_array_equal(arm.dofs(), before)
+
+
+def test_drag_may_end_over_a_panel(arm):
+    places = around(joint_seen(arm, 0), VIEW_RADIUS, 0.3, 1.1)
+    drag_along(arm, [*places, (5.0, 300.0)])
+    assert arm.state.of(Posing).drag is None and arm.dofs().any() and arm.undo_steps == 1
+    azimuth = arm.state.camera.azimuth
+    arm.move(places[0])
+    assert arm.state.camera.azimuth == azimuth
+
+
+def test_panel_over_the_view_keeps_its_clicks(arm):
+    before = arm.dofs()
+    x, y = arm.place("tool Mirror")
+    arm.pull((x, y), (x + 30, y + 30))
+    assert_array_equal(arm.dofs(), before)
+
+
+def test_other_scene_ends_a_drag(arm, tmp_path):
+    places = around(joint_seen(arm, 0), VIEW_RADIUS, 0.3, 1.1)
+    arm.move(places[0])
+    arm.press()
+    arm.move(places[2])
+    arm.open(*write_rig(tmp_path))
+    before = arm.dofs()
+    arm.move(places[-1])
+    arm.let_go()
+    assert_array_equal(arm.dofs(), before)
+    assert arm.state.of(Posing).drag is None

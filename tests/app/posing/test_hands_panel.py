@@ -1,0 +1,66 @@
+"""Hands: components add up in rotation vectors, flat and mean hands are what the file says."""
+
+import numpy as np
+import pytest
+from driver import Driver
+from family_models import family_figure
+from numpy.testing import assert_allclose
+
+from viewer.app.posing.state import Posing
+from viewer.app.shown_panels import ShownPanels
+from viewer.rig.geometry.rotation import matrix_to_rotation_vector
+from viewer.rig.pose import joint_rotations
+from viewer.rig.scene import Actor, Scene
+
+
+@pytest.fixture
+def hand(tmp_path):
+    scene = Scene([Actor(family_figure("smplx", tmp_path))])
+    driver = Driver(scene=scene, size=(1280, 800))
+    driver.state.of(ShownPanels).closed |= {"joints", "shape"}
+    driver.step(3)
+    yield driver
+    driver.close()
+
+
+def vectors(driver, which):
+    actor = driver.state.actor
+    rotations = joint_rotations(actor.figure.skeleton, actor.pose)
+    return matrix_to_rotation_vector(rotations[actor.figure.hands[which].joints]).ravel()
+
+
+def test_mean_hand_is_the_files_and_flat_hand_is_zero(hand):
+    left = hand.state.actor.figure.hands[0]
+    hand.click("left mean")
+    assert_allclose(vectors(hand, 0), left.mean, atol=1e-12)
+    assert not vectors(hand, 1).any()
+    hand.click("left flat")
+    assert_allclose(vectors(hand, 0), 0.0, atol=1e-12)
+
+
+def test_component_adds_its_row_to_the_rotation_vectors(hand):
+    right = hand.state.actor.figure.hands[1]
+    hand.click("right mean")
+    hand.drag("right component 2", 0.6, "right 2")
+    change = vectors(hand, 1) - right.mean
+    row = right.components[2]
+    share = change @ row / (row @ row)
+    assert share > 0.1
+    assert_allclose(change, share * row, atol=1e-9)
+    hand.key("z", "ctrl")
+    assert_allclose(vectors(hand, 1), right.mean, atol=1e-12)
+
+
+def test_number_of_components_is_the_number_of_sliders(hand):
+    assert "left component 5" in hand.state.item_rects
+    assert "left component 6" not in hand.state.item_rects
+    hand.state.of(Posing).n_hand_components = 12
+    hand.step(2)
+    assert "left component 11" in hand.state.item_rects
+
+
+def test_figures_without_hands_have_no_such_panel():
+    driver = Driver(size=(900, 640))
+    assert not any("component" in label for label in driver.state.item_rects)
+    assert np.size(driver.state.actor.figure.hands) == 0
+    driver.close()

@@ -1,0 +1,289 @@
+"""The Joints panel: sliders, limits, units, resets and the filter."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import numpy as np
+import pytest
+from app.tiny import FILE_POSE, LABELS, chain, comb
+
+from viewer.app.keys import Keyboard
+from viewer.app.posing.joint_tree import joint_tree
+from viewer.app.posing.joints_panel import rows
+
+SLIDERS = [label for label in LABELS if label != "root.z"]  # root.z is locked
+
+
+@pytest.mark.parametrize("label", SLIDERS)
+def test_slider_drag_changes_only_its_dof_as_one_step(hand, label):
+    before = hand.dofs()
+    hand.drag(label, 0.8)
+    changed = np.flatnonzero(hand.dofs() != before)
+    assert changed.tolist() == [hand.dof_index(label)]
+    assert hand.undo_steps == 1
+    hand.key("z", "ctrl")
+    assert (hand.dofs() == before).all()
+
+
+def test_slider_follows_the_mouse_over_the_range_of_its_limits(hand):
+    for fraction in (0.0, 0.25, 1.0):
+        hand.drag("root.x", fraction)
+        assert hand.dof("root.x") == pytest.approx(-1 + 2 * fraction, abs=0.02)
+        hand.drag("arm.y", fraction)
+        assert hand.dof("arm.y") == pytest.approx(math.pi * (2 * fraction - 1), abs=0.05)
+
+
+def test_slider_dragged_out_of_the_panel_stops_at_the_limit(hand):
+    hand.pull("root.y", (5000.0, 5000.0))
+    assert hand.dof("root.y") == 2.0
+    hand.pull("root.y", (-5000.0, 0.0))
+    assert hand.dof("root.y") == 0.5
+
+
+def test_slider_typed_value_is_clamped_to_its_limits(hand):
+    hand.enter_value("root.x", "400")
+    assert hand.dof("root.x") == 1.0
+    hand.enter_value("root.x", "-400")
+    assert hand.dof("root.x") == -1.0
+
+
+@pytest.mark.parametrize("degrees", [270, -725])
+def test_unlimited_slider_keeps_a_typed_value_beyond_its_range(hand, degrees):
+    hand.enter_value("arm.x", str(degrees))
+    assert hand.dof("arm.x") == pytest.approx(math.radians(degrees), rel=1e-6)
+    hand.step(5)
+    assert hand.dof("arm.x") == pytest.approx(math.radians(degrees), rel=1e-6)
+    assert hand.undo_steps == 1
+
+
+@pytest.mark.parametrize("label", ["arm.x", "root.tx", "root.x"])
+def test_typed_nonsense_leaves_a_finite_pose(hand, label):
+    for text in ("nan", "inf", "-inf", "1e39", "-1e300", "", "abc", "1/0", "--", "3e38"):
+        hand.enter_value(label, text)
+        hand.assert_sane()
+    assert hand.scene_picture().any()
+
+
+def test_typed_value_is_dropped_by_escape(hand):
+    before = hand.dofs()
+    hand.click(hand.place("arm.x", 0.3), held="ctrl")
+    hand.type("90")
+    hand.key("escape")
+    hand.step(2)
+    assert (hand.dofs() == before).all() and hand.undo_steps == 0
+
+
+def test_locked_slider_does_not_move(hand):
+    hand.drag("root.z", 0.9)
+    hand.click(hand.place("root.z", 0.3), held="ctrl")
+    hand.type("1")
+    hand.key("enter")
+    hand.double_click("root.z")
+    assert hand.dof("root.z") == 0.3 and hand.undo_steps == 0
+
+
+def test_radians_show_and_take_the_files_unit(hand):
+    hand.click("radians")
+    hand.enter_value("arm.x", "1.5")
+    assert hand.dof("arm.x") == 1.5
+    hand.click("degrees")
+    hand.enter_value("arm.x", "90")
+    assert hand.dof("arm.x") == pytest.approx(math.pi / 2, rel=1e-6)
+    assert hand.state.in_degrees
+
+
+def test_changing_the_unit_changes_no_dof(hand):
+    before = hand.dofs()
+    for label in ("radians", "degrees", "radians"):
+        hand.click(label)
+    assert (hand.dofs() == before).all() and hand.undo_steps == 0
+
+
+def test_double_click_resets_one_dof(hand):
+    hand.drag("arm.x", 0.9)
+    hand.drag("arm.z", 0.1)
+    moved = hand.dof("arm.z")
+    hand.double_click("arm.x")
+    assert hand.dof("arm.x") == FILE_POSE["arm.x"]
+    assert hand.dof("arm.z") == moved
+
+
+def test_double_click_is_one_step(hand):
+    hand.drag("arm.x", 0.9)
+    hand.double_click(hand.place("arm.x", 0.1))
+    steps = hand.undo_steps
+    hand.key("z", "ctrl")
+    # The first of the two clicks moved the slider: at most that remains as a step of its own.
+    assert steps <= 3 and hand.dof("arm.x") != FILE_POSE["arm.x"]
+
+
+def test_context_menu_resets_one_dof_or_sets_it_to_zero(hand):
+    hand.drag("arm.x", 0.9)
+    hand.click("arm.x", button=1)
+    hand.click("Reset")
+    assert hand.dof("arm.x") == FILE_POSE["arm.x"]
+    hand.click("arm.x", button=1)
+    hand.click("Set to 0")
+    assert hand.dof("arm.x") == 0.0
+    assert hand.undo_steps == 3
+
+
+def test_context_menu_offers_zero_only_within_the_limits(hand):
+    hand.click("root.y", button=1)
+    hand.click("Set to 0")
+    assert hand.dof("root.y") == 0.5
+
+
+def test_context_menu_of_a_joint_resets_its_dofs(hand):
+    for label in ("arm.x", "arm.y", "root.x"):
+        hand.drag(label, 0.9)
+    kept = hand.dof("root.x")
+    hand.click(hand.place("joint arm", 0.5), button=1)
+    hand.click("Reset this joint")
+    assert [hand.dof(f"arm.{axis}") for axis in "xyz"] == [0.2, 0.0, -0.1]
+    assert hand.dof("root.x") == kept
+
+
+def test_reset_button_restores_the_clamped_pose_of_the_file(hand):
+    for label in SLIDERS:
+        hand.drag(label, 0.9)
+    hand.click("Reset (R)")
+    assert {label: hand.dof(label) for label in FILE_POSE} == FILE_POSE
+    assert hand.dof("root.tx") == 0.0
+
+
+def test_values_that_nobody_moves_keep_every_digit(hand):
+    exact = 0.12345678901234567
+    hand.state.actor.pose.dofs[hand.dof_index("arm.x")] = exact
+    hand.step(3)
+    hand.drag("arm.y", 0.7)
+    assert hand.dof("arm.x") == exact
+
+
+def test_filter_lists_only_joints_that_contain_its_text(hand):
+    hand.click("Filter")
+    hand.type("AR")
+    hand.step(2)
+    joints = {label for label in hand.state.item_rects if label.startswith("joint ")}
+    assert joints == {"joint arm"}
+    assert "arm.x" in hand.state.item_rects and "root.x" not in hand.state.item_rects
+
+
+def test_filter_takes_letters_that_are_shortcuts(hand):
+    hand.drag("arm.x", 0.9)
+    before, steps = hand.dofs(), hand.undo_steps
+    view = (hand.state.camera.azimuth, hand.state.camera.orthographic)
+    hand.click("Filter")
+    hand.type("rskwntgf1375h?")
+    for name in ("tab", "f1"):
+        hand.key(name)
+    assert joint_tree(hand.state).filter == "rskwntgf1375h?"
+    assert (hand.dofs() == before).all() and hand.undo_steps == steps
+    assert (hand.state.camera.azimuth, hand.state.camera.orthographic) == view
+    assert hand.state.panels_visible and not hand.state.of(Keyboard).is_listed
+
+
+def test_filter_without_a_match_lists_nothing_and_can_be_emptied(hand):
+    hand.click("Filter")
+    hand.type("zzz")
+    hand.step(2)
+    assert not [label for label in hand.state.item_rects if label.startswith("joint ")]
+    for _ in range(3):
+        hand.key("backspace")
+    hand.step(2)
+    assert "joint arm" in hand.state.item_rects
+
+
+def test_joint_row_selects_and_deselects(hand):
+    hand.click(hand.place("joint arm", 0.5))
+    assert hand.state.selected_joint == 1
+    hand.click(hand.place("joint arm", 0.5))
+    assert hand.state.selected_joint == -1
+
+
+def test_joint_row_closes_and_opens_with_its_arrow(hand):
+    hand.click(hand.place("joint root", 0.02))
+    assert "joint arm" not in hand.state.item_rects and "root.x" not in hand.state.item_rects
+    hand.click(hand.place("joint root", 0.02))
+    assert "joint arm" in hand.state.item_rects
+    assert hand.state.selected_joint == -1
+
+
+def test_selected_joint_is_marked_in_the_picture(drive, rig):
+    hand = drive(rig[0])
+    before = hand.scene_picture()
+    hand.click(hand.place("joint arm", 0.5))
+    assert (hand.scene_picture() != before).any()
+
+
+def test_figure_without_skeleton_says_so(drive, rig):
+    hand = drive(rig[1])
+    assert "Filter" not in hand.state.item_rects
+    for name in ("r", "s", "k", "f"):
+        hand.key(name)
+    assert hand.state.actor.pose is None
+
+
+@pytest.mark.parametrize("text", [chain(5000), comb(5000), comb(100_000)], ids=len)
+def test_thousands_of_joints_stay_usable(drive, tmp_path, text):
+    path = tmp_path / "many.skel"
+    path.write_text(text)
+    hand = drive(path, size=(640, 480))
+    joint_tree(hand.state).opened = set(range(hand.state.actor.figure.skeleton.n_joints))
+    hand.step(2)
+    assert len(hand.state.item_rects) < 150  # rows out of sight are not drawn
+    started = time.process_time()
+    hand.step(5)
+    assert (time.process_time() - started) / 5 < 0.25
+    label = next(label for label in hand.state.item_rects if label.endswith(".y"))
+    index = hand.dof_index(label)
+    hand.click(hand.place(label, 0.9))
+    assert hand.state.actor.pose.dofs[index] != 0.0
+
+
+def test_rows_list_children_right_below_their_parent(hand):
+    skeleton = hand.state.actor.figure.skeleton
+    listed = rows(skeleton, frozenset({0}), "")
+    assert [(joint, depth) for joint, dof, depth in listed if dof < 0] == [(0, 0), (1, 1)]
+    assert [dof for joint, dof, _ in listed if joint == 0 and dof >= 0] == list(range(6))
+    assert not [dof for joint, dof, _ in listed if joint == 1 and dof >= 0]
+
+
+def test_second_figure_is_chosen_posed_and_reset(drive, rig, tmp_path):
+    other = tmp_path / "other.skel"
+    other.write_text("balljoint hip { offset 0 0 0 balljoint knee { offset 0 -1 0 } }")
+    hand = drive(*rig, other)
+    first = hand.state.scene.actors[0].pose.dofs.copy()
+    hand.click("Actor")
+    hand.key("down_arrow")
+    assert "Actor" in hand.state.item_rects
+    hand.state.choose_actor(1)
+    hand.step(2)
+    assert "knee.x" in hand.state.item_rects and "arm.x" not in hand.state.item_rects
+    hand.key("escape")
+    hand.drag("knee.x", 0.75)
+    assert hand.state.actor is hand.state.scene.actors[1]
+    assert hand.dof("knee.x") == pytest.approx(math.pi / 2, abs=0.1)
+    assert (hand.state.scene.actors[0].pose.dofs == first).all()
+    hand.key("r")
+    assert hand.dof("knee.x") == 0.0
+
+
+def test_escape_closes_a_context_menu_and_keeps_the_pose(hand):
+    before = hand.dofs()
+    hand.click("root.x", button=1)
+    hand.step(2)
+    hand.key("escape")
+    hand.click("Filter")
+    hand.type("root")
+    assert joint_tree(hand.state).filter == "root"
+    assert (hand.dofs() == before).all() and not hand.state.of(Keyboard).is_listed
+
+
+def test_filter_without_a_match_says_so_and_draws_no_row(hand):
+    hand.click("Filter")
+    hand.type("xyz")
+    hand.step(2)
+    assert not [label for label in hand.state.item_rects if label.startswith("joint ")]

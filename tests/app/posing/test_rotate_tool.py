@@ -1,0 +1,181 @@
+"""Rings and what turning them does, with a camera that looks along -z at the joint."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from app.posing_rigs import arm_figure
+from numpy.testing import assert_allclose
+
+from viewer.app.core.view_frame import ViewFrame
+from viewer.app.posing.posed_joint import posed_joint
+from viewer.app.posing.rotate_tool import RADIUS, TurnHandle, circle, grab_ring, limit_text, rings
+from viewer.rendering.camera import Camera
+from viewer.rig.geometry.rotation import rotation_vector_to_matrix
+from viewer.rig.pose import joint_rotations
+from viewer.rig.scene import Actor
+
+BOX = np.array([[-1.0, -1, -1], [3, 1, 1]])
+
+
+def frame(azimuth=0.0, inclination=0.0, parallel=True) -> ViewFrame:
+    camera = Camera(distance=5.0, azimuth=azimuth, inclination=inclination, orthographic=parallel)
+    matrix = camera.projection_matrix(1.0, BOX) @ camera.view_matrix()
+    return ViewFrame(matrix, (0.0, 0.0, 600.0, 600.0))
+
+
+def grabbed(actor, joint, view, place, orientation="local"):
+    posed = posed_joint(actor, joint)
+    ring, held = grab_ring(rings(posed, actor.pose, orientation, view), posed.center, view, place)
+    return TurnHandle(posed, actor.pose, ring, held, place)
+
+
+def spot(angle, radius=RADIUS):
+    """Return a place around the joint at the origin, against the clock from the right."""
+    return (300 + radius * np.cos(angle), 300 - radius * np.sin(angle))
+
+
+def test_free_joint_has_three_rings_and_one_about_the_line_of_sight() -> None:
+    actor, view = Actor(arm_figure()), frame()
+    found = rings(posed_joint(actor, 0), actor.pose, "local", view)
+    assert [(ring.color, ring.dof) for ring in found] == [(0, -1), (1, -1), (2, -1), (3, -1)]
+    assert_allclose([ring.axis for ring in found], [*np.eye(3), [0, 0, 1]], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("orientation", "x_axis"), [("world", [1, 0, 0]), ("parent", [0, 1, 0]), ("local", [-1, 0, 0])]
+)
+def test_orientation_chooses_the_axes(orientation, x_axis) -> None:
+    actor = Actor(arm_figure(orders=("xyz", "xyz", "xyz")))
+    actor.pose.dofs[[2, 5]] = np.pi / 2  # shoulder and elbow a quarter about z each
+    found = rings(posed_joint(actor, 1), actor.pose, orientation, frame())
+    assert_allclose(found[0].axis, x_axis, atol=1e-12)
+
+
+def test_joint_with_two_dofs_has_a_ring_for_each_about_its_own_axis() -> None:
+    # x is applied first: the axis of x is turned by what y does, y's is the parent's.
+    actor = Actor(arm_figure(orders=("xy", "z", "")))
+    actor.pose.dofs[:2] = 0.7, np.pi / 2
+    found = rings(posed_joint(actor, 0), actor.pose, "world", frame())
+    assert [(ring.color, ring.dof) for ring in found] == [(0, 0), (1, 1)]
+    assert_allclose([ring.axis for ring in found], [[0, 0, -1], [0, 1, 0]], atol=1e-12)
+    assert rings(posed_joint(actor, 2), actor.pose, "world", frame()) == []
+
+
+def test_locked_dof_has_no_ring() -> None:
+    actor = Actor(arm_figure(limits={(0, "y"): (0.2, 0.2)}))
+    found = rings(posed_joint(actor, 0), actor.pose, "local", frame())
+    assert [ring.dof for ring in found] == [0, 2]
+
+
+def test_circle_is_round_and_across() -> None:
+    center, axis = np.array([1.0, 2, 3]), np.array([0.6, 0, 0.8])
+    points = circle(center, axis, 2.5)
+    assert_allclose(np.linalg.norm(points - center, axis=1), 2.5)
+    assert_allclose((points - center) @ axis, 0, atol=1e-12)
+    assert_allclose(points[0], points[-1], atol=1e-12)
+
+
+def test_pointer_takes_the_nearest_ring_and_none_far_away() -> None:
+    actor, view = Actor(arm_figure()), frame()
+    posed = posed_joint(actor, 0)
+    found = rings(posed, actor.pose, "local", view)
+    at = (300 + RADIUS * np.cos(1.0), 300 - RADIUS * np.sin(1.0))
+    ring, held = grab_ring(found, posed.center, view, at)
+    assert ring.color == 2
+    assert_allclose(held, [np.cos(1.0), np.sin(1.0), 0], atol=0.02)
+    assert grab_ring(found, posed.center, view, (300 + 1.2 * RADIUS, 300))[0].color == 3
+    assert grab_ring(found, posed.center, view, (330, 320)) is None
+    assert grab_ring(found, posed.center, view, (500, 500)) is None
+
+
+@pytest.mark.parametrize("parallel", [True, False])
+@pytest.mark.parametrize("angle", [0.4, -1.2, 2.9])
+def test_ring_seen_from_above_turns_by_the_angle_of_the_pointer(angle, parallel) -> None:
+    actor, view = Actor(arm_figure()), frame(parallel=parallel)
+    handle = grabbed(actor, 0, view, spot(0.7))  # where no other ring crosses
+    assert handle.ring.color == 2
+    for share in (0.3, 0.6, 1.0):
+        outcome = handle.follow(view, spot(0.7 + share * angle, 200.0), False)
+    assert_allclose(outcome.pose.dofs[:3], [0, 0, angle], atol=1e-6)
+    assert outcome.angle == pytest.approx(angle) and outcome.limited == ()
+    assert not actor.pose.dofs.any()  # the pose at the start is left alone
+
+
+def test_turning_around_and_around_goes_on() -> None:
+    actor, view = Actor(arm_figure(orders=("z", "z", ""))), frame()
+    handle = grabbed(actor, 0, view, (300 + RADIUS, 300.0))
+    for turn in np.linspace(0, 4.5 * np.pi, 40):
+        outcome = handle.follow(view, (300 + 90 * np.cos(turn), 300 - 90 * np.sin(turn)), False)
+    assert outcome.pose.dofs[0] == pytest.approx(4.5 * np.pi)
+
+
+def test_ring_seen_at_a_slant_follows_where_its_plane_is_pointed_at() -> None:
+    # From 50 degrees above the ring about y is an ellipse; a point of it is dragged to another.
+    actor, view = Actor(arm_figure()), frame(inclination=50.0)
+    unit = view.unit_length(np.zeros(3))
+    spot = [unit * RADIUS * np.array([np.sin(a), 0, np.cos(a)]) for a in (0.3, 1.0)]
+    handle = grabbed(actor, 0, view, view.place(spot[0]), "world")
+    assert handle.ring.color == 1
+    outcome = handle.follow(view, view.place(spot[1]), False)
+    assert_allclose(outcome.pose.dofs[:3], [0, 0.7, 0], atol=1e-3)
+
+
+def test_ring_seen_from_its_edge_rolls_like_a_wheel() -> None:
+    # The front of the ring about y moves right by one radius: one radian.
+    actor, view = Actor(arm_figure()), frame()
+    handle = grabbed(actor, 0, view, (310.0, 300.0))
+    assert handle.ring.color == 1
+    outcome = handle.follow(view, (310.0 + RADIUS, 300.0), False)
+    assert outcome.pose.dofs[1] == pytest.approx(1.0, abs=1e-3)
+
+
+def test_snap_goes_by_fifteen_degrees() -> None:
+    actor, view = Actor(arm_figure()), frame()
+    handle = grabbed(actor, 0, view, spot(0.7))
+    outcome = handle.follow(view, spot(0.7 + np.radians(40.0)), True)
+    assert outcome.angle == pytest.approx(np.radians(45.0))
+    assert outcome.pose.dofs[2] == pytest.approx(np.radians(45.0))
+    assert outcome.text == "shoulder z +45.0\N{DEGREE SIGN}"
+
+
+def test_whole_joint_is_turned_exactly_about_the_axis() -> None:
+    actor, view = Actor(arm_figure(orders=("zxy", "yzx", ""))), frame()
+    actor.pose.dofs[:] = 0.3, -0.4, 0.5, 0.6, 0.2, -0.9
+    posed = posed_joint(actor, 1)
+    before = posed.world[1, :3, :3]
+    place = view.place(posed.center)
+    handle = grabbed(actor, 1, view, (place[0] + 1.2 * RADIUS, place[1]))
+    assert handle.ring.color == 3
+    turn = 0.8
+    end = (place[0] + 90 * np.cos(turn), place[1] - 90 * np.sin(turn))
+    outcome = handle.follow(view, end, False)
+    after = posed_joint(actor, 1, outcome.pose).world[1, :3, :3]
+    wanted = rotation_vector_to_matrix(np.array([0, 0, turn])) @ before
+    assert_allclose(after, wanted, atol=1e-7)
+    assert_allclose(joint_rotations(posed.skeleton, outcome.pose)[0],
+                    joint_rotations(posed.skeleton, actor.pose)[0])  # fmt: skip
+
+
+def test_limit_stops_one_dof_and_is_named() -> None:
+    actor = Actor(arm_figure(orders=("z", "z", ""), limits={(0, "z"): (-0.2, 0.5)}))
+    view = frame()
+    handle = grabbed(actor, 0, view, (300 + RADIUS, 300.0))
+    outcome = handle.follow(view, (300.0, 300 - RADIUS), False)
+    assert outcome.pose.dofs[0] == 0.5 and outcome.limited == (0,)
+    assert outcome.angle == pytest.approx(0.5)
+    skeleton = actor.figure.skeleton
+    assert limit_text(skeleton, outcome.limited) == "at its limit: shoulder.z"
+    assert limit_text(skeleton, (0, 1)) == "at limits: shoulder.z, elbow.z"
+    assert limit_text(skeleton, ()) == ""
+
+
+def test_mirrored_figure_turns_the_way_the_pointer_goes() -> None:
+    actor, view = Actor(arm_figure(orders=("z", "z", ""))), frame()
+    actor.placement[0, 0] = -1.0
+    handle = grabbed(actor, 0, view, (300 + RADIUS, 300.0))
+    turn = 0.6
+    outcome = handle.follow(view, (300 + 90 * np.cos(turn), 300 - 90 * np.sin(turn)), False)
+    elbow = posed_joint(actor, 1, outcome.pose).center
+    # The elbow was at (-1, 0, 0) and has gone round against the clock.
+    assert_allclose(elbow, [-np.cos(turn), -np.sin(turn), 0], atol=1e-6)

@@ -1,0 +1,233 @@
+"""Recording from the window: the dialog, what is written, progress, and cancelling."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from PIL import Image
+
+from viewer.app.files.state import Files
+from viewer.app.recording.recorded_marks import RecordedMarks
+from viewer.app.recording.state import Recording, RecordSettings
+from viewer.app.weights.actions import pin_vertex, unpin
+from viewer.rendering.overlay.joint_marks import HIGHLIGHT
+from viewer.rendering.recorder import copied
+from viewer.rig.motion.clip import Channel, Clip
+from viewer.rig.motion.instances import pose_actors
+
+
+@pytest.fixture
+def moving(drive, rig):
+    """A hand on the tiny figure whose root moves right, 0.5 a second, for a second."""
+    hand = drive(*rig, size=(1000, 700), samples=1)
+    channel = Channel(0, np.array([0.0, 1.0]), np.array([0.0, 0.5]), (("linear", "linear"),) * 2)
+    hand.state.actor.clip = Clip("slide", (channel,), 0.0, 1.0)
+    hand.step(3)
+    return hand
+
+
+def start(hand, path, **settings):
+    hand.state.of(Recording).settings = RecordSettings(**settings)
+    hand.state.of(Recording).wanted = path
+    hand.step(1)
+
+
+def finish(hand):
+    for _ in range(3000):
+        if hand.state.job is None:
+            return
+        hand.step(1)
+    raise AssertionError("recording did not end")
+
+
+def test_menu_opens_the_dialog_and_escape_closes_it(moving):
+    moving.click("menu File")
+    moving.click("Record pictures or video…")
+    moving.step(2)
+    assert "Save as…" in moving.state.item_rects
+    moving.click("Save as…")
+    assert moving.state.of(Files).dialog is not None and moving.state.of(
+        Files
+    ).dialog.name.endswith(".mp4")
+    moving.key("escape")
+    moving.key("escape")
+    moving.step(2)
+    assert moving.state.of(Recording).settings is None
+
+
+def test_numbered_pictures_show_what_the_window_shows(moving, tmp_path):
+    (tmp_path / "out").mkdir()
+    start(moving, tmp_path / "out" / "f_{frame:03}.png", kind="pictures", rate=4.0)
+    finish(moving)
+    assert moving.state.error == ""
+    files = sorted((tmp_path / "out").iterdir())
+    assert [file.name for file in files] == [f"f_{n:03}.png" for n in range(5)]
+    differences = np.zeros((5, 5))
+    for number in range(5):
+        moving.state.playback.seek(number / 4)
+        moving.step(2)
+        shown = moving.scene_picture()
+        for other, file in enumerate(files):
+            with Image.open(file) as picture:
+                found = np.array(picture.convert("RGB")).astype(int)
+            height, width = found.shape[:2]
+            # An odd row or column of the view is left out, which moves edges by a fraction.
+            differences[number, other] = np.abs(found - shown[:height, :width, :3]).mean()
+    assert (differences.argmin(axis=1) == range(5)).all()
+    assert np.diag(differences).max() < 2.0 < differences[0, 1]
+
+
+def test_what_explains_the_view_is_in_every_frame(moving, tmp_path):
+    state = moving.state
+    pin_vertex(state, 0, 4)
+    state.selected_joint = 1
+    state.options.joint_names = state.options.xray = True
+    moving.step(4)
+    start(moving, tmp_path / "a_{frame}.png", kind="pictures", rate=2.0)
+    finish(moving)
+    unpin(state)
+    state.options.joint_names = state.options.xray = False
+    moving.step(2)
+    start(moving, tmp_path / "b_{frame}.png", kind="pictures", rate=2.0)
+    finish(moving)
+    middles = []
+    for number in range(3):
+        with (
+            Image.open(tmp_path / f"a_{number}.png") as marked,
+            Image.open(tmp_path / f"b_{number}.png") as plain,
+        ):
+            pictures = [np.array(one.convert("RGB")).astype(int) for one in (marked, plain)]
+        changed = np.abs(pictures[0] - pictures[1]).max(axis=-1) > 8
+        # The selected joint's dot, 1.5 times as large as the others.
+        yellow = np.abs(pictures[0] - 255 * np.array(HIGHLIGHT[:3])).max(axis=-1) < 6
+        assert yellow.sum() > 20 and changed[yellow].any()
+        # The white dot of the vertex moves with the figure.
+        white = changed & (pictures[0].min(axis=-1) > 250)
+        middles.append(np.nonzero(white)[1].max())
+    assert middles[0] < middles[1] < middles[2]
+
+
+def test_annotations_are_those_of_the_frames_pose(moving):
+    pin_vertex(moving.state, 0, 4)
+    moving.step(4)
+    marks = RecordedMarks(moving.state)
+    unpin(moving.state)
+    scene = copied(moving.state.scene)
+    places = []
+    for seconds in (0.0, 1.0):
+        pose_actors(scene.actors, seconds, False)
+        (found,) = marks.at(scene, (960, 720))
+        places.append(found.segments.starts[-1])
+    assert_allclose(places[1] - places[0], [0.5, 0.0, 0.0], atol=1e-12)
+    scene.actors[0].visible = False
+    assert marks.at(scene, (960, 720)) == []
+
+
+def test_dialog_offers_the_legend_where_there_is_one(moving):
+    moving.state.of(Recording).settings = RecordSettings()
+    moving.step(2)
+    assert "Legend in pictures" not in moving.state.item_rects
+    moving.state.options.shading = "scalar"
+    moving.step(2)
+    moving.click("Legend in pictures")
+    assert moving.state.options.legend
+
+
+def test_scene_is_left_as_it_was(moving, tmp_path):
+    moving.state.playback.seek(0.25)
+    moving.step(2)
+    before, steps = moving.dofs(), moving.undo_steps
+    start(moving, tmp_path / "f_{frame}.png", kind="pictures", rate=4.0)
+    finish(moving)
+    assert (moving.dofs() == before).all()
+    assert moving.state.playback.time == 0.25
+    assert moving.undo_steps == steps
+
+
+def test_sheet_has_as_many_cells_as_asked(moving, tmp_path):
+    start(moving, tmp_path / "s.png", kind="sheet", n_cells=4, size="own", own_size=(400, 300))
+    finish(moving)
+    with Image.open(tmp_path / "s.png") as picture:
+        assert picture.size == (400, 300)
+        cells = np.array(picture.convert("L")).reshape(2, 150, 2, 200).swapaxes(1, 2)
+    flat = cells.reshape(4, -1)
+    assert all((flat[i] != flat[j]).any() for i in range(4) for j in range(i))
+
+
+def test_video_has_every_frame(moving, tmp_path):
+    av = pytest.importorskip("av")
+    start(moving, tmp_path / "v.mp4", rate=10.0, size="own", own_size=(320, 240))
+    finish(moving)
+    assert moving.state.error == ""
+    with av.open(str(tmp_path / "v.mp4")) as container:
+        stream = container.streams.video[0]
+        assert (stream.width, stream.height, stream.average_rate) == (320, 240, 10)
+        assert sum(1 for _ in container.decode(stream)) == 11
+
+
+def test_cancelling_leaves_nothing(moving, tmp_path):
+    pytest.importorskip("av")
+    (tmp_path / "out").mkdir()
+    start(moving, tmp_path / "out" / "v.mp4", rate=500.0, size="own", own_size=(64, 64))
+    moving.step(5)
+    done, total = moving.state.job.progress
+    assert 0 < done < total == 501
+    assert "Cancel" in moving.state.item_rects
+    moving.key("escape")
+    moving.step(3)
+    assert moving.state.job is None
+    assert list((tmp_path / "out").iterdir()) == []
+    assert moving.scene_picture().std() > 1.0  # the window still draws
+
+
+def test_window_answers_while_it_records(moving, tmp_path):
+    start(moving, tmp_path / "f_{frame}.png", kind="pictures", rate=60.0)
+    moving.step(3)
+    azimuth = moving.state.camera.azimuth
+    x, y = moving.middle[0], moving.middle[1] + 80  # beside the progress bar
+    moving.pull((x, y), (x + 40, y))
+    assert moving.state.camera.azimuth != azimuth
+    finish(moving)
+    assert len(list(tmp_path.glob("f_*.png"))) == 61
+
+
+def test_still_scene_is_recorded_as_a_turntable(drive, rig, tmp_path):
+    hand = drive(*rig, size=(600, 400), samples=1)
+    (tmp_path / "t").mkdir()
+    start(
+        hand,
+        tmp_path / "t" / "f_{frame}.png",
+        kind="pictures",
+        rate=4.0,
+        turntable=True,
+        seconds=1.0,
+    )
+    finish(hand)
+    assert len(list((tmp_path / "t").iterdir())) == 4
+
+
+def test_names_that_would_all_be_the_same_are_refused(moving, tmp_path):
+    start(moving, tmp_path / "same.png", kind="pictures")
+    moving.step(2)
+    assert moving.state.error.startswith(f"{tmp_path / 'same.png'}: expected a name with {{frame}}")
+    assert moving.state.job is None
+
+
+def test_pictures_that_exist_are_not_replaced(moving, tmp_path):
+    (tmp_path / "f_2.png").write_bytes(b"precious")
+    start(moving, tmp_path / "f_{frame}.png", kind="pictures", rate=4.0)
+    moving.step(2)
+    assert moving.state.error.startswith(f"{tmp_path / 'f_2.png'}: exists already")
+    assert (tmp_path / "f_2.png").read_bytes() == b"precious"
+
+
+def test_picture_that_the_scene_was_read_from_is_not_replaced(moving, tmp_path):
+    """Nobody opened it: the figure's own file names it."""
+    texture = tmp_path / "cloth.png"
+    texture.write_bytes(b"precious")
+    moving.state.scene.files = (texture,)
+    start(moving, texture, kind="sheet")
+    moving.step(2)
+    assert moving.state.error == f"{texture}: is an input file, which is never replaced"
+    assert texture.read_bytes() == b"precious" and moving.state.job is None

@@ -1,0 +1,642 @@
+"""The Rig panel by mouse and keys: choose, align, match, run, compare, save."""
+
+from __future__ import annotations
+
+import threading
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from app import rig_scene
+from app.rig_scene import TRUE, finish
+from app.tiny import write_rig
+from imgui_bundle import imgui
+from numpy.testing import assert_allclose
+
+pytest.importorskip("scipy")
+
+import viewer
+from viewer.app.files.state import Files
+from viewer.app.rigging.placing import as_similarity, move_by_hand, placing_now
+from viewer.app.rigging.sources import current_template, target_mesh, template_texts
+from viewer.app.rigging.state import Rigging
+from viewer.app.rigging.steps import align_template
+from viewer.app.rigging.work import start_adding, start_reading
+from viewer.autorig.alignment.surface_alignment import Alignment, AlignmentSettings
+from viewer.export import export
+from viewer.formats.rigged import save
+from viewer.rig.geometry.transform import apply_transform
+from viewer.rig.scene import Actor, Scene
+from viewer.rig.skinning import deform
+
+SIZE = (900, 1250)
+
+
+@pytest.fixture
+def rigging(drive):
+    """A hand on an app with the mesh and its template, which lies on it, the panel open."""
+
+    def opened(placed=True, **settings):
+        hand = drive(scene=rig_scene.scene(**settings), size=SIZE, samples=1)
+        hand.menu("menu Window", "Rig")
+        hand.step(2)
+        if placed:  # searching takes seconds
+            move_by_hand(hand.state, current_template(hand.state), as_similarity(TRUE))
+            hand.step(2)
+        return hand
+
+    return opened
+
+
+def names(hand):
+    return [actor.name for actor in hand.state.scene.actors]
+
+
+def visible(hand):
+    return [actor.name for actor in hand.state.scene.actors if actor.visible]
+
+
+def seen(hand, row):
+    actor = hand.state.scene.actors[row]
+    return apply_transform(actor.placement, deform(actor.figure, actor.pose)[0])
+
+
+def test_scene_without_a_bare_mesh_greys_all_but_adding_one(drive, texts):
+    hand = drive(size=SIZE, samples=1)
+    hand.menu("menu Window", "Rig")
+    texts.clear()
+    hand.step(2)
+    assert "Every mesh here has a rig: add one without, an .obj or .ply." in texts
+    for label in ("Align", "Run", "Compare methods", "rig tool move"):
+        hand.click(label)
+    assert hand.state.job is None and hand.state.of(Rigging).tool == "" and not hand.state.error
+    assert hand.state.of(Rigging).target is None
+
+
+def test_alignment_is_found_and_shown_with_its_error(rigging, texts):
+    hand = rigging(placed=False)
+    steps = hand.undo_steps
+    hand.click("Align")
+    finish(hand)
+    assert_allclose(hand.state.of(Rigging).placing.similarity.matrix, TRUE, atol=1e-6)
+    texts.clear()
+    hand.step()
+    assert "error 0.00 % (by closest points)" in texts
+    ghost = hand.app.frame.renderer.ghost
+    assert ghost.style == "translucent"
+    assert_allclose(ghost.placement, TRUE, atol=1e-6)
+    assert hand.undo_steps == steps + 1
+    hand.key("z", "ctrl")
+    hand.step(2)
+    assert hand.state.of(Rigging).placing is None and hand.app.frame.renderer.ghost is None
+
+
+@pytest.mark.parametrize(
+    ("factors", "own", "words"),
+    [
+        ((1.0, 1.0, 1.0), (1.0, 1.0, 1.0), "pose and limbs fitted"),
+        ((1.3, 1.0, 1.0), (1.0, 1.0, 1.0), "stretched, pose kept"),
+        ((1.0, 1.0, 1.0), (1.0, 0.8, 1.0), "stretched, pose kept"),
+    ],
+)
+def test_words_beside_the_error_say_what_was_done(rigging, texts, factors, own, words):
+    hand = rigging()
+    finish(hand)  # the gap where it was laid is being measured
+    placing = placing_now(hand.state)
+    where = replace(placing.similarity, factors=np.array(factors), own_factors=np.array(own))
+    found = Alignment(where, 0.0015, 0.002, (0.001, 0.001), "fit")
+    hand.state.of(Rigging).placing = replace(placing, similarity=where, alignment=found)
+    texts.clear()
+    hand.step()
+    assert f"error 0.15 % ({words})" in texts
+
+
+@pytest.mark.parametrize("fits", [True, False])
+def test_align_says_what_it_does(rigging, monkeypatch, fits):
+    said, show = [], imgui.set_tooltip
+    monkeypatch.setattr(imgui, "set_tooltip", lambda text: said.append(text) or show(text))
+    hand = rigging()
+    finish(hand)
+    hand.state.of(Rigging).choices.fits = fits
+    also = "; joints are turned and limbs resized{} where that fits much better" if fits else ""
+    for label, words in (
+        ("Align", "found by closest points" + also.format(", or all of it stretched,")),
+        ("Refine", "from where it lies, by closest points" + also.format("")),
+    ):
+        hand.move(label)
+        hand.step(60)
+        assert said[-1] == words
+
+
+def test_template_posed_after_aligning_says_so(rigging, texts):
+    hand = rigging()
+    hand.state.scene.actors[1].pose.dofs[8] = 0.0
+    texts.clear()
+    hand.step(2)
+    assert "the template was posed otherwise since: align again" in texts
+
+
+def test_match_is_coloured_before_anything_is_rigged(rigging, texts):
+    hand = rigging(placed=False)
+    assert "Colours" not in hand.state.item_rects
+    hand.click("Show match")  # greyed: not aligned yet
+    assert hand.state.job is None
+    move_by_hand(hand.state, current_template(hand.state), as_similarity(TRUE))
+    hand.step(2)
+    hand.click("Show match")
+    finish(hand)
+    state = hand.state
+    assert (state.options.shading, state.options.scalar) == ("scalar", "class:match")
+    assert state.of(Rigging).match_share == 1.0 and state.error == ""
+    fields = {field.name: field for field in state.scene.actors[0].figure.fields}
+    assert fields["match"].names == ("matched", "unmatched")
+    assert fields["match"].values.tolist() == [0.0] * state.scene.actors[0].figure.mesh.n_vertices
+    assert fields["match distance"].values.max() < 1e-9
+    texts.clear()
+    hand.step()
+    assert "100.0 % of the vertices match" in texts
+    hand.pick("Colours", 2)
+    assert state.options.scalar == "field:match distance"
+    hand.pick("Colours", 0)
+    assert state.options.shading == "phong"
+
+
+def test_match_counts_what_is_near_enough_and_faces_alike(rigging):
+    hand = rigging()
+    # The template a tenth of the target's size beside it: nothing is within 1 %.
+    placing = hand.state.of(Rigging).placing.similarity
+    away = placing.matrix.copy()
+    away[:3, 3] += 10.0
+    move_by_hand(hand.state, current_template(hand.state), as_similarity(away))
+    hand.enter_value("Max. distance", "1")
+    assert hand.state.of(Rigging).choices.max_distance == pytest.approx(0.01)
+    hand.click("Show match")
+    finish(hand)
+    assert hand.state.of(Rigging).match_share < 0.35
+
+
+def test_stretch_is_kept_when_the_template_is_moved_and_run(rigging):
+    hand = rigging()
+    stretch = np.array([1.25, 1.0, 0.8])
+    stretched = replace(placing_now(hand.state).similarity, own_factors=stretch)
+    move_by_hand(hand.state, current_template(hand.state), stretched)
+    hand.click("rig tool scale")
+    hand.step(2)
+    hand.enter_value("Scale by", f"{stretched.scale * 1.01}")
+    now = placing_now(hand.state).similarity
+    assert now.scale == pytest.approx(1.01 * stretched.scale)
+    assert_allclose(now.own_factors, stretch)
+    moved = now.matrix.copy()
+    moved[:3, :3] = rig_scene.ROTATION @ moved[:3, :3]
+    again = as_similarity(moved, now)
+    assert_allclose(again.matrix, moved, atol=1e-9 * np.abs(moved).max())
+    finish(hand)
+    hand.click("Run")
+    finish(hand)
+    placed = hand.state.of(Rigging).results["robust"].rigged.alignment.placed
+    assert_allclose(placed.own_factors, stretch, atol=1e-9)
+
+
+def test_run_puts_the_rigged_mesh_in_the_targets_place_in_one_step(rigging):
+    hand = rigging()
+    target = hand.state.scene.actors[0]
+    wanted = target.figure.mesh.positions
+    steps = hand.undo_steps
+    hand.click("Run")
+    assert hand.state.job is not None and hand.state.job.can_cancel
+    finish(hand)
+    assert hand.state.error == ""
+    assert names(hand) == ["scan rigged", "arm", "scan"]
+    assert visible(hand) == ["scan rigged", "arm"]
+    assert hand.state.actor.figure.is_attached and hand.state.chosen_actor == 0
+    assert_allclose(seen(hand, 0), wanted, atol=1e-8)
+    assert hand.undo_steps == steps + 1
+    hand.key("z", "ctrl")
+    hand.step(2)
+    assert names(hand) == visible(hand) == ["scan", "arm"]
+    assert hand.state.scene.actors[0] is target
+    hand.key("y", "ctrl")
+    hand.step(2)
+    assert visible(hand) == ["scan rigged", "arm"]
+    hand.assert_sane()
+
+
+def test_report_says_how_the_alignment_was_found(rigging, texts):
+    hand = rigging(placed=False)
+    hand.state.scene.actors[1].pose.dofs[6:] = 0.2, -0.1, 0.2
+    hand.step(2)
+    hand.click("Align")
+    finish(hand)
+    hand.click("Run")
+    finish(hand)
+    rigged = hand.state.of(Rigging).results["robust"].rigged
+    keys = ["R001.alignment", "R001.error", "R003.pose", "R003.gap", "R005.matched"]
+    assert [line.key for line in rigged.lines[:5]] == keys
+    assert str(rigged.lines[0].values["how"]) == "found by fitting pose and proportions"
+    assert rigged.lines[2:4] == hand.state.of(Rigging).placing.lines
+
+
+def test_stats_count_the_rigged_mesh(rigging, texts):
+    hand = rigging()
+    hand.click("Run")
+    finish(hand)
+    texts.clear()
+    hand.step()
+    assert "scan rigged, arm, scan" in texts and "4" in texts  # joints: two of each rig
+
+
+def test_a_goes_between_the_mesh_and_its_rig_without_steps(rigging):
+    hand = rigging()
+    hand.key("a")
+    assert hand.says("A/B: nothing was rigged yet, see Window > Rig")
+    hand.click("Run")
+    finish(hand)
+    steps = hand.undo_steps
+    for expected in ("scan", "scan rigged", "scan"):
+        hand.key("a")
+        hand.step(2)
+        assert sorted(visible(hand)) == ["arm", expected]
+        assert hand.state.actor.name == expected
+    assert hand.undo_steps == steps
+    hand.key("z", "ctrl")
+    hand.step(2)
+    assert visible(hand) == ["scan", "arm"] and names(hand) == ["scan", "arm"]
+
+
+def test_second_run_replaces_the_first_result(rigging):
+    hand = rigging()
+    for _ in range(2):
+        hand.click("Run")
+        finish(hand)
+    assert names(hand) == ["scan rigged", "arm", "scan"]
+
+
+def test_both_methods_are_compared(rigging, texts):
+    hand = rigging()
+    hand.click("Compare methods")
+    finish(hand)
+    assert names(hand) == ["scan rigged", "arm", "scan", "scan rigged (nearest)"]
+    assert visible(hand) == ["scan rigged", "arm"]
+    results = hand.state.of(Rigging).results
+    assert list(results) == ["robust", "nearest"]
+    # An independent sum over dense rows.
+    dense = []
+    for result in results.values():
+        skin = result.rigged.figure.skin
+        rows = np.zeros((skin.n_vertices, 2))
+        np.add.at(rows, (np.repeat(np.arange(len(rows)), np.diff(skin.starts)), skin.joints),
+                  skin.weights)  # fmt: skip
+        dense.append(rows)
+    comparison = hand.state.of(Rigging).comparison
+    assert comparison.weights == pytest.approx(np.abs(dense[0] - dense[1]).sum(axis=1).mean())
+    clear = np.abs(np.diff(dense[0])[:, 0]) > 1e-9
+    same = dense[0].argmax(axis=1) == dense[1].argmax(axis=1)
+    assert abs(comparison.dominant - same.mean()) <= (~clear).mean() + 1e-12
+    texts.clear()
+    hand.step()
+    assert "matched" in texts and "100.0 %" in texts and "nearest" in texts
+    for expected in ("scan", "scan rigged", "scan rigged (nearest)"):
+        hand.click(f"version {['target', 'robust', 'nearest'][names_of(expected)]}")
+        assert sorted(visible(hand)) == ["arm", expected]
+
+
+def names_of(expected):
+    return ["scan", "scan rigged", "scan rigged (nearest)"].index(expected)
+
+
+def test_confidence_maps_are_buttons(rigging):
+    hand = rigging()
+    hand.click("Run")
+    finish(hand)
+    for view in ("class:confidence", "field:distance", "class:guarded"):
+        hand.click(f"color {view}")
+        assert (hand.state.options.shading, hand.state.options.scalar) == ("scalar", view)
+        hand.step(2)
+        assert hand.state.error == "" and hand.state.stats.legend is not None
+    hand.click("color ")
+    assert hand.state.options.shading == "phong"
+
+
+def test_result_moves_as_the_template_where_the_target_stands(rigging):
+    hand = rigging(with_clip=True)
+    # The clip's first frame is the rest pose; the target was posed otherwise.
+    template = hand.state.scene.actors[1]
+    template.pose.dofs[6:] = 0.2, -0.1, 0.7
+    hand.step(2)
+    hand.click("Run")
+    finish(hand)
+    assert hand.state.error == ""
+    still = seen(hand, 0)
+    hand.click("Move as the template")
+    hand.step(2)
+    hand.state.playback.seek(1.0)
+    hand.step(3)
+    figure, pose = rig_scene.bent()
+    pose.dofs[:] = 0.0
+    pose.dofs[0], pose.dofs[8] = 1.0, 1.0  # as the template moves, carried by the alignment
+    wanted = apply_transform(TRUE, deform(figure, pose)[0])
+    assert_allclose(seen(hand, 0), wanted, atol=1e-5)
+    hand.click("Move as the template")
+    hand.step(2)
+    assert hand.state.actor.clip is None
+    assert_allclose(seen(hand, 0), still, atol=1e-9)
+    assert hand.undo_steps >= 2
+
+
+def test_template_without_motion_says_why_nothing_moves(rigging):
+    hand = rigging()
+    hand.click("Run")
+    finish(hand)
+    hand.click("Move as the template")
+    assert hand.state.actor.clip is None
+
+
+def test_cancelled_work_changes_nothing(rigging):
+    hand = rigging()
+    before = names(hand)
+    hand.click("Run")
+    hand.key("escape")
+    finish(hand)
+    assert hand.says("Cancelled")
+    hand.step(5)
+    running = hand.state.of(Rigging).running
+    assert running is None and names(hand) == before and hand.state.error == ""
+
+
+def test_result_of_a_mesh_that_is_gone_is_dropped(rigging):
+    hand = rigging()
+    hand.click("Run")
+    job = hand.state.job
+    job.wait()
+    del hand.state.scene.actors[0]
+    hand.state.chosen_actor = 0
+    hand.step(3)
+    assert hand.says("The mesh that was rigged is there no more")
+    assert names(hand) == ["arm"]
+
+
+def test_new_scene_forgets_everything_but_the_choices(rigging, rig):
+    hand = rigging()
+    hand.pick("Method", 1)
+    hand.click("Run")
+    finish(hand)
+    assert names(hand)[0] == "scan rigged (nearest)"
+    hand.open(*rig)
+    assert hand.state.of(Rigging).results == {} and hand.state.of(Rigging).target is None
+    assert hand.state.of(Rigging).choices.method == "nearest"
+
+
+def test_missing_scipy_is_a_message(rigging, monkeypatch):
+    def missing(name):
+        raise ModuleNotFoundError(name)
+
+    monkeypatch.setattr("viewer.rig._scipy.import_module", missing)
+    hand = rigging()
+    hand.click("Run")
+    finish(hand)
+    assert hand.state.error == "rigging needs scipy: pip install scipy"
+    assert names(hand) == ["scan", "arm"]
+
+
+def test_settings_reach_alignment_and_transfer(rigging, monkeypatch):
+    asked = {}
+
+    def placed(template, own, target, settings, fits, tell):
+        asked.update(alignment=settings, fits=fits)
+        return align_template(template, own, target, AlignmentSettings(matrix=TRUE), False, tell)
+
+    def instead(figure, pose, target, settings, report, name):
+        asked.update(settings=settings, name=name)
+        raise viewer.ViewerError("stopped here")
+
+    monkeypatch.setattr("viewer.app.rigging.work.align_template", placed)
+    monkeypatch.setattr("viewer.app.rigging.work.transfer", instead)
+    hand = rigging(placed=False)
+    hand.pick("Up", 3)
+    hand.pick("Scale", 2)
+    hand.click("rig advanced")
+    hand.step(2)
+    hand.pick("Joints##rig", 1)
+    hand.enter_value("Max. angle", "75")
+    hand.enter_value("Smoothing", "7")
+    hand.enter_value("Max. influences", "3")
+    hand.click("Pose correctives")
+    hand.click("Refine alignment")
+    hand.click("Fit pose and proportions")
+    hand.click("Run")
+    finish(hand)
+    settings = asked["settings"]
+    assert hand.state.error == "stopped here" and asked["name"] == "scan rigged"
+    assert (asked["alignment"].up, asked["alignment"].scale) == ("z", "none")
+    assert asked["alignment"].facing is None and not asked["fits"]
+    assert not asked["alignment"].refines
+    assert_allclose(settings.alignment.matrix, TRUE, atol=1e-9)
+    assert settings.joints == "copied" and not settings.correctives and not settings.fits
+    assert settings.weights.match.max_angle == pytest.approx(np.radians(75.0))
+    assert settings.weights.match.near_angle == pytest.approx(np.radians(75.0))
+    assert (settings.weights.smoothing_rounds, settings.weights.max_influences) == (7, 3)
+
+
+def test_advanced_settings_are_folded_away_and_counted(rigging, texts, monkeypatch):
+    titles, draw = [], imgui.tree_node
+    monkeypatch.setattr(imgui, "tree_node", lambda text: titles.append(text) or draw(text))
+    hand = rigging(placed=False)
+    assert titles[-1] == "Advanced###rig advanced" and "Smoothing" not in hand.state.item_rects
+    hand.state.of(Rigging).choices.smoothing, hand.state.of(Rigging).choices.joints = 3, "copied"
+    hand.step(2)
+    assert titles[-1] == "Advanced (2 changed)###rig advanced"
+    hand.click("rig advanced")
+    hand.step(2)
+    assert "Smoothing" in hand.state.item_rects
+
+
+def test_work_says_in_words_what_it_does_and_its_share(rigging, texts, monkeypatch):
+    gate = threading.Event()
+
+    def placed(template, own, target, settings, fits, tell):
+        tell(0.4, "pose")
+        gate.wait(60)
+        return align_template(template, own, target, AlignmentSettings(matrix=TRUE), False, tell)
+
+    monkeypatch.setattr("viewer.app.rigging.work.align_template", placed)
+    said, draw = [], imgui.progress_bar
+    monkeypatch.setattr(imgui, "progress_bar", lambda *given: said.append(given[2]) or draw(*given))
+    hand = rigging(placed=False)
+    hand.click("Align")
+    while hand.state.job.progress != (40, 100):
+        time.sleep(0.01)
+    texts.clear()
+    hand.step(2)
+    gate.set()
+    assert "Fitting pose and proportions" in texts and said[-1] == "40 %"
+    finish(hand)
+
+
+def test_template_in_another_pose_is_turned_to_fit_and_shown_so(rigging, texts):
+    hand = rigging(placed=False)
+    actor = hand.state.scene.actors[1]
+    actor.pose.dofs[6:] = 0.2, -0.1, 0.2  # the tip of the target is turned by half a radian more
+    hand.step(2)
+    hand.click("Align")
+    finish(hand)
+    state = hand.state
+    assert state.of(Rigging).placing.fitted is not None
+    texts.clear()
+    hand.step()
+    assert any(text.startswith("pose: the template's joints turned") for text in texts)
+    ghost = hand.app.frame.renderer.ghost
+    shown = apply_transform(ghost.placement, ghost.figure.mesh.positions)
+    own = apply_transform(ghost.placement, deform(actor.figure, actor.pose)[0])
+    wanted = target_mesh(state).positions
+    gaps = [np.linalg.norm(points - wanted, axis=1).max() for points in (shown, own)]
+    assert gaps[0] < 0.2 * gaps[1]
+    assert actor.pose.dofs[8] == 0.2  # the actor stands as before
+    hand.click("Run")
+    finish(hand)
+    assert_allclose(seen(hand, 0), wanted, atol=1e-6)
+    assert state.error == ""
+
+
+def test_mesh_is_added_by_the_dialog_and_the_body_is_read_when_needed(drive, tmp_path):
+    figure, pose = rig_scene.bent()
+    export(Actor(rig_scene.scan(figure, pose)), tmp_path / "scan.obj")
+    hand = drive(size=SIZE, samples=1)
+    hand.menu("menu Window", "Rig")
+    hand.click("Add mesh…")
+    hand.state.of(Files).dialog.enter(tmp_path)
+    hand.step()
+    hand.click("file scan.obj")
+    hand.click("Open###Open")
+    finish(hand)
+    assert hand.state.actor.name == "scan" and hand.state.of(Rigging).target is hand.state.actor
+    assert hand.state.paths[-1] == tmp_path / "scan.obj"
+    assert hand.undo_steps == 1
+    assert [*template_names(hand)][1:] == ["Bundled body", "Bundled fox"]
+    hand.pick("Template", 2)
+    assert hand.state.of(Rigging).template_key == "fox"
+    hand.click("rig tool move")  # the template has to be there to be moved
+    finish(hand)
+    assert hand.state.of(Rigging).template.figure.name == "fox"
+    hand.click("Pose it…")
+    hand.step(2)
+    assert names(hand) == ["fox", "scan", "fox-2"]
+    chosen = hand.state.scene.actors[2]
+    assert hand.state.of(Rigging).template_key == f"actor {id(chosen)}"
+    assert seen(hand, 2)[:, 0].min() > seen(hand, 1)[:, 0].max()  # beside the others
+    hand.key("z", "ctrl")
+    hand.step(2)
+    assert names(hand) == ["fox", "scan"]
+
+
+def template_names(hand):
+    return template_texts(hand.state).values()
+
+
+def test_template_of_a_file_stays_itself_when_it_is_fitted(drive, tmp_path):
+    hand = drive(scene=rig_scene.scene(with_template=False), size=SIZE, samples=1)
+    hand.menu("menu Window", "Rig")
+    hand.step(2)
+    assert hand.state.of(Rigging).template_key == "body"  # there is no other
+    save(rig_scene.bent()[0], tmp_path / "arm.npz")
+    start_reading(hand.state, (tmp_path / "arm.npz",))
+    finish(hand)
+    template = hand.state.of(Rigging).template
+    hand.click("Run")  # aligns, and turns the joints of the template, which is at rest
+    finish(hand)
+    assert hand.state.of(Rigging).template is template
+    assert placing_now(hand.state).fitted is not None
+    hand.click("Run")
+    finish(hand)
+    assert hand.state.of(Rigging).template is template and placing_now(hand.state) is not None
+    assert names(hand) == ["scan rigged", "scan"] and hand.state.error == ""
+
+
+def test_files_that_do_not_fit_are_messages(rigging, tmp_path):
+    hand = rigging()
+    skel, skin = write_rig(tmp_path)
+    hand.click("Template file…")
+    hand.state.of(Files).dialog.enter(tmp_path)
+    hand.step()
+    hand.click("file tiny.skel")
+    hand.click("Open###Open")
+    finish(hand)
+    wanted = "tiny.skel: expected a figure with mesh, skeleton and skin, found none"
+    assert hand.state.error == wanted
+    hand.key("escape")
+    hand.click("Template file…")
+    hand.state.of(Files).dialog.enter(tmp_path)
+    hand.state.of(Files).dialog.chosen = {skel, skin}
+    hand.step()
+    hand.click("Open 2 files###Open")
+    finish(hand)
+    assert hand.state.of(Rigging).template.figure.name == "tiny" and hand.state.error == ""
+    assert hand.state.of(Rigging).template_key == "file"
+
+
+def test_rigged_mesh_without_a_bare_one_is_refused(drive, tmp_path):
+    hand = drive(size=SIZE, samples=1)
+    body = viewer.load(*write_rig(tmp_path)).actors[0]
+    save(body.figure, tmp_path / "whole.npz")
+    start_adding(hand.state, tmp_path / "whole.npz")
+    finish(hand)
+    assert hand.state.error == (
+        f"{tmp_path / 'whole.npz'}: expected a mesh without a rig, found one with a rig"
+    )
+
+
+def test_result_is_saved_and_opens_again(rigging, tmp_path):
+    hand = rigging()
+    hand.click("Run")
+    finish(hand)
+    hand.click("Save rigged…")
+    hand.state.of(Files).dialog.enter(tmp_path)
+    hand.step()
+    assert hand.state.of(Files).dialog.name == "scan_rigged.npz"
+    hand.click("Save###Save")
+    finish(hand)
+    assert hand.says("Saved") and hand.state.error == ""
+    again = viewer.load(tmp_path / "scan_rigged.npz").actors[0].figure
+    assert again.is_attached and again.fields[0].name == "confidence"
+    hand.click("Save rigged…")
+    hand.state.of(Files).dialog.enter(tmp_path)
+    hand.state.of(Files).dialog.name = "arm2.skel"
+    hand.step()
+    hand.click("Save###Save")
+    finish(hand)
+    found = sorted(path.name for path in tmp_path.glob("arm2.*"))
+    assert found == ["arm2.json", "arm2.obj", "arm2.skel", "arm2.skin"]
+    hand.click("Save rigged…")
+    hand.state.of(Files).dialog.enter(tmp_path)
+    hand.state.of(Files).dialog.name = "arm3.glb"
+    hand.step()
+    hand.click("Save###Save")
+    finish(hand)
+    assert hand.state.error.startswith('a rigged mesh cannot be written as ".glb"; there are: ')
+
+
+def test_report_is_copied(rigging, texts):
+    hand = rigging()
+    hand.click("Run")
+    finish(hand)
+    lines = [line.labelled for line in hand.state.of(Rigging).results["robust"].rigged.lines]
+    hand.click("Copy report")
+    assert imgui.get_clipboard_text() == "\n".join(lines)
+    texts.clear()
+    hand.step()
+    assert set(lines) <= set(texts)
+
+
+def test_target_without_meeting_the_template_is_a_message(drive):
+    figure, pose = rig_scene.bent()
+    mesh = rig_scene.scan(figure, pose).mesh
+    flat = viewer.Mesh(np.zeros((3, 3)), np.tile([0.0, 1, 0], (3, 1)), np.array([[0, 1, 2]]))
+    assert mesh.n_triangles
+    hand = drive(
+        scene=Scene([Actor(viewer.Figure("point", flat)), Actor(figure, pose)]),
+        size=SIZE, samples=1,
+    )  # fmt: skip
+    hand.menu("menu Window", "Rig")
+    hand.click("Run")
+    finish(hand)
+    assert hand.state.error != "" and names(hand) == ["point", "arm"]

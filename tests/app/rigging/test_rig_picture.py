@@ -1,0 +1,38 @@
+"""The Rig panel as it looks: a mesh with its template over it, and the result with its report."""
+
+from __future__ import annotations
+
+import pytest
+from app import rig_scene
+from app.rig_scene import finish
+from app.test_panel_pictures import _compare, _shown
+
+from viewer.app.shown_panels import ShownPanels
+
+pytest.importorskip("scipy")
+
+SIZE = (1000, 1100)
+
+
+def _aligned(hand):
+    hand.click("Align")
+    finish(hand)
+    hand.click("rig tool rotate")
+    hand.move((5, 5))
+
+
+def _result(hand):
+    hand.click("Run")
+    finish(hand)
+    hand.click("color class:confidence")
+    hand.move((5, 5))
+
+
+@pytest.mark.golden("app_{name}")
+@pytest.mark.parametrize(("name", "prepare"), [("rig", _aligned), ("rigged", _result)])
+def test_rig_panel_looks_as_it_did(drive, name, prepare):
+    hand = drive(scene=rig_scene.scene(), size=SIZE, samples=1)
+    hand.state.of(ShownPanels).closed.add("stats")  # times are others every time
+    hand.menu("menu Window", "Rig")
+    hand.step(2)
+    _compare(_shown(hand, prepare), name)

@@ -1,0 +1,66 @@
+"""Forward kinematics of a pose run once a frame, however much of the window shows the pose."""
+
+from __future__ import annotations
+
+import pytest
+
+from viewer.app.actors.following import start_following
+from viewer.app.posing.joint_tree import select_joint
+from viewer.app.posing.tool_actions import choose_tool
+from viewer.app.weights.actions import pin_vertex, show_scalar
+from viewer.rig import kinematics
+
+
+@pytest.fixture
+def runs(monkeypatch):
+    """How many poses forward kinematics ran for."""
+    counted, run = [], kinematics.forward_kinematics
+
+    def count(parents, local, root=None):
+        counted.extend([1] * (local.shape[1] if local.ndim == 4 else 1))
+        return run(parents, local, root)
+
+    monkeypatch.setattr("viewer.rig.kinematics.forward_kinematics", count)
+    monkeypatch.setattr("viewer.rig.motion.instances.forward_kinematics", count)
+    return counted
+
+
+def show_everything(state):
+    """Show a pose as skin, boxes, bones, names, axes, rings, an explained vertex and numbers."""
+    options = state.options
+    options.show, options.xray, options.joint_names, options.joint_axes = "both", True, True, True
+    options.keypoints = True
+    choose_tool(state, "rotate")
+    select_joint(state, 1)
+    pin_vertex(state, 0, 0)
+    show_scalar(state, "field" if state.actor.figure.fields else "weight")
+    start_following(state, 0, 1)
+
+
+def test_an_edited_pose_runs_kinematics_once(hand, runs):
+    show_everything(hand.state)
+    hand.step(4)
+    runs.clear()
+    hand.state.actor.pose.dofs[hand.dof_index("arm.x")] += 0.1
+    hand.step(1)
+    assert runs == [1]
+    hand.step(2)
+    assert runs == [1]
+
+
+def test_a_pose_of_a_body_runs_kinematics_once(box, runs):
+    show_everything(box.state)
+    box.step(4)
+    runs.clear()
+    box.state.actor.pose.dofs[-1] += 0.1
+    box.step(1)
+    assert runs == [1]
+
+
+def test_a_moved_camera_runs_none(hand, runs):
+    show_everything(hand.state)
+    hand.step(4)
+    runs.clear()
+    hand.state.camera.azimuth += 5.0
+    hand.step(2)
+    assert runs == []

@@ -1,0 +1,212 @@
+"""The key of the picture: every change of what is drawn changes it, and nothing else does."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from app.driver import make_state
+
+import viewer
+from viewer.app.picture_key import PictureKeys
+from viewer.rendering.options import DisplayOptions, Light, Lights
+from viewer.rendering.overlay.marks import Marks
+from viewer.rig.motion.clip_edit import clip_from_pose
+from viewer.rig.scene import Actor
+from viewer.rig.skinning import Skinning
+
+SIZE = (64, 48)
+
+
+@pytest.fixture
+def state():
+    state = make_state(viewer.load())
+    state.actor.points = np.zeros((2, 4))
+    state.actor.pose.shape_weights = np.zeros(3)
+    return state
+
+
+def another(value):
+    """Return another value of the same kind."""
+    if isinstance(value, bool):
+        return not value
+    if isinstance(value, int | float):
+        return value + 1
+    if isinstance(value, str):
+        return f"{value} else"
+    return (0, 0, 0) if value != (0, 0, 0) else None
+
+
+def put(owner, name):
+    setattr(owner, name, another(getattr(owner, name)))
+
+
+CAMERA = {
+    name: lambda state, name=name: put(state.camera, name)
+    for name in ("distance", "azimuth", "inclination", "fov", "orthographic", "up", "fixed")
+}
+NESTED = ("lights", "skinning")
+OPTIONS = {
+    one.name: lambda state, name=one.name: put(state.options, name)
+    for one in fields(DisplayOptions)
+    if one.name not in NESTED
+}
+LIGHTS = {
+    f"lights.{one.name}": lambda state, name=one.name: put(state.options.lights, name)
+    for one in fields(Lights)
+    if one.name not in ("key", "rim")
+}
+KEY_LIGHT = {
+    f"lights.{light}.{one.name}": lambda state, light=light, name=one.name: put(
+        getattr(state.options.lights, light), name
+    )
+    for light in ("key", "rim")
+    for one in fields(Light)
+}
+
+
+def skin_otherwise(state, name):
+    how = state.options.skinning
+    state.options.skinning = replace(how, **{name: another(getattr(how, name))})
+
+
+SKINNING = {
+    f"skinning.{one.name}": lambda state, name=one.name: skin_otherwise(state, name)
+    for one in fields(Skinning)
+}
+
+
+def add_in_place(array):
+    array[(0,) * array.ndim] += 0.25
+
+
+def move_pose(name):
+    return lambda state: add_in_place(getattr(state.actor.pose, name))
+
+
+POSE = {
+    name: move_pose(name)
+    for name in (
+        "dofs",
+        "translations",
+        "rotations",
+        "scales",
+        "shape_weights",
+        "figure_translation",
+    )
+}
+
+
+def swap_actor(state):
+    state.scene.actors[0] = Actor(state.actor.figure, pose=state.actor.pose)
+
+
+def swap_figure(state):
+    state.actor.figure = replace(state.actor.figure)
+
+
+def key_pose(state):
+    actor = state.actor
+    actor.clip = clip_from_pose(actor.figure.skeleton, actor.pose, "walk", 0.0, 1.0)
+
+
+ACTOR = {
+    "figure scale": lambda state: put(state.actor.pose, "figure_scale"),
+    "placement": lambda state: add_in_place(state.actor.placement),
+    "other placement": lambda state: setattr(state.actor, "placement", 2.0 * np.eye(4)),
+    "points": lambda state: add_in_place(state.actor.points),
+    "no points": lambda state: setattr(state.actor, "points", None),
+    "other pose": lambda state: setattr(state.actor, "pose", _turned(state.actor.pose)),
+    "no pose": lambda state: setattr(state.actor, "pose", None),
+    "visible": lambda state: put(state.actor, "visible"),
+    "present": lambda state: put(state.actor, "is_present"),
+    "color": lambda state: put(state.actor, "color"),
+    "clip": key_pose,
+    "offset": lambda state: put(state.actor, "offset"),
+    "other actor": swap_actor,
+    "another actor": lambda state: state.scene.actors.append(Actor(state.actor.figure)),
+    "no actor": lambda state: state.scene.actors.clear(),
+    "figure": swap_figure,
+}
+
+
+def _turned(pose):
+    other = pose.copy()
+    other.dofs[0] += 0.5
+    return other
+
+
+REST = {
+    "target": lambda state: add_in_place(state.camera.target),
+    "ground": lambda state: add_in_place(state.box),
+    "chosen actor": lambda state: put(state, "chosen_actor"),
+    "selected joint": lambda state: put(state, "selected_joint"),
+}
+CHANGES = CAMERA | OPTIONS | LIGHTS | KEY_LIGHT | SKINNING | POSE | ACTOR | REST
+
+
+@pytest.mark.parametrize("name", CHANGES)
+def test_every_change_of_what_is_drawn_changes_the_key(state, name):
+    keys = PictureKeys()
+    before = keys.key(state, SIZE)
+    assert keys.key(state, SIZE) == before
+    CHANGES[name](state)
+    after = keys.key(state, SIZE)
+    assert after != before
+    assert keys.key(state, SIZE) == after
+
+
+def test_size_and_what_is_drawn_over_the_scene_are_part_of_the_key(state):
+    keys, marks = PictureKeys(), Marks(np.zeros((0, 3)), np.zeros(0), np.zeros((0, 2, 3)))
+    known = [
+        keys.key(state, SIZE),
+        keys.key(state, (64, 49)),
+        keys.key(state, SIZE, marks),
+        keys.key(state, SIZE, copy.copy(marks)),
+        keys.key(state, SIZE, None, "ghost"),
+        keys.key(state, SIZE, None, None, ("annotation",)),
+    ]
+    assert all(one != other for row, one in enumerate(known) for other in known[:row])
+    assert keys.key(state, SIZE, marks) == known[2]
+
+
+def test_time_counts_only_where_motion_paths_are_drawn(state):
+    keys = PictureKeys()
+    before = keys.key(state, SIZE)
+    state.scene.time = 1.0
+    assert keys.key(state, SIZE) == before
+    state.options.trail_joints = ((0, 0),)
+    before = keys.key(state, SIZE)
+    state.scene.time = 2.0
+    assert keys.key(state, SIZE) != before
+
+
+def test_numbers_that_come_back_give_an_equal_key(state):
+    keys = PictureKeys()
+    before = keys.key(state, SIZE)
+    state.actor.pose.dofs[0] += 0.5
+    keys.key(state, SIZE)
+    state.actor.pose.dofs[0] -= 0.5
+    assert keys.key(state, SIZE) == before
+
+
+def test_a_still_scene_copies_nothing(state, monkeypatch):
+    keys = PictureKeys()
+    before = keys.key(state, SIZE)
+    monkeypatch.setattr("viewer.app.picture_key.copy.deepcopy", None)
+    monkeypatch.setattr("viewer.app.picture_key.NumberKey", None)
+    monkeypatch.setattr("viewer.rig.pose.NumberKey", None)
+    assert keys.key(state, SIZE) == before
+
+
+def test_the_frame_draws_when_the_key_changes_and_only_then(hand, monkeypatch):
+    renderer, drawn = hand.app.frame.renderer, []
+    draw = renderer.draw
+    monkeypatch.setattr(renderer, "draw", lambda *args: (drawn.append(1), draw(*args)))
+    hand.step(3)
+    assert drawn == []
+    hand.state.actor.pose.dofs[hand.dof_index("arm.x")] += 0.1
+    hand.step(3)
+    assert drawn == [1]

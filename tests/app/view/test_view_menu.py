@@ -1,0 +1,65 @@
+"""The menu "View", its keys, and the check boxes of the Display panel."""
+
+from __future__ import annotations
+
+import pytest
+
+from viewer.app.view.view_menu import JOINT_TOGGLES
+from viewer.app.weights.state import Weights
+
+KEYS = {"xray": ("b", ""), "joint_names": ("j", ""), "joint_axes": ("j", "shift")}
+
+
+@pytest.mark.parametrize("name", JOINT_TOGGLES)
+def test_menu_and_key_switch_what_is_seen_of_joints(hand, name):
+    text, _ = JOINT_TOGGLES[name]
+    before = hand.scene_picture()
+    hand.menu("menu View", text)
+    assert getattr(hand.state.options, name) and hand.says(f"{text} on")
+    hand.step(2)
+    assert (hand.scene_picture() != before).any()
+    assert hand.undo_steps == 1
+    key, held = KEYS[name]
+    hand.key(key, held)
+    hand.step(2)
+    assert not getattr(hand.state.options, name) and hand.says(f"{text} off")
+    assert (hand.scene_picture() == before).all()
+
+
+def test_boxes_of_the_display_panel(drive, rig):
+    hand = drive(*rig, size=(900, 1000), samples=1)
+    for short, name in (("X-ray", "xray"), ("Names", "joint_names"), ("Axes", "joint_axes")):
+        hand.click(f"{short}###{name}")
+        assert getattr(hand.state.options, name)
+
+
+def test_menu_shows_weights_and_lets_go_of_them(hand):
+    hand.click(hand.place("joint arm", 0.5))
+    hand.menu("menu View", "Weights of the selected joint")
+    assert (hand.state.options.shading, hand.state.options.scalar) == ("scalar", "weight")
+    assert hand.says("Weights of arm")
+    hand.menu("menu View", "Weights of the selected joint")
+    assert hand.state.options.shading == "phong"
+
+
+def test_menu_picks_vertices(hand):
+    hand.menu("menu View", "Pick vertices")
+    assert hand.state.of(Weights).picks_vertices and hand.says("Click a vertex")
+    hand.menu("menu View", "Pick vertices")
+    assert not hand.state.of(Weights).picks_vertices
+
+
+def test_skin_alone_has_no_joints_to_show(drive, rig):
+    hand = drive(rig[1])
+    for text in ("X-ray", "Joint names", "Joint axes", "Unpin the vertex"):
+        hand.menu("menu View", text)
+        hand.key("escape")
+    assert not hand.state.options.xray and not hand.state.options.joint_names
+
+
+def test_skeleton_alone_has_no_vertices_to_show(drive, rig):
+    lone = drive(rig[0])
+    for text in ("Weights of the selected joint", "Pick vertices", "Vertex under the mouse"):
+        lone.menu("menu View", text)
+        lone.key("escape")
+    assert lone.state.options.shading == "phong" and not lone.state.of(Weights).picks_vertices

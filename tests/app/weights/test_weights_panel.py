@@ -1,0 +1,342 @@
+"""The Weights panel: numbers as colours, their range and legend, and the tools for vertices."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from imgui_bundle import imgui
+from numpy.testing import assert_array_equal
+
+from viewer.app.weights.actions import no_view
+from viewer.rendering.colormap import colormap
+from viewer.rig.annotations import VertexField
+from viewer.rig.scalars import SCALARS, compute, missing_part
+from viewer.rig.skinning import Skinning
+
+
+@pytest.fixture
+def bent(drive, rig):
+    """A hand on the Weights panel of the tiny rig, which is bent and turned."""
+    hand = drive(*rig, size=(900, 1000), samples=1)
+    dofs = hand.dofs()
+    dofs[hand.dof_index("arm.x")], dofs[hand.dof_index("arm.y")] = 1.0, 2.0
+    return _posed(hand, dofs)
+
+
+@pytest.fixture
+def wide(drive_body):
+    """A hand on the Weights panel of a body with many influences a vertex, posed."""
+    hand = drive_body("smpl", n_vertices=96)
+    return _posed(hand, 0.8 * np.sin(np.arange(len(hand.dofs()))))
+
+
+def _posed(hand, dofs):
+    """Show the panel of a figure that was in this pose from the start."""
+    hand.show_panel("Weights")
+    hand.state.actor.pose.dofs[:] = dofs
+    hand.state.options.skinning.max_influences = 4
+    hand.state.options.scalar = "cut"
+    hand.state.history.start(hand.state.scene, hand.state.options)
+    hand.step(2)
+    return hand
+
+
+def _chosen(hand) -> Skinning:
+    return hand.state.options.skinning
+
+
+def _legend_colours(hand):
+    """Return where the legend has its dark, middle and bright colour, None without a legend."""
+    x, y, width, _ = hand.state.view_rect
+    screen, colours = hand.screen(), colormap(256)[:, :3].astype(int)
+    for row in range(int(y), int(y) + 70):
+        pixels = screen[row, int(x) : int(x + width)].astype(int)
+        ends = [np.abs(pixels - colours[index]).sum(axis=1) <= 12 for index in (2, 128, 253)]
+        if all(end.any() for end in ends):
+            return [int(np.flatnonzero(end).mean()) for end in ends]
+    return None
+
+
+def test_heat_map_box_switches_the_shading_and_the_legend(wide, texts):
+    plain = wide.scene_picture()
+    assert _legend_colours(wide) is None
+    wide.click("Heat map")
+    assert wide.state.options.shading == "scalar"
+    assert (wide.scene_picture() != plain).any()
+    dark, middle, bright = _legend_colours(wide)
+    assert dark < middle < bright
+    texts.clear()
+    wide.step()
+    assert "Distance to 4 influences, mm" in texts
+    wide.click("Heat map")
+    assert wide.state.options.shading == "phong"
+    assert _legend_colours(wide) is None
+    assert_array_equal(wide.scene_picture(), plain)
+
+
+def test_heat_map_is_undone(wide):
+    wide.click("Heat map")
+    wide.key("z", "ctrl")
+    assert wide.state.options.shading == "phong"
+    wide.key("z", "ctrl shift")
+    assert wide.state.options.shading == "scalar"
+
+
+@pytest.mark.parametrize("name", SCALARS)
+def test_scalar_range_is_that_of_the_vertices(wide, texts, name):
+    _chosen(wide).max_influences = 2
+    wide.click("Heat map")
+    wide.state.options.scalar, wide.state.selected_joint = name, 0
+    wide.step(2)
+    actor = wide.state.actor
+    joint = ":#0" if SCALARS[name].takes_joint else ""
+    values = compute(f"{name}{joint}", actor.figure, actor.pose, _chosen(wide))
+    low, high = wide.state.stats.scalar_range
+    lacks = missing_part(name + joint, actor.figure)
+    assert (low, high) == ((0.0, 0.0) if lacks else (values.min(), values.max()))
+    texts.clear()
+    wide.step()
+    shown = [text for text in texts if text.startswith("up to")]
+    if SCALARS[name].unit != "length":
+        assert not shown
+        return
+    assert shown and shown[0].endswith("mm in this pose")
+    # Three digits, in millimetres.
+    said = float(shown[0].split()[2].replace(",", ""))
+    assert said == pytest.approx(1000 * high, rel=6e-3)
+    # The model has no symmetry map, and its weights are scaled to 1 already.
+    assert high > 0 or name in ("asymmetry", "normalized")
+
+
+def test_scalar_range_follows_the_pose(wide):
+    wide.state.options.scalar = "methods"
+    wide.click("Heat map")
+    wide.step(2)
+    assert wide.state.stats.scalar_range[1] > 0
+    wide.key("r")
+    wide.step(2)
+    assert wide.state.stats.scalar_range[1] == pytest.approx(0, abs=1e-12)
+
+
+def test_legend_says_where_there_is_nothing_to_see(bent, texts):
+    # The tiny rig has two influences a vertex: four are as good as all.
+    bent.click("Heat map")
+    bent.step(2)
+    texts.clear()
+    bent.step()
+    assert "0 everywhere" in texts
+    assert bent.state.stats.scalar_range == (0.0, 0.0)
+
+
+def test_lengths_without_a_unit_are_shares_of_the_size(bent, texts):
+    bent.state.options.scalar = "methods"
+    bent.click("Heat map")
+    bent.step(2)
+    texts.clear()
+    bent.step()
+    assert "Distance LBS to DQS, % of the size" in texts
+    actor = bent.state.actor
+    plain = replace(_chosen(bent), method="lbs")
+    values = compute("methods", actor.figure, actor.pose, plain)
+    size = np.linalg.norm([0.4, 2.0, 0.4])  # of the column's box
+    found = next(text for text in texts if text.startswith("up to"))
+    assert float(found.split()[2]) == pytest.approx(100 * values.max() / size, rel=6e-3)
+
+
+@pytest.mark.parametrize("name", SCALARS)
+def test_view_is_chosen_from_the_list(wide, name):
+    first = wide.state.options.scalar
+    lacking = {"asymmetry": "a symmetry map", "parts": "body parts", "field": "fields",
+               "class": "classes"}  # fmt: skip
+    choose(wide, name)
+    if name in lacking:
+        assert no_view(wide.state, name) == f"no figure here has {lacking[name]}"
+        assert wide.state.options.scalar == first and wide.state.options.shading == "phong"
+        return
+    assert no_view(wide.state, name) == ""
+    assert wide.state.options.scalar == name and wide.state.options.shading == "scalar"
+
+
+def choose(hand, name):
+    """Choose a view from the list."""
+    hand.click("##Heat map of")
+    hand.step(2)
+    hand.click(f"view {name}")
+    hand.step(2)
+
+
+def test_greyed_view_says_why(wide, tooltips):
+    wide.click("##Heat map of")
+    wide.step(2)
+    wide.move("view parts")
+    wide.step(60)
+    assert "no figure here has body parts" in tooltips
+
+
+@pytest.fixture
+def tooltips(monkeypatch):
+    """What tooltips say."""
+    said = []
+    monkeypatch.setattr(imgui, "set_tooltip", said.append)
+    return said
+
+
+def test_legend_of_joints_lists_them(wide, texts):
+    wide.state.options.scalar = "dominant"
+    wide.click("Heat map")
+    wide.step(2)
+    texts.clear()
+    wide.step()
+    entries = wide.state.stats.legend.entries
+    assert len(entries) > 2
+    shown = [entry.text for entry in entries if entry.text in texts]
+    assert shown == [entry.text for entry in entries[: len(shown)]] and len(shown) > 2
+    hidden = len(entries) - len(shown)
+    assert hidden == 0 or f"and {hidden} more" in texts
+
+
+def test_weight_of_a_joint_is_that_of_the_selected_one(wide, texts):
+    wide.state.options.scalar = "weight"
+    wide.click("Heat map")
+    for joint in (0, 1):
+        wide.state.selected_joint = joint
+        wide.step(2)
+        texts.clear()
+        wide.step()
+        assert f"Weight of {wide.state.actor.figure.skeleton.names[joint]}" in texts
+    wide.state.selected_joint = -1
+    wide.step(2)
+    texts.clear()
+    wide.step()
+    assert "no joint is selected" in texts
+    assert "Click the skin in the view, or a joint in the tree." in texts
+
+
+def test_list_keeps_the_joint_of_the_command_line(wide):
+    wide.state.options.scalar = "weight:#1"
+    wide.click("Heat map")
+    wide.step(2)
+    assert wide.state.options.scalar == "weight:#1"
+
+
+def test_picture_with_its_own_legend_has_no_second_one(wide, texts):
+    wide.state.options.legend = True
+    wide.click("Heat map")
+    wide.step(2)
+    texts.clear()
+    wide.step()
+    assert "Distance to few influences, mm" not in texts
+    assert _legend_colours(wide) is not None  # drawn into the picture
+
+
+def test_fixed_range_begins_as_the_automatic_one_and_keeps_its_order(bent):
+    choose(bent, "stretch")
+    # Strains are shown from -m to m, in percent; the numbers are percent already.
+    most = max(map(abs, bent.state.stats.scalar_range))
+    bent.click("Fixed")
+    low, high = bent.state.options.scalar_range
+    assert (low, high) == (-float(f"{most:.3g}"), float(f"{most:.3g}"))
+    type_into(bent, "To", "50")
+    assert bent.state.options.scalar_range == (low, 50.0)
+    type_into(bent, "From", "60")  # above the other end
+    assert bent.state.options.scalar_range == (low, 50.0)
+    type_into(bent, "From", "-12.5")
+    assert bent.state.options.scalar_range == (-12.5, 50.0)
+    assert [tick.text for tick in bent.state.stats.legend.ticks] == ["0", "+20", "+40"]
+    bent.click("Automatic")
+    assert bent.state.options.scalar_range is None
+
+
+def type_into(hand, label, text):
+    """Replace the number in a field."""
+    hand.double_click(hand.place(label, 0.2))
+    hand.key("a", "ctrl")
+    hand.type(text.replace("-", ""))
+    if text.startswith("-"):
+        hand.key("home")
+        hand.type("-")
+    hand.key("enter")
+    hand.step(2)
+
+
+def test_another_view_lets_go_of_the_range(bent):
+    choose(bent, "stretch")
+    bent.click("Fixed")
+    choose(bent, "methods")
+    assert bent.state.options.scalar_range is None
+
+
+def test_range_and_isolines_are_grey_for_whole_numbers(wide):
+    choose(wide, "influences")
+    for label in ("Fixed", "Isolines"):
+        wide.click(label)
+    assert wide.state.options.scalar_range is None and wide.state.options.isolines is None
+
+
+def test_isolines_box_shows_what_is_usual_and_keeps_what_is_not(bent):
+    bent.state.selected_joint = 1
+    choose(bent, "weight")
+    assert bent.state.stats.legend.lines  # usual for weights
+    bent.click("Isolines")
+    assert bent.state.options.isolines is False
+    bent.step(2)
+    assert not bent.state.stats.legend.lines
+    bent.click("Isolines")
+    assert bent.state.options.isolines is None
+    choose(bent, "methods")
+    bent.click("Isolines")
+    assert bent.state.options.isolines is True
+
+
+def test_legend_box_draws_the_legend_into_pictures(bent):
+    choose(bent, "methods")
+    before = bent.scene_picture()
+    bent.click("Legend in pictures")
+    bent.step(2)
+    assert bent.state.options.legend and (bent.scene_picture() != before).any()
+
+
+def test_named_joint_gives_way_to_the_selected_one(bent, texts):
+    bent.state.options.scalar, bent.state.options.shading = "weight:root", "scalar"
+    bent.state.selected_joint = 1
+    bent.step(2)
+    assert "of root" in texts
+    bent.click("Of the selected joint")
+    texts.clear()
+    bent.step(2)
+    assert bent.state.options.scalar == "weight" and "of arm" in texts
+
+
+def test_key_shows_weights_of_the_selected_joint_and_goes_back(bent):
+    bent.key("v")
+    assert bent.says("Weights of root")
+    bent.click(bent.place("joint arm", 0.5))
+    bent.step(2)
+    assert bent.state.stats.legend.title == "Weight of arm"
+    bent.key("v")
+    assert bent.state.options.shading == "phong"
+
+
+def test_key_on_a_figure_without_weights_says_so(drive, rig):
+    hand = drive(rig[0])
+    hand.key("v")
+    assert hand.says("there is no mesh") and hand.state.options.shading == "phong"
+
+
+def test_several_fields_have_a_list(bent):
+    actor = bent.state.actor
+    count = actor.figure.mesh.n_vertices
+    fields = (
+        VertexField("far", "Distance", np.linspace(0.0, 2.0, count)),
+        VertexField("near", "Closeness", np.linspace(1.0, 5.0, count)),
+    )
+    bent.state.scene.actors[0] = replace(actor, figure=replace(actor.figure, fields=fields))
+    bent.step(2)
+    choose(bent, "field")
+    assert bent.state.stats.scalar_range == (0.0, 2.0)
+    bent.pick("Field", 1)
+    bent.step(2)
+    assert bent.state.options.scalar == "field:near"
+    assert bent.state.stats.scalar_range == (1.0, 5.0)

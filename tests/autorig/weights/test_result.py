@@ -1,0 +1,78 @@
+import numpy as np
+import pytest
+from faults import told
+
+from viewer.autorig.correspondence.matching import Matches
+from viewer.autorig.weights.result import RigidIslands, match_lines, nothing_matched, rigid_lines
+from viewer.rig.geometry.closest_point import SurfacePoints
+
+pytest.importorskip("scipy")
+
+
+def matches(matched, inside_out=()):
+    count = len(matched)
+    points = SurfacePoints(
+        np.zeros(count, int),
+        np.tile([1.0, 0, 0], (count, 1)),
+        np.zeros((count, 3)),
+        np.zeros(count),
+    )
+    return Matches(points, np.array(matched), np.zeros(count), np.array(inside_out, dtype=np.int32))
+
+
+def test_match_lines_count():
+    found = matches([True, True, True, False])
+    assert told(match_lines(found, ~found.matched, "direct")) == [
+        ("R005.matched", {"n": 3, "all": 4, "ratio": 0.75, "filled": 1})
+    ]
+
+
+def test_match_lines_say_what_is_out_of_the_ordinary():
+    found = matches([True, False, False, False], [0, 2])
+    lines = match_lines(found, ~found.matched, "harmonic")
+    assert told(lines) == [
+        ("R005.matched", {"n": 1, "all": 4, "ratio": 0.25, "filled": 3}),
+        ("R006.matched", {"limit": 0.75}),
+        ("R005.reversed", {"n": 2}),
+        ("R005.solver", {"method": "harmonic"}),
+    ]
+    assert [line.severity for line in lines] == ["note", "warning", "note", "note"]
+    assert lines[1].labelled == (
+        "warning: less than 75% of the target meets the template: check the alignment, or allow "
+        "a larger distance"
+    )
+
+
+def test_match_lines_speak_of_one_part_alone():
+    found = matches([True, True], [0])
+    (line,) = match_lines(found, ~found.matched, "direct")[1:]
+    assert str(line) == (
+        "1 part of the target faces the other way than the template: matched as if turned round"
+    )
+
+
+def islands(counts):
+    number = np.arange(len(counts), dtype=np.int32)
+    return RigidIslands(10 * number, np.array(counts), number, np.zeros(len(counts)))
+
+
+def test_rigid_lines_name_the_largest_first():
+    assert told(rigid_lines(islands([1, 30]))) == [
+        ("R007.part", {"n": 30, "vertex": 10, "joint": 1}),
+        ("R007.part", {"n": 1, "vertex": 0, "joint": 0}),
+    ]
+    assert rigid_lines(islands([])) == ()
+
+
+def test_rigid_lines_count_what_they_do_not_name():
+    lines = rigid_lines(islands([9, 8, 7, 6, 5, 4, 3]))
+    assert len(lines) == 6
+    assert told(lines[-1:]) == [("R007.more-parts", {"n": 2})]
+    assert told(rigid_lines(islands([9, 8, 7, 6, 5, 4])))[-1] == ("R007.more-parts", {"n": 1})
+
+
+def test_nothing_matched_says_how_far_it_is():
+    assert nothing_matched(np.array([1.0, 3.0, 9.0]), 10.0) == (
+        "no vertex of the target meets the template: expected a target aligned with it, found "
+        "it at a median distance of 30.0% of the target's size"
+    )

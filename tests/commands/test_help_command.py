@@ -1,0 +1,57 @@
+"""``viewer help``: topics, pages as text and laid out, a command's options, unknown topics."""
+
+from __future__ import annotations
+
+import io
+import sys
+
+import pytest
+
+from viewer.cli import run
+from viewer.commands import COMMANDS
+from viewer.manual import PAGES, page_text
+
+
+class Terminal(io.StringIO):
+    """Standard output that says it is a terminal."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def test_alone_it_lists_all_topics_and_commands(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["help"]) == 0
+    printed = capsys.readouterr().out
+    assert all(f"  {topic} " in printed and text in printed for topic, text in PAGES.items())
+    assert ", ".join(COMMANDS) in printed
+
+
+def test_into_a_pipe_a_page_is_printed_as_it_is(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["help", "keys"]) == 0
+    assert capsys.readouterr().out == page_text("keys")
+
+
+def test_at_a_terminal_tables_are_laid_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stdout", terminal)
+    monkeypatch.setenv("TERM", "xterm-256color")
+    monkeypatch.setenv("COLUMNS", "80")
+    assert run(["help", "keys"]) == 0
+    printed = terminal.getvalue()
+    assert "\x1b[" in printed, "no style"
+    assert "| R |" not in printed and "---" not in printed, "Markdown is left"
+    assert "reset every DOF to the file's pose" in printed
+
+
+def test_of_a_command_it_lists_the_options(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["help", "diff"]) == 0
+    assert capsys.readouterr().out.startswith("usage: viewer diff")
+
+
+def test_an_unknown_topic_is_one_line_with_the_nearest(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert run(["help", "captres"]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == "" and printed.err.count("\n") == 1
+    assert "did you mean captures?" in printed.err and "troubleshooting" in printed.err

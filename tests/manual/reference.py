@@ -1,0 +1,183 @@
+"""Reference tables of the manual, generated from the registries.
+
+A page marks where a table belongs with ``<!-- table: NAME -->`` and ``<!-- end -->``.
+``make manual`` writes the tables into the pages, ``test_pages.py`` fails when one is stale.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import viewer
+from viewer.app.features import KEYS, MOUSE
+from viewer.commands import COMMANDS
+from viewer.commands._usage import command_parser
+from viewer.export import EXPORTERS
+from viewer.formats import FORMATS
+from viewer.lint import CODES
+from viewer.media.video_kinds import VIDEOS
+from viewer.rendering.gpu.program import SHADING
+from viewer.rig.scalars import SCALARS
+from viewer.rig.skinning import METHODS
+
+FOLDER = Path(viewer.__file__).parent / "manual"
+
+_BLOCK = re.compile(r"(<!-- table: (\w+) -->\n)(.*?)(<!-- end -->\n)", re.DOTALL)
+
+
+def with_tables(text: str) -> str:
+    """Return a page with its tables as the registries have them now."""
+    return _BLOCK.sub(lambda block: f"{block[1]}\n{TABLES[block[2]]()}\n{block[4]}", text)
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return a Markdown table; bars within cells are escaped."""
+    lines = [head, ["---"] * len(head), *([cell.replace("|", "\\|") for cell in r] for r in rows)]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+def keys() -> str:
+    return table(("key", "action"), [(key.label, key.text) for key in KEYS])
+
+
+def mouse() -> str:
+    return table(("mouse", "action"), MOUSE)
+
+
+def codes() -> str:
+    rows = [(name, code.severity, code.title, code.hint) for name, code in CODES.items()]
+    return table(("code", "severity", "finding", "cure"), rows)
+
+
+def readers() -> str:
+    rows = [
+        (
+            kind.title,
+            ", ".join(f"`{suffix}`" for suffix in kind.suffixes) + ", folder" * bool(kind.files),
+        )
+        for kind in FORMATS.values()
+    ]
+    return table(("opens", "files"), rows)
+
+
+def writers() -> str:
+    rows = [
+        (
+            kind.title,
+            ", ".join("folder" if suffix == "/" else f"`{suffix}`" for suffix in kind.suffixes),
+            "yes" if kind.writes_pose else "",
+            "yes" if kind.writes_motion else "",
+            f"`--as {name}`",
+        )
+        for name, kind in EXPORTERS.items()
+    ]
+    return table(("writes", "files", "one pose", "motion", "option"), rows)
+
+
+def videos() -> str:
+    rows = [
+        (kind.title, f"`{suffix}`", "yes" if kind.has_alpha else "")
+        for suffix, kind in VIDEOS.items()
+    ]
+    return table(("video", "file", "transparent"), rows)
+
+
+def scalars() -> str:
+    units = {"length": "figure units", "": ""}
+    rows = [
+        (f"`{name}`", kind.title, units.get(kind.unit, kind.unit), kind.needs)
+        for name, kind in SCALARS.items()
+    ]
+    return table(("name", "quantity", "unit", "needs"), rows)
+
+
+def methods() -> str:
+    return table(
+        ("method", "skinning"), [(f"`{name}`", kind.title) for name, kind in METHODS.items()]
+    )
+
+
+def shading() -> str:
+    return table(("shading", "surface"), [(f"`{name}`", text) for name, text in SHADING.items()])
+
+
+def commands() -> str:
+    return table(
+        ("command", "purpose"), [(f"`viewer {key}`", text) for key, text in COMMANDS.items()]
+    )
+
+
+def options() -> str:
+    """Return a table for each group of options, with the commands that have them."""
+    groups: dict[str, dict[tuple[str, str], list[str]]] = {}
+    for command in COMMANDS:
+        for group in command_parser(command)._action_groups:
+            for action in group._group_actions:
+                if action.dest != "help":
+                    row = _names(action), action.help or ""
+                    rows = groups.setdefault(_title(group), {})
+                    rows.setdefault(row, []).append(command)
+    return "\n".join(
+        f"## {title}\n\n"
+        + table(
+            ("option", "meaning", "commands"),
+            [(name, text, ", ".join(of)) for (name, text), of in rows.items()],
+        )
+        for title, rows in groups.items()
+    )
+
+
+def _title(group: argparse._ArgumentGroup) -> str:
+    """Return a group's title as a heading, without the explanation after its colon."""
+    title = (group.title or "").partition(":")[0]
+    if title in ("options", "positional arguments"):
+        return "Other"
+    return f"{title[:1].upper()}{title[1:]}"
+
+
+def _names(action: argparse.Action) -> str:
+    """Return how an option is written, its value included."""
+    if not action.option_strings:
+        return f"`{action.metavar or action.dest}`"
+    value = action.metavar or ("" if action.nargs == 0 else action.dest.upper())
+    if action.choices is not None:
+        value = "|".join(map(str, action.choices))
+    if value and action.nargs == "?":
+        value = f"[{value}]"
+    return ", ".join(
+        f"`{name} {value}`" if value else f"`{name}`" for name in action.option_strings
+    )
+
+
+TABLES = {
+    "codes": codes,
+    "commands": commands,
+    "keys": keys,
+    "methods": methods,
+    "mouse": mouse,
+    "options": options,
+    "readers": readers,
+    "scalars": scalars,
+    "shading": shading,
+    "videos": videos,
+    "writers": writers,
+}
+
+
+def main() -> int:
+    """Write the tables into the pages, and print which ones have changed."""
+    for path in sorted(FOLDER.glob("*.md")):
+        old = path.read_text("utf-8")
+        new = with_tables(old)
+        if new != old:
+            path.write_text(new, "utf-8")
+            print(path)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,120 @@
+"""The manual's pages: complete, up to date, and true in what they tell people to type."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+from manual.reference import FOLDER, with_tables
+
+from viewer.app.features import KEYS
+from viewer.cli import _protect_numbers
+from viewer.commands import COMMANDS
+from viewer.commands._usage import command_parser
+from viewer.errors import ViewerError
+from viewer.export import EXPORTERS
+from viewer.formats import FORMATS
+from viewer.lint import CODES
+from viewer.manual import PAGES, page_text
+
+ROOT = Path(__file__).resolve().parents[2]
+README = ROOT / "README.md"
+PATHS = [README, ROOT / "CONTRIBUTING.md", *sorted(FOLDER.glob("*.md"))]
+_BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+_LINK = re.compile(r"\]\(([^)#:]+)\)")
+
+
+def blocks(path: Path, language: str) -> list[str]:
+    return [text for name, text in _BLOCK.findall(path.read_text("utf-8")) if name == language]
+
+
+def commands(path: Path) -> list[str]:
+    lines = [line for block in blocks(path, "sh") for line in block.splitlines()]
+    return [line for line in lines if line.startswith("viewer")]
+
+
+ALL_COMMANDS = [(path.name, line) for path in PATHS for line in commands(path)]
+
+
+def test_pages_are_exactly_the_folder() -> None:
+    assert {path.stem for path in FOLDER.glob("*.md")} == set(PAGES)
+    assert not set(PAGES) & set(COMMANDS), "viewer help could mean either"
+
+
+@pytest.mark.parametrize("path", PATHS, ids=lambda path: path.stem)
+def test_tables_are_those_of_the_registries(path: Path) -> None:
+    text = path.read_text("utf-8")
+    assert with_tables(text) == text, "stale: type make manual"
+
+
+@pytest.mark.parametrize("path", PATHS, ids=lambda path: path.stem)
+def test_links_lead_somewhere(path: Path) -> None:
+    for target in _LINK.findall(path.read_text("utf-8")):
+        assert (path.parent / target).exists(), target
+
+
+@pytest.mark.parametrize(("page", "line"), ALL_COMMANDS)
+def test_commands_have_the_options_that_pages_use(page: str, line: str) -> None:
+    words = shlex.split(line, comments=True)[1:]
+    name = words.pop(0) if words and words[0] in COMMANDS else "view"
+    parser = command_parser(name)
+    words = _protect_numbers(words)
+    parser.check_options(words)
+    parser.parse_intermixed_args(words)
+
+
+@pytest.mark.parametrize("path", PATHS, ids=lambda path: path.stem)
+def test_python_runs_as_it_is_printed(
+    path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {}
+    for block in blocks(path, "python"):
+        exec(compile(block, path.name, "exec"), names)
+
+
+@pytest.mark.parametrize("topic", PAGES)
+def test_a_page_begins_with_its_title_and_fits_a_terminal(topic: str) -> None:
+    text = page_text(topic)
+    assert text.startswith("# ")
+    assert "<!--" not in text and "![" not in text and ".md)" not in text
+    is_table = re.compile(r"\|.*\|$")
+    assert not [line for line in text.splitlines() if len(line) > 100 and not is_table.match(line)]
+
+
+def test_reference_names_all_there_is() -> None:
+    assert all(f"| {key.label} | {key.text} |" in page_text("keys") for key in KEYS)
+    assert all(f"| {code} |" in page_text("codes") for code in CODES)
+    formats = page_text("formats")
+    for kind in (*FORMATS.values(), *EXPORTERS.values()):
+        assert all(f"`{suffix}`" in formats for suffix in kind.suffixes if suffix != "/")
+    options = page_text("options")
+    assert all(f"| `viewer {command}` |" in options for command in COMMANDS)
+
+
+def test_the_readme_is_short() -> None:
+    assert len(README.read_text("utf-8").split()) <= 900
+
+
+def test_an_unknown_topic_offers_the_nearest_and_lists_all() -> None:
+    with pytest.raises(ViewerError) as caught:
+        page_text("wieghts")
+    assert "did you mean weights?" in str(caught.value)
+    assert all(topic in str(caught.value) for topic in PAGES)
+
+
+@pytest.mark.parametrize("name", ["CONTRIBUTING.md", "viewer/ARCHITECTURE.md"])
+def test_paths_that_contributors_are_sent_to_exist(name: str) -> None:
+    text = (ROOT / name).read_text("utf-8")
+    paths = re.findall(r"`((?:viewer|shaders|tests|assets)/[\w/.]+)`", text)
+    assert paths
+    assert not [path for path in paths if not (ROOT / path).exists()]
+
+
+def test_contributors_are_told_of_every_registry() -> None:
+    text = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
+    for name, home in re.findall(r"\| `([A-Z]+)` in `([\w/.]+)` \|", text):
+        assert re.search(rf"^{name}\b.*=", (ROOT / home).read_text("utf-8"), re.MULTILINE), name
+    assert text.count(" in `viewer/") >= 11

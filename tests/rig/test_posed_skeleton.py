@@ -1,0 +1,134 @@
+"""World and skinning matrices of a pose: made once, right, and of its present numbers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+import viewer
+from viewer.rig import kinematics
+from viewer.rig.kinematics import posed_skeleton, skinning_matrices, world_matrices
+from viewer.rig.motion.instances import posed_worlds
+from viewer.rig.number_key import NumberKey
+
+ARRAYS = ("dofs", "translations", "rotations", "scales", "shape_weights")
+
+
+@pytest.fixture
+def actor():
+    actor = viewer.load().actors[0]
+    actor.pose.shape_weights = np.zeros(2)
+    actor.pose.dofs[:] = np.linspace(-0.2, 0.2, len(actor.pose.dofs))
+    return actor
+
+
+@pytest.fixture
+def runs(monkeypatch):
+    """How often forward kinematics ran."""
+    counted, run = [], kinematics.forward_kinematics
+
+    def count(*args):
+        counted.append(1)
+        return run(*args)
+
+    monkeypatch.setattr("viewer.rig.kinematics.forward_kinematics", count)
+    monkeypatch.setattr("viewer.rig.motion.instances.forward_kinematics", count)
+    return counted
+
+
+def test_matrices_are_those_of_the_pose(actor):
+    figure, pose = actor.figure, actor.pose
+    posed, world = posed_skeleton(figure.skeleton, pose), world_matrices(figure.skeleton, pose)
+    assert_array_equal(posed.world, world)
+    assert_array_equal(
+        posed.palette(figure.skin), skinning_matrices(world, figure.skin.inverse_bind)
+    )
+
+
+def test_kinematics_run_once_until_a_number_changes(actor, runs):
+    skeleton, pose = actor.figure.skeleton, actor.pose
+    first = posed_skeleton(skeleton, pose)
+    assert posed_skeleton(skeleton, pose) is first and len(runs) == 1
+    pose.figure_translation[0] += 1.0  # comes after skinning
+    pose.figure_scale = 2.0
+    assert posed_skeleton(skeleton, pose) is first and len(runs) == 1
+
+
+@pytest.mark.parametrize("name", ARRAYS)
+def test_every_number_of_the_joints_counts(actor, name):
+    skeleton, pose = actor.figure.skeleton, actor.pose
+    first, key = posed_skeleton(skeleton, pose), pose.skinning_key
+    getattr(pose, name)[-1] += 0.25
+    assert pose.skinning_key is not key and pose.skinning_key != key
+    other = posed_skeleton(skeleton, pose)
+    assert other is not first
+    assert_array_equal(other.world, world_matrices(skeleton, pose))
+    getattr(pose, name)[-1] -= 0.25
+    assert_array_equal(posed_skeleton(skeleton, pose).world, first.world)
+
+
+def test_another_skeleton_or_skin_has_its_own_matrices(actor):
+    figure, pose = actor.figure, actor.pose
+    longer = replace(figure.skeleton, rest_translations=2.0 * figure.skeleton.rest_translations)
+    first = posed_skeleton(figure.skeleton, pose)
+    assert_array_equal(posed_skeleton(longer, pose).world, world_matrices(longer, pose))
+    other = replace(figure.skin, inverse_bind=2.0 * figure.skin.inverse_bind)
+    assert_array_equal(first.palette(other), 2.0 * first.palette(figure.skin))
+
+
+def test_matrices_are_read_only(actor):
+    posed = posed_skeleton(actor.figure.skeleton, actor.pose)
+    for matrices in (posed.world, posed.palette(actor.figure.skin)):
+        with pytest.raises(ValueError, match="read-only"):
+            matrices[0] = 0.0
+
+
+def test_copies_of_a_pose_keep_their_own(actor, runs):
+    skeleton, pose = actor.figure.skeleton, actor.pose
+    first, copy = posed_skeleton(skeleton, pose), pose.copy()
+    copy.dofs[0] += 0.5
+    assert posed_skeleton(skeleton, copy) is not first
+    assert posed_skeleton(skeleton, pose) is first and len(runs) == 2
+
+
+def test_poses_computed_together_keep_theirs(actor, runs):
+    skeleton, poses = actor.figure.skeleton, [actor.pose.copy() for _ in range(3)]
+    for row, pose in enumerate(poses):
+        pose.dofs[:] *= row
+    wanted = [world_matrices(skeleton, pose) for pose in poses]
+    runs.clear()
+    assert_array_equal(posed_worlds(skeleton, poses), wanted)
+    assert len(runs) == 1
+    kept = [posed_skeleton(skeleton, pose) for pose in poses]
+    assert_array_equal([posed.world for posed in kept], wanted)
+    assert len(runs) == 1
+    poses[1].dofs[0] += 0.5
+    wanted[1] = world_matrices(skeleton, poses[1])
+    runs.clear()
+    assert_array_equal(posed_worlds(skeleton, poses), wanted)
+    assert len(runs) == 1 and posed_skeleton(skeleton, poses[0]) is kept[0]
+
+
+def test_poses_with_the_same_numbers_are_alike(actor):
+    pose, other = actor.pose, actor.pose.copy()
+    assert pose.is_like(other) and other.is_like(pose)
+    for name in (*ARRAYS, "figure_translation"):
+        other = pose.copy()
+        getattr(other, name)[-1] += 0.25
+        assert not pose.is_like(other) and not other.is_like(pose)
+    other = pose.copy()
+    other.figure_scale = 2.0
+    assert not pose.is_like(other)
+
+
+def test_keys_know_arrays_of_other_layout_and_count():
+    square = np.arange(9.0).reshape(3, 3)
+    key = NumberKey(square[:, ::2], np.zeros(0))
+    assert key.is_of(square[:, ::2], np.zeros(0)) and key.is_of(square[:, ::2].copy(), np.zeros(0))
+    assert not key.is_of(square[:, 1::2], np.zeros(0))
+    assert not key.is_of(square[:, ::2]) and not key.is_of(square[:, ::2], np.zeros(1))
+    assert key == NumberKey(square[:, ::2], np.zeros(0)) and key != NumberKey(square)
+    assert hash(key) == hash(NumberKey(square[:, ::2], np.zeros(0))) and key != 1

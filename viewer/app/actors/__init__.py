@@ -1,0 +1,1 @@
+"""Actors: the figures of the scene, and a camera that follows one."""

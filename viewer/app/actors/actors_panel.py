@@ -1,0 +1,159 @@
+"""Actors: who is in the scene, seen or not, in which colour, when and where."""
+
+from __future__ import annotations
+
+import numpy as np
+from imgui_bundle import imgui
+
+from viewer.app.actors.following import Following, start_following, stop_following
+from viewer.app.core.state import AppState
+from viewer.app.core.widgets import (
+    button,
+    checkbox,
+    explain,
+    note_item,
+    plain_zero,
+    same_line_if_room,
+)
+from viewer.errors import printable
+from viewer.rig.captures.fit_error import fitted_body, keypoint_distances
+from viewer.rig.mesh import box_size
+from viewer.rig.scalars import length_unit
+from viewer.rig.scene import Actor
+
+__all__ = ["draw"]
+
+_PLAIN = (0.75, 0.72, 0.68)  # what the colour button shows of actors without one of their own
+_LOOK = (
+    imgui.ColorEditFlags_.no_inputs | imgui.ColorEditFlags_.no_label | imgui.ColorEditFlags_.float
+)
+
+
+def draw(state: AppState) -> None:
+    """Draw the panel."""
+    _draw_list(state)
+    actor = state.actor
+    imgui.separator()
+    _draw_place(state, actor)
+    _draw_following(state)
+    _draw_motion_paths(state, actor)
+    _draw_fit(state, actor)
+
+
+def _draw_list(state: AppState) -> None:
+    actors = state.scene.actors
+    rows = min(len(actors), 8)
+    height = rows * imgui.get_frame_height_with_spacing() + 4.0
+    if imgui.begin_child("##list", (0.0, height)):
+        clipper = imgui.ListClipper()
+        clipper.begin(len(actors), imgui.get_frame_height_with_spacing())
+        while clipper.step():
+            for index in range(clipper.display_start, clipper.display_end):
+                imgui.push_id(index)
+                _draw_actor(state, index, actors[index])
+                imgui.pop_id()
+    imgui.end_child()
+
+
+def _draw_actor(state: AppState, index: int, actor: Actor) -> None:
+    actor.visible = imgui.checkbox("##visible", actor.visible)[1]
+    note_item(state, f"visible {index}")
+    if imgui.is_item_hovered(imgui.HoveredFlags_.delay_normal):
+        imgui.set_tooltip("drawn or not")
+    imgui.same_line()
+    shown = actor.color or _PLAIN
+    changed, color = imgui.color_edit3("##color", list(shown), _LOOK)
+    note_item(state, f"color {index}")
+    if imgui.is_item_clicked(imgui.MouseButton_.right):
+        actor.color = None
+    elif changed:
+        actor.color = (color[0], color[1], color[2])
+    if imgui.is_item_hovered(imgui.HoveredFlags_.delay_normal):
+        imgui.set_tooltip("colour; a right click takes the usual one")
+    imgui.same_line()
+    absent = "" if actor.is_present else "  (not there now)"
+    text = f"{printable(actor.name, 60)}{absent}"
+    if imgui.selectable(text, index == state.chosen_actor)[0]:
+        state.choose_actor(index)
+    note_item(state, f"actor {index}")
+
+
+def _draw_place(state: AppState, actor: Actor) -> None:
+    """Draw when and where the chosen actor is."""
+    if actor.clip is not None:
+        shown = plain_zero(actor.offset, "%.3f s")
+        changed, value = imgui.drag_float("Starts at", shown, 0.01, 0.0, 0.0, "%.3f s")
+        note_item(state, "Starts at")
+        if changed and abs(value) < 1e6:
+            actor.offset = value
+        explain("seconds by which its motion starts later than the scene's clock")
+    size = box_size(state.box) or 1.0
+    place = [plain_zero(part, "%.3f") for part in actor.placement[:3, 3].tolist()]
+    changed, moved = imgui.drag_float3("Stands at", place, 0.002 * size, 0.0, 0.0, "%.3f")
+    note_item(state, "Stands at")
+    if changed and all(abs(value) < 1e6 * size for value in moved):
+        placement = actor.placement.copy()
+        kept = np.array(place, dtype=np.float32) == np.array(moved, dtype=np.float32)
+        placement[:3, 3] = np.where(kept, placement[:3, 3], moved)
+        actor.placement = placement
+
+
+def _draw_following(state: AppState) -> None:
+    """Let the camera go with the chosen actor or joint."""
+    imgui.text_unformatted("Camera follows")
+    same_line_if_room("Actor")
+    target = state.of(Following).target
+    index, joint = state.chosen_actor, state.selected_joint
+    if checkbox(state, "Actor##follow", target == (index, -1)) != (target == (index, -1)):
+        stop_following(state) if target == (index, -1) else start_following(state, index, -1)
+    if joint >= 0:
+        same_line_if_room("Joint")
+        if checkbox(state, "Joint##follow", target == (index, joint)) != (target == (index, joint)):
+            chosen = target == (index, joint)
+            stop_following(state) if chosen else start_following(state, index, joint)
+    if target is not None:
+        same_line_if_room("Nobody")
+        if button(state, "Nobody"):
+            stop_following(state)
+
+
+def _draw_motion_paths(state: AppState, actor: Actor) -> None:
+    """Choose the joint whose path is drawn."""
+    options, joint = state.options, state.selected_joint
+    key = (state.chosen_actor, joint)
+    if actor.clip is not None and joint >= 0:
+        shown = key in options.path_joints
+        if checkbox(state, "Path of the selected joint", shown) != shown:
+            others = tuple(one for one in options.path_joints if one != key)
+            options.path_joints = others if shown else (*others, key)
+    if options.path_joints:
+        if button(state, "Clear paths"):
+            options.path_joints = ()
+        changed, value = imgui.drag_float(
+            "Seconds around now", options.path_seconds, 0.02, 0.0, 1e4, "%.2f s"
+        )
+        note_item(state, "Seconds around now")
+        explain("how far paths go back and forth; 0 shows all of the motion")
+        if changed:
+            options.path_seconds = max(value, 0.0)
+
+
+def _draw_fit(state: AppState, actor: Actor) -> None:
+    """Say how far a person's captured keypoints are from the joints of the body fitted to them."""
+    same = [a for a in state.scene.actors if a.points is not None and a.person == actor.person]
+    points = actor if actor.points is not None else next(iter(same), None)
+    body = None if points is None else fitted_body(points, state.scene.actors)
+    if points is None or body is None:
+        return
+    distances = keypoint_distances(points, body)
+    if not distances:
+        return
+    factor, unit = length_unit(body.figure)
+    mean = sum(distances.values()) / len(distances)
+    imgui.separator()
+    text = f"Keypoints to joints: {factor * mean:.1f} {unit} on average###fit"
+    if imgui.tree_node(text):
+        for name, distance in sorted(distances.items(), key=lambda item: -item[1]):
+            imgui.text_unformatted(f"{factor * distance:8.1f} {unit}  {printable(name, 40)}")
+        imgui.tree_pop()
+    note_item(state, "fit")

@@ -1,0 +1,59 @@
+"""A camera that follows an actor or one of its joints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from viewer.app.core.state import AppState
+from viewer.errors import printable
+from viewer.rig.arrays import Floats
+from viewer.rig.motion.follow import followed_point
+
+__all__ = ["Following", "follow_actor", "start_following", "stop_following"]
+
+
+@dataclass(slots=True)
+class Following:
+    """Whom the camera follows.
+
+    Attributes
+    ----------
+    target : (int, int) or None
+        The actor, and the joint of it (-1 for its middle).
+    place : (3,) or None
+        Where that was when the camera was moved last.
+    """
+
+    target: tuple[int, int] | None = None
+    place: Floats | None = None
+
+
+def follow_actor(state: AppState) -> None:
+    """Keep the camera's target on the followed actor or joint, as far from it as before."""
+    following = state.of(Following)
+    if following.target is None:
+        return
+    index, joint = following.target
+    place = None
+    if index < len(state.scene.actors):
+        place = followed_point(state.scene.actors[index], joint)
+    if place is not None:
+        if following.place is not None:
+            state.camera.target = state.camera.target + place - following.place
+        following.place = place
+
+
+def start_following(state: AppState, actor: int, joint: int) -> None:
+    """Let the camera follow an actor's joint, or its middle (-1), from where it is now."""
+    following = state.of(Following)
+    state.framing.is_fitting = False
+    following.target = actor, joint
+    following.place = followed_point(state.scene.actors[actor], joint)
+    name = state.scene.actors[actor].name
+    state.say_status(f"The camera follows {printable(name, 60)}")
+
+
+def stop_following(state: AppState) -> None:
+    """Leave the camera where it is."""
+    following = state.of(Following)
+    following.target = following.place = None

@@ -1,0 +1,58 @@
+"""The key Esc: close or cancel what lies on top."""
+
+from __future__ import annotations
+
+from viewer.app.core.state import AppState
+from viewer.app.files.state import Files
+from viewer.app.keys import Keyboard
+from viewer.app.linting.state import Linting
+from viewer.app.manual.manual_window import Manual
+from viewer.app.posing.tool_actions import cancel_drag
+from viewer.app.recording.state import Recording
+from viewer.app.rigging.tools import drop_rig_tool
+from viewer.app.weights.actions import unpin
+from viewer.app.weights.state import Weights
+
+__all__ = ["cancel"]
+
+
+def cancel(state: AppState) -> None:
+    """Close what lies on top: message, dialog, key list; else drop the selection."""
+    files = state.of(Files)
+    recording = state.of(Recording)
+    keyboard = state.of(Keyboard)
+    linting = state.of(Linting)
+    manual = state.of(Manual)
+    if cancel_drag(state):
+        return
+    if state.error:
+        state.error = ""
+    elif files.dialog is not None:
+        files.dialog = None
+    elif state.messages.is_open:
+        state.messages.is_open = False
+    elif manual.topic:
+        manual.topic = ""
+    elif files.loader is not None:
+        files.loader = None
+        state.say_status("Opening was cancelled")
+    elif state.job is not None and state.job.can_cancel:
+        state.job.cancel()
+        state.say_status("Cancelled")
+    elif recording.settings is not None:
+        recording.settings = None
+    elif files.stream is not None:
+        files.stream.cancel()
+        files.stream = None
+        state.say_status("Reading was cancelled; what was read stays")
+    elif keyboard.is_listed:
+        keyboard.is_listed = False
+    elif drop_rig_tool(state):
+        state.say_status("The template is left where it is")
+    elif linting.chosen >= 0:
+        linting.chosen = -1
+    elif state.of(Weights).pinned is not None:
+        unpin(state)
+        state.say_status("The vertex was unpinned")
+    else:
+        state.selected_joint = -1

@@ -1,0 +1,1 @@
+"""Core of the window: scene, selection, camera, time, history and messages. Knows no feature."""

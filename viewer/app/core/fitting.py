@@ -1,0 +1,102 @@
+"""Fitting of the camera to the free view until the user moves it."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from viewer.app.core.state import AppState
+from viewer.rendering.camera import fit
+from viewer.rig.arrays import Floats
+from viewer.rig.scene import scene_points
+
+__all__ = ["fit_again", "fit_points", "fit_shown", "keep_fitting"]
+
+_GAP = 6.0  # points between the tools and what is seen
+_LEAST = 0.6  # of the view's height, however much lies over it
+_NARROWEST = 40.0  # points: in a smaller view nothing can be seen
+
+
+def keep_fitting(state: AppState, grows: bool) -> None:
+    """Go on with finding how far the scene reaches, and fit the camera to it if nobody moved it.
+
+    To be called in each frame, when it is known how much room the panels leave.
+
+    Parameters
+    ----------
+    state : AppState
+        With the camera.
+    grows : bool
+        Whether more of the motion is still to come.
+    """
+    framing = state.framing
+    framing.watch(state.camera)
+    if framing.extent.look(state.scene, state.playback, state.options.show, grows):
+        state.box = framing.extent.box
+        framing.note_extent()
+    _, _, width, height = state.view_rect
+    if not framing.is_fitting or min(width, height) < _NARROWEST:
+        return
+    if framing.is_due((width, height, state.panels_visible)):
+        _fit(state, framing.fitted_points)
+
+
+def fit_points(state: AppState, points: Floats) -> None:
+    """Aim the camera at some points, fill the view with them, and keep it so.
+
+    Parameters
+    ----------
+    state : AppState
+        Its camera leaves a calibrated one's place.
+    points : (N, 3)
+        Scene space.
+    """
+    framing = state.framing
+    framing.is_fitting, framing.points = True, points
+    _fit(state, points)
+
+
+def fit_again(state: AppState) -> None:
+    """Fit the camera from where it looks now: to what it was fitted to, if nobody moved it."""
+    framing = state.framing
+    if not framing.is_fitting:
+        fit_shown(state)
+    else:
+        _fit(state, framing.fitted_points)
+
+
+def fit_shown(state: AppState) -> None:
+    """Aim the camera at the scene as it is posed, and keep it so."""
+    fit_points(state, scene_points(state.scene, state.options.show))
+
+
+def _fit(state: AppState, points: Floats) -> None:
+    camera = state.camera
+    camera.fixed = None
+    fit(camera, points, state.aspect)
+    state.limit_camera()
+    covered = _covered_height(state, points)
+    if covered:
+        # As much is left out below, so that the camera turns about the middle of what it sees.
+        height = max(state.view_rect[3], 1.0)
+        fit(camera, points, state.aspect, max(1.0 - 2.0 * covered / height, _LEAST))
+        state.limit_camera()
+    state.framing.note_placed(camera)
+
+
+def _covered_height(state: AppState, points: Floats) -> float:
+    """Return how far down the tools in the upper right corner reach if they cover any point.
+
+    The settings that some tools have below their buttons do not count: whoever takes a tool in hand
+    wants to go on with what is seen.
+    """
+    tools = state.item_rects.get("##tools")
+    if tools is None:
+        return 0.0
+    x, y, width, height = state.view_rect
+    matrix = state.camera.projection_matrix(state.aspect, state.box) @ state.camera.view_matrix()
+    clip = points @ matrix[:, :3].T + matrix[:, 3]
+    across = x + 0.5 * width * (1.0 + clip[:, 0] / clip[:, 3])
+    down = y + 0.5 * height * (1.0 - clip[:, 1] / clip[:, 3])
+    row = imgui.get_frame_height() + 2.0 * imgui.get_style().window_padding.y
+    is_covered = (across > tools[0] - _GAP) & (down < tools[1] + row + _GAP)
+    return tools[1] + row + _GAP - y if is_covered.any() else 0.0

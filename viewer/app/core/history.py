@@ -1,0 +1,261 @@
+"""Undo and redo: every change of pose, clip or display is a step; a slider drag is one."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Protocol
+
+from viewer.app.core.snapshot import (
+    Snapshot,
+    copied_poses,
+    have_same_motion,
+    is_current,
+    is_same,
+    look_of,
+    restore_display,
+    restore_motion,
+    same_pose,
+)
+from viewer.rendering.options import DisplayOptions
+from viewer.rig.captures.points import PointClip
+from viewer.rig.motion.retimed import with_rate
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.pose import Pose
+from viewer.rig.scene import Actor, Motion, Scene
+
+__all__ = ["History", "Undoable"]
+
+_MOST = 500  # steps kept
+
+
+class Undoable(Protocol):
+    """A feature's state of which one value is undone with the scene."""
+
+    def kept(self) -> object | None:
+        """Return that value, which is never changed, only replaced; None if there is none."""
+
+    def restore(self, kept: object | None) -> None:
+        """Bring back a value that was kept."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Step:
+    """One edit: the state before it and the state that it made, both at the time of the edit."""
+
+    before: Snapshot
+    after: Snapshot
+
+
+@dataclass(slots=True)
+class History:
+    """Notices changes instead of being told of them, so no panel or key can forget to.
+
+    ``observe`` compares the state of each frame with that of the frame before. While a widget is
+    held an edit goes on: the whole drag becomes one step. What the scene's clock does to poses is
+    no edit: see ``follow``.
+
+    Undo and redo of an edit of actors, poses or clips go to the time of the edit. There the clock
+    poses all actors by their restored clips (``settle``), but a pose that was edited by hand comes
+    back as it was. Undo of an edit of the display alone leaves time and poses.
+
+    Attributes
+    ----------
+    time : float
+        Seconds that are shown.
+    has_restored : bool
+        Whether clips and poses were restored and the clock has yet to follow.
+    feature : Undoable or None
+        Has a value that is undone with the scene.
+    """
+
+    time: float = 0.0
+    has_restored: bool = False
+    feature: Undoable | None = None
+    _seen: Snapshot | None = None  # the state of the last frame
+    _before: Snapshot | None = None  # the state before an edit that still goes on
+    _clocked: dict[Actor, tuple[Motion, float, Pose | None]] = field(default_factory=dict)
+    _undo: list[_Step] = field(default_factory=list)
+    _redo: list[_Step] = field(default_factory=list)
+
+    def start(self, scene: Scene, options: DisplayOptions) -> None:
+        """Forget everything; the scene as it is becomes the first state."""
+        self.feature = None  # it was about another scene
+        self.has_restored = False
+        self._clocked.clear()
+        self._seen, self._before = self._take(scene, options), None
+        self._undo.clear()
+        self._redo.clear()
+
+    def observe(self, scene: Scene, options: DisplayOptions, busy: bool) -> bool:
+        """Keep a step if something changed and no widget is held; return whether it did."""
+        if self._seen is None:
+            return False
+        if not is_current(self._seen, scene, options) or self._has_another_value():
+            self._before = self._before or self._seen
+            self._seen = self._take(scene, options)
+        if busy or self._before is None:
+            return False
+        before, self._before = self._before, None
+        if is_same(before, self._seen):  # dragged there and back
+            return False
+        self._undo.append(_Step(before, self._seen))
+        del self._undo[:-_MOST]
+        self._redo.clear()
+        return True
+
+    def accept(self, scene: Scene, options: DisplayOptions) -> None:
+        """Take over what only looks at the scene otherwise, without a step of its own."""
+        if self._seen is not None:
+            self._seen = self._take(scene, options)
+
+    def exchange(self, old: object, new: object) -> None:
+        """Put a feature's value about which more is known in the place of an older one."""
+
+        def exchanged(one: Snapshot) -> Snapshot:
+            return replace(one, kept=new) if one.kept is old else one
+
+        self._replace(exchanged)
+
+    def follow(self, scene: Scene, time: float) -> None:
+        """Take over poses that the clock has set, without a step; edits keep their steps.
+
+        Edits of the same frame must have been observed before the clock has posed the scene.
+        """
+        self.time = time
+        if self._seen is None:
+            return
+        actors = self._seen.actors  # others may have come to the scene since
+        poses = copied_poses(actors)
+        self._seen = replace(self._seen, poses=poses, by_hand=(False,) * len(poses), time=time)
+        self._clocked = {
+            actor: (actor.clip, actor.offset, pose)
+            for actor, pose in zip(actors, poses, strict=True)
+            if actor.clip is not None
+        }
+
+    def settle(self, scene: Scene, time: float) -> None:
+        """Put restored poses that were made by hand over those that the clock has set."""
+        restored, self.has_restored = self._seen, False
+        if restored is None:
+            return
+        self.follow(scene, time)
+        rows = zip(restored.actors, restored.poses, restored.by_hand, strict=True)
+        for actor, pose, is_own in rows:
+            if is_own and pose is not None:
+                actor.pose = pose.copy()
+        self._seen = replace(restored, poses=copied_poses(restored.actors), time=time)
+
+    def add_actors(self, scene: Scene, options: DisplayOptions) -> None:
+        """Go on with a scene to which actors were added at its end, as captures are read."""
+        whole = self._take(scene, options)
+        known = {
+            id(actor)
+            for step in (*self._undo, *self._redo)
+            for one in (step.before, step.after)
+            for actor in one.actors
+        }
+        known |= {id(actor) for one in (self._seen, self._before) if one for actor in one.actors}
+        rows = [row for row, actor in enumerate(whole.actors) if id(actor) not in known]
+        clips = {id(actor): actor.clip for actor in whole.actors}
+
+        def extended(one: Snapshot) -> Snapshot:
+            looks = (
+                replace(look, clip=_grown(look.clip, clips.get(id(actor))))
+                for actor, look in zip(one.actors, one.looks, strict=True)
+            )
+            return replace(
+                one,
+                actors=(*one.actors, *(whole.actors[row] for row in rows)),
+                poses=(*one.poses, *(whole.poses[row] for row in rows)),
+                by_hand=(*one.by_hand, *(False for _ in rows)),
+                looks=(*looks, *(whole.looks[row] for row in rows)),
+            )
+
+        self._replace(extended)
+
+    @property
+    def can_undo(self) -> bool:
+        """Whether there is a step to go back to."""
+        return bool(self._undo)
+
+    @property
+    def can_redo(self) -> bool:
+        """Whether a step was undone and can come back."""
+        return bool(self._redo)
+
+    def undo(self, scene: Scene, options: DisplayOptions) -> bool:
+        """Go back one step; return whether there was one."""
+        self.observe(scene, options, busy=False)
+        if not self._undo:
+            return False
+        step = self._undo.pop()
+        self._redo.append(step)
+        self._go(step.after, step.before, scene, options)
+        return True
+
+    def redo(self, scene: Scene, options: DisplayOptions) -> bool:
+        """Go forward one step; return whether there was one."""
+        self.observe(scene, options, busy=False)
+        if not self._redo:
+            return False
+        step = self._redo.pop()
+        self._undo.append(step)
+        self._go(step.before, step.after, scene, options)
+        return True
+
+    def _go(self, here: Snapshot, there: Snapshot, scene: Scene, options: DisplayOptions) -> None:
+        """Go from one state of a step to the other."""
+        if not have_same_motion(here, there):
+            restore_motion(there, scene)
+            self.time, self.has_restored = there.time, True
+            self._seen = there
+        restore_display(there, options)
+        if self.feature is not None:
+            self.feature.restore(there.kept)
+        if self._seen is not None and self._seen is not there:
+            looks = tuple(map(look_of, scene.actors))
+            kept = copy.deepcopy(options)
+            self._seen = replace(self._seen, looks=looks, options=kept, kept=self._kept())
+
+    def _replace(self, change: Callable[[Snapshot], Snapshot]) -> None:
+        """Replace every state that is kept."""
+        for steps in (self._undo, self._redo):
+            steps[:] = [_Step(change(step.before), change(step.after)) for step in steps]
+        self._seen, self._before = (
+            None if one is None else change(one) for one in (self._seen, self._before)
+        )
+
+    def _take(self, scene: Scene, options: DisplayOptions) -> Snapshot:
+        actors = tuple(scene.actors)
+        poses, by_hand = copied_poses(actors), tuple(map(self._is_by_hand, actors))
+        looks, kept = tuple(map(look_of, actors)), copy.deepcopy(options)
+        return Snapshot(actors, poses, by_hand, looks, kept, self.time, self._kept())
+
+    def _is_by_hand(self, actor: Actor) -> bool:
+        """Return whether an actor's pose is another than the clock gave it by its present clip.
+
+        A clip that is new poses the actor in the same frame, whatever its pose was.
+        """
+        clip, offset, pose = self._clocked.get(actor, (None, 0.0, None))
+        if clip is None or clip is not actor.clip or offset != actor.offset:
+            return False
+        return not same_pose(pose, actor.pose)
+
+    def _kept(self) -> object | None:
+        return None if self.feature is None else self.feature.kept()
+
+    def _has_another_value(self) -> bool:
+        """Return whether a feature's value is another; that it has none any more is no edit."""
+        kept = self._kept()
+        return kept is not None and (self._seen is None or kept is not self._seen.kept)
+
+
+def _grown(old: Motion | None, new: Motion | None) -> Motion | None:
+    """Return what a clip of an earlier step is now that more of its capture has been read."""
+    if isinstance(old, SampledClip) and isinstance(new, SampledClip):
+        return with_rate(new, old.timing.frame_rate)
+    if isinstance(old, PointClip) and isinstance(new, PointClip):
+        return with_rate(new, old.timing.frame_rate)
+    return old

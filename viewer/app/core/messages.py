@@ -1,0 +1,141 @@
+"""What was said: every message of the window, kept after it has gone from the view."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+__all__ = ["KINDS", "Message", "MessageLog", "Messages", "Note", "message_line"]
+
+KINDS = ("note", "status", "error")
+"""What is said by itself; in answer to a key or button; because something did not work."""
+
+_MOST = 1000  # messages kept
+_NOTE_SECONDS = 4.0  # for which a short message is shown
+
+
+@dataclass(slots=True)
+class Message:
+    """A text that was said once or more.
+
+    Attributes
+    ----------
+    text : str
+        As it was shown.
+    kind : str
+        One of ``KINDS``.
+    count : int
+        How often it was said.
+    """
+
+    text: str
+    kind: str
+    count: int = 1
+
+
+@dataclass(slots=True)
+class MessageLog:
+    """The latest messages in the order in which they were said last, none of them twice."""
+
+    _messages: dict[tuple[str, str], Message] = field(default_factory=dict)
+
+    def add(self, text: str, kind: str = "note") -> None:
+        """Keep a message; one that is known is counted and moves to the end.
+
+        Parameters
+        ----------
+        text : str
+            One line.
+        kind : str
+            One of ``KINDS``.
+        """
+        message = self._messages.pop((kind, text), None)
+        if message is None:
+            message = Message(text, kind, 0)
+        message.count += 1
+        self._messages[kind, text] = message
+        while len(self._messages) > _MOST:
+            del self._messages[next(iter(self._messages))]
+
+    def __len__(self) -> int:
+        return len(self._messages)
+
+    def __iter__(self) -> Iterator[Message]:
+        return iter(self._messages.values())
+
+    def listed(self, with_status: bool) -> list[Message]:
+        """Return the messages, the oldest first, with or without what keys and buttons did."""
+        return [message for message in self if with_status or message.kind != "status"]
+
+
+@dataclass(slots=True)
+class Note:
+    """A message that goes away by itself, or when the next one of its kind comes."""
+
+    text: str
+    until: float
+    is_status: bool = False
+
+
+@dataclass(slots=True)
+class Messages:
+    """Everything that was said, and what of it is shown now.
+
+    Attributes
+    ----------
+    notes : list of Note
+        What is shown over the view.
+    log : MessageLog
+        Everything that was said.
+    is_open : bool
+        Whether the window "Messages" is open.
+    lists_status : bool
+        Whether it lists what keys and buttons did as well.
+    """
+
+    notes: list[Note] = field(default_factory=list)
+    log: MessageLog = field(default_factory=MessageLog)
+    is_open: bool = False
+    lists_status: bool = False
+    _logged_error: str = ""  # the one that the log has already, while it is shown
+
+    def show(self, text: str, is_status: bool = False) -> None:
+        """Show a message for some seconds, and keep it in the log.
+
+        Parameters
+        ----------
+        text : str
+            One line.
+        is_status : bool
+            Whether it says what a key did, in place of what the key before did.
+        """
+        until = time.monotonic() + _NOTE_SECONDS + len(text) / 30.0
+        # What is said again stays longer, and does not push others out of the view.
+        self.notes[:] = [
+            note for note in self.notes if note.text != text and not (is_status and note.is_status)
+        ]
+        self.notes.append(Note(text, until, is_status))
+        self.log.add(text, "status" if is_status else "note")
+
+    def log_error(self, error: str) -> None:
+        """Keep the error that is shown in the log, once while it is shown; empty if none is."""
+        if error and error != self._logged_error:
+            self.log.add(error, "error")
+        self._logged_error = error
+
+    def drop_old(self) -> None:
+        """Forget notes whose time is over."""
+        now = time.monotonic()
+        self.notes[:] = [note for note in self.notes if note.until > now]
+
+
+def message_line(message: Message) -> str:
+    """Return a message as one line, with how often it was said.
+
+    >>> message_line(Message("no uvs", "note", 3)), message_line(Message("no uvs", "error"))
+    ('no uvs (3 times)', 'error: no uvs')
+    """
+    start = "error: " if message.kind == "error" else ""
+    end = f" ({message.count:,} times)" if message.count > 1 else ""
+    return f"{start}{message.text}{end}"

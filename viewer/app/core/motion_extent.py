@@ -1,0 +1,174 @@
+"""Extent of a scene over its whole motion, computed a few frames at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from viewer.app.core.playback import Playback
+from viewer.rendering.framing import frames_looked_at, outermost
+from viewer.rendering.recorder import copied
+from viewer.rig.arrays import Floats
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import bounding_box
+from viewer.rig.motion.instances import pose_actors
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.pose import Pose
+from viewer.rig.scene import Actor, Scene, scene_points
+
+__all__ = ["MotionExtent"]
+
+_POINTS_A_TIME = 30_000  # posed in one frame of the interface: a motion takes some of those
+_MOST_POINTS = 2_000_000  # posed in all
+_MOST_FRAMES = 32
+_MOST_PRODUCTS = 100_000_000  # of points and directions, where there are very many points
+_N_DIRECTIONS = (100, 1000)
+
+
+@dataclass(slots=True)
+class MotionExtent:
+    """Outermost points of a scene in some frames of its motion; of a still scene, as it was opened.
+
+    A capture that is being read is looked at as it comes: frames are taken at a step that doubles
+    whenever there are too many. When all is there they are those that a recording is fitted to.
+
+    Attributes
+    ----------
+    is_done : bool
+        Whether all frames have been looked at.
+    was_edited : bool
+        Whether somebody has changed a shape or a motion since the scene was opened.
+    """
+
+    is_done: bool = False
+    was_edited: bool = False
+    _clouds: dict[float, Floats] = field(default_factory=dict)  # by the seconds they are seen at
+    _kept: dict[float, Floats] = field(default_factory=dict)  # of before an edit
+    _shapes: tuple[bytes, ...] = ()
+    _motions: tuple[object, ...] = ()
+    _opened: dict[int, tuple[Actor, Figure, Pose]] = field(default_factory=dict)
+    _grew: bool = False
+
+    def restart(self) -> None:
+        """Forget everything: other figures are shown, or these in other poses."""
+        self.is_done = self.was_edited = self._grew = False
+        self._clouds, self._kept, self._opened = {}, {}, {}
+        self._shapes, self._motions = (), ()
+
+    @property
+    def points(self) -> Floats:
+        """What was found: (N, 3), scene space; the origin if nobody was seen."""
+        clouds = [cloud for cloud in {**self._kept, **self._clouds}.values() if len(cloud)]
+        return np.concatenate(clouds) if clouds else np.zeros((1, 3))
+
+    @property
+    def box(self) -> Floats:
+        """The box around all of them: (2, 3)."""
+        return bounding_box(self.points)
+
+    def look(self, scene: Scene, playback: Playback, show: str, grows: bool) -> bool:
+        """Look at some more frames; return whether there was one.
+
+        Parameters
+        ----------
+        scene : Scene
+            As it is shown; nothing of it changes.
+        playback : Playback
+            Gives the frames.
+        show : str
+            What is drawn of the figures, a key of ``SHOWN``.
+        grows : bool
+            Whether more of the motion is still to come.
+        """
+        shapes = tuple(map(_own_shape, scene.actors))
+        motions = tuple(map(_own_motion, scene.actors))
+        is_edited = shapes[: len(self._shapes)] != self._shapes
+        if not grows and not self._grew:  # motions that grow are no edits
+            is_edited |= motions[: len(self._motions)] != self._motions
+        if is_edited or (self._grew and not grows):
+            # Frames are looked at again: after an edit, or as another capture had not come so far.
+            self._kept, self._clouds = {**self._kept, **self._clouds}, {}
+        self.was_edited |= is_edited
+        self._shapes, self._motions, self._grew = shapes, motions, grows
+        self._keep_poses(scene)
+        left = self._left(scene, playback, grows)
+        self.is_done = not left and not grows
+        n_points = max(_n_points(scene), 1)
+        for time in left[: max(_POINTS_A_TIME // n_points, 1)]:
+            self._clouds[time] = self._cloud(scene, playback, time, show)
+            self._kept.pop(time, None)
+        return bool(left)
+
+    def _keep_poses(self, scene: Scene) -> None:
+        """Remember the pose that each actor has at first: edits do not move the ground."""
+        for actor in scene.actors:
+            known = self._opened.get(id(actor))
+            if actor.pose is not None and (known is None or known[1] is not actor.figure):
+                self._opened[id(actor)] = actor, actor.figure, actor.pose.copy()
+
+    def _left(self, scene: Scene, playback: Playback, grows: bool) -> list[float]:
+        """Return the times to look at next, and drop those that no longer count."""
+        first, last = playback.frame_range if playback.has_motion else (0, 0)
+        last = max(first, last)  # a motion may lie between two frames
+        if grows:
+            wanted = set(map(playback.frame_time, _growing(first, last)))
+        else:
+            most = min(max(_MOST_POINTS // max(_n_points(scene), 1), 2), _MOST_FRAMES)
+            frames = frames_looked_at(last - first + 1, most)
+            wanted = {playback.frame_time(first + frame) for frame in frames}
+            for known in (self._clouds, self._kept):
+                for time in known.keys() - wanted:
+                    del known[time]
+        # What was lowest comes first: the ground must not lag behind a shape's slider.
+        up = "xyz".index(scene.up)
+        lowest = {time: cloud[:, up].min() for time, cloud in self._kept.items() if len(cloud)}
+        left = wanted - self._clouds.keys()
+        return sorted(left, key=lambda time: (lowest.get(time, np.inf), time))
+
+    def _cloud(self, scene: Scene, playback: Playback, time: float, show: str) -> Floats:
+        """Return the outermost points at one time; none if nobody is there."""
+        seen = copied(scene)
+        for actor, shown in zip(seen.actors, scene.actors, strict=True):
+            if actor.pose is not None:
+                weights = actor.pose.shape_weights
+                actor.pose = self._opened[id(shown)][2].copy()
+                actor.pose.shape_weights = weights
+        if playback.has_motion:
+            pose_actors(seen.actors, time, playback.fill_gaps)
+            if not any(actor.is_drawn for actor in seen.actors):
+                return np.zeros((0, 3))
+        points = scene_points(seen, show)
+        if not playback.has_motion:
+            return points  # one frame: to keep all takes less time than to choose
+        low, high = _N_DIRECTIONS
+        return outermost(points, min(max(_MOST_PRODUCTS // len(points), low), high))
+
+
+def _growing(first: int, last: int) -> list[int]:
+    """Return at most 33 frames of a motion that grows: what was looked at once still counts.
+
+    >>> _growing(0, 3), _growing(0, 70)[:4]
+    ([0, 1, 2, 3], [0, 4, 8, 12])
+    """
+    step = 1
+    while (last - first) // step > _MOST_FRAMES:
+        step *= 2
+    return list(range(first, last + 1, step))
+
+
+def _own_shape(actor: Actor) -> bytes:
+    """Return the key of a shape that no motion changes."""
+    is_driven = isinstance(actor.clip, SampledClip) and actor.clip.shape_weights is not None
+    return b"" if actor.pose is None or is_driven else actor.pose.shape_weights.tobytes()
+
+
+def _own_motion(actor: Actor) -> tuple[object, ...]:
+    """Return the key of what moves and places an actor; clips are replaced when they are edited."""
+    return actor.clip, actor.offset, actor.placement.tobytes()
+
+
+def _n_points(scene: Scene) -> int:
+    meshes: Sequence[object] = [actor.figure.mesh for actor in scene.actors]
+    return sum(getattr(mesh, "n_vertices", 0) for mesh in meshes)

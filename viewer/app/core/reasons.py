@@ -1,0 +1,110 @@
+"""Why a control cannot act right now: words for its tooltip; empty where it can."""
+
+from __future__ import annotations
+
+from viewer.app.core.state import AppState
+from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.sampled_clip import SampledClip
+
+__all__ = [
+    "no_job_room",
+    "no_mesh",
+    "no_motion",
+    "no_new_clip",
+    "no_panel",
+    "no_pose",
+    "no_redo",
+    "no_skeleton",
+    "no_skin",
+    "no_texture",
+    "no_undo",
+    "nothing_to_export",
+]
+
+
+def no_motion(state: AppState) -> str:
+    """Say why time cannot be moved."""
+    return "" if state.playback.has_motion else "nothing moves: open a clip, a capture or a BVH"
+
+
+def no_panel(state: AppState, needs: str) -> str:
+    """Say why a panel has nothing to show.
+
+    Parameters
+    ----------
+    state : AppState
+        With the scene.
+    needs : str
+        As the table of panels says.
+    """
+    if needs == "motion" or (needs == "actors" and len(state.scene.actors) < 2):
+        return no_motion(state)
+    if needs in ("", "actors") or getattr(state.actor.figure, needs) not in (None, ()):
+        return ""
+    return f"this figure has no {needs.replace('_', ' ')}"
+
+
+def no_pose(state: AppState) -> str:
+    """Say why the chosen actor cannot be posed."""
+    return "" if state.actor.pose is not None else f"{_what(state)} has no joints to pose"
+
+
+def no_new_clip(state: AppState) -> str:
+    """Say why the chosen actor cannot get a clip."""
+    return no_pose(state) or ("it has a motion already" if state.actor.clip is not None else "")
+
+
+def nothing_to_export(state: AppState) -> str:
+    """Say why no motion can be written."""
+    if any(isinstance(actor.clip, Clip | SampledClip) for actor in state.scene.actors):
+        return ""
+    if state.playback.has_motion:
+        return "captured points alone move, and no joints"
+    return no_motion(state)
+
+
+def no_job_room(state: AppState) -> str:
+    """Say why no other long work can be begun."""
+    return "" if state.job is None else f"wait for: {state.job.title}"
+
+
+def no_undo(state: AppState) -> str:
+    """Say why nothing can be taken back."""
+    return "" if state.history.can_undo else "nothing was changed"
+
+
+def no_redo(state: AppState) -> str:
+    """Say why nothing can be brought back."""
+    return "" if state.history.can_redo else "nothing was undone"
+
+
+def no_mesh(state: AppState) -> str:
+    """Say why the ways to draw surfaces do nothing."""
+    has_one = any(actor.figure.mesh is not None for actor in state.scene.actors)
+    return "" if has_one else "there is no mesh"
+
+
+def no_skeleton(state: AppState) -> str:
+    """Say why no skeleton can be drawn."""
+    has_one = any(actor.figure.skeleton is not None for actor in state.scene.actors)
+    return "" if has_one else "there is no skeleton"
+
+
+def no_skin(state: AppState) -> str:
+    """Say why there is no binding space to show."""
+    has_one = any(actor.figure.is_attached for actor in state.scene.actors)
+    return "" if has_one else "there is no skin that follows a skeleton"
+
+
+def no_texture(state: AppState) -> str:
+    """Say why the texture makes no difference."""
+    meshes = [actor.figure.mesh for actor in state.scene.actors]
+    has_one = any(
+        mesh is not None and any(material.image is not None for material in mesh.materials)
+        for mesh in meshes
+    )
+    return "" if has_one else "no figure here has a texture: drop a picture on the window"
+
+
+def _what(state: AppState) -> str:
+    return "a set of captured points" if state.actor.figure.points is not None else "this figure"

@@ -1,0 +1,33 @@
+"""Undo and redo as actions of the window: the chosen actor stays chosen."""
+
+from __future__ import annotations
+
+from viewer.app.core.state import AppState
+from viewer.rig.scene import Actor
+
+__all__ = ["redo", "undo"]
+
+
+def undo(state: AppState) -> None:
+    """Take back the last change of pose or display."""
+    before = state.actor
+    if not state.history.undo(state.scene, state.options):
+        state.say_status("Nothing to undo")
+    _keep_choice(state, before)
+
+
+def redo(state: AppState) -> None:
+    """Bring back the change that was undone last."""
+    before = state.actor
+    if not state.history.redo(state.scene, state.options):
+        state.say_status("Nothing to redo")
+    _keep_choice(state, before)
+
+
+def _keep_choice(state: AppState, before: Actor) -> None:
+    """Keep the chosen actor, wherever it is now; choose anew if it is there no more."""
+    actors, row = state.scene.actors, state.chosen_actor
+    if row < len(actors) and actors[row] is before:
+        return
+    rows = [number for number, actor in enumerate(actors) if actor is before]
+    state.choose_actor(rows[0] if rows else min(row, len(actors) - 1))

@@ -1,0 +1,97 @@
+"""Between the scene and the window: where points are seen, and what lies under the pointer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.app.core.state import AppState
+from viewer.rig.arrays import Floats
+from viewer.rig.geometry.vectors import unit
+
+__all__ = ["ViewFrame", "view_frame"]
+
+Place = tuple[float, float]
+"""A point of the window, window coordinates."""
+
+_NEAREST = 1e-9  # of clip space's w: what is nearer is beside or behind the eye
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ViewFrame:
+    """The camera's projection and the part of the window that it fills.
+
+    Attributes
+    ----------
+    matrix : (4, 4)
+        Scene to clip space, projection @ view.
+    rect : (x, y, width, height)
+        Window coordinates.
+    """
+
+    matrix: Floats
+    rect: tuple[float, float, float, float]
+
+    def project(self, points: Floats) -> Floats:
+        """Return where points are seen: (..., 3) to (..., 2), NaN for those not before the eye."""
+        clip = points @ self.matrix[:, :3].T + self.matrix[:, 3]
+        w = clip[..., 3:]
+        ratio = clip[..., :2] / np.where(w > _NEAREST, w, np.nan)
+        x, y, width, height = self.rect
+        return np.array([x + 0.5 * width, y + 0.5 * height]) + ratio * (
+            0.5 * np.array([width, -height])
+        )
+
+    def place(self, point: Floats) -> Place | None:
+        """Return where one point is seen, None if it is not before the eye."""
+        seen = self.project(point)
+        return (float(seen[0]), float(seen[1])) if np.isfinite(seen).all() else None
+
+    def at_depth_of(self, point: Floats, place: Place) -> Floats:
+        """Return the point seen at a place, as deep in the view as another point.
+
+        Parameters
+        ----------
+        point : (3,)
+            Scene space, before the eye.
+        place : (float, float)
+            Window coordinates.
+
+        Returns
+        -------
+        (3,)
+            On the plane through the point that is parallel to the picture.
+        """
+        clip = self.matrix @ np.append(point, 1.0)
+        found = np.linalg.solve(self.matrix, self._clip(place, clip[2], clip[3]))
+        return np.asarray(found[:3] / found[3])
+
+    def ray(self, place: Place) -> tuple[Floats, Floats]:
+        """Return the line of sight at a place: a point on it, and its unit direction away."""
+        ends = np.stack([self._clip(place, depth, 1.0) for depth in (-1.0, 1.0)], axis=1)
+        near, far = np.linalg.solve(self.matrix, ends).T
+        near, far = near[:3] / near[3], far[:3] / far[3]
+        return near, unit(far - near)
+
+    def unit_length(self, point: Floats) -> float:
+        """Return how long a unit of the window is at a point's depth, scene units."""
+        seen = self.place(point)
+        if seen is None:
+            return 0.0
+        beside = self.at_depth_of(point, (seen[0] + 1.0, seen[1]))
+        return float(np.linalg.norm(beside - point))
+
+    def _clip(self, place: Place, depth: float, w: float) -> Floats:
+        x, y, width, height = self.rect
+        across = 2.0 * (place[0] - x) / width - 1.0
+        upward = 1.0 - 2.0 * (place[1] - y) / height
+        return np.array([across * w, upward * w, depth, w])
+
+
+def view_frame(state: AppState) -> ViewFrame:
+    """Return how the scene is seen in the view right now."""
+    x, y, width, height = state.view_rect
+    rect = (x, y, max(width, 1.0), max(height, 1.0))
+    projection = state.camera.projection_matrix(state.aspect, state.box)
+    return ViewFrame(projection @ state.camera.view_matrix(), rect)

@@ -1,0 +1,178 @@
+"""Widgets that several panels use; each notes where it was drawn."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import re
+from collections.abc import Iterator
+
+from imgui_bundle import imgui
+
+from viewer.app.core.state import AppState
+from viewer.rig.number_text import number_text
+
+__all__ = [
+    "Rect",
+    "begin_menu",
+    "begin_overlay",
+    "button",
+    "checkbox",
+    "choice",
+    "disabled",
+    "explain",
+    "menu_item",
+    "note_item",
+    "overlay_rect",
+    "plain_zero",
+    "same_line_if_room",
+    "slider",
+]
+
+_NUMBER = re.compile(r"%[0-9.+]*[efg]")
+
+Rect = tuple[float, float, float, float]
+"""Left, upper, right and lower edge, in window coordinates."""
+
+
+def note_item(state: AppState, label: str) -> None:
+    """Remember where the last widget is, under a label that tests can aim at."""
+    low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+    state.item_rects[label] = (low.x, low.y, high.x, high.y)
+
+
+@contextlib.contextmanager
+def disabled(why: str) -> Iterator[None]:
+    """Grey out what a block draws if there is a reason; ``explain`` puts it into a tooltip."""
+    imgui.begin_disabled(bool(why))
+    try:
+        yield
+    finally:
+        imgui.end_disabled()
+
+
+def explain(text: str, why: str = "") -> None:
+    """Give the last widget a tooltip: what it does, or why it cannot.
+
+    Parameters
+    ----------
+    text : str
+        What it does; may be empty.
+    why : str
+        Why it is greyed out; empty if it is not.
+    """
+    flags = imgui.HoveredFlags_.delay_normal | imgui.HoveredFlags_.allow_when_disabled
+    words = "\n".join(filter(None, (text, why)))
+    if words and imgui.is_item_hovered(flags):
+        imgui.set_tooltip(words)
+
+
+def begin_overlay(name: str, x: float, y: float, pivot: tuple[float, float]) -> bool:
+    """Begin a small window over the view that takes no input; then ``imgui.end`` follows.
+
+    Parameters
+    ----------
+    name : str
+        Of the window.
+    x, y : float
+        Where it is, in window coordinates.
+    pivot : (float, float)
+        The part of it that is there: (0, 0) its upper left, (1, 1) its lower right corner.
+    """
+    imgui.set_next_window_pos((x, y), imgui.Cond_.always, pivot)
+    imgui.set_next_window_bg_alpha(0.86)
+    flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_docking
+    flags |= imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_saved_settings
+    flags |= imgui.WindowFlags_.no_inputs | imgui.WindowFlags_.no_focus_on_appearing
+    flags |= imgui.WindowFlags_.no_nav
+    return imgui.begin(name, None, flags)[0]
+
+
+def overlay_rect(state: AppState, name: str) -> Rect:
+    """Return where the window being drawn is; remembered under its name, as widgets are."""
+    place, size = imgui.get_window_pos(), imgui.get_window_size()
+    rect = (place.x, place.y, place.x + size.x, place.y + size.y)
+    state.item_rects[name] = rect
+    return rect
+
+
+def slider(
+    state: AppState,
+    label: str,
+    value: float,
+    low: float,
+    high: float,
+    unit: str = "%.2f",
+    flags: int = 0,
+) -> float:
+    """Draw a slider and return its value; one that was not moved keeps every digit."""
+    shown = plain_zero(value, unit)
+    changed, moved = imgui.slider_float(label, shown, low, high, unit, flags)
+    note_item(state, label)
+    # "nan" and "1e99" can be typed into a slider.
+    return moved if changed and math.isfinite(moved) else value
+
+
+def checkbox(state: AppState, label: str, value: bool, why: str = "") -> bool:
+    """Draw a check box and return its state; greyed out if there is a reason."""
+    with disabled(why):
+        result = imgui.checkbox(label, value)[1]
+        note_item(state, label)
+        explain("", why)
+    return value if why else result
+
+
+def button(state: AppState, label: str, why: str = "") -> bool:
+    """Draw a button and return whether it was pressed; greyed out if there is a reason."""
+    with disabled(why):
+        pressed = imgui.button(label)
+        note_item(state, label)
+        explain("", why)
+    return pressed and not why
+
+
+def begin_menu(state: AppState, text: str, enabled: bool = True) -> bool:
+    """Draw a menu's title and return whether it is open; then ``imgui.end_menu`` follows."""
+    opened = imgui.begin_menu(text, enabled)
+    if not opened:
+        note_item(state, f"menu {text}")
+    return opened
+
+
+def menu_item(
+    state: AppState, text: str, key: str = "", checked: bool = False, why: str = ""
+) -> bool:
+    """Draw an entry of a menu and return whether it was chosen; greyed if there is a reason."""
+    chosen = imgui.menu_item(text, key, checked, not why)[0]
+    note_item(state, text)
+    explain("", why)
+    return chosen
+
+
+def same_line_if_room(text: str) -> None:
+    """Put a check box, radio button or button with this text beside the last widget if it fits."""
+    style = imgui.get_style()
+    width = imgui.calc_text_size(text).x + imgui.get_frame_height() + style.item_inner_spacing.x
+    end = imgui.get_item_rect_max().x + style.item_spacing.x + width
+    if end <= imgui.get_cursor_screen_pos().x + imgui.get_content_region_avail().x:
+        imgui.same_line()
+
+
+def choice(state: AppState, label: str, value: str, texts: dict[str, str]) -> str:
+    """Draw a drop-down list and return the chosen key."""
+    keys = list(texts)
+    index = keys.index(value) if value in keys else 0
+    changed, chosen = imgui.combo(label, index, list(texts.values()), len(keys))
+    note_item(state, label)
+    return keys[chosen] if changed else value
+
+
+def plain_zero(value: float, text: str) -> float:
+    """Return a number for a widget: 0 in place of one that its format would show as -0.
+
+    >>> plain_zero(-0.04, "%.1f s"), plain_zero(-0.06, "%.1f s")
+    (0.0, -0.06)
+    """
+    spec = _NUMBER.search(text)
+    shown = spec.group() % value if spec else ""
+    return value if not shown.startswith("-") or number_text(float(shown)) != "0" else 0.0

@@ -1,0 +1,1 @@
+"""Curves: the channels and keys of a clip, shown and edited."""

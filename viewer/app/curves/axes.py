@@ -1,0 +1,83 @@
+"""What the parts of the Curves panel's plot share: its axes, and how curves are shown on them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from imgui_bundle import implot
+
+from viewer.app.core.state import AppState
+from viewer.app.curves.data import Curve
+from viewer.app.curves.state import Curves
+
+__all__ = ["Color", "Plot", "curve_color", "factor_of", "measured"]
+
+Color = tuple[float, float, float, float]
+
+_COLORS = ((0.95, 0.45, 0.42), (0.48, 0.85, 0.45), (0.45, 0.65, 1.0))
+_SHADES = (1.0, 0.72, 1.25, 0.85, 1.12)  # of one axis of several joints
+
+
+@dataclass(frozen=True, slots=True)
+class Plot:
+    """The plot as it is drawn in this frame.
+
+    Attributes
+    ----------
+    state : AppState
+        What is shown and changed.
+    curves : tuple of Curve
+        All that there are.
+    limits : (low, high, bottom, top)
+        Seconds of the clip's own, then values as they are shown.
+    scale : (float, float)
+        Pixels per second, and per unit of what is shown.
+    """
+
+    state: AppState
+    curves: tuple[Curve, ...]
+    limits: tuple[float, float, float, float]
+    scale: tuple[float, float]
+
+    @property
+    def view(self) -> Curves:
+        """What the panel shows."""
+        return self.state.of(Curves)
+
+    def factor(self, row: int) -> float:
+        """Return what a curve's values are multiplied by to be shown."""
+        return factor_of(self.state, self.curves[row])
+
+    def color(self, row: int) -> Color:
+        """Return a curve's colour."""
+        return curve_color(self.view, self.curves, row)
+
+    def note(self, label: str, time: float, value: float, reach: float = 4.0) -> None:
+        """Remember where a point of the plot is, under a label that tests can aim at."""
+        place = implot.plot_to_pixels(time, value)
+        rect = (place.x - reach, place.y - reach, place.x + reach, place.y + reach)
+        self.state.item_rects[label] = rect
+
+
+def measured(state: AppState, curves: tuple[Curve, ...]) -> Plot:
+    """Return the plot that was begun, when its axes are set up."""
+    box, place, size = implot.get_plot_limits(), implot.get_plot_pos(), implot.get_plot_size()
+    limits = (box.x.min, box.x.max, box.y.min, box.y.max)
+    state.item_rects["plot"] = (place.x, place.y, place.x + size.x, place.y + size.y)
+    across, up = max(limits[1] - limits[0], 1e-12), max(limits[3] - limits[2], 1e-12)
+    return Plot(state, curves, limits, (size.x / across, size.y / up))
+
+
+def factor_of(state: AppState, curve: Curve) -> float:
+    """Return what a curve's values are multiplied by to be shown: angles may be in degrees."""
+    return math.degrees(1.0) if curve.is_angle and state.in_degrees else 1.0
+
+
+def curve_color(view: Curves, curves: tuple[Curve, ...], row: int) -> Color:
+    """Return a curve's colour: red, green or blue for x, y, z, other shades for other joints."""
+    groups = list(dict.fromkeys(curves[other].number for other in view.rows))
+    number = curves[row].number
+    shade = _SHADES[groups.index(number) % len(_SHADES)] if number in groups else 1.0
+    red, green, blue = (min(part * shade, 1.0) for part in _COLORS[curves[row].axis])
+    return red, green, blue, 1.0

@@ -1,0 +1,63 @@
+"""What is done to a keyed clip as a whole: made of a pose, given keys, saved."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from viewer.app.core.state import AppState
+from viewer.app.files.file_choice import FileDialog, folder_of
+from viewer.app.files.saving import save_files
+from viewer.app.files.state import Files
+from viewer.formats import FORMATS, file_stem, write
+from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.clip_edit import clip_from_pose, key_pose
+from viewer.rig.number_text import number_text
+
+__all__ = ["ask_for_clip", "can_have_keys", "key_present_pose", "new_clip", "save_clip"]
+
+_SECONDS = 2.0  # of a new clip
+
+
+def can_have_keys(state: AppState) -> bool:
+    """Return whether the chosen actor can get a clip: it has joints and no motion yet."""
+    return state.actor.pose is not None and state.actor.clip is None
+
+
+def new_clip(state: AppState) -> None:
+    """Give the chosen actor a clip that holds its pose: one key for each DOF."""
+    actor = state.actor
+    if actor.pose is None or actor.figure.skeleton is None or actor.clip is not None:
+        return
+    actor.clip = clip_from_pose(actor.figure.skeleton, actor.pose, actor.title, 0.0, _SECONDS)
+    state.say_status("New clip: two seconds that hold this pose")
+
+
+def key_present_pose(state: AppState, only_changed: bool = False) -> None:
+    """Make the pose keys at the time that is shown."""
+    actor = state.actor
+    if not isinstance(actor.clip, Clip) or actor.pose is None or actor.figure.skeleton is None:
+        return
+    time = state.playback.time - actor.offset
+    old, skeleton = actor.clip, actor.figure.skeleton
+    actor.clip = key_pose(old, skeleton, actor.pose, time, only_changed)
+    keys = [sum(len(channel.times) for channel in clip.channels) for clip in (old, actor.clip)]
+    state.say_status(f"Pose keyed at {number_text(time, '.3f')} s: {keys[1] - keys[0]} new keys")
+
+
+def ask_for_clip(state: AppState) -> None:
+    """Ask where to save the chosen actor's clip."""
+    state.of(Files).dialog = FileDialog(
+        folder_of(state.paths),
+        lambda state, paths: save_clip(state, paths[0]),
+        "save",
+        "Save clip: .anim",
+        FORMATS["anim"].suffixes,
+        f"{file_stem(state.actor.name)}_edited.anim",
+    )
+
+
+def save_clip(state: AppState, path: Path) -> None:
+    """Write the chosen actor's clip, if it consists of keys."""
+    clip = state.actor.clip
+    if isinstance(clip, Clip):
+        save_files(state, lambda: write(clip, path), [path])

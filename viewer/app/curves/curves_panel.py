@@ -1,0 +1,299 @@
+"""Curves: a motion's channels over time, their keys, tangents and extrapolation, to be edited."""
+
+from __future__ import annotations
+
+import math
+
+from imgui_bundle import imgui
+
+from viewer.app.core.state import AppState
+from viewer.app.core.widgets import (
+    button,
+    choice,
+    explain,
+    note_item,
+    plain_zero,
+    same_line_if_room,
+)
+from viewer.app.curves.axes import curve_color, factor_of
+from viewer.app.curves.clip_actions import ask_for_clip, can_have_keys, key_present_pose, new_clip
+from viewer.app.curves.data import Curve, channel_of, curves_of
+from viewer.app.curves.editing import (
+    add_key_at,
+    clip_of,
+    delete_chosen,
+    drop_missing,
+    extrapolate,
+    focused_rows,
+    place_key,
+    turn_tangent,
+)
+from viewer.app.curves.plot import draw_plot
+from viewer.app.curves.state import Curves, KeyPlace
+from viewer.rig.motion.clip import EXTRAPOLATIONS, TANGENT_RULES, Channel, Clip, slopes
+
+__all__ = ["draw"]
+
+_LIST_WIDTH, _SIDE_WIDTH, _FIELD = 10.0, 20.0, 5.8  # letters' heights
+_MODES: dict[str, str] = {mode: mode.replace("_", " ") for mode in EXTRAPOLATIONS}
+_TANGENTS: dict[str, str] = {rule: rule for rule in TANGENT_RULES} | {"number": "number"}
+_SIDES = ("In", "Out")
+_FARTHEST = 1e9  # that can be typed
+_WIDE = "M" * 8  # about as wide as a field with its label
+_HINT = "Double-click adds a key. Drag keys and tangents; Delete removes keys, Shift takes more."
+
+
+def draw(state: AppState) -> None:
+    """Draw the panel for the chosen actor."""
+    curves = curves_of(state.actor)
+    if not curves or state.actor.clip is None:
+        imgui.text_disabled("nothing moves this figure")
+        if can_have_keys(state) and button(state, "New clip"):
+            new_clip(state)
+        return
+    _follow(state, curves)
+    if imgui.begin_child("##channels", (_LIST_WIDTH * imgui.get_font_size(), 0.0)):
+        _draw_list(state, curves)
+    imgui.end_child()
+    imgui.same_line()
+    # Beside the plot, not above it: what appears there must not push a key from under the mouse.
+    room, side = imgui.get_content_region_avail().x, 0.0
+    if clip_of(state) is not None:
+        side = min(_SIDE_WIDTH * imgui.get_font_size(), 0.45 * room)
+    if imgui.begin_child("##plot", (-side, 0.0)):
+        _draw_tools(state)
+        draw_plot(state, curves)
+    imgui.end_child()
+    if side:
+        imgui.same_line()
+        if imgui.begin_child("##keys"):
+            imgui.push_item_width(_FIELD * imgui.get_font_size())
+            _draw_key_fields(state, curves)
+            _draw_modes(state)
+            imgui.pop_item_width()
+        imgui.end_child()
+
+
+def _follow(state: AppState, curves: tuple[Curve, ...]) -> None:
+    """Keep the choice to what there is, and follow the joint that is selected elsewhere."""
+    view, clip = state.of(Curves), state.actor.clip
+    owner = (id(state.actor), type(clip).__name__, len(curves))
+    if owner != view.owner:
+        view.owner, view.joint = owner, -1
+        view.choose(_rows_of(curves, curves[0].number))
+    if state.selected_joint != view.joint:
+        view.joint = state.selected_joint
+        rows = _rows_of(curves, view.joint)
+        if view.joint >= 0 and rows:
+            view.choose(rows)
+            view.wants_scroll = True
+    if isinstance(clip, Clip):
+        drop_missing(view, clip)
+
+
+def _rows_of(curves: tuple[Curve, ...], number: int) -> tuple[int, ...]:
+    return tuple(row for row, curve in enumerate(curves) if curve.number == number)
+
+
+# The list
+
+
+def _draw_list(state: AppState, curves: tuple[Curve, ...]) -> None:
+    view = state.of(Curves)
+    imgui.set_next_item_width(-1.0)
+    view.filter = imgui.input_text_with_hint("##curve filter", "Filter", view.filter)[1]
+    note_item(state, "Curve filter")
+    if not imgui.begin_child("##curve rows"):
+        imgui.end_child()
+        return
+    shown = _listed(curves, view.filter.lower())
+    if not shown:
+        imgui.text_disabled("no channel is called so")
+    if view.wants_scroll:
+        view.wants_scroll = False
+        above = shown.index(view.rows[0]) - 1 if view.rows and view.rows[0] in shown else 0
+        imgui.set_scroll_y(above * imgui.get_text_line_height_with_spacing())
+    clipper = imgui.ListClipper()
+    clipper.begin(len(shown))
+    while clipper.step():
+        for entry in shown[clipper.display_start : clipper.display_end]:
+            if isinstance(entry, str):
+                _draw_heading(state, curves, entry, shown)
+            else:
+                _draw_entry(state, curves, entry)
+    clipper.end()
+    imgui.end_child()
+
+
+def _listed(curves: tuple[Curve, ...], wanted: str) -> list[int | str]:
+    """Return rows of curves, and before those of each joint its number as a text."""
+    listed: list[int | str] = []
+    last: int | None = None
+    for row, curve in enumerate(curves):
+        if wanted and wanted not in curve.label.lower():
+            continue
+        if curve.number != last:
+            listed.append(str(curve.number))
+            last = curve.number
+        listed.append(row)
+    return listed
+
+
+def _draw_heading(
+    state: AppState, curves: tuple[Curve, ...], entry: str, shown: list[int | str]
+) -> None:
+    """Draw a joint's name; a click chooses those of its curves that are listed."""
+    rows = tuple(row for row in shown if isinstance(row, int) and curves[row].number == int(entry))
+    name = curves[rows[0]].group
+    is_chosen = set(rows) <= set(state.of(Curves).rows)
+    if imgui.selectable(f"{name}##group {entry}", is_chosen)[0]:
+        _choose(state, rows)
+    note_item(state, f"curves of {name}")
+
+
+def _draw_entry(state: AppState, curves: tuple[Curve, ...], row: int) -> None:
+    curve, view = curves[row], state.of(Curves)
+    is_chosen = row in view.rows
+    imgui.push_style_color(imgui.Col_.text, curve_color(view, curves, row))
+    if imgui.selectable(f"    {curve.name}{_key_count(state, row)}##row {row}", is_chosen)[0]:
+        _choose(state, (row,))
+    imgui.pop_style_color()
+    note_item(state, f"curve {curve.label}")
+
+
+def _key_count(state: AppState, row: int) -> str:
+    clip = clip_of(state)
+    channel = None if clip is None else channel_of(clip, row)
+    return "" if channel is None or not len(channel.times) else f"  {len(channel.times)}"
+
+
+def _choose(state: AppState, rows: tuple[int, ...]) -> None:
+    """Show only these curves, or with Ctrl or Shift these too, or no more."""
+    view, io = state.of(Curves), imgui.get_io()
+    if io.key_ctrl or io.key_shift:
+        if set(rows) <= set(view.rows):
+            rows = tuple(row for row in view.rows if row not in rows)
+        else:
+            rows = (*view.rows, *(row for row in rows if row not in view.rows))
+    view.choose(rows)
+
+
+# The tools
+
+
+def _draw_tools(state: AppState) -> None:
+    view = state.of(Curves)
+    if button(state, "Fit"):
+        view.wants_fit = True
+    explain("show the chosen curves whole")
+    if clip_of(state) is None:
+        imgui.same_line()
+        imgui.text_disabled("frames, not keys: to be looked at")
+        return
+    if _button_beside(state, "Add key", "on the shown curves, at the present time"):
+        add_key_at(state, view.rows, state.playback.time - state.actor.offset)
+    if _button_beside(state, "Key pose", "every DOF as it is posed, at the present time"):
+        key_present_pose(state)
+    if _button_beside(state, "Key changes", "the same for DOFs alone that were posed anew"):
+        key_present_pose(state, only_changed=True)
+    if _button_beside(state, "Save clip…", "as .anim"):
+        ask_for_clip(state)
+
+
+def _button_beside(state: AppState, text: str, words: str) -> bool:
+    same_line_if_room(text)
+    pressed = button(state, text)
+    explain(words)
+    return pressed
+
+
+# Keys, tangents and extrapolation
+
+
+def _draw_modes(state: AppState) -> None:
+    """Draw what the curves in focus do before their first and after their last key."""
+    rows, clip = focused_rows(state.of(Curves)), clip_of(state)
+    channel = channel_of(clip, rows[0]) if rows and clip is not None else None
+    if channel is None:
+        return
+    for side, text in enumerate(("Before", "After")):
+        if side:
+            same_line_if_room(_WIDE)
+        now = channel.extrapolation[side]
+        new = choice(state, text, now, _MODES)
+        explain("of the curves with chosen keys, or else of all that are shown")
+        for mode in EXTRAPOLATIONS:
+            if new == mode != now:
+                extrapolate(state, side, mode)
+
+
+def _draw_key_fields(state: AppState, curves: tuple[Curve, ...]) -> None:
+    """Draw numbers and tangents of the chosen keys."""
+    view, clip = state.of(Curves), clip_of(state)
+    place = min(view.keys, default=None)
+    channel = None if clip is None or place is None else channel_of(clip, place[0])
+    if channel is None or place is None:
+        imgui.push_text_wrap_pos(0.0)
+        imgui.text_disabled(_HINT)
+        imgui.pop_text_wrap_pos()
+        return
+    factor = factor_of(state, curves[place[0]])
+    more = f" and {len(view.keys) - 1} more" * (len(view.keys) > 1)
+    if button(state, "Delete"):
+        delete_chosen(state)
+        return
+    imgui.same_line()
+    imgui.text_unformatted(f"{curves[place[0]].label}, key {place[1]}{more}")
+    if len(view.keys) == 1:
+        _draw_numbers(state, channel, place, factor)
+    for side, text in enumerate(_SIDES):
+        if side:
+            same_line_if_room(_WIDE)
+        _draw_rule(state, channel, place, side, text)
+    if len(view.keys) == 1:
+        _draw_slopes(state, channel, place, factor)
+
+
+def _field(state: AppState, label: str, value: float) -> float | None:
+    """Draw a number; return what was typed and entered."""
+    flags = imgui.InputTextFlags_.enter_returns_true | imgui.InputTextFlags_.auto_select_all
+    entered, typed = imgui.input_double(label, plain_zero(value, "%.5g"), 0.0, 0.0, "%.5g", flags)
+    note_item(state, label)
+    # "nan" and "1e999" can be typed.
+    return typed if entered and math.isfinite(typed) and abs(typed) < _FARTHEST else None
+
+
+def _draw_numbers(state: AppState, channel: Channel, place: KeyPlace, factor: float) -> None:
+    key = place[1]
+    time = _field(state, "Time", float(channel.times[key]))
+    if time is not None:
+        place_key(state, place, time=time)
+    same_line_if_room(_WIDE)
+    value = _field(state, "Value", factor * float(channel.values[key]))
+    if value is not None:
+        place_key(state, place, value=value / factor)
+
+
+def _draw_rule(state: AppState, channel: Channel, place: KeyPlace, side: int, text: str) -> None:
+    """Draw how the tangent on one side is found."""
+    tangent = channel.tangents[place[1]][side]
+    now = tangent if isinstance(tangent, str) else "number"
+    new = choice(state, text, now, _TANGENTS)
+    if new == "number" != now:
+        # The slope that the rule gave: the curve stays as it is.
+        turn_tangent(state, [place], side, float(slopes(channel)[place[1], side]))
+    for rule in TANGENT_RULES:
+        if new == rule != now:
+            turn_tangent(state, state.of(Curves).keys, side, rule)
+
+
+def _draw_slopes(state: AppState, channel: Channel, place: KeyPlace, factor: float) -> None:
+    """Draw the slopes of tangents that are numbers, per second."""
+    pair = channel.tangents[place[1]]
+    given = [(side, slope) for side, slope in enumerate(pair) if not isinstance(slope, str)]
+    for number, (side, slope) in enumerate(given):
+        if number:
+            same_line_if_room(_WIDE)
+        typed = _field(state, f"{_SIDES[side]} slope", factor * slope)
+        if typed is not None:
+            turn_tangent(state, [place], side, typed / factor)

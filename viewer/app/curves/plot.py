@@ -1,0 +1,201 @@
+"""The plot of the Curves panel: lines, the range that is played, and the present time.
+
+Times are the clip's own seconds; angles are shown in the unit that the Joints panel shows.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from imgui_bundle import imgui, implot
+
+from viewer.app.core.state import AppState
+from viewer.app.curves.axes import Color, Plot, factor_of, measured
+from viewer.app.curves.data import Curve, channel_of, keyed_values, sampled_points
+from viewer.app.curves.editing import set_clip_range
+from viewer.app.curves.plotted_keys import draw_keys, edit
+from viewer.app.curves.state import Curves
+from viewer.rig.arrays import Floats
+from viewer.rig.captures.points import PointClip
+from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.sampled_clip import SampledClip
+
+__all__ = ["draw_plot"]
+
+_TIME, _RANGE = (1.0, 0.62, 0.25, 1.0), (0.75, 0.75, 0.8, 0.55)
+_OUTSIDE = (0.0, 0.0, 0.0, 0.28)
+_MOST_SAMPLES = 900
+_DASHES = 90  # across the plot
+_MARGIN = 0.08  # around what is fitted, share of its size
+_FARTHEST = 1e9
+_TIME_ID, _START_ID, _END_ID = 1, 2, 3
+
+
+def draw_plot(state: AppState, curves: tuple[Curve, ...]) -> None:
+    """Draw the chosen curves in the room that is left, and do what the mouse does there."""
+    # A double click adds a key, so it cannot fit the axes as well.
+    implot.get_input_map().fit = imgui.MouseButton_.middle
+    flags = implot.Flags_.no_title | implot.Flags_.no_legend | implot.Flags_.no_menus
+    room = imgui.get_content_region_avail()
+    implot.push_style_var(implot.StyleVar_.plot_padding, (4.0, 4.0))
+    implot.push_style_var(implot.StyleVar_.label_padding, (3.0, 2.0))
+    shown = implot.begin_plot("##curves", (max(room.x, 60.0), max(room.y, 60.0)), flags)
+    if shown:
+        _draw(state, curves)
+        implot.end_plot()
+    implot.pop_style_var(2)
+
+
+def _draw(state: AppState, curves: tuple[Curve, ...]) -> None:
+    view, no_label = state.of(Curves), implot.AxisFlags_.no_label
+    implot.setup_axes("seconds", "values", no_label, no_label)
+    implot.setup_axis_format(implot.ImAxis_.x1, "%g s")
+    for axis in (implot.ImAxis_.x1, implot.ImAxis_.y1):
+        implot.setup_axis_limits_constraints(axis, -_FARTHEST, _FARTHEST)
+    if view.wants_fit:
+        implot.setup_axes_limits(*_fitting(state, curves), implot.Cond_.always)
+        view.wants_fit = False
+    implot.setup_finish()
+    plot = measured(state, curves)
+    _draw_outside(plot)
+    for row in view.rows:
+        _draw_line(plot, row)
+    # Of what lies at one place, ImGui gives the mouse to what comes first.
+    touched = draw_keys(plot)
+    _draw_time(plot)
+    _draw_range(plot)
+    edit(plot, touched)
+    _draw_units(plot)
+
+
+def _draw_units(plot: Plot) -> None:
+    """Say in a corner what the values are."""
+    kinds = {plot.curves[row].is_angle for row in plot.view.rows}
+    angle = "degrees" if plot.state.in_degrees else "radians"
+    text = ", ".join(["units"] * (False in kinds) + [angle] * (True in kinds))
+    place, size = implot.get_plot_pos(), implot.get_plot_size()
+    corner = (place.x + 6.0, place.y + size.y - imgui.get_text_line_height() - 3.0)
+    implot.get_plot_draw_list().add_text(corner, imgui.get_color_u32(_RANGE), text)
+
+
+def _fitting(state: AppState, curves: tuple[Curve, ...]) -> tuple[float, float, float, float]:
+    """Return axes that show the chosen curves from their first to their last key or frame."""
+    clip, rows = state.actor.clip, state.of(Curves).rows
+    low, high = (0.0, 1.0) if clip is None else (clip.start, clip.end)
+    if isinstance(clip, Clip):
+        channels = [channel_of(clip, row) for row in rows]
+        ends = [one.times[[0, -1]] for one in channels if one is not None and len(one.times)]
+        times = np.concatenate([[low, high], *ends])
+        low, high = float(times.min()), float(times.max())
+    pad = _MARGIN * (high - low) or 1.0
+    low, high = low - pad, high + pad
+    factors = [factor_of(state, curves[row]) for row in rows]
+    parts = [np.zeros(0)]
+    if isinstance(clip, Clip):
+        shown = keyed_values(clip, rows, np.linspace(low, high, _MOST_SAMPLES))
+        parts.append((shown * factors).ravel())
+    elif clip is not None:
+        parts += [
+            factor * sampled_points(clip, row, low, high)[1]
+            for row, factor in zip(rows, factors, strict=True)
+        ]
+    values = np.concatenate(parts)
+    values = values[np.isfinite(values)]
+    bottom, top = (float(values.min()), float(values.max())) if len(values) else (-1.0, 1.0)
+    pad = 2.0 * _MARGIN * (top - bottom)
+    # Rounding alone is no reason to fill the height with it.
+    pad = pad if pad > 1e-6 * max(abs(top), 1e-6) else max(0.5 * abs(top), 0.5)
+    return low, high, bottom - pad, top + pad
+
+
+def _spec(color: Color, weight: float = 1.5, flags: int = 0) -> implot.Spec:
+    return implot.Spec(line_color=color, line_weight=weight, flags=flags)
+
+
+def _draw_line(plot: Plot, row: int) -> None:
+    """Draw one curve: between its keys solid, the extrapolation dashed."""
+    clip, color, factor = plot.state.actor.clip, plot.color(row), plot.factor(row)
+    low, high = plot.limits[:2]
+    if isinstance(clip, SampledClip | PointClip):
+        times, values = sampled_points(clip, row, low, high)
+        implot.plot_line(f"##{row}", times, factor * values, _spec(color))
+        return
+    if clip is None:
+        return
+    channel = channel_of(clip, row)
+    keys = channel.times if channel is not None else np.zeros(0)
+    # A curve without keys is 0 everywhere: all of it is extrapolation.
+    first, last = (float(keys[0]), float(keys[-1])) if len(keys) else (high, high)
+    if len(keys) and first <= high and last >= low:
+        times = _inner_times(keys, max(low, first), min(high, last))
+        implot.plot_line(
+            f"##{row}", times, factor * keyed_values(clip, (row,), times)[:, 0], _spec(color)
+        )
+    for start, end in ((low, min(high, first)), (max(low, last), high)):
+        if start < end:
+            _draw_dashes(plot, clip, row, start, end)
+
+
+def _inner_times(keys: Floats, low: float, high: float) -> Floats:
+    """Return times to draw at: evenly over what is seen, and on the keys themselves."""
+    seen = keys[(keys >= low) & (keys <= high)][:_MOST_SAMPLES]
+    # Just before a key too: keys at one time make a jump.
+    times = np.concatenate([np.linspace(low, high, _MOST_SAMPLES), seen, np.nextafter(seen, low)])
+    return np.sort(np.clip(times, low, high))
+
+
+def _draw_dashes(plot: Plot, clip: Clip, row: int, start: float, end: float) -> None:
+    """Draw every other piece of a curve as three short lines, so that it bends."""
+    step = (plot.limits[1] - plot.limits[0]) / _DASHES
+    # Whole multiples of the step, so that dashes stay where they are while panning.
+    lows = step * np.arange(math.floor(start / step), math.ceil(end / step))
+    share = np.array([0.0, 0.2, 0.2, 0.4, 0.4, 0.6])
+    points = np.clip((lows[:, None] + step * share).ravel(), start, end)
+    values = plot.factor(row) * keyed_values(clip, (row,), points)[:, 0]
+    spec = _spec((*plot.color(row)[:3], 0.75), 1.2, implot.LineFlags_.segments)
+    implot.plot_line(f"##outside {row} {start < plot.limits[1]}", points, values, spec)
+
+
+def _draw_outside(plot: Plot) -> None:
+    """Darken what lies outside of the range that is meant to be played."""
+    clip = plot.state.actor.clip
+    if clip is None:
+        return
+    low, high, bottom, top = plot.limits
+    draw_list = implot.get_plot_draw_list()
+    implot.push_plot_clip_rect()
+    for start, end in ((low, clip.start), (clip.end, high)):
+        if start < end:
+            corner, other = implot.plot_to_pixels(start, top), implot.plot_to_pixels(end, bottom)
+            draw_list.add_rect_filled(corner, other, imgui.get_color_u32(_OUTSIDE))
+    implot.pop_plot_clip_rect()
+
+
+def _draw_range(plot: Plot) -> None:
+    """Draw the lines at which the range starts and ends; they can be dragged if there are keys."""
+    clip = plot.state.actor.clip
+    if clip is None:
+        return
+    flags = implot.DragToolFlags_.no_fit
+    if not isinstance(clip, Clip):
+        flags |= implot.DragToolFlags_.no_inputs
+    moved, start, *_ = implot.drag_line_x(_START_ID, clip.start, _RANGE, 1.0, flags)
+    if moved:
+        set_clip_range(plot.state, min(start, clip.end), clip.end)
+    moved, end, *_ = implot.drag_line_x(_END_ID, clip.end, _RANGE, 1.0, flags)
+    if moved:
+        set_clip_range(plot.state, clip.start, max(end, clip.start))
+    middle = 0.5 * (plot.limits[2] + plot.limits[3])
+    plot.note("range start", clip.start, middle)
+    plot.note("range end", clip.end, middle)
+
+
+def _draw_time(plot: Plot) -> None:
+    """Draw the present time; dragging it moves the clock by whole frames, with Alt freely."""
+    state, offset = plot.state, plot.state.actor.offset
+    time = state.playback.time - offset
+    moved, time, *_ = implot.drag_line_x(_TIME_ID, time, _TIME, 1.5, implot.DragToolFlags_.no_fit)
+    if moved:
+        state.playback.scrub(time + offset, between=imgui.get_io().key_alt)
+    plot.note("time line", time, 0.5 * (plot.limits[2] + plot.limits[3]))

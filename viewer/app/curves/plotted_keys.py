@@ -1,0 +1,221 @@
+"""Keys and tangents in the plot of the Curves panel: drawn, dragged, added and deleted."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from imgui_bundle import imgui, implot
+
+from viewer.app.curves.axes import Plot
+from viewer.app.curves.data import channel_of
+from viewer.app.curves.editing import (
+    add_key_at,
+    clip_of,
+    delete_chosen,
+    move_chosen,
+    nearest_row,
+    turn_tangent,
+)
+from viewer.app.curves.state import KeyPlace
+from viewer.app.files.state import Files
+from viewer.rig.arrays import Floats
+from viewer.rig.motion.clip import Channel, Clip, slopes
+from viewer.rig.number_text import number_text
+
+__all__ = ["draw_keys", "edit"]
+
+_CHOSEN, _HANDLE = (1.0, 1.0, 1.0, 1.0), (1.0, 0.85, 0.4, 1.0)
+_FAINT = (0.75, 0.75, 0.8, 0.8)
+_MOST_KEYS = 300  # that can be taken hold of at once
+_SAME_KEY = 2.0  # points: keys nearer than this to one another could not be told apart
+_HANDLE_LENGTH = 4.0  # letters' heights
+_HANDLE_ID = 16
+_FIRST_KEY_ID = 32
+_KEYS_PER_ROW = 1 << 20
+_FIXED = implot.DragToolFlags_.no_fit
+
+
+def draw_keys(plot: Plot) -> bool:
+    """Draw keys and tangents; return whether the mouse is at one of them.
+
+    Of what lies at one place, ImGui gives the mouse to what comes first: chosen keys, tangents,
+    other keys.
+    """
+    clip = clip_of(plot.state)
+    if clip is None:
+        return False
+    low, high, bottom, top = plot.limits
+    seen: list[tuple[int, Floats, Floats, list[int]]] = []
+    for row in plot.view.rows:
+        channel = channel_of(clip, row)
+        if channel is not None:
+            values = plot.factor(row) * channel.values
+            inside = (channel.times >= low) & (channel.times <= high)
+            inside &= (values >= bottom) & (values <= top)
+            # A key that is dragged out of the plot is still held.
+            inside[[key for owner, key in plot.view.keys if owner == row]] = True
+            seen.append((row, channel.times, values, np.flatnonzero(inside).tolist()))
+    if sum(len(keys) for *_, keys in seen) > _MOST_KEYS:
+        _draw_many(plot, seen)
+        return False
+    places = [
+        ((row, key), float(times[key]), float(values[key]))
+        for row, times, values, keys in seen
+        for key in keys
+    ]
+    chosen = [one for one in places if one[0] in plot.view.keys]
+    touched = [_draw_key(plot, *one) for one in chosen]
+    touched.append(_draw_handles(plot))
+    touched += [_draw_key(plot, *one) for one in places if one not in chosen]
+    _mark(plot, chosen)
+    return any(touched)
+
+
+def _mark(plot: Plot, chosen: list[tuple[KeyPlace, float, float]]) -> None:
+    """Draw the chosen keys once more, over everything."""
+    implot.push_plot_clip_rect()
+    for place, time, value in chosen:
+        middle, inner = implot.plot_to_pixels(time, value), plot.color(place[0])
+        draw_list = implot.get_plot_draw_list()
+        draw_list.add_circle_filled(middle, 6.0, imgui.get_color_u32(_CHOSEN))
+        draw_list.add_circle_filled(middle, 3.5, imgui.get_color_u32(inner))
+    implot.pop_plot_clip_rect()
+
+
+def _draw_many(plot: Plot, seen: list[tuple[int, Floats, Floats, list[int]]]) -> None:
+    """Draw more keys than a mouse could tell apart as mere dots."""
+    for row, times, values, keys in seen:
+        if keys:
+            color = plot.color(row)
+            spec = implot.Spec(
+                marker=implot.Marker_.circle,
+                marker_size=2.0,
+                marker_fill_color=color,
+                marker_line_color=color,
+            )
+            implot.plot_scatter(f"##keys {row}", times[keys], values[keys], spec)
+    place, light = implot.get_plot_pos(), imgui.get_color_u32(_FAINT)
+    text = f"{sum(len(keys) for *_, keys in seen)} keys: zoom in to edit them"
+    implot.get_plot_draw_list().add_text((place.x + 6.0, place.y + 4.0), light, text)
+
+
+def _draw_key(plot: Plot, place: KeyPlace, time: float, value: float) -> bool:
+    view, (row, key) = plot.view, place
+    is_chosen = place in view.keys
+    moved, x, y, _, hovered, held = implot.drag_point(
+        (_FIRST_KEY_ID + row * _KEYS_PER_ROW + key) & 0x7FFFFFFF,
+        time,
+        value,
+        plot.color(row),
+        4.5,
+        _FIXED,
+        False,
+        False,
+        False,
+    )
+    plot.note(f"key {plot.curves[row].label} {key}", time, value)
+    if held and not is_chosen:
+        kept = view.keys if imgui.get_io().key_shift else frozenset()
+        view.keys = kept | {place}
+    if moved:
+        move_chosen(plot.state, x - time, (y - value) / plot.factor(row))
+    return bool(hovered or held)
+
+
+def _draw_handles(plot: Plot) -> bool:
+    """Draw the tangents of a key that is chosen alone; return whether the mouse is at one."""
+    clip, view = clip_of(plot.state), plot.view
+    if clip is None or len(view.keys) != 1:
+        return False
+    row, key = next(iter(view.keys))
+    channel = channel_of(clip, row)
+    if channel is None or row not in view.rows or len(channel.times) < 2:
+        return False
+    touched = [_draw_handle(plot, channel, (row, key), side) for side in (0, 1)]
+    return any(touched)
+
+
+def _draw_handle(plot: Plot, channel: Channel, place: KeyPlace, side: int) -> bool:
+    """Draw one tangent as a line of fixed length with a knob; dragging makes it a slope."""
+    row, key = place
+    factor, sign = plot.factor(row), (-1.0, 1.0)[side]
+    time, value = float(channel.times[key]), factor * float(channel.values[key])
+    slope = factor * float(slopes(channel)[key, side])
+    across, up = plot.scale
+    length = _HANDLE_LENGTH * imgui.get_font_size() / math.hypot(1.0, slope * up / across)
+    end, height = time + sign * length / across, value + sign * slope * length / across
+    points = implot.plot_to_pixels(time, value), implot.plot_to_pixels(end, height)
+    implot.push_plot_clip_rect()
+    implot.get_plot_draw_list().add_line(points[0], points[1], imgui.get_color_u32(_HANDLE), 1.2)
+    implot.pop_plot_clip_rect()
+    moved, x, y, _, hovered, held = implot.drag_point(
+        _HANDLE_ID + side, end, height, _HANDLE, 3.5, _FIXED, False, False, False
+    )
+    plot.note(f"tangent {side}", end, height)
+    if moved:
+        # A pixel at least on its own side of the key: no tangent is vertical.
+        run = sign * max(sign * (x - time), 1.0 / across)
+        for each in (0, 1) if imgui.get_io().key_shift else (side,):
+            turn_tangent(plot.state, [place], each, (y - value) / run / factor)
+    return bool(hovered or held)
+
+
+def edit(plot: Plot, touched: bool) -> None:
+    """Do what clicks and keys ask for.
+
+    Parameters
+    ----------
+    plot : Plot
+        Being drawn.
+    touched : bool
+        Whether the mouse is at a key or tangent, so that a click is not meant for the plot.
+    """
+    state, view, clip = plot.state, plot.view, clip_of(plot.state)
+    if clip is None or state.error or state.of(Files).dialog is not None or not _is_mouse_inside():
+        return
+    left, io = imgui.MouseButton_.left, imgui.get_io()
+    # Keys and lines that can be dragged hide the plot from the mouse, but not from the keyboard.
+    is_free = implot.is_plot_hovered()
+    is_second = io.mouse_clicked_last_count[left] > 1
+    was_dragged = io.mouse_drag_max_distance_sqr[left] >= io.mouse_drag_threshold**2
+    adds = is_free and imgui.is_mouse_double_clicked(left) and not touched
+    if adds or _is_pressed(imgui.Key.insert):
+        mouse = implot.get_plot_mouse_pos()
+        factors = [plot.factor(row) for row in view.rows]
+        row = nearest_row(clip, view, mouse.x, mouse.y, factors)
+        if row >= 0:
+            _add_key(plot, clip, row, mouse.x)
+    elif _is_pressed(imgui.Key.delete):
+        delete_chosen(state)
+    elif is_free and imgui.is_mouse_released(left) and not (touched or was_dragged or is_second):
+        view.keys = frozenset()
+
+
+def _add_key(plot: Plot, clip: Clip, row: int, time: float) -> None:
+    """Add a key where the mouse is; one that is drawn there already is chosen instead."""
+    channel = channel_of(clip, row)
+    times = np.zeros(0) if channel is None else channel.times
+    near = np.flatnonzero(np.abs(times - time) * plot.scale[0] <= _SAME_KEY)
+    if len(near):
+        plot.view.keys = frozenset({(row, int(near[0]))})
+        plot.state.say_status(
+            f"There is a key at {number_text(float(times[near[0]]), '.4g')} s already"
+        )
+    else:
+        add_key_at(plot.state, [row], time)
+
+
+def _is_mouse_inside() -> bool:
+    """Return whether the mouse is over the plot, whatever of it, and no window lies between."""
+    flags = imgui.HoveredFlags_.allow_when_blocked_by_active_item
+    place, size = implot.get_plot_pos(), implot.get_plot_size()
+    corner = (place.x + size.x, place.y + size.y)
+    return imgui.is_window_hovered(flags) and imgui.is_mouse_hovering_rect(place, corner)
+
+
+def _is_pressed(key: imgui.Key) -> bool:
+    """Return whether a key went down while nothing is typed or dragged."""
+    is_dragging = imgui.is_mouse_down(imgui.MouseButton_.left)
+    is_free = not (is_dragging or imgui.get_io().want_text_input)
+    return is_free and imgui.is_key_pressed(key, False)

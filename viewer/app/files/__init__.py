@@ -1,0 +1,1 @@
+"""Files: opening, saving and exporting from the window."""

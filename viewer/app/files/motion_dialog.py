@@ -1,0 +1,84 @@
+"""Ask which motions to export, as what, and where to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from imgui_bundle import imgui
+
+from viewer.app.core.state import AppState
+from viewer.app.core.widgets import choice, explain
+from viewer.app.files.file_choice import FileDialog, folder_of
+from viewer.app.files.motion_export import (
+    FOLDER,
+    motion_files,
+    motion_suffixes,
+    moving_actors,
+    save_motion,
+)
+from viewer.app.files.state import Files
+from viewer.errors import printable
+from viewer.export import EXPORTERS
+from viewer.formats import file_stem
+
+__all__ = ["ask_for_motion"]
+
+
+@dataclass(slots=True)
+class _Wish:
+    """What is asked for: everybody's motions, or the chosen actor's."""
+
+    everyone: bool
+
+
+def ask_for_motion(state: AppState) -> None:
+    """Ask where motions go; all actors' if there are several, unless the user says otherwise."""
+    moving = moving_actors(state)
+    wish = _Wish(len(moving) > 1 or state.actor not in moving)
+    first = moving[0] if wish.everyone else state.actor
+    # People's numbers are put behind the name when there are several files.
+    stem = file_stem(first.title if len(moving) > 1 else first.name)
+    suffixes = motion_suffixes()
+    state.of(Files).dialog = FileDialog(
+        folder_of(state.paths),
+        lambda state, paths: save_motion(state, paths[0], wish.everyone),
+        "save",
+        "Export motion",
+        suffixes,
+        f"{stem}{suffixes[0]}",
+        more=lambda state, dialog: _draw_more(state, dialog, wish),
+        written=lambda path: motion_files(state, path, wish.everyone),
+    )
+
+
+def _draw_more(state: AppState, dialog: FileDialog, wish: _Wish) -> None:
+    """Draw what is exported, and as what."""
+    moving = moving_actors(state)
+    imgui.set_next_item_width(16.0 * imgui.get_font_size())
+    if len(moving) > 1 or state.actor not in moving:
+        whose = {"all": f"all {len(moving)} actors"}
+        if state.actor in moving:
+            whose["one"] = f"{printable(state.actor.name, 60)} alone"
+        wish.everyone = choice(state, "Whose", "all" if wish.everyone else "one", whose) == "all"
+        explain("" if dialog.suffix == "" else "a file each: people by their number")
+        imgui.same_line()
+        imgui.set_next_item_width(16.0 * imgui.get_font_size())
+    kinds = {suffix: _title(suffix) for suffix in motion_suffixes()}
+    kinds[FOLDER] = _title(FOLDER)
+    typed = Path(dialog.name.strip()).suffix.lower()
+    now = typed if typed in kinds else dialog.suffix or FOLDER
+    kind = choice(state, "As", now, kinds)
+    if kind != now:
+        stem = dialog.name.strip()[: -len(typed)] if typed in kinds else dialog.name.strip()
+        dialog.suffix = "" if kind == FOLDER else kind
+        dialog.name = stem + dialog.suffix
+
+
+def _title(suffix: str) -> str:
+    """Return what a file of this suffix is, in the words of its exporters."""
+    titles = [
+        kind.title for kind in EXPORTERS.values() if kind.writes_motion and suffix in kind.suffixes
+    ]
+    start = "folder  " if suffix == FOLDER else f"{suffix}  "
+    return start + " or ".join(title.partition(":")[0] for title in titles)

@@ -1,0 +1,182 @@
+"""What is done with motions as a whole: exported for other programs, one actor's or everybody's."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from viewer.app.core.jobs import ThreadJob
+from viewer.app.core.state import AppState
+from viewer.errors import RigError, ViewerError, printable
+from viewer.export import (
+    EXPORTERS,
+    MotionOptions,
+    animation_for,
+    export_animation,
+    suited_exporter,
+)
+from viewer.export._motion_paths import motion_paths
+from viewer.formats import all_or_none, check_folder_target, check_targets
+from viewer.rig.captures.points import PointClip
+from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.scene import Actor, Scene
+
+_MANY = (".obj",)  # a file for each frame: the command line writes them
+_FRAMES = "smpl"  # the folder of frames within a capture's folder
+
+__all__ = ["FOLDER", "motion_files", "motion_suffixes", "moving_actors", "save_motion"]
+
+FOLDER = "/"
+"""Stands for a folder where suffixes are listed: everybody of a capture is in it."""
+
+
+def moving_actors(state: AppState) -> list[Actor]:
+    """Return the actors whose joints a motion moves."""
+    return [a for a in state.scene.actors if isinstance(a.clip, Clip | SampledClip)]
+
+
+def motion_suffixes() -> tuple[str, ...]:
+    """Return the suffixes of files that hold one actor's motion, the usual one first."""
+    kinds = [kind for kind in EXPORTERS.values() if kind.writes_motion]
+    found = dict.fromkeys(suffix for kind in kinds for suffix in kind.suffixes)
+    others = (suffix for suffix in found if suffix.startswith(".") and suffix not in _MANY)
+    return (".bvh", *(suffix for suffix in others if suffix != ".bvh"))
+
+
+def motion_files(state: AppState, path: Path, everyone: bool) -> list[Path]:
+    """Return all that is written for one name.
+
+    Parameters
+    ----------
+    state : AppState
+        Gives the actors.
+    path : Path
+        A file, or a folder: a name without suffix.
+    everyone : bool
+        Whether all actors are written, or the chosen one alone.
+
+    Returns
+    -------
+    list of Path
+        One for each actor; a ``.gltf`` has a ``.bin`` beside it. Of a folder the one with frames.
+    """
+    if not path.suffix:
+        return [path / _FRAMES]
+    actors = moving_actors(state) if everyone else [state.actor]
+    paths = motion_paths(path, actors) if actors else []
+    beside = [file.with_suffix(".bin") for file in paths if file.suffix.lower() == ".gltf"]
+    return [*paths, *beside]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Part:
+    """An actor as it was when the export began, where it goes, and which of its frames."""
+
+    actor: Actor
+    path: Path
+    frames: tuple[int, int] | None
+    rate: float | None
+    number: int
+
+
+def save_motion(state: AppState, path: Path, everyone: bool = False) -> None:
+    """Write motions, in the range that is played, beside the frame loop.
+
+    Parameters
+    ----------
+    state : AppState
+        Says afterwards what was written, and what of it the format cannot hold.
+    path : Path
+        Its suffix chooses the format; without one it is an EasyMocap folder. All of the files
+        appear, or none.
+    everyone : bool
+        Whether all actors are written, a file each (in one folder all of them), or the chosen
+        one alone.
+    """
+    try:
+        parts, lines = _parts(state, path, everyone)
+        key = suited_exporter(path, parts[0].actor.figure)
+        files = motion_files(state, path, everyone)
+        # The dialog has asked what becomes of files that are there.
+        if path.suffix:
+            check_targets(files, state.inputs, force=True)
+        else:
+            check_folder_target(files[0], state.inputs, force=True)
+    except ViewerError as problem:
+        state.error = str(problem)
+        return
+    scene = Scene([], world_up=state.scene.up)
+    options = MotionOptions(skinning=replace(state.options.skinning))
+    more = f" and {len(parts) - 1} more" if path.suffix and len(parts) > 1 else ""
+    title = f"Writing {printable(parts[0].path.name, 60)}{more}"
+
+    def write() -> list[str]:
+        if key == "easymocap":
+            return [*_write_capture(scene, parts, path, options), *lines]
+        with all_or_none(files):
+            return [*_write(scene, parts, key, options), *lines]
+
+    state.job = ThreadJob(title, write)
+
+
+def _parts(state: AppState, path: Path, everyone: bool) -> tuple[list[_Part], list[str]]:
+    """Return what is to be written, and lines about who is left out."""
+    actors = moving_actors(state) if everyone else [state.actor]
+    paths = motion_paths(path, actors) if path.suffix else [path] * len(actors)
+    parts, lines = [], []
+    for number, (actor, file) in enumerate(zip(actors, paths, strict=True)):
+        frames = _range(state, actor)
+        if frames is not None and frames[0] >= frames[1]:
+            lines.append(f"{printable(actor.name)}: not there in the range, and not written")
+            continue
+        # What goes on in the window meanwhile must not change what is written.
+        taken = actor.copy()
+        rate = state.playback.frame_rate if isinstance(actor.clip, Clip) else None
+        parts.append(_Part(taken, file, frames, rate, number))
+    if not parts:
+        raise RigError("nobody is there in the range that is played: there is nothing to write")
+    points = [a for a in state.scene.actors if isinstance(a.clip, PointClip)]
+    if everyone and points:
+        names = ", ".join(printable(actor.name, 60) for actor in points)
+        lines.append(f"captured points are not written: {names}")
+    return parts, lines
+
+
+def _write(scene: Scene, parts: Sequence[_Part], key: str, options: MotionOptions) -> list[str]:
+    lines: list[str] = []
+    for part in parts:
+        animation, up = animation_for(key, options, scene, part.actor, part.rate, part.frames)
+        lines += export_animation(animation, part.path, key, replace(options, world_up=up))
+    return lines
+
+
+def _write_capture(
+    scene: Scene, parts: Sequence[_Part], path: Path, options: MotionOptions
+) -> list[str]:
+    """Write everybody into one folder."""
+    from viewer.export.easymocap import export_animations
+
+    found = [
+        animation_for("easymocap", options, scene, part.actor, part.rate, part.frames)
+        for part in parts
+    ]
+    ups = sorted({up for _, up in found})
+    if len(ups) > 1:
+        raise RigError(f"expected one up axis for all people, found {' and '.join(ups)}")
+    people = [part.number if part.actor.person is None else part.actor.person for part in parts]
+    animations = [animation for animation, _ in found]
+    return export_animations(animations, path, replace(options, world_up=ups[0]), people)
+
+
+def _range(state: AppState, actor: Actor) -> tuple[int, int] | None:
+    """Return the frames of the actor's own clip that are played; None for all."""
+    playback, clip = state.playback, actor.clip
+    if (playback.start, playback.end) == playback.whole or clip is None:
+        return None
+    rate = clip.timing.frame_rate if isinstance(clip, SampledClip) else playback.frame_rate
+    count = int((clip.end - clip.start) * rate + 1e-6) + 1
+    first = round((playback.start - actor.offset - clip.start) * rate)
+    stop = round((playback.end - actor.offset - clip.start) * rate) + 1
+    return max(first, 0), min(stop, count)

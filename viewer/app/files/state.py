@@ -1,0 +1,40 @@
+"""State of files: what is being opened or chosen, and what was opened before."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from viewer.app.files.file_choice import FileDialog
+from viewer.app.files.loader import Loader
+from viewer.app.files.stream import Stream
+
+__all__ = ["Files"]
+
+
+@dataclass(slots=True)
+class Files:
+    """What goes on with files.
+
+    Attributes
+    ----------
+    dialog : FileDialog or None
+        The dialog that is open.
+    wants_open : list of Path
+        Files to open after the frame.
+    loader : Loader or None
+        Files that are being opened.
+    stream : Stream or None
+        Captures that are still being read.
+    recent : list of tuple of str
+        Groups of files that were opened together, latest first.
+    models : dict
+        Body models in the model folder, by name; looked for when the menu opens.
+    """
+
+    dialog: FileDialog | None = None
+    wants_open: list[Path] = field(default_factory=list)
+    loader: Loader | None = None
+    stream: Stream | None = None
+    recent: list[tuple[str, ...]] = field(default_factory=list)
+    models: dict[str, Path] = field(default_factory=dict)

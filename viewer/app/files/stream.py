@@ -1,0 +1,135 @@
+"""Read the rest of captures beside the frame loop, while their first frames are shown."""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections.abc import Callable, Sequence
+
+from viewer.diagnostics import Diagnostic
+from viewer.errors import ViewerError
+from viewer.loading.capturing import Builder
+from viewer.rig.captures.capture import CapturePart
+from viewer.rig.captures.points import PointClip
+from viewer.rig.motion.evaluation import frame_rate
+from viewer.rig.motion.retimed import with_rate
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.scene import Actor
+
+__all__ = ["Stream"]
+
+_WAITING = 4  # parts that may wait to be taken in: memory stays bounded
+
+
+class Stream:
+    """Parts of captures being read in a thread of their own, taken in by the frame loop.
+
+    Parameters
+    ----------
+    builders : sequence of Builder
+        What is left to read; their actors are in the scene.
+    wake : callable
+        Called from the thread when there is something to take in.
+
+    Attributes
+    ----------
+    error : str
+        Why reading ended before its end; empty if nothing is wrong.
+    """
+
+    def __init__(self, builders: Sequence[Builder], wake: Callable[[], None]) -> None:
+        self.builders = tuple(builder for builder in builders if not builder.is_done)
+        self.error = ""
+        self._wake = wake
+        self._parts: queue.Queue[tuple[Builder, CapturePart]] = queue.Queue(_WAITING)
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._read, daemon=True)
+        self._thread.start()
+
+    def _read(self) -> None:
+        try:
+            for builder in self.builders:
+                for part in builder.parts():
+                    if not self._hand_over(builder, part):
+                        return
+        except ViewerError as problem:
+            self.error = str(problem)
+        except MemoryError:
+            self.error = f"{self.builders[0].capture.name}: not enough memory"
+        self._wake()
+
+    def _hand_over(self, builder: Builder, part: CapturePart) -> bool:
+        """Wait for room in the queue; return False if reading was cancelled."""
+        while not self._stop.is_set():
+            try:
+                self._parts.put((builder, part), timeout=0.1)
+            except queue.Full:
+                continue
+            self._wake()
+            return True
+        return False
+
+    def take(self) -> tuple[list[Actor], list[Diagnostic], bool]:
+        """Take in what has been read since the last call.
+
+        Returns
+        -------
+        new : list of Actor
+            People who appeared.
+        notes : list of Diagnostic
+            What was noticed.
+        grew : bool
+            Whether anything was taken in.
+
+        Raises
+        ------
+        RigError
+            If bodies do not fit the model; the stream is then over.
+        """
+        new: list[Actor] = []
+        notes: list[Diagnostic] = []
+        grew = False
+        while True:
+            try:
+                builder, part = self._parts.get_nowait()
+            except queue.Empty:
+                return new, notes, grew
+            known = builder.actors
+            more, said = builder.add(part)
+            # The rate may have been changed since the first of them appeared.
+            _keep_rate(known[:1], more)
+            new += more
+            notes += said
+            grew = True
+
+    @property
+    def is_done(self) -> bool:
+        """Whether everything has been read and taken in."""
+        return not self._thread.is_alive() and self._parts.empty()
+
+    @property
+    def progress(self) -> tuple[int, int]:
+        """Frames that are in the scene, and frames there are."""
+        read = sum(builder.n_read for builder in self.builders)
+        return read, sum(builder.capture.n_frames for builder in self.builders)
+
+    def cancel(self) -> None:
+        """Read no further; what is in the scene stays."""
+        self._stop.set()
+        for builder in self.builders:
+            builder.is_cut = True
+
+    def wait(self) -> None:
+        """Return when the thread is done; its parts must be taken meanwhile. For tests."""
+        while self._thread.is_alive():
+            self._thread.join(0.01)
+            if self._parts.full():
+                return
+
+
+def _keep_rate(known: Sequence[Actor], new: Sequence[Actor]) -> None:
+    """Give people who appear the frame rate of those who are there."""
+    for first in known:
+        for actor in new:
+            if isinstance(actor.clip, SampledClip | PointClip):
+                actor.clip = with_rate(actor.clip, frame_rate(first.clip))

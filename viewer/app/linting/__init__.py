@@ -1,0 +1,1 @@
+"""Linting: checks of the scene, their findings, and where those are."""

@@ -1,0 +1,220 @@
+"""What the Lint panel and its menu entry do: check, choose a finding, copy all of them."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+from imgui_bundle import imgui
+
+from viewer.app.core.jobs import CountedJob, Report
+from viewer.app.core.reasons import no_job_room
+from viewer.app.core.state import AppState
+from viewer.app.linting.state import Checked, Linting, Running
+from viewer.app.shown_panels import set_open
+from viewer.app.view.picks import take_pick
+from viewer.errors import counted, printable
+from viewer.lint import (
+    Finding,
+    LintOptions,
+    describe,
+    finding_text,
+    lint_again,
+    summary,
+    worst_first,
+)
+from viewer.loading import bundled_files
+from viewer.rendering.picking import Pick
+from viewer.rig.pose import pose_key
+from viewer.rig.scene import Actor, Scene
+
+__all__ = [
+    "check_rig",
+    "choose_finding",
+    "copy_findings",
+    "copy_place",
+    "file_place",
+    "is_in_scene",
+    "is_known_there",
+    "is_stale",
+    "start_check",
+    "take_findings",
+]
+
+_TITLE = "Checking the rig"
+
+
+def check_rig(state: AppState) -> None:
+    """Show the Lint panel and check the scene."""
+    set_open(state, "lint", True)
+    imgui.set_window_focus("Lint")
+    state.of(Linting).was_shown = True
+    start_check(state)
+
+
+def start_check(state: AppState) -> None:
+    """Check the scene as it is now, in a thread; nothing if other work goes on."""
+    if no_job_room(state):
+        return
+    source, options, running = state.scene, _options(state), Running()
+    copy, paths = _copied(source), state.paths
+    settings, since = state.motion_settings, state.opened_at
+
+    def check(report: Report) -> list[str]:
+        # The figure that is shown without files comes from some as well.
+        files, is_likely = paths or bundled_files(), not paths
+        again = lint_again(copy, files, options, settings, since, report, is_likely)
+        findings = tuple(worst_first(again.findings))
+        running.result = Checked(source, copy, options, findings, again.n_files, again.notes)
+        return [f"Checked: {summary(findings)}"]
+
+    running.job = state.job = CountedJob(_TITLE, check)
+    state.of(Linting).running = running
+
+
+def _options(state: AppState) -> LintOptions:
+    """Return what counts as a fault; frames are those of the timeline."""
+    return replace(state.of(Linting).options, frame_rate=state.playback.keyed_rate)
+
+
+def _copied(scene: Scene) -> Scene:
+    """Return a scene whose poses stay as they are while the other one is posed on."""
+    return Scene([actor.copy() for actor in scene.actors], world_up=scene.up)
+
+
+def take_findings(state: AppState) -> None:
+    """Show the findings of a check that has ended; those of another scene are forgotten."""
+    view = state.of(Linting)
+    running = view.running
+    if running is not None and running.job is not state.job:
+        view.running = None
+        # A check that was cancelled, or of a scene that is gone, has nothing to show.
+        if running.result is not None and running.result.source is state.scene:
+            view.checked, view.chosen = running.result, -1
+            view.is_edited, view.seen = False, _moving(state)
+    if view.checked is not None and view.checked.source is not state.scene:
+        view.checked, view.chosen = None, -1
+
+
+def is_stale(state: AppState) -> bool:
+    """Return whether the scene, or what counts as a fault, is another than when it was checked.
+
+    That time moves on, and poses with it, changes nothing. To be asked once a frame.
+    """
+    view = state.of(Linting)
+    known = view.checked
+    if known is None:
+        return False
+    before, view.seen = view.seen, _moving(state)
+    if before[0] == view.seen[0] and before[1:] != view.seen[1:]:
+        view.is_edited = True
+    actors, old = state.scene.actors, known.scene.actors
+    return (
+        view.is_edited
+        or _options(state) != known.options
+        or len(actors) != len(old)
+        or any(map(_differs, actors, old))
+    )
+
+
+def _moving(state: AppState) -> tuple[object, ...]:
+    """Return the time at which the scene is posed, and the poses of what moves."""
+    poses = [actor.pose for actor in state.scene.actors if actor.clip is not None]
+    time = (state.scene.time, state.playback.fill_gaps)
+    return (time, *(pose_key(pose) for pose in poses if pose is not None))
+
+
+def _differs(actor: Actor, old: Actor) -> bool:
+    if actor.figure is not old.figure or actor.clip is not old.clip:
+        return True
+    if actor.offset != old.offset or (actor.placement != old.placement).any():
+        return True
+    if actor.clip is not None or actor.pose is None or old.pose is None:
+        return False
+    return pose_key(actor.pose) != pose_key(old.pose)
+
+
+def choose_finding(state: AppState, index: int) -> None:
+    """Look at a finding: its actor, joint and time; -1 or the same one again: at none.
+
+    Parameters
+    ----------
+    state : AppState
+        The camera goes there with the next picture.
+    index : int
+        Of ``state.of(Linting).checked.findings``.
+    """
+    view = state.of(Linting)
+    view.chosen = -1 if index == view.chosen else index
+    finding = view.finding
+    if finding is None or finding.actor is None or not is_in_scene(state, finding):
+        return
+    view.wants_aim = True
+    actor = state.scene.actors[finding.actor]
+    joint = int(finding.joints[0]) if len(finding.joints) else -1
+    if actor.figure.skeleton is None or joint >= actor.figure.skeleton.n_joints:
+        joint = -1
+    take_pick(state, Pick(finding.actor, joint, -1, -1, actor.placement[:3, 3]), False)
+    if len(finding.times) and state.playback.has_motion:
+        state.playback.playing = False
+        seek = finding.times[0] if finding.seek is None else finding.seek
+        state.playback.seek(float(seek))
+        if finding.seek is not None and finding.code == "C005":
+            state.say_status("The last frame before the gap: in it nobody is there")
+    if not actor.visible:
+        state.say_status(f"{printable(actor.name, 60)} is hidden: see the panel Actors")
+
+
+def is_in_scene(state: AppState, finding: Finding) -> bool:
+    """Return whether a finding is about an actor that is shown; others are of files alone."""
+    return finding.actor is not None and finding.actor < len(state.scene.actors)
+
+
+def is_known_there(state: AppState, finding: Finding) -> bool:
+    """Return whether an actor's figure is still the one in which something was found.
+
+    Parameters
+    ----------
+    state : AppState
+        With the check.
+    finding : Finding
+        Of its last check.
+    """
+    known, index = state.of(Linting).checked, finding.actor
+    if known is None or index is None or not is_in_scene(state, finding):
+        return False
+    return state.scene.actors[index].figure is known.scene.actors[index].figure
+
+
+def file_place(finding: Finding) -> str:
+    """Return path and line of a finding, as editors take them; empty if it is in no file."""
+    if finding.file is None or finding.file == Path():
+        return ""
+    line = "" if finding.line is None else f":{finding.line}"
+    return f"{printable(finding.file, 300)}{line}"
+
+
+def copy_place(state: AppState, finding: Finding) -> None:
+    """Put path and line of a finding that is in no figure on the clipboard; look at none."""
+    choose_finding(state, -1)
+    place = file_place(finding)
+    if place:
+        imgui.set_clipboard_text(place)
+        state.say_status(f"Copied {place}")
+
+
+def copy_findings(state: AppState, as_json: bool) -> None:
+    """Put all findings on the clipboard, as ``viewer lint`` prints them."""
+    known = state.of(Linting).checked
+    if known is None:
+        return
+    if as_json:
+        text = json.dumps(describe(known.findings, known.scene), indent=1, allow_nan=False)
+    else:
+        last = summary(known.findings, known.n_files)
+        text = "\n".join([*map(finding_text, known.findings), last])
+    imgui.set_clipboard_text(text)
+    count = len(known.findings)
+    kind = "JSON" if as_json else "text"
+    state.say_status(f"{counted(count, 'finding')} copied as {kind}")

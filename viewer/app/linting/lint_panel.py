@@ -1,0 +1,298 @@
+"""Lint: what is wrong with rigs and motions, where, and what to do about it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from imgui_bundle import imgui
+
+from viewer.app.core.reasons import no_job_room
+from viewer.app.core.state import AppState
+from viewer.app.core.widgets import button, choice, explain, note_item, same_line_if_room, slider
+from viewer.app.linting.actions import (
+    choose_finding,
+    copy_findings,
+    copy_place,
+    file_place,
+    is_in_scene,
+    is_known_there,
+    is_stale,
+    start_check,
+    take_findings,
+)
+from viewer.app.linting.state import Checked, Linting
+from viewer.errors import printable
+from viewer.lint import SEVERITIES, Finding, LintOptions
+from viewer.lint.captures import LOW_FRAMES, LOW_SHARE
+from viewer.rig.mesh import box_size
+
+__all__ = ["draw"]
+
+_COLORS = {
+    "error": (1.0, 0.42, 0.36, 1.0),
+    "warning": (1.0, 0.77, 0.30, 1.0),
+    "note": (0.52, 0.74, 1.0, 1.0),
+}
+_STALE_COLOR = _COLORS["warning"]
+_GROUNDS = {
+    "auto": "where feet rest",
+    "height": "at a height",
+    "none": "none: feet are not checked",
+}
+_LONGEST = 400  # characters of a message in the list
+_FASTEST = 100.0  # speeds that can be set, units a second
+_TIP_WIDTH = 30.0  # letters' heights
+
+
+def draw(state: AppState) -> None:
+    """Draw the panel; the first time it is shown it checks by itself."""
+    view = state.of(Linting)
+    take_findings(state)
+    if not view.was_shown:
+        view.was_shown = True
+        start_check(state)
+    known = view.checked
+    _draw_buttons(state, known)
+    if view.running is not None:
+        _draw_progress(state)
+    if known is None:
+        if view.running is None:
+            imgui.text_wrapped("This scene has not been checked yet.")
+        return
+    if is_stale(state):
+        _draw_warning("Figure, pose or limits are others than when it was checked.")
+    for note in known.notes:
+        _draw_warning(note)
+    _draw_filters(state, known)
+    if view.chosen >= 0 and view.marks_note:
+        imgui.text_wrapped(view.marks_note)
+    _draw_list(state, known)
+
+
+def _draw_warning(text: str) -> None:
+    imgui.push_style_color(imgui.Col_.text, _STALE_COLOR)
+    imgui.text_wrapped(text)
+    imgui.pop_style_color()
+
+
+def _draw_buttons(state: AppState, known: Checked | None) -> None:
+    if button(state, "Check" if known is None else "Recheck", no_job_room(state)):
+        start_check(state)
+    explain("look for faults in rigs, meshes and motions as they are now, and in their files")
+    same_line_if_room("Limits…")
+    if button(state, "Limits…"):
+        imgui.open_popup("lint limits")
+    _draw_limits(state)
+    why = "" if known is not None and known.findings else "there is no finding to copy"
+    same_line_if_room("Copy text")
+    if button(state, "Copy text", why):
+        copy_findings(state, as_json=False)
+    if not why:
+        explain("all findings, as the command viewer lint prints them")
+    same_line_if_room("Copy JSON")
+    if button(state, "Copy JSON", why):
+        copy_findings(state, as_json=True)
+
+
+def _draw_limits(state: AppState) -> None:
+    """Draw what only the person who asks can know."""
+    if not imgui.begin_popup("lint limits"):
+        return
+    view = state.of(Linting)
+    options = view.options
+    turn = np.degrees(options.max_turn)
+    moved = slider(state, "Largest turn", turn, 90.0, 10_000.0, "%.0f\N{DEGREE SIGN}/s")
+    explain("of a joint against its parent between two frames")
+    if moved != turn:
+        view.options = replace(view.options, max_turn=float(np.radians(max(moved, 0.0))))
+    speed = options.max_speed or 0.0
+    text = "%.2f units/s" if speed else "15 times its size"
+    moved = slider(state, "Largest speed", speed, 0.0, _FASTEST, text)
+    explain("of joints and captured points; 0: 15 times the figure's size a second")
+    if moved != speed:
+        view.options = replace(view.options, max_speed=moved if moved > 0.0 else None)
+    sure = options.confidence
+    moved = slider(state, "Low confidence", sure, 0.0, 1.0)
+    explain(
+        "a captured point is reported if its confidence is below in more than "
+        f"{100.0 * LOW_SHARE:g} % of the frames that see it, and in {LOW_FRAMES} at least"
+    )
+    if moved != sure:
+        view.options = replace(view.options, confidence=moved)
+    _draw_ground(state)
+    if button(state, "Usual limits"):
+        view.options = LintOptions()
+    imgui.end_popup()
+
+
+def _draw_ground(state: AppState) -> None:
+    """Draw where the ground is: found out, at a height, or nowhere."""
+    view = state.of(Linting)
+    ground = view.options.ground
+    is_given = not isinstance(ground, str)
+    chosen = choice(state, "Ground", "height" if is_given else str(ground), _GROUNDS)
+    explain("no foot may be below by more than 1 % of the figure's height")
+    if chosen == "height":
+        height = float(ground) if is_given else 0.0
+        size = box_size(state.box) or 1.0
+        ground = slider(state, "Ground height", height, -size, size, "%.3f")
+    elif chosen == "auto":
+        ground = "auto"
+    else:
+        ground = "none"
+    if ground != view.options.ground:
+        view.options = replace(view.options, ground=ground)
+
+
+def _draw_progress(state: AppState) -> None:
+    running = state.of(Linting).running
+    if running is None or running.job is None or running.job is not state.job:
+        return
+    job = running.job
+    done, total = job.progress
+    share = done / total if total else -imgui.get_time()
+    imgui.progress_bar(share, (-1.0, 0.0), f"{done} of {total}" if total else "")
+    if button(state, "Cancel check"):
+        job.cancel()
+        state.say_status("Cancelled")
+
+
+def _draw_filters(state: AppState, known: Checked) -> None:
+    view = state.of(Linting)
+    counts = Counter(finding.severity for finding in known.findings)
+    for severity in reversed(SEVERITIES):
+        text = f"{counts[severity]:,} {severity}{'s' * (counts[severity] != 1)}"
+        if severity != SEVERITIES[-1]:
+            same_line_if_room(text)
+        imgui.push_style_color(imgui.Col_.text, _COLORS[severity])
+        changed, _ = imgui.checkbox(f"{text}###{severity}", severity in view.severities)
+        imgui.pop_style_color()
+        note_item(state, f"lint {severity}")
+        if changed:
+            view.severities ^= {severity}
+    imgui.set_next_item_width(-1.0)
+    view.text = imgui.input_text_with_hint("##lint filter", "Filter findings", view.text)[1]
+    note_item(state, "Filter findings")
+
+
+def _draw_list(state: AppState, known: Checked) -> None:
+    view = state.of(Linting)
+    shown = [
+        index
+        for index, finding in enumerate(known.findings)
+        if finding.severity in view.severities and view.text.lower() in _words(finding)
+    ]
+    if not shown:
+        imgui.text_disabled("no finding is like this" if known.findings else "nothing was found")
+        return
+    flags = imgui.TableFlags_.scroll_y | imgui.TableFlags_.borders_inner_h
+    if not imgui.begin_table("findings", 2, flags):
+        return
+    imgui.table_setup_column("code", imgui.TableColumnFlags_.width_fixed)
+    imgui.table_setup_column("finding", imgui.TableColumnFlags_.width_stretch)
+    several = len(state.scene.actors) > 1
+    for index in shown:
+        imgui.push_id(index)
+        _draw_row(state, index, known.findings[index], several)
+        imgui.pop_id()
+    imgui.end_table()
+
+
+def _words(finding: Finding) -> str:
+    """Return what the filter looks at, in small letters."""
+    words = (finding.code, finding.severity, finding.title, finding.message, finding.name)
+    return " ".join((*words, _place(finding))).lower()
+
+
+def _place(finding: Finding) -> str:
+    """Return the file's name and the line, empty if there is none."""
+    if finding.file is None or finding.file == Path():
+        return ""
+    line = "" if finding.line is None else f":{finding.line}"
+    return f"{printable(finding.file.name, 60)}{line}"
+
+
+def _draw_row(state: AppState, index: int, finding: Finding, several: bool) -> None:
+    """Draw a finding: what it is, whose, and its message; the whole row can be clicked."""
+    imgui.table_next_row()
+    imgui.table_set_column_index(1)
+    title, message = finding.title, printable(finding.message, _LONGEST)
+    if several and finding.name:
+        title = f"{printable(finding.name, 60)}: {title}"
+    if _place(finding):
+        title = f"{title} ({_place(finding)})"
+    room = max(imgui.get_content_region_avail().x, 1.0)
+    heights = [imgui.calc_text_size(text, False, room).y for text in (title, message)]
+    imgui.text_wrapped(title)
+    imgui.push_style_color(imgui.Col_.text, imgui.get_style_color_vec4(imgui.Col_.text_disabled))
+    imgui.text_wrapped(message)
+    imgui.pop_style_color()
+    imgui.table_set_column_index(0)
+    place = imgui.get_cursor_screen_pos()
+    flags = imgui.SelectableFlags_.span_all_columns
+    size = (0.0, sum(heights) + imgui.get_style().item_spacing.y)
+    if imgui.selectable("##finding", index == state.of(Linting).chosen, flags, size)[0]:
+        if is_in_scene(state, finding):
+            choose_finding(state, index)
+        else:
+            copy_place(state, finding)
+    note_item(state, f"finding {index}")
+    if imgui.is_item_hovered(imgui.HoveredFlags_.delay_normal):
+        _draw_tooltip(state, finding)
+    imgui.set_cursor_screen_pos(place)
+    _draw_severity(finding.severity)
+    imgui.same_line(0.0, imgui.get_style().item_inner_spacing.x)
+    imgui.text_colored(_COLORS[finding.severity], finding.code)
+
+
+def _draw_tooltip(state: AppState, finding: Finding) -> None:
+    if imgui.begin_tooltip():
+        imgui.push_text_wrap_pos(_TIP_WIDTH * imgui.get_font_size())
+        imgui.text_colored(_COLORS[finding.severity], f"{finding.severity} {finding.code}")
+        imgui.text_unformatted(finding.title)
+        if file_place(finding):
+            imgui.text_unformatted(file_place(finding))
+        imgui.text_unformatted(printable(finding.message, 2000))
+        imgui.text_unformatted(f"What to do: {finding.hint}")
+        imgui.text_disabled(_click_text(state, finding))
+        imgui.pop_text_wrap_pos()
+        imgui.end_tooltip()
+
+
+def _click_text(state: AppState, finding: Finding) -> str:
+    """Return what a click on the row of a finding does."""
+    if is_known_there(state, finding):
+        return "a click shows it in the view; another one, or Esc, ends that"
+    if is_in_scene(state, finding):
+        return "a click chooses the actor: its figure is another than when it was checked"
+    if not file_place(finding):
+        return "nothing in the view is what this is about"
+    copied = "its path" if finding.line is None else "its path and line"
+    return f"it is in the file, not in the figure that is shown: a click copies {copied}"
+
+
+def _draw_severity(severity: str) -> None:
+    """Draw the sign of a severity: a cross in a disc, a triangle with "!", a ring with "i"."""
+    size = imgui.get_text_line_height()
+    corner = imgui.get_cursor_screen_pos()
+    x, y, r = corner.x + 0.5 * size, corner.y + 0.5 * size, 0.42 * size
+    draw_list = imgui.get_window_draw_list()
+    color, dark = imgui.get_color_u32(_COLORS[severity]), imgui.get_color_u32((0.1, 0.1, 0.1, 1))
+    line = max(0.12 * size, 1.0)
+    if severity == "error":
+        draw_list.add_circle_filled((x, y), r, color)
+        arm = 0.45 * r
+        draw_list.add_line((x - arm, y - arm), (x + arm, y + arm), dark, line)
+        draw_list.add_line((x - arm, y + arm), (x + arm, y - arm), dark, line)
+    elif severity == "warning":
+        draw_list.add_triangle_filled((x, y - r), (x + r, y + 0.8 * r), (x - r, y + 0.8 * r), color)
+        draw_list.add_line((x, y - 0.35 * r), (x, y + 0.25 * r), dark, line)
+        draw_list.add_circle_filled((x, y + 0.55 * r), 0.6 * line, dark)
+    else:
+        draw_list.add_circle((x, y), 0.9 * r, color, 0, 0.7 * line)
+        draw_list.add_circle_filled((x, y - 0.4 * r), 0.6 * line, color)
+        draw_list.add_line((x, y - 0.1 * r), (x, y + 0.5 * r), color, line)
+    imgui.dummy((size, size))

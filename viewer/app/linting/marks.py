@@ -1,0 +1,167 @@
+"""Where the chosen finding is: marks in the view, and the camera's way there."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import astuple
+
+import numpy as np
+
+from viewer.app.core.fitting import fit_points
+from viewer.app.core.state import AppState
+from viewer.app.linting.state import Linting
+from viewer.errors import ViewerError
+from viewer.lint import Places, places_of, points_of
+from viewer.rendering.camera import Camera, camera_axes
+from viewer.rendering.overlay.marks import Marks
+from viewer.rig.arrays import Floats
+from viewer.rig.mesh import bounding_box, box_size
+from viewer.rig.pose import pose_key
+from viewer.rig.scene import actor_points
+
+__all__ = ["aim", "marks_of", "show_finding"]
+
+_MOST = 3000  # vertices, and triangles' edges, that are marked
+_FEW = 200  # triangles whose middles are marked too: the smallest have edges of no pixel
+_AROUND, _AROUND_JOINTS = 0.06, 0.15  # of the actor's size: seen around a place, to know where
+_ONE_WAY = 0.5  # length of a mean normal from which a place has a side to be seen from
+_AWAY = 0.2  # cosine to the line of sight below which that side is not seen
+_STEEPEST = 70.0  # degrees
+_JOINT, _MIDDLE = 6.5, 3.0  # radii, pixels
+
+
+def show_finding(state: AppState) -> Marks | None:
+    """Return the marks of the chosen finding as the scene is posed; send the camera if asked.
+
+    To be called when the scene has been posed, before it is drawn.
+    """
+    view = state.of(Linting)
+    finding = view.finding
+    wants_aim, view.wants_aim = view.wants_aim, False
+    key = _key(state)
+    if finding is None or key is None:
+        view.marks, view.marks_key = None, None
+        return None
+    if key == view.marks_key and not wants_aim:
+        return view.marks
+    options = state.options
+    try:
+        places = places_of(finding, state.scene, options.skinning, options.show == "binding")
+        if wants_aim:
+            on_surface = len(places.vertices) + len(places.triangles) > 0
+            around = _AROUND if on_surface else _AROUND_JOINTS
+            aim(state, points_of(finding, state.scene, places), places.facing, around)
+    except ViewerError as problem:
+        state.error, view.chosen, view.marks = str(problem), -1, None
+        return None
+    if key != view.marks_key:
+        view.marks, view.marks_note = marks_of(places)
+        view.marks_key = key
+    return view.marks
+
+
+def _key(state: AppState) -> object:
+    """Return all that the marks depend on; None if their actor is there no more."""
+    linting = state.of(Linting)
+    known, finding = linting.checked, linting.finding
+    if known is None or known.source is not state.scene:
+        return None
+    if finding is None or finding.actor is None or finding.actor >= len(state.scene.actors):
+        return None
+    actor = state.scene.actors[finding.actor]
+    if actor.figure is not known.scene.actors[finding.actor].figure:
+        return None  # the finding's numbers may mean others on it
+    options = state.options
+    return (
+        id(finding),
+        actor.placement.tobytes(),
+        pose_key(actor.pose) if actor.pose else (),
+        b"" if actor.points is None else actor.points.tobytes(),
+        astuple(options.skinning),
+        options.show == "binding",
+    )
+
+
+def marks_of(places: Places) -> tuple[Marks, str]:
+    """Return marks of places, and words about what is not marked because there are too many.
+
+    Parameters
+    ----------
+    places : Places
+        Those that are not finite are left out.
+
+    Returns
+    -------
+    marks : Marks
+        Points at vertices and joints, edges of triangles.
+    note : str
+        Empty if all are marked.
+    """
+    vertices, joints = _finite(places.vertices), _finite(places.joints)
+    triangles = _finite(places.triangles)
+    shown = triangles[: _MOST // 3]
+    edges = np.stack([shown, np.roll(shown, -1, axis=1)], axis=2)
+    middles = shown.mean(axis=1) if len(shown) <= _FEW else np.zeros((0, 3))
+    parts = (vertices[:_MOST], middles, joints[:_MOST])
+    radii = (_radius(len(parts[0])), _MIDDLE, _JOINT)
+    marks = Marks(
+        np.concatenate(parts),
+        np.concatenate([np.full(len(part), r) for part, r in zip(parts, radii, strict=True)]),
+        edges.reshape(-1, 2, 3),
+    )
+    cut = [
+        f"the worst {marked:,} of {count:,} {what} are marked"
+        for what, marked, count in (
+            ("vertices", len(parts[0]), len(places.vertices)),
+            ("triangles", len(shown), len(places.triangles)),
+        )
+        if marked < count
+    ]
+    return marks, "; ".join(cut)
+
+
+def _finite(places: Floats) -> Floats:
+    axes = tuple(range(1, places.ndim))
+    return places[np.isfinite(places).all(axis=axes)]
+
+
+def _radius(count: int) -> float:
+    """Return how large many points are drawn, pixels: the more, the smaller."""
+    return 4.5 if count <= 50 else 3.0 if count <= 500 else 1.8
+
+
+def aim(state: AppState, points: Floats, facing: Floats, around: float) -> None:
+    """Let the camera look at some points, from the side that they face if it saw them from behind.
+
+    Parameters
+    ----------
+    state : AppState
+        Its camera moves at once; some of the actor around the points is seen too.
+    points : (N, 3)
+        Scene space.
+    facing : (3,)
+        Mean normal, as ``Places`` has it.
+    around : float
+        How much around their middle is seen at least, as a share of the actor's size.
+    """
+    linting = state.of(Linting)
+    points, camera, finding = _finite(points), state.camera, linting.finding
+    if not len(points) or finding is None or finding.actor is None:
+        return
+    whole = _finite(actor_points(state.scene.actors[finding.actor]))
+    size = box_size(bounding_box(whole if len(whole) else points)) or box_size(state.box) or 1.0
+    room = bounding_box(points).mean(axis=0) + around * size * np.array([[-1.0], [1.0]])
+    _turn(camera, facing)
+    fit_points(state, np.concatenate([points, room]))
+
+
+def _turn(camera: Camera, facing: Floats) -> None:
+    """Turn a camera that looks at the back of a surface to its front."""
+    length = float(np.linalg.norm(facing))
+    backward = camera_axes(camera)[2]
+    if length < _ONE_WAY or float(facing @ backward) > _AWAY * length:
+        return
+    x, y, z = facing if camera.up == "y" else (facing[0], facing[2], -facing[1])
+    camera.azimuth = math.degrees(math.atan2(x, z))
+    inclination = math.degrees(math.atan2(y, math.hypot(x, z)))
+    camera.inclination = min(max(inclination, -_STEEPEST), _STEEPEST)

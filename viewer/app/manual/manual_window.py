@@ -1,0 +1,161 @@
+"""The window "Manual": the list of pages, and the page that was chosen."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+
+from imgui_bundle import imgui
+
+from viewer.app.core.state import AppState
+from viewer.app.core.widgets import begin_menu, menu_item, note_item
+from viewer.app.manual.blocks import Block, blocks_of
+from viewer.errors import ViewerError
+from viewer.manual import PAGES, page_text
+
+__all__ = ["Manual", "draw_manual", "draw_manual_menu"]
+
+_SIZE = (60.0, 40.0)  # letters' heights
+_TOPICS = 8.5  # letters' heights across
+_TITLE = 1.35  # times the usual letters
+_TITLE_COLOR = (1.0, 0.78, 0.45, 1.0)
+_CODE_COLOR = (0.72, 0.85, 0.95, 1.0)
+_ALIGNED = re.compile(" {2,}#")
+_NARROWEST, _WIDEST = 6, 60  # letters that a column is given room for
+
+
+@dataclass(slots=True)
+class Manual:
+    """The page that is shown.
+
+    Attributes
+    ----------
+    topic : str
+        A key of ``viewer.manual.PAGES``; empty while the window is closed.
+    pages : dict
+        Blocks of the pages that were shown so far, by topic.
+    """
+
+    topic: str = ""
+    pages: dict[str, list[Block]] = field(default_factory=dict)
+
+
+def draw_manual_menu(state: AppState) -> None:
+    """Draw a menu with an item for each page."""
+    if not begin_menu(state, "Manual"):
+        return
+    manual = state.of(Manual)
+    for topic in PAGES:
+        # Some pages are called like other items.
+        if menu_item(state, f"{_title(topic)}##page {topic}", "", topic == manual.topic):
+            manual.topic = topic
+    imgui.end_menu()
+
+
+def draw_manual(state: AppState) -> None:
+    """Draw the window if a page was chosen."""
+    manual = state.of(Manual)
+    if not manual.topic:
+        return
+    size, viewport = imgui.get_font_size(), imgui.get_main_viewport()
+    room = (
+        min(_SIZE[0] * size, 0.95 * viewport.size.x),
+        min(_SIZE[1] * size, 0.9 * viewport.size.y),
+    )
+    imgui.set_next_window_size(room, imgui.Cond_.appearing)
+    imgui.set_next_window_pos(viewport.get_center(), imgui.Cond_.appearing, (0.5, 0.5))
+    flags = imgui.WindowFlags_.no_docking | imgui.WindowFlags_.no_saved_settings
+    shown, stays = imgui.begin("Manual", True, flags | imgui.WindowFlags_.no_collapse)
+    if shown:
+        _draw_topics(state, manual)
+        imgui.same_line()
+        _draw_page(state, manual)
+    imgui.end()
+    if not stays:
+        manual.topic = ""
+
+
+def _title(topic: str) -> str:
+    """Return a topic as menus show it."""
+    return topic.capitalize()
+
+
+def _draw_topics(state: AppState, manual: Manual) -> None:
+    """Draw the list of pages, at the left."""
+    if imgui.begin_child("##topics", (_TOPICS * imgui.get_font_size(), 0.0)):
+        for topic, text in PAGES.items():
+            if imgui.selectable(f"{_title(topic)}##{topic}", topic == manual.topic)[0]:
+                manual.topic = topic
+            note_item(state, f"page {topic}")
+            if imgui.is_item_hovered():
+                imgui.set_tooltip(text)
+    imgui.end_child()
+
+
+def _draw_page(state: AppState, manual: Manual) -> None:
+    """Draw the chosen page; each keeps the place that it was scrolled to."""
+    topic = manual.topic
+    if topic not in manual.pages:
+        try:
+            manual.pages[topic] = blocks_of(page_text(topic))
+        except ViewerError as problem:  # the installation lacks it
+            state.error, manual.topic = str(problem), ""
+            return
+    if imgui.begin_child(f"##page {topic}", (0.0, 0.0), imgui.ChildFlags_.borders):
+        for number, block in enumerate(manual.pages[topic]):
+            _draw_block(block, number)
+    imgui.end_child()
+
+
+def _draw_block(block: Block, number: int) -> None:
+    if block.kind == "title":
+        imgui.push_font(None, _TITLE * imgui.get_style().font_size_base)
+        imgui.text_colored(_TITLE_COLOR, block.text)
+        imgui.pop_font()
+    elif block.kind == "heading":
+        imgui.spacing()
+        imgui.separator_text(block.text)
+    elif block.kind == "item":
+        imgui.bullet()
+        imgui.same_line()
+        imgui.text_wrapped(block.text)
+    elif block.kind == "code":
+        _draw_code(block.text, number)
+    elif block.kind == "table":
+        _draw_table(block, number)
+    else:
+        imgui.text_wrapped(block.text)
+    if block.kind != "item":
+        imgui.spacing()
+
+
+def _draw_code(text: str, number: int) -> None:
+    """Draw lines that are not wrapped, in a frame that scrolls where they are too long."""
+    flags = imgui.ChildFlags_.frame_style | imgui.ChildFlags_.auto_resize_y
+    scrolls = imgui.WindowFlags_.horizontal_scrollbar
+    if imgui.begin_child(f"##code {number}", (0.0, 0.0), flags, scrolls):
+        imgui.push_style_color(imgui.Col_.text, _CODE_COLOR)
+        # Blanks that align comments do so only where all letters are equally wide.
+        imgui.text_unformatted(_ALIGNED.sub("   #", text))
+        imgui.pop_style_color()
+    imgui.end_child()
+
+
+def _draw_table(block: Block, number: int) -> None:
+    """Draw a table as wide as the page; columns share the width by their longest cells."""
+    flags = imgui.TableFlags_.borders_inner_h | imgui.TableFlags_.row_bg
+    head, *rows = block.rows
+    if not imgui.begin_table(f"##table {number}", len(head), flags):
+        return
+    for column, text in enumerate(head):
+        longest = max(len(row[column]) for row in block.rows)
+        weight = float(min(max(longest, _NARROWEST), _WIDEST))
+        imgui.table_setup_column(text, imgui.TableColumnFlags_.width_stretch, weight)
+    if any(head):
+        imgui.table_headers_row()
+    for row in rows:
+        imgui.table_next_row()
+        for text in row:
+            imgui.table_next_column()
+            imgui.text_wrapped(text)
+    imgui.end_table()

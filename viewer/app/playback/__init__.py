@@ -1,0 +1,1 @@
+"""Playback: the timeline and its frames."""

@@ -1,0 +1,80 @@
+"""Frames a second: of the chosen actor's capture, or by which keyed clips are counted."""
+
+from __future__ import annotations
+
+import math
+
+from viewer.app.core.state import AppState
+from viewer.rig.captures.points import PointClip
+from viewer.rig.motion.retimed import with_rate
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.scene import Actor
+
+__all__ = ["LIMITS", "foreign_rate", "rate_of", "set_rate"]
+
+LIMITS = (0.01, 1000.0)
+"""Slowest and fastest rate that can be set, frames a second."""
+
+
+def rate_of(state: AppState) -> float:
+    """Return the frames a second of the chosen actor's motion."""
+    clip = state.actor.clip
+    if isinstance(clip, SampledClip | PointClip):
+        return clip.timing.frame_rate
+    return state.playback.frame_rate
+
+
+def foreign_rate(state: AppState) -> str:
+    """Say why the rate cannot be set through the chosen actor: another one's frames count."""
+    playback = state.playback
+    if not playback.has_frames or isinstance(state.actor.clip, SampledClip | PointClip):
+        return ""
+    return "another motion gives the frames: choose its actor"
+
+
+def set_rate(state: AppState, rate: float) -> None:
+    """Let the chosen actor's frames come at another rate, together with all of its capture.
+
+    Keyed clips have no frames: what one steps and counts by is set for them, and no clip changes.
+
+    Parameters
+    ----------
+    state : AppState
+        Clips of its actors are replaced, so that it can be undone.
+    rate : float
+        Frames a second; what is not within ``LIMITS`` is refused with a message.
+    """
+    if foreign_rate(state) or rate == rate_of(state):
+        return
+    if not (math.isfinite(rate) and LIMITS[0] <= rate <= LIMITS[1]):
+        low, high = LIMITS
+        state.say(f"frames a second: expected {low:g} to {high:g}, found {rate:g}")
+        return
+    clip = state.actor.clip
+    if not isinstance(clip, SampledClip | PointClip):
+        state.playback.count_by(rate)
+        state.say_status(f"Keys are counted by {rate:g} frames a second")
+        return
+    together = [actor for actor in state.scene.actors if _is_together(actor, state.actor)]
+    for actor in together:
+        if isinstance(actor.clip, SampledClip | PointClip):
+            actor.clip = with_rate(actor.clip, rate)
+    who = f" for {len(together)} actors of this capture" if len(together) > 1 else ""
+    state.say_status(f"{rate:g} frames a second{who}")
+
+
+def _is_together(one: Actor, other: Actor) -> bool:
+    """Return whether two actors are the same, or people of one capture."""
+    first, second = one.clip, other.clip
+    if one is other:
+        return True
+    if not isinstance(first, SampledClip | PointClip):
+        return False
+    if not isinstance(second, SampledClip | PointClip):
+        return False
+    if one.person is None or other.person is None or first.name != second.name:
+        return False
+    a, b = first.timing, second.timing
+    return (a.frame_rate, a.n_frames, a.first_frame, a.start) == (
+        b.frame_rate, b.n_frames, b.first_frame, b.start,
+    )  # fmt: skip

@@ -1,0 +1,143 @@
+"""Timeline: the clock's buttons, a ruler to scrub, and a track per actor with its gaps."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from viewer.app.core.playback import FASTEST, MODES
+from viewer.app.core.reasons import no_motion
+from viewer.app.core.state import AppState
+from viewer.app.core.widgets import (
+    button,
+    checkbox,
+    choice,
+    disabled,
+    explain,
+    note_item,
+    same_line_if_room,
+    slider,
+)
+from viewer.app.playback.actions import go_to_end, play, step
+from viewer.app.playback.frame_rate import foreign_rate, rate_of, set_rate
+from viewer.app.playback.gaps import no_gaps
+from viewer.app.playback.tracks import draw_tracks
+from viewer.rig.number_text import number_text
+
+__all__ = ["draw"]
+
+_CLAMP = imgui.SliderFlags_.always_clamp
+_TYPED = imgui.InputTextFlags_.enter_returns_true | imgui.InputTextFlags_.auto_select_all
+
+
+def draw(state: AppState) -> None:
+    """Draw the panel."""
+    if not state.playback.has_motion:
+        imgui.text_disabled(no_motion(state))
+        return
+    _draw_transport(state)
+    same_line_if_room("000000")
+    _draw_place(state)
+    same_line_if_room("M" * 9)
+    _draw_rate(state)
+    _draw_settings(state)
+    draw_tracks(state)
+
+
+def _draw_transport(state: AppState) -> None:
+    playback = state.playback
+    if button(state, "|<"):
+        go_to_end(state, last=False)
+    explain("first frame (Home)")
+    imgui.same_line()
+    if button(state, "<"):
+        step(state, -1)
+    explain("one frame back (Left)")
+    imgui.same_line()
+    # One width for both words, or the buttons behind it would jump.
+    width = imgui.calc_text_size("Pause").x + 2 * imgui.get_style().frame_padding.x
+    if imgui.button("Pause###play" if playback.playing else "Play###play", (width, 0.0)):
+        play(state)
+    note_item(state, "Play")
+    explain("play or pause (Space)")
+    imgui.same_line()
+    if button(state, ">"):
+        step(state, 1)
+    explain("one frame on (Right)")
+    imgui.same_line()
+    if button(state, ">|"):
+        go_to_end(state, last=True)
+    explain("last frame (End)")
+
+
+def _draw_place(state: AppState) -> None:
+    playback = state.playback
+    imgui.set_next_item_width(4.5 * imgui.get_font_size())
+    shown = playback.frame + playback.first_frame
+    changed, frame = imgui.input_int("##frame", shown, 0, 0)
+    note_item(state, "Frame")
+    explain("the frame that is shown")
+    if changed and frame != shown:
+        playback.playing = False
+        playback.seek(playback.frame_time(frame - playback.first_frame))
+    first, last = (playback.first_frame + number for number in playback.frame_range)
+    text = f"of {first} to {last}    {number_text(playback.time, '.3f')} s"
+    same_line_if_room(text)
+    imgui.text_unformatted(text)
+
+
+def _draw_rate(state: AppState) -> None:
+    """Draw how many frames a second there are; a number that is typed and entered sets it."""
+    foreign = foreign_rate(state)
+    with disabled(foreign):
+        imgui.set_next_item_width(4.0 * imgui.get_font_size())
+        entered, typed = imgui.input_double(
+            "Frames a second##rate", rate_of(state), 0.0, 0.0, "%.6g", _TYPED
+        )
+        note_item(state, "Frame rate")
+        explain("Enter sets it: the same frames faster or slower", foreign)
+    if entered:
+        set_rate(state, typed)
+
+
+def _draw_settings(state: AppState) -> None:
+    playback = state.playback
+    size = imgui.get_font_size()
+    imgui.set_next_item_width(8 * size)
+    playback.mode = choice(state, "Mode", playback.mode, MODES)
+    explain("what happens at the end of the range")
+    if playback.mode != "run on":
+        playback.time = min(max(playback.time, playback.whole[0]), playback.whole[1])
+    same_line_if_room("M" * 12)
+    imgui.set_next_item_width(8 * size)
+    playback.speed = slider(state, "Speed", playback.speed, -FASTEST, FASTEST, "%.2f x", _CLAMP)
+    if imgui.is_item_clicked(imgui.MouseButton_.right):
+        playback.speed = 1.0
+    explain("seconds of motion a second; a right click sets 1")
+    same_line_if_room("M" * 14)
+    _draw_range(state)
+    same_line_if_room("Fill gaps")
+    gapless = no_gaps(state)
+    playback.fill_gaps = checkbox(state, "Fill gaps", playback.fill_gaps, gapless)
+    text = "show captures in their gaps too, on the way from the frame before to the one after"
+    explain(text, gapless)
+
+
+def _draw_range(state: AppState) -> None:
+    """Draw the frames at which playing starts and ends."""
+    playback = state.playback
+    rate, origin = playback.frame_rate, playback.origin
+    first = round((playback.start - origin) * rate) + playback.first_frame
+    last = round((playback.end - origin) * rate) + playback.first_frame
+    lowest, highest = (playback.first_frame + number for number in playback.frame_range)
+    imgui.set_next_item_width(9 * imgui.get_font_size())
+    changed, low, high = imgui.drag_int_range2("Range", first, last, 0.3, lowest, highest)
+    note_item(state, "Range")
+    text = "frames that are played; I and O set them to the present one, a right click to all"
+    explain(text)
+    if imgui.is_item_clicked(imgui.MouseButton_.right):
+        playback.set_range(*playback.whole)
+    elif changed:
+        # What was not touched keeps its exact time.
+        start = playback.frame_time(low - playback.first_frame) if low != first else playback.start
+        end = playback.frame_time(high - playback.first_frame) if high != last else playback.end
+        playback.set_range(start, end)

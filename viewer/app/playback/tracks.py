@@ -1,0 +1,227 @@
+"""The timeline's ruler and tracks: where in time each actor is there, and where time stands."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from imgui_bundle import imgui
+
+from viewer.app.core.playback import Playback
+from viewer.app.core.state import AppState
+from viewer.app.core.widgets import note_item
+from viewer.errors import printable
+from viewer.rendering.srgb import encode_color
+from viewer.rig.motion.clip import Clip
+from viewer.rig.scene import Actor, Motion
+
+__all__ = ["bars", "draw_tracks", "nice_step", "present_spans", "ruler_text_place"]
+
+_NAME_WIDTH = 9.0  # letters' heights
+_TICK_GAP = 5.0  # the same: smallest distance of two numbers on the ruler
+_TICK_ASIDE = 3.0  # points between a line of the ruler and its number
+_TIME = (1.0, 0.62, 0.25, 1.0)
+_PLAIN = (0.44, 0.62, 0.80)  # of actors without a colour of their own, sRGB
+_QUIET = 0.6  # opacity of the tracks of actors that are not chosen
+_CHOSEN_EDGE = (1.0, 1.0, 1.0, 0.85)
+_NARROWEST = 0.35  # letters' heights, of a bar: a single frame between gaps is to be seen
+_NARROWEST_GAP = 1.0  # points between two bars that are as narrow as that
+_OUTSIDE = (0.0, 0.0, 0.0, 0.35)
+_LINE, _TEXT = (1.0, 1.0, 1.0, 0.13), (1.0, 1.0, 1.0, 0.6)
+_BACK = (1.0, 1.0, 1.0, 0.03)
+
+
+def draw_tracks(state: AppState) -> None:
+    """Draw the ruler and the tracks; dragging in them moves time by whole frames, Alt freely."""
+    size = imgui.get_font_size()
+    moving = [index for index, actor in enumerate(state.scene.actors) if actor.clip is not None]
+    height = imgui.get_text_line_height_with_spacing()
+    low, high = state.playback.whole
+    if not imgui.begin_child("##tracks"):
+        imgui.end_child()
+        return
+    corner = imgui.get_cursor_screen_pos()
+    left = corner.x + _NAME_WIDTH * size
+    width = max(imgui.get_content_region_avail().x - _NAME_WIDTH * size - 0.5 * size, 1.0)
+    scale = width / max(high - low, 1e-9)
+    area = (left, corner.y, width, height * (len(moving) + 1))
+    _draw_names(state, moving, height)
+    imgui.set_cursor_screen_pos((left, corner.y))
+    imgui.invisible_button("##scrub", (max(width, 1.0), area[3]))
+    note_item(state, "Scrubber")
+    if imgui.is_item_active() and imgui.is_mouse_down(imgui.MouseButton_.left):
+        time = low + (imgui.get_mouse_pos().x - left) / scale
+        state.playback.scrub(time, between=imgui.get_io().key_alt)
+    first = max(0, int((imgui.get_scroll_y() - height) / height))
+    last = first + int(imgui.get_window_height() / height) + 3
+    for row in range(first, min(last, len(moving))):
+        index = moving[row]
+        top = corner.y + height * (row + 1)
+        chosen = index == state.chosen_actor
+        _draw_track(state.scene.actors[index], state.playback, area, top, height, chosen)
+    _draw_ruler(state.playback, area, height)
+    _draw_time(state.playback, area)
+    imgui.end_child()
+
+
+def _draw_names(state: AppState, moving: list[int], height: float) -> None:
+    """Draw the actors' names; a click chooses one."""
+    width = (_NAME_WIDTH - 0.5) * imgui.get_font_size()
+    imgui.dummy((width, height - imgui.get_style().item_spacing.y))
+    for index in moving:
+        actor = state.scene.actors[index]
+        imgui.push_id(index)
+        text = printable(actor.name, 40)
+        if not actor.is_drawn:
+            imgui.push_style_color(imgui.Col_.text, _TEXT)
+        if imgui.selectable(text, index == state.chosen_actor, 0, (width, 0.0))[0]:
+            state.choose_actor(index)
+        if not actor.is_drawn:
+            imgui.pop_style_color()
+        note_item(state, f"track {index}")
+        imgui.pop_id()
+
+
+def _draw_track(
+    actor: Actor,
+    playback: Playback,
+    area: tuple[float, float, float, float],
+    top: float,
+    height: float,
+    chosen: bool,
+) -> None:
+    draw_list = imgui.get_window_draw_list()
+    left, _, width, _ = area
+    low, high = playback.whole
+    scale = width / max(high - low, 1e-9)
+    gap = 0.16 * height
+    back = imgui.get_color_u32(_BACK)
+    draw_list.add_rect_filled((left, top + gap), (left + width, top + height - gap), back)
+    red, green, blue = encode_color(actor.color) if actor.color is not None else _PLAIN
+    color = imgui.get_color_u32((red, green, blue, 1.0 if chosen else _QUIET))
+    edge = imgui.get_color_u32(_CHOSEN_EDGE)
+    assert actor.clip is not None  # it has a track
+    spans = present_spans(actor.clip, 1.0 / scale)
+    places = [left + (time + actor.offset - low) * scale for span in spans for time in span]
+    for x0, x1 in bars(places, _NARROWEST * imgui.get_font_size(), left + width):
+        draw_list.add_rect_filled((x0, top + gap), (x1, top + height - gap), color, 2.0)
+        if chosen:
+            draw_list.add_rect((x0, top + gap), (x1, top + height - gap), edge, 2.0)
+
+
+def bars(places: Sequence[float], narrowest: float, end: float) -> list[tuple[float, float]]:
+    """Return from where to where bars are drawn, none too narrow to be seen.
+
+    Parameters
+    ----------
+    places : sequence of float
+        Start and end of each, one after the other, in points.
+    narrowest : float
+        Width of a bar; less only between others that leave no room for it.
+    end : float
+        The right end of all.
+
+    >>> bars([0.0, 9.0, 20.0, 20.0, 22.0, 30.0, 40.0, 40.0], 5.0, 40.0)
+    [(0.0, 9.0), (16.0, 21.0), (22.0, 30.0), (35.0, 40.0)]
+    """
+    found: list[tuple[float, float]] = []
+    for number in range(0, len(places), 2):
+        x0, x1 = places[number], places[number + 1]
+        following = places[number + 2] - _NARROWEST_GAP if number + 2 < len(places) else end
+        x1 = max(x1, min(x0 + narrowest, following))
+        before = found[-1][1] + _NARROWEST_GAP if found else x1 - narrowest
+        found.append((min(x0, max(x1 - narrowest, before)), x1))
+    return found
+
+
+def present_spans(clip: Motion, shortest: float) -> list[tuple[float, float]]:
+    """Return from when to when a motion has its actor.
+
+    Parameters
+    ----------
+    clip : Motion
+        Keyed clips are there all of their range.
+    shortest : float
+        Gaps shorter than this, in seconds, are not told: nobody could see them.
+
+    Returns
+    -------
+    list of (float, float)
+        Seconds of the motion's own clock.
+    """
+    if isinstance(clip, Clip):
+        return [(clip.start, clip.end)]
+    timing = clip.timing
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], timing.present, [False]])))
+    first, stop = edges[::2], edges[1::2]
+    starts = timing.start + first / timing.frame_rate
+    ends = timing.start + (stop - 1) / timing.frame_rate
+    split = np.flatnonzero(starts[1:] - ends[:-1] > max(shortest, 1.0 / timing.frame_rate) * 1.001)
+    begins = starts[np.concatenate([[0], split + 1])] if len(starts) else starts
+    stops = ends[np.concatenate([split, [len(ends) - 1]])] if len(ends) else ends
+    return list(zip(begins.tolist(), stops.tolist(), strict=True))
+
+
+def _draw_ruler(playback: Playback, area: tuple[float, float, float, float], height: float) -> None:
+    """Draw frame numbers and lines, and darken what is not played."""
+    draw_list = imgui.get_window_draw_list()
+    left, top, width, total = area
+    low, high = playback.whole
+    scale = width / max(high - low, 1e-9)
+    line, color = imgui.get_color_u32(_LINE), imgui.get_color_u32(_TEXT)
+    first, last = (playback.first_frame + frame for frame in playback.frame_range)
+    # Room for two numbers: the last one may stand left of its line.
+    room = 2.0 * imgui.calc_text_size(str(last)).x + 3.0 * _TICK_ASIDE
+    room = max(_TICK_GAP * imgui.get_font_size(), room)
+    step = nice_step(room / scale * playback.frame_rate)
+    for number in range(math.ceil(first / step) * step, last + 1, step):
+        x = left + (playback.frame_time(number - playback.first_frame) - low) * scale
+        draw_list.add_line((x, top), (x, top + total), line)
+        place = ruler_text_place(x, imgui.calc_text_size(str(number)).x, left + width)
+        draw_list.add_text((place, top), color, str(number))
+    dark = imgui.get_color_u32(_OUTSIDE)
+    for start, end in ((low, playback.start), (playback.end, high)):
+        if end > start:
+            x0, x1 = left + (start - low) * scale, left + (end - low) * scale
+            draw_list.add_rect_filled((x0, top), (x1, top + total), dark)
+
+
+def ruler_text_place(x: float, length: float, end: float) -> float:
+    """Return where a number of the ruler begins: right of its line, left of it at the end.
+
+    Parameters
+    ----------
+    x : float
+        Of the line, points.
+    length : float
+        Of the number as it is written, points.
+    end : float
+        Where the ruler ends, points.
+
+    >>> ruler_text_place(50.0, 20.0, 100.0), ruler_text_place(90.0, 20.0, 100.0)
+    (53.0, 67.0)
+    """
+    return x - _TICK_ASIDE - length if x + _TICK_ASIDE + length > end else x + _TICK_ASIDE
+
+
+def _draw_time(playback: Playback, area: tuple[float, float, float, float]) -> None:
+    draw_list = imgui.get_window_draw_list()
+    left, top, width, total = area
+    low, high = playback.whole
+    share = (playback.time - low) / max(high - low, 1e-9)
+    x = left + width * min(max(share, 0.0), 1.0)
+    color = imgui.get_color_u32(_TIME)
+    draw_list.add_line((x, top), (x, top + total), color, 2.0)
+    half = 0.3 * imgui.get_font_size()
+    draw_list.add_triangle_filled((x - half, top), (x + half, top), (x, top + 1.4 * half), color)
+
+
+def nice_step(smallest: float) -> int:
+    """Return the smallest of 1, 2, 5, 10, 20, 50 … that is no smaller.
+
+    >>> [nice_step(x) for x in (0.2, 1.5, 3, 11, 60)]
+    [1, 2, 5, 20, 100]
+    """
+    power = 10 ** max(math.floor(math.log10(max(smallest, 1.0))), 0)
+    return next(f * power for f in (1, 2, 5, 10) if f * power >= smallest - 1e-9)

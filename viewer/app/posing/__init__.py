@@ -1,0 +1,1 @@
+"""Posing by hand: joints, shapes, hands, and the tools in the view."""

@@ -1,0 +1,93 @@
+"""Ball joints in the Joints panel: as rotation vectors, and as the file's own numbers."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from imgui_bundle import imgui
+
+from viewer.app.core.state import AppState
+from viewer.app.core.widgets import note_item, plain_zero
+from viewer.app.posing.state import HeldVector, Posing
+from viewer.rig.arrays import Floats
+from viewer.rig.figure import Figure
+from viewer.rig.geometry.rotation import matrix_to_rotation_vector, rotation_vector_to_matrix
+from viewer.rig.number_text import number_text
+from viewer.rig.pose import Pose, joint_rotations
+from viewer.rig.posing.pose_vector import own_numbers, rotation_rows, set_joint_rotations
+
+__all__ = ["draw_own_numbers", "draw_vector_component", "is_ball"]
+
+_SAME = 1e-9  # rotations nearer to each other are one
+
+
+def is_ball(figure: Figure, joint: int) -> bool:
+    """Return whether a joint may be a vector: of a body model, about x, y and z, unlimited."""
+    skeleton = figure.skeleton
+    if skeleton is None or figure.pose_layout is None:
+        return False
+    rows = rotation_rows(skeleton)[joint]
+    return rows[0] >= 0 and bool(np.isinf(skeleton.dof_limits[rows]).all())
+
+
+def draw_vector_component(
+    state: AppState, figure: Figure, pose: Pose, joint: int, axis: int, label: str
+) -> None:
+    """Draw the slider of one component of a joint's rotation vector, and turn the joint by it."""
+    skeleton = figure.skeleton
+    assert skeleton is not None  # the panel looked
+    vector = _shown_vector(state, figure, pose, joint)
+    factor = math.degrees(1.0) if state.in_degrees else 1.0
+    text = "%.1f\N{DEGREE SIGN}" if state.in_degrees else "%.4f rad"
+    reach = math.pi * factor
+    changed, moved = imgui.slider_float(
+        f"##vector{joint}.{axis}",
+        plain_zero(float(vector[axis]) * factor, text),
+        -reach,
+        reach,
+        text,
+    )
+    note_item(state, f"{label}.r{'xyz'[axis]}")
+    is_reset = False
+    if imgui.is_item_hovered():
+        imgui.set_tooltip(
+            f"{label}: component of the rotation vector\n"
+            "Ctrl+click types a value, double-click sets it to 0"
+        )
+        is_reset = imgui.is_mouse_double_clicked(imgui.MouseButton_.left)
+    if is_reset or (changed and math.isfinite(moved) and abs(moved) < 1e6):
+        vector[axis] = 0.0 if is_reset else moved / factor
+        rotation = rotation_vector_to_matrix(vector)
+        joints = np.array([joint], dtype=np.int32)
+        set_joint_rotations(skeleton, pose, joints, rotation[None])
+        state.of(Posing).held_vector = HeldVector(joint, vector, rotation, state.n_choices)
+
+
+def _shown_vector(state: AppState, figure: Figure, pose: Pose, joint: int) -> Floats:
+    """Return a joint's rotation vector: the one being edited, as long as it is its rotation."""
+    posing = state.of(Posing)
+    assert figure.skeleton is not None  # the caller looked
+    rotation = joint_rotations(figure.skeleton, pose)[joint]
+    held = posing.held_vector
+    if held is not None and (held.joint, held.n_choices) == (joint, state.n_choices):
+        if np.abs(held.rotation - rotation).max() < _SAME:
+            return held.vector.copy()
+        posing.held_vector = None
+    return matrix_to_rotation_vector(rotation)
+
+
+def draw_own_numbers(state: AppState, figure: Figure, pose: Pose, joint: int) -> None:
+    """Draw the three numbers that the model's own files would hold for a joint."""
+    layout, skeleton = figure.pose_layout, figure.skeleton
+    if layout is None or skeleton is None:
+        return
+    numbers = own_numbers(layout, joint_rotations(skeleton, pose))[joint]
+    kind = "angles z y x" if layout.is_euler[joint] else "vector"
+    imgui.text_disabled(
+        f"file: {'  '.join(number_text(number, '.4f') for number in numbers.tolist())}"
+    )
+    note_item(state, f"own {joint}")
+    if imgui.is_item_hovered():
+        start = int(layout.starts[joint])
+        imgui.set_tooltip(f"numbers {start} to {start + 2} of the file's pose: {kind}, radians")

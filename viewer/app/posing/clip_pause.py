@@ -1,0 +1,25 @@
+"""A pose edited while a clip drives the actor: time stops, and the user is told what follows."""
+
+from __future__ import annotations
+
+from viewer.app.core.state import AppState
+from viewer.rig.motion.clip import Clip
+
+__all__ = ["pause_for_edit"]
+
+
+def pause_for_edit(state: AppState) -> None:
+    """Pause a clip that would overwrite the chosen actor's pose in the next frame, and say so.
+
+    Parameters
+    ----------
+    state : AppState
+        Whose chosen actor is about to be posed; nothing happens if no clip drives it.
+    """
+    clip, playback = state.actor.clip, state.playback
+    if clip is None:
+        return
+    stopped = "Paused: the" if playback.playing else "The"
+    playback.playing = False
+    kept = "key it (Key) to keep it" if isinstance(clip, Clip) else "it lasts until time moves"
+    state.say_status(f"{stopped} clip overwrites this pose as time moves; {kept}")

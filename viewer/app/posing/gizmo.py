@@ -1,0 +1,184 @@
+"""Handles in the view: what a press takes hold of, and what happens until it is let go.
+
+ImGuizmo turns matrices about three axes at right angles; joints here have one, two or three DOFs
+about axes that may lean, with limits, so rings and arrows are our own.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from imgui_bundle import imgui
+
+from viewer.app.core.state import AppState
+from viewer.app.core.view_frame import Place, ViewFrame, view_frame
+from viewer.app.posing.clip_pause import pause_for_edit
+from viewer.app.posing.joint_tree import select_joint
+from viewer.app.posing.move_tool import (
+    ReachHandle,
+    ShiftHandle,
+    arrows,
+    grab_arrow,
+    shifts,
+    used_chain,
+)
+from viewer.app.posing.posed_joint import PosedJoint, posed_joint
+from viewer.app.posing.rotate_tool import TurnHandle, grab_ring, rings
+from viewer.app.posing.state import Drag, Handle, Outcome, Posing
+from viewer.app.posing.tool_actions import cancel_drag, no_tool, selected
+from viewer.rig.arrays import Floats
+from viewer.rig.pose import Pose
+from viewer.rig.skeleton import joint_label
+
+__all__ = [
+    "DOT_REACH",
+    "choose_joint",
+    "handle_at",
+    "joint_at",
+    "joint_places",
+    "use_handles",
+]
+
+DOT_REACH = 9.0
+"""Window coordinates around a joint in which it is chosen."""
+
+_STILL = 2.0  # window coordinates by which a hand that clicks may shake
+_LEFT, _RIGHT = imgui.MouseButton_.left, imgui.MouseButton_.right
+
+
+def use_handles(state: AppState) -> bool:
+    """Begin, go on with or end a drag; return whether the mouse belongs to a handle."""
+    posing = state.of(Posing)
+    io = imgui.get_io()
+    place = (io.mouse_pos.x, io.mouse_pos.y)
+    if posing.drag is not None:
+        return _go_on(state, posing.drag, place)
+    if not posing.is_on or io.want_capture_mouse or no_tool(state):
+        return False
+    if io.key_shift or io.key_alt:  # these pan, and ask for vertices
+        return False
+    if not imgui.is_mouse_clicked(_LEFT):
+        return False
+    handle = _grabbed(state, place)
+    if handle is None:
+        return False
+    posing.drag = Drag(state.actor, handle, Outcome(_pose(state), ""))
+    return True
+
+
+def _go_on(state: AppState, drag: Drag, place: Place) -> bool:
+    """Pose by where the pointer is; let go with the button, give up with the other one."""
+    posing = state.of(Posing)
+    if state.actor is not drag.actor or drag.actor.pose is not drag.outcome.pose:
+        drag.is_over = True  # undone, reset or closed meanwhile: that stays
+    if imgui.is_mouse_clicked(_RIGHT):
+        cancel_drag(state)
+    if drag.is_over:
+        posing.drag = drag if imgui.is_mouse_down(_LEFT) else None
+        return True
+    frame, snaps = view_frame(state), imgui.get_io().key_ctrl
+    if not drag.has_moved and _apart(place, drag.handle.place) > _STILL:
+        drag.has_moved = True
+        pause_for_edit(state)
+    asked = (place, snaps, frame.matrix.tobytes())
+    if drag.has_moved and imgui.is_mouse_pos_valid() and asked != drag.asked:
+        drag.asked = asked
+        drag.outcome = drag.handle.follow(frame, place, snaps)
+        drag.actor.pose = drag.outcome.pose
+    if not imgui.is_mouse_down(_LEFT):
+        posing.drag = None
+        if not drag.has_moved:
+            choose_joint(state)  # its dot lies under a ring or an arrow
+    return True
+
+
+def _apart(one: Place, other: Place) -> float:
+    return float(np.hypot(one[0] - other[0], one[1] - other[1]))
+
+
+def _pose(state: AppState) -> Pose:
+    pose = state.actor.pose
+    assert pose is not None  # no_tool looked
+    return pose
+
+
+def _grabbed(state: AppState, place: Place) -> Handle | None:
+    """Return the handle under the pointer; with the tool Move any joint is one."""
+    handle = handle_at(state, view_frame(state), place)
+    if handle is not None or state.of(Posing).tool != "move":
+        return handle
+    joint = joint_at(state, place)
+    if joint < 0:
+        return None
+    select_joint(state, joint)
+    posed = posed_joint(state.actor, joint)
+    return None if posed is None else _middle(state, posed, place)
+
+
+def handle_at(state: AppState, frame: ViewFrame, place: Place) -> Handle | None:
+    """Return the handle of the selected joint that a place belongs to.
+
+    Parameters
+    ----------
+    state : AppState
+        With tool, actor and joint.
+    frame : ViewFrame
+        How the scene is seen.
+    place : (float, float)
+        The pointer.
+    """
+    posing = state.of(Posing)
+    posed, pose = selected(state), state.actor.pose
+    if posed is None or pose is None:
+        return None
+    if posing.tool == "rotate":
+        found = rings(posed, pose, posing.orientation, frame)
+        held = grab_ring(found, posed.center, frame, place)
+        return None if held is None else TurnHandle(posed, pose, *held, place, state.in_degrees)
+    if posing.tool != "move":
+        return None
+    arrow = grab_arrow(arrows(posed, posing.orientation), posed.center, frame, place)
+    if arrow is not None:
+        return ShiftHandle(posed, pose, place, arrow)
+    center = frame.place(posed.center)
+    if center is None or _apart(center, place) > DOT_REACH:
+        return None
+    return _middle(state, posed, place)
+
+
+def _middle(state: AppState, posed: PosedJoint, place: Place) -> Handle | None:
+    """Return what dragging a joint itself does: its chain follows, or it is shifted."""
+    pose, skeleton = _pose(state), posed.skeleton
+    length = len(used_chain(skeleton, posed.joint, state.of(Posing).chain_length))
+    if length:
+        return ReachHandle(posed, pose, place, length)
+    if shifts(skeleton, posed.joint):
+        return ShiftHandle(posed, pose, place)
+    state.say_status(f"No joint above {joint_label(skeleton, posed.joint)} can turn")
+    return None
+
+
+def joint_places(state: AppState) -> Floats:
+    """Return where the chosen actor's joints are seen: (J, 2), NaN for those not before the eye."""
+    posed = posed_joint(state.actor, 0)
+    if posed is None:
+        return np.zeros((0, 2))
+    return view_frame(state).project(posed.world[:, :3, 3])
+
+
+def joint_at(state: AppState, place: Place) -> int:
+    """Return the chosen actor's joint that is seen at a place, -1 for none."""
+    distances = np.linalg.norm(joint_places(state) - place, axis=1)
+    distances[np.isnan(distances)] = np.inf
+    nearest = int(distances.argmin()) if len(distances) else -1
+    return nearest if nearest >= 0 and distances[nearest] <= DOT_REACH else -1
+
+
+def choose_joint(state: AppState) -> bool:
+    """Select the joint whose dot was clicked; return whether there was one."""
+    if not state.of(Posing).is_on or no_tool(state):
+        return False
+    mouse = imgui.get_io().mouse_pos
+    joint = joint_at(state, (mouse.x, mouse.y))
+    if joint >= 0:
+        select_joint(state, joint)
+    return joint >= 0

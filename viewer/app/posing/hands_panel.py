@@ -1,0 +1,89 @@
+"""Hands: a slider per principal component of hand poses, flat and mean hands."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from imgui_bundle import imgui
+
+from viewer.app.core.state import AppState
+from viewer.app.core.widgets import button, note_item, plain_zero, same_line_if_room
+from viewer.app.posing.state import Posing
+from viewer.rig.arrays import Floats
+from viewer.rig.figure import Figure
+from viewer.rig.geometry.rotation import matrix_to_rotation_vector, rotation_vector_to_matrix
+from viewer.rig.hands import Hand, hand_coefficients, hand_vectors
+from viewer.rig.memo import Memo
+from viewer.rig.pose import Pose, joint_rotations
+from viewer.rig.posing.pose_vector import set_joint_rotations
+
+__all__ = ["draw"]
+
+_REACH = 3.0  # of a slider; more can be typed
+_CLAMP = imgui.SliderFlags_.always_clamp
+_coefficients: Memo[Hand, Floats] = Memo()
+
+
+def draw(state: AppState) -> None:
+    """Draw the panel for the chosen actor."""
+    posing = state.of(Posing)
+    figure, pose = state.actor.figure, state.actor.pose
+    if not figure.hands or pose is None:
+        imgui.text_wrapped("This figure has no hand components.")
+        return
+    most = min(len(hand.components) for hand in figure.hands)
+    imgui.set_next_item_width(8.0 * imgui.get_font_size())
+    changed, count = imgui.slider_int(
+        "components", min(posing.n_hand_components, most), 1, most, "%d", _CLAMP
+    )
+    note_item(state, "components")
+    if changed:
+        posing.n_hand_components = count
+    if imgui.begin_child("hands", (0.0, 0.0)):
+        for hand in figure.hands:
+            _draw_hand(state, figure, pose, hand)
+    imgui.end_child()
+
+
+def _draw_hand(state: AppState, figure: Figure, pose: Pose, hand: Hand) -> None:
+    side = hand.side or "hand"
+    imgui.separator_text(side.capitalize())
+    for name, flat in (("flat", True), ("mean", False)):
+        if button(state, f"{name.capitalize()}###{side} {name}"):
+            _turn(figure, pose, hand, hand_vectors(hand, np.zeros(0), flat))
+        note_item(state, f"{side} {name}")
+        if flat:
+            same_line_if_room("Mean")
+    imgui.push_item_width(-6.0 * imgui.get_font_size())
+    vectors = _vectors(figure, pose, hand)
+    values = _values(hand, vectors)
+    for index in range(min(state.of(Posing).n_hand_components, len(hand.components))):
+        changed, value = imgui.slider_float(
+            f"{side} {index}", plain_zero(float(values[index]), "%.2f"), -_REACH, _REACH, "%.2f"
+        )
+        note_item(state, f"{side} component {index}")
+        if changed and math.isfinite(value) and abs(value) < 1e3:
+            # The other components, and what none of them can make, stay as they are.
+            step = (value - values[index]) * hand.components[index].reshape(-1, 3)
+            _turn(figure, pose, hand, vectors + step)
+    imgui.pop_item_width()
+
+
+def _vectors(figure: Figure, pose: Pose, hand: Hand) -> Floats:
+    assert figure.skeleton is not None  # whoever has hands has a skeleton
+    return matrix_to_rotation_vector(joint_rotations(figure.skeleton, pose)[hand.joints])
+
+
+def _values(hand: Hand, vectors: Floats) -> Floats:
+    """Return the coefficients of all components, relative to the mean hand."""
+    return _coefficients.get(
+        hand,
+        vectors.tobytes(),
+        lambda: hand_coefficients(hand, vectors, flat=False, count=len(hand.components)),
+    )
+
+
+def _turn(figure: Figure, pose: Pose, hand: Hand, vectors: Floats) -> None:
+    assert figure.skeleton is not None
+    set_joint_rotations(figure.skeleton, pose, hand.joints, rotation_vector_to_matrix(vectors))

@@ -1,0 +1,76 @@
+"""The joint tree of the Joints panel: filter, open rows, and the row of the selected joint."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from viewer.app.core.state import AppState
+from viewer.rig.scene import Actor
+from viewer.rig.skeleton import joint_label
+
+__all__ = ["JointTree", "joint_tree", "select_joint"]
+
+_MOST_OPENED = 128  # joints of a rig that is seen whole at first
+
+
+@dataclass(slots=True)
+class JointTree:
+    """Which rows are listed.
+
+    Attributes
+    ----------
+    filter : str
+        Only joints, or captured points, with this in their names are listed.
+    opened : set of int
+        Joints whose DOFs and children are listed.
+    scrolls_to : int
+        The joint that is to be brought into view, -1 for none.
+    n_choices : int
+        That of the state for which filter and opened rows are.
+    """
+
+    filter: str = ""
+    opened: set[int] = field(default_factory=set)
+    scrolls_to: int = -1
+    n_choices: int = -1
+
+
+def joint_tree(state: AppState) -> JointTree:
+    """Return the tree of the chosen actor; of another one than before it begins anew."""
+    tree = state.of(JointTree)
+    if tree.n_choices != state.n_choices:
+        tree.n_choices = state.n_choices
+        tree.filter, tree.opened = "", _first_opened(state.actor)
+    return tree
+
+
+def _first_opened(actor: Actor) -> set[int]:
+    """Return the joints whose rows are open at first: all of a small rig, else the roots."""
+    skeleton = actor.figure.skeleton
+    if skeleton is None:
+        return set()
+    if skeleton.n_joints <= _MOST_OPENED:
+        return set(range(skeleton.n_joints))
+    return {joint for joint, parent in enumerate(skeleton.parents) if parent < 0}
+
+
+def select_joint(state: AppState, joint: int) -> None:
+    """Select a joint of the chosen actor; its row is opened, brought into view, and not hidden.
+
+    Parameters
+    ----------
+    state : AppState
+        Gets the joint; a filter that hides it is emptied.
+    joint : int
+        Index, 0 or more.
+    """
+    tree = joint_tree(state)
+    state.selected_joint = tree.scrolls_to = joint
+    skeleton = state.actor.figure.skeleton
+    if skeleton is None or joint >= skeleton.n_joints:
+        return
+    if tree.filter.lower() not in joint_label(skeleton, joint).lower():
+        tree.filter = ""
+    while joint >= 0:
+        tree.opened.add(joint)  # so that the rows below it are seen
+        joint = int(skeleton.parents[joint])

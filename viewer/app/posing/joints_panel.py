@@ -1,0 +1,322 @@
+"""Joints: the tree with a filter, a slider per DOF within its limits, and the pose as a whole."""
+
+from __future__ import annotations
+
+import math
+from typing import TypeAlias
+
+import numpy as np
+from imgui_bundle import imgui
+
+from viewer.app.core.state import AppState
+from viewer.app.core.widgets import (
+    button,
+    checkbox,
+    menu_item,
+    note_item,
+    plain_zero,
+    same_line_if_room,
+)
+from viewer.app.curves.state import Curves
+from viewer.app.posing.ball_joint import draw_own_numbers, draw_vector_component, is_ball
+from viewer.app.posing.captured_points import draw_captured_points
+from viewer.app.posing.clip_pause import pause_for_edit
+from viewer.app.posing.figure_place import draw_figure_place
+from viewer.app.posing.joint_tree import joint_tree
+from viewer.app.posing.pose_actions import copy_numbers, copy_pose, mirror, paste_pose, reset_pose
+from viewer.app.posing.state import Posing
+from viewer.errors import printable
+from viewer.rig.hierarchy import depth_first
+from viewer.rig.memo import Memo
+from viewer.rig.mesh import box_size
+from viewer.rig.number_text import angle_text, number_text
+from viewer.rig.pose import Pose
+from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_labels
+
+__all__ = ["draw", "rows"]
+
+Rows: TypeAlias = tuple[tuple[int, int, int], ...]
+
+OWN_NUMBERS = -2
+"""In place of a DOF: the row with the numbers that the model's own files would hold."""
+
+_FIRST_ROTATION = 3
+_INDENT = 9.0  # points a level
+_DEEPEST = 14  # levels that are indented: chains of thousands must stay readable
+_AXIS_COLORS = ((0.95, 0.45, 0.42, 1.0), (0.48, 0.85, 0.45, 1.0), (0.45, 0.65, 1.0, 1.0))
+_known_labels: Memo[Skeleton, tuple[str, ...]] = Memo()
+_known_rows: Memo[Skeleton, Rows] = Memo(kept=4)
+_MAY_TYPE_BEYOND = imgui.SliderFlags_.none
+_STAYS_WITHIN = imgui.SliderFlags_.always_clamp
+
+
+def draw(state: AppState) -> None:
+    """Draw the panel for the chosen actor."""
+    _draw_actor_choice(state)
+    actor = state.actor
+    if actor.figure.points is not None:
+        draw_captured_points(state, actor, actor.figure.points)
+        return
+    if actor.figure.skeleton is None or actor.pose is None:
+        imgui.text_wrapped(
+            "This figure has no skeleton: open its .skel with it, or give it one: Window > Rig."
+        )
+        return
+    _draw_head(state)
+    skeleton = actor.figure.skeleton
+    if not imgui.begin_child("joints", (0.0, 0.0)):
+        imgui.end_child()
+        return
+    draw_figure_place(state, actor.pose)
+    has_own = actor.figure.pose_layout is not None
+    shown = rows(skeleton, frozenset(joint_tree(state).opened), joint_tree(state).filter, has_own)
+    labels = _labels(skeleton)
+    if not shown:
+        imgui.text_disabled("no joint has this in its name")
+    clipper = imgui.ListClipper()
+    clipper.begin(len(shown))
+    _include_wanted(state, clipper, shown)
+    while clipper.step():
+        for joint, dof, depth in shown[clipper.display_start : clipper.display_end]:
+            if dof == OWN_NUMBERS:
+                _indent(depth)
+                draw_own_numbers(state, actor.figure, actor.pose, joint)
+            elif dof < 0:
+                _draw_joint(state, skeleton, joint, depth, labels[joint])
+            else:
+                _draw_dof(state, skeleton, actor.pose, dof, depth, labels[joint])
+    clipper.end()
+    imgui.end_child()
+
+
+def _include_wanted(state: AppState, clipper: imgui.ListClipper, shown: Rows) -> None:
+    """Let the row of a joint that was chosen elsewhere be drawn, so that it can be scrolled to."""
+    for row, (joint, dof, _) in enumerate(shown if joint_tree(state).scrolls_to >= 0 else ()):
+        if joint == joint_tree(state).scrolls_to and dof == -1:
+            clipper.include_item_by_index(row)
+
+
+def _draw_actor_choice(state: AppState) -> None:
+    """Draw a list of the actors if there are several."""
+    if len(state.scene.actors) < 2:
+        return
+    names = [
+        f"{number}  {printable(actor.name, 60)}"
+        for number, actor in enumerate(state.scene.actors, 1)
+    ]
+    imgui.set_next_item_width(-1.0)
+    changed, index = imgui.combo("##actor", state.chosen_actor, names)
+    note_item(state, "Actor")
+    if changed:
+        state.choose_actor(index)
+
+
+def _draw_head(state: AppState) -> None:
+    posing = state.of(Posing)
+    imgui.set_next_item_width(-1.0)
+    joint_tree(state).filter = imgui.input_text_with_hint(
+        "##filter", "Filter joints", joint_tree(state).filter
+    )[1]
+    note_item(state, "Filter")
+    if button(state, "Reset (R)"):
+        reset_pose(state)
+    same_line_if_room("Pose…")
+    if button(state, "Pose…"):
+        imgui.open_popup("pose menu")
+    _draw_pose_menu(state)
+    same_line_if_room("degrees")
+    if imgui.radio_button("degrees", state.in_degrees):
+        _show_angles(state, in_degrees=True)
+    note_item(state, "degrees")
+    same_line_if_room("radians")
+    if imgui.radio_button("radians", not state.in_degrees):
+        _show_angles(state, in_degrees=False)
+    note_item(state, "radians")
+    if state.actor.figure.pose_layout is not None:
+        posing.as_vectors = checkbox(state, "Rotation vectors", posing.as_vectors)
+
+
+def _show_angles(state: AppState, in_degrees: bool) -> None:
+    """Choose the unit of angles; curves are fitted again, as their axis has other numbers."""
+    state.of(Curves).wants_fit |= in_degrees != state.in_degrees
+    state.in_degrees = in_degrees
+
+
+def _draw_pose_menu(state: AppState) -> None:
+    """Draw what can be done to the pose as a whole."""
+    if not imgui.begin_popup("pose menu"):
+        return
+    for text, action in (
+        ("Copy as JSON", copy_pose),
+        ("Copy as the file's numbers", copy_numbers),
+        ("Paste", paste_pose),
+        ("Mirror", mirror),
+    ):
+        if menu_item(state, text):
+            action(state)
+    imgui.end_popup()
+
+
+def _labels(skeleton: Skeleton) -> tuple[str, ...]:
+    names = joint_labels(skeleton)
+    return _known_labels.get(skeleton, None, lambda: tuple(printable(label, 60) for label in names))
+
+
+def rows(skeleton: Skeleton, opened: frozenset[int], wanted: str, has_own: bool = False) -> Rows:
+    """Return what is listed, as (joint, DOF or -1 for the joint's own row, depth).
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Gives joints and DOFs.
+    opened : frozenset of int
+        Joints whose DOFs and children are listed.
+    wanted : str
+        If not empty, only joints whose name contains it are listed, without hierarchy.
+    has_own : bool
+        Whether a row with the file's own numbers, ``OWN_NUMBERS``, follows each joint's DOFs.
+    """
+    key = (opened, wanted, has_own)
+    return _known_rows.get(skeleton, key, lambda: _rows(skeleton, opened, wanted, has_own))
+
+
+def _rows(skeleton: Skeleton, opened: frozenset[int], wanted: str, has_own: bool) -> Rows:
+    dofs: list[list[int]] = [[] for _ in range(skeleton.n_joints)]
+    for dof, joint in enumerate(skeleton.dof_joints.tolist()):
+        dofs[joint].append(dof)
+    listed: list[tuple[int, int, int]] = []
+    depths, visible = [0] * skeleton.n_joints, [True] * skeleton.n_joints
+    labels = _labels(skeleton)
+    for joint, parent in enumerate(skeleton.parents.tolist()):
+        if wanted:
+            visible[joint] = wanted.lower() in labels[joint].lower()
+        elif parent >= 0:
+            depths[joint] = depths[parent] + 1
+            visible[joint] = visible[parent] and parent in opened
+        if visible[joint]:
+            listed.append((joint, -1, depths[joint]))
+            if wanted or joint in opened:
+                listed += [(joint, dof, depths[joint] + 1) for dof in dofs[joint]]
+                if has_own:
+                    listed.append((joint, OWN_NUMBERS, depths[joint] + 1))
+    # Parents come before children in a skeleton, but not always right before them.
+    place = np.argsort(depth_first(skeleton.parents)).tolist()
+    return tuple(sorted(listed, key=lambda row: place[row[0]]))
+
+
+def _draw_joint(state: AppState, skeleton: Skeleton, joint: int, depth: int, label: str) -> None:
+    _indent(depth)
+    flags = imgui.TreeNodeFlags_.no_tree_push_on_open | imgui.TreeNodeFlags_.open_on_arrow
+    flags |= imgui.TreeNodeFlags_.span_avail_width
+    if joint == state.selected_joint:
+        flags |= imgui.TreeNodeFlags_.selected
+    imgui.set_next_item_open(joint in joint_tree(state).opened or bool(joint_tree(state).filter))
+    imgui.tree_node_ex(f"{label}##joint{joint}", flags)
+    note_item(state, f"joint {label}")
+    if joint == joint_tree(state).scrolls_to:
+        imgui.set_scroll_here_y(0.5)
+        joint_tree(state).scrolls_to = -1
+    if imgui.is_item_toggled_open():
+        joint_tree(state).opened ^= {joint}
+    elif imgui.is_item_clicked():
+        state.selected_joint = -1 if state.selected_joint == joint else joint
+    if imgui.begin_popup_context_item(f"menu of joint {joint}"):
+        if menu_item(state, "Reset this joint"):
+            _reset(state, np.flatnonzero(skeleton.dof_joints == joint))
+        imgui.end_popup()
+
+
+def _indent(depth: int) -> None:
+    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + _INDENT * min(depth, _DEEPEST))
+
+
+def _draw_dof(
+    state: AppState, skeleton: Skeleton, pose: Pose, dof: int, depth: int, label: str
+) -> None:
+    kind = int(skeleton.dof_kinds[dof])
+    name = DOF_KINDS[kind]
+    _indent(depth)
+    imgui.align_text_to_frame_padding()
+    imgui.text_colored(_AXIS_COLORS[kind % 3], f"{name:>2}")
+    imgui.same_line()
+    imgui.set_next_item_width(-1.0)
+    low, high = skeleton.dof_limits[dof]
+    locked = low == high
+    joint, figure = int(skeleton.dof_joints[dof]), state.actor.figure
+    if state.of(Posing).as_vectors and kind >= _FIRST_ROTATION and is_ball(figure, joint):
+        draw_vector_component(state, figure, pose, joint, kind - _FIRST_ROTATION, label)
+        return
+    imgui.begin_disabled(bool(locked))
+    value = _dof_slider(state, skeleton, pose, dof)
+    if imgui.is_item_activated():
+        pause_for_edit(state)
+    imgui.end_disabled()
+    note_item(state, f"{label}.{name}")
+    if imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):
+        imgui.set_tooltip(f"{label}.{name}\n{_limits_text(low, high, kind, state.in_degrees)}")
+        if imgui.is_mouse_double_clicked(imgui.MouseButton_.left) and not locked:
+            value = float(skeleton.rest_dofs[dof])
+    if imgui.begin_popup_context_item(f"menu of DOF {dof}"):
+        why = f"locked at {_value_text(low, kind, state.in_degrees)}" if locked else ""
+        if menu_item(state, "Reset", why=why):
+            value = float(skeleton.rest_dofs[dof])
+        outside = "" if low <= 0.0 <= high else "0 is outside of its limits"
+        if menu_item(state, "Set to 0", why=why or outside):
+            value = 0.0
+        if menu_item(state, "Copy value"):
+            is_angle = state.in_degrees and kind >= _FIRST_ROTATION
+            shown = math.degrees(pose.dofs[dof]) if is_angle else float(pose.dofs[dof])
+            imgui.set_clipboard_text(repr(shown + 0.0))
+        imgui.end_popup()
+    pose.dofs[dof] = min(max(value, low), high)
+
+
+def _dof_slider(state: AppState, skeleton: Skeleton, pose: Pose, dof: int) -> float:
+    """Draw the slider in the chosen unit and return the value in the file's own."""
+    low, high = (float(limit) for limit in skeleton.dof_limits[dof])
+    is_rotation = skeleton.dof_kinds[dof] >= _FIRST_ROTATION
+    unlimited = math.pi if is_rotation else _reach(state)
+    factor = math.degrees(1.0) if is_rotation and state.in_degrees else 1.0
+    text = ("%.1f\N{DEGREE SIGN}" if state.in_degrees else "%.4f rad") if is_rotation else "%.4f"
+    if low == high:
+        text += "  locked"
+    bounded = math.isfinite(low) and math.isfinite(high)
+    changed, moved = imgui.slider_float(
+        f"##dof{dof}",
+        plain_zero(float(pose.dofs[dof]) * factor, text),
+        (low if math.isfinite(low) else min(-unlimited, high - unlimited)) * factor,
+        (high if math.isfinite(high) else max(unlimited, low + unlimited)) * factor,
+        text,
+        _STAYS_WITHIN if bounded else _MAY_TYPE_BEYOND,
+    )
+    # float32 of the widget must not touch a value that nobody moved; "nan" can be typed.
+    return moved / factor if changed and math.isfinite(moved) else float(pose.dofs[dof])
+
+
+def _reach(state: AppState) -> float:
+    """Return how far a slider moves the root: the size of the scene."""
+    return box_size(state.box) or 1.0
+
+
+def _limits_text(low: float, high: float, kind: int, in_degrees: bool) -> str:
+    """Return what a slider's tooltip says of its limits, in the unit that is shown."""
+    texts = [_value_text(limit, kind, in_degrees) for limit in (low, high)]
+    if low == high:
+        return f"locked at {texts[0]}"
+    if not math.isfinite(low) and not math.isfinite(high):
+        return "unlimited; Ctrl+click types any value\ndouble-click resets"
+    span = f"{texts[0]} to {texts[1]}"
+    if not math.isfinite(low) or not math.isfinite(high):
+        span = f"at most {texts[1]}" if math.isfinite(high) else f"at least {texts[0]}"
+    return f"{span}\nCtrl+click types a value, double-click resets"
+
+
+def _value_text(value: float, kind: int, in_degrees: bool) -> str:
+    """Return a DOF's value in the unit that is shown."""
+    return angle_text(value, in_degrees) if kind >= _FIRST_ROTATION else number_text(value)
+
+
+def _reset(state: AppState, dofs: np.ndarray) -> None:
+    actor = state.actor
+    if actor.pose is not None and actor.figure.skeleton is not None:
+        actor.pose.dofs[dofs] = actor.figure.skeleton.rest_dofs[dofs]

@@ -1,0 +1,158 @@
+"""What is done to a pose as a whole: copied, pasted, saved, mirrored, shaped at random."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+from imgui_bundle import imgui
+
+from viewer.app.core.state import AppState
+from viewer.app.files.saving import save_files
+from viewer.app.posing.clip_pause import pause_for_edit
+from viewer.app.posing.state import Posing
+from viewer.errors import ViewerError
+from viewer.export import export, files_written
+from viewer.formats import Source, write
+from viewer.rig.motion.upright import upright_actor
+from viewer.rig.pose import rest_pose
+from viewer.rig.posing.pose_record import PosePartError, PoseRecord, apply_record, record_of
+from viewer.rig.posing.pose_vector import write_vector
+from viewer.rig.retargeting.mirror import mirror_pose
+from viewer.rig.scene import figure_pose
+
+__all__ = [
+    "copy_numbers",
+    "copy_pose",
+    "mirror",
+    "paste_pose",
+    "random_shape",
+    "reset_pose",
+    "reset_shape",
+    "save_export",
+    "save_pose",
+]
+
+_RANDOM = 10  # leading coefficients, which vary most, that a random body varies
+
+
+def _record(state: AppState) -> PoseRecord | None:
+    actor = state.actor
+    return None if actor.pose is None else record_of(actor.figure, actor.pose)
+
+
+def copy_pose(state: AppState) -> None:
+    """Put the chosen actor's pose on the clipboard as JSON."""
+    from viewer.formats.pose import pose_text
+
+    record = _record(state)
+    if record is not None:
+        imgui.set_clipboard_text(pose_text(record))
+        state.say_status("Pose copied as JSON")
+
+
+def copy_numbers(state: AppState) -> None:
+    """Put the pose on the clipboard as the model's own numbers."""
+    actor = state.actor
+    if actor.pose is None or actor.figure.skeleton is None:
+        return
+    numbers = write_vector(actor.figure.pose_layout, actor.figure.skeleton, actor.pose)
+    imgui.set_clipboard_text(" ".join(f"{number!r}" for number in numbers.tolist()))
+    state.say_status(f"Pose copied as {len(numbers)} numbers")
+
+
+def paste_pose(state: AppState) -> None:
+    """Pose the chosen actor by what is on the clipboard: JSON, or the model's own numbers.
+
+    A pose that was copied from a figure with other DOFs is carried over joint by joint: JSON says
+    how they are turned.
+    """
+    from viewer.formats import pose
+
+    actor = state.actor
+    if actor.pose is None:
+        return
+    text = imgui.get_clipboard_text() or ""
+    try:
+        # Numbers may come with commas, from a list in a program.
+        words = text if "{" in text else re.sub(r"[\[\],;]", " ", text)
+        source = Source("clipboard", words.encode("utf-8", "replace"))
+        if not text.strip():
+            raise source.error("expected a pose, found nothing")
+        record = pose.read(source)
+        try:
+            notes = apply_record(record, actor.figure, actor.pose)
+        except PosePartError as problem:
+            raise pose.pose_error(source.path, record, problem) from None
+    except ViewerError as problem:
+        state.error = str(problem)
+        return
+    state.say(*source.diagnostics.warnings, *notes)
+    state.say_status("Pose pasted")
+    pause_for_edit(state)
+
+
+def save_pose(state: AppState, path: Path) -> None:
+    """Write the chosen actor's pose; the suffix chooses the form."""
+    record = _record(state)
+    if record is not None:
+        save_files(state, lambda: write(record, path), [path])
+
+
+def save_export(state: AppState, path: Path) -> None:
+    """Write the chosen actor as it is posed, for other programs."""
+    try:
+        files = files_written(path)
+    except ViewerError as problem:
+        state.error = str(problem)
+        return
+    actor = upright_actor(state.scene, state.actor)
+    save_files(state, lambda: state.say(*export(actor, path, state.options.skinning)), files)
+
+
+def mirror(state: AppState) -> None:
+    """Exchange left and right of the chosen actor's pose."""
+    actor = state.actor
+    if actor.pose is None:
+        return
+    try:
+        actor.pose = mirror_pose(actor.figure, actor.pose)
+        state.say_status("Pose mirrored")
+        pause_for_edit(state)
+    except ViewerError as problem:
+        state.say(str(problem))
+
+
+def reset_pose(state: AppState) -> None:
+    """Set every DOF of every actor back to the file's pose; shapes stay."""
+    for actor in state.scene.actors:
+        if actor.figure.skeleton is not None and actor.pose is not None:
+            weights = actor.pose.shape_weights
+            actor.pose = rest_pose(actor.figure.skeleton)
+            actor.pose.shape_weights = weights
+    state.say_status("Pose reset")
+
+
+def random_shape(state: AppState) -> None:
+    """Draw the first shape coefficients from a normal distribution; expressions stay."""
+    posing = state.of(Posing)
+    actor = state.actor
+    shapes = actor.figure.blend_shapes
+    if shapes is None or actor.pose is None:
+        return
+    weights = actor.pose.shape_weights.copy()
+    rows = [row for row, group in enumerate(shapes.groups) if group == "shape"]
+    chosen = rows[:_RANDOM]
+    weights[rows] = 0.0
+    weights[chosen] = np.random.default_rng(posing.shape_seed).standard_normal(len(chosen))
+    actor.pose.shape_weights = weights
+    state.say_status(f"Random shape, seed {posing.shape_seed}")
+
+
+def reset_shape(state: AppState) -> None:
+    """Set every coefficient of the chosen actor to 0."""
+    actor = state.actor
+    if actor.pose is not None:
+        actor.pose.shape_weights = figure_pose(actor.figure).shape_weights
+        state.say_status("Shape reset")

@@ -1,0 +1,123 @@
+"""The selected joint as the tools need it: where it is in the scene, and its axes there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.rig.arrays import Floats
+from viewer.rig.geometry.rotation import nearest_rotations
+from viewer.rig.geometry.vectors import unit
+from viewer.rig.kinematics import posed_skeleton
+from viewer.rig.pose import Pose, placement_matrix
+from viewer.rig.scene import Actor
+from viewer.rig.shape import shaped
+from viewer.rig.skeleton import Skeleton
+
+__all__ = ["PosedJoint", "posed_joint"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PosedJoint:
+    """One joint of an actor, posed and placed.
+
+    Attributes
+    ----------
+    skeleton : Skeleton
+        Of the actor's figure in its present shape.
+    joint : int
+        Which one.
+    placement : (4, 4)
+        Figure space to scene, the figure's own place and size included.
+    world : (J, 4, 4)
+        Joint space to scene, all joints.
+    """
+
+    skeleton: Skeleton
+    joint: int
+    placement: Floats
+    world: Floats
+
+    @property
+    def center(self) -> Floats:
+        """Where the joint is: (3,), scene space."""
+        return np.asarray(self.world[self.joint, :3, 3])
+
+    @property
+    def parent_linear(self) -> Floats:
+        """The parent's axes in the scene with their lengths: (3, 3); a root's are the figure's."""
+        parent = int(self.skeleton.parents[self.joint])
+        return np.asarray((self.placement if parent < 0 else self.world[parent])[:3, :3])
+
+    @property
+    def parent_rotation(self) -> Floats:
+        """The parent's axes in the scene, at right angles and of unit length: (3, 3)."""
+        return _axes(self.parent_linear)
+
+    def turning_axis(self, axis: Floats) -> Floats:
+        """Return about what the joint is seen to turn: cof(A) axis, with the parent's axes A.
+
+        Cofactors carry axes of rotations through mirrored and stretched frames too.
+
+        Parameters
+        ----------
+        axis : (3,)
+            Of a rotation, in the parent's frame.
+
+        Returns
+        -------
+        (3,)
+            Unit vector, scene space.
+        """
+        x, y, z = self.parent_linear.T
+        cofactors = np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)], axis=1)
+        return unit(cofactors @ axis)
+
+    def parent_axis(self, axis: Floats) -> Floats:
+        """Return what is an axis of rotation in the scene in the parent's frame: (3,), unit."""
+        linear = self.parent_linear
+        return unit(linear.T @ axis) * (-1.0 if np.linalg.det(linear) < 0.0 else 1.0)
+
+    def axes(self, orientation: str) -> Floats:
+        """Return the axes of an orientation as the columns of a rotation: (3, 3), scene space.
+
+        Parameters
+        ----------
+        orientation : str
+            A key of ``ORIENTATIONS``.
+        """
+        if orientation == "world":
+            return np.eye(3)
+        if orientation == "parent":
+            return self.parent_rotation
+        return _axes(self.world[self.joint, :3, :3])
+
+
+def _axes(linear: Floats) -> Floats:
+    """Return the rotation next to a matrix: axes without their lengths, mirrored ones turned."""
+    if abs(np.linalg.det(linear)) < 1e-300:
+        return np.eye(3)
+    return nearest_rotations(linear)[0]
+
+
+def posed_joint(actor: Actor, joint: int, pose: Pose | None = None) -> PosedJoint | None:
+    """Return a joint of an actor, None if it has no such joint.
+
+    Parameters
+    ----------
+    actor : Actor
+        Placed and posed.
+    joint : int
+        -1 for none.
+    pose : Pose, optional
+        In place of the actor's own.
+    """
+    pose = actor.pose if pose is None else pose
+    if pose is None or joint < 0:
+        return None
+    skeleton = shaped(actor.figure, pose.shape_weights).skeleton
+    if skeleton is None or joint >= skeleton.n_joints:
+        return None
+    placement = actor.placement @ placement_matrix(pose)
+    return PosedJoint(skeleton, joint, placement, placement @ posed_skeleton(skeleton, pose).world)

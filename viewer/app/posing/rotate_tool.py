@@ -1,0 +1,298 @@
+"""The tool "Rotate": rings about a joint, and what turning one of them does.
+
+A joint that turns freely about three axes is turned as a whole, about the axes of the chosen
+orientation or the line of sight. Any other joint has a ring for each of its DOFs, about the axis
+which that DOF really has.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.app.core.view_frame import Place, ViewFrame
+from viewer.app.posing.posed_joint import PosedJoint
+from viewer.app.posing.state import Outcome
+from viewer.rig.arrays import Floats
+from viewer.rig.geometry.rotation import rotation_vector_to_matrix
+from viewer.rig.geometry.vectors import unit
+from viewer.rig.number_text import angle_text
+from viewer.rig.pose import Pose, joint_rotations
+from viewer.rig.posing.inverse_kinematics import rotation_axes
+from viewer.rig.posing.joint_rotation import nearest_dofs, rotation_dofs, turns_freely
+from viewer.rig.skeleton import Skeleton, dof_label, joint_label
+
+__all__ = [
+    "RADIUS",
+    "Ring",
+    "TurnHandle",
+    "circle",
+    "grab_ring",
+    "limit_text",
+    "rings",
+    "toward_eye",
+]
+
+RADIUS = 78.0
+"""Of the rings, window coordinates."""
+
+SNAP = math.radians(15.0)
+_VIEW_RADIUS = 1.2  # of the ring about the line of sight, in the others' radii
+_REACH = 7.0  # window coordinates around a ring in which it is taken
+_FLAT = 0.25  # cosine between axis and line of sight below which a ring is turned along its edge
+_STEPS = 72
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ring:
+    """A circle about a joint that turns it.
+
+    Attributes
+    ----------
+    axis : (3,)
+        Unit vector, scene space.
+    color : int
+        0, 1, 2 for x, y, z; 3 for the line of sight.
+    size : float
+        Its radius in window coordinates.
+    dof : int
+        The DOF that it turns, -1 for the whole joint.
+    """
+
+    axis: Floats
+    color: int
+    size: float = RADIUS
+    dof: int = -1
+
+
+def rings(joint: PosedJoint, pose: Pose, orientation: str, frame: ViewFrame) -> list[Ring]:
+    """Return the rings that a joint can be turned by; none if it cannot turn.
+
+    Parameters
+    ----------
+    joint : PosedJoint
+        In the scene.
+    pose : Pose
+        Of its actor.
+    orientation : str
+        A key of ``ORIENTATIONS``.
+    frame : ViewFrame
+        How the scene is seen.
+    """
+    skeleton = joint.skeleton
+    if turns_freely(skeleton, joint.joint):
+        axes = joint.axes(orientation)
+        whole = [Ring(axes[:, axis], axis) for axis in range(3)]
+        return [*whole, Ring(toward_eye(frame, joint.center), 3, RADIUS * _VIEW_RADIUS)]
+    axes_of = rotation_axes(skeleton, pose, joint.joint)
+    found = []
+    for dof in rotation_dofs(skeleton, joint.joint, free=True).tolist():
+        axis = joint.turning_axis(axes_of[dof])
+        found.append(Ring(axis, int(skeleton.dof_kinds[dof]) - 3, RADIUS, dof))
+    return found
+
+
+def toward_eye(frame: ViewFrame, point: Floats) -> Floats:
+    """Return the direction from a point to the eye: (3,), a unit vector; up if it is not seen."""
+    seen = frame.place(point)
+    return np.array([0.0, 1.0, 0.0]) if seen is None else -frame.ray(seen)[1]
+
+
+def circle(center: Floats, axis: Floats, radius: float, start: Floats | None = None) -> Floats:
+    """Return points all around an axis, the first one again at the end: (N, 3).
+
+    Parameters
+    ----------
+    center, axis : (3,)
+        Scene space; the axis of unit length.
+    radius : float
+        Scene units.
+    start : (3,), optional
+        The direction of the first point, at right angles to the axis.
+    """
+    first = _across(axis) if start is None else start
+    second = np.cross(axis, first)
+    angles = np.linspace(0.0, 2.0 * math.pi, _STEPS + 1)[:, None]
+    return np.asarray(center + radius * (np.cos(angles) * first + np.sin(angles) * second))
+
+
+def _across(axis: Floats) -> Floats:
+    """Return some unit vector at right angles to an axis."""
+    least = np.eye(3)[int(np.argmin(np.abs(axis)))]
+    return unit(np.cross(axis, least))
+
+
+def grab_ring(
+    found: list[Ring], center: Floats, frame: ViewFrame, place: Place
+) -> tuple[Ring, Floats] | None:
+    """Return the ring under the pointer and the direction to where it is held.
+
+    Of several the nearest is taken; the half of a ring that is behind the joint counts as farther.
+
+    Parameters
+    ----------
+    found : list of Ring
+        To choose from.
+    center : (3,)
+        Where the joint is, scene space.
+    frame : ViewFrame
+        How the scene is seen.
+    place : (float, float)
+        The pointer.
+    """
+    best, nearest = None, _REACH
+    length = frame.unit_length(center)
+    eye = toward_eye(frame, center)
+    for ring in found:
+        points = circle(center, ring.axis, ring.size * length)
+        seen = frame.project(points)
+        if length == 0.0 or not np.isfinite(seen).all():
+            continue
+        distances, shares = _distances(seen, np.array(place))
+        directions = unit(points - center)
+        if ring.color < 3:
+            distances = distances + 0.5 * _REACH * (directions[:-1] @ eye < -1e-6)
+        nearer = int(distances.argmin())
+        if distances[nearer] < nearest:
+            nearest = float(distances[nearer])
+            along = directions[nearer] * (1 - shares[nearer])
+            best = ring, unit(along + directions[nearer + 1] * shares[nearer])
+    return best
+
+
+def _distances(line: Floats, place: Floats) -> tuple[Floats, Floats]:
+    """Return how far a place is from each piece of a line, and where along it: (N,) both."""
+    starts, steps = line[:-1], np.diff(line, axis=0)
+    lengths = np.maximum(np.einsum("na,na->n", steps, steps), 1e-12)
+    shares = np.clip(np.einsum("na,na->n", place - starts, steps) / lengths, 0.0, 1.0)
+    return np.linalg.norm(starts + shares[:, None] * steps - place, axis=1), shares
+
+
+class TurnHandle:
+    """A ring that is held and turned.
+
+    Parameters
+    ----------
+    posed : PosedJoint
+        When the drag began.
+    start : Pose
+        The pose then.
+    ring : Ring
+        What is held.
+    held : (3,)
+        From the joint to where it is held: a unit vector, scene space.
+    place : (float, float)
+        The pointer then.
+    in_degrees : bool
+        How angles are written.
+    """
+
+    def __init__(
+        self,
+        posed: PosedJoint,
+        start: Pose,
+        ring: Ring,
+        held: Floats,
+        place: Place,
+        in_degrees: bool = True,
+    ) -> None:
+        self.posed, self.start, self.ring, self.held = posed, start.copy(), ring, held
+        self.place, self.in_degrees = place, in_degrees
+        self.joint, self.center = posed.joint, posed.center
+        self._angle = 0.0
+        self._first: float | None = None
+
+    def follow(self, frame: ViewFrame, place: Place, snaps: bool) -> Outcome:
+        """Return the pose with the joint turned as far as the pointer went around it."""
+        angle = self._turned(frame, place)
+        if angle is not None:
+            # Around and around: of the angles that look the same the nearest to the last.
+            self._angle = angle - 2 * math.pi * round((angle - self._angle) / (2 * math.pi))
+        turn = SNAP * round(self._angle / SNAP) if snaps else self._angle
+        if self.ring.dof >= 0:
+            return self._one_dof(turn)
+        return self._whole(turn)
+
+    def _turned(self, frame: ViewFrame, place: Place) -> float | None:
+        """Return the angle from where the ring was held to the pointer, None if there is none."""
+        if self.ring.color == 3:
+            return self._on_screen(frame, place)
+        axis, eye = self.ring.axis, toward_eye(frame, self.center)
+        if abs(axis @ eye) < _FLAT:
+            return self._along_edge(frame, place)
+        found = self._angle_at(frame, place)
+        if self._first is None:
+            self._first = self._angle_at(frame, self.place)
+        return None if found is None or self._first is None else found - self._first
+
+    def _on_screen(self, frame: ViewFrame, place: Place) -> float | None:
+        """Return the angle around the joint in the picture, against the clock."""
+        center = frame.place(self.center)
+        if center is None:
+            return None
+        first, now = (
+            math.atan2(center[1] - at[1], at[0] - center[0]) for at in (self.place, place)
+        )
+        return now - first
+
+    def _angle_at(self, frame: ViewFrame, place: Place) -> float | None:
+        """Return the angle from the held direction to where the ring's plane is pointed at."""
+        axis, (origin, direction) = self.ring.axis, frame.ray(place)
+        along = float(axis @ direction)
+        if abs(along) < 1e-6:
+            return None
+        away = origin + direction * float(axis @ (self.center - origin)) / along - self.center
+        if not np.isfinite(frame.project(self.center + away)).all():
+            return None  # the plane is met behind the eye
+        return math.atan2(float(axis @ np.cross(self.held, away)), float(self.held @ away))
+
+    def _along_edge(self, frame: ViewFrame, place: Place) -> float:
+        """Return the angle of a ring seen from its edge: like a wheel rolled by the pointer."""
+        eye = toward_eye(frame, self.center)
+        radius = self.ring.size * frame.unit_length(self.center)
+        rim = 1e-3 * radius * np.cross(self.ring.axis, eye)  # the way of its front, a mrad long
+        ends = frame.project(np.stack([self.center, self.center + rim]))
+        way = (ends[1] - ends[0]) * 1e3
+        length = float(way @ way)
+        if not length > 0.0:
+            return self._angle
+        side = 1.0 if self.held @ eye >= -1e-9 else -1.0
+        return side * float((np.array(place) - self.place) @ way) / length
+
+    def _one_dof(self, turn: float) -> Outcome:
+        """Turn the DOF of the ring, as far as its limits let it."""
+        skeleton, dof, pose = self.posed.skeleton, self.ring.dof, self.start.copy()
+        low, high = skeleton.dof_limits[dof]
+        value = float(pose.dofs[dof]) + turn
+        pose.dofs[dof] = min(max(value, float(low)), float(high))
+        limited = () if low < value < high else (dof,)
+        done = float(pose.dofs[dof] - self.start.dofs[dof])
+        now = f"{dof_label(skeleton, dof)} {self._text(float(pose.dofs[dof]))}"
+        return Outcome(pose, f"{self._text(done, '+')}   {now}", limited, angle=done)
+
+    def _whole(self, turn: float) -> Outcome:
+        """Turn the joint about the ring's axis; where a limit is met, as near as it can."""
+        skeleton, joint = self.posed.skeleton, self.joint
+        axis = self.posed.parent_axis(self.ring.axis)
+        now = joint_rotations(skeleton, self.start)[joint]
+        wanted = rotation_vector_to_matrix(axis * turn) @ now
+        found = nearest_dofs(skeleton, self.start, joint, wanted)
+        pose = self.start.copy()
+        pose.dofs[:] = found.dofs
+        name = "xyz "[self.ring.color].strip() or "view"
+        text = f"{joint_label(skeleton, joint)} {name} {self._text(turn, '+')}"
+        return Outcome(pose, text, tuple(found.limited.tolist()), angle=turn)
+
+    def _text(self, angle: float, sign: str = "") -> str:
+        return angle_text(angle, self.in_degrees, sign)
+
+
+def limit_text(skeleton: Skeleton, limited: tuple[int, ...]) -> str:
+    """Return a line on the DOFs that stand at their limits; empty if there is none."""
+    if not limited:
+        return ""
+    names = ", ".join(dof_label(skeleton, dof) for dof in limited[:4])
+    more = f" and {len(limited) - 4} more" if len(limited) > 4 else ""
+    return f"at its limit: {names}{more}" if len(limited) == 1 else f"at limits: {names}{more}"

@@ -1,0 +1,147 @@
+"""Shape: a slider per coefficient of shape, expression or morph, and what the body measures."""
+
+from __future__ import annotations
+
+import numpy as np
+from imgui_bundle import imgui
+
+from viewer.app.core.state import AppState
+from viewer.app.core.widgets import button, checkbox, note_item, plain_zero, same_line_if_room
+from viewer.app.posing.pose_actions import random_shape, reset_shape
+from viewer.app.posing.state import Posing
+from viewer.errors import printable
+from viewer.rig.figure import Figure
+from viewer.rig.inspection.measure import measure
+from viewer.rig.memo import Memo
+from viewer.rig.morph_target import MORPH_GROUP
+from viewer.rig.pose import Pose
+from viewer.rig.shape import shaped
+
+__all__ = ["draw"]
+
+_REACH = 5.0  # standard deviations that a slider covers; more can be typed
+_WIDEST = 20.0  # a slider, in heights of the letters
+_HEADINGS = {"shape": "Shape", "expression": "Expression", MORPH_GROUP: "Morphs"}
+_measured: Memo[Figure, tuple[tuple[str, str], ...]] = Memo(kept=4)
+
+
+def draw(state: AppState) -> None:
+    """Draw the panel for the chosen actor."""
+    figure, pose = state.actor.figure, state.actor.pose
+    if figure.blend_shapes is None or pose is None:
+        imgui.text_wrapped("This figure has one fixed shape.")
+        return
+    _draw_measures(figure, pose)
+    varies = "shape" in figure.blend_shapes.groups
+    if varies and button(state, "Random"):
+        state.of(Posing).shape_seed += 1
+        random_shape(state)
+    if varies:
+        same_line_if_room("Reset shape")
+    if button(state, "Reset shape"):
+        reset_shape(state)
+    if varies:
+        _draw_seed(state)
+    if figure.correctives is not None:
+        skinning = state.options.skinning
+        skinning.correctives = checkbox(state, "Pose correctives", skinning.correctives)
+    imgui.separator()
+    if imgui.begin_child("coefficients", (0.0, 0.0)):
+        longest = max(figure.blend_shapes.names, key=len)
+        imgui.push_item_width(_width_beside(printable(longest, 40), _WIDEST))
+        _draw_coefficients(state, figure, pose)
+        imgui.pop_item_width()
+    imgui.end_child()
+
+
+def _draw_seed(state: AppState) -> None:
+    imgui.set_next_item_width(_width_beside("seed", 8.0))
+    changed, seed = imgui.input_int("seed", state.of(Posing).shape_seed)
+    note_item(state, "seed")
+    if changed and seed != state.of(Posing).shape_seed:
+        state.of(Posing).shape_seed = max(seed, 0)
+        random_shape(state)
+
+
+def _width_beside(label: str, most: float) -> float:
+    """Return the width of a widget whose label fits beside it, if there is room for both."""
+    room = imgui.get_content_region_avail().x
+    taken = imgui.calc_text_size(label).x + imgui.get_style().item_inner_spacing.x
+    return min(max(room - taken, 0.35 * room), most * imgui.get_font_size())
+
+
+def _draw_measures(figure: Figure, pose: Pose) -> None:
+    """Draw height, volume and weight of the shaped rest body."""
+    rest = shaped(figure, pose.shape_weights)
+    for name, value in _measured.get(rest, None, lambda: _measures(rest)):
+        imgui.text_disabled(name)
+        imgui.same_line(imgui.get_font_size() * 5)
+        imgui.text_unformatted(value)
+
+
+def _measures(rest: Figure) -> tuple[tuple[str, str], ...]:
+    found = measure(rest)
+    if found.mass is None:
+        return (("Height", f"{found.height:.4g}"), ("Volume", f"{found.volume:.4g}"))
+    return (
+        ("Height", f"{found.height:.3f} m"),
+        ("Volume", f"{1000.0 * found.volume:.1f} litres"),
+        ("Mass", f"{found.mass:.1f} kg at 985 kg/m\N{SUPERSCRIPT THREE}"),
+    )
+
+
+def _draw_coefficients(state: AppState, figure: Figure, pose: Pose) -> None:
+    shapes = figure.blend_shapes
+    assert shapes is not None  # the caller looked
+    if len(pose.shape_weights) < shapes.n_shapes:
+        padding = np.zeros(shapes.n_shapes - len(pose.shape_weights))
+        pose.shape_weights = np.concatenate([pose.shape_weights, padding])
+    # A heading is a row like the others, so that hundreds of rows can be clipped.
+    rows: list[int | str] = []
+    for index, group in enumerate(shapes.groups):
+        if index == 0 or shapes.groups[index - 1] != group:
+            rows.append(_HEADINGS.get(group, group))
+        rows.append(index)
+    clipper = imgui.ListClipper()
+    clipper.begin(len(rows), imgui.get_frame_height_with_spacing())
+    while clipper.step():
+        for row in rows[clipper.display_start : clipper.display_end]:
+            if isinstance(row, str):
+                imgui.align_text_to_frame_padding()
+                imgui.text_disabled(row)
+            else:
+                is_morph = shapes.groups[row] == MORPH_GROUP
+                _draw_slider(state, shapes.names[row], row, pose, is_morph)
+    clipper.end()
+
+
+def _draw_slider(state: AppState, name: str, index: int, pose: Pose, is_morph: bool) -> None:
+    shown = printable(name, 40)
+    low, high = (0.0, 1.0) if is_morph else (-_REACH, _REACH)
+    changed, value = imgui.slider_float(
+        f"{shown}##{index}", plain_zero(float(pose.shape_weights[index]), "%.2f"), low, high, "%.2f"
+    )
+    note_item(state, f"coefficient {index}")
+    if changed and abs(value) < 1e6:  # "nan" and "1e99" can be typed into a slider
+        pose.shape_weights[index] = value
+    if not is_morph:
+        _draw_marks()
+    if imgui.is_item_hovered():
+        unit = "1 reaches the target" if is_morph else "standard deviations"
+        imgui.set_tooltip(f"{shown}: {unit}\nCtrl+click types a value, double-click resets")
+        if imgui.is_mouse_double_clicked(imgui.MouseButton_.left):
+            pose.shape_weights[index] = 0.0
+
+
+def _draw_marks() -> None:
+    """Mark whole standard deviations under the slider drawn last, the mean more strongly."""
+    low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+    width = imgui.calc_item_width()
+    grab = imgui.get_style().grab_min_size * 0.5
+    draw_list = imgui.get_window_draw_list()
+    for sigma in range(-int(_REACH), int(_REACH) + 1):
+        share = 0.5 + sigma / (2.0 * _REACH)
+        x = low.x + grab + share * (width - 2.0 * grab)
+        height = 7.0 if sigma == 0 else 4.0
+        color = imgui.get_color_u32((1.0, 1.0, 1.0, 0.8 if sigma == 0 else 0.5))
+        draw_list.add_line((x, high.y - height), (x, high.y - 1.0), color)

@@ -1,0 +1,135 @@
+"""What the tools' buttons and keys do, and why they cannot."""
+
+from __future__ import annotations
+
+from viewer.app.core.reasons import no_pose
+from viewer.app.core.state import AppState
+from viewer.app.curves.clip_actions import key_present_pose
+from viewer.app.posing.move_tool import longest_chain, shifts, used_chain
+from viewer.app.posing.posed_joint import PosedJoint, posed_joint
+from viewer.app.posing.state import ORIENTATIONS, TOOLS, Posing
+from viewer.rig.motion.clip import Clip
+from viewer.rig.posing.joint_rotation import rotation_dofs, turns_freely
+from viewer.rig.skeleton import joint_label
+
+__all__ = [
+    "cancel_drag",
+    "chain_length",
+    "chain_limit",
+    "choose_tool",
+    "key_pose_now",
+    "next_orientation",
+    "no_chain",
+    "no_keys",
+    "no_orientation",
+    "no_tool",
+    "selected",
+]
+
+
+def choose_tool(state: AppState, tool: str) -> None:
+    """Take a tool in hand, a key of ``TOOLS``, and say what it needs."""
+    why = no_tool(state)
+    if tool != "select" and why:
+        state.say_status(f"{TOOLS[tool][0]}: {why}")
+        return
+    cancel_drag(state)
+    state.of(Posing).tool = tool
+    name, _, text = TOOLS[tool]
+    hint = "; select a joint first" if tool != "select" and state.selected_joint < 0 else ""
+    state.say_status(f"{name}: {text}{hint}")
+
+
+def next_orientation(state: AppState) -> None:
+    """Go on to the next of local, parent and world axes."""
+    posing = state.of(Posing)
+    names = list(ORIENTATIONS)
+    following = names[(names.index(posing.orientation) + 1) % len(names)]
+    posing.orientation = following
+    state.say_status(ORIENTATIONS[following])
+
+
+def cancel_drag(state: AppState) -> bool:
+    """Let go of a handle and restore the pose of before; return whether one was held."""
+    drag = state.of(Posing).drag
+    if drag is None or drag.is_over:
+        return False
+    drag.is_over = True
+    if drag.actor.pose is drag.outcome.pose:
+        drag.actor.pose = drag.handle.start.copy()
+        state.say_status("Drag cancelled")
+    return True
+
+
+def key_pose_now(state: AppState) -> None:
+    """Make the pose keys of its clip at the time that is shown."""
+    if not no_keys(state):
+        key_present_pose(state)
+
+
+def selected(state: AppState) -> PosedJoint | None:
+    """Return the selected joint in the scene, None if there is none to be posed."""
+    actor = state.actor
+    if not actor.is_drawn or state.options.show == "binding":
+        return None
+    return posed_joint(actor, state.selected_joint)
+
+
+def no_tool(state: AppState) -> str:
+    """Say why nothing can be posed in the view."""
+    if state.options.show == "binding" and state.actor.figure.is_attached:
+        return "the skin is shown in its binding space: K shows the pose"
+    if not state.actor.is_drawn:
+        return "this actor is not shown"
+    return no_pose(state)
+
+
+def no_orientation(state: AppState) -> str:
+    """Say why the choice of axes does nothing for the selected joint."""
+    skeleton, joint = state.actor.figure.skeleton, state.selected_joint
+    if skeleton is None or joint < 0:
+        return ""
+    if state.of(Posing).tool != "rotate":
+        return "" if shifts(skeleton, joint) else "it is dragged in the plane of the picture"
+    if turns_freely(skeleton, joint):
+        return ""
+    if not len(rotation_dofs(skeleton, joint, free=True)):
+        return f"{joint_label(skeleton, joint)} cannot turn"
+    return "this joint turns about the axes of its DOFs alone"
+
+
+def chain_limit(state: AppState) -> int:
+    """Return how long the chain above the selected joint can be; 0 if nothing above it turns."""
+    skeleton = state.actor.figure.skeleton
+    return 0 if skeleton is None else longest_chain(skeleton, state.selected_joint)
+
+
+def chain_length(state: AppState) -> int:
+    """Return how many joints would follow the selected one if it was dragged; at least 1."""
+    posing = state.of(Posing)
+    skeleton = state.actor.figure.skeleton
+    if skeleton is None or state.selected_joint < 0:
+        return max(posing.chain_length, 1)
+    return max(len(used_chain(skeleton, state.selected_joint, posing.chain_length)), 1)
+
+
+def no_chain(state: AppState) -> str:
+    """Say why there is no chain to choose the length of."""
+    if state.of(Posing).tool != "move":
+        return "the tool Move (D) has chains"
+    skeleton = state.actor.figure.skeleton
+    if skeleton is None or state.selected_joint < 0:
+        return "select a joint"
+    if not chain_limit(state):
+        return f"no joint above {joint_label(skeleton, state.selected_joint)} can turn"
+    return ""
+
+
+def no_keys(state: AppState) -> str:
+    """Say why the pose cannot become keys."""
+    clip = state.actor.clip
+    if clip is None:
+        return no_pose(state) or "there is no clip: New clip (menu Edit) makes one"
+    if not isinstance(clip, Clip):
+        return "this motion consists of frames, not of keys"
+    return ""

@@ -1,0 +1,1 @@
+"""Recording: pictures and videos of what is shown."""

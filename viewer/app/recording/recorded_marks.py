@@ -1,0 +1,64 @@
+"""What explains the picture in recordings as it does in the view, frame by frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import deepcopy
+
+from viewer.app.core.state import AppState
+from viewer.app.linting.marks import marks_of
+from viewer.app.linting.state import Linting
+from viewer.app.weights.explanation_lines import vertex_annotation
+from viewer.app.weights.state import Weights
+from viewer.lint import Finding, places_of
+from viewer.rendering.overlay.annotation import Annotation
+from viewer.rendering.overlay.marks import mark_annotation
+from viewer.rig.inspection.explanation import explain
+from viewer.rig.scene import Scene
+
+__all__ = ["RecordedMarks"]
+
+
+class RecordedMarks:
+    """Annotations of a scene that moves: the pinned vertex and the chosen finding of this moment.
+
+    Parameters
+    ----------
+    state : AppState
+        What is pinned or chosen in it later changes nothing.
+    """
+
+    def __init__(self, state: AppState) -> None:
+        weights = state.of(Weights)
+        linting = state.of(Linting)
+        self._pinned, self._draws_lines = weights.pinned, weights.draws_lines
+        self._finding: Finding | None = linting.finding if linting.marks else None
+        self._skinning = deepcopy(state.options.skinning)
+        self._binding = state.options.show == "binding"
+
+    def at(self, scene: Scene, size: tuple[int, int]) -> Sequence[Annotation]:
+        """Return what is drawn over one frame.
+
+        Parameters
+        ----------
+        scene : Scene
+            Posed; its actors are those of the state, or copies of them.
+        size : (int, int)
+            Width and height of the picture, pixels.
+
+        Raises
+        ------
+        ViewerError
+            If a figure's shapes cannot be read.
+        """
+        found = []
+        if self._finding is not None:
+            places = places_of(self._finding, scene, self._skinning, self._binding)
+            found.append(mark_annotation(marks_of(places)[0]))
+        pinned = self._pinned
+        if pinned is not None and not self._binding:
+            actor = scene.actors[pinned.actor]
+            if actor.pose is not None and actor.is_drawn:
+                why = explain(actor.figure, actor.pose, self._skinning, pinned.vertex)
+                found.append(vertex_annotation(why, actor, self._draws_lines, size))
+        return found

@@ -1,0 +1,174 @@
+"""Record what the window shows: a step a frame, so that it answers and can be cancelled."""
+
+from __future__ import annotations
+
+import contextlib
+import copy
+import math
+from collections.abc import Generator
+from dataclasses import replace
+from pathlib import Path
+
+import moderngl
+import numpy as np
+
+from viewer.app.actors.following import Following
+from viewer.app.core.state import AppState
+from viewer.app.recording.recorded_marks import RecordedMarks
+from viewer.app.recording.state import RecordSettings
+from viewer.errors import OutputError, printable
+from viewer.formats import check_targets
+from viewer.media.video_kinds import MOST_GIF_RATE
+from viewer.rendering.passes.ghost_pass import Ghost
+from viewer.rendering.recorder import Follow, Recording, Sink, record
+from viewer.rendering.renderer import Renderer
+from viewer.rig.arrays import Floats
+
+__all__ = ["recording_steps"]
+
+_FULL = 360.0  # degrees
+
+
+def recording_steps(
+    state: AppState,
+    context: moderngl.Context,
+    settings: RecordSettings,
+    path: Path,
+    ghost: Ghost | None = None,
+) -> Generator[tuple[int, int], None, list[str]]:
+    """Record the range that is played, from the view as it is now.
+
+    Parameters
+    ----------
+    state : AppState
+        Its scene is copied; going on with it changes nothing of the recording but clips that
+        are being edited.
+    context : moderngl.Context
+        Current in every step.
+    settings : RecordSettings
+        What is asked for.
+    path : Path
+        Where the result goes; ``{frame}`` in the name of numbered pictures is their number.
+    ghost : Ghost, optional
+        A surface that is shown over the scene.
+
+    Yields
+    ------
+    (int, int)
+        Frames done, and all frames.
+
+    Returns
+    -------
+    list of str
+        What was written.
+
+    Raises
+    ------
+    ViewerError
+        If it cannot be drawn or written.
+    """
+    times, numbers, rate = _times(state, settings)
+    size = settings.pixels((state.view_rect[2], state.view_rect[3]))
+    files = [path]
+    if settings.kind == "pictures":
+        files = _numbered(path, numbers)
+    # The dialog asks only about a file that it can see.
+    is_asked = settings.kind != "pictures"
+    check_targets(files, state.inputs, is_asked, hint="choose another name")
+    sink, size = _sink(settings, files, size, rate, numbers)
+    recording = _recording(state, settings, times, size)
+    renderer = Renderer(context)
+    renderer.ghost = ghost
+    try:
+        # Closed before its renderer goes, also if this generator is.
+        with contextlib.closing(record(recording, renderer, sink)) as steps:
+            for progress in steps:
+                yield progress.done, progress.total
+    finally:
+        renderer.release()
+    name = printable(files[0], 200) + (f" to {printable(files[-1].name)}" if files[1:] else "")
+    notes = [*getattr(sink, "notes", []), *renderer.notes]
+    return [f"Saved {name}: {len(times)} frames, {size[0]} x {size[1]}", *notes]
+
+
+def _recording(
+    state: AppState, settings: RecordSettings, times: Floats, size: tuple[int, int]
+) -> Recording:
+    """Return what is recorded: all that the view shows, but tools and panels."""
+    following = state.of(Following)
+    options = copy.deepcopy(state.options)
+    if settings.transparent and settings.kind != ".mp4":
+        options.background = "transparent"
+    follow = None
+    if following.target is not None and following.place is not None:
+        follow = Follow(*following.target, following.place)
+    return Recording(
+        replace(state.scene, actors=[replace(actor) for actor in state.scene.actors]),
+        times,
+        state.camera.copy(),
+        size,
+        options,
+        box=state.box.copy(),
+        moves=state.playback.has_motion,
+        fill=state.playback.fill_gaps,
+        turn=_FULL if settings.turntable else 0.0,
+        follow=follow,
+        selected=(state.chosen_actor, state.selected_joint),
+        annotations=RecordedMarks(state).at,
+    )
+
+
+def _times(state: AppState, settings: RecordSettings) -> tuple[Floats, list[int], float]:
+    """Return the seconds of every frame, what they are called, and frames a second."""
+    playback = state.playback
+    rate = settings.rate or playback.frame_rate
+    if settings.kind == ".gif":
+        rate = min(rate, MOST_GIF_RATE)
+    if not playback.has_motion:
+        count = max(round(settings.seconds * rate), 1) if settings.turntable else 1
+        if settings.kind == "sheet":
+            count = settings.n_cells if settings.turntable else 1
+        return np.zeros(count), list(range(count)), rate
+    count = math.floor((playback.end - playback.start) * rate + 1e-6) + 1
+    times = playback.start + np.arange(count) / rate
+    first = playback.first_frame if rate == playback.frame_rate else 0
+    first += math.floor((playback.start - playback.origin) * rate + 1e-6)
+    if settings.kind == "sheet":
+        chosen = np.unique(np.rint(np.linspace(0, count - 1, settings.n_cells)).astype(int))
+        return times[chosen], (first + chosen).tolist(), rate
+    return times, list(range(first, first + count)), rate
+
+
+def _numbered(path: Path, numbers: list[int]) -> list[Path]:
+    try:
+        files = [path.with_name(path.name.format(frame=number)) for number in numbers]
+    except (ValueError, KeyError, IndexError, AttributeError):
+        files = []
+    if len(set(files)) < len(numbers):
+        raise OutputError(
+            f"{printable(path, 300)}: expected a name with {{frame}}, as in "
+            f"{printable(path.stem)}_{{frame:05}}.png"
+        )
+    return files
+
+
+def _sink(
+    settings: RecordSettings,
+    files: list[Path],
+    size: tuple[int, int],
+    rate: float,
+    numbers: list[int],
+) -> tuple[Sink, tuple[int, int]]:
+    """Return where frames go, and their size."""
+    if settings.kind == "pictures":
+        from viewer.media.picture_sinks import PictureSink
+
+        return PictureSink(files), size
+    if settings.kind == "sheet":
+        from viewer.media.picture_sinks import SheetSink
+
+        sheet = SheetSink(files[0], size, numbers)
+        return sheet, sheet.cell
+    from viewer.media.video import VideoSink
+
+    return VideoSink(files[0], size, rate, settings.quality, settings.transparent), size

@@ -1,0 +1,84 @@
+"""State of recording: the settings of the window "Record", and what was asked for there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+__all__ = ["KINDS", "LEAST_PIXELS", "RecordSettings", "Recording"]
+
+KINDS = {
+    ".mp4": "MP4 video (H.264)",
+    ".webm": "WebM video (VP9)",
+    ".gif": "Animated GIF",
+    "pictures": "Numbered pictures (PNG)",
+    "sheet": "Contact sheet (PNG)",
+}
+"""What can be recorded, with the name that the dialog shows."""
+
+LEAST_PIXELS = 16
+"""Smallest width and height of a recording."""
+
+
+@dataclass(slots=True)
+class RecordSettings:
+    """What is recorded, and how.
+
+    Attributes
+    ----------
+    kind : str
+        A key of ``KINDS``.
+    size : str
+        A key of the sizes offered.
+    own_size : (int, int)
+        For ``"own"``.
+    rate : float
+        Frames a second; 0 for the scene's own.
+    turntable : bool
+        Whether the camera turns once around.
+    seconds : float
+        How long a turn takes if nothing moves.
+    transparent : bool
+        Whether the background is left out.
+    n_cells : int
+        Frames of a contact sheet.
+    quality : int
+        Of videos, 0 to 100.
+    """
+
+    kind: str = ".mp4"
+    size: str = "view"
+    own_size: tuple[int, int] = (1280, 720)
+    rate: float = 0.0
+    turntable: bool = False
+    seconds: float = 6.0
+    transparent: bool = False
+    n_cells: int = 12
+    quality: int = 75
+
+    def pixels(self, view: tuple[float, float]) -> tuple[int, int]:
+        """Return width and height, of a view of that size."""
+        if self.size == "view":
+            wide, high = (max(round(side), LEAST_PIXELS) for side in view)
+            # Videos want even sizes; nobody misses a row of the view.
+            return wide - wide % 2, high - high % 2
+        if self.size == "own":
+            return self.own_size
+        width, _, height = self.size.partition("x")
+        return int(width), int(height)
+
+
+@dataclass(slots=True)
+class Recording:
+    """What is asked for.
+
+    Attributes
+    ----------
+    settings : RecordSettings or None
+        What the window "Record" asks for, while it is open.
+    wanted : Path or None
+        Where to record to, after the frame.
+    """
+
+    settings: RecordSettings | None = None
+    wanted: Path | None = None

@@ -1,0 +1,1 @@
+"""Rigging: a mesh gets the rig of a template."""

@@ -1,0 +1,234 @@
+"""The part of the Rig panel that lays the template onto the target."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from imgui_bundle import imgui
+
+from viewer.app.core.reasons import no_job_room
+from viewer.app.core.state import AppState
+from viewer.app.core.widgets import (
+    button,
+    checkbox,
+    choice,
+    disabled,
+    explain,
+    note_item,
+    plain_zero,
+    same_line_if_room,
+)
+from viewer.app.rigging.placing import (
+    box_fit,
+    is_posed_since,
+    laid_template,
+    move_by_hand,
+    placing_now,
+    posed_template,
+    similarity_now,
+)
+from viewer.app.rigging.sources import target_mesh
+from viewer.app.rigging.state import GHOSTS, TOOLS, Placing, Rigging, Template
+from viewer.app.rigging.tools import choose_rig_tool
+from viewer.app.rigging.work import landmark_settings, start_align
+from viewer.autorig.alignment.orientation_search import AXES
+from viewer.autorig.alignment.similarity import Similarity
+from viewer.autorig.alignment.surface_alignment import SCALES, Alignment, AlignmentSettings
+from viewer.errors import ViewerError
+from viewer.rig.arrays import Floats
+from viewer.rig.geometry.rotation import axis_rotations, matrix_to_euler
+
+__all__ = ["draw_alignment"]
+
+_FEWEST = 3  # landmarks
+_DOUBTFUL = 0.03  # error over size, as in the report
+_WARNING = (1.0, 0.77, 0.30, 1.0)
+_STRETCHED = "stretched, pose kept"
+_HOW = {
+    "in place": "about the origin of both",
+    "search": "by closest points",
+    "fit": "pose and limbs fitted",
+    "landmarks": "by landmarks",
+    "given": "by hand",
+}
+"""How a template came to where it lies, as ``Alignment.how`` says it."""
+_POSES = "; joints are turned and limbs resized where that fits much better"
+_FITS = "; joints are turned and limbs resized, or all of it stretched, where that fits much better"
+_SCALE_TEXTS = {"uniform": "one scale", "axes": "one along each axis", "none": "as it is"}
+
+
+def draw_alignment(state: AppState) -> None:
+    """Draw how the template is aligned, how well it is, and how to move it by hand."""
+    rigging, why = state.of(Rigging), no_job_room(state)
+    choices = rigging.choices
+    axes = {"": "searched", **{axis: axis for axis in AXES}}
+    choices.up = choice(state, "Up", choices.up, axes)
+    explain("the target's axis that points up")
+    choices.facing = choice(state, "Facing", choices.facing, axes)
+    explain("the target's axis that it looks along")
+    choices.scale = choice(state, "Scale", choices.scale, {s: _SCALE_TEXTS[s] for s in SCALES})
+    choices.fits = checkbox(state, "Fit pose and proportions", choices.fits)
+    explain("turn the template's joints and resize its limbs where the target is otherwise")
+    if button(state, "Align", why):
+        start_align(state)
+    if not why:
+        explain(f"found by closest points{_FITS if choices.fits else ''}")
+    same_line_if_room("Refine")
+    refuses = why or ("" if placing_now(state) else "align the template first")
+    if button(state, "Refine", refuses):
+        _refine(state)
+    if not refuses:
+        explain(f"from where it lies, by closest points{_POSES if choices.fits else ''}")
+    _draw_placing(placing_now(state))
+    rigging.ghost = choice(state, "Template shown", rigging.ghost, GHOSTS)
+    _draw_tools(state)
+    template = laid_template(state)
+    if template is not None and rigging.tool not in ("", "landmarks"):
+        _draw_numbers(state, template)
+    if template is not None and (rigging.tool == "landmarks" or rigging.landmarks):
+        _draw_landmarks(state, template)
+    placing = placing_now(state)
+    # What comes and goes stands below the controls, which stay where they are.
+    for line in placing.lines if placing is not None else ():
+        imgui.text_wrapped(line.labelled)
+    if is_posed_since(state):
+        imgui.text_wrapped("the template was posed otherwise since: align again")
+
+
+def _draw_placing(placing: Placing | None) -> None:
+    """Draw how the template lies: how far the surfaces are apart."""
+    if placing is None:
+        imgui.text_disabled("not aligned yet")
+        return
+    _draw_error(placing.alignment)
+
+
+def _draw_error(found: Alignment | None) -> None:
+    """Draw the error: trimmed RMS, as in the report."""
+    if found is None:
+        imgui.text_disabled("error: not measured here")
+        return
+    text = f"error {100.0 * found.error:.2f} % ({_how(found)})"
+    if found.error > _DOUBTFUL:
+        imgui.push_style_color(imgui.Col_.text, _WARNING)
+        imgui.text_wrapped(f"{text}: doubtful")
+        imgui.pop_style_color()
+    else:
+        imgui.text_wrapped(text)
+    explain(
+        "of the target's size: RMS distance of its best 90 % from the template; of the template "
+        f"from the target: {100.0 * found.away:.2f} %"
+    )
+
+
+def _how(found: Alignment) -> str:
+    """Say how a template came to where it lies: fitted limbs come with one scale for all axes."""
+    is_even = (found.placed.factors == 1.0).all() and (found.placed.own_factors == 1.0).all()
+    return _HOW[found.how] if found.how != "fit" or is_even else _STRETCHED
+
+
+def _refine(state: AppState) -> None:
+    """Let closest points improve on where the template lies: corners of its box are landmarks."""
+    rigging = state.of(Rigging)
+    template = laid_template(state)
+    if template is None:
+        return
+    low, high = (f(posed_template(rigging, template).positions, axis=0) for f in (np.min, np.max))
+    corners = np.array([low, *(np.where(np.eye(3)[axis] > 0, high, low) for axis in range(3))])
+    corners[1:] += (high == low) * np.eye(3)  # flat meshes have corners too
+    pairs = np.stack([corners, similarity_now(state, template).apply(corners)], axis=1)
+    start_align(state, AlignmentSettings(landmarks=pairs, scale=rigging.choices.scale))
+
+
+def _draw_tools(state: AppState) -> None:
+    """Draw the ways to move the template in the view."""
+    imgui.text_disabled("By hand")
+    for number, (tool, (name, text)) in enumerate(TOOLS.items()):
+        if number:
+            same_line_if_room(name)
+        if imgui.radio_button(f"{name}###rig tool {tool}", state.of(Rigging).tool == tool):
+            choose_rig_tool(state, tool)
+        note_item(state, f"rig tool {tool}")
+        explain(text)
+
+
+def _draw_numbers(state: AppState, template: Template) -> None:
+    """Draw the template's place as numbers: shift, turn about x, y, z, scale."""
+    now = similarity_now(state, template)
+    angles = np.degrees(matrix_to_euler(now.rotation[None])[0])
+    shift, angle, scale = _inputs(state, now.shift, angles, now.scale)
+    if shift is None and angle is None and scale is None:
+        if button(state, "Lay box on box"):
+            fit = box_fit(posed_template(state.of(Rigging), template), target_mesh(state))
+            _move(state, template, fit)
+        return
+    rotation = now.rotation
+    if angle is not None:
+        x, y, z = (axis_rotations(axis, np.radians(angle[axis])) for axis in range(3))
+        rotation = z @ y @ x
+    moved = replace(
+        now,
+        scale=now.scale if scale is None else scale,
+        rotation=rotation,
+        shift=now.shift if shift is None else shift,
+    )
+    _move(state, template, moved)
+
+
+def _inputs(
+    state: AppState, shift: Floats, angles: Floats, scale: float
+) -> tuple[Floats | None, Floats | None, float | None]:
+    """Draw the fields; return what was typed, None for each that was not."""
+    flags = imgui.InputTextFlags_.enter_returns_true
+    typed: list[Floats | None] = []
+    for label, values, digits in (("Shift", shift, "%.4g"), ("Turn (degrees)", angles, "%.2f")):
+        changed, new = imgui.input_float3(
+            label, [plain_zero(value, digits) for value in values.tolist()], digits, flags
+        )
+        note_item(state, label)
+        fits = changed and bool(np.isfinite(new).all())
+        typed.append(np.array(new, dtype=np.float64) if fits else None)
+    changed, size = imgui.input_float("Scale by", scale, 0.0, 0.0, "%.6g", flags)
+    note_item(state, "Scale by")
+    fits = changed and math.isfinite(size) and size > 0.0
+    return typed[0], typed[1], size if fits else None
+
+
+def _move(state: AppState, template: Template, similarity: Similarity) -> None:
+    move_by_hand(state, template, similarity)
+    state.of(Rigging).was_dragged = True
+
+
+def _draw_landmarks(state: AppState, template: Template) -> None:
+    """Draw the list of pairs, and the button that aligns by them."""
+    view = state.of(Rigging)
+    if view.tool == "landmarks":
+        side = "the same point of the target" if view.pending else "a point of the blue template"
+        imgui.text_wrapped(f"Click {side}.")
+    removed = -1
+    for row in range(len(view.landmarks)):
+        if imgui.small_button(f"x##landmark {row}"):
+            removed = row
+        note_item(state, f"delete landmark {row}")
+        explain("delete this pair")
+        imgui.same_line()
+        imgui.text_unformatted(f"Pair {row + 1}")
+        if row % 3 != 2 and row + 1 < len(view.landmarks):
+            imgui.same_line()
+    if removed >= 0:
+        del view.landmarks[removed]
+    view.choices.refines = checkbox(state, "Closest points refine it", view.choices.refines)
+    missing = _FEWEST - len(view.landmarks)
+    why = f"{missing} more pair{'s' * (missing != 1)} needed" if missing > 0 else ""
+    if button(state, "Align by landmarks", why or no_job_room(state)):
+        mesh = posed_template(view, template)
+        try:
+            start_align(state, landmark_settings(state, mesh, view.choices.refines))
+        except ViewerError as problem:
+            state.error = str(problem)
+    with disabled("" if view.landmarks else "there is none"):
+        same_line_if_room("Delete all")
+        if button(state, "Delete all"):
+            view.landmarks, view.pending = [], None

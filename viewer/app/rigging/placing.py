@@ -1,0 +1,190 @@
+"""Where the template lies over the target: as aligned, as dragged, or beside it for landmarks."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.app.core.state import AppState
+from viewer.app.rigging.sources import current_template, target_mesh
+from viewer.app.rigging.state import Placing, Rigging, Template
+from viewer.autorig.alignment.similarity import Similarity
+from viewer.autorig.alignment.surface_alignment import AlignmentSettings
+from viewer.diagnostics import Diagnostic
+from viewer.rendering.camera import camera_axes
+from viewer.rendering.passes.ghost_pass import Ghost
+from viewer.rig.arrays import Floats
+from viewer.rig.figure import Figure
+from viewer.rig.geometry.rotation import nearest_rotations
+from viewer.rig.geometry.transform import translation_matrix
+from viewer.rig.mesh import Mesh, bounding_box, box_size
+from viewer.rig.pose import placement_matrix, pose_key
+from viewer.rig.scene import Actor
+from viewer.rig.skinning import deform
+
+__all__ = [
+    "as_similarity",
+    "box_fit",
+    "ghost_of",
+    "ghost_place",
+    "is_posed_since",
+    "laid_template",
+    "move_by_hand",
+    "placing_now",
+    "posed_template",
+    "set_aside",
+    "similarity_now",
+    "target_place",
+]
+
+_DONE = ("R003.pose", "R003.proportions", "R003.not-fitted")  # true wherever the template lies
+_GAP = 1.25  # of both widths' mean, between target and template where they stand side by side
+
+
+def target_place(actor: Actor) -> Floats:
+    """Return where an actor's mesh stands in the scene: (4, 4)."""
+    return actor.placement @ placement_matrix(actor.pose) if actor.pose else actor.placement
+
+
+def posed_template(view: Rigging, template: Template) -> Mesh:
+    """Return the template as it is posed now, as a mesh; remembered until the pose changes."""
+    key = (template.figure, pose_key(template.pose))
+    if view.ghost_figure is None or view.ghost_key != key:
+        positions, normals = deform(template.figure, template.pose)
+        assert template.figure.mesh is not None  # it is attached
+        mesh = Mesh(positions, normals, template.figure.mesh.triangles)
+        view.ghost_key, view.ghost_figure = key, Figure(template.figure.name, mesh)
+    mesh_now = view.ghost_figure.mesh
+    assert mesh_now is not None  # it consists of one
+    return mesh_now
+
+
+def box_fit(template: Mesh, target: Mesh) -> Similarity:
+    """Return the similarity that lays the middles of boxes onto each other, diagonals alike."""
+    boxes = [bounding_box(mesh.positions[mesh.triangles.ravel()]) for mesh in (template, target)]
+    scale = (box_size(boxes[1]) or 1.0) / (box_size(boxes[0]) or 1.0)
+    shift = boxes[1].mean(axis=0) - scale * boxes[0].mean(axis=0)
+    return Similarity(scale, np.eye(3), shift, np.ones(3))
+
+
+def placing_now(state: AppState) -> Placing | None:
+    """Return where the template was laid, None if that was for another target or template."""
+    rigging, template = state.of(Rigging), current_template(state)
+    placing = rigging.placing
+    if placing is None or template is None or rigging.target is None:
+        return None
+    mesh, figure = placing.meshes
+    return placing if mesh is target_mesh(state) and figure is template.figure else None
+
+
+def is_posed_since(state: AppState) -> bool:
+    """Return whether the template was posed otherwise since it was laid onto the target."""
+    placing, template = placing_now(state), current_template(state)
+    return placing is not None and template is not None and placing.pose != pose_key(template.pose)
+
+
+def laid_template(state: AppState) -> Template | None:
+    """Return the template in the pose in which it lies on the target; None if it is unread."""
+    placing, template = placing_now(state), current_template(state)
+    if placing is None or template is None or placing.fitted is None or is_posed_since(state):
+        return template
+    return placing.fitted
+
+
+def similarity_now(state: AppState, template: Template) -> Similarity:
+    """Return where the template lies, box on box if nobody has aligned it."""
+    placing = placing_now(state)
+    if placing is not None:
+        return placing.similarity
+    return box_fit(posed_template(state.of(Rigging), template), target_mesh(state))
+
+
+def as_similarity(matrix: Floats, like: Similarity | None = None) -> Similarity:
+    """Return the similarity next to a matrix, whose scale is the mean of its three.
+
+    Parameters
+    ----------
+    matrix : (4, 4)
+        Not mirrored, nearly one; digits that are missing to a rotation are made up for.
+    like : Similarity or None
+        What was moved: if it is stretched, so is the result, along the template's own axes, which
+        turn with it.
+    """
+    linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
+    own = np.ones(3)
+    if like is not None and not like.is_plain:
+        own = np.linalg.norm(linear, axis=0)
+        own = own / np.cbrt(np.prod(own))
+    linear = linear / own
+    scale = float(np.cbrt(max(np.linalg.det(linear), 1e-30)))
+    rotation = np.asarray(nearest_rotations(linear / scale)[0], dtype=np.float64)
+    shift = np.asarray(matrix, dtype=np.float64)[:3, 3]
+    return Similarity(scale, rotation, shift, np.ones(3), own)
+
+
+def move_by_hand(state: AppState, template: Template, similarity: Similarity) -> None:
+    """Lay the template somewhere else; its error is not known there."""
+    own, before = current_template(state), placing_now(state)
+    assert own is not None  # it is moved
+    fitted = template if before is not None and before.fitted is template else None
+    state.of(Rigging).placing = Placing(
+        similarity=similarity,
+        alignment=None,
+        settings=AlignmentSettings(matrix=similarity.matrix),
+        fitted=fitted,
+        lines=_still_true(before.lines) if before is not None and fitted is not None else (),
+        meshes=(target_mesh(state), own.figure),
+        pose=pose_key(own.pose),
+    )
+
+
+def _still_true(lines: tuple[Diagnostic, ...]) -> tuple[Diagnostic, ...]:
+    """Return what was done to the template, without the gap that it left where it lay."""
+    return tuple(line for line in lines if line.key in _DONE)
+
+
+def set_aside(state: AppState) -> None:
+    """Show the template to the right of the target, as the camera sees it."""
+    view, template = state.of(Rigging), laid_template(state)
+    view.aside = np.zeros(3)
+    if template is None or view.target is None:
+        return
+    mesh = posed_template(view, template)
+    place = target_place(view.target)
+    placed = place @ similarity_now(state, template).matrix
+    right = camera_axes(state.camera)[0]
+    spans = [
+        np.ptp((mesh_.positions @ matrix[:3, :3].T) @ right)
+        for mesh_, matrix in ((mesh, placed), (target_mesh(state), place))
+    ]
+    view.aside = _GAP * 0.5 * (spans[0] + spans[1]) * right
+
+
+def ghost_of(state: AppState) -> Ghost | None:
+    """Return the template as it is to be drawn over the scene, None if it is not."""
+    view, template = state.of(Rigging), laid_template(state)
+    if template is None or view.target is None:
+        return None
+    if view.tool == "landmarks":
+        style = "solid"
+    elif view.tool or placing_now(state) is not None:
+        style = view.ghost or ("wireframe" if view.tool else "")
+    else:
+        style = ""
+    if not style:
+        return None
+    posed_template(view, template)
+    figure, place, old = view.ghost_figure, ghost_place(state, template), view.shown
+    assert figure is not None  # it was just posed
+    if old is None or (old.figure, old.style) != (figure, style) or (old.placement != place).any():
+        return Ghost(figure, place, style)
+    return old
+
+
+def ghost_place(state: AppState, template: Template) -> Floats:
+    """Return where the template is shown: (4, 4), from its posed mesh to the scene."""
+    view = state.of(Rigging)
+    assert view.target is not None  # the callers looked
+    matrix = target_place(view.target) @ similarity_now(state, template).matrix
+    if view.tool == "landmarks":
+        matrix = translation_matrix(view.aside) @ matrix
+    return np.asarray(matrix)

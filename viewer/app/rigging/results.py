@@ -1,0 +1,259 @@
+"""What rigging gave: in the scene in place of the target, as colours, as motion, in files."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from viewer.app.core.jobs import ThreadJob
+from viewer.app.core.state import AppState
+from viewer.app.rigging.placing import target_place
+from viewer.app.rigging.state import Comparison, Result, Rigging
+from viewer.autorig.rigged import clip_for
+from viewer.errors import RigError, ViewerError, printable
+from viewer.export._rigged_files import files_of, write_rigged
+from viewer.formats import check_targets
+from viewer.rig.annotations import VertexField
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.comparison.pairs import Pairs
+from viewer.rig.comparison.weights import row_distances
+from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.scene import Actor, figure_pose
+from viewer.rig.skin import Skin, owners
+
+__all__ = [
+    "MATCH_COLORS",
+    "RESULT_COLORS",
+    "TARGET",
+    "compare",
+    "no_motion_of",
+    "no_other_version",
+    "plays_motion",
+    "put_results",
+    "save_rigged",
+    "set_motion",
+    "show_colors",
+    "show_match",
+    "show_version",
+    "shown_result",
+    "shown_version",
+    "switch_version",
+    "versions",
+]
+
+MATCH_COLORS = {
+    "class:match": "matched or not",
+    "field:match distance": "distance",
+    "field:match angle": "angle",
+}
+"""Scalar views of where a target meets the template."""
+
+RESULT_COLORS = {
+    "class:confidence": "confidence",
+    "field:distance": "distance",
+    "class:guarded": "guarded",
+}
+"""Scalar views of how a rig was found."""
+
+TARGET = "target"
+"""The version that is the mesh as it was, beside those of the methods."""
+
+
+def compare(first: Result, second: Result) -> Comparison:
+    """Return how far the weights of two results for one target are apart."""
+    one, other = first.rigged.figure.skin, second.rigged.figure.skin
+    assert one is not None and other is not None  # both are rigged
+    joints = np.arange(one.n_joints, dtype=np.int32)
+    distances = row_distances(one, other, Pairs(joints, joints, ()))
+    same = _dominant(one) == _dominant(other)
+    return Comparison(float(distances.mean()), float(same.mean()))
+
+
+def _dominant(skin: Skin) -> Ints:
+    """Return each vertex's strongest joint, -1 for those without influences: (V,)."""
+    order = np.lexsort((-skin.joints, skin.weights, owners(skin)))
+    last = np.cumsum(np.diff(skin.starts)) - 1
+    has_some = np.diff(skin.starts) > 0
+    found = np.full(skin.n_vertices, -1)
+    found[has_some] = skin.joints[order][last[has_some]]
+    return found
+
+
+def put_results(state: AppState, results: list[Result], comparison: Comparison | None) -> None:
+    """Put rigged meshes into the scene: the first is seen in place of the target."""
+    view, actors = state.of(Rigging), state.scene.actors
+    target = results[0].target
+    if not any(actor is target for actor in actors):
+        state.say("The mesh that was rigged is there no more")
+        return
+    if view.target is not target:
+        view.results = {}
+    chosen = state.actor
+    for result in results:
+        old = view.results.get(result.method)
+        row = _row(actors, old.actor) if old is not None else -1
+        if row >= 0:
+            actors[row] = result.actor
+        elif not any(_row(actors, one.actor) >= 0 for one in view.results.values()):
+            # The target goes to the end, so that nobody else gets another number.
+            actors[_row(actors, target)] = result.actor
+            actors.append(target)
+        else:
+            actors.append(result.actor)
+        view.results[result.method] = result
+    view.target, view.comparison, view.tool = target, comparison, ""
+    view.ghost, view.scrolls = "", 2
+    _look(state, results[0].method)
+    if any(chosen is actor for actor in (target, *(one.actor for one in results))) or (
+        _row(actors, chosen) < 0
+    ):
+        state.choose_actor(_row(actors, results[0].actor))
+    if state.options.scalar in MATCH_COLORS:
+        show_colors(state, "")  # those numbers were the target's
+    state.say_status(f"Rigged: {printable(target.name, 60)}; A shows the mesh as it was")
+
+
+def _row(actors: list[Actor], actor: Actor) -> int:
+    """Return an actor's index, -1 if it is not there."""
+    return next((row for row, one in enumerate(actors) if one is actor), -1)
+
+
+def versions(state: AppState) -> dict[str, Actor]:
+    """Return what A/B goes through: the target and its results that are in the scene."""
+    view, actors = state.of(Rigging), state.scene.actors
+    if view.target is None:
+        return {}
+    found = {TARGET: view.target} | {name: one.actor for name, one in view.results.items()}
+    return {name: actor for name, actor in found.items() if _row(actors, actor) >= 0}
+
+
+def shown_version(state: AppState) -> str:
+    """Return the one that is seen; empty if none is."""
+    return next((name for name, actor in versions(state).items() if actor.visible), "")
+
+
+def shown_result(state: AppState) -> Result | None:
+    """Return the result that is seen, else the last one that is in the scene."""
+    known = versions(state)
+    there = [one for name, one in state.of(Rigging).results.items() if name in known]
+    seen = [one for one in there if one.actor.visible]
+    return (seen or there)[-1] if there else None
+
+
+def no_other_version(state: AppState) -> str:
+    """Say why A/B has nothing to switch to."""
+    return "" if len(versions(state)) > 1 else "nothing was rigged yet: Run"
+
+
+def switch_version(state: AppState) -> None:
+    """Show the next of the target and its results, in the same place."""
+    known = list(versions(state))
+    if len(known) < 2:
+        state.say_status("A/B: nothing was rigged yet, see Window > Rig")
+        return
+    shown = shown_version(state)
+    following = known[(known.index(shown) + 1) % len(known)] if shown else known[0]
+    show_version(state, following)
+
+
+def show_version(state: AppState, name: str) -> None:
+    """Show one of ``versions``; that is no step of undoing."""
+    # What else was changed in this frame keeps its own step.
+    state.history.observe(state.scene, state.options, busy=False)
+    _look(state, name)
+    state.history.accept(state.scene, state.options)
+    text = "The mesh as it was" if name == TARGET else f"Rigged, method {name}"
+    state.say_status(text)
+
+
+def _look(state: AppState, name: str) -> None:
+    known = versions(state)
+    was_chosen = any(state.actor is actor for actor in known.values())
+    for key, actor in known.items():
+        actor.visible = key == name
+    if was_chosen:
+        state.choose_actor(_row(state.scene.actors, known[name]))
+
+
+def show_match(
+    state: AppState, actor: Actor, fields: tuple[VertexField, ...], share: float
+) -> None:
+    """Colour the target by where it meets the template."""
+    rigging = state.of(Rigging)
+    names = {field.name for field in fields}
+    kept = tuple(field for field in actor.figure.fields if field.name not in names)
+    actor.figure = replace(actor.figure, fields=(*fields, *kept))
+    rigging.match_share, rigging.ghost = share, ""
+    if not actor.visible:
+        _look(state, TARGET)
+    show_colors(state, "class:match")
+
+
+def show_colors(state: AppState, view: str) -> None:
+    """Show a scalar view, or plain surfaces if its name is empty."""
+    options = state.options
+    if view:
+        options.shading, options.scalar, options.scalar_range = "scalar", view, None
+    elif options.shading == "scalar":
+        options.shading = "phong"
+
+
+def plays_motion(result: Result) -> bool:
+    """Return whether a result moves as its template does."""
+    return result.actor.clip is not None
+
+
+def no_motion_of(result: Result | None) -> str:
+    """Say why a result cannot move as its template does."""
+    if result is None:
+        return "nothing was rigged yet: Run"
+    if isinstance(result.template.clip, Clip | SampledClip):
+        return ""
+    return "the template has no motion: give it one before running"
+
+
+def set_motion(state: AppState, result: Result, plays: bool) -> None:
+    """Let a result move as its template where the target stands, or pose it as the target."""
+    actor, rigged, clip = result.actor, result.rigged, result.template.clip
+    place = target_place(result.target)
+    if not plays or not isinstance(clip, Clip | SampledClip):
+        actor.clip, actor.pose = None, rigged.pose.copy()
+        actor.placement = place @ rigged.placement
+        return
+    try:
+        actor.clip = clip_for(rigged, clip)
+    except RigError as problem:
+        state.error = str(problem)
+        return
+    # The clip sets what the template's does; how the target was turned is no part of it.
+    actor.pose = figure_pose(rigged.figure)
+    actor.offset = result.template.actor.offset if result.template.actor else 0.0
+    actor.placement = place @ _stand(result)
+
+
+def _stand(result: Result) -> Floats:
+    """Return where the template's space lies in the target's frame, without its scale: (4, 4)."""
+    alignment = result.rigged.alignment
+    if alignment is None:
+        return result.rigged.placement
+    stand = np.eye(4)
+    stand[:3, :3], stand[:3, 3] = alignment.placed.rotation, alignment.placed.shift
+    return stand
+
+
+def save_rigged(state: AppState, result: Result, path: Path) -> None:
+    """Write a result beside the frame loop, all of its files or none."""
+    try:
+        files = files_of(path)
+        # The dialog has asked what becomes of files that are there.
+        check_targets(files, [*state.inputs, *result.template.paths], force=True)
+    except ViewerError as problem:
+        state.error = str(problem)
+        return
+    saved = f"Saved {', '.join(printable(file, 200) for file in files)}"
+    state.job = ThreadJob(
+        f"Writing {printable(path.name, 60)}", lambda: [*write_rigged(result.rigged, path), saved]
+    )

@@ -1,0 +1,164 @@
+"""The part of the Rig panel about what rigging gave."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from imgui_bundle import imgui
+
+from viewer.app.core.reasons import no_job_room
+from viewer.app.core.state import AppState
+from viewer.app.core.widgets import button, checkbox, explain, note_item, same_line_if_room
+from viewer.app.files.file_choice import FileDialog, folder_of
+from viewer.app.files.state import Files
+from viewer.app.rigging.results import (
+    RESULT_COLORS,
+    TARGET,
+    no_motion_of,
+    plays_motion,
+    save_rigged,
+    set_motion,
+    show_colors,
+    show_version,
+    shown_result,
+    shown_version,
+    versions,
+)
+from viewer.app.rigging.sources import no_results
+from viewer.app.rigging.state import Result, Rigging
+from viewer.errors import printable
+from viewer.export._rigged_files import RIGGED_SUFFIXES, files_of
+from viewer.formats import file_stem
+
+__all__ = ["draw_results"]
+
+_WARNING = (1.0, 0.77, 0.30, 1.0)
+_LINES_HEIGHT = 9.0  # lines of the report that are seen at once
+
+
+def draw_results(state: AppState) -> None:
+    """Draw what is seen, how sure it is, the numbers of both methods, and the report."""
+    why, result = no_results(state), shown_result(state)
+    if why or result is None:
+        imgui.text_wrapped("What was rigged was undone; Ctrl+Shift+Z brings it back.")
+        return
+    _draw_versions(state)
+    _draw_colors(state)
+    moves = plays_motion(result)
+    still = no_motion_of(result)
+    plays = checkbox(state, "Move as the template", moves, still)
+    if not still:
+        explain("its motion, standing where the target stands")
+    if plays != moves:
+        set_motion(state, result, plays)
+    _draw_table(state)
+    if button(state, "Save rigged…", no_job_room(state)):
+        _ask_where(state, result)
+    same_line_if_room("Copy report")
+    if button(state, "Copy report"):
+        imgui.set_clipboard_text("\n".join(line.labelled for line in result.rigged.lines))
+        state.say_status("Report copied")
+    _draw_lines(state, result)
+
+
+def _draw_versions(state: AppState) -> None:
+    """Draw the target and its results as radio buttons; the key A goes through them."""
+    shown = shown_version(state)
+    for number, name in enumerate(versions(state)):
+        text = "as it was" if name == TARGET else name
+        if number:
+            same_line_if_room(text)
+        if imgui.radio_button(f"{text}###version {name}", name == shown) and name != shown:
+            show_version(state, name)
+        note_item(state, f"version {name}")
+        explain("A goes through them")
+
+
+def _draw_colors(state: AppState) -> None:
+    options = state.options
+    now = options.scalar if options.shading == "scalar" else ""
+    for number, (view, text) in enumerate({"": "plain", **RESULT_COLORS}.items()):
+        if number:
+            same_line_if_room(text)
+        is_on = now == view if view else now not in RESULT_COLORS
+        if imgui.radio_button(f"{text}###color {view}", is_on):
+            show_colors(state, view)
+        note_item(state, f"color {view}")
+
+
+def _draw_table(state: AppState) -> None:
+    """Draw the numbers of each method side by side."""
+    view, known = state.of(Rigging), versions(state)
+    found = [one for name, one in view.results.items() if name in known]
+    if not imgui.begin_table("methods", 1 + len(found), imgui.TableFlags_.sizing_stretch_same):
+        return
+    rigged = [one.rigged for one in found]
+    _row("", "", [one.method for one in found])
+    _row(
+        "matched",
+        "vertices whose weights are those of the template's surface under them",
+        [f"{100.0 * one.weights.matched.mean():.1f} %" for one in rigged],
+    )
+    _row(
+        "residual",
+        "how far the mesh is from the target when it is posed again, at most, of its size",
+        [f"{one.residual:.1e}" for one in rigged],
+    )
+    _row(
+        "guarded",
+        "vertices bent too far to be undone exactly: their rest position is a guess",
+        [f"{int(one.guarded.sum()):,}" for one in rigged],
+    )
+    _row(
+        "joints outside",
+        "joints that lie outside the mesh, and inside the template",
+        [f"{len(one.outside):,}" for one in rigged],
+    )
+    imgui.end_table()
+    if view.comparison is not None and len(found) > 1:
+        text = (
+            f"weights differ by {view.comparison.weights:.3f} (mean L1), same strongest joint at "
+            f"{100.0 * view.comparison.dominant:.1f} % of the vertices"
+        )
+        imgui.text_wrapped(text)
+
+
+def _row(title: str, meaning: str, cells: list[str]) -> None:
+    imgui.table_next_row()
+    for text in (title, *cells):
+        imgui.table_next_column()
+        imgui.text_unformatted(text)
+        explain(meaning)
+
+
+def _draw_lines(state: AppState, result: Result) -> None:
+    """Draw the report, warnings in their colour."""
+    height = _LINES_HEIGHT * imgui.get_text_line_height_with_spacing()
+    if imgui.begin_child("report", (0.0, height), imgui.ChildFlags_.borders):
+        for line in result.rigged.lines:
+            warns = line.severity == "warning"
+            if warns:
+                imgui.push_style_color(imgui.Col_.text, _WARNING)
+            imgui.text_wrapped(printable(line.labelled, 400))
+            if warns:
+                imgui.pop_style_color()
+    imgui.end_child()
+    note_item(state, "report")
+
+
+def _ask_where(state: AppState, result: Result) -> None:
+    name = f"{file_stem(result.target.name)}_rigged.npz"
+    state.of(Files).dialog = FileDialog(
+        folder_of(state.paths),
+        lambda state, paths: save_rigged(state, result, paths[0]),
+        "save",
+        "Save rigged mesh: .npz, or .skel with .skin, .obj and .json",
+        RIGGED_SUFFIXES,
+        name,
+        written=_written,
+    )
+
+
+def _written(path: Path) -> list[Path]:
+    """Return all files that a name stands for; one with another suffix is refused afterwards."""
+    return files_of(path) if path.suffix.lower() in RIGGED_SUFFIXES else [path]

@@ -1,0 +1,247 @@
+"""Rig: a mesh without a rig gets that of a template: choose, align, match, run, compare, save."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from imgui_bundle import imgui
+
+from viewer.app.core.reasons import no_job_room
+from viewer.app.core.state import AppState
+from viewer.app.core.widgets import (
+    button,
+    checkbox,
+    choice,
+    disabled,
+    explain,
+    note_item,
+    same_line_if_room,
+    slider,
+)
+from viewer.app.files.file_choice import FileDialog, folder_of
+from viewer.app.files.state import Files
+from viewer.app.rigging.alignment_section import draw_alignment
+from viewer.app.rigging.placing import placing_now
+from viewer.app.rigging.results import MATCH_COLORS, show_colors
+from viewer.app.rigging.results_section import draw_results
+from viewer.app.rigging.sources import (
+    choose_target,
+    choose_template,
+    current_template,
+    no_target,
+    refresh,
+    targets,
+    template_texts,
+)
+from viewer.app.rigging.state import RigChoices, Rigging, Template
+from viewer.app.rigging.work import start_adding, start_match, start_reading, start_run
+from viewer.autorig.settings import JOINTS, METHODS
+from viewer.errors import printable
+from viewer.rig.geometry.transform import translation_matrix
+from viewer.rig.mesh import bounding_box
+from viewer.rig.scene import Actor, actor_points, free_title
+
+__all__ = ["draw"]
+
+_MESHES = (".obj", ".ply")
+_MOST_ROUNDS, _MOST_INFLUENCES = 50, 16
+_NEAREST_WHY = "the method nearest has no such choice"
+_ADVANCED = ("refines", "joints", "smoothing", "max_influences", "correctives")
+_GAP = 1.2  # of the template's width, between it and the target
+
+
+def draw(state: AppState) -> None:
+    """Draw the panel."""
+    rigging = state.of(Rigging)
+    refresh(state)
+    _draw_sources(state)
+    why = no_target(state)
+    if why:
+        imgui.text_wrapped(f"{why[0].upper()}{why[1:]}.")
+    with disabled(why):
+        if _section("Align", "the template is laid onto the target"):
+            draw_alignment(state)
+        if _section("Match", "which vertices take the template's weights as they are"):
+            _draw_match(state)
+        if _section("Rig", "weights, joints and the rest pose"):
+            _draw_run(state)
+    if not rigging.results:
+        return
+    if rigging.scrolls:
+        # Its height counts from the second frame on.
+        rigging.scrolls -= 1
+        imgui.set_scroll_here_y(0.0)
+    if _section("Result", "the rigged mesh in place of the target"):
+        draw_results(state)
+
+
+def _section(title: str, text: str) -> bool:
+    opened = imgui.collapsing_header(
+        f"{title}###rig section {title}", imgui.TreeNodeFlags_.default_open
+    )
+    explain(text)
+    return opened
+
+
+def _draw_sources(state: AppState) -> None:
+    """Draw what is rigged, and from what."""
+    view, found, why = state.of(Rigging), targets(state), no_job_room(state)
+    names = {str(row): printable(actor.name, 60) for row, actor in enumerate(found)}
+    rows = [str(row) for row, actor in enumerate(found) if actor is view.target]
+    with disabled("" if found else "no mesh without a rig"):
+        chosen = choice(state, "Target", rows[0] if rows else "", names or {"": "none"})
+    if found and chosen in names:
+        choose_target(state, found[int(chosen)])
+    if button(state, "Add mesh…", why):
+        _ask(state, _add_mesh, "Add a mesh to rig: .obj, .ply", _MESHES)
+    if not why:
+        explain("a mesh without a rig, put into this scene")
+    with disabled(why):
+        key = choice(state, "Template", view.template_key, template_texts(state))
+    if key != view.template_key:
+        choose_template(state, key)
+    if button(state, "Template file…", why):
+        _ask(state, _read_template, "Template: any rigged figure", ())
+    if not why:
+        explain("any figure that opens: a body model, .npz, or .skel and .skin together")
+    template = current_template(state)
+    # A template that was not read yet has the same controls: nothing moves away from the pointer.
+    if template is None or template.actor is None:
+        same_line_if_room("Pose it…")
+        refuses = no_target(state) or why
+        if button(state, "Pose it…", refuses):
+            if template is None:
+                start_reading(state, then=_add_template)
+            else:
+                _add_template(state)
+        if not refuses:
+            explain("puts the template beside the target, to be posed like it")
+    imgui.push_text_wrap_pos(0.0)
+    imgui.text_disabled(_template_text(template))
+    imgui.pop_text_wrap_pos()
+
+
+def _template_text(template: Template | None) -> str:
+    """Say what the template is."""
+    if template is None:
+        return "read when it is needed"
+    skeleton, mesh = template.figure.skeleton, template.figure.mesh
+    assert skeleton is not None and mesh is not None  # it is attached
+    pose = "in its present pose" if template.actor is not None else "in its file's pose"
+    return f"{skeleton.n_joints} joints, {mesh.n_vertices:,} vertices, {pose}"
+
+
+def _ask(state: AppState, done: object, title: str, suffixes: tuple[str, ...]) -> None:
+    assert callable(done)
+    state.of(Files).dialog = FileDialog(folder_of(state.paths), done, "open", title, suffixes)
+
+
+def _add_mesh(state: AppState, paths: list[Path]) -> None:
+    start_adding(state, paths[0])
+
+
+def _read_template(state: AppState, paths: list[Path]) -> None:
+    """Read the template from files that were chosen."""
+    start_reading(state, tuple(paths))
+
+
+def _add_template(state: AppState) -> None:
+    """Put the template into the scene, to the right of what is there."""
+    template = current_template(state)
+    assert template is not None  # it was read
+    actor = Actor(template.figure, template.pose.copy(), template.clip)
+    actor.called = free_title(state.scene.actors, actor.title)
+    span = bounding_box(actor_points(actor))[:, 0]
+    edge = max(
+        (actor_points(one)[:, 0].max() for one in state.scene.actors if one.is_drawn), default=0.0
+    )
+    shift = edge - span[0] + (_GAP - 1.0) * (span[1] - span[0])
+    actor.placement = translation_matrix(np.array([shift, 0.0, 0.0]))
+    state.scene.actors.append(actor)
+    state.choose_actor(len(state.scene.actors) - 1)
+    choose_template(state, f"actor {id(actor)}")
+
+
+def _draw_match(state: AppState) -> None:
+    """Draw when a vertex matches, and what that gives."""
+    view = state.of(Rigging)
+    choices = view.choices
+    why = _NEAREST_WHY if choices.method == "nearest" else ""
+    with disabled(why):
+        percent = 100.0 * choices.max_distance
+        moved = slider(state, "Max. distance", percent, 0.1, 30.0, "%.1f %%")
+        explain("between the surfaces, of the target's size", why)
+        choices.max_distance = min(max(moved, 0.0), 1000.0) / 100.0
+        moved = slider(state, "Max. angle", choices.max_angle, 0.0, 180.0, "%.0f\N{DEGREE SIGN}")
+        explain("between the surfaces' normals", why)
+        choices.max_angle = min(max(moved, 0.0), 180.0)
+    why = no_job_room(state) or ("" if placing_now(state) else "align the template first")
+    if button(state, "Show match", why):
+        start_match(state)
+    if view.match_share is None:
+        return
+    same_line_if_room("100.0 % of the vertices match")
+    imgui.text_unformatted(f"{100.0 * view.match_share:.1f} % of the vertices match")
+    _draw_colors(state, MATCH_COLORS, "Colours")
+
+
+def _draw_colors(state: AppState, views: dict[str, str], label: str) -> None:
+    options = state.options
+    now = options.scalar if options.shading == "scalar" and options.scalar in views else ""
+    chosen = choice(state, label, now, {"": "none", **views})
+    if chosen != now:
+        show_colors(state, chosen)
+
+
+def _draw_run(state: AppState) -> None:
+    """Draw how the rig is carried over, and the buttons that do it."""
+    choices = state.of(Rigging).choices
+    choices.method = choice(state, "Method", choices.method, {name: name for name in METHODS})
+    explain(METHODS[choices.method])
+    _draw_advanced(state, choices)
+    why = no_job_room(state)
+    if button(state, "Run", why):
+        start_run(state, (choices.method,))
+    if not why:
+        explain("what is not aligned yet is aligned first")
+    same_line_if_room("Compare methods")
+    if button(state, "Compare methods", why):
+        start_run(state, tuple(METHODS))
+    if not why:
+        explain("runs both; A goes through the mesh as it was and both results")
+
+
+def _draw_advanced(state: AppState, choices: RigChoices) -> None:
+    """Draw what is seldom asked for, folded away; what was changed there is counted."""
+    usual = RigChoices()
+    changed = sum(getattr(choices, name) != getattr(usual, name) for name in _ADVANCED)
+    text = f"Advanced ({changed} changed)" if changed else "Advanced"
+    opened = imgui.tree_node(f"{text}###rig advanced")
+    note_item(state, "rig advanced")
+    if not opened:
+        return
+    _draw_advanced_choices(state, choices)
+    imgui.tree_pop()
+
+
+def _draw_advanced_choices(state: AppState, choices: RigChoices) -> None:
+    why = _NEAREST_WHY if choices.method == "nearest" else ""
+    with disabled(why):
+        choices.refines = checkbox(state, "Refine alignment", choices.refines)
+        explain("closest points improve on what the search or the landmarks found", why)
+        choices.joints = choice(state, "Joints##rig", choices.joints, {n: n for n in JOINTS})
+        explain("carried: moved as the surface around them; copied: with the alignment alone", why)
+        changed, rounds = imgui.slider_int("Smoothing", choices.smoothing, 0, _MOST_ROUNDS)
+        note_item(state, "Smoothing")
+        explain("rounds of evening out weights that were filled in", why)
+        choices.smoothing = min(max(rounds, 0), 1000) if changed else choices.smoothing
+        text = "%d" if choices.max_influences else "all"
+        changed, most = imgui.slider_int(
+            "Max. influences", choices.max_influences, 0, _MOST_INFLUENCES, text
+        )
+        note_item(state, "Max. influences")
+        explain("of each vertex, the strongest; 0 keeps all", why)
+        choices.max_influences = max(most, 0) if changed else choices.max_influences
+        choices.correctives = checkbox(state, "Pose correctives", choices.correctives)
+        explain("carry those of the template, if it has some", why)

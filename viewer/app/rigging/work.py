@@ -1,0 +1,337 @@
+"""The Rig panel's long work, in a thread: read a template, align, match, rig; and what follows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from viewer.app.core.jobs import CountedJob, Report
+from viewer.app.core.reasons import no_job_room
+from viewer.app.core.state import AppState
+from viewer.app.rigging.placing import laid_template, placing_now, target_place
+from viewer.app.rigging.results import compare, put_results, show_match
+from viewer.app.rigging.sources import (
+    choose_target,
+    choose_template,
+    current_template,
+    read_template,
+    target_mesh,
+    template_files,
+)
+from viewer.app.rigging.state import (
+    Landmark,
+    Placing,
+    Result,
+    RigChoices,
+    Rigging,
+    Running,
+    Template,
+)
+from viewer.app.rigging.steps import (
+    align_template,
+    match_fields,
+    match_settings,
+    retold,
+    transfer_settings,
+)
+from viewer.autorig.alignment.surface_alignment import AlignmentSettings
+from viewer.autorig.pipeline import transfer
+from viewer.autorig.settings import METHODS
+from viewer.errors import RigError, printable
+from viewer.loading import load
+from viewer.rig.arrays import Floats
+from viewer.rig.geometry.ray_hit import surface_point
+from viewer.rig.mesh import Mesh
+from viewer.rig.scene import Actor, free_title
+
+__all__ = [
+    "landmark_settings",
+    "start_adding",
+    "start_align",
+    "start_match",
+    "start_reading",
+    "start_run",
+    "take_finished",
+]
+
+_Finish = Callable[[AppState], None]
+_STEPS = {
+    "alignment": "laying the template onto the mesh",
+    "pose": "fitting pose and proportions",
+    "joints": "placing the joints",
+    "rest pose": "undoing the pose",
+    "checks": "checking the result",
+    "weighing": "carrying weights over",
+}
+"""What the transfer calls its steps, in words for somebody who waits."""
+_CALLED = {"robust": "rigged", "nearest": "rigged (nearest)"}  # what is added to the mesh's name
+
+
+def _begin(state: AppState, title: str, act: Callable[[Report], _Finish]) -> None:
+    """Let a thread work; what it returns is done in the frame loop when it has ended."""
+    if no_job_room(state):
+        state.say_status(no_job_room(state))
+        return
+    running = Running(state.scene)
+
+    def work(report: Report) -> list[str]:
+        running.finish = act(report)
+        return []
+
+    running.job = state.job = CountedJob(title, work)
+    state.of(Rigging).running = running
+
+
+def take_finished(state: AppState) -> None:
+    """Do what follows from work that has ended; of a scene that is gone nothing does."""
+    rigging = state.of(Rigging)
+    running = rigging.running
+    if running is None or running.job is state.job:
+        return
+    rigging.running = None
+    if running.finish is not None and running.source is state.scene:
+        running.finish(state)
+
+
+def start_adding(state: AppState, path: Path) -> None:
+    """Read a mesh that is to be rigged, and put it into the scene."""
+
+    def act(report: Report) -> _Finish:
+        report(0, 0, f"Reading {printable(path.name, 60)}")
+        scene = load(path)
+        found = [actor for actor in scene.actors if actor.figure.mesh is not None]
+        if not found:
+            raise RigError(f"{printable(path)}: expected a mesh to rig, found none")
+        actor = found[0]
+        if actor.figure.is_attached:
+            raise RigError(
+                f"{printable(path)}: expected a mesh without a rig, found one with a rig"
+            )
+
+        def finish(state: AppState) -> None:
+            actor.called = free_title(state.scene.actors, actor.title)
+            state.scene.actors.append(actor)
+            state.paths = (*state.paths, path)
+            state.of(Rigging).target = None  # so that the panel chooses anew
+            state.say(*scene.diagnostics)
+            _show_added(state, actor)
+
+        return finish
+
+    _begin(state, f"Reading {printable(path.name, 60)}", act)
+
+
+def _show_added(state: AppState, actor: Actor) -> None:
+    """Choose a mesh that came to the scene, and bring it into view."""
+    choose_target(state, actor)
+    state.choose_actor(len(state.scene.actors) - 1)
+    state.framing.restart()
+
+
+def start_reading(
+    state: AppState, paths: tuple[Path, ...] = (), then: _Finish | None = None
+) -> None:
+    """Read the chosen template, or one from other files, which is then chosen.
+
+    Parameters
+    ----------
+    state : AppState
+        With a template that is to be read, if there are no paths.
+    paths : tuple of Path
+        Its files.
+    then : callable, optional
+        Goes on with it.
+    """
+    key = "file" if paths else state.of(Rigging).template_key
+
+    def act(report: Report) -> _Finish:
+        report(0, 0, "Reading the template")
+        template = read_template(paths or template_files(key), key)
+
+        def finish(state: AppState) -> None:
+            state.of(Rigging).template = template
+            state.of(Rigging).template_key = ""  # another file has the same key
+            choose_template(state, key)
+            if then is not None:
+                then(state)
+
+        return finish
+
+    _begin(state, "Reading the template", act)
+
+
+def _snapshot(state: AppState, laid: bool) -> Callable[[Report], Template]:
+    """Return what gives a thread the template as it is now, or as it lies on the target.
+
+    It is read there if it has to be.
+    """
+    known, key = (
+        laid_template(state) if laid else current_template(state),
+        state.of(Rigging).template_key,
+    )
+    if known is not None:
+        taken = replace(known, pose=known.pose.copy())
+        return lambda report: taken
+
+    def read(report: Report) -> Template:
+        report(0, 0, "Reading the template")
+        return read_template(template_files(key), key)
+
+    return read
+
+
+def _keep(state: AppState, template: Template) -> None:
+    """Remember a template that was read on the way."""
+    view = state.of(Rigging)
+    is_new = view.template is None or view.template.key != template.key
+    if is_new and template.actor is None and view.template_key == template.key:
+        view.template = template
+
+
+def _shares(
+    report: Report, low: float = 0.0, high: float = 1.0, title: str = ""
+) -> Callable[[float, str], None]:
+    """Return what tells a job of shares of the work, which is itself a part of all."""
+
+    def tell(share: float, what: str) -> None:
+        text = title + _STEPS.get(what, what)
+        report(round(100 * (low + (high - low) * share)), 100, text[:1].upper() + text[1:])
+
+    return tell
+
+
+def start_align(state: AppState, settings: AlignmentSettings | None = None) -> None:
+    """Lay the template onto the target: by searching, or from where it lies as the settings say."""
+    choices, target = state.of(Rigging).choices, target_mesh(state)
+    take = _snapshot(state, laid=settings is not None)
+    how = settings or _search_settings(choices)
+    own = current_template(state)
+    fits = choices.fits and how.matrix is None
+    asked = state.of(Rigging).placing
+
+    def act(report: Report) -> _Finish:
+        template = take(report)
+        found = align_template(template, own or template, target, how, fits, _shares(report))
+
+        def finish(state: AppState) -> None:
+            _keep(state, template)
+            if asked is not None and how.matrix is not None:
+                _take_measured(state, asked, found)
+                return
+            state.of(Rigging).placing = found
+            if state.of(Rigging).tool == "landmarks":
+                state.of(Rigging).tool = ""  # so that the template is seen where it lies
+
+        return finish
+
+    _begin(state, "Aligning", act)
+
+
+def _take_measured(state: AppState, asked: Placing, found: Placing) -> None:
+    """Take over the error of a template that was laid by hand, and may lie elsewhere by now."""
+    rigging = state.of(Rigging)
+    known = replace(found, lines=asked.lines) if found.fitted is not None else found
+    if rigging.placing is asked:
+        rigging.placing = known
+    state.history.exchange(asked, known)
+
+
+def _search_settings(choices: RigChoices) -> AlignmentSettings:
+    return AlignmentSettings(
+        up=choices.up or None,
+        facing=choices.facing or None,
+        scale=choices.scale,
+        refines=choices.refines,
+    )
+
+
+def landmark_settings(state: AppState, mesh: Mesh, refines: bool) -> AlignmentSettings:
+    """Return an alignment by the landmarks; there must be three or more.
+
+    Parameters
+    ----------
+    state : AppState
+        With landmarks.
+    mesh : Mesh
+        The template as it is posed.
+    refines : bool
+        Whether closest points improve on it.
+    """
+    target = target_mesh(state)
+
+    def pair(landmark: Landmark) -> list[Floats]:
+        return [
+            surface_point(mesh.positions, mesh.triangles, landmark.template),
+            surface_point(target.positions, target.triangles, landmark.target),
+        ]
+
+    pairs = np.array([pair(landmark) for landmark in state.of(Rigging).landmarks])
+    return AlignmentSettings(
+        landmarks=pairs.reshape(-1, 2, 3), scale=state.of(Rigging).choices.scale, refines=refines
+    )
+
+
+def start_match(state: AppState) -> None:
+    """Find which vertices of the target lie on the template, and show them as colours."""
+    rigging, placing = state.of(Rigging), placing_now(state)
+    settings, actor = match_settings(rigging.choices), rigging.target
+    if placing is None or actor is None:
+        return
+    take, similarity = _snapshot(state, laid=True), placing.similarity
+    mesh = target_mesh(state)
+
+    def act(report: Report) -> _Finish:
+        template = take(report)
+        report(0, 0, "Looking for closest points")
+        fields, share = match_fields(template, similarity, mesh, settings)
+        return lambda state: show_match(state, actor, fields, share)
+
+    _begin(state, "Looking for closest points", act)
+
+
+def start_run(state: AppState, methods: tuple[str, ...]) -> None:
+    """Rig the target by one or several methods; the first one's result takes its place.
+
+    The template is aligned first if it was not, and taken as it is shown if it was.
+    """
+    target, choices, placing = (
+        state.of(Rigging).target,
+        replace(state.of(Rigging).choices),
+        placing_now(state),
+    )
+    if target is None:
+        return
+    take, mesh, name = _snapshot(state, laid=True), target_mesh(state), target.title
+    place, own = target_place(target), current_template(state)
+
+    def act(report: Report) -> _Finish:
+        template, found, start = take(report), placing, 0.0
+        laid = template
+        if found is None and "robust" in methods:
+            start, how = 0.4, _search_settings(choices)
+            tell = _shares(report, 0.0, start)
+            found = align_template(template, own or template, mesh, how, choices.fits, tell)
+            laid = found.fitted or template
+        results = []
+        for number, method in enumerate(methods):
+            low, high = (start + (1.0 - start) * (number + k) / len(methods) for k in (0, 1))
+            tell = _shares(report, low, high, f"{printable(name, 40)}, {method}: ")
+            settings = transfer_settings(choices, method, found)
+            called = f"{name} {_CALLED[method]}"
+            rigged = transfer(laid.figure, laid.pose, mesh, settings, tell, name=called)
+            rigged = retold(rigged, found)
+            actor = Actor(rigged.figure, rigged.pose.copy(), placement=place @ rigged.placement)
+            results.append(Result(method, rigged, actor, target, template))
+        return lambda state: _put(state, results, found)
+
+    _begin(state, f"Rigging {printable(name, 40)}", act)
+
+
+def _put(state: AppState, results: list[Result], placing: Placing | None) -> None:
+    """Take over what a run has made."""
+    _keep(state, results[0].template)
+    state.of(Rigging).placing = placing
+    put_results(state, results, compare(*results) if len(results) == len(METHODS) else None)

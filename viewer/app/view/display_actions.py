@@ -1,0 +1,37 @@
+"""Actions that change how the scene is drawn."""
+
+from __future__ import annotations
+
+from viewer.app.core.state import AppState
+from viewer.rendering.options import SHOWN, Lights
+
+__all__ = ["reset_lights", "show", "toggle_binding", "toggle_option", "toggle_skeleton"]
+
+
+def toggle_skeleton(state: AppState) -> None:
+    """Draw the skeleton with the skin, or leave it out."""
+    shown = {"skin": "both", "both": "skin", "skeleton": "skin", "binding": "skeleton"}
+    show(state, shown[state.options.show])
+
+
+def toggle_binding(state: AppState) -> None:
+    """Switch between the attached skin and the skin in its binding space."""
+    show(state, "skin" if state.options.show == "binding" else "binding")
+
+
+def show(state: AppState, what: str) -> None:
+    """Choose what is drawn, a key of ``SHOWN``, and say so."""
+    state.options.show = what
+    state.say_status(SHOWN[what])
+
+
+def toggle_option(state: AppState, name: str, text: str) -> None:
+    """Flip a display option and say so."""
+    value = not getattr(state.options, name)
+    setattr(state.options, name, value)
+    state.say_status(f"{text} {'on' if value else 'off'}")
+
+
+def reset_lights(state: AppState) -> None:
+    """Set both lights, ambient and highlight back to what they were at first."""
+    state.options.lights = Lights()

@@ -1,0 +1,141 @@
+"""Display: what of the figure is drawn, and how."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from viewer.app.core.reasons import no_mesh, no_skeleton, no_skin, no_texture
+from viewer.app.core.state import AppState
+from viewer.app.core.widgets import (
+    checkbox,
+    choice,
+    disabled,
+    explain,
+    note_item,
+    same_line_if_room,
+    slider,
+)
+from viewer.app.view.display_actions import show
+from viewer.app.view.view_menu import JOINT_TOGGLES
+from viewer.app.weights.actions import start_heat_map
+from viewer.errors import printable
+from viewer.rendering.gpu.program import SHADING
+from viewer.rendering.options import SHOWN
+from viewer.rendering.part_colors import part_colors
+from viewer.rendering.passes.ground_pass import grid_step, parse_color
+from viewer.rig.annotations import BodyParts
+
+__all__ = ["draw"]
+
+_BACKGROUNDS = {"gradient": "Gradient", "transparent": "Transparent", "#": "Colour"}
+
+
+def draw(state: AppState) -> None:
+    """Draw the panel."""
+    options = state.options
+    missing = {
+        "skin": no_mesh(state),
+        "skeleton": no_skeleton(state),
+        "both": no_mesh(state) or no_skeleton(state),
+        "binding": no_skin(state),
+    }
+    for key, text in SHOWN.items():
+        with disabled(missing[key]):
+            if imgui.radio_button(text, options.show == key):
+                show(state, key)
+            note_item(state, text)
+            explain("", missing[key])
+    if options.show == "both":
+        options.skeleton_opacity = slider(
+            state, "Skeleton opacity", options.skeleton_opacity, 0.0, 1.0, flags=_CLAMP
+        )
+    imgui.separator()
+    before = options.shading
+    options.shading = choice(state, "Shading", before, SHADING)
+    if options.shading == "scalar" != before:
+        start_heat_map(state)
+    _draw_extras(state)
+    why = no_mesh(state)
+    options.flat = checkbox(state, "Flat", options.flat, why)
+    _beside("Wireframe")
+    options.wireframe = checkbox(state, "Wireframe", options.wireframe, why)
+    options.normals = checkbox(state, "Vertex normals", options.normals, why)
+    _beside("Texture")
+    options.texture = checkbox(state, "Texture", options.texture, no_texture(state))
+    options.cull = checkbox(state, "Cull back faces", options.cull, why)
+    _beside("Grid (0.5)")
+    options.grid = checkbox(state, f"Grid ({grid_step(state.box):g})###Grid", options.grid)
+    _draw_background(state)
+    imgui.separator()
+    _draw_joint_toggles(state)
+
+
+_CLAMP = imgui.SliderFlags_.always_clamp
+
+
+def _draw_joint_toggles(state: AppState) -> None:
+    """Draw what is seen of joints beside their boxes, in one line if there is room."""
+    options, why = state.options, no_skeleton(state)
+    for name, (text, key) in JOINT_TOGGLES.items():
+        short = text.removeprefix("Joint ").capitalize()
+        if name != "xray":
+            same_line_if_room(short)
+        label = f"{short}###{name}"
+        setattr(options, name, checkbox(state, label, getattr(options, name), why))
+        explain(f"{text} ({key})")
+
+
+def _draw_extras(state: AppState) -> None:
+    """Draw what only some figures have: keypoints, a coarser mesh, body parts."""
+    options, figure = state.options, state.actor.figure
+    if figure.keypoints is not None:
+        options.keypoints = checkbox(state, "Keypoints", options.keypoints)
+        if figure.reduced is not None:
+            _beside("Reduced mesh")
+    if figure.reduced is not None:
+        options.reduced = checkbox(state, "Reduced mesh", options.reduced)
+    if figure.body_parts is not None:
+        _draw_parts(state, figure.body_parts)
+
+
+def _draw_parts(state: AppState, parts: BodyParts) -> None:
+    """Draw a check box for every body part that has vertices, with its colour."""
+    is_open = imgui.tree_node("Body parts")
+    note_item(state, "Body parts")
+    if not is_open:
+        return
+    hidden, present = set(state.options.hidden_parts), set(parts.of_vertex.tolist())
+    colors = part_colors(len(parts.names)) ** (1 / 2.2)
+    for index in sorted(present):
+        r, g, b = (float(channel) for channel in colors[index])
+        flags = imgui.ColorEditFlags_.no_tooltip | imgui.ColorEditFlags_.no_drag_drop
+        imgui.color_button(f"##part{index}", (r, g, b, 1.0), flags)
+        imgui.same_line()
+        shown = checkbox(state, printable(parts.names[index], 40), index not in hidden)
+        hidden = hidden - {index} if shown else hidden | {index}
+    state.options.hidden_parts = tuple(sorted(hidden))
+    imgui.tree_pop()
+
+
+def _beside(text: str) -> None:
+    """Put a check box with this text into the right half of the last one's line if it fits."""
+    start, room = imgui.get_cursor_screen_pos().x, imgui.get_content_region_avail().x
+    gap = imgui.get_style().item_spacing.x
+    begins_free = imgui.get_item_rect_max().x + gap <= start + room * 0.5
+    if begins_free and imgui.get_frame_height() + gap + imgui.calc_text_size(text).x <= room * 0.5:
+        imgui.same_line(room * 0.5)
+
+
+def _draw_background(state: AppState) -> None:
+    options = state.options
+    is_color = options.background.startswith("#")
+    chosen = choice(state, "Background", "#" if is_color else options.background, _BACKGROUNDS)
+    if chosen != "#":
+        options.background = chosen
+        return
+    color = parse_color(options.background) if is_color else (1.0, 1.0, 1.0)
+    changed, picked = imgui.color_edit3("Colour", list(color))
+    note_item(state, "Colour")
+    if changed or not is_color:
+        digits = "".join(f"{round(255 * min(max(c, 0.0), 1.0)):02x}" for c in picked[:3])
+        options.background = f"#{digits}"

@@ -1,0 +1,53 @@
+"""Lights: direction, colour and strength of two lights; ambient light and highlight."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from viewer.app.core.state import AppState
+from viewer.app.core.widgets import button, checkbox, note_item, plain_zero, slider
+from viewer.app.view.display_actions import reset_lights
+from viewer.rendering.options import Light
+from viewer.rendering.srgb import decode_color, encode_color
+
+__all__ = ["draw"]
+
+_CLAMP = imgui.SliderFlags_.always_clamp
+_LOG = imgui.SliderFlags_.always_clamp | imgui.SliderFlags_.logarithmic
+
+
+def draw(state: AppState) -> None:
+    """Draw the panel."""
+    lights = state.options.lights
+    _draw_light(state, "Key", lights.key)
+    _draw_light(state, "Rim", lights.rim)
+    imgui.separator()
+    lights.ambient = slider(state, "Ambient", lights.ambient, 0.0, 1.0, flags=_CLAMP)
+    lights.specular = slider(state, "Specular", lights.specular, 0.0, 2.0, flags=_CLAMP)
+    lights.shininess = slider(state, "Shininess", lights.shininess, 1.0, 512.0, "%.0f", _LOG)
+    lights.follow_camera = checkbox(state, "Follow the camera", lights.follow_camera)
+    imgui.same_line()
+    if button(state, "Reset lights"):
+        reset_lights(state)
+
+
+def _draw_light(state: AppState, name: str, light: Light) -> None:
+    changed, picked = imgui.color_edit3(
+        f"{name} light", list(encode_color(light.color)), imgui.ColorEditFlags_.no_inputs
+    )
+    note_item(state, f"{name} light")
+    if changed:
+        light.color = decode_color((picked[0], picked[1], picked[2]))
+    imgui.push_id(name)
+    for attribute, text, low, high, unit in (
+        ("strength", "Strength", 0.0, 4.0, "%.2f"),
+        ("azimuth", "Azimuth", -180.0, 180.0, "%.0f\N{DEGREE SIGN}"),
+        ("inclination", "Inclination", -90.0, 90.0, "%.0f\N{DEGREE SIGN}"),
+    ):
+        changed, value = imgui.slider_float(
+            text, plain_zero(getattr(light, attribute), unit), low, high, unit, _CLAMP
+        )
+        note_item(state, f"{name} {text}")
+        if changed:
+            setattr(light, attribute, value)
+    imgui.pop_id()

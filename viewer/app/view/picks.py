@@ -1,0 +1,253 @@
+"""What lies in the view under a click or a mouse that rests: actors, joints, vertices."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from imgui_bundle import imgui
+
+from viewer.app.core.state import AppState
+from viewer.app.features import PANELS
+from viewer.app.posing.gizmo import joint_at
+from viewer.app.posing.joint_tree import select_joint
+from viewer.app.posing.state import Posing
+from viewer.app.posing.tool_actions import no_tool
+from viewer.app.view.state import Picking
+from viewer.app.weights.actions import pin_vertex
+from viewer.app.weights.hover_text import tells_vertices
+from viewer.app.weights.state import Hover, Weights, wants_vertex
+from viewer.errors import ViewerError, printable
+from viewer.rendering.options import DisplayOptions
+from viewer.rendering.picking import Pick
+from viewer.rendering.renderer import Renderer
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.geometry.transform import apply_transform
+from viewer.rig.inspection.single_vertices import deform_vertices
+from viewer.rig.inspection.vertex_facts import facts_text, nearest_corner, vertex_facts
+from viewer.rig.scene import Actor
+from viewer.rig.skeleton import joint_label
+from viewer.rig.skinning import Skinning
+
+__all__ = ["answer_picks", "take_pick", "vertex_at"]
+
+_LONGEST = 40  # letters of a name
+_REST = 0.2  # seconds for which the mouse must lie still
+
+
+def answer_picks(
+    state: AppState, renderer: Renderer, size: tuple[int, int], scale: float, picture: object
+) -> None:
+    """Choose or pin what was clicked, and look what lies under a mouse that rests.
+
+    Parameters
+    ----------
+    state : AppState
+        Told what was found.
+    renderer : Renderer
+        Has drawn the scene.
+    size : (int, int)
+        Of the view, pixels.
+    scale : float
+        Pixels per window coordinate.
+    picture : object
+        Equal as long as the picture of the scene is the same.
+    """
+    picking = state.of(Picking)
+    wanted, picking.wanted = picking.wanted, None
+    try:
+        if wanted is not None:
+            x, y, aims = wanted
+            _take_click(state, renderer, size, (x * scale, y * scale), aims)
+        _look_under_mouse(state, renderer, size, scale, picture)
+    except ViewerError as problem:
+        state.error = str(problem)
+
+
+def _take_click(
+    state: AppState,
+    renderer: Renderer,
+    size: tuple[int, int],
+    pixel: tuple[float, float],
+    aims: bool,
+) -> None:
+    """Pin the vertex at a pixel if vertices are wanted; else choose, or aim the camera there.
+
+    On a skin the joint is chosen that moves it most there, on the background none.
+    """
+    if not aims and wants_vertex(state.of(Weights)):
+        found = vertex_at(state, renderer, size, pixel)
+        if found is not None:
+            pin_vertex(state, found[0], found[1])
+            imgui.set_window_focus(PANELS["vertex"].title)  # other tabs may lie over it
+        return
+    pick = _pick(state, renderer, size, pixel, state.options)
+    if pick is None:
+        if not aims:
+            state.selected_joint = -1
+        return
+    take_pick(state, pick, aims)
+    mover = None if aims else _mover(state, pick)
+    if mover is not None:
+        select_joint(state, mover.joint)
+        state.say_status(f"{mover.text}: the largest weight at vertex {mover.vertex}")
+
+
+class _Mover(NamedTuple):
+    """The joint that moves a vertex most."""
+
+    joint: int
+    vertex: int
+    text: str
+
+
+def _mover(state: AppState, pick: Pick) -> _Mover | None:
+    """Return the joint with the largest weight where a skin was hit; None for anything else."""
+    if pick.joint >= 0 or pick.triangle < 0:
+        return None
+    actor, vertex, triangle = _vertex_of(state, pick)
+    figure = state.scene.actors[actor].figure
+    facts = vertex_facts(figure, None, state.options.skinning, vertex, triangle)
+    if not len(facts.joints):
+        return None
+    name = printable(facts.names[0], _LONGEST)
+    return _Mover(int(facts.joints[0]), vertex, f"{name} {facts.weights[0]:.2f}")
+
+
+def _pick(
+    state: AppState,
+    renderer: Renderer,
+    size: tuple[int, int],
+    pixel: tuple[float, float],
+    options: DisplayOptions,
+) -> Pick | None:
+    return renderer.pick(state.scene, state.camera, options, size, *pixel, state.box)
+
+
+def take_pick(state: AppState, found: Pick, aims: bool) -> None:
+    """Choose the actor and joint that were clicked; a double click aims the camera there."""
+    if found.actor != state.chosen_actor:
+        state.choose_actor(found.actor)
+        state.say_status(printable(state.actor.name, 60))
+    if found.joint >= 0:
+        select_joint(state, found.joint)
+    if aims:
+        state.camera.fixed = None
+        state.camera.target = found.point.copy()
+
+
+def vertex_at(
+    state: AppState, renderer: Renderer, size: tuple[int, int], pixel: tuple[float, float]
+) -> tuple[int, int, int] | None:
+    """Return the vertex of the surface that is seen at a pixel.
+
+    Parameters
+    ----------
+    state : AppState
+        With the scene.
+    renderer : Renderer
+        Has drawn it.
+    size : (int, int)
+        Of the view, pixels.
+    pixel : (float, float)
+        From its left and upper edge.
+
+    Returns
+    -------
+    (actor, vertex, triangle) or None
+        Indices; the triangle is -1 where the reduced mesh is drawn, which has others.
+    """
+    options = state.options
+    # Only surfaces count, whatever lies over them.
+    show = "skin" if options.show == "both" else options.show
+    seen = replace(
+        options, show=show, keypoints=False, xray=False, joint_names=False, joint_axes=False
+    )
+    found = _pick(state, renderer, size, pixel, seen)
+    return None if found is None or found.triangle < 0 else _vertex_of(state, found)
+
+
+def _vertex_of(state: AppState, found: Pick) -> tuple[int, int, int]:
+    """Return actor, vertex and triangle of a surface that was hit; -1 for a reduced triangle."""
+    options = state.options
+    actor = state.scene.actors[found.actor]
+    figure = actor.figure
+    assert figure.mesh is not None  # it has a triangle
+    corners, triangle = figure.mesh.triangles[found.triangle], found.triangle
+    if options.reduced and figure.reduced is not None:
+        corners = figure.reduced.vertices[figure.reduced.triangles[found.triangle]]
+        triangle = -1
+    positions = _drawn_positions(actor, options, corners)
+    back = np.linalg.inv(actor.placement).astype(np.float64)
+    point = apply_transform(back, found.point)
+    return found.actor, nearest_corner(positions, corners, point), triangle
+
+
+def _drawn_positions(actor: Actor, options: DisplayOptions, vertices: Ints) -> Floats:
+    """Return where vertices are drawn, before the actor's placement: (N, 3)."""
+    mesh = actor.figure.mesh
+    assert mesh is not None  # it has vertices
+    if options.show == "binding":
+        return mesh.positions[vertices]
+    return deform_vertices(actor.figure, actor.pose, options.skinning, vertices)[0]
+
+
+def _look_under_mouse(
+    state: AppState, renderer: Renderer, size: tuple[int, int], scale: float, picture: object
+) -> None:
+    """Describe the vertex under the mouse once mouse and picture have come to rest."""
+    view, io = state.of(Weights), imgui.get_io()
+    x, y, width, height = state.view_rect
+    place = (io.mouse_pos.x, io.mouse_pos.y)
+    is_inside = x <= place[0] < x + width and y <= place[1] < y + height
+    view.is_waiting = False
+    if not tells_vertices(state) or not is_inside:
+        view.hover = Hover()
+        return
+    now, hover = imgui.get_time(), view.hover
+    if hover.place != place or hover.picture != picture:
+        view.hover = hover = Hover(now, place, picture)
+    view.is_waiting = not hover.is_known and now - hover.since < _REST
+    if hover.is_known or view.is_waiting:
+        return
+    hover.is_known = True
+    pixel = (place[0] - x) * scale, (place[1] - y) * scale
+    pick = _pick(state, renderer, size, pixel, state.options)
+    on_skin = pick is not None and pick.joint < 0 and pick.triangle >= 0
+    if pick is not None and on_skin:
+        found: tuple[int, int, int] | None = _vertex_of(state, pick)
+    else:  # something lies over the surface
+        found = vertex_at(state, renderer, size, pixel)
+    if found is not None:
+        _describe(state, hover, *found)
+        hover.lines = (*hover.lines, *_click_text(state, pick))
+
+
+def _click_text(state: AppState, pick: Pick | None) -> tuple[str, ...]:
+    """Return a line on what a click would choose here, if it would choose a joint."""
+    mouse = imgui.get_io().mouse_pos
+    if wants_vertex(state.of(Weights)) or pick is None:
+        return ()
+    over = (
+        joint_at(state, (mouse.x, mouse.y)) if state.of(Posing).is_on and not no_tool(state) else -1
+    )
+    whose = state.actor if over >= 0 else state.scene.actors[pick.actor]
+    joint, skeleton = over if over >= 0 else pick.joint, whose.figure.skeleton
+    if joint >= 0 and skeleton is not None:
+        return (f"click: {printable(joint_label(skeleton, joint), _LONGEST)}",)
+    mover = _mover(state, pick)
+    return () if mover is None else (f"click: {mover.text}",)
+
+
+def _describe(state: AppState, hover: Hover, index: int, vertex: int, triangle: int) -> None:
+    actor, options = state.scene.actors[index], state.options
+    skinning: Skinning = options.skinning
+    facts = vertex_facts(actor.figure, actor.pose, skinning, vertex, triangle)
+    if options.show == "binding":
+        mesh = actor.figure.mesh
+        assert mesh is not None  # it has this vertex
+        facts = replace(facts, position=mesh.positions[vertex], normal=mesh.normals[vertex])
+    hover.point = apply_transform(actor.placement, facts.position)
+    title = (actor.name,) if len(state.scene.actors) > 1 else ()
+    hover.lines = (*title, *facts_text(facts))

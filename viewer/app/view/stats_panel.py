@@ -1,0 +1,46 @@
+"""Stats: how large the scene is, how long a frame takes, and who draws it."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from viewer.app.core.state import AppState
+from viewer.errors import printable
+from viewer.rig.figure import Figure
+from viewer.rig.memo import Memo
+from viewer.rig.scene import Scene
+from viewer.rig.skin import influence_counts
+
+__all__ = ["draw"]
+
+_known: Memo[Scene, tuple[tuple[str, str], ...]] = Memo()
+
+
+def draw(state: AppState) -> None:
+    """Draw the panel."""
+    figures = tuple(actor.figure for actor in state.scene.actors)
+    for name, value in (
+        *_known.get(state.scene, figures, lambda: _counts(figures)),
+        ("Frame", f"{state.stats.frame_ms:.1f} ms" if state.stats.frame_ms else "not measured"),
+        ("Renderer", state.stats.renderer),
+        ("OpenGL", state.stats.version),
+        ("Samples", f"{state.stats.samples or 1} a pixel"),
+    ):
+        imgui.text_disabled(name)
+        imgui.same_line(imgui.get_font_size() * 6)
+        imgui.text_wrapped(value)
+
+
+def _counts(figures: tuple[Figure, ...]) -> tuple[tuple[str, str], ...]:
+    skeletons = [figure.skeleton for figure in figures if figure.skeleton is not None]
+    meshes = [figure.mesh for figure in figures if figure.mesh is not None]
+    skins = [figure.skin for figure in figures if figure.skin is not None]
+    most = max((int(influence_counts(skin).max()) for skin in skins), default=0)
+    return (
+        ("Figure", printable(", ".join(figure.name for figure in figures), 60)),
+        ("Joints", f"{sum(skeleton.n_joints for skeleton in skeletons):,}"),
+        ("DOFs", f"{sum(skeleton.n_dofs for skeleton in skeletons):,}"),
+        ("Vertices", f"{sum(mesh.n_vertices for mesh in meshes):,}"),
+        ("Triangles", f"{sum(mesh.n_triangles for mesh in meshes):,}"),
+        ("Influences", f"{sum(len(skin.joints) for skin in skins):,}, at most {most} a vertex"),
+    )

@@ -1,0 +1,1 @@
+"""Weights: numbers of vertices as colours, and explanations of single vertices."""

@@ -1,0 +1,195 @@
+"""What keys, menus and buttons do with weights and vertices, each a function of the state."""
+
+from __future__ import annotations
+
+from viewer.app.core.state import AppState
+from viewer.app.posing.joint_tree import select_joint
+from viewer.app.shown_panels import is_open, set_open
+from viewer.app.weights.state import Pinned, Weights
+from viewer.errors import printable
+from viewer.rig.inspection.explanation import Explanation, explain
+from viewer.rig.pose import pose_key
+from viewer.rig.scalars import (
+    SCALARS,
+    joint_influences,
+    joint_text,
+    missing_part,
+    most_influential,
+    split_name,
+    telling_view,
+)
+
+__all__ = [
+    "explained",
+    "no_view",
+    "pin_vertex",
+    "show_scalar",
+    "shown_joint",
+    "start_heat_map",
+    "toggle_picking",
+    "toggle_telling",
+    "toggle_weights",
+    "unpin",
+]
+
+_FIRST = ("weight", "field", "class", "parts")
+"""Views to begin with, the best first."""
+
+
+def no_view(state: AppState, key: str) -> str:
+    """Say why a scalar view has nothing to show; a joint or field can still be chosen.
+
+    Parameters
+    ----------
+    state : AppState
+        With the scene.
+    key : str
+        Of ``SCALARS``.
+    """
+    figures = [actor.figure for actor in state.scene.actors if actor.figure.mesh is not None]
+    if not figures:
+        return "there is no mesh"
+    lacks = [missing_part(key, figure) for figure in figures]
+    if not all(lacks) or (SCALARS[key].takes_joint and "a selected joint" in lacks):
+        return ""
+    return f"no figure here has {lacks[0]}"
+
+
+def start_heat_map(state: AppState) -> None:
+    """Show numbers as colours, and begin with something to see.
+
+    A view that no figure here has is replaced by one that there is; a joint without influence, or
+    none, by the one with the most; a field that is 0 everywhere by the first that is not.
+    """
+    options = state.options
+    options.shading = "scalar"
+    key, about = split_name(options.scalar)
+    if no_view(state, key):
+        key, about = next((one for one in _FIRST if not no_view(state, one)), key), ""
+        options.scalar = key
+    if about:
+        return
+    if SCALARS[key].takes_joint:
+        _start_with_joint(state, key)
+    elif SCALARS[key].about:
+        options.scalar = telling_view(key, [actor.figure for actor in state.scene.actors])
+
+
+def _start_with_joint(state: AppState, key: str) -> None:
+    """Select the joint with the most influence if the selected one has none."""
+    figure, joint = state.actor.figure, state.selected_joint
+    sums = joint_influences(figure)
+    if 0 <= joint < len(sums) and sums[joint]:
+        return
+    most = most_influential(figure)
+    if most < 0:  # the chosen actor has no weights, another one may
+        state.options.scalar = telling_view(key, [actor.figure for actor in state.scene.actors])
+        return
+    if joint >= 0:
+        names = (printable(joint_text(figure, one), 60) for one in (joint, most))
+        state.say("{} has no influence: {} is selected, which has the most".format(*names))
+    select_joint(state, most)
+
+
+def show_scalar(state: AppState, name: str) -> None:
+    """Show a scalar view; a range that was fixed for another one is let go of."""
+    options = state.options
+    if split_name(name)[0] != split_name(options.scalar)[0]:
+        options.scalar_range = options.isolines = None
+    options.scalar = name
+    start_heat_map(state)
+
+
+def shown_joint(state: AppState) -> str:
+    """Return what the joint is called whose weights are shown; empty if none is selected."""
+    about, figure = split_name(state.options.scalar)[1], state.actor.figure
+    if about or state.selected_joint < 0:
+        return about
+    if figure.skin is None or state.selected_joint >= figure.skin.n_joints:
+        return ""
+    return joint_text(figure, state.selected_joint)
+
+
+def toggle_weights(state: AppState) -> None:
+    """Show the weights of the selected joint as colours, or the figure as before."""
+    options = state.options
+    if options.shading == "scalar" and options.scalar == "weight":
+        options.shading = "phong"
+        state.say_status("Weights off")
+        return
+    why = no_view(state, "weight")
+    if why:
+        state.say_status(why)
+        return
+    show_scalar(state, "weight")
+    joint = shown_joint(state)
+    state.say_status(f"Weights of {printable(joint, 60)}" if joint else "No joint has influence")
+
+
+def toggle_telling(state: AppState) -> None:
+    """Describe the vertex under the mouse, also without the Weights panel, or only with it."""
+    view = state.of(Weights)
+    view.tells_always = not view.tells_always
+    state.say_status(f"Vertex under the mouse {'on' if view.tells_always else 'off'}")
+
+
+def toggle_picking(state: AppState) -> None:
+    """Let clicks pin vertices, or choose actors and joints again."""
+    view = state.of(Weights)
+    view.picks_vertices = not view.picks_vertices
+    state.say_status("Click a vertex" if view.picks_vertices else "Clicks choose again")
+
+
+def pin_vertex(state: AppState, actor: int, vertex: int) -> None:
+    """Explain a vertex from now on.
+
+    Parameters
+    ----------
+    state : AppState
+        With the scene.
+    actor : int
+        Index in the scene.
+    vertex : int
+        Of its figure.
+    """
+    figure = state.scene.actors[actor].figure
+    if not figure.is_attached:
+        state.say_status("This figure has no skin that follows a skeleton: nothing moves a vertex")
+        return
+    state.of(Weights).pinned = Pinned(actor, figure, vertex)
+    set_open(state, "vertex", True)
+
+
+def unpin(state: AppState) -> None:
+    """Explain no vertex any more; the panel that did so goes."""
+    set_open(state, "vertex", False)
+    view = state.of(Weights)
+    view.pinned = view.explanation = view.explanation_key = None
+    view.annotations, view.annotation_key = (), None
+
+
+def explained(state: AppState) -> Explanation | None:
+    """Return why the pinned vertex is where it is right now; None if none is pinned any more.
+
+    Raises
+    ------
+    ViewerError
+        If the figure's shapes cannot be read.
+    """
+    view, actors = state.of(Weights), state.scene.actors
+    pinned = view.pinned
+    if pinned is None:
+        return None
+    if not is_open(state, "vertex"):
+        unpin(state)  # the panel was closed
+        return None
+    is_there = pinned.actor < len(actors) and actors[pinned.actor].figure is pinned.figure
+    pose = actors[pinned.actor].pose if is_there else None
+    if pose is None:
+        unpin(state)
+        return None
+    key = (pinned, pose_key(pose), repr(state.options.skinning))
+    if key != view.explanation_key:
+        view.explanation = explain(pinned.figure, pose, state.options.skinning, pinned.vertex)
+        view.explanation_key = key
+    return view.explanation

@@ -1,0 +1,165 @@
+"""What a transfer of weights found, and what a person should know about it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.autorig.correspondence.matching import Matches
+from viewer.diagnostics import Diagnostic
+from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.geometry.closest_point import SurfacePoints
+from viewer.rig.skin import Skin
+
+__all__ = [
+    "RigidIslands",
+    "WeightTransfer",
+    "match_lines",
+    "nothing_matched",
+    "rigid_lines",
+    "template_lines",
+]
+
+_LISTED = 5  # islands named one by one
+_FEW = 0.75  # of the vertices: with fewer matched, many weights are guesses
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RigidIslands:
+    """Connected parts of a target that nowhere meet the template, and so hang on it rigidly.
+
+    Attributes
+    ----------
+    vertices : (R,) int32
+        The first vertex of each.
+    counts : (R,) int32
+        How many vertices it has, coincident ones counted once.
+    joints : (R,) int32
+        The joint with the largest weight.
+    distances : (R,)
+        From the mean of its vertices to the template, in the target's unit.
+    """
+
+    vertices: Ints
+    counts: Ints
+    joints: Ints
+    distances: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WeightTransfer:
+    """Weights of a target's vertices, and how they were found.
+
+    Attributes
+    ----------
+    starts, joints, weights
+        As in ``Skin``: vertex v owns influences ``starts[v]`` up to ``starts[v + 1]``.
+    matched : (V,) bool
+        Vertices whose weights are those of the template's surface.
+    filled : (V,) bool
+        Vertices whose weights were solved for. Those neither matched nor filled belong to a
+        rigid island.
+    distances : (V,)
+        To the template, in the target's unit.
+    angles : (V,)
+        Radians between the normals of both, 0 where the target has none.
+    points : SurfacePoints or None
+        The V points of the template that were looked at; None if only its vertices were.
+    backwards : (V,) bool
+        Vertices of parts whose triangles are wound the wrong way.
+    rigid : RigidIslands
+        Parts without any matched vertex.
+    lines : tuple of Diagnostic
+        What a person should know; joints by number, from 0.
+    """
+
+    starts: Ints
+    joints: Ints
+    weights: Floats
+    matched: Bools
+    filled: Bools
+    distances: Floats
+    angles: Floats
+    points: SurfacePoints | None
+    backwards: Bools
+    rigid: RigidIslands
+    lines: tuple[Diagnostic, ...]
+
+    def skin(self, inverse_bind: Floats) -> Skin:
+        """Return the weights as a skin bound by ``inverse_bind``, (J, 4, 4)."""
+        return Skin(self.starts, self.joints, self.weights, inverse_bind)
+
+
+def nothing_matched(distances: Floats, size: float) -> str:
+    """Return the message for a target that nowhere meets the template.
+
+    Parameters
+    ----------
+    distances : (V,)
+        To the template.
+    size : float
+        The target's box diagonal, in the same unit.
+    """
+    far = float(np.median(distances)) / size
+    return (
+        "no vertex of the target meets the template: expected a target aligned with it, found "
+        f"it at a median distance of {far:.1%} of the target's size"
+    )
+
+
+def template_lines(skin: Skin) -> tuple[Diagnostic, ...]:
+    """Return what was wrong with the template's weights."""
+    negative = int((skin.weights < 0.0).sum())
+    if not negative:
+        return ()
+    return (Diagnostic("R005.negative-weights", values={"n": negative}),)
+
+
+def match_lines(found: Matches, filled: Bools, method: str) -> tuple[Diagnostic, ...]:
+    """Return what was matched, turned round and filled in.
+
+    Parameters
+    ----------
+    found : Matches
+        Of the welded vertices.
+    filled : (W,) bool
+        Which of them were solved for.
+    method : str
+        How; "direct" is the rule.
+    """
+    ratio = float(found.matched.mean())
+    values = {
+        "n": int(found.matched.sum()),
+        "all": len(found.matched),
+        "ratio": ratio,
+        "filled": int(filled.sum()),
+    }
+    lines = [Diagnostic("R005.matched", values=values)]
+    if ratio < _FEW:
+        lines.append(Diagnostic("R006.matched", values={"limit": _FEW}))
+    if len(found.inside_out):
+        lines.append(Diagnostic("R005.reversed", values={"n": len(found.inside_out)}))
+    if method != "direct":
+        lines.append(Diagnostic("R005.solver", values={"method": method}))
+    return tuple(lines)
+
+
+def rigid_lines(rigid: RigidIslands) -> tuple[Diagnostic, ...]:
+    """Return one remark for each of the largest rigid islands, and how many more there are."""
+    order = np.argsort(-rigid.counts, kind="stable")
+    lines = [
+        Diagnostic(
+            "R007.part",
+            values={
+                "n": int(rigid.counts[island]),
+                "vertex": int(rigid.vertices[island]),
+                "joint": int(rigid.joints[island]),
+            },
+        )
+        for island in order[:_LISTED]
+    ]
+    more = len(order) - _LISTED
+    if more > 0:
+        lines.append(Diagnostic("R007.more-parts", values={"n": more}))
+    return tuple(lines)
