@@ -38,3 +38,13 @@ def refusal_of(work: Callable[[], Any]) -> Fault:
 def warnings_of(found: Iterable[Diagnostic]) -> list[Fault]:
     """Return the warnings among diagnostics."""
     return [fault_of(one) for one in found if not one.is_refusal]
+
+
+def lines(found: Iterable[Diagnostic]) -> list[str]:
+    """Return diagnostics as they are shown."""
+    return list(map(str, found))
+
+
+def told(found: Iterable[Diagnostic]) -> list[tuple[str, dict[str, Any]]]:
+    """Return the keys and values of diagnostics."""
+    return [(one.key, dict(one.values)) for one in found]

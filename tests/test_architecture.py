@@ -211,7 +211,6 @@ def test_nothing_touches_the_environment_of_the_process() -> None:
 
 # Circles that are still there, at run time or through types alone; new ones are not added.
 CIRCLES = {
-    frozenset({"viewer.lint", "viewer.lint._again"}),
     frozenset({"viewer.lint._finding", "viewer.lint._tracks"}),
     frozenset({"viewer.formats._archive", "viewer.formats._source"}),
     frozenset({"viewer.commands._sequence", "viewer.commands._shots"}),

@@ -113,7 +113,7 @@ def test_files_find_their_partners(files, order, expected):
 
 def test_skin_of_another_skeleton_is_refused_with_both_names_and_numbers(files):
     skel, skin = files("2.skel", "3.skin")
-    expected = f"{skin} has 3 binding matrices, {skel} has 2 joints"
+    expected = f"{skin}: expected 2 binding matrices, one for each joint of {skel}, found 3"
     assert refusal(skel, skin) == expected
     assert refusal(skin, skel) == expected
 
@@ -122,7 +122,7 @@ def test_odd_skin_among_pairs_is_refused(files):
     skels = files("2.skel", "3.skel")
     skins = files("2.skin", "5.skin")
     assert refusal(*skels, *skins) == (
-        f"{skins[1]} has 5 binding matrices, {skels[1]} has 3 joints"
+        f"{skins[1]}: expected 3 binding matrices, one for each joint of {skels[1]}, found 5"
     )
 
 
@@ -140,7 +140,9 @@ def test_skin_without_weights_cannot_follow_a_skeleton(files, tmp_path):
 
 def test_real_skin_of_another_skeleton_is_refused(shared):
     skel, skin = shared / "test.skel", shared / "wasp.skin"
-    assert refusal(skel, skin) == f"{skin} has 23 binding matrices, {skel} has 6 joints"
+    assert refusal(skel, skin) == (
+        f"{skin}: expected 6 binding matrices, one for each joint of {skel}, found 23"
+    )
 
 
 # Side by side

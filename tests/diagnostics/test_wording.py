@@ -33,11 +33,11 @@ def sample(spec: str) -> Any:
         return 3
     if spec == "word":
         return b"x"
-    if spec.startswith("list") or spec in ("axes", "or"):
+    if spec.startswith("list") or spec in ("all", "axes", "or"):
         return ["first", "second\n"]
     if spec in ("text", "name", "quoted") or spec.startswith("+"):
         return "x\ny"  # may come from a file
-    return 1.5 if re.fullmatch(r"[+,.\d]*[efg%]", spec) else 3 if spec == "d" else "x"
+    return 1.5 if re.fullmatch(r"[+,z.\d]*[efg%]", spec) else 3 if spec == "d" else "x"
 
 
 @pytest.mark.parametrize("key", MESSAGES)

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from faults import fault_of
+from faults import fault_of, lines
 from pig_text import CORE
 from pig_text import write as write_pig
 from synthetic_smpl import model
@@ -99,11 +99,11 @@ def test_scale_of_0_is_noted(files):
 
 
 def test_pose_alone_is_refused(files):
-    wanted = "is a pose: open it together with a figure"
-    assert refusal(files["kick"]) == f"{files['kick']} {wanted}"
+    wanted = "this is a pose: open it together with a figure"
+    assert refusal(files["kick"]) == f"{files['kick']}: {wanted}"
     skin = files["kick"].with_name("a.skin")
     skin.write_text("positions 1 { 0 0 0 } normals 1 { 0 0 1 } triangles 1 { 0 0 0 }")
-    assert refusal(skin, files["kick"]) == f"{files['kick']} {wanted}"
+    assert refusal(skin, files["kick"]) == f"{files['kick']}: {wanted}"
 
 
 @pytest.mark.parametrize(
@@ -143,12 +143,12 @@ def test_second_picture_goes_to_the_second_figure(files):
 def test_picture_for_figures_without_texture_coordinates_is_refused(files, names):
     listed = ", ".join(names)
     assert refusal(files["red"], *(files[name] for name in names)) == (
-        f"{files['red']} is a picture: {listed} has no texture coordinates"
+        f"{files['red']}: this is a picture, but {listed} has no texture coordinates"
     )
 
 
 def test_picture_alone_is_refused(files):
-    assert refusal(files["red"]) == f"{files['red']} is a picture: open it with a figure"
+    assert refusal(files["red"]) == f"{files['red']}: this is a picture: open it with a figure"
 
 
 def test_broken_picture_is_refused(files):
@@ -175,7 +175,7 @@ def test_pose_is_added_to_an_actor_in_place(files):
     assert actor.pose is pose
     assert pose.dofs[[3, 6]].tolist() == [0.25, 0.5]
     assert notes == []
-    assert add_to_actor(additions(files, "far"), actor)[1] == [
+    assert lines(add_to_actor(additions(files, "far"), actor)[1]) == [
         f"{files['far']}: 1 DOF of the pose was beyond its limits and clamped"
     ]
 
@@ -207,7 +207,7 @@ def test_pose_for_an_actor_without_a_skeleton_is_refused(files):
     actor = viewer.load(skin).actors[0]
     with pytest.raises(RigError) as caught:
         add_to_actor(additions(files, "kick"), actor)
-    assert str(caught.value) == f"{files['kick']} is a pose, a has no skeleton"
+    assert str(caught.value) == f"{files['kick']}: this is a pose, but a has no skeleton"
 
 
 def test_figures_and_clips_are_no_additions(files):

@@ -287,7 +287,7 @@ class Frame:
         state.scene.actors[state.chosen_actor] = actor
         state.scene.files += contents.files
         added = [*contents.poses, *contents.pictures]
-        state.say(*contents.warnings, *notes)
+        state.say(*contents.diagnostics, *notes)
         state.say_status(f"Applied {', '.join(printable(path.name, 60) for path, _ in added)}")
 
     def _do_wanted(self) -> None:

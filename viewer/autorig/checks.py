@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from viewer.autorig.transfer.joint_transfer import outside
+from viewer.diagnostics import Diagnostic
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import apply_transform
@@ -15,10 +16,9 @@ from viewer.rig.pose import Pose
 from viewer.rig.skeleton import joint_label
 from viewer.rig.skinning import deform, joint_matrices
 
-__all__ = ["check_lines", "joint_list", "newly_outside", "residual_of", "with_joint_name"]
+__all__ = ["check_lines", "newly_outside", "residual_of", "with_joint_name"]
 
 _EXACT = 1e-4  # residual over size above which a person is warned
-_LISTED = 8  # vertices or joints named one by one
 
 
 def newly_outside(
@@ -74,8 +74,10 @@ def residual_of(figure: Figure, pose: Pose, placement: Floats, target: Mesh) -> 
     return float(np.linalg.norm(again - target.positions, axis=1).max(initial=0.0)) / size
 
 
-def check_lines(figure: Figure, guarded: Bools, out: tuple[int, ...], residual: float) -> list[str]:
-    """Return what the checks found, one sentence each.
+def check_lines(
+    figure: Figure, guarded: Bools, out: tuple[int, ...], residual: float
+) -> list[Diagnostic]:
+    """Return what the checks found.
 
     Parameters
     ----------
@@ -90,32 +92,24 @@ def check_lines(figure: Figure, guarded: Bools, out: tuple[int, ...], residual: 
     """
     lines = []
     if out:
-        lines.append(f"warning: outside the mesh: {joint_list(figure, out)}")
-    count = int(guarded.sum())
-    if count:
-        first = ", ".join(map(str, np.flatnonzero(guarded)[:_LISTED]))
-        more = " …" if count > _LISTED else ""
-        lines.append(
-            f"warning: {count} vertices bent too far to be undone exactly, smoothed: {first}{more}"
-        )
-    lines.append(f"posed again, the mesh is off by at most {residual:.2e} of its size")
-    if residual > _EXACT and not count:
-        lines.append(f"warning: that is more than {_EXACT:g}")
+        skeleton = figure.skeleton
+        assert skeleton is not None  # it has joints
+        names = [joint_label(skeleton, joint) for joint in out]
+        joints = np.array(out, dtype=np.int32)
+        lines.append(Diagnostic("R009.joints", None, None, "joints", joints, {"names": names}))
+    vertices = np.flatnonzero(guarded).astype(np.int32)
+    if len(vertices):
+        values = {"n": len(vertices), "vertices": vertices.tolist()}
+        lines.append(Diagnostic("R010.vertices", None, None, "positions", vertices, values))
+    lines.append(Diagnostic("R011.residual", values={"residual": residual}))
+    if residual > _EXACT and not len(vertices):
+        lines.append(Diagnostic("R012.residual", values={"limit": _EXACT}))
     return lines
 
 
-def joint_list(figure: Figure, joints: Sequence[int]) -> str:
-    """Return the names of the first few joints, and how many more there are."""
-    skeleton = figure.skeleton
-    assert skeleton is not None  # the callers looked
-    names = [joint_label(skeleton, joint) for joint in joints[:_LISTED]]
-    return ", ".join(names) + (f" and {len(joints) - _LISTED} more" * (len(joints) > _LISTED))
-
-
-def with_joint_name(line: str, figure: Figure) -> str:
-    """Give joints that a line tells by number their names."""
-    skeleton = figure.skeleton
-    assert skeleton is not None  # it was just made
-    head, mark, number = line.rpartition("joint ")
-    is_joint = bool(mark) and number.isdecimal() and int(number) < skeleton.n_joints
-    return head + mark + joint_label(skeleton, int(number)) if is_joint else line
+def with_joint_name(line: Diagnostic, figure: Figure) -> Diagnostic:
+    """Give a joint that a remark tells by number its name."""
+    skeleton, joint = figure.skeleton, line.values.get("joint")
+    if skeleton is None or not isinstance(joint, int):
+        return line
+    return replace(line, values={**line.values, "joint": joint_label(skeleton, joint)})

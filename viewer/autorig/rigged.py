@@ -9,6 +9,7 @@ import numpy as np
 from viewer.autorig.alignment.surface_alignment import Alignment
 from viewer.autorig.transfer.clip_transfer import carry_clip
 from viewer.autorig.weights.result import WeightTransfer
+from viewer.diagnostics import Diagnostic
 from viewer.rig.annotations import VertexField
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
@@ -48,8 +49,8 @@ class Rigged:
         Joints that lie outside the target, and inside the template.
     length_scale, figure_scale, path_scale : float
         What ``clip_for`` scales lengths by.
-    lines : tuple of str
-        What a person should know, one sentence each.
+    lines : tuple of Diagnostic
+        What a person should know.
     """
 
     figure: Figure
@@ -63,7 +64,7 @@ class Rigged:
     length_scale: float
     figure_scale: float
     path_scale: float
-    lines: tuple[str, ...]
+    lines: tuple[Diagnostic, ...]
 
     @property
     def confidence(self) -> Ints:

@@ -10,7 +10,6 @@ from viewer.autorig.alignment.posed_alignment import align_posed
 from viewer.autorig.alignment.surface_alignment import Alignment, alignment_lines
 from viewer.autorig.checks import (
     check_lines,
-    joint_list,
     newly_outside,
     residual_of,
     with_joint_name,
@@ -25,13 +24,14 @@ from viewer.autorig.transfer.joint_transfer import boundary_weights, carry_joint
 from viewer.autorig.transfer.rest_skeleton import RestSkeleton, fit_rest_skeleton
 from viewer.autorig.weights.result import WeightTransfer
 from viewer.autorig.weights.weight_transfer import transferred_weights
+from viewer.diagnostics import Diagnostic, Phrase
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.blendshapes import Correctives, corrective_weights
 from viewer.rig.figure import Figure
 from viewer.rig.kinematics import skinning_matrices, world_matrices
 from viewer.rig.mesh import Mesh, bounding_box, box_size, vertex_normals
 from viewer.rig.pose import Pose, joint_rotations
-from viewer.rig.skeleton import Skeleton
+from viewer.rig.skeleton import Skeleton, joint_label
 from viewer.rig.skinning import joint_matrices
 from viewer.rig.units import WORDS, unit_of_scaled
 
@@ -128,14 +128,14 @@ def _carried_skeleton(
     laid: Floats,
     target: Mesh,
     how: TransferSettings,
-) -> tuple[RestSkeleton, Bools | None, list[str]]:
+) -> tuple[RestSkeleton, Bools | None, list[Diagnostic]]:
     """Place the joints in the target; return which were carried, and what a person should know."""
     mesh, skeleton, skin = template.mesh, template.skeleton, template.skin
     assert mesh is not None and skeleton is not None and skin is not None  # the caller looked
     joints = alignment.placed.apply(joint_matrices(template, pose)[:, :3, 3])
     if how.joints == "copied":
         rest = fit_rest_skeleton(template, pose, alignment.placed, joints, None, original)
-        return rest, None, ["joints: those of the template, aligned"]
+        return rest, None, [Diagnostic("R008.aligned")]
     reach = _JOINT_REACH * box_size(bounding_box(target.positions[target.triangles.ravel()]))
     normals = vertex_normals(laid, mesh.triangles)
     ways, matched = surface_shifts(laid, normals, target.positions, target.triangles, reach)
@@ -150,16 +150,17 @@ def _carried_skeleton(
     rest = fit_rest_skeleton(
         template, pose, alignment.placed, found.positions, found.carried, original
     )
-    by = "the joint regressor" if regressor else "the boundaries of the joints' regions"
-    count = int(found.carried.sum())
-    line = f"joints: {count} of {skeleton.n_joints} carried by {by}"
-    missed = np.flatnonzero(found.measurable & ~found.carried).tolist()
-    if missed:
-        line += f"; too little of the target around {joint_list(template, missed)}"
+    missed = np.flatnonzero(found.measurable & ~found.carried)
+    labels = [joint_label(skeleton, joint) for joint in missed.tolist()]
     without = int((~found.measurable).sum())
-    if without:
-        line += f"; {without} without such a boundary moved with their parents"
-    return rest, found.carried, [line]
+    values = {
+        "n": int(found.carried.sum()),
+        "all": skeleton.n_joints,
+        "by": Phrase("by-joint-regressor" if regressor else "by-boundaries"),
+        "missed": Phrase("joints-missed", names=labels) if labels else "",
+        "without": Phrase("joints-without-boundary", n=without) if without else "",
+    }
+    return rest, found.carried, [Diagnostic("R008.transferred", values=values)]
 
 
 def _at_rest(
@@ -216,25 +217,28 @@ def _correctives(
     )
 
 
-def _judged(template: Figure, figure: Figure, weights: WeightTransfer) -> list[str]:
+def _judged(template: Figure, figure: Figure, weights: WeightTransfer) -> list[Diagnostic]:
     """Say what was judged of the target: which way round it is wound, and its unit."""
     assert figure.mesh is not None  # it was just made
     lines = []
     turned = int(weights.backwards[figure.mesh.triangles].any(axis=1).sum())
     if turned:
-        lines.append(f"wound inside out, and turned round in the result: {turned} triangles")
+        lines.append(Diagnostic("R014.wound", values={"n": turned}))
     if template.unit in WORDS:
-        unit = WORDS.get(figure.unit, "not known, much larger or smaller than the template")
-        lines.append(f"unit, judged by size: {unit}")
+        lines.append(
+            Diagnostic("R014.unit", values={"unit": WORDS[figure.unit]})
+            if figure.unit in WORDS
+            else Diagnostic("R014.unit-unknown")
+        )
     return lines
 
 
-def _lost(template: Figure, figure: Figure, how: TransferSettings) -> list[str]:
+def _lost(template: Figure, figure: Figure, how: TransferSettings) -> list[Diagnostic]:
     """Say what of the template the new figure does not have."""
     lines = []
     if template.blend_shapes is not None:
-        lines.append(f"not carried over: {template.n_shapes} shape directions of the template")
+        lines.append(Diagnostic("R013.shapes", values={"n": template.n_shapes}))
     if template.correctives is not None and figure.correctives is None:
-        why = ", too large for this many vertices" if how.correctives else ""
-        lines.append(f"pose correctives of the template: left out{why}")
+        key = "R013.correctives-too-large" if how.correctives else "R013.correctives"
+        lines.append(Diagnostic(key))
     return lines

@@ -12,6 +12,7 @@ from viewer.autorig.rigged import Rigged
 from viewer.autorig.settings import Report
 from viewer.autorig.transfer.inverse_skinning import unpose
 from viewer.autorig.weights.weight_transfer import nearest_weights
+from viewer.diagnostics import Diagnostic
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import apply_transform
@@ -60,12 +61,16 @@ def nearest(template: Figure, pose: Pose, target: Mesh, report: Report, name: st
     back = np.asarray(np.linalg.inv(box), dtype=np.float64)
     residual = residual_of(figure, pose, back, target)
     out = newly_outside(template, pose, posed, replace(target, positions=laid))
-    factors = ", ".join(f"{factor:.4g}" for factor in np.diag(box)[:3])
+    factors = dict(zip("xyz", np.diag(box)[:3].tolist(), strict=True))
+    matched = {
+        "n": int(weights.matched.sum()),
+        "all": len(weights.matched),
+        "ratio": float(weights.matched.mean()),
+    }
     lines = (
-        f"alignment: boxes; the target scaled along x, y, z by {factors}",
-        f"matched {int(weights.matched.sum())} of {len(weights.matched)} vertices "
-        f"({weights.matched.mean():.1%}); all have the weights of the nearest vertex",
-        "joints: those of the template, copied",
+        Diagnostic("R001.boxes", values=factors),
+        Diagnostic("R005.all-nearest", values=matched),
+        Diagnostic("R008.copied"),
         *check_lines(figure, found.guarded, out, residual),
     )
     return Rigged(

@@ -87,7 +87,7 @@ def read_clips(
 
 def _clip_of(name: str, template: list[Path], fps: float | None) -> Clip | SampledClip:
     scene = load(*template, resolve(name), motion=MotionSettings(frame_rate=fps))
-    print_warnings(scene.warnings)
+    print_warnings(scene.diagnostics)
     for actor in scene.actors:
         if actor.figure.is_attached and isinstance(actor.clip, Clip | SampledClip):
             return actor.clip

@@ -34,7 +34,8 @@ def describe_model(actor: Actor, skinning: Skinning) -> dict[str, Any]:
         How joints move its mesh.
     """
     figure, pose = actor.figure, actor.pose
-    model: dict[str, Any] = {"facts": dict(figure.facts)} if figure.facts else {}
+    facts = {heading: str(fact) for heading, fact in figure.facts}
+    model: dict[str, Any] = {"facts": facts} if facts else {}
     if figure.blend_shapes is not None:
         shapes = figure.blend_shapes
         model["shapes"] = [

@@ -12,6 +12,7 @@ import numpy as np
 from viewer.commands._frame_numbers import apply_time
 from viewer.commands._morph_weights import has_only_morphs, is_named, morph_record, named_record
 from viewer.commands._numbers import number
+from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError, ViewerError, printable
 from viewer.formats import Source, detect, read
 from viewer.formats.pose import pose_error
@@ -114,13 +115,13 @@ def skinning_of(arguments: argparse.Namespace) -> Skinning:
     )
 
 
-def apply_pose(scene: Scene, arguments: argparse.Namespace) -> list[str]:
+def apply_pose(scene: Scene, arguments: argparse.Namespace) -> list[str | Diagnostic]:
     """Shape and pose a scene as asked.
 
     Returns
     -------
-    list of str
-        What could not be taken over exactly, one line each.
+    list of str or Diagnostic
+        What could not be taken over exactly.
 
     Raises
     ------
@@ -128,12 +129,12 @@ def apply_pose(scene: Scene, arguments: argparse.Namespace) -> list[str]:
         If an option makes no sense for what was opened.
     """
     apply_time(scene, arguments)
-    notes: list[str] = []
+    notes: list[str | Diagnostic] = []
     if arguments.hands:
         _apply_hands(scene, arguments.hands)
     if arguments.pose:
         record, source = _pose(arguments.pose)
-        notes += [] if source is None else source.warnings
+        notes += [] if source is None else source.diagnostics.warnings
         notes += _apply_record("--pose", record, scene, source)
     # What is asked for here counts more than what a pose file says.
     if arguments.shape is not None:
@@ -184,7 +185,7 @@ def _numbers(option: str, text: str | None) -> Floats | None:
 
 def _apply_record(
     option: str, record: PoseRecord, scene: Scene, source: Source | None = None
-) -> list[str]:
+) -> list[Diagnostic]:
     """Apply a record, which may be from a file, to the first actor that takes it."""
     problem: RigError | None = None
     for actor in scene.actors:
@@ -198,7 +199,7 @@ def _apply_record(
     raise ViewerError(f"{option}: {problem or 'no file has a skeleton'}")
 
 
-def _apply_shape(scene: Scene, text: str) -> list[str]:
+def _apply_shape(scene: Scene, text: str) -> list[Diagnostic]:
     """Set shapes by name, or all from the first on; figures without shapes may have morphs."""
     if is_named(text):
         actor, record = named_record(scene, text)
@@ -291,7 +292,7 @@ def _place(scene: Scene, label: str, setting: str, text: str) -> bool:
     record = PoseRecord(translation=place, scale=value if part == "scale" else None)
     refused = apply_record(record, actor.figure, actor.pose)
     if refused:
-        raise ViewerError(f"--dof: {refused[0].partition(';')[0]}")
+        raise ViewerError(f"--dof: {refused[0].values['fault']}")
     return True
 
 

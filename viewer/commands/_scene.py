@@ -6,13 +6,14 @@ import argparse
 import contextlib
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from viewer.commands._frame_numbers import add_frame_arguments
 from viewer.commands._pose import add_pose_arguments, apply_pose
 from viewer.commands._progress import Progress
+from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, ViewerError, printable
 from viewer.formats import SUFFIXES
 from viewer.loading import MotionSettings, begin, bundled_body, bundled_files, read_files
@@ -162,14 +163,14 @@ def open_scene(arguments: argparse.Namespace) -> Scene:
 
 def finish(builder: Builder, scene: Scene) -> None:
     """Read a capture to its end, with progress at a terminal, and print what was noticed."""
-    notes: list[str] = []
+    notes: list[Diagnostic] = []
     with Progress(f"reading {builder.capture.name}", builder.capture.n_frames) as progress:
         while not builder.is_done:
             new, said = builder.read_some()
             scene.actors += new
             notes += said
             progress.show(builder.n_read)
-    scene.warnings = (*scene.warnings, *notes)  # the window and its pictures show them too
+    scene.diagnostics = (*scene.diagnostics, *notes)  # the window and its pictures show them too
     print_warnings(notes)
 
 
@@ -186,7 +187,7 @@ def begin_scene(arguments: argparse.Namespace) -> tuple[Scene, list[Builder]]:
     except FormatError as problem:
         named = [*arguments.files, *filter(None, [arguments.model])]
         raise _with_models(problem, named) from None
-    print_warnings(scene.warnings)
+    print_warnings(scene.diagnostics)
     return scene, builders
 
 
@@ -217,7 +218,7 @@ def _announce(files: Sequence[str | Path]) -> None:
                 print(f"reading {printable(file)} ({size / 1e6:.0f} MB) …", file=sys.stderr)
 
 
-def print_warnings(warnings: Sequence[str]) -> None:
+def print_warnings(warnings: Iterable[str | Diagnostic]) -> None:
     """Print one line each to the error stream."""
     for warning in warnings:
         print(f"warning: {warning}", file=sys.stderr)

@@ -107,7 +107,7 @@ def run(arguments: argparse.Namespace) -> int:
     output = _checked_output(arguments)
     open_one = _opener(arguments)
     reference = open_one(arguments.reference)
-    print_warnings(reference.warnings)
+    print_warnings(reference.diagnostics)
     skinning = skinning_of(arguments)
     rows: list[Compared] = []
     heats: list[Heat] = []
@@ -202,7 +202,7 @@ def _compared(
             difference = replace(difference, notes=(note, *difference.notes))
         found.append((posed, difference))
     differences = tuple((actor.name, difference) for actor, difference in found)
-    row = Compared(name, differences, _lone(name, pairing), warnings=other.warnings)
+    row = Compared(name, differences, _lone(name, pairing), diagnostics=other.diagnostics)
     return row, heat_of(name, found)
 
 
@@ -219,5 +219,5 @@ def _print(arguments: argparse.Namespace, rows: Sequence[Compared], stream: Text
     elif len(rows) > 1:
         print("\n".join(table_of(rows, tolerance)), file=stream)
     else:
-        print_warnings(rows[0].warnings)
+        print_warnings(rows[0].diagnostics)
         print("\n".join(lines_of(rows[0], tolerance)), file=stream)

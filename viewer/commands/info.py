@@ -14,6 +14,7 @@ from viewer.commands._model_info import describe_model, model_lines
 from viewer.commands._pose import add_skinning_arguments, skinning_of
 from viewer.commands._scene import add_scene_arguments, open_scene
 from viewer.commands._usage import require_files
+from viewer.diagnostics import described
 from viewer.errors import counted, printable
 from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.mesh import Mesh, bounding_box, box_size, triangle_areas
@@ -65,6 +66,7 @@ def describe(scene: Scene, skinning: Skinning | None = None) -> dict[str, Any]:
             for actor in scene.actors
         ],
         "warnings": list(scene.warnings),
+        "diagnostics": [described(found) for found in scene.diagnostics],
     }
 
 

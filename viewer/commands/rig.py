@@ -198,7 +198,7 @@ def _target(arguments: argparse.Namespace, inputs: list[Path]) -> Figure:
     """Return the mesh that is to be rigged; one that has a rig already as it is posed."""
     scene = load(*map(resolve, arguments.files))
     inputs += scene.files
-    print_warnings(scene.warnings)
+    print_warnings(scene.diagnostics)
     meshes = [actor for actor in scene.actors if actor.figure.mesh is not None]
     if len(meshes) != 1:
         raise ViewerError(f"expected one mesh to rig, found {len(meshes)}")
@@ -217,7 +217,7 @@ def _template(arguments: argparse.Namespace, inputs: list[Path]) -> Actor:
     scene = load(*_files(arguments), motion=MotionSettings(frame_rate=arguments.fps))
     inputs += scene.files
     _check_frame(scene, arguments)
-    print_warnings([*scene.warnings, *apply_pose(scene, arguments)])
+    print_warnings([*scene.diagnostics, *apply_pose(scene, arguments)])
     attached = [actor for actor in scene.actors if actor.figure.is_attached]
     if not attached:
         raise RigError("--from: expected a figure with mesh, skeleton and skin, found none")
@@ -315,10 +315,9 @@ def _settings(
 
 def _tell(rigged: Rigged, stream: TextIO) -> None:
     """Print what was found, and warnings where errors go."""
-    mark = "warning: "
-    print_warnings([line.removeprefix(mark) for line in rigged.lines if line.startswith(mark)])
-    found = [line for line in rigged.lines if not line.startswith(mark)]
-    print("\n".join(found), file=stream)
+    print_warnings(line for line in rigged.lines if line.severity == "warning")
+    notes = [str(line) for line in rigged.lines if line.severity == "note"]
+    print("\n".join(notes), file=stream)
 
 
 def _show(rigged: Rigged, target: Figure) -> None:

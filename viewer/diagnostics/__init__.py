@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from viewer.diagnostics.codes import CODES, SEVERITIES, Code
 from viewer.diagnostics.collector import Collector
+from viewer.diagnostics.describing import described
 from viewer.diagnostics.diagnostic import Diagnostic, Part
 from viewer.diagnostics.phrase import Phrase
 from viewer.diagnostics.wording import MESSAGES
@@ -22,4 +23,5 @@ __all__ = [
     "Diagnostic",
     "Part",
     "Phrase",
+    "described",
 ]

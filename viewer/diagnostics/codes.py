@@ -109,5 +109,28 @@ CODES = {
     "C011": Code("warning", "keypoints of low confidence", "leave these out, or capture again"),
     "C012": Code("note", "keypoints that are never seen", "nothing, if the camera cannot see them"),
     "C013": Code("note", "no ground found for the feet", "give its height (--ground)"),
+    # Rigging
+    "R001": Code("note", "alignment of the template", "nothing, if it lies on the target"),
+    "R002": Code(
+        "warning",
+        "doubtful alignment",
+        "give --up, --facing or landmarks, or pose the template like the target",
+    ),
+    "R003": Code("note", "pose and proportions fitted", "nothing, if they are the target's"),
+    "R004": Code(
+        "warning", "poor fit of pose or proportions", "choose a template of the target's kind"
+    ),
+    "R005": Code("note", "weights matched", "nothing, if most vertices are"),
+    "R006": Code(
+        "warning", "few vertices matched", "check the alignment, or allow a larger distance"
+    ),
+    "R007": Code("note", "part that moves rigidly", "nothing, if it is stiff"),
+    "R008": Code("note", "joints transferred", "nothing, if they lie in the limbs"),
+    "R009": Code("warning", "joints outside the mesh", "check the alignment, or move them"),
+    "R010": Code("warning", "pose bent too far to be undone", "use a target that is bent less"),
+    "R011": Code("note", "accuracy of the rigged figure", "nothing, if it is small"),
+    "R012": Code("warning", "rigged figure differs from the target", "check the alignment"),
+    "R013": Code("note", "part of the template left out", "nothing, if it is not needed"),
+    "R014": Code("note", "property judged by the target", "nothing, if it is right"),
 }
 """By code; codes are never given to something else."""

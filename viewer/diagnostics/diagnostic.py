@@ -108,6 +108,11 @@ class Diagnostic:
         path = printable(self.path, 300)
         return path if self.line is None else f"{path}:{self.line}"
 
+    @property
+    def labelled(self) -> str:
+        """The line, with its severity in front unless that is a note."""
+        return str(self) if self.severity == "note" else f"{self.severity}: {self}"
+
     def __str__(self) -> str:
         """Return one line: place and message."""
         return ": ".join(filter(None, (self.place, self.message)))

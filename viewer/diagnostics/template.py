@@ -7,6 +7,7 @@
 ``{name:text}``        the same, not more than 200 letters
 ``{name:name}``        a name in a file, cut after 60 characters; bytes that are no text show as �
 ``{names:list}``       the first six and how many more, ``none``; ``list12`` for twelve
+``{names:all}``        every name
 ``{shape:axes}``       the axes of an array: ``800 x 3``; letters stand for any number
 ``{names:or}``         alternatives
 ``{n:#vertex}``        a count with its noun: ``3 vertices``
@@ -39,7 +40,12 @@ def rendered(template: str, values: Mapping[str, Any]) -> str:
 
 def fields(template: str) -> dict[str, str]:
     """Return the names of the values that a template shows, each with its specification."""
-    return {name: spec or "" for _, name, spec, _ in Formatter().parse(template) if name}
+    found = {}
+    for _, name, spec, _ in Formatter().parse(template):
+        if name:
+            found[name] = spec or ""
+            found |= dict.fromkeys(fields(found[name]), "d")  # totals of counts
+    return found
 
 
 class _Formatter(Formatter):
@@ -97,6 +103,7 @@ _PLAIN: dict[str, Callable[[Any], str]] = {
     "text": printable,
     "name": _name,
     "axes": _axes,
+    "all": lambda names: ", ".join(map(printable, names)),
     "or": _alternatives,
 }
 _FORMATTER = _Formatter()

@@ -21,8 +21,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from viewer.diagnostics import Part, Phrase
-from viewer.errors import counted
+from viewer.diagnostics import Diagnostic, Part, Phrase
 from viewer.formats._numbers import is_infinite, is_number, to_number
 from viewer.formats._skel.writing import KEYWORDS, UNLIMITED, write
 from viewer.formats._source import Source
@@ -84,15 +83,17 @@ def read(source: Source) -> Figure:
     return Figure(name=source.path.stem, skeleton=skeleton, facts=_facts(skeleton, dofs))
 
 
-def _facts(skeleton: Skeleton, dofs: Floats) -> tuple[tuple[str, str], ...]:
+def _facts(skeleton: Skeleton, dofs: Floats) -> tuple[tuple[str, Diagnostic], ...]:
     """Say which DOFs of the file's own pose had to be brought within their limits."""
     moved = np.flatnonzero(skeleton.rest_dofs != dofs)
     if len(moved) == 0:
         return ()
     first = int(moved[0])
     beyond = beyond_text(skeleton, first, float(dofs[first]))
-    text = f"{counted(len(moved), 'DOF')}, {beyond}: clamped"
-    return (("pose outside limits", text),)
+    values = {"n": len(moved), "dof": beyond}
+    joints = np.unique(skeleton.dof_joints[moved])
+    clamped = Diagnostic("S004.clamped", part="joints", places=joints, values=values)
+    return (("pose outside limits", clamped),)
 
 
 class _Parser:

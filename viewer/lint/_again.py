@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,6 +14,7 @@ import numpy as np
 from viewer.errors import printable
 from viewer.lint._finding import Finding, LintOptions
 from viewer.lint._opening import Opened, Owners, open_files, with_files
+from viewer.lint._running import Progress, lint_scene
 from viewer.phrases import listed
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor, Scene
@@ -22,8 +23,6 @@ if TYPE_CHECKING:
     from viewer.loading import MotionSettings
 
 __all__ = ["Again", "lint_again"]
-
-Progress = Callable[[int, int, str], None]
 
 _MESH = ("positions", "normals", "triangles")
 _SKIN = ("starts", "joints", "weights", "inverse_bind")
@@ -80,8 +79,6 @@ def lint_again(
         Whether nobody knows that it came from these files: they count only if they hold something
         of the scene.
     """
-    from viewer.lint import lint_scene
-
     opened = open_files(paths, settings, progress=progress)
     findings = lint_scene(scene, options, progress)
     owners = [_owners(actor, index, opened) for index, actor in enumerate(scene.actors)]

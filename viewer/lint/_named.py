@@ -32,10 +32,24 @@ def aimed_at(remark: Finding, actor: Actor, part: str) -> Finding | None:
     """
     if part == "mesh":
         return _in_mesh(remark, actor)
+    found = remark.diagnostic
+    if part == "clip" and found.part == "channels" and found.places is not None:
+        return _of_channels(remark, actor)
     joint = _joint_of(remark, actor, part)
     if joint is None:
         return remark if len(remark.joints) and part == "skeleton" else None
     return replace(remark, joints=np.array([joint], dtype=np.int32))
+
+
+def _of_channels(remark: Finding, actor: Actor) -> Finding | None:
+    """Return a finding about channels of a clip with the joints that they move."""
+    channels, skeleton = remark.diagnostic.places, actor.figure.skeleton
+    if channels is None or skeleton is None:
+        return None
+    known = channels[channels < skeleton.n_dofs]
+    if len(known) == 0:
+        return None
+    return replace(remark, joints=np.unique(skeleton.dof_joints[known]))
 
 
 def _in_mesh(remark: Finding, actor: Actor) -> Finding | None:

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from viewer.diagnostics import SEVERITIES, Collector, Diagnostic
+from viewer.diagnostics import SEVERITIES, Collector
 from viewer.diagnostics.merging import merged
 from viewer.errors import FormatError, ViewerError, printable
 from viewer.formats import MAX_SIZE, Source
 from viewer.lint._finding import Finding
 from viewer.lint._messages import CHECKED, of_diagnostic, of_error, of_refusal
 from viewer.lint._named import aimed_at
+from viewer.lint._running import Progress
 from viewer.loading import Contents, MotionSettings, begin, read_source
 from viewer.rig.arrays import Ints
 from viewer.rig.figure import Figure
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from viewer.loading.capturing import Builder
 
 __all__ = ["Opened", "Owners", "open_files", "spoiled_parts", "with_files"]
-
-Progress = Callable[[int, int, str], None]
 
 Owners = dict[str, int]
 """For the parts of an actor, which actor of what was opened has the same: by ``Finding.part``."""
@@ -174,9 +172,7 @@ def _assemble(opened: Opened, settings: MotionSettings | None, progress: Progres
             contents = Contents(figures=contents.figures, clips=contents.clips)
         else:
             alone += _take_out(contents, culprit)
-    opened.findings += [
-        of_diagnostic(_of_scene(text, opened.contents)) for text in opened.scene.warnings
-    ]
+    opened.findings += [of_diagnostic(found) for found in opened.scene.diagnostics]
     opened.scene.actors += [Actor(figure) for figure in alone]
 
 
@@ -193,7 +189,7 @@ def _read_on(
             except ViewerError as problem:
                 return problem
             scene.actors += new
-            scene.warnings += tuple(notes)
+            scene.diagnostics += tuple(notes)
     return None
 
 
@@ -209,16 +205,15 @@ def _is_unbound(figure: Figure, source: Source) -> bool:
 
 
 def _culprit(problem: ViewerError, contents: Contents) -> Path | None:
-    """Return the file that an error is about: the one it names first, or else the last read.
+    """Return the file that an error is about, or the last one read if it does not say.
 
     None if it is about a file that was not among them.
     """
     paths = [path for name in _LISTS for path, _ in getattr(contents, name)]
-    if isinstance(problem, FormatError):
-        return problem.path if problem.path in paths else None
-    named = [(str(problem).find(printable(path, 300)), path) for path in paths]
-    found = [pair for pair in named if pair[0] >= 0]
-    return min(found, key=lambda pair: pair[0])[1] if found else paths[-1]
+    found = problem.diagnostic
+    if found is None or found.path is None:
+        return paths[-1]
+    return found.path if found.path in paths else None
 
 
 def _take_out(contents: Contents, culprit: Path) -> list[Figure]:
@@ -227,23 +222,6 @@ def _take_out(contents: Contents, culprit: Path) -> list[Figure]:
     for name in _LISTS:
         setattr(contents, name, [item for item in getattr(contents, name) if item[0] != culprit])
     return figures
-
-
-def _of_scene(text: str, contents: Contents) -> Diagnostic:
-    """Return a remark about the scene as a diagnostic, until loading records them so."""
-    path = _owner(text, contents)
-    start = printable(path, 300)
-    found = re.fullmatch(r"(?::(\d+))?: (.*)", text[len(start) :], re.DOTALL)
-    if not text.startswith(start) or found is None:
-        return Diagnostic("F007.plain", path, values={"message": text})
-    line = None if found[1] is None else int(found[1])
-    return Diagnostic("F007.plain", path, line, values={"message": found[2]})
-
-
-def _owner(text: str, contents: Contents) -> Path:
-    """Return the file that a remark about the scene begins with."""
-    paths = [path for name in _LISTS for path, _ in getattr(contents, name)]
-    return next((path for path in paths if text.startswith(printable(path, 300))), Path())
 
 
 def with_files(

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from viewer.diagnostics import SEVERITIES
+from viewer.diagnostics import SEVERITIES, Diagnostic, described
 from viewer.errors import counted, printable
 from viewer.formats import folder_name
 from viewer.lint._finding import Finding
@@ -88,6 +88,7 @@ def _describe(finding: Finding, scene: Scene) -> dict[str, Any]:
         "line": finding.line,
         "actor": finding.actor,
         "name": printable(finding.name),
+        **_data(finding.diagnostic),
     }
     for key in ("vertices", "triangles", "joints", "frames", "times"):
         values = getattr(finding, key)
@@ -95,6 +96,12 @@ def _describe(finding: Finding, scene: Scene) -> dict[str, Any]:
         facts[f"n_{key}"] = len(values)
     facts["joint_names"] = _joint_names(finding, scene)
     return facts
+
+
+def _data(found: Diagnostic) -> dict[str, Any]:
+    """Return what a diagnostic knows beside its code, severity, message and place in a file."""
+    told = described(found)
+    return {key: told[key] for key in ("key", "part", "places", "n_places", "count", "values")}
 
 
 def _joint_names(finding: Finding, scene: Scene) -> list[str]:

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.errors import counted
 from viewer.lint._finding import Finding, Subject
-from viewer.phrases import listed
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure
 from viewer.rig.kinematics import world_matrices
@@ -49,33 +47,22 @@ def check(subject: Subject) -> list[Finding]:
     linear = np.where(known[:, None, None], skin.inverse_bind[:, :3, :3], np.eye(3))
     determinants = np.linalg.det(linear)
     flat = are_singular(linear)
-    findings = _about(
-        subject, "B002", flat, determinants, ("cannot be inverted",) * 2, "determinant"
-    )
     conditions = np.zeros(len(linear))
     conditions[~flat] = np.linalg.cond(linear[~flat])
-    findings += _about(
-        subject, "B003", conditions > _NEARLY, conditions, ("can hardly be inverted",) * 2,
-        "condition number",
-    )  # fmt: skip
     mirrors = (determinants < 0.0) & ~flat
-    findings += _about(subject, "B005", mirrors, determinants, ("mirrors", "mirror"), "determinant")
     off = np.abs(skin.inverse_bind[:, 3] - [0.0, 0.0, 0.0, 1.0]).max(axis=1) * known
-    findings += _about(
-        subject, "B006", off > _AFFINE, off, ("is not affine", "are not affine"), "error"
-    )
+    findings = [
+        *_about(subject, "B002.singular", flat, determinants),
+        *_about(subject, "B003.ill-conditioned", conditions > _NEARLY, conditions),
+        *_about(subject, "B005.reflected", mirrors, determinants),
+        *_about(subject, "B006.not-affine", off > _AFFINE, off),
+    ]
     usable = known & ~flat & (off <= _AFFINE)
     return findings + _elsewhere(subject, subject.actor.figure, usable)
 
 
-def _about(
-    subject: Subject,
-    code: str,
-    wrong: np.ndarray,
-    values: Floats,
-    what: tuple[str, str],
-    measure: str,
-) -> list[Finding]:
+def _about(subject: Subject, key: str, wrong: Bools, values: Floats) -> list[Finding]:
+    """Report joints whose bind matrices are wrong, with the value that shows it for the first."""
     joints = np.flatnonzero(wrong)
     if len(joints) == 0:
         return []
@@ -84,13 +71,16 @@ def _about(
     if skeleton is not None:
         labels = joint_labels(skeleton)
         names = [labels[joint] for joint in joints]
+    first = int(joints[0])
     return [
         subject.found(
-            f"{code}.plain",
-            message=f"{counted(len(joints), 'bind matrix', *what, of=len(values))}: {listed(names)} "
-            f"({measure} {values[joints[0]]:.3g})",
+            key,
+            n=len(joints),
+            all=len(values),
+            names=names,
+            value=float(values[first]),
             joints=joints,
-            at=("bindings", int(joints[0])),
+            at=("bindings", first),
         )
     ]
 
@@ -117,14 +107,14 @@ def _elsewhere(subject: Subject, figure: Figure, usable: Bools) -> list[Finding]
     if len(away) == 0:
         return []
     away = away[np.argsort(-distances[away], kind="stable")]
-    label = joint_labels(skeleton)[away[0]]
-    rest = "it rests" if len(away) == 1 else "they rest"
+    first = int(away[0])
     return [
         subject.found(
-            "B004.plain",
-            message=f"{counted(len(away), 'joint', 'was', 'were')} bound away from where {rest}, {label} "
-            f"by {subject.length(distances[away[0]])}: at rest the mesh is not as it was bound",
+            "B004.joints",
+            n=len(away),
+            joint=joint_labels(skeleton)[first],
+            distance=subject.length(float(distances[first])),
             joints=away,
-            at=("bindings", int(away[0])),
+            at=("bindings", first),
         )
     ]

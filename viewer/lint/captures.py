@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.errors import counted
+from viewer.diagnostics import Phrase
 from viewer.lint._finding import Finding, Subject
 from viewer.lint.clips import missing_frames
-from viewer.phrases import listed
-from viewer.rig.arrays import Floats, Ints
+from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.captures.points import PointClip
 
 __all__ = ["LOW_FRAMES", "LOW_SHARE", "check"]
@@ -50,9 +49,16 @@ def _confidence(subject: Subject, clip: PointClip, names: list[str]) -> list[Fin
     seen = confidence > 0.0
     never = np.flatnonzero(~seen.any(axis=0))
     if len(never):
-        shown = listed([names[point] for point in never])
-        text = f"{counted(len(never), 'keypoint', 'is', 'are', of=len(names))} never seen: {shown}"
-        findings.append(subject.found("C012.plain", message=text, part="clip", joints=never))
+        findings.append(
+            subject.found(
+                "C012.points",
+                n=len(never),
+                all=len(names),
+                names=[names[point] for point in never],
+                part="clip",
+                joints=never,
+            )
+        )
     return findings + _low(subject, clip, names, numbers, confidence)
 
 
@@ -76,37 +82,56 @@ def _low(
     shares = counts / np.maximum(seen.sum(axis=0), 1)
     points = np.flatnonzero((shares > LOW_SHARE) & (counts >= LOW_FRAMES))
     points = points[np.argsort(-shares[points], kind="stable")]
-    limit = f"a confidence below {subject.options.confidence:g}"
+    limit, first_frame = subject.options.confidence, clip.timing.first_frame
     findings = []
     for point in points[:_SINGLE].tolist():
-        rows = np.flatnonzero(is_low[:, point])
-        first = numbers[rows[0]] + clip.timing.first_frame
-        words = (
-            f"{names[point]} has {limit} in {100.0 * shares[point]:.0f} % of the "
-            f"{int(seen[:, point].sum())} frames that see it, first in frame {first}"
+        frames = numbers[is_low[:, point]]
+        findings.append(
+            subject.found(
+                "C011.point",
+                name=names[point],
+                limit=limit,
+                percent=100.0 * float(shares[point]),
+                n=int(seen[:, point].sum()),
+                frame=int(frames[0]) + first_frame,
+                part="clip",
+                joints=[point],
+                frames=frames + first_frame,
+                times=_times(subject, clip, frames),
+            )
         )
-        findings.append(_low_finding(subject, clip, words, [point], numbers[rows]))
-    rest = points[_SINGLE:]
-    if len(rest):
-        frames = np.flatnonzero(is_low[:, rest].any(axis=1))
-        which = counted(len(rest), "more keypoint", "has", "have")
-        shown = ", ".join(f"{names[k]} in {100.0 * shares[k]:.0f} %" for k in rest.tolist())
-        words = f"{which} {limit}: {shown} of the frames that see them"
-        findings.append(_low_finding(subject, clip, words, rest, numbers[frames]))
-    return findings
+    return findings + _rarer(subject, clip, names, points[_SINGLE:], shares, numbers, is_low)
 
 
-def _low_finding(
-    subject: Subject, clip: PointClip, text: str, points: Indices | list[int], frames: Indices
-) -> Finding:
-    return subject.found(
-        "C011.plain",
-        message=text,
-        part="clip",
-        joints=points,
-        frames=frames + clip.timing.first_frame,
-        times=_times(subject, clip, frames),
-    )
+def _rarer(
+    subject: Subject,
+    clip: PointClip,
+    names: list[str],
+    points: Indices,
+    shares: Floats,
+    numbers: Indices,
+    is_low: Bools,
+) -> list[Finding]:
+    """Report keypoints of low confidence together; ``shares`` (K,) are of the frames."""
+    if len(points) == 0:
+        return []
+    frames = numbers[is_low[:, points].any(axis=1)]
+    shown = [
+        Phrase("low-point", name=names[point], percent=100.0 * float(shares[point]))
+        for point in points.tolist()
+    ]
+    return [
+        subject.found(
+            "C011.more-points",
+            n=len(points),
+            limit=subject.options.confidence,
+            points=shown,
+            part="clip",
+            joints=points,
+            frames=frames + clip.timing.first_frame,
+            times=_times(subject, clip, frames),
+        )
+    ]
 
 
 def _jumps(subject: Subject, clip: PointClip, names: list[str]) -> list[Finding]:
@@ -130,10 +155,13 @@ def _jumps(subject: Subject, clip: PointClip, names: list[str]) -> list[Finding]
     frames = both[wrong]
     return [
         subject.found(
-            "C003.plain",
-            message=f"{counted(len(wrong), 'frame', of=_n_frames(rows))}: {names[point]} moves at "
-            f"{fastest[wrong[0]]:.3g} units a second (limit {limit:.3g}) to frame "
-            f"{frames[0] + clip.timing.first_frame}",
+            "C003.point",
+            n=len(wrong),
+            all=_n_frames(rows),
+            name=names[point],
+            speed=float(fastest[wrong[0]]),
+            limit=float(limit),
+            frame=int(frames[0]) + clip.timing.first_frame,
             part="clip",
             joints=[point],
             frames=frames + clip.timing.first_frame,

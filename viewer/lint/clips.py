@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
+
 import numpy as np
 
-from viewer.errors import counted
+from viewer.diagnostics import Phrase
 from viewer.lint._finding import Finding, Subject
 from viewer.lint._tracks import Indices, Track, frame_numbers, key_times, track_of
-from viewer.phrases import listed
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.clip import SHORTEST, Clip
 from viewer.rig.motion.clip_table import evaluate_all
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
-from viewer.rig.number_text import number_text
 from viewer.rig.posing.dof_text import beyond_text
 from viewer.rig.skeleton import Skeleton, joint_labels
 
@@ -38,8 +39,7 @@ def check(subject: Subject) -> list[Finding]:
         findings += _keys(subject, clip)
         findings += _outside(subject, clip, skeleton)
     if clip.end - clip.start <= SHORTEST:
-        text = f"it begins and ends at {number_text(clip.start)} s"
-        return [*findings, subject.found("C010.plain", message=text, part="clip")]
+        return [*findings, subject.found("C010.one-time", time=float(clip.start), part="clip")]
     track = track_of(subject)
     assert track is not None  # there is a clip and a skeleton
     return findings + _jumps(subject, track, skeleton) + _turns(subject, track, skeleton)
@@ -57,13 +57,14 @@ def missing_frames(subject: Subject, timing: Timing) -> list[Finding]:
         return []
     runs = np.split(gaps, np.flatnonzero(np.diff(gaps) > 1) + 1)
     numbers = gaps + timing.first_frame
-    missing = counted(len(gaps), "frame", "is", "are", of=int(there[-1] - there[0]) + 1)
-    shown = listed([_run_text(run + timing.first_frame) for run in runs])
     times = timing.start + gaps / timing.frame_rate + subject.actor.offset
     return [
         subject.found(
-            "C005.plain",
-            message=f"{missing} missing in {counted(len(runs), 'gap')}: {shown}",
+            "C005.gaps",
+            n=len(gaps),
+            all=int(there[-1] - there[0]) + 1,
+            n_gaps=len(runs),
+            gaps=[_gap(run + timing.first_frame) for run in runs],
             part="clip",
             frames=numbers,
             times=times,
@@ -73,10 +74,11 @@ def missing_frames(subject: Subject, timing: Timing) -> list[Finding]:
     ]
 
 
-def _run_text(numbers: Indices) -> str:
+def _gap(numbers: Indices) -> Phrase:
+    """Return the numbers of frames that follow one another."""
     if len(numbers) == 1:
-        return f"frame {numbers[0]}"
-    return f"frames {numbers[0]} to {numbers[-1]}"
+        return Phrase("one-frame", frame=int(numbers[0]))
+    return Phrase("frame-range", first=int(numbers[0]), last=int(numbers[-1]))
 
 
 def _keys(subject: Subject, clip: Clip) -> list[Finding]:
@@ -88,9 +90,10 @@ def _keys(subject: Subject, clip: Clip) -> list[Finding]:
     channel = next(index for index, found in enumerate(times) if len(found))
     return [
         subject.found(
-            "C002.plain",
-            message=f"{counted(count, 'key', 'lies', 'lie')} at the time of the one before, first in "
-            f"channel {channel} at {number_text(float(times[channel][0]))} s",
+            "C002.keys",
+            n=count,
+            channel=channel,
+            time=float(times[channel][0]),
             part="clip",
             times=np.unique(np.concatenate(times)) + subject.actor.offset,
             at=("channels", channel),
@@ -110,17 +113,13 @@ def _outside(subject: Subject, clip: Clip, skeleton: Skeleton) -> list[Finding]:
     worst = int(outside[beyond[:, outside].max(axis=0).argmax()])
     row = int(beyond[:, worst].argmax())
     number = int(frame_numbers(subject, times[row : row + 1])[0])
-    text = beyond_text(
-        skeleton,
-        int(targets[worst]),
-        float(values[row, worst]),
-        f" in frame {number} at {number_text(times[row] + subject.actor.offset, '.3f')} s",
-    )
+    when = Phrase("in-frame", frame=number, time=float(times[row] + subject.actor.offset))
     order = np.flatnonzero((beyond > _ROUNDING).any(axis=1))
     return [
         subject.found(
-            "C006.plain",
-            message=f"{counted(len(outside), 'curve', 'leaves its', 'leave their')} limits: {text}",
+            "C006.curves",
+            n=len(outside),
+            dof=beyond_text(skeleton, int(targets[worst]), float(values[row, worst]), when),
             part="clip",
             joints=np.unique(skeleton.dof_joints[targets[outside]]),
             times=times[order] + subject.actor.offset,
@@ -136,46 +135,87 @@ def _jumps(subject: Subject, track: Track, skeleton: Skeleton) -> list[Finding]:
     speeds = np.zeros((len(track.times), skeleton.n_joints))
     steps = np.linalg.norm(np.diff(track.positions, axis=0), axis=2)
     speeds[1:] = steps / np.diff(track.times)[:, None]
-    return _too_fast(subject, track, skeleton, speeds, limit, "C003")
+    fast = _too_fast(track, speeds, limit)
+    if fast is None:
+        return []
+    return [
+        subject.found(
+            "C003.joint",
+            n=len(fast.rows),
+            all=track.n_frames,
+            joint=joint_labels(skeleton)[fast.joints[0]],
+            speed=subject.speed(fast.rate / track.scale),
+            limit=subject.speed(limit / track.scale),
+            frame=int(track.numbers[fast.worst]),
+            time=float(track.times[fast.worst]),
+            part="clip",
+            joints=fast.joints,
+            frames=track.numbers[fast.rows],
+            times=track.times[fast.rows],
+            at=("frames", fast.worst),
+        )
+    ]
 
 
 def _turns(subject: Subject, track: Track, skeleton: Skeleton) -> list[Finding]:
     rates = np.zeros((len(track.times), skeleton.n_joints))
     cosines = np.abs(np.einsum("fjq,fjq->fj", track.rotations[1:], track.rotations[:-1]))
     rates[1:] = 2.0 * np.arccos(np.minimum(cosines, 1.0)) / np.diff(track.times)[:, None]
-    return _too_fast(subject, track, skeleton, rates, subject.options.max_turn, "C004")
-
-
-def _too_fast(
-    subject: Subject, track: Track, skeleton: Skeleton, rates: Floats, limit: float, code: str
-) -> list[Finding]:
-    """Report frames in which a joint came from the frame before faster than the limit."""
-    rates[1:][~(track.present[1:] & track.present[:-1])] = 0.0
-    fastest = rates.max(axis=1)
-    frames = np.flatnonzero(fastest > limit)
-    if len(frames) == 0:
+    fast = _too_fast(track, rates, subject.options.max_turn)
+    if fast is None:
         return []
-    frames = frames[np.argsort(-fastest[frames], kind="stable")]
-    rate = float(fastest[frames[0]])
-    # Of joints that move as one, up to rounding, the parent of the others is named.
-    joint = int((rates[frames[0]] >= (1.0 - _ALIKE) * rate).argmax())
-    label = joint_labels(skeleton)[joint]
-    if code == "C003":
-        speed, most = (subject.speed(value / track.scale) for value in (rate, limit))
-        how = f"moves at {speed} (limit {most})"
-    else:
-        how = f"turns by {np.degrees(rate):.0f} degrees a second (limit {np.degrees(limit):.0f})"
-    joints = np.flatnonzero((rates > limit).any(axis=0))
-    each = track.of_each(frames)
     return [
         subject.found(
-            f"{code}.plain",
-            message=f"{counted(len(each), 'frame', of=track.n_frames)}: {label} {how} to frame "
-            f"{track.numbers[frames[0]]} at {number_text(track.times[frames[0]], '.3f')} s",
+            "C004.joint",
+            n=len(fast.rows),
+            all=track.n_frames,
+            joint=joint_labels(skeleton)[fast.joints[0]],
+            rate=math.degrees(fast.rate),
+            limit=math.degrees(subject.options.max_turn),
+            frame=int(track.numbers[fast.worst]),
+            time=float(track.times[fast.worst]),
             part="clip",
-            joints=np.concatenate([[joint], joints[joints != joint]]),
-            frames=track.numbers[each],
-            times=track.times[each],
-            at=("frames", int(frames[0])),
+            joints=fast.joints,
+            frames=track.numbers[fast.rows],
+            times=track.times[fast.rows],
+            at=("frames", fast.worst),
         )
     ]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _TooFast:
+    """Joints that come from the frame before faster than a limit.
+
+    Attributes
+    ----------
+    rate : float
+        The highest, per second.
+    worst : int
+        The row of a track that it leads to.
+    rows : (N,)
+        One for each frame with such a joint, the worst first.
+    joints : (J,)
+        The fastest first.
+    """
+
+    rate: float
+    worst: int
+    rows: Indices
+    joints: Indices
+
+
+def _too_fast(track: Track, rates: Floats, limit: float) -> _TooFast | None:
+    """Return the joints that are faster than a limit; rates (F, J) are per second."""
+    rates[1:][~(track.present[1:] & track.present[:-1])] = 0.0
+    fastest = rates.max(axis=1)
+    rows = np.flatnonzero(fastest > limit)
+    if len(rows) == 0:
+        return None
+    rows = rows[np.argsort(-fastest[rows], kind="stable")]
+    rate = float(fastest[rows[0]])
+    # Of joints that move as one, up to rounding, the parent of the others is named.
+    joint = int((rates[rows[0]] >= (1.0 - _ALIKE) * rate).argmax())
+    joints = np.flatnonzero((rates > limit).any(axis=0))
+    first_then_others = np.concatenate([[joint], joints[joints != joint]])
+    return _TooFast(rate, int(rows[0]), track.of_each(rows), first_then_others)

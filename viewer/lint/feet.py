@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.errors import counted
+from viewer.diagnostics import Phrase
 from viewer.lint._finding import Finding, Subject
 from viewer.lint._ground import Ground, ground_of
 from viewer.lint._soles import extent
 from viewer.lint._tracks import Track, track_of
-from viewer.phrases import listed
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure
 from viewer.rig.skeleton import joint_labels
@@ -69,13 +68,13 @@ def _moving(subject: Subject, figure: Figure) -> Track | None:
 
 def _unsure(subject: Subject, found: Ground, step: float) -> Finding:
     """Say that nobody knows where the ground is, so that feet were not checked."""
-    if found.levels:
-        shown = listed([f"{level:.4g} for {count * step:.2g} s" for level, count in found.levels])
-        why = f"feet rest at {counted(len(found.levels), 'height')}, {shown}"
-    else:
-        why = "feet rest at no height for long"
-    text = f"{why}: it is not clear where the ground is, and they were not checked"
-    return subject.found("C013.plain", message=text, part="clip")
+    if not found.levels:
+        return subject.found("C013.no-height", part="clip")
+    levels = [
+        Phrase("resting-height", height=height, seconds=count * step)
+        for height, count in found.levels
+    ]
+    return subject.found("C013.heights", n=len(levels), levels=levels, part="clip")
 
 
 def _sunk(
@@ -100,10 +99,12 @@ def _sunk(
     each = track.of_each(frames)
     return [
         subject.found(
-            "C008.plain",
-            message=f"{counted(len(each), 'frame', of=track.n_frames)}: {labels[worst]} is "
-            f"{subject.length(deepest[frames[0]] / track.scale)} below the ground in frame "
-            f"{track.numbers[frames[0]]}",
+            "C008.foot",
+            n=len(each),
+            all=track.n_frames,
+            joint=labels[worst],
+            depth=subject.length(float(deepest[frames[0]] / track.scale)),
+            frame=int(track.numbers[frames[0]]),
             part="clip",
             joints=[feet[worst]],
             frames=track.numbers[each],
@@ -142,11 +143,13 @@ def _slipped(
     each = track.of_each(np.concatenate([[fastest + width], frames]))
     return [
         subject.found(
-            "C007.plain",
-            message=f"{counted(len(each), 'frame', of=track.n_frames)}: {labels[worst]} slides by "
-            f"{subject.length(paths[worst] / track.scale)} in all, at most "
-            f"{subject.speed(speeds[fastest, worst] / track.scale)} to frame "
-            f"{track.numbers[fastest + width]}",
+            "C007.foot",
+            n=len(each),
+            all=track.n_frames,
+            joint=labels[worst],
+            distance=subject.length(float(paths[worst] / track.scale)),
+            speed=subject.speed(float(speeds[fastest, worst] / track.scale)),
+            frame=int(track.numbers[fastest + width]),
             part="clip",
             joints=[feet[worst]],
             frames=track.numbers[each],

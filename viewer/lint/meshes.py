@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.errors import counted
 from viewer.lint._finding import Finding, Subject
 from viewer.lint._topology import Edges, edges_of, orientations, welded
 from viewer.rig.arrays import Bools, Floats, Ints
@@ -72,9 +71,10 @@ def _flat(subject: Subject, flat: Bools) -> list[Finding]:
         return []
     return [
         subject.found(
-            "M001.plain",
-            message=f"{counted(len(triangles), 'triangle', 'has', 'have', of=len(flat))} no area, first "
-            f"triangle {triangles[0]}",
+            "M001.triangles",
+            n=len(triangles),
+            all=len(flat),
+            triangle=int(triangles[0]),
             triangles=triangles,
             at=("triangles", int(triangles[0])),
         )
@@ -92,9 +92,9 @@ def _doubled(subject: Subject, mesh: Mesh, whole: Indices) -> list[Finding]:
         return []
     return [
         subject.found(
-            "M011.plain",
-            message=f"{counted(len(copies), 'triangle', 'has', 'have')} the corners of another one, first "
-            f"triangle {copies[0]}",
+            "M011.triangles",
+            n=len(copies),
+            triangle=int(copies[0]),
             triangles=copies,
             at=("triangles", int(copies[0])),
         )
@@ -112,9 +112,11 @@ def _crowded_edges(subject: Subject, mesh: Mesh, whole: Indices) -> list[Finding
     vertices = np.unique(ends)
     return [
         subject.found(
-            "M006.plain",
-            message=f"{counted(len(ends), 'edge', 'belongs', 'belong')} to more than two triangles, at "
-            f"most {int(edges.counts.max())}, first between vertices {ends[0, 0]} and {ends[0, 1]}",
+            "M006.edges",
+            n=len(ends),
+            most=int(edges.counts.max()),
+            vertex=int(ends[0, 0]),
+            other=int(ends[0, 1]),
             triangles=triangles,
             vertices=vertices,
             at=("positions", int(ends[0, 0])),
@@ -138,12 +140,12 @@ def _sides(
     findings = []
     if flipped.any():
         triangles = sound[flipped]
-        wound = ("is wound against its", "are wound against their")
         findings.append(
             subject.found(
-                "M002.plain",
-                message=f"{counted(len(triangles), 'triangle', *wound, of=mesh.n_triangles)} neighbours, "
-                f"first triangle {triangles[0]}",
+                "M002.triangles",
+                n=len(triangles),
+                all=mesh.n_triangles,
+                triangle=int(triangles[0]),
                 triangles=triangles,
                 at=("triangles", int(triangles[0])),
             )
@@ -152,9 +154,9 @@ def _sides(
         triangles = sound[one_sided]
         findings.append(
             subject.found(
-                "M012.plain",
-                message=f"a surface of {counted(len(triangles), 'triangle')} has no two sides, with "
-                f"triangle {triangles[0]}",
+                "M012.surface",
+                n=len(triangles),
+                triangle=int(triangles[0]),
                 triangles=triangles,
                 at=("triangles", int(triangles[0])),
             )
@@ -175,9 +177,10 @@ def _borders(subject: Subject, mesh: Mesh, sound: Indices, border: Bools) -> lis
     first = ends[np.lexsort(ends.T[::-1])[0]]
     return [
         subject.found(
-            "M005.plain",
-            message=f"{counted(len(ends), 'edge', 'belongs', 'belong')} to one triangle only, first "
-            f"between vertices {first[0]} and {first[1]}",
+            "M005.edges",
+            n=len(ends),
+            vertex=int(first[0]),
+            other=int(first[1]),
             vertices=vertices,
             triangles=sound[np.unique(np.flatnonzero(border) // 3)],
             at=("positions", int(first[0])),
@@ -220,9 +223,10 @@ def _inside_out(
     triangles = sound[np.isin(component, wrong)]
     return [
         subject.found(
-            "M003.plain",
-            message=f"{counted(len(wrong), 'closed part')} with {counted(len(triangles), 'triangle')} "
-            f"{'is' if len(wrong) == 1 else 'are'} inside out, first triangle {triangles[0]}",
+            "M003.parts",
+            n=len(wrong),
+            n_triangles=len(triangles),
+            triangle=int(triangles[0]),
             triangles=triangles,
             at=("triangles", int(triangles[0])),
         )
@@ -247,9 +251,9 @@ def _normals(subject: Subject, mesh: Mesh) -> list[Finding]:
     if len(zero):
         findings.append(
             subject.found(
-                "M007.plain",
-                message=f"{counted(len(zero), 'normal', 'has', 'have')} length 0, first of vertex "
-                f"{zero[0]}",
+                "M007.normals",
+                n=len(zero),
+                vertex=int(zero[0]),
                 vertices=zero,
                 at=("normals", int(zero[0])),
             )
@@ -259,9 +263,10 @@ def _normals(subject: Subject, mesh: Mesh) -> list[Finding]:
         odd = odd[np.argsort(-np.abs(lengths[odd] - 1.0), kind="stable")]
         findings.append(
             subject.found(
-                "M008.plain",
-                message=f"{counted(len(odd), 'normal', 'is', 'are')} not of length 1, that of vertex "
-                f"{odd[0]} is {lengths[odd[0]]:.4g} long",
+                "M008.normals",
+                n=len(odd),
+                vertex=int(odd[0]),
+                length=float(lengths[odd[0]]),
                 vertices=odd,
                 at=("normals", int(odd[0])),
             )
@@ -286,13 +291,12 @@ def _against(subject: Subject, mesh: Mesh, sound: Indices) -> list[Finding]:
     against = np.flatnonzero((numbers > 0) & (opposed == numbers) & ~_beside_lost(subject, mesh))
     if len(against) == 0:
         return []
-    used = int((numbers > 0).sum())
-    point = "points against all of its" if len(against) == 1 else "point against all of their"
     return [
         subject.found(
-            "M009.plain",
-            message=f"{counted(len(against), 'normal', of=used)} {point} triangles, first of vertex "
-            f"{against[0]}",
+            "M009.normals",
+            n=len(against),
+            all=int((numbers > 0).sum()),
+            vertex=int(against[0]),
             vertices=against,
             at=("normals", int(against[0])),
         )
@@ -307,9 +311,10 @@ def _vertices(subject: Subject, mesh: Mesh) -> list[Finding]:
     if len(unused):
         findings.append(
             subject.found(
-                "M004.plain",
-                message=f"{counted(len(unused), 'vertex', 'belongs', 'belong', of=mesh.n_vertices)} to no "
-                f"triangle, first vertex {unused[0]}",
+                "M004.vertices",
+                n=len(unused),
+                all=mesh.n_vertices,
+                vertex=int(unused[0]),
                 vertices=unused,
                 at=("positions", int(unused[0])),
             )
@@ -321,9 +326,10 @@ def _vertices(subject: Subject, mesh: Mesh) -> list[Finding]:
         far = far[np.argsort(-distances[far], kind="stable")]
         findings.append(
             subject.found(
-                "M010.plain",
-                message=f"{counted(len(far), 'vertex', 'is', 'are')} far from the others, vertex {far[0]} "
-                f"by {distances[far[0]] / typical:.2g} times what is usual",
+                "M010.vertices",
+                n=len(far),
+                vertex=int(far[0]),
+                ratio=float(distances[far[0]] / typical),
                 vertices=far,
                 at=("positions", int(far[0])),
             )

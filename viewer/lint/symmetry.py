@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.errors import RigError, counted
+from viewer.errors import RigError
 from viewer.lint._finding import Finding, Subject
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
@@ -52,12 +52,12 @@ def _positions(subject: Subject, figure: Figure, mesh: Mesh) -> list[Finding]:
         return []
     off = off[np.argsort(-distances[off], kind="stable")]
     worst = int(off[0])
-    where = "is not where its partner's" if len(off) == 1 else "are not where their partners'"
     return [
         subject.found(
-            "Y001.plain",
-            message=f"{counted(len(off), 'vertex')} {where} mirror images are: "
-            f"{subject.length(distances[worst])} at vertex {worst}",
+            "Y001.positions",
+            n=len(off),
+            distance=subject.length(float(distances[worst])),
+            vertex=worst,
             severity="warning" if distances[worst] > _ASKEW * size else "note",
             vertices=off,
             at=("positions", worst),
@@ -74,12 +74,12 @@ def _weights(
         return []
     off = off[np.argsort(-differences[off], kind="stable")]
     worst = int(off[0])
-    whose = "its partner's" if len(off) == 1 else "their partners'"
     return [
         subject.found(
-            "Y002.plain",
-            message=f"weights of {counted(len(off), 'vertex')} differ from {whose}: by "
-            f"{differences[worst]:.3g} in sum at vertex {worst}",
+            "Y002.weights",
+            n=len(off),
+            difference=float(differences[worst]),
+            vertex=worst,
             severity="warning" if differences[worst] > _UNEQUAL else "note",
             vertices=off,
             at=("weights", worst),

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from viewer.errors import RigError, printable
+from viewer.diagnostics import Diagnostic
+from viewer.errors import RigError
 from viewer.formats.pose import pose_error
 from viewer.loading.contents import Contents
 from viewer.loading.covering import with_texture
@@ -16,7 +17,7 @@ from viewer.rig.scene import Actor
 __all__ = ["add_to_actor", "apply_pose"]
 
 
-def add_to_actor(contents: Contents, actor: Actor) -> tuple[Actor, list[str]]:
+def add_to_actor(contents: Contents, actor: Actor) -> tuple[Actor, list[Diagnostic]]:
     """Apply poses and pictures to an actor that is open already.
 
     Parameters
@@ -30,7 +31,7 @@ def add_to_actor(contents: Contents, actor: Actor) -> tuple[Actor, list[str]]:
     -------
     actor : Actor
         A new one, with the same pose, if it has another texture.
-    notes : list of str
+    notes : list of Diagnostic
         What could not be taken over exactly.
 
     Raises
@@ -40,13 +41,14 @@ def add_to_actor(contents: Contents, actor: Actor) -> tuple[Actor, list[str]]:
     RigError
         If a picture does not, or there is nothing to pose.
     """
-    notes: list[str] = []
+    notes: list[Diagnostic] = []
     trial = actor.copy()
     for path, pixels in contents.pictures:
         trial.figure = with_texture(trial.figure, path, pixels)
     for path, record in contents.poses:
         if trial.pose is None:
-            raise RigError(f"{printable(path, 300)} is a pose, {actor.figure.name} has no skeleton")
+            values = {"figure": actor.figure.name}
+            raise RigError(Diagnostic("F004.pose", path, values=values))
         notes += apply_pose(path, record, trial)
     # Nothing fails from here on.
     if actor.pose is not None and trial.pose is not None:
@@ -56,7 +58,7 @@ def add_to_actor(contents: Contents, actor: Actor) -> tuple[Actor, list[str]]:
     return actor if is_same else replace(actor, figure=trial.figure), notes
 
 
-def apply_pose(path: Path, record: PoseRecord, actor: Actor) -> list[str]:
+def apply_pose(path: Path, record: PoseRecord, actor: Actor) -> list[Diagnostic]:
     """Pose an actor by a record that came from a file; return what could not be taken over.
 
     Raises
@@ -65,9 +67,8 @@ def apply_pose(path: Path, record: PoseRecord, actor: Actor) -> list[str]:
         If it does not fit; the actor is then as it was.
     """
     assert actor.pose is not None  # the callers looked
-    shown = printable(path, 300)
     try:
         notes = apply_record(record, actor.figure, actor.pose, cut=True)
-        return [f"{shown}: {note}" for note in notes]
+        return [replace(note, path=path) for note in notes]
     except RigError as problem:
         raise pose_error(path, record, problem) from None

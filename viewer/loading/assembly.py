@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from viewer.errors import FormatError, RigError, printable
+from viewer.diagnostics import Diagnostic
+from viewer.errors import FormatError, RigError
 from viewer.loading.additions import apply_pose
 from viewer.loading.cast import Cast
 from viewer.loading.contents import Contents
@@ -31,14 +32,14 @@ _GAP = 0.25  # between actors side by side, in widths of the wider one
 def assemble(contents: Contents, settings: MotionSettings | None = None) -> Scene:
     """Make actors of figures and motions, and read captures to their end; see ``load``."""
     scene, builders = begin(contents, settings)
-    notes: list[str] = []
+    notes: list[Diagnostic] = []
     for builder in builders:
         while not builder.is_done:
             new, more = builder.read_some()
             scene.actors += new
             notes += more
     if notes:
-        scene.warnings = (*scene.warnings, *notes)
+        scene.diagnostics = (*scene.diagnostics, *notes)
     return scene
 
 
@@ -83,15 +84,15 @@ def begin(
         for actor in cast.actors:
             pose_actor(actor, start)
     for path, record in contents.poses:
-        cast.notes += _assign_pose(path, record, cast.actors)
+        cast.diagnostics += _assign_pose(path, record, cast.actors)
     for path, pixels in contents.pictures:
         _assign_picture(path, pixels, cast.actors)
     world_up = next((up for up, placed in zip(cast.ups, cast.placed, strict=True) if placed), None)
     world_up = world_up or next(iter(cast.ups), "y")
     _stand_up(cast, world_up)
     _place_side_by_side(cast)
-    warnings = (*contents.warnings, *cast.notes)
-    scene = Scene(cast.actors, warnings, "z" if world_up == "z" else "y", tuple(cast.views))
+    found = (*contents.diagnostics, *cast.diagnostics)
+    scene = Scene(cast.actors, found, "z" if world_up == "z" else "y", tuple(cast.views))
     scene.files = contents.files
     if settings is not None and settings.model is not None:
         scene.files += (settings.model,)
@@ -141,21 +142,19 @@ def _give_morphs(contents: Contents, cast: Cast) -> None:
             try:
                 if figure.skeleton is None and figure.mesh is not None:
                     figure = on_one_joint(figure)
-                    cast.notes.append(
-                        f"{printable(figure.name, 60)}: without its .skel only the morphs move it"
-                    )
+                    cast.note("F007.only-morphs", figure=figure.name)
                 actors[index] = Actor(with_morphs(figure, [target]), called=actor.called)
                 break
             except RigError as refused:
                 problem = problem or refused
         else:
-            shown = printable(path, 300)
-            raise RigError(
-                f"{shown}: {problem}" if problem else f"{shown}: open it together with its .skin"
-            )
+            if problem is None:
+                raise RigError(Diagnostic("F004.morph-alone", path))
+            values = {"problem": str(problem)}
+            raise RigError(Diagnostic("F004.morph", path, values=values))
 
 
-def _assign_pose(path: Path, record: PoseRecord, actors: list[Actor]) -> list[str]:
+def _assign_pose(path: Path, record: PoseRecord, actors: list[Actor]) -> list[Diagnostic]:
     """Pose the first actor that a record fits."""
     problem: FormatError | None = None
     for actor in actors:
@@ -164,7 +163,7 @@ def _assign_pose(path: Path, record: PoseRecord, actors: list[Actor]) -> list[st
                 return apply_pose(path, record, actor)
             except FormatError as found:
                 problem = problem or found
-    raise problem or RigError(f"{printable(path, 300)} is a pose: open it together with a figure")
+    raise problem or RigError(Diagnostic("F004.pose-alone", path))
 
 
 def _assign_picture(path: Path, pixels: Bytes, actors: list[Actor]) -> None:
@@ -177,9 +176,10 @@ def _assign_picture(path: Path, pixels: Bytes, actors: list[Actor]) -> None:
     bare = [a for a in open_for_it if a.figure.mesh is not None and not a.figure.mesh.materials]
     chosen = next(iter(bare or open_for_it), None)
     if chosen is None:
-        names = ", ".join(actor.figure.name for actor in actors)
-        missing = f"{names} has no texture coordinates" if names else "open it with a figure"
-        raise RigError(f"{printable(path, 300)} is a picture: {missing}")
+        if not actors:
+            raise RigError(Diagnostic("F004.picture-alone", path))
+        values = {"figures": [actor.figure.name for actor in actors]}
+        raise RigError(Diagnostic("F004.picture", path, values=values))
     chosen.figure = with_texture(chosen.figure, path, pixels)
 
 
@@ -189,19 +189,13 @@ def _join(parts: list[tuple[Path, Figure]]) -> Figure:
         return parts[0][1]
     paths, figures = [path for path, _ in parts], [figure for _, figure in parts]
     skeleton, skin = figures[0].skeleton, figures[1].skin
-    skel_path, skin_path = (printable(path, 300) for path in paths)
     assert skeleton is not None  # the pairs put it first
     if skin is None:
-        raise FormatError(
-            paths[1],
-            f"expected weights and bindings to follow the {skeleton.n_joints} joints of "
-            f"{skel_path}, found none",
-        )
+        values = {"n": skeleton.n_joints, "skeleton": paths[0]}
+        raise FormatError(Diagnostic("F004.skin", paths[1], values=values))
     if skin.n_joints != skeleton.n_joints:
-        raise RigError(
-            f"{skin_path} has {skin.n_joints} binding matrices, "
-            f"{skel_path} has {skeleton.n_joints} joints"
-        )
+        values = {"n": skin.n_joints, "skeleton": paths[0], "joints": skeleton.n_joints}
+        raise RigError(Diagnostic("B001.joints", paths[1], values=values))
     facts = (*figures[0].facts, *figures[1].facts)
     return Figure(paths[1].stem, figures[1].mesh, skeleton, skin, facts=facts)
 

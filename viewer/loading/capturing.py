@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
+from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.captures.capture import Capture, CapturePart
@@ -44,6 +46,8 @@ class Builder:
     ----------
     capture : Capture
         What is read.
+    path : Path or None
+        Its file or folder, for remarks.
     model : Figure
         What its bodies are drawn with.
     called : str
@@ -72,6 +76,7 @@ class Builder:
     is_cut: bool = False
     has_shape: bool = False
     has_expression: bool = False
+    path: Path | None = None
     _names_shapes: bool = False  # whether anybody has shapes, if only zeros
     _parts: Iterator[CapturePart] | None = None
     _bodies: dict[int, Actor] = field(default_factory=dict)
@@ -89,7 +94,7 @@ class Builder:
             self._parts = self.capture.parts()
         return self._parts
 
-    def read_some(self) -> tuple[list[Actor], list[str]]:
+    def read_some(self) -> tuple[list[Actor], list[Diagnostic]]:
         """Read the next part; return the actors that are new, and what was noticed."""
         part = next(self.parts(), None)
         if part is None:
@@ -97,15 +102,15 @@ class Builder:
             return [], []
         return self.add(part)
 
-    def add(self, part: CapturePart) -> tuple[list[Actor], list[str]]:
+    def add(self, part: CapturePart) -> tuple[list[Actor], list[Diagnostic]]:
         """Take in one part.
 
         Returns
         -------
         new : list of Actor
             People who appear for the first time; posed as at the start.
-        notes : list of str
-            One line each, none twice.
+        notes : list of Diagnostic
+            None twice.
 
         Raises
         ------
@@ -113,7 +118,7 @@ class Builder:
             If the bodies do not fit the model.
         """
         new: list[Actor] = []
-        notes = [*map(str, part.warnings)]
+        notes = [*part.warnings]
         for person, motion in sorted(part.bodies.items(), key=_order):
             notes += self._add_body(person, motion, new)
         for person, (layout, clip) in sorted(part.points.items(), key=_order):
@@ -122,18 +127,18 @@ class Builder:
         notes += self._shape_notes()
         for actor in new:
             pose_actor(actor, 0.0)
-        fresh = [note for note in dict.fromkeys(notes) if note not in self._notes]
+        fresh = {str(note): note for note in reversed(notes) if str(note) not in self._notes}
         self._notes.update(fresh)
-        return new, fresh
+        return new, [*reversed(fresh.values())]
 
-    def _shape_notes(self) -> list[str]:
+    def _shape_notes(self) -> list[Diagnostic]:
         """Say at the end that bodies have the model's mean shape because no file has another."""
         lacks = self._bodies and self.model.n_shapes and not self._names_shapes
         if not (self.is_done and self.keeps_shape and lacks):
             return []
-        return [f"{self.capture.name}: no shapes in the files: all have the model's mean shape"]
+        return [Diagnostic("F007.no-shapes", self.path)]
 
-    def _add_body(self, person: int, motion: BodyMotion, new: list[Actor]) -> list[str]:
+    def _add_body(self, person: int, motion: BodyMotion, new: list[Actor]) -> list[Diagnostic]:
         self.has_shape |= motion.shape is not None and bool(motion.shape.any())
         self.has_expression |= motion.expression is not None
         self._names_shapes |= motion.shape is not None
@@ -150,11 +155,11 @@ class Builder:
             assert isinstance(actor.clip, SampledClip)  # as it was made above
             timing = joined_timing(actor.clip.timing, clip.timing, actor.clip.n_rows)
             actor.clip = joined([actor.clip, clip], timing)
-        return notes
+        return [replace(note, path=self.path) for note in notes]
 
     def _add_points(
         self, person: int, layout: PointLayout, clip: PointClip, new: list[Actor]
-    ) -> list[str]:
+    ) -> list[Diagnostic]:
         actor = self._points.get(person)
         if actor is None:
             figure = Figure(layout.title, points=layout, up=self.up)
@@ -165,11 +170,13 @@ class Builder:
         known = actor.figure.points
         assert isinstance(actor.clip, PointClip) and known is not None  # as it was made above
         if len(known.names) != len(layout.names):
-            frame = self.n_read + self.capture.first_frame
-            return [
-                f"{self.capture.name}: {person_label(person)} has {len(layout.names)} keypoints in "
-                f"frames from {frame} on, {len(known.names)} before; those frames are left out"
-            ]
+            values = {
+                "person": person_label(person),
+                "n": len(layout.names),
+                "frame": self.n_read + self.capture.first_frame,
+                "known": len(known.names),
+            }
+            return [Diagnostic("C005.keypoint-count", self.path, values=values)]
         actor.clip = joined_points(actor.clip, clip)
         return []
 
@@ -201,8 +208,9 @@ class Builder:
 
     def refusal(self, problem: RigError) -> RigError:
         """Return a refusal that says which model would fit."""
-        wanted = f"a {self.capture.model} model" if self.capture.model else "the model"
-        return RigError(f"{self.capture.name}: {problem}; name {wanted} with --model")
+        values = {"problem": str(problem), "member": self.capture.model}
+        key = "F004.capture-of-member" if self.capture.model else "F004.capture"
+        return RigError(Diagnostic(key, self.path, values=values))
 
 
 def _order(item: tuple[int, object]) -> tuple[bool, int]:

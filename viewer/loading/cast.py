@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+from viewer.diagnostics import Diagnostic
 from viewer.rig.scene import Actor, free_title
 
 if TYPE_CHECKING:
@@ -30,8 +32,8 @@ class Cast:
         Captures that are still being read.
     views : list of CameraView
         Calibrated cameras, in the scene.
-    notes : list of str
-        One line each.
+    diagnostics : list of Diagnostic
+        What was noticed while it was put together.
     """
 
     actors: list[Actor]
@@ -39,7 +41,11 @@ class Cast:
     placed: list[bool] = field(default_factory=list)
     builders: list[Builder] = field(default_factory=list)
     views: list[CameraView] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
+    diagnostics: list[Diagnostic] = field(default_factory=list)
+
+    def note(self, key: str, path: Path | None = None, **values: Any) -> None:
+        """Record a remark about a file, or about none; ``values`` are what its message shows."""
+        self.diagnostics.append(Diagnostic(key, path, values=values))
 
     def free_title(self, title: str) -> str:
         """Return a title for one more actor, or all people of one more capture."""

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
-from viewer.errors import FormatError, printable
+from viewer.diagnostics import Diagnostic
+from viewer.errors import FormatError
 from viewer.formats import (
     MAX_SIZE,
     Source,
@@ -47,7 +48,7 @@ class Contents:
     ----------
     called : dict
         What a figure is called whose file, resolved, was named by one that was opened.
-    warnings : tuple of str
+    diagnostics : tuple of Diagnostic
         What the readers noticed.
     files : tuple of Path
         All that was read.
@@ -62,8 +63,13 @@ class Contents:
     captures: list[tuple[Path, Capture]] = field(default_factory=list)
     morphs: list[tuple[Path, MorphTarget]] = field(default_factory=list)
     called: dict[Path, str] = field(default_factory=dict)
-    warnings: tuple[str, ...] = ()
+    diagnostics: tuple[Diagnostic, ...] = ()
     files: tuple[Path, ...] = ()
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the readers noticed, one line each."""
+        return tuple(map(str, self.diagnostics))
 
     @property
     def has_motion(self) -> bool:
@@ -103,7 +109,9 @@ def read_files(
                 called = contents.called.get(source.path.resolve(), source.path.stem)
                 contents.called[path.resolve()] = called
                 sources.append(Source.open(path, max_size))
-    contents.warnings = tuple(text for source in sources for text in source.warnings)
+    contents.diagnostics = tuple(
+        found for source in sources for found in source.diagnostics.warnings
+    )
     read = (path for source in sources for path in (source.path, *source.also_read))
     contents.files = tuple(dict.fromkeys(read))
     return contents
@@ -190,15 +198,15 @@ def _with_own_picture(source: Source, figure: Figure) -> Figure:
         inside = source.inside(path.name)
         if path.is_file() and _is_picture(inside):
             if referenced_path(source.path, path.name) is None:
-                source.warn(f"texture {printable(path.name)} lies outside the folder: not read")
+                source.warn("F005.texture-outside", name=path.name)
                 continue
             pictures.append(inside)
     if len(pictures) > 1:
-        source.warn(f"{len(pictures)} pictures in the folder: name the texture to show it")
+        source.warn("F007.several-pictures", n=len(pictures))
     if len(pictures) != 1:
         return figure
     try:
         return with_texture(figure, pictures[0].path, read_picture(pictures[0]))
     except FormatError as problem:
-        source.warn(f"texture {problem}; drawn untextured")
+        source.warn("F005.texture-unreadable", problem=problem.diagnostic)
         return figure

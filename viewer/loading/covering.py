@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.errors import RigError, printable
+from viewer.diagnostics import Diagnostic
+from viewer.errors import RigError
 from viewer.rig.arrays import Bytes
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Material
@@ -25,9 +26,8 @@ def with_texture(figure: Figure, path: Path, pixels: Bytes) -> Figure:
     """
     mesh = figure.mesh
     if mesh is None or mesh.uvs is None:
-        raise RigError(
-            f"{printable(path, 300)} is a picture, {figure.name} has no texture coordinates"
-        )
+        values = {"figures": [figure.name]}
+        raise RigError(Diagnostic("F004.picture", path, values=values))
     covered = replace(
         mesh,
         materials=(Material(name=path.stem, texture=path.name, image=pixels),),

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from viewer.errors import RigError, counted, printable
+from viewer.diagnostics import Diagnostic
+from viewer.errors import RigError
 from viewer.formats import Source, read
 from viewer.loading.bundled import bundled_body
 from viewer.loading.capturing import Builder
@@ -47,9 +48,7 @@ def drive(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
     drives = bool(contents.skeleton_motions) and settings.drives
     named = _named_model(cast, settings.model) if bodies or drives else None
     if settings.model is not None and named is None and contents.skeleton_motions:
-        cast.notes.append(
-            f"--model {printable(settings.model, 300)}: with --beside nothing moves it"
-        )
+        cast.note("F007.model-beside", model=settings.model)
     lone = _give_skeleton_motions(contents, cast, settings, named)
     if bodies:
         model, is_bundled = _model(cast, named)
@@ -90,16 +89,14 @@ def _give_clip(path: Path, clip: Clip, cast: Cast, contents: Contents) -> None:
         ):
             actor.clip = clip
             return
-    shown, count = printable(path, 300), len(clip.channels)
     first = next((skeleton for skeleton in skeletons if skeleton is not None), None)
     if first is None:
-        raise RigError(f"{shown} is a clip: open it together with its .skel")
+        raise RigError(Diagnostic("F004.clip-alone", path))
     if any(skeleton is not None and suits(clip, skeleton) for skeleton in skeletons):
-        raise RigError(f"{shown}: every skeleton that it fits has a clip already")
+        raise RigError(Diagnostic("F004.clip-taken", path))
     owner = next(path for path, figure in contents.figures if figure.skeleton)
-    raise RigError(
-        f"{shown} has {counted(count, 'channel')}, {printable(owner, 300)} {misfit(clip, first)}"
-    )
+    values = {"n": len(clip.channels), "skeleton": owner, "misfit": misfit(clip, first)}
+    raise RigError(Diagnostic("C009.clip", path, values=values))
 
 
 def is_body(figure: Figure) -> bool:
@@ -115,8 +112,8 @@ def _named_model(cast: Cast, path: Path | None) -> Figure | None:
     source = Source.open(path)
     model = read(source)
     if not isinstance(model, Figure) or model.skeleton is None or model.mesh is None:
-        raise source.error("--model: expected a body model")
-    cast.notes += source.warnings
+        raise source.fault("F002.no-body-model")
+    cast.diagnostics += source.diagnostics.warnings
     return model
 
 
@@ -141,11 +138,15 @@ def _is_bundled(figure: Figure) -> bool:
     return figure.blend_shapes is not None and "stature" in figure.blend_shapes.names
 
 
-def _on_bundled(path: Path, has_shape: bool, has_expression: bool) -> str:
-    given = ["shapes"] * has_shape + ["expressions"] * has_expression
-    lost = f", without the {' and '.join(given)} of the files, which mean nothing to it"
-    text = f"drawn with the bundled body{lost if given else ''} (--model names another)"
-    return f"{printable(path, 300)}: {text}"
+def _note_bundled(cast: Cast, path: Path, has_shape: bool, has_expression: bool) -> None:
+    """Say that the bundled body is shown, and what of the files it cannot take."""
+    key = {
+        (False, False): "F007.bundled-body",
+        (True, False): "F007.bundled-body-without-shapes",
+        (False, True): "F007.bundled-body-without-expressions",
+        (True, True): "F007.bundled-body-without-either",
+    }[has_shape, has_expression]
+    cast.note(key, path)
 
 
 def _give_body_motion(
@@ -159,15 +160,14 @@ def _give_body_motion(
     if settings.frame_rate is not None:
         motion = replace(motion, timing=replace(motion.timing, frame_rate=settings.frame_rate))
     if is_bundled:
-        cast.notes.append(
-            _on_bundled(path, motion.shape is not None, motion.expression is not None)
-        )
+        _note_bundled(cast, path, motion.shape is not None, motion.expression is not None)
         motion = replace(motion, shape=None, expression=None)
     try:
         clip, notes = body_clip(motion, model)
     except RigError as problem:
-        raise RigError(f"{printable(path, 300)}: {problem} (--model names the model)") from None
-    cast.notes += [f"{printable(path, 300)}: {note}" for note in notes]
+        values = {"problem": str(problem)}
+        raise RigError(Diagnostic("F004.model", path, values=values)) from None
+    cast.diagnostics += [replace(note, path=path) for note in notes]
     actor = Actor(model, clip=clip, called=cast.free_title(motion.name))
     up = settings.up or motion.up
     if not up:
@@ -183,9 +183,8 @@ def _judged_up(path: Path, actors: Sequence[Actor], cast: Cast, usual: str = "")
 
     up = guess_up(actors)
     if up != usual:
-        turned = ", so all is turned over" if up.startswith("-") else ""
-        text = f"taken for {up} up, judged by the people{turned}; --up sets it"
-        cast.notes.append(f"{printable(path, 300)}: {text}")
+        key = "F007.up-judged-over" if up.startswith("-") else "F007.up-judged"
+        cast.note(key, path, up=up)
     return up
 
 
@@ -199,15 +198,15 @@ def _begin_capture(
 ) -> None:
     """Read a capture until somebody is seen; the rest is read later."""
     called = cast.free_title(capture.name)
-    builder = Builder(capture, model, called=called, keeps_shape=not is_bundled)
-    cast.notes += map(str, capture.warnings)
+    builder = Builder(capture, model, called=called, keeps_shape=not is_bundled, path=path)
+    cast.diagnostics += capture.warnings
     while not builder.actors and not builder.is_done:
         try:
-            cast.notes += builder.read_some()[1]
+            cast.diagnostics += builder.read_some()[1]
         except RigError as problem:
             raise builder.refusal(problem) from None
     if is_bundled and any(actor.figure is model for actor in builder.actors):
-        cast.notes.append(_on_bundled(path, builder.has_shape, builder.has_expression))
+        _note_bundled(cast, path, builder.has_shape, builder.has_expression)
     # EasyMocap's usual calibration has z up, which needs no word.
     up = settings.up or capture.up or _judged_up(path, builder.actors, cast, usual="z")
     builder.place(up)

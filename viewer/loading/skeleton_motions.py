@@ -8,7 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from viewer.errors import RigError, printable
+from viewer.diagnostics import Diagnostic
+from viewer.errors import RigError
 from viewer.loading.cast import Cast
 from viewer.loading.settings import MotionSettings
 from viewer.rig.arrays import Floats
@@ -73,19 +74,21 @@ def give_skeleton_motion(
     RigError
         If it does not fit the model.
     """
-    motion, shown = _as_asked(motion, settings), printable(path, 300)
-    cast.notes += [f"{shown}: {note}; --up sets it" for note in motion.up_notes]
+    motion = _as_asked(motion, settings)
+    for note in motion.up_notes:
+        cast.note("F007.up-taken", path, note=note)
     turn = rotation_transform(0, np.pi) if settings.up.startswith("-") else np.eye(4)
     if settings.drives and model is not None:
         try:
             clip, notes = retarget(motion, model)
         except RigError as problem:
-            raise RigError(f"{shown}: {problem} (--model names the model)") from None
-        cast.notes += [f"{shown}: {note}" for note in notes]
+            values = {"problem": str(problem)}
+            raise RigError(Diagnostic("F004.model", path, values=values)) from None
+        cast.diagnostics += [replace(note, path=path) for note in notes]
         called = cast.free_title(motion.figure.name)
         cast.add(Actor(model, clip=clip, placement=turn, called=called), model.up, placed=False)
         return None
-    if settings.drives and _drives_somebody(shown, motion, cast, turn):
+    if settings.drives and _drives_somebody(path, motion, cast, turn):
         return None
     called = cast.free_title(motion.figure.name)
     actor = Actor(motion.figure, clip=motion.clip, placement=turn, called=called)
@@ -115,7 +118,7 @@ def _in_metres(motion: SkeletonMotion, unit: str, fact: str) -> SkeletonMotion:
     return replace(scaled, figure=replace(scaled.figure, facts=kept), unit_note="")
 
 
-def _drives_somebody(shown: str, motion: SkeletonMotion, cast: Cast, turn: Floats) -> bool:
+def _drives_somebody(path: Path, motion: SkeletonMotion, cast: Cast, turn: Floats) -> bool:
     """Give a motion to the first figure with a mesh and no clip that it fits, if there is one."""
     refusal = ""
     for actor in cast.actors:
@@ -127,10 +130,10 @@ def _drives_somebody(shown: str, motion: SkeletonMotion, cast: Cast, turn: Float
             refusal = refusal or str(problem)
             continue
         actor.placement = turn @ actor.placement
-        cast.notes += [f"{shown}: {note}" for note in notes]
+        cast.diagnostics += [replace(note, path=path) for note in notes]
         return True
     if refusal:
-        cast.notes.append(f"{shown} stands alone: {refusal}")
+        cast.note("F007.stands-alone", path, problem=refusal)
     return False
 
 
@@ -150,15 +153,14 @@ def agree_on_units(cast: Cast, lone: list[Lone]) -> None:
     for one in lone:
         if one in chosen:
             unit, facts = one.motion.figure.unit, dict(one.motion.figure.facts)
-            scaled = _in_metres(one.motion, unit, facts.get("unit", unit))
+            scaled = _in_metres(one.motion, unit, str(facts.get("unit", unit)))
             place = next(n for n, actor in enumerate(cast.actors) if actor is one.actor)
             cast.actors[place] = replace(
                 one.actor, figure=scaled.figure, clip=scaled.clip, pose=None
             )
         if one.motion.unit_note:
-            done = ", and scaled to metres beside others" * (one in chosen)
-            shown = printable(one.path, 300)
-            cast.notes.append(f"{shown}: {one.motion.unit_note}{done}; --unit sets it")
+            key = "F007.unit-taken-and-scaled" if one in chosen else "F007.unit-taken"
+            cast.note(key, one.path, note=one.motion.unit_note)
 
 
 def _is_odd(one: Lone, actors: list[Actor]) -> bool:

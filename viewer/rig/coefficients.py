@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
@@ -14,8 +15,8 @@ __all__ = ["apply_coefficients", "unused_coefficients"]
 _MOST_SIGMA = 1e6  # of a shape coefficient: beyond it the mesh has no shape
 
 
-def unused_coefficients(group: str, values: Floats, used: int, name: str) -> list[str]:
-    """Return a line on coefficients that a figure does not have; none if all of those are 0.
+def unused_coefficients(group: str, values: Floats, used: int, name: str) -> list[Diagnostic]:
+    """Return a remark on coefficients that a figure does not have; none if all of those are 0.
 
     Parameters
     ----------
@@ -31,17 +32,21 @@ def unused_coefficients(group: str, values: Floats, used: int, name: str) -> lis
     rest, count = values[..., used:], values.shape[-1]
     if not rest.any():
         return []
-    lost = (
-        f"coefficients {used + 1} to {count} were"
-        if count > used + 1
-        else f"coefficient {count} was"
-    )
-    return [f"{group} {lost} left out, as {name} has {used} (largest {np.abs(rest).max():.3g})"]
+    values_shown = {
+        "group": group,
+        "first": used + 1,
+        "last": count,
+        "figure": name,
+        "most": used,
+        "largest": float(np.abs(rest).max()),
+    }
+    key = "F007.coefficients-left-out" if count > used + 1 else "F007.coefficient-left-out"
+    return [Diagnostic(key, values=values_shown)]
 
 
 def apply_coefficients(
     group: str, values: Floats | None, figure: Figure, pose: Pose, cut: bool
-) -> list[str]:
+) -> list[Diagnostic]:
     """Set the weights of one group of blend shapes, in place; the others of the group become 0.
 
     Parameters
@@ -59,8 +64,8 @@ def apply_coefficients(
 
     Returns
     -------
-    list of str
-        What was left out, in a line.
+    list of Diagnostic
+        What was left out.
 
     Raises
     ------

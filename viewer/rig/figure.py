@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.rig.annotations import BodyParts, Keypoints, ReducedMesh, VertexField
 from viewer.rig.arrays import Floats, Ints, frozen
@@ -61,7 +62,7 @@ class Figure:
         Of a figure that is nothing but captured keypoints.
     fields : tuple of VertexField
         Numbers of the vertices that can be shown as colours.
-    facts : tuple of (str, str)
+    facts : tuple of (str, str or Diagnostic)
         What the reader found out, for ``viewer info``: a heading and a text each.
     """
 
@@ -82,7 +83,7 @@ class Figure:
     symmetry: Ints | None = None
     points: PointLayout | None = None
     fields: tuple[VertexField, ...] = ()
-    facts: tuple[tuple[str, str], ...] = ()
+    facts: tuple[tuple[str, str | Diagnostic], ...] = ()
 
     def __post_init__(self) -> None:
         if self.mesh is None and self.skeleton is None and self.points is None:

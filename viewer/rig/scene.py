@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 
+from viewer.diagnostics import Diagnostic
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.person import person_name
 from viewer.rig.figure import Figure, skeleton_points
@@ -141,8 +142,8 @@ class Scene:
     ----------
     actors : list of Actor
         In drawing order.
-    warnings : tuple of str
-        What the readers noticed, one line each.
+    diagnostics : tuple of Diagnostic
+        What the readers noticed.
     world_up : "y", "z" or None
         The axis that points up; None for that of the first figure.
     views : tuple of CameraView
@@ -154,11 +155,16 @@ class Scene:
     """
 
     actors: list[Actor]
-    warnings: tuple[str, ...] = ()
+    diagnostics: tuple[Diagnostic, ...] = ()
     world_up: Literal["y", "z"] | None = None
     views: tuple[CameraView, ...] = ()
     time: float | None = None
     files: tuple[Path, ...] = ()
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the readers noticed, one line each."""
+        return tuple(map(str, self.diagnostics))
 
     @property
     def title(self) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -11,6 +12,7 @@ from imgui_bundle import imgui
 import viewer
 from viewer.app.core.messages import Message, MessageLog, message_line
 from viewer.app.overlays import _newest
+from viewer.diagnostics import Diagnostic
 
 
 def texts_of(log):
@@ -55,7 +57,10 @@ def test_message_line(message, line):
 
 def test_warnings_of_a_scene_are_said_and_kept_from_the_start(rig):
     scene = viewer.load(*rig)
-    scene.warnings = ("tiny.skin: 3 normals are 0", "tiny.skin: no texture")
+    scene.diagnostics = (
+        Diagnostic("M007.normals", Path("tiny.skin"), values={"n": 3, "vertex": 0}),
+        Diagnostic("F007.several-pictures", Path("tiny"), values={"n": 2}),
+    )
     state = make_state(scene)
     assert [note.text for note in state.messages.notes] == list(scene.warnings)
     assert [message.text for message in state.messages.log] == list(scene.warnings)
@@ -202,7 +207,8 @@ def test_messages_without_room_are_only_counted(drive, rig, texts):
 
 def test_picture_of_the_interface_shows_warnings_however_long_it_takes(drive, rig, monkeypatch):
     scene = viewer.load(*rig)
-    scene.warnings = ("tiny.skin: 3 normals are 0",)
+    values = {"n": 3, "vertex": 0}
+    scene.diagnostics = (Diagnostic("M007.normals", Path("tiny.skin"), values=values),)
     hand = drive(scene=scene, samples=1)
     for note in hand.state.messages.notes:
         note.until = 1e11  # as if it had been said just before the next line

@@ -64,7 +64,7 @@ def test_person_with_lowered_arms_is_found_from_behind(standing):
     assert np.linalg.norm(places - joints, axis=1).max() < 0.02 * size
     assert found.figure.mesh is not figure.mesh and found.pose is not pose
     assert len(found.lines) == 2
-    assert found.lines[0].startswith("pose: the template's joints turned to fit, ")
+    assert found.lines[0].key == "R003.pose"
 
 
 def test_person_whose_mesh_is_inside_out_is_found_alike(standing):
@@ -126,19 +126,19 @@ def test_stretched_target_gets_a_scale_along_each_axis(own):
     assert found.alignment.how == "fit" and found.pose is pose
     wanted = rotation @ np.diag([1.3, 1.0, 0.8])
     assert_allclose(found.alignment.placed.linear, wanted, atol=0.005)
-    assert [re.sub(r"[\d.]+", "N", line) for line in found.lines] == [
+    assert [re.sub(r"[\d.]+", "N", str(line)) for line in found.lines] == [
         f"proportions: the template stretched by N, N, N along {whose} x, y and z, pose kept",
         "that leaves a gap of N % of the size, before N %",
     ]
     unfitted, _ = aligned(figure, target, fits=False)
     (line,) = unfitted.lines
-    told = re.fullmatch(
+    found = re.fullmatch(
         rf"warning: stretched by (.+) along {whose} x, y and z, the template fits much better, "
         rf"with a gap of 0\.\d+ % instead of \d\.\d+ %: if the target was stretched, (.+)",
-        line,
+        line.labelled,
     )
-    assert_allclose([float(each) for each in told[1].split(", ")], [1.3, 1.0, 0.8], atol=0.005)
-    assert told[2] == cure
+    assert_allclose([float(each) for each in found[1].split(", ")], [1.3, 1.0, 0.8], atol=0.005)
+    assert found[2] == cure
 
 
 def test_scales_that_are_known_are_not_looked_for():
@@ -187,7 +187,7 @@ def test_fit_that_leaves_a_gap_is_doubted_or_left(monkeypatch, target, reached, 
     half = bent(reached)[1]
     monkeypatch.setattr(posed_alignment, "fit_pose", lambda *_: fit_of(figure, half, reached))
     found, own = aligned(figure, mesh, landmarks=LANDMARKS, refines=False)
-    assert tuple(re.sub(r"\d+\.\d+", "G", line) for line in found.lines) == lines
+    assert tuple(re.sub(r"\d+\.\d+", "G", line.labelled) for line in found.lines) == lines
     assert (found.pose is own) == ("not fitted" in lines[0])
 
 

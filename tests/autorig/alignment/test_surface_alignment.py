@@ -195,13 +195,13 @@ def test_matrices_that_stretch_along_either_spaces_axes_are_taken():
 def test_lines_of_a_shared_origin_say_whether_anything_was_done(scale, angle, words):
     placed = Similarity(scale, turn([1, 0, 0], angle), np.zeros(3), np.ones(3))
     lines = alignment_lines(Alignment(placed, 0.0, 0.0, (0.0, 0.0), "in place"))
-    assert lines[0] == f"alignment: {words}, shift (0, 0, 0)"
+    assert str(lines[0]) == f"alignment: {words}, shift (0, 0, 0)"
 
 
 def test_lines_tell_everything_and_warn_of_a_bad_fit():
     placed = Similarity(2.0, turn([0, 1, 0], np.pi / 2), np.array([1.0, 0, -2]), np.ones(3))
     lines = alignment_lines(Alignment(placed, 0.05, 0.1, (0.05, 0.1), "search"))
-    assert lines == [
+    assert [line.labelled for line in lines] == [
         "alignment: found by closest points; scale 2, turned by 90.00 degrees, shift (1, 0, -2)",
         "alignment error: 5.000 % of the target's size (RMS of the best 90 %; template to target "
         "10.000 %)",

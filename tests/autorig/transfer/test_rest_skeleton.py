@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from autorig.rigged_shapes import arm, turn
+from faults import told
 from numpy.testing import assert_allclose
 
 from viewer.autorig.alignment.similarity import Similarity
@@ -88,7 +89,7 @@ def test_limits_of_the_root_make_room_and_lengths_are_scaled():
     assert_allclose(limits[6:], np.tile([-0.8, 0.8], (3, 1)))  # the tip's angles
     angles = found.pose.dofs[3:6]
     assert (limits[3:6, 0] <= angles).all() and (angles <= limits[3:6, 1]).all()
-    assert found.lines == ("limits of base widened to hold the target's pose",)
+    assert told(found.lines) == [("R008.limits-widened", {"joint": "base"})]
 
 
 def test_root_without_ball_joint_turns_by_its_quaternion():

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from faults import told
 
 from viewer.autorig.correspondence.matching import Matches
 from viewer.autorig.weights.result import RigidIslands, match_lines, nothing_matched, rigid_lines
@@ -21,26 +22,32 @@ def matches(matched, inside_out=()):
 
 def test_match_lines_count():
     found = matches([True, True, True, False])
-    assert match_lines(found, ~found.matched, "direct") == (
-        "matched 3 of 4 vertices (75.0%), filled in 1",
-    )
+    assert told(match_lines(found, ~found.matched, "direct")) == [
+        ("R005.matched", {"n": 3, "all": 4, "ratio": 0.75, "filled": 1})
+    ]
 
 
 def test_match_lines_say_what_is_out_of_the_ordinary():
     found = matches([True, False, False, False], [0, 2])
-    assert match_lines(found, ~found.matched, "harmonic") == (
-        "matched 1 of 4 vertices (25.0%), filled in 3",
+    lines = match_lines(found, ~found.matched, "harmonic")
+    assert told(lines) == [
+        ("R005.matched", {"n": 1, "all": 4, "ratio": 0.25, "filled": 3}),
+        ("R006.matched", {"limit": 0.75}),
+        ("R005.reversed", {"n": 2}),
+        ("R005.solver", {"method": "harmonic"}),
+    ]
+    assert [line.severity for line in lines] == ["note", "warning", "note", "note"]
+    assert lines[1].labelled == (
         "warning: less than 75% of the target meets the template: check the alignment, or allow "
-        "a larger distance",
-        "2 parts of the target face the other way than the template: matched as if turned round",
-        "the weights that were filled in needed another solver: harmonic",
+        "a larger distance"
     )
 
 
 def test_match_lines_speak_of_one_part_alone():
     found = matches([True, True], [0])
-    assert match_lines(found, ~found.matched, "direct")[1:] == (
-        "1 part of the target faces the other way than the template: matched as if turned round",
+    (line,) = match_lines(found, ~found.matched, "direct")[1:]
+    assert str(line) == (
+        "1 part of the target faces the other way than the template: matched as if turned round"
     )
 
 
@@ -50,20 +57,18 @@ def islands(counts):
 
 
 def test_rigid_lines_name_the_largest_first():
-    assert rigid_lines(islands([1, 30])) == (
-        "a part of 30 vertices at vertex 10 meets the template nowhere: it moves rigidly, "
-        "mostly with joint 1",
-        "a part of 1 vertex at vertex 0 meets the template nowhere: it moves rigidly, "
-        "mostly with joint 0",
-    )
+    assert told(rigid_lines(islands([1, 30]))) == [
+        ("R007.part", {"n": 30, "vertex": 10, "joint": 1}),
+        ("R007.part", {"n": 1, "vertex": 0, "joint": 0}),
+    ]
     assert rigid_lines(islands([])) == ()
 
 
 def test_rigid_lines_count_what_they_do_not_name():
     lines = rigid_lines(islands([9, 8, 7, 6, 5, 4, 3]))
     assert len(lines) == 6
-    assert lines[-1] == "and so do 2 smaller parts"
-    assert rigid_lines(islands([9, 8, 7, 6, 5, 4]))[-1] == "and so do 1 smaller part"
+    assert told(lines[-1:]) == [("R007.more-parts", {"n": 2})]
+    assert told(rigid_lines(islands([9, 8, 7, 6, 5, 4])))[-1] == ("R007.more-parts", {"n": 1})
 
 
 def test_nothing_matched_says_how_far_it_is():

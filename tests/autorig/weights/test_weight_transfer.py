@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from faults import told
 
 from viewer.autorig.correspondence.matching import MatchSettings, Template
 from viewer.autorig.weights.weight_transfer import (
@@ -73,7 +74,9 @@ def test_transfer_onto_itself_changes_nothing():
     np.testing.assert_allclose(dense(result), along(positions[:, 0]), atol=1e-12)
     assert result.matched.all()
     assert not result.filled.any()
-    assert result.lines == ("matched 208 of 208 vertices (100.0%), filled in 0",)
+    assert told(result.lines) == [
+        ("R005.matched", {"n": 208, "all": 208, "ratio": 1.0, "filled": 0})
+    ]
     np.testing.assert_allclose(result.distances, 0.0, atol=1e-12)
 
 
@@ -149,10 +152,7 @@ def test_transfer_hangs_parts_without_match_on_the_closest_point_of_their_middle
     assert result.rigid.counts.tolist() == [4]
     assert result.rigid.joints.tolist() == [1]
     np.testing.assert_allclose(result.rigid.distances, 1.0, atol=1e-12)
-    assert result.lines[1] == (
-        "a part of 4 vertices at vertex 208 meets the template nowhere: it moves rigidly, "
-        "mostly with joint 1"
-    )
+    assert told(result.lines)[1] == ("R007.part", {"n": 4, "vertex": 208, "joint": 1})
 
 
 def test_transfer_does_not_depend_on_unit_and_place():
@@ -243,7 +243,7 @@ def test_transfer_says_that_the_template_has_negative_weights():
     result = transferred_weights(
         template()[0], skin_of_rows(rows), positions, triangles, WeightSettings(), silent
     )
-    assert result.lines[0] == "negative weights of the template that count as 0: 1"
+    assert told(result.lines)[0] == ("R005.negative-weights", {"n": 1})
     np.testing.assert_allclose(dense(result)[0], [1.0, 0.0, 0.0], atol=1e-12)
 
 
@@ -264,7 +264,7 @@ def test_nearest_weights_copies_rows():
     assert result.weights.tolist() == [1.0, 0.5, 0.25, 0.5, 0.25]
     # 5 % of the diagonal of a box of 0.9 x 0 x 5 is 0.254.
     assert result.matched.tolist() == [True, True, False]
-    assert result.lines == ("nearest vertex within the limit for 2 of 3 vertices",)
+    assert told(result.lines) == [("R005.nearest", {"n": 2, "all": 3})]
     assert result.points is None
 
 

@@ -25,13 +25,13 @@ def test_angles_are_in_degrees_and_lengths_as_they_are() -> None:
 
 def test_value_and_limits_are_told_together() -> None:
     # 0.3 and 0.5 radians are 17.188734 and 28.647890 degrees.
-    text = beyond_text(head(0.3, 0.5), 4, 0.0, " in frame 7")
+    text = str(beyond_text(head(0.3, 0.5), 4, 0.0, " in frame 7"))
     assert text == "head.y is 0.0° in frame 7, its limits are 17.2° and 28.6°"
 
 
 def test_a_value_just_beyond_is_seen_to_be() -> None:
     # 1e-5 radians are 0.00057 degrees.
-    text = beyond_text(head(0.3, 0.5), 4, 0.50001)
+    text = str(beyond_text(head(0.3, 0.5), 4, 0.50001))
     assert text == "head.y is 28.6485°, its limits are 17.1887° and 28.6479°"
 
 
@@ -43,4 +43,4 @@ def test_a_value_just_beyond_is_seen_to_be() -> None:
     ],
 )
 def test_what_has_one_limit_says_which(low: float, high: float, value: float, text: str) -> None:
-    assert beyond_text(head(low, high), 4, value) == text
+    assert str(beyond_text(head(low, high), 4, value)) == text

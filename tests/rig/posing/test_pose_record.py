@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from family_models import family_figure
+from faults import lines
 from formats.synthetic_smpl import model
 from numpy.testing import assert_allclose
 from rig.hand_made import mesh, skeleton
@@ -68,7 +69,7 @@ def test_dofs_beyond_their_limits_are_clamped_and_counted():
     pose = rest_pose(figure.skeleton)
     notes = apply_record(PoseRecord(dofs={"knee.z": 3.0, "hip.x": -2.0}), figure, pose)
     assert pose.dofs.tolist() == [0.5, -1.0, 1.0]
-    assert notes == ["2 DOFs of the pose were beyond their limits and clamped"]
+    assert lines(notes) == ["2 DOFs of the pose were beyond their limits and clamped"]
 
 
 def test_unknown_dof_is_refused_and_leaves_the_pose():
@@ -129,7 +130,7 @@ def test_vector_of_another_member_goes_by_joint_names(family, kind, count, share
     found, notes = applied(figure, vector=wanted.ravel())
     assert_allclose(found, expected, atol=1e-13)
     said = [f"{left_out} joints of the pose that {figure.name} lacks were left out"]
-    assert notes == (said if left_out else [])
+    assert lines(notes) == (said if left_out else [])
 
 
 def test_joints_that_the_vector_lacks_go_to_rest(family):
@@ -154,14 +155,18 @@ def test_scale_that_cannot_be_drawn_is_left_out(family, scale):
     pose.figure_scale = 1.5
     notes = apply_record(PoseRecord(scale=scale), figure, pose)
     assert pose.figure_scale == 1.5
-    assert len(notes) == 1 and notes[0].startswith("scale: expected") and "left at 1.5" in notes[0]
+    assert (
+        len(notes) == 1
+        and lines(notes)[0].startswith("scale: expected")
+        and "left at 1.5" in lines(notes)[0]
+    )
 
 
 def test_place_and_shape_beyond_all_measure_are_left_out_or_refused(family):
     figure = family("smpl")
     pose = figure_pose(figure)
     notes = apply_record(PoseRecord(translation=np.array([1e300, 0, 0])), figure, pose)
-    assert notes == ["translation: expected at most 1e+09, found 1e+300; left as it was"]
+    assert lines(notes) == ["translation: expected at most 1e+09, found 1e+300; left as it was"]
     assert not pose.figure_translation.any()
     message = refusal(figure, shape=np.array([1e300]))
     assert message == "shape coefficients: expected at most 1e+06, found 1e+300"
@@ -226,7 +231,7 @@ def test_part_that_the_figure_lacks_is_noted_if_it_says_something(family):
     figure = family("smpl")
     assert applied(figure, parts={"jaw_pose": np.zeros(3)})[1] == []
     found, notes = applied(figure, parts={"jaw_pose": np.ones(3)})
-    assert notes == [f"jaw_pose: {figure.name} has no such joint, left out"]
+    assert lines(notes) == [f"jaw_pose: {figure.name} has no such joint, left out"]
     assert not found.any()
 
 
@@ -293,7 +298,7 @@ def test_fingers_without_components_take_rotation_vectors_only(tmp_path):
     assert_allclose(found[37:].ravel(), wanted, atol=1e-13)
     assert notes == []
     found, notes = applied(figure, parts={"right_hand_pose": np.ones(6)})
-    assert notes == [f"right_hand_pose: {figure.name} has no hand components, left out"]
+    assert lines(notes) == [f"right_hand_pose: {figure.name} has no hand components, left out"]
     assert not found.any()
 
 
@@ -322,7 +327,7 @@ def test_more_coefficients_than_the_figure_has_can_be_left_out(family):
     figure = family("smpl")
     pose = figure_pose(figure)
     record = PoseRecord(shape=np.array([0.5] * 14 + [-3.0, 0.0]), expression=np.array([2.0]))
-    assert apply_record(record, figure, pose, cut=True) == [
+    assert lines(apply_record(record, figure, pose, cut=True)) == [
         f"shape coefficients 11 to 16 were left out, as {figure.name} has 10 (largest 3)",
         f"expression coefficient 1 was left out, as {figure.name} has 0 (largest 2)",
     ]

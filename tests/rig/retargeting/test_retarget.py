@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from faults import lines
 
 from viewer.errors import RigError
 from viewer.rig.figure import Figure
@@ -129,7 +130,7 @@ def test_onto_itself_is_the_identity() -> None:
     same = np.abs(np.einsum("nja,nja->nj", clip.rotations, motion.clip.rotations))
     np.testing.assert_allclose(same, 1.0, atol=EXACT)
     np.testing.assert_allclose(clip.translations, motion.clip.translations, atol=1e-12 * 100)
-    assert notes == [
+    assert lines(notes) == [
         "mocap moves 20 of 20 joints of mocap",
         "its path is scaled by 1, the ratio of legs",
     ]
@@ -149,9 +150,11 @@ def test_limbs_point_as_the_source_s_do_from_t_pose_to_a_pose() -> None:
     source, figure = moving(figure_of(HIK, "mocap")), figure_of(BODY, "body")
     clip, notes = retarget(source, figure)
     assert_same_limbs(source, figure, clip)
-    assert notes[0].startswith("mocap moves 19 of 20 joints of body: pelvis by Hips, left_hip by ")
-    assert notes[0].endswith("left_wrist by LeftHand, right_wrist by RightHand")
-    assert notes[1:3] == [
+    assert lines(notes)[0].startswith(
+        "mocap moves 19 of 20 joints of body: pelvis by Hips, left_hip by "
+    )
+    assert lines(notes)[0].endswith("left_wrist by LeftHand, right_wrist by RightHand")
+    assert lines(notes)[1:3] == [
         "at rest, as nothing moves them: spine2",
         "joints of mocap without a partner: LeftToeBase",
     ]
@@ -246,7 +249,7 @@ def test_the_path_is_scaled_by_the_legs() -> None:
     clip, notes = retarget(source, figure)
     theirs = places(source.figure, source.clip)["Hips"]
     np.testing.assert_allclose(places(figure, clip)["pelvis"], path_scale() * theirs, atol=1e-12)
-    assert notes[-1] == f"its path is scaled by {path_scale():.4g}, the ratio of legs"
+    assert lines(notes)[-1] == f"its path is scaled by {path_scale():.4g}, the ratio of legs"
     assert clip.figure_translations is None
 
 
@@ -294,7 +297,7 @@ def test_joints_between_two_that_match_are_folded_in() -> None:
         bones(theirs, ("LeftForeArm", "LeftHand")),
         atol=EXACT,
     )
-    assert "joints of mocap without a partner: LeftToeBase, LeftArmRoll" in notes
+    assert "joints of mocap without a partner: LeftToeBase, LeftArmRoll" in lines(notes)
 
 
 def test_joints_that_nothing_moves_stay_at_rest_in_their_parent() -> None:
@@ -302,7 +305,7 @@ def test_joints_that_nothing_moves_stay_at_rest_in_their_parent() -> None:
     source, figure = moving(figure_of(HIK, "mocap")), figure_of(table, "body")
     clip, notes = retarget(source, figure)
     np.testing.assert_array_equal(clip.rotations[:, -2:], np.tile([0.0, 0, 0, 1], (5, 2, 1)))
-    assert "at rest, as nothing moves them: spine2, jaw, tail" in notes
+    assert "at rest, as nothing moves them: spine2, jaw, tail" in lines(notes)
 
 
 def test_fingers_turn_with_the_hand_and_bend_about_the_knuckles() -> None:
@@ -358,7 +361,7 @@ def test_same_hierarchy_with_other_proportions_takes_rotations_over() -> None:
             "na,na->n", clip.rotations[:, joint], source.clip.rotations[:, names.index(name)]
         )
         np.testing.assert_allclose(np.abs(same), 1.0, atol=EXACT)
-    assert notes[0] == "one moves 20 of 20 joints of two"
+    assert lines(notes)[0] == "one moves 20 of 20 joints of two"
 
 
 def test_moves_of_inner_joints_are_carried_where_the_hierarchy_is_the_same() -> None:
@@ -373,7 +376,7 @@ def test_moves_of_inner_joints_are_carried_where_the_hierarchy_is_the_same() -> 
     clip, _ = retarget(motion, bigger)
     np.testing.assert_allclose(clip.translations[:, 4], 2 * shifts[:, 4], atol=EXACT)
     _, notes = retarget(motion, figure_of(HIK, "mocap"))
-    assert notes[-1] == (
+    assert lines(notes)[-1] == (
         "positions of 1 joint within its parent were left out, up to 0.0548 (left_knee)"
     )
 
@@ -392,11 +395,11 @@ def test_mapping_names_what_rules_do_not_know() -> None:
     np.testing.assert_allclose(
         bones(mine, ("left_elbow", "left_wrist")), bones(theirs, ("x14", "x15")), atol=EXACT
     )
-    assert notes[0] == (
+    assert lines(notes)[0] == (
         "strange moves 4 of 20 joints of body: pelvis by x0, left_shoulder by x13, left_elbow by "
         "x14, left_wrist by x15"
     )
-    assert "at rest, as nothing moves them: left_hip, right_hip" in notes[1]
+    assert "at rest, as nothing moves them: left_hip, right_hip" in lines(notes)[1]
 
 
 def test_equal_names_match_whatever_they_mean() -> None:
@@ -410,7 +413,7 @@ def test_equal_names_match_whatever_they_mean() -> None:
     clip, notes = retarget(source, figure)
     theirs, mine = places(source.figure, source.clip), places(figure, clip)
     np.testing.assert_allclose(mine["tail_02"], theirs["tail_02"], atol=EXACT)
-    assert notes[:2] == [
+    assert lines(notes)[:2] == [
         "snake moves 3 of 4 joints of wasp",
         "at rest, as nothing moves them: sting",
     ]

@@ -16,6 +16,7 @@ from viewer.app.core.jobs import Job
 from viewer.app.core.messages import Messages
 from viewer.app.core.playback import Playback
 from viewer.app.core.stats import Stats
+from viewer.diagnostics import Diagnostic
 from viewer.loading import MotionSettings
 from viewer.rendering.camera import Camera, front_azimuth, orbit
 from viewer.rendering.options import DisplayOptions
@@ -168,7 +169,7 @@ class AppState:
         self.playback.show(self.scene)
         self.history.time = self.playback.time
         self.history.start(self.scene, self.options)
-        self.say(*self.scene.warnings)
+        self.say(*self.scene.diagnostics)
 
     def set_front(self, front: Front) -> None:
         """Say which axis the figures face, or let it be guessed; the camera turns as far.
@@ -192,10 +193,10 @@ class AppState:
         if length > _FARTHEST * size:
             camera.target = center + away * (_FARTHEST * size / length)
 
-    def say(self, *texts: str) -> None:
+    def say(self, *messages: str | Diagnostic) -> None:
         """Show messages that go away by themselves; longer ones stay longer."""
-        for text in texts:
-            self.messages.show(text)
+        for message in messages:
+            self.messages.show(str(message))
 
     def say_status(self, text: str) -> None:
         """Show what a key did, in place of what the key before did."""

@@ -6,6 +6,7 @@ import queue
 import threading
 from collections.abc import Callable, Sequence
 
+from viewer.diagnostics import Diagnostic
 from viewer.errors import ViewerError
 from viewer.loading.capturing import Builder
 from viewer.rig.captures.capture import CapturePart
@@ -68,14 +69,14 @@ class Stream:
             return True
         return False
 
-    def take(self) -> tuple[list[Actor], list[str], bool]:
+    def take(self) -> tuple[list[Actor], list[Diagnostic], bool]:
         """Take in what has been read since the last call.
 
         Returns
         -------
         new : list of Actor
             People who appeared.
-        notes : list of str
+        notes : list of Diagnostic
             What was noticed.
         grew : bool
             Whether anything was taken in.
@@ -86,7 +87,7 @@ class Stream:
             If bodies do not fit the model; the stream is then over.
         """
         new: list[Actor] = []
-        notes: list[str] = []
+        notes: list[Diagnostic] = []
         grew = False
         while True:
             try:

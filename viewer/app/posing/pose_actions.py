@@ -88,7 +88,7 @@ def paste_pose(state: AppState) -> None:
     except ViewerError as problem:
         state.error = str(problem)
         return
-    state.say(*source.warnings, *notes)
+    state.say(*source.diagnostics.warnings, *notes)
     state.say_status("Pose pasted")
     pause_for_edit(state)
 

@@ -92,7 +92,7 @@ def draw_alignment(state: AppState) -> None:
     placing = placing_now(state)
     # What comes and goes stands below the controls, which stay where they are.
     for line in placing.lines if placing is not None else ():
-        imgui.text_wrapped(line)
+        imgui.text_wrapped(line.labelled)
     if is_posed_since(state):
         imgui.text_wrapped("the template was posed otherwise since: align again")
 

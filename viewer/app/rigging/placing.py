@@ -9,6 +9,7 @@ from viewer.app.rigging.sources import current_template, target_mesh
 from viewer.app.rigging.state import Placing, Rigging, Template
 from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
+from viewer.diagnostics import Diagnostic
 from viewer.rendering.camera import camera_axes
 from viewer.rendering.passes.ghost_pass import Ghost
 from viewer.rig.arrays import Floats
@@ -35,6 +36,7 @@ __all__ = [
     "target_place",
 ]
 
+_DONE = ("R003.pose", "R003.proportions", "R003.not-fitted")  # true wherever the template lies
 _GAP = 1.25  # of both widths' mean, between target and template where they stand side by side
 
 
@@ -135,9 +137,9 @@ def move_by_hand(state: AppState, template: Template, similarity: Similarity) ->
     )
 
 
-def _still_true(lines: tuple[str, ...]) -> tuple[str, ...]:
+def _still_true(lines: tuple[Diagnostic, ...]) -> tuple[Diagnostic, ...]:
     """Return what was done to the template, without the gap that it left where it lay."""
-    return tuple(line for line in lines if line.startswith(("pose:", "proportions:")))
+    return tuple(line for line in lines if line.key in _DONE)
 
 
 def set_aside(state: AppState) -> None:

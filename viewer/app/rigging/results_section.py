@@ -33,7 +33,6 @@ from viewer.formats import file_stem
 __all__ = ["draw_results"]
 
 _WARNING = (1.0, 0.77, 0.30, 1.0)
-_MARK = "warning: "
 _LINES_HEIGHT = 9.0  # lines of the report that are seen at once
 
 
@@ -57,7 +56,7 @@ def draw_results(state: AppState) -> None:
         _ask_where(state, result)
     same_line_if_room("Copy report")
     if button(state, "Copy report"):
-        imgui.set_clipboard_text("\n".join(result.rigged.lines))
+        imgui.set_clipboard_text("\n".join(line.labelled for line in result.rigged.lines))
         state.say_status("Report copied")
     _draw_lines(state, result)
 
@@ -137,10 +136,10 @@ def _draw_lines(state: AppState, result: Result) -> None:
     height = _LINES_HEIGHT * imgui.get_text_line_height_with_spacing()
     if imgui.begin_child("report", (0.0, height), imgui.ChildFlags_.borders):
         for line in result.rigged.lines:
-            warns = line.startswith(_MARK)
+            warns = line.severity == "warning"
             if warns:
                 imgui.push_style_color(imgui.Col_.text, _WARNING)
-            imgui.text_wrapped(printable(line, 400))
+            imgui.text_wrapped(printable(line.labelled, 400))
             if warns:
                 imgui.pop_style_color()
     imgui.end_child()

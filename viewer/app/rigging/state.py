@@ -13,6 +13,7 @@ from viewer.app.core.state import AppState
 from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.alignment.surface_alignment import Alignment, AlignmentSettings
 from viewer.autorig.rigged import Rigged
+from viewer.diagnostics import Diagnostic
 from viewer.rendering.passes.ghost_pass import Ghost
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
@@ -88,7 +89,7 @@ class Placing:
         How to come there again.
     fitted : Template or None
         The template with its joints turned and its limbs resized; None where it fits as it is.
-    lines : tuple of str
+    lines : tuple of Diagnostic
         What was done to it.
     meshes : tuple of object
         The target's mesh and the template's figure: for others it means nothing.
@@ -100,7 +101,7 @@ class Placing:
     alignment: Alignment | None
     settings: AlignmentSettings
     fitted: Template | None
-    lines: tuple[str, ...]
+    lines: tuple[Diagnostic, ...]
     meshes: tuple[object, object]
     pose: tuple[object, ...]
 

@@ -116,7 +116,7 @@ def start_adding(state: AppState, path: Path) -> None:
             state.scene.actors.append(actor)
             state.paths = (*state.paths, path)
             state.of(Rigging).target = None  # so that the panel chooses anew
-            state.say(*scene.warnings)
+            state.say(*scene.diagnostics)
             _show_added(state, actor)
 
         return finish

@@ -27,11 +27,11 @@ from viewer.autorig.alignment.surface_alignment import (
     misfit,
 )
 from viewer.autorig.surface.samples import sample_surface
+from viewer.diagnostics import Diagnostic, Phrase
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 from viewer.rig.mesh import Mesh, volume
-from viewer.rig.number_text import number_text
 from viewer.rig.pose import Pose
 from viewer.rig.skeleton import joint_label
 from viewer.rig.skinning import deform
@@ -70,7 +70,7 @@ class PosedAlignment:
         The template's own, or fitted.
     positions : (V, 3)
         The template's vertices in that pose, in its own frame.
-    lines : tuple of str
+    lines : tuple of Diagnostic
         What was done to pose and proportions, and what would fit better.
     most_turned : (float, str)
         The largest turn of a joint in radians, and its name; (0, "") if none was turned.
@@ -80,7 +80,7 @@ class PosedAlignment:
     figure: Figure
     pose: Pose
     positions: Floats
-    lines: tuple[str, ...]
+    lines: tuple[Diagnostic, ...]
     most_turned: tuple[float, str] = (0.0, "")
 
 
@@ -182,17 +182,15 @@ def _if_better(
                 found = other
     after = misfit(found.alignment, is_part)
     bent, name = found.most_turned
-    gaps = _gaps(after, before)
+    gap = {"gap": _gap(after, before)}
     if after > (_PART_KEPT if is_part else _KEPT) * before:
-        return replace(kept, lines=(f"pose: not fitted, as that would leave {gaps}",))
+        return replace(kept, lines=(Diagnostic("R003.not-fitted", values=gap),))
     if after <= _POOR:
-        return replace(found, lines=(*found.lines, f"that leaves {gaps}"))
-    doubt = "is the template of the same kind as the target?"
+        return replace(found, lines=(*found.lines, Diagnostic("R003.gap", values=gap)))
     if bent > _BENT:
-        turn = f"{name} turned by {np.degrees(bent):.0f} degrees"
-        line = f"warning: pose: not fitted, as that would leave {gaps}, with {turn}: {doubt}"
-        return replace(kept, lines=(line,))
-    return replace(found, lines=(*found.lines, f"warning: that leaves {gaps}: {doubt}"))
+        values = {**gap, "joint": name, "angle": float(np.degrees(bent))}
+        return replace(kept, lines=(Diagnostic("R004.not-fitted", values=values),))
+    return replace(found, lines=(*found.lines, Diagnostic("R004.gap", values=gap)))
 
 
 def _fitted(job: _Job, start: Alignment, report: Callable[[float], None]) -> PosedAlignment:
@@ -250,8 +248,8 @@ def _stretched(
         kept,
         alignment=alignment,
         lines=(
-            f"proportions: the template stretched by {_scales(alignment.placed)}, pose kept",
-            f"that leaves {_gaps(after, before)}",
+            Diagnostic("R003.proportions", values={"scales": _scales(alignment.placed)}),
+            Diagnostic("R003.gap", values={"gap": _gap(after, before)}),
         ),
     )
     return found if _is_closer(found, kept) else None
@@ -263,14 +261,13 @@ def _is_closer(stretched: PosedAlignment, other: PosedAlignment) -> bool:
     return gap <= _STRETCH_LEFT * misfit(other.alignment, False)
 
 
-def _advice(stretched: PosedAlignment, kept: PosedAlignment) -> str:
-    gaps = [100.0 * misfit(one.alignment, False) for one in (stretched, kept)]
+def _advice(stretched: PosedAlignment, kept: PosedAlignment) -> Diagnostic:
+    """Return the remark that a stretched template would fit better."""
+    gap, other = (100.0 * misfit(one.alignment, False) for one in (stretched, kept))
     placed = stretched.alignment.placed
-    cure = "fit proportions" if (placed.factors == 1.0).all() else "ask for it (--scale axes)"
-    return (
-        f"warning: stretched by {_scales(placed)}, the template fits much better, with a gap of "
-        f"{gaps[0]:.3f} % instead of {gaps[1]:.3f} %: if the target was stretched, {cure}"
-    )
+    is_own = (placed.factors == 1.0).all()
+    key = "R004.stretched-along-its-axes" if is_own else "R004.stretched-along-the-target"
+    return Diagnostic(key, values={"scales": _scales(placed), "gap": gap, "kept": other})
 
 
 def _stretch(placed: Similarity) -> float:
@@ -278,30 +275,33 @@ def _stretch(placed: Similarity) -> float:
     return float(factors.max() / factors.min())
 
 
-def _scales(placed: Similarity) -> str:
+def _scales(placed: Similarity) -> Phrase:
+    """Return the scales along the axes of the template or the target."""
     is_own = bool((placed.factors == 1.0).all())
     scales = placed.scale * (placed.own_factors if is_own else placed.factors)
-    texts = ", ".join(f"{value:.4g}" for value in scales)
-    whose = "its own" if is_own else "the target's"
-    return f"{texts} along {whose} x, y and z"
+    x, y, z = scales.tolist()
+    key = "scales-along-its-axes" if is_own else "scales-along-the-target"
+    return Phrase(key, x=x, y=y, z=z)
 
 
-def _gaps(after: float, before: float) -> str:
-    return f"a gap of {100.0 * after:.3f} % of the size, before {100.0 * before:.3f} %"
+def _gap(after: float, before: float) -> Phrase:
+    """Return the gap that a fit leaves, and the one before."""
+    return Phrase("gap", after=100.0 * after, before=100.0 * before)
 
 
-def _lines(found: Fitted) -> tuple[str, ...]:
+def _lines(found: Fitted) -> tuple[Diagnostic, ...]:
     """Say which joint was turned most, and which limb resized most."""
     skeleton = found.figure.skeleton
     assert skeleton is not None  # the caller looked
     angle, name = _most_turned(found)
     longest = int(np.abs(found.grown[0]).argmax())
-    change = 100.0 * np.expm1(found.grown[0, longest])
-    longer = number_text(change, "+.0f")
-    return (
-        f"pose: the template's joints turned to fit, {name} by {np.degrees(angle):.0f} degrees; "
-        f"its limbs resized, {joint_label(skeleton, longest)} by {longer} % in length",
-    )
+    values = {
+        "joint": name,
+        "angle": float(np.degrees(angle)),
+        "limb": joint_label(skeleton, longest),
+        "change": 100.0 * float(np.expm1(found.grown[0, longest])),
+    }
+    return (Diagnostic("R003.pose", values=values),)
 
 
 def _most_turned(found: Fitted) -> tuple[float, str]:

@@ -21,9 +21,9 @@ from viewer.autorig.alignment.icp import (
 from viewer.autorig.alignment.orientation_search import axis_turns, in_place, search
 from viewer.autorig.alignment.similarity import Similarity, fit_similarity
 from viewer.autorig.surface.samples import sample_surface
+from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints, frozen
-from viewer.rig.number_text import number_text
 
 __all__ = [
     "PART",
@@ -314,35 +314,36 @@ def _is_rotation(linear: Floats) -> bool:
 
 
 _HOW = {
-    "in place": "the template is scaled and turned about the origin that both share",
-    "search": "found by closest points",
-    "landmarks": "from the landmarks",
-    "given": "as given",
-    "fit": "found by fitting pose and proportions",
+    "in place": "aligned-in-place",
+    "search": "aligned-by-search",
+    "landmarks": "aligned-by-landmarks",
+    "given": "aligned-as-given",
+    "fit": "aligned-by-fit",
 }
 
 
-def alignment_lines(alignment: Alignment) -> list[str]:
+def alignment_lines(alignment: Alignment) -> list[Diagnostic]:
     """Return what a person should know: scale, turn, shift, error, and whether to doubt it."""
     placed = alignment.placed
     angle = np.degrees(np.arccos(np.clip((np.trace(placed.rotation) - 1.0) / 2.0, -1.0, 1.0)))
-    how = _HOW[alignment.how]
+    how = Phrase(_HOW[alignment.how])
     if alignment.how == "in place" and placed.scale == 1.0 and angle == 0.0:
-        how = "the target lies on the template as it is"
-    shift = ", ".join(number_text(value, ".4g") for value in placed.shift.tolist())
-    factors = ""
-    for values, whose in ((placed.factors, ""), (placed.own_factors, "the template's ")):
-        if (values != 1.0).any():
-            factors = f" (along {whose}x, y, z: {', '.join(f'{f:.4g}' for f in values)})"
+        how = Phrase("aligned-as-it-is")
+    factors: Phrase | str = ""
+    for numbers, key in ((placed.factors, "factors"), (placed.own_factors, "own-factors")):
+        if (numbers != 1.0).any():
+            factors = Phrase(key, **_by_axis(numbers))
+    values = {"how": how, "scale": float(placed.scale), "factors": factors, "angle": float(angle)}
+    errors = {"error": 100.0 * alignment.error, "away": 100.0 * alignment.away}
     lines = [
-        f"alignment: {how}; scale {placed.scale:.6g}{factors}, turned by "
-        f"{angle:.2f} degrees, shift ({shift})",
-        f"alignment error: {100.0 * alignment.error:.3f} % of the target's size (RMS of the best "
-        f"90 %; template to target {100.0 * alignment.away:.3f} %)",
+        Diagnostic("R001.alignment", values={**values, **_by_axis(placed.shift)}),
+        Diagnostic("R001.error", values=errors),
     ]
     if alignment.error > _BAD:
-        lines.append(
-            f"warning: the alignment is doubtful, above {100.0 * _BAD:g} %: give --up, --facing "
-            "or landmarks, or pose the template like the target"
-        )
+        lines.append(Diagnostic("R002.error", values={"limit": 100.0 * _BAD}))
     return lines
+
+
+def _by_axis(numbers: Floats) -> dict[str, float]:
+    """Return three numbers as the values of a message."""
+    return dict(zip("xyz", numbers.tolist(), strict=True))

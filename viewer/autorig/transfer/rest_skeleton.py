@@ -8,6 +8,7 @@ import numpy as np
 
 from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.transfer.leg_scale import leg_scale
+from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
@@ -38,7 +39,7 @@ class RestSkeleton:
         Puts the joints where they are in the target.
     root_scale : float
         What lengths of the root are scaled by, see ``leg_scale``.
-    lines : tuple of str
+    lines : tuple of Diagnostic
         What was changed beside the lengths.
     """
 
@@ -46,7 +47,7 @@ class RestSkeleton:
     inverse_bind: Floats
     pose: Pose
     root_scale: float
-    lines: tuple[str, ...]
+    lines: tuple[Diagnostic, ...]
 
 
 def fit_rest_skeleton(
@@ -202,7 +203,9 @@ def _scaled_pose(skeleton: Skeleton, pose: Pose, joint_scales: Floats) -> Pose:
     return posed
 
 
-def _turn_roots(skeleton: Skeleton, pose: Pose, rotation: Floats) -> tuple[Skeleton, list[str]]:
+def _turn_roots(
+    skeleton: Skeleton, pose: Pose, rotation: Floats
+) -> tuple[Skeleton, list[Diagnostic]]:
     """Turn the roots by the alignment, in place: by their DOFs where they are ball joints.
 
     Limits of a root say how it may stand in the template's world, not in the target's: they are
@@ -227,7 +230,7 @@ def _turn_roots(skeleton: Skeleton, pose: Pose, rotation: Floats) -> tuple[Skele
     left = wanted[~ball] @ np.swapaxes(held, 1, 2)
     pose.rotations[others] = matrix_to_quaternion(left)
     lines = [
-        f"limits of {joint_label(skeleton, int(joint))} widened to hold the target's pose"
+        Diagnostic("R008.limits-widened", values={"joint": joint_label(skeleton, int(joint))})
         for joint in roots[ball][beyond]
     ]
     return replace(skeleton, dof_limits=limits), lines

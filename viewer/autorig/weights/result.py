@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from viewer.autorig.correspondence.matching import Matches
-from viewer.errors import counted
+from viewer.diagnostics import Diagnostic
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.closest_point import SurfacePoints
 from viewer.rig.skin import Skin
@@ -70,8 +70,8 @@ class WeightTransfer:
         Vertices of parts whose triangles are wound the wrong way.
     rigid : RigidIslands
         Parts without any matched vertex.
-    lines : tuple of str
-        What a person should know, one sentence each; joints by number, from 0.
+    lines : tuple of Diagnostic
+        What a person should know; joints by number, from 0.
     """
 
     starts: Ints
@@ -84,7 +84,7 @@ class WeightTransfer:
     points: SurfacePoints | None
     backwards: Bools
     rigid: RigidIslands
-    lines: tuple[str, ...]
+    lines: tuple[Diagnostic, ...]
 
     def skin(self, inverse_bind: Floats) -> Skin:
         """Return the weights as a skin bound by ``inverse_bind``, (J, 4, 4)."""
@@ -108,14 +108,16 @@ def nothing_matched(distances: Floats, size: float) -> str:
     )
 
 
-def template_lines(skin: Skin) -> tuple[str, ...]:
+def template_lines(skin: Skin) -> tuple[Diagnostic, ...]:
     """Return what was wrong with the template's weights."""
     negative = int((skin.weights < 0.0).sum())
-    return (f"negative weights of the template that count as 0: {negative}",) if negative else ()
+    if not negative:
+        return ()
+    return (Diagnostic("R005.negative-weights", values={"n": negative}),)
 
 
-def match_lines(found: Matches, filled: Bools, method: str) -> tuple[str, ...]:
-    """Return what was matched, turned round and filled in, one sentence each.
+def match_lines(found: Matches, filled: Bools, method: str) -> tuple[Diagnostic, ...]:
+    """Return what was matched, turned round and filled in.
 
     Parameters
     ----------
@@ -126,38 +128,38 @@ def match_lines(found: Matches, filled: Bools, method: str) -> tuple[str, ...]:
     method : str
         How; "direct" is the rule.
     """
-    total = len(found.matched)
-    lines = [
-        f"matched {int(found.matched.sum())} of {total} vertices ({found.matched.mean():.1%}), "
-        f"filled in {int(filled.sum())}"
-    ]
-    if found.matched.mean() < _FEW:
-        lines.append(
-            f"warning: less than {_FEW:.0%} of the target meets the template: check the "
-            "alignment, or allow a larger distance"
-        )
-    count = len(found.inside_out)
-    if count:
-        does = "faces" if count == 1 else "face"
-        lines.append(
-            f"{counted(count, 'part')} of the target {does} the other way than the template: "
-            "matched as if turned round"
-        )
+    ratio = float(found.matched.mean())
+    values = {
+        "n": int(found.matched.sum()),
+        "all": len(found.matched),
+        "ratio": ratio,
+        "filled": int(filled.sum()),
+    }
+    lines = [Diagnostic("R005.matched", values=values)]
+    if ratio < _FEW:
+        lines.append(Diagnostic("R006.matched", values={"limit": _FEW}))
+    if len(found.inside_out):
+        lines.append(Diagnostic("R005.reversed", values={"n": len(found.inside_out)}))
     if method != "direct":
-        lines.append(f"the weights that were filled in needed another solver: {method}")
+        lines.append(Diagnostic("R005.solver", values={"method": method}))
     return tuple(lines)
 
 
-def rigid_lines(rigid: RigidIslands) -> tuple[str, ...]:
-    """Return one sentence for each of the largest rigid islands, and how many more there are."""
+def rigid_lines(rigid: RigidIslands) -> tuple[Diagnostic, ...]:
+    """Return one remark for each of the largest rigid islands, and how many more there are."""
     order = np.argsort(-rigid.counts, kind="stable")
     lines = [
-        f"a part of {counted(int(rigid.counts[island]), 'vertex')} at vertex "
-        f"{rigid.vertices[island]} meets the template nowhere: it moves rigidly, mostly with "
-        f"joint {rigid.joints[island]}"
+        Diagnostic(
+            "R007.part",
+            values={
+                "n": int(rigid.counts[island]),
+                "vertex": int(rigid.vertices[island]),
+                "joint": int(rigid.joints[island]),
+            },
+        )
         for island in order[:_LISTED]
     ]
     more = len(order) - _LISTED
     if more > 0:
-        lines.append(f"and so do {counted(more, 'smaller part')}")
+        lines.append(Diagnostic("R007.more-parts", values={"n": more}))
     return tuple(lines)

@@ -23,6 +23,7 @@ from viewer.autorig.weights.result import (
 )
 from viewer.autorig.weights.smoothing import smooth, within
 from viewer.autorig.weights.sparse_weights import put_rows, skin_of, weight_matrix
+from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.closest_point import SurfacePoints, interpolate
@@ -171,7 +172,7 @@ def nearest_weights(
         points=None,
         backwards=np.zeros(len(near), dtype=bool),
         rigid=RigidIslands(empty, empty, empty, np.zeros(0)),
-        lines=(f"nearest vertex within the limit for {int(near.sum())} of {len(near)} vertices",),
+        lines=(Diagnostic("R005.nearest", values={"n": int(near.sum()), "all": len(near)}),),
     )
 
 
@@ -224,7 +225,7 @@ def _in_vertices(
     filled: Bools,
     backwards: Bools,
     rigid: RigidIslands,
-    lines: tuple[str, ...],
+    lines: tuple[Diagnostic, ...],
 ) -> WeightTransfer:
     """Return what belongs to welded vertices for each of the vertices that they stand for."""
     rows = skin_rows(skin, welded)

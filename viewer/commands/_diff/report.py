@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from viewer.commands._printing import table_lines
+from viewer.diagnostics import Diagnostic, described
 from viewer.errors import printable
 from viewer.rig.comparison import Difference, Measure
 from viewer.rig.units import METRES
@@ -29,7 +30,7 @@ class Compared:
         Actors that only one has, and which.
     error : str
         Why it could not be opened; empty if it could.
-    warnings : tuple of str
+    diagnostics : tuple of Diagnostic
         What its readers noticed.
     """
 
@@ -37,7 +38,7 @@ class Compared:
     differences: tuple[tuple[str, Difference], ...] = ()
     mismatches: tuple[str, ...] = ()
     error: str = ""
-    warnings: tuple[str, ...] = field(default=())
+    diagnostics: tuple[Diagnostic, ...] = field(default=())
 
     def exceeds(self, tolerance: float) -> bool:
         """Return whether anything differs by more, or could not be compared."""
@@ -133,7 +134,8 @@ def json_text(reference: str, rows: Sequence[Compared], tolerance: float | None)
                 "error": row.error or None,
                 "within": None if tolerance is None else not row.exceeds(tolerance),
                 "mismatches": row.mismatches,
-                "warnings": row.warnings,
+                "warnings": [str(found) for found in row.diagnostics],
+                "diagnostics": [described(found) for found in row.diagnostics],
                 "actors": [_actor(name, difference) for name, difference in row.differences],
             }
             for row in rows

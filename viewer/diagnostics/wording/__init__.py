@@ -9,18 +9,25 @@ from __future__ import annotations
 from viewer.diagnostics.wording import (
     anim,
     archives,
+    bindings,
     body_models,
     bvh,
+    clips,
     easymocap,
     joints,
     kinds,
+    loading,
+    meshes,
     morph,
+    motion,
     obj,
     pictures,
     ply,
     poses,
     reading,
     rig,
+    rigging,
+    skeletons,
     skin,
     weights,
 )
@@ -28,6 +35,7 @@ from viewer.diagnostics.wording import (
 _TABLES = (
     *(reading, kinds, skin, obj, ply, morph, rig, joints, bvh, anim, weights),
     *(archives, body_models, easymocap, poses, pictures),
+    *(bindings, skeletons, meshes, clips, motion, loading, rigging),
 )
 
 MESSAGES: dict[str, str] = {

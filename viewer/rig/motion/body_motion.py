@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from viewer.errors import RigError, counted
+from viewer.diagnostics import Diagnostic
+from viewer.errors import RigError
 from viewer.rig.arrays import Floats, frozen
 from viewer.rig.coefficients import unused_coefficients
 from viewer.rig.figure import Figure
@@ -18,8 +19,6 @@ from viewer.rig.motion.timing import Timing
 from viewer.rig.shape import joint_directions, rest_joints
 
 __all__ = ["BodyMotion", "body_clip", "root_positions"]
-
-_LISTED = 6  # joints in a note
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,7 +86,7 @@ class BodyMotion:
         return len(self.vectors)
 
 
-def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[str]]:
+def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[Diagnostic]]:
     """Return a figure's clip of a body motion: joints found by name.
 
     With the root turning about the origin, the figure's translation is t = T - J0 + R J0, where
@@ -105,8 +104,8 @@ def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[str
     -------
     clip : SampledClip
         For that figure.
-    notes : list of str
-        What could not be taken over, one line each.
+    notes : list of Diagnostic
+        What could not be taken over.
 
     Raises
     ------
@@ -119,7 +118,7 @@ def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[str
             f"{motion.name} moves the joint {motion.joint_names[0]}, "
             f"which {figure.name} does not have"
         )
-    count, notes = motion.n_rows, []
+    count = motion.n_rows
     vectors = np.zeros((count, skeleton.n_joints, 3))
     lost = []
     for column, name in enumerate(motion.joint_names):
@@ -127,14 +126,10 @@ def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[str
             vectors[:, skeleton.names.index(name)] = motion.vectors[:, column]
         elif motion.vectors[:, column].any():
             lost.append(name)
-    notes += _put_hands(motion, figure, vectors)
+    notes = _put_hands(motion, figure, vectors)
     if lost:
-        were = "was" if len(lost) == 1 else "were"
-        rest = f", … and {len(lost) - _LISTED} more" * (len(lost) > _LISTED)
-        notes.append(
-            f"{counted(len(lost), 'joint')} that {figure.name} lacks {were} left out: "
-            f"{', '.join(lost[:_LISTED])}{rest}"
-        )
+        values = {"n": len(lost), "figure": figure.name, "names": lost}
+        notes.append(Diagnostic("F007.joints-left-out", values=values))
     weights, more = _weights(motion, figure)
     rotations = rotation_vector_to_quaternion(vectors)
     translations, turns = motion.translations, None
@@ -163,18 +158,20 @@ def root_positions(figure: Figure, weights: Floats) -> Floats:
     return rest_joints(figure)[0] + weights[:, : len(directions)] @ directions
 
 
-def _put_hands(motion: BodyMotion, figure: Figure, vectors: Floats) -> list[str]:
+def _put_hands(motion: BodyMotion, figure: Figure, vectors: Floats) -> list[Diagnostic]:
     """Turn the fingers by their components, in place; return what was left out."""
-    notes = []
+    notes: list[Diagnostic] = []
     for side, coefficients in motion.hands.items():
         hand = _hand(figure, side)
         if hand is None:
             if coefficients.any():
-                notes.append(f"the {side or 'only'} hand: {figure.name} has no hand components")
+                values = {"side": side or "only", "figure": figure.name}
+                notes.append(Diagnostic("F007.hand-left-out", values=values))
             continue
         used = min(coefficients.shape[1], len(hand.components))
         if coefficients[:, used:].any():
-            notes.append(f"hand components beyond the {used} of {figure.name} were left out")
+            values = {"most": used, "figure": figure.name}
+            notes.append(Diagnostic("F007.hand-components-left-out", values=values))
         turned = coefficients[:, :used] @ hand.components[:used]
         if not motion.flat_hands:
             turned = turned + hand.mean
@@ -187,9 +184,9 @@ def _hand(figure: Figure, side: str) -> Hand | None:
     return known.get(side) or (known.get("") if len(known) == 1 else None)
 
 
-def _weights(motion: BodyMotion, figure: Figure) -> tuple[Floats, list[str]]:
+def _weights(motion: BodyMotion, figure: Figure) -> tuple[Floats, list[Diagnostic]]:
     """Return the blend shape weights of every frame, or one row if they never change."""
-    notes = []
+    notes: list[Diagnostic] = []
     groups = figure.blend_shapes.groups if figure.blend_shapes else ()
     given = {"shape": motion.shape, "expression": motion.expression}
     rows = max([1, *(len(part) for part in given.values() if part is not None)])

@@ -1,9 +1,10 @@
-"""Values of DOFs in words, as sliders show them: angles in degrees."""
+"""Values of DOFs as text, as sliders show them: angles in degrees."""
 
 from __future__ import annotations
 
 import math
 
+from viewer.diagnostics import Phrase
 from viewer.rig.number_text import number_text
 from viewer.rig.skeleton import Skeleton, dof_label
 
@@ -32,7 +33,7 @@ def dof_value_text(skeleton: Skeleton, dof: int, value: float, digits: int = 1) 
     return number_text(value, f".{digits + 3}g")
 
 
-def beyond_text(skeleton: Skeleton, dof: int, value: float, when: str = "") -> str:
+def beyond_text(skeleton: Skeleton, dof: int, value: float, when: Phrase | str = "") -> Phrase:
     """Return what is wrong with a DOF beyond its limits: ``"a.x is 0.0°, its limits are …"``.
 
     Parameters
@@ -43,7 +44,7 @@ def beyond_text(skeleton: Skeleton, dof: int, value: float, when: str = "") -> s
         Row of the DOF.
     value : float
         Radians, or a length in the figure's unit; less than the minimum, or more than the maximum.
-    when : str
+    when : Phrase or str
         Follows the value: ``" in frame 3"``.
     """
     low, high = (float(limit) for limit in skeleton.dof_limits[dof])
@@ -54,9 +55,12 @@ def beyond_text(skeleton: Skeleton, dof: int, value: float, when: str = "") -> s
         skeleton, dof, limit, digits
     ):
         digits += 1
-    texts = [dof_value_text(skeleton, dof, number, digits) for number in (value, low, high)]
-    head = f"{dof_label(skeleton, dof)} is {texts[0]}{when}"
+    shown, least, most = (
+        dof_value_text(skeleton, dof, number, digits) for number in (value, low, high)
+    )
+    label = dof_label(skeleton, dof)
     if math.isfinite(low) and math.isfinite(high):
-        return f"{head}, its limits are {texts[1]} and {texts[2]}"
-    which = f"minimum is {texts[1]}" if value < low else f"maximum is {texts[2]}"
-    return f"{head}, its {which}"
+        return Phrase("beyond-limits", dof=label, value=shown, when=when, low=least, high=most)
+    if value < low:
+        return Phrase("below-minimum", dof=label, value=shown, when=when, low=least)
+    return Phrase("above-maximum", dof=label, value=shown, when=when, high=most)

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic
-from viewer.errors import RigError, counted
+from viewer.diagnostics import Diagnostic, Phrase
+from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.coefficients import apply_coefficients
 from viewer.rig.figure import Figure
@@ -144,7 +144,9 @@ def record_of(figure: Figure, pose: Pose) -> PoseRecord:
     )
 
 
-def apply_record(record: PoseRecord, figure: Figure, pose: Pose, cut: bool = False) -> list[str]:
+def apply_record(
+    record: PoseRecord, figure: Figure, pose: Pose, cut: bool = False
+) -> list[Diagnostic]:
     """Pose a figure by a record, in place.
 
     Parameters
@@ -161,8 +163,8 @@ def apply_record(record: PoseRecord, figure: Figure, pose: Pose, cut: bool = Fal
 
     Returns
     -------
-    list of str
-        What could not be taken over exactly, one line each.
+    list of Diagnostic
+        What could not be taken over exactly.
 
     Raises
     ------
@@ -179,7 +181,8 @@ def apply_record(record: PoseRecord, figure: Figure, pose: Pose, cut: bool = Fal
         work, notes = turn_joints(record.turns, figure, pose)
         _take_over(work, pose)
         return notes + _left_as_they_were(record)
-    work, notes = pose.copy(), []
+    work = pose.copy()
+    notes = []
     if record.dofs:
         notes += _apply_dofs(record, figure, work)
     elif record.vector is not None:
@@ -209,43 +212,43 @@ def _take_over(work: Pose, pose: Pose) -> None:
         setattr(pose, name, getattr(work, name))
 
 
-def _left_as_they_were(record: PoseRecord) -> list[str]:
-    """Return a line on what a record says that a figure with other DOFs does not take over."""
+def _left_as_they_were(record: PoseRecord) -> list[Diagnostic]:
+    """Return a remark on what a record says that a figure with other DOFs does not take over."""
     moves = DOF_KINDS[:3]
     moved = [label for label, value in record.dofs.items() if value and label.endswith(moves)]
     shifts = record.turns is not None and record.turns.shifts.any()
     place = record.translation is not None and np.any(record.translation)
     shapes = (values is not None and np.any(values) for values in (record.shape, record.expression))
     left = {
-        "where joints are moved to": bool(moved) or shifts,
-        "the figure's place": place,
-        "its size": record.scale not in (None, 1.0),
-        "its shape": any(shapes),
+        "left-moves": bool(moved) or shifts,
+        "left-place": place,
+        "left-size": record.scale not in (None, 1.0),
+        "left-shape": any(shapes),
     }
-    words = [word for word, says in left.items() if says]
-    return [f"left as they were: {', '.join(words)}"] if words else []
+    names = [Phrase(key) for key, says in left.items() if says]
+    return [Diagnostic("F007.left-as-they-were", values={"names": names})] if names else []
 
 
-def _keep_drawable(before: Pose, pose: Pose) -> list[str]:
+def _keep_drawable(before: Pose, pose: Pose) -> list[Diagnostic]:
     """Undo a place or scale that no camera could show, and say so."""
     notes = []
-    if not _SMALLEST <= pose.figure_scale <= _LARGEST:
-        notes.append(
-            f"scale: expected more than 0, found {pose.figure_scale:g}; "
-            f"left at {before.figure_scale:g}"
-            if pose.figure_scale <= 0.0
-            else f"scale: expected {_SMALLEST:g} to {_LARGEST:g}, found {pose.figure_scale:g}; "
-            f"left at {before.figure_scale:g}"
-        )
+    scale = pose.figure_scale
+    if not _SMALLEST <= scale <= _LARGEST:
+        fault = Phrase("scale-out-of-range", low=_SMALLEST, high=_LARGEST, found=scale)
+        if scale <= 0.0:
+            fault = Phrase("scale-not-positive", found=scale)
+        kept = {"fault": fault, "scale": before.figure_scale}
+        notes.append(Diagnostic("F007.scale-kept", values=kept))
         pose.figure_scale = before.figure_scale
     far = float(np.abs(pose.figure_translation).max())
     if far > _FARTHEST:
-        notes.append(f"translation: expected at most {_FARTHEST:g}, found {far:g}; left as it was")
+        fault = Phrase("translation-too-far", most=_FARTHEST, found=far)
+        notes.append(Diagnostic("F007.translation-kept", values={"fault": fault}))
         pose.figure_translation = before.figure_translation.copy()
     return notes
 
 
-def _apply_dofs(record: PoseRecord, figure: Figure, pose: Pose) -> list[str]:
+def _apply_dofs(record: PoseRecord, figure: Figure, pose: Pose) -> list[Diagnostic]:
     skeleton = figure.skeleton
     assert skeleton is not None
     for label, value in record.dofs.items():
@@ -254,9 +257,9 @@ def _apply_dofs(record: PoseRecord, figure: Figure, pose: Pose) -> list[str]:
     if record.turns is not None:
         is_whole = len(record.dofs) == skeleton.n_dofs
         restore_beneath(skeleton, pose, record.turns, is_whole)
-    notes = _beyond_limits(skeleton, pose.dofs)
-    pose.dofs[:] = clamp_dofs(skeleton, pose.dofs)
-    return notes
+    before = pose.dofs.copy()
+    pose.dofs[:] = clamp_dofs(skeleton, before)
+    return _beyond_limits(skeleton, before)
 
 
 def _dof(figure: Figure, label: str) -> int:
@@ -269,14 +272,12 @@ def _dof(figure: Figure, label: str) -> int:
         raise RigError(Diagnostic("F002.pose-unknown-dof", values=values)) from None
 
 
-def _beyond_limits(skeleton: Skeleton, dofs: Floats) -> list[str]:
+def _beyond_limits(skeleton: Skeleton, dofs: Floats) -> list[Diagnostic]:
     count = int((clamp_dofs(skeleton, dofs) != dofs).sum())
-    which = counted(count, "DOF")
-    were = "was beyond its" if count == 1 else "were beyond their"
-    return [f"{which} of the pose {were} limits and clamped"] if count else []
+    return [Diagnostic("F007.pose-clamped", values={"n": count})] if count else []
 
 
-def _apply_vector(vector: Floats, figure: Figure, pose: Pose) -> list[str]:
+def _apply_vector(vector: Floats, figure: Figure, pose: Pose) -> list[Diagnostic]:
     """Take the model's own numbers, or the vector of another member of the SMPL family."""
     skeleton = figure.skeleton
     assert skeleton is not None
@@ -301,13 +302,13 @@ def _apply_vector(vector: Floats, figure: Figure, pose: Pose) -> list[str]:
         else:
             lost += bool(row.any())
     _turn(figure, pose, joints, wanted.ravel())
-    which, was = counted(lost, "joint"), "was" if lost == 1 else "were"
-    return [f"{which} of the pose that {figure.name} lacks {was} left out"] if lost else []
+    values = {"n": lost, "figure": figure.name}
+    return [Diagnostic("F007.pose-joints-left-out", values=values)] if lost else []
 
 
 def _apply_part(
     name: str, values: Floats, record: PoseRecord, figure: Figure, pose: Pose
-) -> list[str]:
+) -> list[Diagnostic]:
     skeleton = figure.skeleton
     assert skeleton is not None
     values = np.asarray(values, dtype=np.float64).ravel()
@@ -318,7 +319,7 @@ def _apply_part(
     known = [joint for joint in PARTS[name] if joint in skeleton.names]
     if not known:
         if values.any():
-            return [f"{name}: {figure.name} has no such joint, left out"]
+            return [Diagnostic("F007.part-left-out", values={"part": name, "figure": figure.name})]
         return []
     if len(values) != 3:
         raise _odd_length(name, 3, len(values))
@@ -326,7 +327,7 @@ def _apply_part(
     return []
 
 
-def _apply_body(values: Floats, figure: Figure, pose: Pose) -> list[str]:
+def _apply_body(values: Floats, figure: Figure, pose: Pose) -> list[Diagnostic]:
     """Turn the joints after the root; the two hands of SMPL mean nothing to its kin."""
     skeleton = figure.skeleton
     assert skeleton is not None
@@ -346,10 +347,9 @@ def _odd_length(name: str, expected: int, found: int) -> RigError:
     return RigError(Diagnostic("F002.pose-part", values=values))
 
 
-def _left_out(rest: Floats, own: int) -> str:
+def _left_out(rest: Floats, own: int) -> Diagnostic:
     count = int(rest.reshape(-1, 3).any(axis=1).sum())
-    was = "was" if count == 1 else "were"
-    return f"{counted(count, 'joint')} of the pose beyond the body's {own} {was} left out"
+    return Diagnostic("F007.body-joints-left-out", values={"n": count, "own": own})
 
 
 def _hand(figure: Figure, name: str) -> Hand | None:
@@ -363,7 +363,7 @@ def _apply_hand(
     record: PoseRecord,
     figure: Figure,
     pose: Pose,
-) -> list[str]:
+) -> list[Diagnostic]:
     skeleton = figure.skeleton
     assert skeleton is not None
     side = _HAND_PARTS[name]
@@ -376,7 +376,9 @@ def _apply_hand(
         return []
     if hand is None:
         if values.any():
-            return [f"{name}: {figure.name} has no hand components, left out"]
+            return [
+                Diagnostic("F007.hand-part-left-out", values={"part": name, "figure": figure.name})
+            ]
         return []
     as_coefficients = record.hand_coefficients
     if as_coefficients is None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.rig.arrays import Ints
 from viewer.rig.retargeting.joint_names import canonical_names, plain_names
@@ -14,7 +15,6 @@ from viewer.rig.skeleton import Skeleton, joint_labels
 
 __all__ = ["Matches", "match_joints"]
 
-_LISTED = 60  # names in a note
 _SHORTLY = 8  # names in an error
 _LIMBS = ("left_hip left_knee", "right_hip right_knee", "left_shoulder left_elbow",
           "right_shoulder right_elbow")  # fmt: skip
@@ -32,14 +32,14 @@ class Matches:
         What the SMPL family calls the target's joints; empty where it has no such joint.
     is_hierarchy : bool
         Whether both have the same names and hierarchy.
-    notes : tuple of str
+    notes : tuple of Diagnostic
         Who moves whom, who stays at rest, and who is not used.
     """
 
     partners: Ints
     names: tuple[str, ...]
     is_hierarchy: bool
-    notes: tuple[str, ...]
+    notes: tuple[Diagnostic, ...]
 
 
 def match_joints(
@@ -160,20 +160,27 @@ def _listed(names: list[str], limit: int) -> str:
 
 def _notes(
     source: Skeleton, target: Skeleton, partners: Ints, titles: tuple[str, str]
-) -> list[str]:
+) -> list[Diagnostic]:
+    """Return which joints move which, and which are left over."""
     moved, movers = joint_labels(target), joint_labels(source)
     pairs = [
-        f"{moved[joint]} by {movers[partner]}"
+        Phrase("joint-by-joint", joint=moved[joint], partner=movers[partner])
         for joint, partner in enumerate(partners)
         if partner >= 0 and target.names[joint] != source.names[partner]
     ]
-    count = int((partners >= 0).sum())
-    notes = [f"{titles[0]} moves {count} of {target.n_joints} joints of {titles[1]}"]
-    if pairs:
-        notes[0] += f": {_listed(pairs, _LISTED)}"
+    values = {
+        "motion": titles[0],
+        "figure": titles[1],
+        "n": int((partners >= 0).sum()),
+        "all": target.n_joints,
+        "pairs": pairs,
+    }
+    key = "F007.joints-matched-as-follows" if pairs else "F007.joints-matched"
+    notes = [Diagnostic(key, values=values)]
     unused, idle = _left(source, target, partners)
     if idle:
-        notes.append(f"at rest, as nothing moves them: {_listed(idle, _LISTED)}")
+        notes.append(Diagnostic("F007.joints-at-rest", values={"names": idle}))
     if unused:
-        notes.append(f"joints of {titles[0]} without a partner: {_listed(unused, _LISTED)}")
+        values = {"motion": titles[0], "names": unused}
+        notes.append(Diagnostic("F007.joints-without-partner", values=values))
     return notes

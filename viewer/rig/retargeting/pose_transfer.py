@@ -20,6 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError, printable
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
@@ -38,7 +39,6 @@ __all__ = [
     "turn_joints",
 ]
 
-_LISTED = 12  # names in a note
 _INEXACT = 1e-4  # radians: a turn that is missed by less is met
 _REST_DIGITS = 5  # of rest rotations that count as the same
 
@@ -185,7 +185,7 @@ def joints_by_name(source: Sequence[str], target: Sequence[str]) -> Ints:
     )
 
 
-def turn_joints(source: JointTurns, target: Figure, start: Pose) -> tuple[Pose, list[str]]:
+def turn_joints(source: JointTurns, target: Figure, start: Pose) -> tuple[Pose, list[Diagnostic]]:
     """Return a figure's pose with the joints turned as another figure's are.
 
     Parameters
@@ -202,9 +202,8 @@ def turn_joints(source: JointTurns, target: Figure, start: Pose) -> tuple[Pose, 
     -------
     pose : Pose
         Of the target, within its limits.
-    notes : list of str
-        How many joints were taken over, which the target lacks, and which cannot turn that way,
-        one line each.
+    notes : list of Diagnostic
+        How many joints were taken over, which the target lacks, and which cannot turn that way.
 
     Raises
     ------
@@ -247,25 +246,24 @@ def _turn_joints(
     return pose, missed
 
 
-def _notes(source: JointTurns, target: Figure, partners: Ints, missed: list[int]) -> list[str]:
+def _notes(
+    source: JointTurns, target: Figure, partners: Ints, missed: list[int]
+) -> list[Diagnostic]:
+    """Return what became of the joints."""
     skeleton = target.skeleton
     assert skeleton is not None  # the caller looked
     used = set(partners[partners >= 0].tolist())
     whose = printable(source.figure) or "the pose"
-    notes = [f"{len(used)} of {len(source.names)} joints of {whose} taken over"]
+    values: dict[str, object] = {"n": len(used), "all": len(source.names), "figure": whose}
+    notes = [Diagnostic("F007.joints-taken-over", values=values)]
     lacking = [name or f"#{joint}" for joint, name in enumerate(source.names) if joint not in used]
     if lacking:
-        notes.append(f"{target.name} has no joint called {_listed(lacking)}")
+        values = {"figure": target.name, "names": [printable(name, 40) for name in lacking]}
+        notes.append(Diagnostic("F007.joints-lacking", values=values))
     if missed:
-        names = _listed([skeleton.names[joint] for joint in missed])
-        notes.append(f"turned as far as their DOFs and limits allow: {names}")
+        values = {"names": [printable(skeleton.names[joint], 40) for joint in missed]}
+        notes.append(Diagnostic("F007.joints-limited", values=values))
     return notes
-
-
-def _listed(names: list[str]) -> str:
-    shown = ", ".join(printable(name, 40) for name in names[:_LISTED])
-    more = len(names) - _LISTED
-    return f"{shown} and {more} more" if more > 0 else shown
 
 
 def _unturned(skeleton: Skeleton) -> Pose:

@@ -17,7 +17,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from viewer.errors import RigError, counted
+from viewer.diagnostics import Diagnostic, Phrase
+from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import multiply
@@ -78,7 +79,7 @@ def scaled_motion(motion: SkeletonMotion, factor: float, unit: str = "") -> Skel
 
 def retarget(
     motion: SkeletonMotion, figure: Figure, mapping: Mapping[str, str] | None = None
-) -> tuple[SampledClip, list[str]]:
+) -> tuple[SampledClip, list[Diagnostic]]:
     """Return a figure's clip of a motion that was made for another skeleton.
 
     Joints are matched by ``mapping``, then by the names that many programs use for a body (see
@@ -101,7 +102,7 @@ def retarget(
     clip : SampledClip
         For the figure. A skinned figure moves as a whole (``figure_translations``), a bare
         skeleton at its root.
-    notes : list of str
+    notes : list of Diagnostic
         Which joints were matched and which not, and the scale of the path.
 
     Raises
@@ -133,7 +134,8 @@ def retarget(
         translations=shifts if shifts.any() else None,
         figure_translations=place,
     )
-    return clip, [*matches.notes, f"its path is scaled by {scale:.4g}, the ratio of {by}", *notes]
+    scaled = Diagnostic("F007.path-scaled", values={"scale": scale, "by": by})
+    return clip, [*matches.notes, scaled, *notes]
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,7 +193,7 @@ def _target_rotations(carried: _Carried, worlds: Floats) -> Floats:
     return local
 
 
-def _scale(carried: _Carried) -> tuple[float, str]:
+def _scale(carried: _Carried) -> tuple[float, Phrase]:
     """Return the ratio of the target's lengths to the source's, and of what: legs if there are."""
     partners, names = carried.matches.partners, carried.matches.names
     source, target = carried.rests
@@ -207,13 +209,17 @@ def _scale(carried: _Carried) -> tuple[float, str]:
 
     matched = np.flatnonzero(partners >= 0)
     bones = [(int(matched[0]), int(joint)) for joint in matched[1:]]
-    choices = [("legs", _pairs(_LEGS, place)), ("arms", _pairs(_ARMS, place)), ("bones", bones)]
+    choices = [
+        ("ratio-of-legs", _pairs(_LEGS, place)),
+        ("ratio-of-arms", _pairs(_ARMS, place)),
+        ("ratio-of-bones", bones),
+    ]
     for what, pairs in choices:
         mine, theirs = length(pairs)
         if mine > 0.0 and theirs > 0.0:
             ratio = mine / theirs
-            return (1.0 if abs(ratio - 1.0) < _ROUNDING else ratio), what
-    return 1.0, "nothing"
+            return (1.0 if abs(ratio - 1.0) < _ROUNDING else ratio), Phrase(what)
+    return 1.0, Phrase("ratio-of-nothing")
 
 
 def _pairs(limbs: tuple[tuple[str, ...], ...], place: dict[str, int]) -> list[tuple[int, int]]:
@@ -227,17 +233,17 @@ def _pairs(limbs: tuple[tuple[str, ...], ...], place: dict[str, int]) -> list[tu
 
 def _shifts(
     carried: _Carried, worlds: Floats, rotations: Floats, scale: float
-) -> tuple[Floats, list[str]]:
+) -> tuple[Floats, list[Diagnostic]]:
     """Return what is added to the target's rest translations, (N, J, 3), and notes."""
     shifts = np.zeros((len(worlds), carried.target.n_joints, 3))
     places = _source_places(carried, worlds)
     if carried.is_same:
-        notes = _carry_translations(carried, scale, shifts)
+        _carry_translations(carried, scale, shifts)
         roots = np.flatnonzero(carried.target.parents < 0)
         for root in roots:
             wanted = scale * places[:, carried.matches.partners[root]] @ carried.turn.T
             shifts[:, root] = wanted - carried.target.rest_translations[root]
-        return shifts, notes
+        return shifts, []
     anchor = _anchor(carried)
     path = _path(carried.target.parents, anchor)
     linear = np.eye(3)
@@ -269,10 +275,10 @@ def _source_places(carried: _Carried, worlds: Floats) -> Floats:
     return places
 
 
-def _carry_translations(carried: _Carried, scale: float, shifts: Floats) -> list[str]:
+def _carry_translations(carried: _Carried, scale: float, shifts: Floats) -> None:
     """Put the moves of joints below the root, in place: the two parents' axes may differ."""
     if carried.clip.translations is None:
-        return []
+        return
     source, target = carried.rests
     for joint, parent in enumerate(carried.target.parents):
         partner = carried.matches.partners[joint]
@@ -281,10 +287,9 @@ def _carry_translations(carried: _Carried, scale: float, shifts: Floats) -> list
             above = carried.matches.partners[parent]
             axes = target.rotations[parent].T @ carried.turn @ source.rotations[above]
             shifts[:, joint] = scale * moves @ axes.T
-    return []
 
 
-def _lost(carried: _Carried) -> list[str]:
+def _lost(carried: _Carried) -> list[Diagnostic]:
     """Say which joints of the source move within their parents, which the target's do not."""
     moves = carried.clip.translations
     if moves is None:
@@ -296,11 +301,12 @@ def _lost(carried: _Carried) -> list[str]:
     if not len(found):
         return []
     worst = int(found[largest[found].argmax()])
-    whose = "its parent" if len(found) == 1 else "their parents"
-    return [
-        f"positions of {counted(len(found), 'joint')} within {whose} were left out, up to "
-        f"{largest[worst]:.3g} ({joint_label(carried.source, worst)})"
-    ]
+    values = {
+        "n": len(found),
+        "most": float(largest[worst]),
+        "joint": joint_label(carried.source, worst),
+    }
+    return [Diagnostic("F007.joint-positions-left-out", values=values)]
 
 
 def _anchor(carried: _Carried) -> int:

@@ -1,0 +1,59 @@
+"""Diagnostics as JSON."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from viewer.diagnostics import Diagnostic, Phrase, described
+
+
+def test_a_diagnostic_gives_all_that_it_knows() -> None:
+    values = {"n": np.int64(2), "joint": "hip", "weight": np.float32(-0.5), "vertex": 7}
+    places = np.array([3, 7], dtype=np.int32)
+    found = Diagnostic(
+        "W002.negative", Path("a.skin"), 4, "weights", places, values, count=2, is_refusal=True
+    )
+    assert described(found) == {
+        "code": "W002",
+        "key": "W002.negative",
+        "severity": "error",
+        "message": "2 weights are negative: -0.5 at vertex 7 for joint hip, the first of 2 "
+        "(vertices 3, 7)",
+        "file": "a.skin",
+        "line": 4,
+        "part": "weights",
+        "places": [3, 7],
+        "n_places": 2,
+        "count": 2,
+        "values": {"n": 2, "joint": "hip", "weight": -0.5, "vertex": 7},
+    }
+
+
+def test_every_kind_of_value_can_be_written_as_json() -> None:
+    inner = Diagnostic("F001.no-file", values={"found": "a folder"})
+    values = {
+        "found": b"up\xff\n",
+        "ratio": float("inf"),
+        "levels": [Phrase("resting-height", height=0.5, seconds=2.0)] * 120,
+        "problem": inner,
+        "path": Path("a b"),
+        "nothing": None,
+    }
+    told = described(Diagnostic("C013.no-height", values=values))["values"]
+    assert json.loads(json.dumps(told, allow_nan=False)) == told
+    assert told["found"] == "up\ufffd\\n" and told["ratio"] == "inf" and told["path"] == "a b"
+    assert len(told["levels"]) == 100 and told["nothing"] is None
+    assert told["levels"][0] == {
+        "text": "0.5 for 2 s",
+        "values": {"height": 0.5, "seconds": 2.0},
+    }
+    assert told["problem"]["code"] == "F001"
+
+
+def test_many_places_are_cut_but_counted() -> None:
+    found = Diagnostic("C013.no-height", part="joints", places=np.arange(300, dtype=np.int32))
+    told = described(found)
+    assert told["places"] == list(range(100)) and told["n_places"] == 300
