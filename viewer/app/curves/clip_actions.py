@@ -37,7 +37,7 @@ def key_present_pose(state: AppState, only_changed: bool = False) -> None:
     actor = state.actor
     if not isinstance(actor.clip, Clip) or actor.pose is None or actor.figure.skeleton is None:
         return
-    time = state.playback.time - actor.offset
+    time = state.clock.time - actor.offset
     old, skeleton = actor.clip, actor.figure.skeleton
     actor.clip = key_pose(old, skeleton, actor.pose, time, only_changed)
     keys = [sum(len(channel.times) for channel in clip.channels) for clip in (old, actor.clip)]
