@@ -1,4 +1,4 @@
-"""What is held with the mouse: edits and drags that go on."""
+"""Widgets and handles that are held with the mouse: edits and drags that go on."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Why a control cannot act right now: words for its tooltip; empty where it can."""
+"""Reasons why a control cannot act right now, for its tooltip; empty where it can."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is done to a keyed clip as a whole: made of a pose, given keys, saved."""
+"""Actions on a keyed clip as a whole: make one of a pose, add keys, save it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is done with motions as a whole: exported for other programs, one actor's or everybody's."""
+"""Export of whole motions for other programs, one actor's or those of all."""
 
 from __future__ import annotations
 

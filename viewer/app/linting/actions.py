@@ -1,4 +1,4 @@
-"""What the Lint panel and its menu entry do: check, choose a finding, copy all of them."""
+"""Actions of the Lint panel and its menu entry: check, choose a finding, copy all of them."""
 
 from __future__ import annotations
 
