@@ -26,7 +26,7 @@ FASTEST = 4.0
 
 
 class PosedFor(NamedTuple):
-    """What poses follow from: the same, and nobody has to be posed again.
+    """Key of the poses: actors are posed again only for another one.
 
     Attributes
     ----------
