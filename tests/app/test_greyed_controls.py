@@ -56,7 +56,7 @@ def test_panels_that_have_nothing_to_show_are_greyed(hand, tooltips, title, why)
 
 def test_space_without_motion_says_why_nothing_happens(hand):
     hand.key("space")
-    assert not hand.state.playback.playing and hand.says(NOTHING_MOVES)
+    assert not hand.state.clock.playing and hand.says(NOTHING_MOVES)
 
 
 def test_controls_of_a_motion_act(drive, rig, tooltips):
@@ -64,13 +64,13 @@ def test_controls_of_a_motion_act(drive, rig, tooltips):
     rest(hand, "Play")
     assert tooltips[-1] == "play or pause (Space)"
     hand.click("Play")
-    assert hand.state.playback.playing
+    assert hand.state.clock.playing
 
 
 def test_gaps_can_be_filled_where_there_are_some(drive, rig):
     hand = drive(scene=people(rig, [True, False, True]), size=(1280, 800), samples=1)
     hand.click("Fill gaps")
-    assert hand.state.playback.fill_gaps
+    assert hand.state.clock.fill_gaps
 
 
 def test_gaps_cannot_be_filled_where_there_are_none(drive, rig, tooltips):
@@ -80,7 +80,7 @@ def test_gaps_cannot_be_filled_where_there_are_none(drive, rig, tooltips):
     scene.actors[0].clip = replace(clip, timing=replace(clip.timing, holds=True))
     hand = drive(scene=scene, size=(1280, 800), samples=1)
     hand.click("Fill gaps")
-    assert not hand.state.playback.fill_gaps
+    assert not hand.state.clock.fill_gaps
     rest(hand, "Fill gaps")
     assert tooltips[-1].endswith("no frame of any motion is missing")
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from lint.sound import column, legs, scene_of, standing
 
-from viewer.app.core.playback import Playback
+from viewer.app.core.clock import Clock
 from viewer.lint import Finding, LintOptions, lint_scene
 from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.scene import Actor, Scene
@@ -33,7 +33,7 @@ def jump_of(scene: Scene, options: LintOptions | None = None) -> Finding:
 
 def shown_frame(scene: Scene, time: float) -> int:
     """Return what the window's timeline says at a time."""
-    playback = Playback()
+    playback = Clock()
     playback.show(scene)
     playback.seek(time)
     return playback.frame + playback.first_frame

@@ -1,4 +1,4 @@
-"""Whether a window can be opened here, and if not, why."""
+"""Search for a display where a window can be opened, and the reason if there is none."""
 
 from __future__ import annotations
 

@@ -176,7 +176,7 @@ MOUSE = (
     ("Alt drag of the time", "between whole frames"),
     ("Drop files", "open them"),
 )
-"""What the mouse does, listed with the keys."""
+"""Actions of the mouse, listed with the keys."""
 
 
 def panel_module(name: str) -> ModuleType:

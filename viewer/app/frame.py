@@ -10,8 +10,7 @@ from pathlib import Path
 import moderngl
 from imgui_bundle import imgui
 
-from viewer.app.actors.following import stop_following
-from viewer.app.clock import Clock
+from viewer.app.actors.following import follow_actor, stop_following
 from viewer.app.core.fitting import keep_fitting
 from viewer.app.core.jobs import FrameJob
 from viewer.app.core.state import AppState
@@ -21,6 +20,7 @@ from viewer.app.files.loader import Loader
 from viewer.app.files.recent import remember
 from viewer.app.files.state import Files
 from viewer.app.files.stream import Stream
+from viewer.app.held import is_held, stops_time
 from viewer.app.interface import draw_interface
 from viewer.app.keys import handle_keys
 from viewer.app.linting.marks import show_finding
@@ -41,7 +41,7 @@ from viewer.loading.capturing import Builder
 from viewer.rendering.gpu.target import Target
 from viewer.rendering.renderer import Renderer
 from viewer.rig.arrays import Bytes
-from viewer.rig.scene import Scene
+from viewer.rig.scene import Actor, Scene
 
 __all__ = ["Frame"]
 
@@ -77,7 +77,6 @@ class Frame:
         self.target: Target | None = None
         self._drawn: object = None
         self._keys = PictureKeys()
-        self.clock = Clock(state)
         state.stats.renderer = context.info["GL_RENDERER"]
         state.stats.version = context.info["GL_VERSION"]
 
@@ -102,7 +101,8 @@ class Frame:
         """Do all of a frame but the painting of its panels, which only a screen needs."""
         state = self.state
         drop_motion_before_press()
-        self.clock.advance()
+        if not stops_time(state):
+            state.clock.advance(imgui.get_io().delta_time)
         drop_unreadable_shapes(state)
         self.open(draw_interface(state))
         draw_record_dialog(state)
@@ -116,9 +116,12 @@ class Frame:
         self._do_wanted()
         self._take_loaded()
         self._work()
-        self.clock.keep_edits()
+        # Edits are kept before the clock poses the scene, which is no edit.
+        state.history.observe(state.scene, state.options, is_held(state))
         self._take_streamed()
-        self.clock.pose()
+        if state.clock.pose(state.actor):
+            state.history.follow(state.clock.time)
+        follow_actor(state)
         keep_fitting(state, files.stream is not None)
         self.renderer.marks, self.renderer.ghost = show_finding(state), show_rig(state)
         self._draw_scene(scale)
@@ -157,12 +160,20 @@ class Frame:
             stream.cancel()
             return
         if grew:
-            self.clock.add(new)
+            self._add_actors(new)
         state.say(*notes)
         if stream.is_done:
             files.stream = None
             if stream.error:
                 state.error = stream.error
+
+    def _add_actors(self, actors: Sequence[Actor]) -> None:
+        """Take in actors, and clips that grew, as captures are read."""
+        state = self.state
+        state.scene.actors += actors
+        state.clock.pose(state.actor, again=True)
+        state.history.add_actors(state.scene, state.options)
+        state.history.follow(state.clock.time)
 
     def _draw_scene(self, scale: float) -> None:
         """Draw the scene if anything about it changed, and put it behind the panels."""
@@ -264,7 +275,6 @@ class Frame:
             files.stream.cancel()
         state.show_scene(scene, paths)
         stop_following(state)
-        self.clock.is_first = True
         self.stream(builders)
         if self.keeps_recent:
             problem_text = remember(files.recent, paths)
@@ -314,7 +324,7 @@ class Frame:
         ghost = self.renderer.ghost
         steps = recording_steps(state, self.context, replace(settings), path, ghost)
         state.job = FrameJob(f"Recording {printable(path.name, 60)}", steps)
-        state.playback.playing, recording.settings = False, None
+        state.clock.playing, recording.settings = False, None
 
     def _save_screenshot(self) -> None:
         """Save the scene, without panels, under a new name in the current folder."""

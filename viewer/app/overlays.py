@@ -1,4 +1,4 @@
-"""What lies over the view: progress, messages, the list of keys, and the hints in its corner.
+"""Overlays of the view: progress, messages, the list of keys, and the hints in its corner.
 
 None covers another: the legend of colours is at the top left, progress at the top beside it or
 below it, and messages grow from the bottom up to whatever is above them.

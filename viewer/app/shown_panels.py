@@ -1,4 +1,4 @@
-"""Which panels are open: most until they are closed, some only when they are asked for."""
+"""Open and closed panels: most are open until closed, some closed until asked for."""
 
 from __future__ import annotations
 

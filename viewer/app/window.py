@@ -107,7 +107,7 @@ def show(
     opened.recent = load_recent()
     state.of(ShownPanels).closed = load_closed_panels()
     state.say(*filter(None, [remember(opened.recent, files)]))
-    state.playback.playing = plays and state.playback.has_motion
+    state.clock.playing = plays and state.clock.has_motion
     window = _Window(state, scale)
     try:
         window.frame.stream(builders)
@@ -225,14 +225,14 @@ class _Window:
         state = self.state
         # What a thread does is looked at now and then: frames would take its time away.
         steps = isinstance(state.job, FrameJob)
-        if is_settling or state.playback.playing or steps:
+        if is_settling or state.clock.playing or steps:
             glfw.poll_events()
         else:
             moves = self._awaits() or state.job is not None
             glfw.wait_events_timeout(_BUSY_SECONDS if moves else _IDLE_SECONDS)
             # Messages that time out, the bar of a file being read, a text cursor that blinks.
             self._is_dirty |= moves or bool(state.messages.notes or imgui.get_io().want_text_input)
-        self._is_dirty |= state.playback.playing or state.job is not None
+        self._is_dirty |= state.clock.playing or state.job is not None
         return self._is_dirty or bool(self._dropped) or len(self._imgui.input_events_queue) > 0
 
     def _awaits(self) -> bool:

@@ -29,7 +29,7 @@ class NumberKey:
     __slots__ = ("_parts",)
 
     def __init__(self, *arrays: Floats) -> None:
-        self._parts = tuple(bytearray(np.ascontiguousarray(array)) for array in arrays)
+        self._parts = tuple(map(bytearray, arrays))
 
     def is_of(self, *arrays: Floats) -> bool:
         """Return whether there are as many arrays and all hold the same numbers, bit by bit."""
@@ -38,7 +38,7 @@ class NumberKey:
         for part, array in zip(self._parts, arrays, strict=True):
             packed = array if array.flags.c_contiguous else np.ascontiguousarray(array)
             # A bytearray compares itself with the array's memory, and no array of answers is made.
-            if part != packed.data:
+            if part != packed:
                 return False
         return True
 

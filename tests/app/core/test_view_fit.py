@@ -189,7 +189,7 @@ def test_whole_motion_is_fitted_as_a_recording_is(drive, rig):
     hand.key("space")
     camera = hand.state.camera.copy()
     hand.step(20)
-    assert hand.state.playback.time > 0
+    assert hand.state.clock.time > 0
     assert (hand.state.camera.target == camera.target).all()
     assert hand.state.camera.distance == camera.distance
 

@@ -165,7 +165,7 @@ def test_dragged_key_goes_where_the_mouse_is_as_one_step(curves):
 
 
 def test_dragged_key_poses_the_figure_at_once(curves):
-    curves.state.playback.seek(1.0)
+    curves.state.clock.seek(1.0)
     curves.step(2)
     assert curves.dof("arm.x") == pytest.approx(0.6)
     x, y = _center(curves, "key arm.x 1")
@@ -228,7 +228,7 @@ def test_insert_adds_a_key_to_the_nearest_curve(curves):
 
 def test_add_key_adds_one_to_each_shown_curve_at_the_present_time(curves):
     curves.click("curves of arm")
-    curves.state.playback.seek(0.5)
+    curves.state.clock.seek(0.5)
     curves.click("Add key")
     for row in (ARM_X, ARM_X + 1, ARM_X + 2):
         assert 0.5 in _clip(curves).channels[row].times
@@ -242,7 +242,7 @@ def test_keys_work_while_the_mouse_is_on_a_key_or_line(curves):
     curves.key("delete")  # the mouse is still there
     curves.step(2)
     assert_array_equal(_arm(curves).times, [0.0, 2.0])
-    curves.state.playback.seek(1.3)
+    curves.state.clock.seek(1.3)
     curves.step(2)
     curves.move(_at(curves, 1.3, 5.0))  # on the line of the present time
     curves.key("insert")
@@ -415,7 +415,7 @@ def test_range_lines_are_dragged(curves):
     curves.pull((x, y), (_at(curves, 1.5, 0)[0], y))
     assert _clip(curves).end == pytest.approx(1.5, abs=0.02) and _clip(curves).start == 0.0
     assert curves.undo_steps == 1
-    curves.state.playback.seek(1.0)
+    curves.state.clock.seek(1.0)
     curves.step(2)
     x, y = _center(curves, "range start")
     y += 25  # a key lies on the middle of the line
@@ -428,12 +428,12 @@ def test_range_lines_are_dragged(curves):
 
 
 def test_time_line_moves_the_clock(curves):
-    curves.state.playback.seek(0.5)
+    curves.state.clock.seek(0.5)
     curves.step(2)
     x, y = _center(curves, "time line")
     curves.pull((x, y), (_at(curves, 1.25, 0)[0], y))
     curves.step()
-    time = curves.state.playback.time
+    time = curves.state.clock.time
     assert time == pytest.approx(1.25, abs=0.02)
     assert curves.dof("arm.x") == pytest.approx(float(evaluate(_arm(curves), np.array(time))))
     assert curves.undo_steps == 0
@@ -442,7 +442,7 @@ def test_time_line_moves_the_clock(curves):
 def test_offset_of_the_actor_moves_its_time_line(curves):
     curves.state.actor.offset = 1.0
     curves.step()
-    curves.state.playback.seek(1.5)
+    curves.state.clock.seek(1.5)
     curves.step(2)
     assert _center(curves, "time line")[0] == pytest.approx(_at(curves, 0.5, 0)[0], abs=1.5)
     curves.click("Add key")
@@ -453,7 +453,7 @@ def test_offset_of_the_actor_moves_its_time_line(curves):
 
 
 def test_key_pose_and_key_changes(curves):
-    curves.state.playback.seek(0.5)
+    curves.state.clock.seek(0.5)
     curves.step(2)
     curves.state.actor.pose.dofs[curves.dof_index("arm.y")] = 0.75
     curves.step(2)
@@ -615,7 +615,7 @@ def test_far_times_and_values_do_no_harm(curves):
 @pytest.mark.golden("app_curves")
 def test_panel_looks_as_it_did(curves):
     curves.click("curves of arm")
-    curves.state.playback.seek(0.5)
+    curves.state.clock.seek(0.5)
     curves.step(3)
     for _ in range(4):
         curves.wheel(-2, "plot")

@@ -12,6 +12,8 @@ from app.curves.test_curves_panel import ARM_X, SIZE, _at, _center, clip_text
 from numpy.testing import assert_allclose
 
 import viewer
+from viewer.app.actors.following import start_following
+from viewer.app.core.undo import undo
 from viewer.app.curves.clip_actions import key_present_pose, new_clip
 from viewer.app.curves.editing import (
     add_key_at,
@@ -24,6 +26,7 @@ from viewer.app.curves.editing import (
 from viewer.app.curves.state import Curves
 from viewer.app.playback.frame_rate import set_rate
 from viewer.rig.motion.clip_sampling import evaluate
+from viewer.rig.motion.follow import followed_point
 from viewer.rig.scene import Actor, Scene
 
 KEY = (ARM_X, 1)  # at 1 s: 0.6
@@ -33,14 +36,14 @@ curves = test_curves_panel.curves  # the fixture
 
 
 def go(hand, time):
-    hand.state.playback.seek(time)
+    hand.state.clock.seek(time)
     hand.step(2)
 
 
 def assert_follows_its_clip(hand, time):
     """Check that the figure is posed as its clip says at a time, which is the one shown."""
     actor = hand.state.actor
-    assert hand.state.playback.time == time and hand.state.scene.time == time
+    assert hand.state.clock.time == time and hand.state.scene.time == time
     wanted = [float(evaluate(channel, np.array(time))) for channel in actor.clip.channels]
     assert_allclose(actor.pose.dofs, wanted, atol=1e-12)
 
@@ -67,11 +70,11 @@ def test_undoing_a_key_edit_shows_the_restored_clip(curves, name, held, monkeypa
     state.of(Curves).keys = frozenset({KEY})
     # Extrapolation is seen outside of the keys alone.
     time = -0.25 if name == "extrapolation" else 0.75
-    state.playback.mode = "run on"
+    state.clock.mode = "run on"
     go(curves, time)
     before = curves.dofs()
     if held:
-        monkeypatch.setattr("viewer.app.clock.is_held", lambda state: True)
+        monkeypatch.setattr("viewer.app.frame.is_held", lambda state: True)
     EDITS[name](state)
     curves.step(2)
     monkeypatch.undo()
@@ -130,8 +133,8 @@ def test_undo_while_playing_goes_on_with_the_restored_clip(curves):
     assert curves.undo_steps == 1
     curves.key("z", "ctrl")
     curves.step(2)
-    assert state.playback.playing and state.actor.clip is old
-    assert_follows_its_clip(curves, state.playback.time)
+    assert state.clock.playing and state.actor.clip is old
+    assert_follows_its_clip(curves, state.clock.time)
 
 
 def test_pose_by_hand_comes_back_where_its_key_is_undone(curves):
@@ -144,7 +147,7 @@ def test_pose_by_hand_comes_back_where_its_key_is_undone(curves):
     assert curves.undo_steps == 2 and curves.dofs()[row] == 0.3
     go(curves, 1.75)
     curves.key("z", "ctrl")
-    assert state.playback.time == 0.75 and curves.dofs()[row] == 0.3  # the hand's, not the clip's
+    assert state.clock.time == 0.75 and curves.dofs()[row] == 0.3  # the hand's, not the clip's
     curves.key("z", "ctrl")
     assert_follows_its_clip(curves, 0.75)
     curves.key("y", "ctrl")
@@ -169,7 +172,7 @@ def test_undo_of_a_new_clip_and_of_keys_in_it(drive, rig):
         hand.key("z", "ctrl")
     assert_follows_its_clip(hand, 1.5)
     hand.key("z", "ctrl")
-    assert state.actor.clip is None and state.playback.time == 0.0
+    assert state.actor.clip is None and state.clock.time == 0.0
     assert_allclose(hand.dofs(), before)
 
 
@@ -177,7 +180,7 @@ def test_undo_of_a_shorter_range_goes_back_to_its_time(curves):
     go(curves, 1.75)
     set_clip_range(curves.state, 0.0, 1.0)
     curves.step(3)
-    assert curves.state.playback.time <= 1.75
+    assert curves.state.clock.time <= 1.75
     curves.key("z", "ctrl")
     assert_follows_its_clip(curves, 1.75)
 
@@ -188,10 +191,10 @@ def test_undo_of_another_rate_shows_the_same_frame(drive, rig):
     before = hand.state.actor.pose.figure_translation.copy()
     set_rate(hand.state, 20.0)
     hand.step(2)
-    assert hand.state.playback.time == pytest.approx(0.25)
+    assert hand.state.clock.time == pytest.approx(0.25)
     go(hand, 0.4)
     hand.key("z", "ctrl")
-    assert hand.state.playback.time == pytest.approx(0.5)
+    assert hand.state.clock.time == pytest.approx(0.5)
     assert_allclose(hand.state.actor.pose.figure_translation, before)
 
 
@@ -208,13 +211,13 @@ def test_undo_of_a_moved_actor_shows_its_clip_at_its_old_offset(curves):
 def test_captured_points_come_back_with_their_time(drive):
     hand = drive(scene=Scene([dots([0.5, 0.25, 1, 1])]), size=SIZE, samples=1)
     state = hand.state
-    go(hand, state.playback.frame_time(1))
+    go(hand, state.clock.frame_time(1))
     before = state.actor.points.copy()
     state.actor.offset = 1.0
     hand.step(2)
-    go(hand, state.playback.end)
+    go(hand, state.clock.end)
     hand.key("z", "ctrl")
-    assert state.playback.frame == 1
+    assert state.clock.frame == 1
     assert_allclose(state.actor.points, before)
 
 
@@ -230,7 +233,7 @@ def test_who_is_absent_comes_back_with_the_time(drive, rig):
     go(hand, 0.0)
     assert state.actor.is_present
     hand.key("z", "ctrl")
-    assert state.playback.time == pytest.approx(0.2) and not state.actor.is_present
+    assert state.clock.time == pytest.approx(0.2) and not state.actor.is_present
 
 
 @pytest.mark.parametrize("held", [False, True])
@@ -244,7 +247,7 @@ def test_edits_while_another_actor_plays_have_their_steps(curves, held, monkeypa
     curves.step(3)
     steps = curves.undo_steps
     if held:
-        monkeypatch.setattr("viewer.app.clock.is_held", lambda state: True)
+        monkeypatch.setattr("viewer.app.frame.is_held", lambda state: True)
     still.pose.dofs[ARM_X] = 0.4
     curves.step(3)
     monkeypatch.undo()
@@ -253,14 +256,14 @@ def test_edits_while_another_actor_plays_have_their_steps(curves, held, monkeypa
     curves.key("z", "ctrl")
     curves.step(2)
     assert_allclose(still.pose.dofs, start)
-    assert_follows_its_clip(curves, state.playback.time)
+    assert_follows_its_clip(curves, state.clock.time)
     curves.key("y", "ctrl")
     assert still.pose.dofs[ARM_X] == 0.4
 
 
 def test_drag_there_and_back_is_no_step(curves, monkeypatch):
     pose = curves.state.actor.pose
-    monkeypatch.setattr("viewer.app.clock.is_held", lambda state: True)
+    monkeypatch.setattr("viewer.app.frame.is_held", lambda state: True)
     start = pose.dofs[ARM_X]
     for value in (0.4, start):
         pose.dofs[ARM_X] = value
@@ -278,12 +281,13 @@ def test_undo_twice_before_the_next_frame(curves):
         place_key(state, KEY, value=value)
         curves.step(2)
     go(curves, 1.5)
-    state.history.undo(state.scene, state.options)
-    state.history.undo(state.scene, state.options)
+    undo(state)
+    undo(state)
+    assert_follows_its_clip(curves, 0.75)  # at once
     curves.step(1)
     assert_follows_its_clip(curves, 0.75)
     assert_allclose(curves.dofs(), before, atol=1e-12)
-    assert not state.history.can_undo and math.isclose(state.history.time, 0.75)
+    assert not state.history.can_undo and math.isclose(state.scene.time, 0.75)
 
 
 def test_files_of_a_clip_are_loaded_into_the_state_that_undo_restores(drive, rig, tmp_path):
@@ -292,3 +296,29 @@ def test_files_of_a_clip_are_loaded_into_the_state_that_undo_restores(drive, rig
     hand = drive(scene=viewer.load(*rig, tmp_path / "wave.anim"), size=SIZE, samples=1)
     hand.step(3)
     assert hand.undo_steps == 0
+
+
+def test_camera_that_follows_goes_along_with_undo(curves):
+    state = curves.state
+    go(curves, 0.75)
+    start_following(state, 0, 1)
+    curves.step(1)
+    place, target = followed_point(state.actor, 1), state.camera.target.copy()
+    place_key(state, (0, 1), value=3.0)  # the root slides farther
+    curves.step(2)
+    moved = followed_point(state.actor, 1) - place
+    assert np.abs(moved).max() > 1e-3
+    assert_allclose(state.camera.target, target + moved, atol=1e-12)
+    curves.key("z", "ctrl")
+    assert_allclose(followed_point(state.actor, 1), place, atol=1e-12)
+    assert_allclose(state.camera.target, target, atol=1e-12)
+
+
+def test_camera_that_follows_stays_where_a_pose_is_edited_by_hand(curves):
+    state = curves.state
+    start_following(state, 0, 1)
+    curves.step(1)
+    target = state.camera.target.copy()
+    state.actor.pose.dofs[0] += 0.5
+    curves.step(2)
+    assert_allclose(state.camera.target, target)

@@ -41,7 +41,7 @@ def test_every_suffix_offered_is_written(moving, tmp_path):
 
 
 def test_only_the_range_that_is_played_is_written(moving, tmp_path):
-    moving.state.playback.set_range(0.2, 0.5)
+    moving.state.clock.set_range(0.2, 0.5)
     save_motion(moving.state, tmp_path / "part.bvh")
     finish(moving)
     text = (tmp_path / "part.bvh").read_text()
@@ -79,7 +79,7 @@ def test_folder_that_does_not_exist_is_one_message(moving, tmp_path):
 
 
 def test_keys_are_written_at_the_frame_rate_that_is_shown(moving, tmp_path):
-    moving.state.playback.count_by(10.0)
+    moving.state.clock.count_by(10.0)
     save_motion(moving.state, tmp_path / "slide.bvh")
     finish(moving)
     text = (tmp_path / "slide.bvh").read_text()
@@ -129,13 +129,13 @@ def test_nobody_there_in_the_range_is_said(drive, rig, tmp_path):
     scene = people(rig, [True] * 21, [True] * 21)
     scene.actors[1].offset = 10.0
     hand = drive(scene=scene, size=(1000, 700), samples=1)
-    hand.state.playback.set_range(0.0, 1.0)
+    hand.state.clock.set_range(0.0, 1.0)
     save_motion(hand.state, tmp_path / "walk.bvh", everyone=True)
     finish(hand)
     assert [path.name for path in tmp_path.glob("*.bvh")] == ["walk-0.bvh"]
     assert frames_of(tmp_path / "walk-0.bvh") == 11
     assert hand.says("tiny 1: not there in the range, and not written")
-    hand.state.playback.set_range(5.0, 6.0)
+    hand.state.clock.set_range(5.0, 6.0)
     save_motion(hand.state, tmp_path / "none.bvh", everyone=True)
     assert hand.state.error == (
         "nobody is there in the range that is played: there is nothing to write"

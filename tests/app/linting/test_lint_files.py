@@ -151,7 +151,7 @@ def gappy() -> Scene:
 def test_a_gap_leads_to_the_frame_before_it(lint):
     hand = lint(scene=gappy())
     hand.click(row_of(hand, "C005"))
-    playback, view = hand.state.playback, hand.state.of(Linting)
+    playback, view = hand.state.clock, hand.state.of(Linting)
     assert playback.frame + playback.first_frame == 109
     assert view.finding.message == "3 of 60 frames are missing in 1 gap: frames 110 to 112"
     assert hand.state.actor.is_present
@@ -167,7 +167,7 @@ def test_a_gap_of_captured_points_marks_their_middle(lint):
     rows[30] = -1
     hand = lint(scene=scene_of(figure, replace(clip, timing=Timing(RATE, rows))))
     hand.click(row_of(hand, "C005"))
-    assert hand.state.playback.frame == 29
+    assert hand.state.clock.frame == 29
     # The points are at heights 1, 0.5 and 0.
     np.testing.assert_allclose(hand.state.of(Linting).marks.points, [[0.0, 0.5, 0.0]])
 
@@ -190,7 +190,7 @@ def test_the_ground_is_a_limit(lint):
 def test_keys_are_counted_as_the_timeline_counts(lint, files):
     hand = lint(*files)
     assert hand.state.of(Linting).checked.options.frame_rate == 30.0
-    hand.state.playback.count_by(24.0)
+    hand.state.clock.count_by(24.0)
     hand.step(2)
     hand.click("Recheck")
     finish(hand)

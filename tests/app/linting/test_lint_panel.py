@@ -235,11 +235,11 @@ def jump() -> Scene:
 
 def test_finding_of_a_clip_goes_to_its_time(lint):
     hand = lint(jump())
-    hand.state.playback.playing = True
+    hand.state.clock.playing = True
     hand.click(row_of(hand, "C003"))
     finding = hand.state.of(Linting).checked.findings[codes(hand).index("C003")]
-    assert not hand.state.playback.playing
-    assert hand.state.playback.time == pytest.approx(finding.times[0])
+    assert not hand.state.clock.playing
+    assert hand.state.clock.time == pytest.approx(finding.times[0])
     assert finding.times[0] == pytest.approx(30 / RATE)
     # The camera is where the figure is at that time, not where it was.
     assert hand.state.camera.target[0] == pytest.approx(40.0)
@@ -252,7 +252,7 @@ def test_captured_points_are_marked(lint):
     points[40:, 2, 3] = 0.1  # the ankle
     hand = lint(scene_of(figure, replace(clip, points=points)))
     hand.click(row_of(hand, "C011"))
-    assert hand.state.playback.time >= 40 / RATE - 1e-9
+    assert hand.state.clock.time >= 40 / RATE - 1e-9
     assert hand.state.of(Linting).marks.points.tolist() == [[0.0, 0.0, 0.0]]
 
 
@@ -288,9 +288,9 @@ def test_findings_are_stale_while_the_pose_is_another(lint, texts):
 
 def test_time_makes_nothing_stale_but_posing_does(lint, texts):
     hand = lint(jump())
-    hand.state.playback.playing = True
+    hand.state.clock.playing = True
     hand.step(20)
-    hand.state.playback.playing = False
+    hand.state.clock.playing = False
     assert not stale(hand, texts)
     hand.click(row_of(hand, "C003"))
     assert not stale(hand, texts)

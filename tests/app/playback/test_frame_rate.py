@@ -57,7 +57,7 @@ def test_clip_at_another_rate_has_the_same_frames():
 
 
 def test_keys_are_counted_by_the_rate_that_is_typed(rising):
-    clip, playback = rising.state.actor.clip, rising.state.playback
+    clip, playback = rising.state.actor.clip, rising.state.clock
     assert playback.n_frames == 121  # four seconds at 30 a second
     rising.enter_value("Frame rate", "24")
     assert (playback.frame_rate, playback.n_frames) == (24.0, 97)
@@ -71,22 +71,22 @@ def test_rate_of_keys_stays_when_the_clip_changes(rising):
     rising.enter_value("Frame rate", "25")
     rising.state.actor.clip = keyed(2.0)
     rising.step(2)
-    assert (rising.state.playback.frame_rate, rising.state.playback.n_frames) == (25.0, 51)
+    assert (rising.state.clock.frame_rate, rising.state.clock.n_frames) == (25.0, 51)
 
 
 def test_capture_gets_the_rate_for_all_of_its_people(pair):
     pair.enter_value("Frame rate", "20")
     assert rates(pair) == [20.0, 20.0]
-    assert pair.state.playback.whole == (0.0, 1.5)  # 30 frames of a twentieth of a second
-    assert pair.state.playback.n_frames == 31
+    assert pair.state.clock.whole == (0.0, 1.5)  # 30 frames of a twentieth of a second
+    assert pair.state.clock.n_frames == 31
     assert pair.says("20 frames a second for 2 actors of this capture")
-    pair.state.playback.seek(1.0)  # frame 20
+    pair.state.clock.seek(1.0)  # frame 20
     pair.step(2)
     assert [actor.is_present for actor in pair.state.scene.actors] == [True, True]
 
 
 def test_time_and_range_stay_on_their_frames(pair):
-    playback = pair.state.playback
+    playback = pair.state.clock
     playback.set_range(0.5, 2.5)
     playback.seek(1.2)
     pair.step(2)
@@ -97,7 +97,7 @@ def test_time_and_range_stay_on_their_frames(pair):
 
 
 def test_change_of_rate_is_undone_with_its_time_and_pose(pair):
-    playback = pair.state.playback
+    playback = pair.state.clock
     playback.seek(1.2)
     pair.step(2)
     clips = [actor.clip for actor in pair.state.scene.actors]
@@ -141,7 +141,7 @@ def test_other_captures_keep_their_rate(drive, rig):
 def test_points_are_retimed_as_well(drive):
     hand = drive(scene=Scene([dots([1, 1, 1, 1])]), size=SIZE, samples=1)
     hand.enter_value("Frame rate", "50")
-    assert rates(hand) == [50.0] and hand.state.playback.whole == (0.0, 0.04)
+    assert rates(hand) == [50.0] and hand.state.clock.whole == (0.0, 0.04)
 
 
 def test_rate_is_greyed_where_another_actor_gives_the_frames(drive, rig):
@@ -156,7 +156,7 @@ def test_rate_is_greyed_where_another_actor_gives_the_frames(drive, rig):
     assert rate_of(hand.state) == 10.0
     hand.enter_value("Frame rate", "20")
     assert hand.state.scene.actors[0].clip.timing.frame_rate == 10.0
-    assert hand.state.playback.frame_rate == 10.0
+    assert hand.state.clock.frame_rate == 10.0
 
 
 def test_people_who_appear_while_reading_have_the_rate_that_was_set(rig):
@@ -178,5 +178,5 @@ def test_undoing_the_rate_while_reading_keeps_what_was_read(rig):
     actor.clip = walk([True] * 4, count, rate=25.0)  # more was read
     history.add_actors(scene, options)
     assert not history.observe(scene, options, busy=False)
-    history.undo(scene, options)
+    history.undo(scene, options, lambda time: None)
     assert (actor.clip.timing.frame_rate, actor.clip.n_rows) == (10.0, 4)

@@ -6,7 +6,7 @@ import pytest
 from app.captured import people
 from app.curves.test_curves_panel import SIZE, _at, _center, clip_text
 
-from viewer.app.core.playback import Playback
+from viewer.app.core.clock import Clock
 
 
 @pytest.fixture
@@ -21,14 +21,14 @@ def scrub(hand, share, held=""):
     x0, y0, x1, _ = hand.state.item_rects["Scrubber"]
     x = round(x0 + share * (x1 - x0))
     hand.pull(((x0 + x1) / 2, y0 + 5), (x, y0 + 5), held=held)
-    low, high = hand.state.playback.whole
+    low, high = hand.state.clock.whole
     return low + (x - x0) / (x1 - x0) * (high - low)
 
 
 @pytest.mark.parametrize("rate", [30.0, 24.0, 12.5])
 @pytest.mark.parametrize("share", [0.137, 0.611, 0.93])
 def test_scrubbing_stops_at_the_nearest_frame_of_the_counting_rate(keyed, rate, share):
-    playback = keyed.state.playback
+    playback = keyed.state.clock
     playback.count_by(rate)
     wanted = scrub(keyed, share)
     number = round(wanted * rate)
@@ -37,7 +37,7 @@ def test_scrubbing_stops_at_the_nearest_frame_of_the_counting_rate(keyed, rate, 
 
 
 def test_scrubbing_with_alt_goes_between_frames(keyed):
-    playback = keyed.state.playback
+    playback = keyed.state.clock
     playback.count_by(2.0)
     wanted = scrub(keyed, 0.63, held="alt")
     assert playback.time == pytest.approx(wanted, abs=2e-3)
@@ -50,8 +50,8 @@ def test_scrubbing_a_capture_goes_by_its_frames(drive, rig):
     hand = drive(scene=scene, size=SIZE, samples=1)
     wanted = scrub(hand, 0.44)
     number = round((wanted - 0.3) * 7.0)
-    assert hand.state.playback.time == pytest.approx(0.3 + number / 7.0)
-    assert hand.state.playback.frame == number
+    assert hand.state.clock.time == pytest.approx(0.3 + number / 7.0)
+    assert hand.state.clock.frame == number
 
 
 @pytest.mark.parametrize("held", ["", "alt"])
@@ -61,7 +61,7 @@ def test_time_line_of_the_curves_stops_at_frames_too(keyed, held):
     keyed.step(3)
     keyed.click("curve arm.x")
     keyed.step(3)
-    playback = keyed.state.playback
+    playback = keyed.state.clock
     playback.count_by(5.0)
     playback.seek(0.6)
     keyed.step(2)
@@ -78,5 +78,5 @@ def test_time_line_of_the_curves_stops_at_frames_too(keyed, held):
     ("time", "nearest"), [(-5.0, 0.0), (0.04, 0.0), (0.06, 0.1), (0.93, 0.9), (9.0, 0.9)]
 )
 def test_nearest_frame_stays_in_the_range(time, nearest):
-    playback = Playback(frame_rate=10.0, whole=(0.0, 0.97), has_motion=True)
+    playback = Clock(frame_rate=10.0, whole=(0.0, 0.97), has_motion=True)
     assert playback.nearest_frame_time(time) == pytest.approx(nearest)

@@ -47,59 +47,59 @@ def test_timeline_appears_with_a_clip(moving):
 
 def test_space_plays_and_pauses_at_the_pace_of_the_clock(moving):
     moving.key("space")
-    before = moving.state.playback.time
+    before = moving.state.clock.time
     moving.step(60)  # frames of a sixtieth of a second
-    assert moving.state.playback.time - before == pytest.approx(1.0, abs=1e-6)
-    assert value(moving) == pytest.approx(0.1 * moving.state.playback.time)
+    assert moving.state.clock.time - before == pytest.approx(1.0, abs=1e-6)
+    assert value(moving) == pytest.approx(0.1 * moving.state.clock.time)
     moving.key("space")
-    stopped = moving.state.playback.time
+    stopped = moving.state.clock.time
     moving.step(10)
-    assert moving.state.playback.time == stopped
+    assert moving.state.clock.time == stopped
 
 
 def test_arrows_home_and_end_go_to_frames(moving):
     moving.key("right_arrow")
     moving.key("right_arrow")
-    assert moving.state.playback.time == pytest.approx(2 / 30)
+    assert moving.state.clock.time == pytest.approx(2 / 30)
     assert value(moving) == pytest.approx(0.1 * 2 / 30)
     moving.key("left_arrow")
-    assert moving.state.playback.frame == 1
+    assert moving.state.clock.frame == 1
     moving.key("end")
     moving.step(1)
-    assert (moving.state.playback.time, value(moving)) == (4.0, pytest.approx(0.4))
+    assert (moving.state.clock.time, value(moving)) == (4.0, pytest.approx(0.4))
     moving.key("home")
-    assert moving.state.playback.time == 0.0
+    assert moving.state.clock.time == 0.0
 
 
 def test_scrubbing_follows_the_mouse_also_while_playing(moving):
     x0, y0, x1, _ = moving.state.item_rects["Scrubber"]
     middle = ((x0 + x1) / 2, y0 + 5)
     moving.pull(middle, ((x0 + 3 * x1) / 4, y0 + 5))
-    assert moving.state.playback.time == pytest.approx(3.0, abs=0.05)
-    assert value(moving) == pytest.approx(0.1 * moving.state.playback.time)
+    assert moving.state.clock.time == pytest.approx(3.0, abs=0.05)
+    assert value(moving) == pytest.approx(0.1 * moving.state.clock.time)
     moving.key("space")
     moving.pull(middle, middle)
-    assert moving.state.playback.playing
-    assert moving.state.playback.time == pytest.approx(2.0, abs=0.3)
+    assert moving.state.clock.playing
+    assert moving.state.clock.time == pytest.approx(2.0, abs=0.3)
 
 
 def test_buttons_do_what_the_keys_do(moving):
     moving.click(">")
-    assert moving.state.playback.frame == 1
+    assert moving.state.clock.frame == 1
     moving.click("Play")
-    assert moving.state.playback.playing
+    assert moving.state.clock.playing
     moving.click(">|")
     moving.step(1)
     moving.click("Play")
-    assert not moving.state.playback.playing
+    assert not moving.state.clock.playing
 
 
 def test_range_by_keys_is_what_loops(moving):
-    moving.state.playback.seek(1.0)
+    moving.state.clock.seek(1.0)
     moving.key("i")
-    moving.state.playback.seek(2.0)
+    moving.state.clock.seek(2.0)
     moving.key("o")
-    playback = moving.state.playback
+    playback = moving.state.clock
     assert (playback.start, playback.end) == (1.0, 2.0)
     moving.key("space")
     moving.step(90)
@@ -111,7 +111,7 @@ def test_playing_leaves_no_steps_to_undo_but_edits_do(moving):
     moving.step(30)
     moving.key("space")
     assert moving.undo_steps == 0
-    time, dofs = moving.state.playback.time, moving.dofs()
+    time, dofs = moving.state.clock.time, moving.dofs()
     moving.state.actor.pose.dofs[moving.dof_row] = moving.dof_start + 0.01
     moving.step(1)
     assert moving.undo_steps == 1
@@ -120,7 +120,7 @@ def test_playing_leaves_no_steps_to_undo_but_edits_do(moving):
     assert moving.undo_steps == 1
     moving.key("z", "ctrl")
     moving.step(2)
-    assert moving.state.playback.time == time
+    assert moving.state.clock.time == time
     assert_allclose(moving.dofs(), dofs)
 
 
@@ -128,11 +128,11 @@ def test_another_clip_is_undone(moving):
     old = moving.state.actor.clip
     moving.state.actor.clip = Clip("other", old.channels, 0.0, 2.0)
     moving.step(2)
-    assert moving.state.playback.whole == (0.0, 2.0)
+    assert moving.state.clock.whole == (0.0, 2.0)
     moving.key("z", "ctrl")
     moving.step(2)
     assert moving.state.actor.clip is old
-    assert moving.state.playback.whole == (0.0, 4.0)
+    assert moving.state.clock.whole == (0.0, 4.0)
 
 
 # Captures
@@ -199,13 +199,13 @@ def test_people_appear_while_a_capture_is_read(streaming):
     assert [actor.person for actor in actors] == [0, 1, 2]
     assert [actor.clip.n_rows for actor in actors] == [100, 90, 80]
     for frame in (0, 9, 10, 57, 99):
-        streaming.state.playback.seek(frame / 10.0)
+        streaming.state.clock.seek(frame / 10.0)
         streaming.step(2)
         assert [a.is_present for a in actors] == [frame >= 0, frame >= 10, frame >= 20]
         for actor in actors:
             if actor.is_present:
                 assert actor.pose.figure_translation[0] == frame
-    assert streaming.state.playback.whole == (0.0, 9.9)
+    assert streaming.state.clock.whole == (0.0, 9.9)
 
 
 def test_reading_is_cancelled_by_escape_and_what_was_read_stays(streaming, monkeypatch):
@@ -289,10 +289,10 @@ def test_camera_follows_an_actor_as_far_as_before(streaming):
     streaming.step(4)
     streaming.click("Actor##follow")
     before = streaming.state.camera.target.copy()
-    streaming.state.playback.seek(3.0)
+    streaming.state.clock.seek(3.0)
     streaming.step(2)
     assert_allclose(streaming.state.camera.target - before, [30.0, 0.0, 0.0], atol=1e-9)
     streaming.click("Nobody")
-    streaming.state.playback.seek(5.0)
+    streaming.state.clock.seek(5.0)
     streaming.step(2)
     assert_allclose(streaming.state.camera.target - before, [30.0, 0.0, 0.0], atol=1e-9)

@@ -16,7 +16,7 @@ def points(drive):
 
 
 def at_frame(hand, frame, texts):
-    hand.state.playback.seek(frame / 10.0)
+    hand.state.clock.seek(frame / 10.0)
     hand.step(2)
     texts.clear()
     hand.step(1)
@@ -46,7 +46,7 @@ def test_panel_lists_names_and_how_sure_each_is_now(points, texts, monkeypatch):
 
 
 def test_points_that_are_not_there_are_said_to_be_so(points, texts):
-    points.state.playback.mode = "run on"
+    points.state.clock.mode = "run on"
     at_frame(points, 9, texts)
     assert "Not there at this time." in texts and texts.count("not seen") == 4
 

@@ -78,8 +78,8 @@ def test_sliders_show_no_minus_before_a_zero(hand, sliders, value):
 def test_timeline_and_status_show_no_minus_before_a_zero(drive, rig, tmp_path, texts):
     (tmp_path / "wave.anim").write_text(clip_text())
     hand = drive(*rig, tmp_path / "wave.anim", size=SIZE, samples=1)
-    hand.state.playback.mode = "run on"
-    hand.state.playback.seek(-1e-4)
+    hand.state.clock.mode = "run on"
+    hand.state.clock.seek(-1e-4)
     texts.clear()
     hand.step(2)
     assert any(text.endswith("0.000 s") for text in texts)

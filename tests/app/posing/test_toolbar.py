@@ -144,42 +144,42 @@ def test_mirror_button_mirrors_and_is_undone(drive_body):
 
 
 def test_edit_pauses_the_clip_and_says_why(moved):
-    moved.state.playback.playing = True
+    moved.state.clock.playing = True
     moved.step(3)
-    time = moved.state.playback.time
+    time = moved.state.clock.time
     assert time > 0
     center = joint_seen(moved, 0)
     places = around(center, 1.2 * RADIUS, 0.3, 1.1)
     drag_along(moved, places)
-    assert not moved.state.playback.playing
+    assert not moved.state.clock.playing
     assert moved.says("Paused: the clip overwrites this pose as time moves; key it (Key)")
-    edited, stopped = moved.dofs(), moved.state.playback.time
+    edited, stopped = moved.dofs(), moved.state.clock.time
     moved.step(3)
     assert_array_equal(moved.dofs(), edited)
-    assert moved.state.playback.time == stopped
+    assert moved.state.clock.time == stopped
 
 
 @pytest.mark.parametrize("shake", [0, 2])
 def test_click_on_a_handle_does_not_pause(moved, shake):
-    moved.state.playback.playing = True
+    moved.state.clock.playing = True
     moved.step(3)
     x, y = around(joint_seen(moved, 0), 1.2 * RADIUS, 0.3, 1.1)[0]
     moved.move((x, y))
     moved.press()
     assert moved.state.of(Posing).drag is not None
-    time = moved.state.playback.time
+    time = moved.state.clock.time
     moved.move((x + shake, y))
     moved.step(3)
     # Time waits as long as the handle is held.
-    assert moved.state.playback.playing and moved.state.playback.time == time
+    assert moved.state.clock.playing and moved.state.clock.time == time
     moved.let_go()
     moved.step(3)
-    assert moved.state.playback.playing and moved.state.playback.time > time
+    assert moved.state.clock.playing and moved.state.clock.time > time
     assert not moved.says("Paused") and moved.undo_steps == 0
 
 
 def test_key_button_keeps_the_pose_in_the_clip_and_is_undone(moved):
-    moved.state.playback.seek(1.0)
+    moved.state.clock.seek(1.0)
     moved.step(2)
     turn(moved, held="ctrl")
     edited, old = moved.dofs(), moved.state.actor.clip
@@ -187,7 +187,7 @@ def test_key_button_keeps_the_pose_in_the_clip_and_is_undone(moved):
     moved.step(2)
     assert moved.state.actor.clip is not old
     for time in (0.0, 1.0):
-        moved.state.playback.seek(time)
+        moved.state.clock.seek(time)
         moved.step(2)
     assert_allclose(moved.dofs(), edited, atol=1e-9)
     moved.key("z", "ctrl")
@@ -197,11 +197,11 @@ def test_key_button_keeps_the_pose_in_the_clip_and_is_undone(moved):
 
 
 def test_slider_pauses_the_clip_too(moved):
-    moved.state.playback.playing = True
+    moved.state.clock.playing = True
     moved.step(2)
     x, y = moved.place("shoulder.x")
     moved.pull((x, y), (x + 30, y))
-    assert not moved.state.playback.playing and moved.says("Paused: the clip")
+    assert not moved.state.clock.playing and moved.says("Paused: the clip")
 
 
 @pytest.fixture

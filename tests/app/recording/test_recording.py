@@ -65,7 +65,7 @@ def test_numbered_pictures_show_what_the_window_shows(moving, tmp_path):
     assert [file.name for file in files] == [f"f_{n:03}.png" for n in range(5)]
     differences = np.zeros((5, 5))
     for number in range(5):
-        moving.state.playback.seek(number / 4)
+        moving.state.clock.seek(number / 4)
         moving.step(2)
         shown = moving.scene_picture()
         for other, file in enumerate(files):
@@ -135,13 +135,13 @@ def test_dialog_offers_the_legend_where_there_is_one(moving):
 
 
 def test_scene_is_left_as_it_was(moving, tmp_path):
-    moving.state.playback.seek(0.25)
+    moving.state.clock.seek(0.25)
     moving.step(2)
     before, steps = moving.dofs(), moving.undo_steps
     start(moving, tmp_path / "f_{frame}.png", kind="pictures", rate=4.0)
     finish(moving)
     assert (moving.dofs() == before).all()
-    assert moving.state.playback.time == 0.25
+    assert moving.state.clock.time == 0.25
     assert moving.undo_steps == steps
 
 

@@ -330,7 +330,7 @@ def test_result_moves_as_the_template_where_the_target_stands(rigging):
     still = seen(hand, 0)
     hand.click("Move as the template")
     hand.step(2)
-    hand.state.playback.seek(1.0)
+    hand.state.clock.seek(1.0)
     hand.step(3)
     figure, pose = rig_scene.bent()
     pose.dofs[:] = 0.0

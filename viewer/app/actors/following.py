@@ -22,17 +22,24 @@ class Following:
         The actor, and the joint of it (-1 for its middle).
     place : (3,) or None
         Where that was when the camera was moved last.
+    n_posed : int
+        How often the clock had posed the scene then.
     """
 
     target: tuple[int, int] | None = None
     place: Floats | None = None
+    n_posed: int = 0
 
 
 def follow_actor(state: AppState) -> None:
-    """Keep the camera's target on the followed actor or joint, as far from it as before."""
-    following = state.of(Following)
-    if following.target is None:
+    """Keep the camera's target on the followed actor or joint, as far from it as before.
+
+    Only the clock moves the camera along: whoever poses by hand sees the pose from one place.
+    """
+    following, n_posed = state.of(Following), state.clock.n_posed
+    if following.target is None or following.n_posed == n_posed:
         return
+    following.n_posed = n_posed
     index, joint = following.target
     place = None
     if index < len(state.scene.actors):
@@ -49,6 +56,7 @@ def start_following(state: AppState, actor: int, joint: int) -> None:
     state.framing.is_fitting = False
     following.target = actor, joint
     following.place = followed_point(state.scene.actors[actor], joint)
+    following.n_posed = state.clock.n_posed
     name = state.scene.actors[actor].name
     state.say_status(f"The camera follows {printable(name, 60)}")
 

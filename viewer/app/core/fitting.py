@@ -30,7 +30,7 @@ def keep_fitting(state: AppState, grows: bool) -> None:
     """
     framing = state.framing
     framing.watch(state.camera)
-    if framing.extent.look(state.scene, state.playback, state.options.show, grows):
+    if framing.extent.look(state.scene, state.clock, state.options.show, grows):
         state.box = framing.extent.box
         framing.note_extent()
     _, _, width, height = state.view_rect

@@ -1,4 +1,4 @@
-"""What the camera is fitted to, and whether it still is."""
+"""State of the camera's fitting: the points it is fitted to, and whether it still is."""
 
 from __future__ import annotations
 

@@ -29,6 +29,9 @@ __all__ = ["History", "Undoable"]
 
 _MOST = 500  # steps kept
 
+PoseAt = Callable[[float], None]
+"""Goes to a time and poses the scene for it."""
+
 
 class Undoable(Protocol):
     """A feature's state of which one value is undone with the scene."""
@@ -57,21 +60,15 @@ class History:
     no edit: see ``follow``.
 
     Undo and redo of an edit of actors, poses or clips go to the time of the edit. There the clock
-    poses all actors by their restored clips (``settle``), but a pose that was edited by hand comes
-    back as it was. Undo of an edit of the display alone leaves time and poses.
+    poses all actors by their restored clips, but a pose that was edited by hand comes back as it
+    was. Undo of an edit of the display alone leaves time and poses.
 
     Attributes
     ----------
-    time : float
-        Seconds that are shown.
-    has_restored : bool
-        Whether clips and poses were restored and the clock has yet to follow.
     feature : Undoable or None
         Has a value that is undone with the scene.
     """
 
-    time: float = 0.0
-    has_restored: bool = False
     feature: Undoable | None = None
     _seen: Snapshot | None = None  # the state of the last frame
     _before: Snapshot | None = None  # the state before an edit that still goes on
@@ -82,9 +79,9 @@ class History:
     def start(self, scene: Scene, options: DisplayOptions) -> None:
         """Forget everything; the scene as it is becomes the first state."""
         self.feature = None  # it was about another scene
-        self.has_restored = False
         self._clocked.clear()
-        self._seen, self._before = self._take(scene, options), None
+        self._seen = self._before = None
+        self._seen = self._take(scene, options)
         self._undo.clear()
         self._redo.clear()
 
@@ -118,12 +115,11 @@ class History:
 
         self._replace(exchanged)
 
-    def follow(self, scene: Scene, time: float) -> None:
+    def follow(self, time: float) -> None:
         """Take over poses that the clock has set, without a step; edits keep their steps.
 
         Edits of the same frame must have been observed before the clock has posed the scene.
         """
-        self.time = time
         if self._seen is None:
             return
         actors = self._seen.actors  # others may have come to the scene since
@@ -134,18 +130,6 @@ class History:
             for actor, pose in zip(actors, poses, strict=True)
             if actor.clip is not None
         }
-
-    def settle(self, scene: Scene, time: float) -> None:
-        """Put restored poses that were made by hand over those that the clock has set."""
-        restored, self.has_restored = self._seen, False
-        if restored is None:
-            return
-        self.follow(scene, time)
-        rows = zip(restored.actors, restored.poses, restored.by_hand, strict=True)
-        for actor, pose, is_own in rows:
-            if is_own and pose is not None:
-                actor.pose = pose.copy()
-        self._seen = replace(restored, poses=copied_poses(restored.actors), time=time)
 
     def add_actors(self, scene: Scene, options: DisplayOptions) -> None:
         """Go on with a scene to which actors were added at its end, as captures are read."""
@@ -185,39 +169,64 @@ class History:
         """Whether a step was undone and can come back."""
         return bool(self._redo)
 
-    def undo(self, scene: Scene, options: DisplayOptions) -> bool:
-        """Go back one step; return whether there was one."""
+    def undo(self, scene: Scene, options: DisplayOptions, pose_at: PoseAt) -> bool:
+        """Go back one step; return whether there was one.
+
+        Parameters
+        ----------
+        scene, options : Scene, DisplayOptions
+            Changed to what they were.
+        pose_at : callable
+            Goes to a time, with clips that were restored, and poses the actors for it.
+        """
         self.observe(scene, options, busy=False)
         if not self._undo:
             return False
         step = self._undo.pop()
         self._redo.append(step)
-        self._go(step.after, step.before, scene, options)
+        self._go(step.after, step.before, scene, options, pose_at)
         return True
 
-    def redo(self, scene: Scene, options: DisplayOptions) -> bool:
-        """Go forward one step; return whether there was one."""
+    def redo(self, scene: Scene, options: DisplayOptions, pose_at: PoseAt) -> bool:
+        """Go forward one step; return whether there was one. Parameters are those of ``undo``."""
         self.observe(scene, options, busy=False)
         if not self._redo:
             return False
         step = self._redo.pop()
         self._undo.append(step)
-        self._go(step.before, step.after, scene, options)
+        self._go(step.before, step.after, scene, options, pose_at)
         return True
 
-    def _go(self, here: Snapshot, there: Snapshot, scene: Scene, options: DisplayOptions) -> None:
+    def _go(
+        self,
+        here: Snapshot,
+        there: Snapshot,
+        scene: Scene,
+        options: DisplayOptions,
+        pose_at: PoseAt,
+    ) -> None:
         """Go from one state of a step to the other."""
-        if not have_same_motion(here, there):
-            restore_motion(there, scene)
-            self.time, self.has_restored = there.time, True
-            self._seen = there
         restore_display(there, options)
         if self.feature is not None:
             self.feature.restore(there.kept)
-        if self._seen is not None and self._seen is not there:
+        if not have_same_motion(here, there):
+            restore_motion(there, scene)
+            pose_at(there.time)
+            self._settle(there, there.time if scene.time is None else scene.time)
+        elif self._seen is not None:
             looks = tuple(map(look_of, scene.actors))
-            kept = copy.deepcopy(options)
-            self._seen = replace(self._seen, looks=looks, options=kept, kept=self._kept())
+            shown = copy.deepcopy(options)
+            self._seen = replace(self._seen, looks=looks, options=shown, kept=self._kept())
+
+    def _settle(self, restored: Snapshot, time: float) -> None:
+        """Put restored poses that were made by hand over those that the clock has set."""
+        self._seen = restored
+        self.follow(time)
+        rows = zip(restored.actors, restored.poses, restored.by_hand, strict=True)
+        for actor, pose, is_own in rows:
+            if is_own and pose is not None:
+                actor.pose = pose.copy()
+        self._seen = replace(restored, poses=copied_poses(restored.actors), time=time)
 
     def _replace(self, change: Callable[[Snapshot], Snapshot]) -> None:
         """Replace every state that is kept."""
@@ -230,8 +239,10 @@ class History:
     def _take(self, scene: Scene, options: DisplayOptions) -> Snapshot:
         actors = tuple(scene.actors)
         poses, by_hand = copied_poses(actors), tuple(map(self._is_by_hand, actors))
-        looks, kept = tuple(map(look_of, actors)), copy.deepcopy(options)
-        return Snapshot(actors, poses, by_hand, looks, kept, self.time, self._kept())
+        looks, shown = tuple(map(look_of, actors)), copy.deepcopy(options)
+        # What was edited belongs to the time of the poses: the clock may have moved on already.
+        time = (scene.time or 0.0) if self._seen is None else self._seen.time
+        return Snapshot(actors, poses, by_hand, looks, shown, time, self._kept())
 
     def _is_by_hand(self, actor: Actor) -> bool:
         """Return whether an actor's pose is another than the clock gave it by its present clip.

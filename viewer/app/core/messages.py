@@ -1,4 +1,4 @@
-"""What was said: every message of the window, kept after it has gone from the view."""
+"""Messages of the window: those shown over the view, and the log of all."""
 
 from __future__ import annotations
 

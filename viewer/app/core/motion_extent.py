@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from viewer.app.core.playback import Playback
+from viewer.app.core.clock import Clock
 from viewer.rendering.framing import frames_looked_at, outermost
 from viewer.rendering.recorder import copied
 from viewer.rig.arrays import Floats
@@ -68,14 +68,14 @@ class MotionExtent:
         """The box around all of them: (2, 3)."""
         return bounding_box(self.points)
 
-    def look(self, scene: Scene, playback: Playback, show: str, grows: bool) -> bool:
+    def look(self, scene: Scene, clock: Clock, show: str, grows: bool) -> bool:
         """Look at some more frames; return whether there was one.
 
         Parameters
         ----------
         scene : Scene
             As it is shown; nothing of it changes.
-        playback : Playback
+        clock : Clock
             Gives the frames.
         show : str
             What is drawn of the figures, a key of ``SHOWN``.
@@ -93,11 +93,11 @@ class MotionExtent:
         self.was_edited |= is_edited
         self._shapes, self._motions, self._grew = shapes, motions, grows
         self._keep_poses(scene)
-        left = self._left(scene, playback, grows)
+        left = self._left(scene, clock, grows)
         self.is_done = not left and not grows
         n_points = max(_n_points(scene), 1)
         for time in left[: max(_POINTS_A_TIME // n_points, 1)]:
-            self._clouds[time] = self._cloud(scene, playback, time, show)
+            self._clouds[time] = self._cloud(scene, clock, time, show)
             self._kept.pop(time, None)
         return bool(left)
 
@@ -108,16 +108,16 @@ class MotionExtent:
             if actor.pose is not None and (known is None or known[1] is not actor.figure):
                 self._opened[id(actor)] = actor, actor.figure, actor.pose.copy()
 
-    def _left(self, scene: Scene, playback: Playback, grows: bool) -> list[float]:
+    def _left(self, scene: Scene, clock: Clock, grows: bool) -> list[float]:
         """Return the times to look at next, and drop those that no longer count."""
-        first, last = playback.frame_range if playback.has_motion else (0, 0)
+        first, last = clock.frame_range if clock.has_motion else (0, 0)
         last = max(first, last)  # a motion may lie between two frames
         if grows:
-            wanted = set(map(playback.frame_time, _growing(first, last)))
+            wanted = set(map(clock.frame_time, _growing(first, last)))
         else:
             most = min(max(_MOST_POINTS // max(_n_points(scene), 1), 2), _MOST_FRAMES)
             frames = frames_looked_at(last - first + 1, most)
-            wanted = {playback.frame_time(first + frame) for frame in frames}
+            wanted = {clock.frame_time(first + frame) for frame in frames}
             for known in (self._clouds, self._kept):
                 for time in known.keys() - wanted:
                     del known[time]
@@ -127,7 +127,7 @@ class MotionExtent:
         left = wanted - self._clouds.keys()
         return sorted(left, key=lambda time: (lowest.get(time, np.inf), time))
 
-    def _cloud(self, scene: Scene, playback: Playback, time: float, show: str) -> Floats:
+    def _cloud(self, scene: Scene, clock: Clock, time: float, show: str) -> Floats:
         """Return the outermost points at one time; none if nobody is there."""
         seen = copied(scene)
         for actor, shown in zip(seen.actors, scene.actors, strict=True):
@@ -135,12 +135,12 @@ class MotionExtent:
                 weights = actor.pose.shape_weights
                 actor.pose = self._opened[id(shown)][2].copy()
                 actor.pose.shape_weights = weights
-        if playback.has_motion:
-            pose_actors(seen.actors, time, playback.fill_gaps)
+        if clock.has_motion:
+            pose_actors(seen.actors, time, clock.fill_gaps)
             if not any(actor.is_drawn for actor in seen.actors):
                 return np.zeros((0, 3))
         points = scene_points(seen, show)
-        if not playback.has_motion:
+        if not clock.has_motion:
             return points  # one frame: to keep all takes less time than to choose
         low, high = _N_DIRECTIONS
         return outermost(points, min(max(_MOST_PRODUCTS // len(points), low), high))

@@ -1,4 +1,4 @@
-"""Why a control cannot act right now: words for its tooltip; empty where it can."""
+"""Reasons why a control cannot act right now, for its tooltip; empty where it can."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ __all__ = [
 
 def no_motion(state: AppState) -> str:
     """Say why time cannot be moved."""
-    return "" if state.playback.has_motion else "nothing moves: open a clip, a capture or a BVH"
+    return "" if state.clock.has_motion else "nothing moves: open a clip, a capture or a BVH"
 
 
 def no_panel(state: AppState, needs: str) -> str:
@@ -58,7 +58,7 @@ def nothing_to_export(state: AppState) -> str:
     """Say why no motion can be written."""
     if any(isinstance(actor.clip, Clip | SampledClip) for actor in state.scene.actors):
         return ""
-    if state.playback.has_motion:
+    if state.clock.has_motion:
         return "captured points alone move, and no joints"
     return no_motion(state)
 

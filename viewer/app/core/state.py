@@ -10,11 +10,11 @@ from typing import TypeVar
 
 import numpy as np
 
+from viewer.app.core.clock import Clock
 from viewer.app.core.framing import Framing
 from viewer.app.core.history import History
 from viewer.app.core.jobs import Job
 from viewer.app.core.messages import Messages
-from viewer.app.core.playback import Playback
 from viewer.app.core.stats import Stats
 from viewer.diagnostics import Diagnostic
 from viewer.loading import MotionSettings
@@ -75,8 +75,8 @@ class AppState:
         Steps to undo.
     framing : Framing
         Whether the camera keeps fitting what is shown.
-    playback : Playback
-        The scene's clock.
+    clock : Clock
+        Moves the scene's time, and poses the actors for it.
     job : Job or None
         Work that goes on beside the frame loop.
     """
@@ -101,7 +101,7 @@ class AppState:
     stats: Stats = field(default_factory=Stats)
     history: History = field(default_factory=History)
     framing: Framing = field(default_factory=Framing)
-    playback: Playback = field(default_factory=Playback)
+    clock: Clock = field(default_factory=Clock)
     job: Job | None = None
     _parts: dict[type[object], object] = field(default_factory=dict)
 
@@ -135,7 +135,7 @@ class AppState:
         """Let panels act on another actor."""
         self.chosen_actor = index
         self.n_choices += 1
-        self.playback.follow(self.scene.actors, self.actor)  # one steps by its frames
+        self.clock.follow(self.actor)  # one steps by its frames
         self.selected_joint = -1
 
     @property
@@ -166,8 +166,7 @@ class AppState:
 
     def _begin(self) -> None:
         """Go to the start of the scene's motion; nothing of it has been changed yet."""
-        self.playback.show(self.scene)
-        self.history.time = self.playback.time
+        self.clock.show(self.scene)
         self.history.start(self.scene, self.options)
         self.say(*self.scene.diagnostics)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from viewer.app.core.state import AppState
 from viewer.rig.scene import Actor
 
@@ -11,7 +13,8 @@ __all__ = ["redo", "undo"]
 def undo(state: AppState) -> None:
     """Take back the last change of pose or display."""
     before = state.actor
-    if not state.history.undo(state.scene, state.options):
+    pose_at = partial(state.clock.go_back, chosen=before)
+    if not state.history.undo(state.scene, state.options, pose_at):
         state.say_status("Nothing to undo")
     _keep_choice(state, before)
 
@@ -19,7 +22,8 @@ def undo(state: AppState) -> None:
 def redo(state: AppState) -> None:
     """Bring back the change that was undone last."""
     before = state.actor
-    if not state.history.redo(state.scene, state.options):
+    pose_at = partial(state.clock.go_back, chosen=before)
+    if not state.history.redo(state.scene, state.options, pose_at):
         state.say_status("Nothing to redo")
     _keep_choice(state, before)
 

@@ -1,4 +1,4 @@
-"""What the parts of the Curves panel's plot share: its axes, and how curves are shown on them."""
+"""Axes of the Curves panel's plot, and the places of curves on them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is done to a keyed clip as a whole: made of a pose, given keys, saved."""
+"""Actions on a keyed clip as a whole: make one of a pose, add keys, save it."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def key_present_pose(state: AppState, only_changed: bool = False) -> None:
     actor = state.actor
     if not isinstance(actor.clip, Clip) or actor.pose is None or actor.figure.skeleton is None:
         return
-    time = state.playback.time - actor.offset
+    time = state.clock.time - actor.offset
     old, skeleton = actor.clip, actor.figure.skeleton
     actor.clip = key_pose(old, skeleton, actor.pose, time, only_changed)
     keys = [sum(len(channel.times) for channel in clip.channels) for clip in (old, actor.clip)]

@@ -191,7 +191,7 @@ def _draw_tools(state: AppState) -> None:
         imgui.text_disabled("frames, not keys: to be looked at")
         return
     if _button_beside(state, "Add key", "on the shown curves, at the present time"):
-        add_key_at(state, view.rows, state.playback.time - state.actor.offset)
+        add_key_at(state, view.rows, state.clock.time - state.actor.offset)
     if _button_beside(state, "Key pose", "every DOF as it is posed, at the present time"):
         key_present_pose(state)
     if _button_beside(state, "Key changes", "the same for DOFs alone that were posed anew"):

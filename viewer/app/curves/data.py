@@ -1,4 +1,4 @@
-"""What there is to plot of a motion: its curves by name, and their values."""
+"""Curves of a motion for plotting: names and values."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the Curves panel does to the chosen actor's clip: each edit replaces it by a new one."""
+"""Edits of the chosen actor's clip in the Curves panel: each replaces it by a new one."""
 
 from __future__ import annotations
 

@@ -194,8 +194,8 @@ def _draw_range(plot: Plot) -> None:
 def _draw_time(plot: Plot) -> None:
     """Draw the present time; dragging it moves the clock by whole frames, with Alt freely."""
     state, offset = plot.state, plot.state.actor.offset
-    time = state.playback.time - offset
+    time = state.clock.time - offset
     moved, time, *_ = implot.drag_line_x(_TIME_ID, time, _TIME, 1.5, implot.DragToolFlags_.no_fit)
     if moved:
-        state.playback.scrub(time + offset, between=imgui.get_io().key_alt)
+        state.clock.scrub(time + offset, between=imgui.get_io().key_alt)
     plot.note("time line", time, 0.5 * (plot.limits[2] + plot.limits[3]))

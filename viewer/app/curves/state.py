@@ -1,4 +1,4 @@
-"""What the Curves panel shows: which curves and keys are chosen, and whether to fit them."""
+"""State of the Curves panel: chosen curves and keys, and whether to fit them."""
 
 from __future__ import annotations
 

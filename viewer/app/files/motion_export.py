@@ -1,4 +1,4 @@
-"""What is done with motions as a whole: exported for other programs, one actor's or everybody's."""
+"""Export of whole motions for other programs, one actor's or those of all."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ def _parts(state: AppState, path: Path, everyone: bool) -> tuple[list[_Part], li
             continue
         # What goes on in the window meanwhile must not change what is written.
         taken = actor.copy()
-        rate = state.playback.frame_rate if isinstance(actor.clip, Clip) else None
+        rate = state.clock.frame_rate if isinstance(actor.clip, Clip) else None
         parts.append(_Part(taken, file, frames, rate, number))
     if not parts:
         raise RigError("nobody is there in the range that is played: there is nothing to write")
@@ -172,11 +172,11 @@ def _write_capture(
 
 def _range(state: AppState, actor: Actor) -> tuple[int, int] | None:
     """Return the frames of the actor's own clip that are played; None for all."""
-    playback, clip = state.playback, actor.clip
-    if (playback.start, playback.end) == playback.whole or clip is None:
+    clock, clip = state.clock, actor.clip
+    if (clock.start, clock.end) == clock.whole or clip is None:
         return None
-    rate = clip.timing.frame_rate if isinstance(clip, SampledClip) else playback.frame_rate
+    rate = clip.timing.frame_rate if isinstance(clip, SampledClip) else clock.frame_rate
     count = int((clip.end - clip.start) * rate + 1e-6) + 1
-    first = round((playback.start - actor.offset - clip.start) * rate)
-    stop = round((playback.end - actor.offset - clip.start) * rate) + 1
+    first = round((clock.start - actor.offset - clip.start) * rate)
+    stop = round((clock.end - actor.offset - clip.start) * rate) + 1
     return max(first, 0), min(stop, count)

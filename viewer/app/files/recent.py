@@ -1,4 +1,4 @@
-"""What is remembered between runs: files opened before, and panels that were closed."""
+"""Files that were opened before and panels that were closed, remembered between runs."""
 
 from __future__ import annotations
 

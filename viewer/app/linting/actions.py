@@ -1,4 +1,4 @@
-"""What the Lint panel and its menu entry do: check, choose a finding, copy all of them."""
+"""Actions of the Lint panel and its menu entry: check, choose a finding, copy all of them."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def start_check(state: AppState) -> None:
 
 def _options(state: AppState) -> LintOptions:
     """Return what counts as a fault; frames are those of the timeline."""
-    return replace(state.of(Linting).options, frame_rate=state.playback.keyed_rate)
+    return replace(state.of(Linting).options, frame_rate=state.clock.keyed_rate)
 
 
 def _copied(scene: Scene) -> Scene:
@@ -119,10 +119,9 @@ def is_stale(state: AppState) -> bool:
 
 
 def _moving(state: AppState) -> tuple[object, ...]:
-    """Return the time at which the scene is posed, and the poses of what moves."""
+    """Return what the scene was posed for, and the poses of what moves."""
     poses = [actor.pose for actor in state.scene.actors if actor.clip is not None]
-    time = (state.scene.time, state.playback.fill_gaps)
-    return (time, *(pose_key(pose) for pose in poses if pose is not None))
+    return (state.clock.posed_for, *(pose_key(pose) for pose in poses if pose is not None))
 
 
 def _differs(actor: Actor, old: Actor) -> bool:
@@ -156,10 +155,10 @@ def choose_finding(state: AppState, index: int) -> None:
     if actor.figure.skeleton is None or joint >= actor.figure.skeleton.n_joints:
         joint = -1
     take_pick(state, Pick(finding.actor, joint, -1, -1, actor.placement[:3, 3]), False)
-    if len(finding.times) and state.playback.has_motion:
-        state.playback.playing = False
+    if len(finding.times) and state.clock.has_motion:
+        state.clock.playing = False
         seek = finding.times[0] if finding.seek is None else finding.seek
-        state.playback.seek(float(seek))
+        state.clock.seek(float(seek))
         if finding.seek is not None and finding.code == "C005":
             state.say_status("The last frame before the gap: in it nobody is there")
     if not actor.visible:

@@ -1,4 +1,4 @@
-"""Where the chosen finding is: marks in the view, and the camera's way there."""
+"""Marks of the chosen finding in the view, and the camera that moves there."""
 
 from __future__ import annotations
 

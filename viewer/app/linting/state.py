@@ -1,4 +1,4 @@
-"""What the Lint panel shows: the findings of the last check, filters, and the one looked at."""
+"""State of the Lint panel: the findings of the last check, filters, and the chosen one."""
 
 from __future__ import annotations
 

@@ -21,13 +21,13 @@ def rate_of(state: AppState) -> float:
     clip = state.actor.clip
     if isinstance(clip, SampledClip | PointClip):
         return clip.timing.frame_rate
-    return state.playback.frame_rate
+    return state.clock.frame_rate
 
 
 def foreign_rate(state: AppState) -> str:
     """Say why the rate cannot be set through the chosen actor: another one's frames count."""
-    playback = state.playback
-    if not playback.has_frames or isinstance(state.actor.clip, SampledClip | PointClip):
+    clock = state.clock
+    if not clock.has_frames or isinstance(state.actor.clip, SampledClip | PointClip):
         return ""
     return "another motion gives the frames: choose its actor"
 
@@ -52,7 +52,7 @@ def set_rate(state: AppState, rate: float) -> None:
         return
     clip = state.actor.clip
     if not isinstance(clip, SampledClip | PointClip):
-        state.playback.count_by(rate)
+        state.clock.count_by(rate)
         state.say_status(f"Keys are counted by {rate:g} frames a second")
         return
     together = [actor for actor in state.scene.actors if _is_together(actor, state.actor)]

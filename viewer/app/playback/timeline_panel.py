@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from viewer.app.core.playback import FASTEST, MODES
+from viewer.app.core.clock import FASTEST, MODES
 from viewer.app.core.reasons import no_motion
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import (
@@ -31,7 +31,7 @@ _TYPED = imgui.InputTextFlags_.enter_returns_true | imgui.InputTextFlags_.auto_s
 
 def draw(state: AppState) -> None:
     """Draw the panel."""
-    if not state.playback.has_motion:
+    if not state.clock.has_motion:
         imgui.text_disabled(no_motion(state))
         return
     _draw_transport(state)
@@ -44,7 +44,7 @@ def draw(state: AppState) -> None:
 
 
 def _draw_transport(state: AppState) -> None:
-    playback = state.playback
+    clock = state.clock
     if button(state, "|<"):
         go_to_end(state, last=False)
     explain("first frame (Home)")
@@ -55,7 +55,7 @@ def _draw_transport(state: AppState) -> None:
     imgui.same_line()
     # One width for both words, or the buttons behind it would jump.
     width = imgui.calc_text_size("Pause").x + 2 * imgui.get_style().frame_padding.x
-    if imgui.button("Pause###play" if playback.playing else "Play###play", (width, 0.0)):
+    if imgui.button("Pause###play" if clock.playing else "Play###play", (width, 0.0)):
         play(state)
     note_item(state, "Play")
     explain("play or pause (Space)")
@@ -70,17 +70,17 @@ def _draw_transport(state: AppState) -> None:
 
 
 def _draw_place(state: AppState) -> None:
-    playback = state.playback
+    clock = state.clock
     imgui.set_next_item_width(4.5 * imgui.get_font_size())
-    shown = playback.frame + playback.first_frame
+    shown = clock.frame + clock.first_frame
     changed, frame = imgui.input_int("##frame", shown, 0, 0)
     note_item(state, "Frame")
     explain("the frame that is shown")
     if changed and frame != shown:
-        playback.playing = False
-        playback.seek(playback.frame_time(frame - playback.first_frame))
-    first, last = (playback.first_frame + number for number in playback.frame_range)
-    text = f"of {first} to {last}    {number_text(playback.time, '.3f')} s"
+        clock.playing = False
+        clock.seek(clock.frame_time(frame - clock.first_frame))
+    first, last = (clock.first_frame + number for number in clock.frame_range)
+    text = f"of {first} to {last}    {number_text(clock.time, '.3f')} s"
     same_line_if_room(text)
     imgui.text_unformatted(text)
 
@@ -100,44 +100,44 @@ def _draw_rate(state: AppState) -> None:
 
 
 def _draw_settings(state: AppState) -> None:
-    playback = state.playback
+    clock = state.clock
     size = imgui.get_font_size()
     imgui.set_next_item_width(8 * size)
-    playback.mode = choice(state, "Mode", playback.mode, MODES)
+    clock.mode = choice(state, "Mode", clock.mode, MODES)
     explain("what happens at the end of the range")
-    if playback.mode != "run on":
-        playback.time = min(max(playback.time, playback.whole[0]), playback.whole[1])
+    if clock.mode != "run on":
+        clock.time = min(max(clock.time, clock.whole[0]), clock.whole[1])
     same_line_if_room("M" * 12)
     imgui.set_next_item_width(8 * size)
-    playback.speed = slider(state, "Speed", playback.speed, -FASTEST, FASTEST, "%.2f x", _CLAMP)
+    clock.speed = slider(state, "Speed", clock.speed, -FASTEST, FASTEST, "%.2f x", _CLAMP)
     if imgui.is_item_clicked(imgui.MouseButton_.right):
-        playback.speed = 1.0
+        clock.speed = 1.0
     explain("seconds of motion a second; a right click sets 1")
     same_line_if_room("M" * 14)
     _draw_range(state)
     same_line_if_room("Fill gaps")
     gapless = no_gaps(state)
-    playback.fill_gaps = checkbox(state, "Fill gaps", playback.fill_gaps, gapless)
+    clock.fill_gaps = checkbox(state, "Fill gaps", clock.fill_gaps, gapless)
     text = "show captures in their gaps too, on the way from the frame before to the one after"
     explain(text, gapless)
 
 
 def _draw_range(state: AppState) -> None:
     """Draw the frames at which playing starts and ends."""
-    playback = state.playback
-    rate, origin = playback.frame_rate, playback.origin
-    first = round((playback.start - origin) * rate) + playback.first_frame
-    last = round((playback.end - origin) * rate) + playback.first_frame
-    lowest, highest = (playback.first_frame + number for number in playback.frame_range)
+    clock = state.clock
+    rate, origin = clock.frame_rate, clock.origin
+    first = round((clock.start - origin) * rate) + clock.first_frame
+    last = round((clock.end - origin) * rate) + clock.first_frame
+    lowest, highest = (clock.first_frame + number for number in clock.frame_range)
     imgui.set_next_item_width(9 * imgui.get_font_size())
     changed, low, high = imgui.drag_int_range2("Range", first, last, 0.3, lowest, highest)
     note_item(state, "Range")
     text = "frames that are played; I and O set them to the present one, a right click to all"
     explain(text)
     if imgui.is_item_clicked(imgui.MouseButton_.right):
-        playback.set_range(*playback.whole)
+        clock.set_range(*clock.whole)
     elif changed:
         # What was not touched keeps its exact time.
-        start = playback.frame_time(low - playback.first_frame) if low != first else playback.start
-        end = playback.frame_time(high - playback.first_frame) if high != last else playback.end
-        playback.set_range(start, end)
+        start = clock.frame_time(low - clock.first_frame) if low != first else clock.start
+        end = clock.frame_time(high - clock.first_frame) if high != last else clock.end
+        clock.set_range(start, end)

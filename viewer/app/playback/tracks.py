@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from imgui_bundle import imgui
 
-from viewer.app.core.playback import Playback
+from viewer.app.core.clock import Clock
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import note_item
 from viewer.errors import printable
@@ -37,7 +37,7 @@ def draw_tracks(state: AppState) -> None:
     size = imgui.get_font_size()
     moving = [index for index, actor in enumerate(state.scene.actors) if actor.clip is not None]
     height = imgui.get_text_line_height_with_spacing()
-    low, high = state.playback.whole
+    low, high = state.clock.whole
     if not imgui.begin_child("##tracks"):
         imgui.end_child()
         return
@@ -52,16 +52,16 @@ def draw_tracks(state: AppState) -> None:
     note_item(state, "Scrubber")
     if imgui.is_item_active() and imgui.is_mouse_down(imgui.MouseButton_.left):
         time = low + (imgui.get_mouse_pos().x - left) / scale
-        state.playback.scrub(time, between=imgui.get_io().key_alt)
+        state.clock.scrub(time, between=imgui.get_io().key_alt)
     first = max(0, int((imgui.get_scroll_y() - height) / height))
     last = first + int(imgui.get_window_height() / height) + 3
     for row in range(first, min(last, len(moving))):
         index = moving[row]
         top = corner.y + height * (row + 1)
         chosen = index == state.chosen_actor
-        _draw_track(state.scene.actors[index], state.playback, area, top, height, chosen)
-    _draw_ruler(state.playback, area, height)
-    _draw_time(state.playback, area)
+        _draw_track(state.scene.actors[index], state.clock, area, top, height, chosen)
+    _draw_ruler(state.clock, area, height)
+    _draw_time(state.clock, area)
     imgui.end_child()
 
 
@@ -85,7 +85,7 @@ def _draw_names(state: AppState, moving: list[int], height: float) -> None:
 
 def _draw_track(
     actor: Actor,
-    playback: Playback,
+    clock: Clock,
     area: tuple[float, float, float, float],
     top: float,
     height: float,
@@ -93,7 +93,7 @@ def _draw_track(
 ) -> None:
     draw_list = imgui.get_window_draw_list()
     left, _, width, _ = area
-    low, high = playback.whole
+    low, high = clock.whole
     scale = width / max(high - low, 1e-9)
     gap = 0.16 * height
     back = imgui.get_color_u32(_BACK)
@@ -163,25 +163,25 @@ def present_spans(clip: Motion, shortest: float) -> list[tuple[float, float]]:
     return list(zip(begins.tolist(), stops.tolist(), strict=True))
 
 
-def _draw_ruler(playback: Playback, area: tuple[float, float, float, float], height: float) -> None:
+def _draw_ruler(clock: Clock, area: tuple[float, float, float, float], height: float) -> None:
     """Draw frame numbers and lines, and darken what is not played."""
     draw_list = imgui.get_window_draw_list()
     left, top, width, total = area
-    low, high = playback.whole
+    low, high = clock.whole
     scale = width / max(high - low, 1e-9)
     line, color = imgui.get_color_u32(_LINE), imgui.get_color_u32(_TEXT)
-    first, last = (playback.first_frame + frame for frame in playback.frame_range)
+    first, last = (clock.first_frame + frame for frame in clock.frame_range)
     # Room for two numbers: the last one may stand left of its line.
     room = 2.0 * imgui.calc_text_size(str(last)).x + 3.0 * _TICK_ASIDE
     room = max(_TICK_GAP * imgui.get_font_size(), room)
-    step = nice_step(room / scale * playback.frame_rate)
+    step = nice_step(room / scale * clock.frame_rate)
     for number in range(math.ceil(first / step) * step, last + 1, step):
-        x = left + (playback.frame_time(number - playback.first_frame) - low) * scale
+        x = left + (clock.frame_time(number - clock.first_frame) - low) * scale
         draw_list.add_line((x, top), (x, top + total), line)
         place = ruler_text_place(x, imgui.calc_text_size(str(number)).x, left + width)
         draw_list.add_text((place, top), color, str(number))
     dark = imgui.get_color_u32(_OUTSIDE)
-    for start, end in ((low, playback.start), (playback.end, high)):
+    for start, end in ((low, clock.start), (clock.end, high)):
         if end > start:
             x0, x1 = left + (start - low) * scale, left + (end - low) * scale
             draw_list.add_rect_filled((x0, top), (x1, top + total), dark)
@@ -205,11 +205,11 @@ def ruler_text_place(x: float, length: float, end: float) -> float:
     return x - _TICK_ASIDE - length if x + _TICK_ASIDE + length > end else x + _TICK_ASIDE
 
 
-def _draw_time(playback: Playback, area: tuple[float, float, float, float]) -> None:
+def _draw_time(clock: Clock, area: tuple[float, float, float, float]) -> None:
     draw_list = imgui.get_window_draw_list()
     left, top, width, total = area
-    low, high = playback.whole
-    share = (playback.time - low) / max(high - low, 1e-9)
+    low, high = clock.whole
+    share = (clock.time - low) / max(high - low, 1e-9)
     x = left + width * min(max(share, 0.0), 1.0)
     color = imgui.get_color_u32(_TIME)
     draw_list.add_line((x, top), (x, top + total), color, 2.0)

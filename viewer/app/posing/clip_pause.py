@@ -16,10 +16,10 @@ def pause_for_edit(state: AppState) -> None:
     state : AppState
         Whose chosen actor is about to be posed; nothing happens if no clip drives it.
     """
-    clip, playback = state.actor.clip, state.playback
+    clip, clock = state.actor.clip, state.clock
     if clip is None:
         return
-    stopped = "Paused: the" if playback.playing else "The"
-    playback.playing = False
+    stopped = "Paused: the" if clock.playing else "The"
+    clock.playing = False
     kept = "key it (Key) to keep it" if isinstance(clip, Clip) else "it lasts until time moves"
     state.say_status(f"{stopped} clip overwrites this pose as time moves; {kept}")

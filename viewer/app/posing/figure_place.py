@@ -1,4 +1,4 @@
-"""Where a figure stands as a whole: rows of the Joints panel."""
+"""Place of a figure as a whole: rows of the Joints panel."""
 
 from __future__ import annotations
 

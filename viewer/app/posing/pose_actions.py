@@ -1,4 +1,4 @@
-"""What is done to a pose as a whole: copied, pasted, saved, mirrored, shaped at random."""
+"""Actions on a pose as a whole: copy, paste, save, mirror, random shape."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the tools that pose by hand keep between frames, and what a handle that is dragged gives."""
+"""State of the tools that pose by hand, handles, and the outcome of dragging one."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ ORIENTATIONS = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outcome:
-    """What a drag has come to.
+    """Result of a drag.
 
     Attributes
     ----------

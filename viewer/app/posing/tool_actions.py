@@ -1,4 +1,4 @@
-"""What the tools' buttons and keys do, and why they cannot."""
+"""Actions of the posing tools' buttons and keys, and the reasons why they cannot act."""
 
 from __future__ import annotations
 

@@ -67,7 +67,7 @@ def _draw_settings(state: AppState, settings: RecordSettings) -> None:
         note_item(state, "Frames##sheet")
         settings.n_cells = min(max(count, 1), 400) if changed else settings.n_cells
     else:
-        shown = settings.rate or state.playback.frame_rate
+        shown = settings.rate or state.clock.frame_rate
         changed, rate = imgui.input_float("Frames a second", shown, 0.0, 0.0, "%.3f")
         note_item(state, "Frames a second")
         if changed and 0.01 <= rate <= 1000.0:
@@ -77,7 +77,7 @@ def _draw_settings(state: AppState, settings: RecordSettings) -> None:
         note_item(state, "Quality")
         settings.quality = min(max(quality, 0), 100) if changed else settings.quality
     settings.turntable = checkbox(state, "Turntable", settings.turntable)
-    if settings.turntable and not state.playback.has_motion:
+    if settings.turntable and not state.clock.has_motion:
         changed, seconds = imgui.input_float("Seconds", settings.seconds, 0.0, 0.0, "%.2f s")
         note_item(state, "Seconds")
         if changed and 0.05 <= seconds <= 3600.0:
@@ -90,10 +90,10 @@ def _draw_settings(state: AppState, settings: RecordSettings) -> None:
 
 
 def _span_text(state: AppState, settings: RecordSettings) -> str:
-    playback = state.playback
-    if not playback.has_motion:
+    clock = state.clock
+    if not clock.has_motion:
         return "one turn" if settings.turntable else "nothing moves: one frame"
-    low, high = playback.start, playback.end
+    low, high = clock.start, clock.end
     return f"the range that is played: {number_text(low, '.3f')} to {number_text(high, '.3f')} s"
 
 

@@ -1,4 +1,4 @@
-"""What explains the picture in recordings as it does in the view, frame by frame."""
+"""Marks and explanations of the view, made for each frame of a recording."""
 
 from __future__ import annotations
 

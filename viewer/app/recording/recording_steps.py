@@ -109,8 +109,8 @@ def _recording(
         size,
         options,
         box=state.box.copy(),
-        moves=state.playback.has_motion,
-        fill=state.playback.fill_gaps,
+        moves=state.clock.has_motion,
+        fill=state.clock.fill_gaps,
         turn=_FULL if settings.turntable else 0.0,
         follow=follow,
         selected=(state.chosen_actor, state.selected_joint),
@@ -120,19 +120,19 @@ def _recording(
 
 def _times(state: AppState, settings: RecordSettings) -> tuple[Floats, list[int], float]:
     """Return the seconds of every frame, what they are called, and frames a second."""
-    playback = state.playback
-    rate = settings.rate or playback.frame_rate
+    clock = state.clock
+    rate = settings.rate or clock.frame_rate
     if settings.kind == ".gif":
         rate = min(rate, MOST_GIF_RATE)
-    if not playback.has_motion:
+    if not clock.has_motion:
         count = max(round(settings.seconds * rate), 1) if settings.turntable else 1
         if settings.kind == "sheet":
             count = settings.n_cells if settings.turntable else 1
         return np.zeros(count), list(range(count)), rate
-    count = math.floor((playback.end - playback.start) * rate + 1e-6) + 1
-    times = playback.start + np.arange(count) / rate
-    first = playback.first_frame if rate == playback.frame_rate else 0
-    first += math.floor((playback.start - playback.origin) * rate + 1e-6)
+    count = math.floor((clock.end - clock.start) * rate + 1e-6) + 1
+    times = clock.start + np.arange(count) / rate
+    first = clock.first_frame if rate == clock.frame_rate else 0
+    first += math.floor((clock.start - clock.origin) * rate + 1e-6)
     if settings.kind == "sheet":
         chosen = np.unique(np.rint(np.linspace(0, count - 1, settings.n_cells)).astype(int))
         return times[chosen], (first + chosen).tolist(), rate

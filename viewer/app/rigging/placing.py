@@ -1,4 +1,4 @@
-"""Where the template lies over the target: as aligned, as dragged, or beside it for landmarks."""
+"""Placement of the template over the target: as aligned, as dragged, or beside it for landmarks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What rigging gave: in the scene in place of the target, as colours, as motion, in files."""
+"""Results of rigging: shown in place of the target, as colours and as motion, and saved."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What can be rigged in this scene, and from what: targets, templates, and why there is none."""
+"""Targets and templates of the Rig panel, and the reasons why there is none."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the Rig panel keeps: what is rigged from what, where the template lies, and the results."""
+"""State of the Rig panel: target and template, the template's placement, and the results."""
 
 from __future__ import annotations
 

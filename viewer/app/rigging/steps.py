@@ -1,4 +1,4 @@
-"""What the Rig panel's threads compute: no state of the window, only figures and numbers."""
+"""Computations of the Rig panel's threads: figures and numbers, no state of the window."""
 
 from __future__ import annotations
 

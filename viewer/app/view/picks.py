@@ -1,4 +1,4 @@
-"""What lies in the view under a click or a mouse that rests: actors, joints, vertices."""
+"""Picking in the view: actors, joints and vertices under a click or a mouse that rests."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What keys, menus and buttons do with weights and vertices, each a function of the state."""
+"""Actions of keys, menus and buttons on weights and vertices."""
 
 from __future__ import annotations
 

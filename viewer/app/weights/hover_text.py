@@ -1,4 +1,4 @@
-"""What is said of the vertex under the mouse, beside it."""
+"""Text about the vertex under the mouse, beside it."""
 
 from __future__ import annotations
 

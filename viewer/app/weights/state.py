@@ -1,4 +1,4 @@
-"""What the tools that look at weights keep between frames: hovering, picking, explaining."""
+"""State of the tools that show weights: hovering, picking, explaining."""
 
 from __future__ import annotations
 

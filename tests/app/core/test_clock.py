@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from viewer.app.core.playback import Playback
+from viewer.app.core.clock import Clock
 from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.figure import Figure
 from viewer.rig.motion.clip import Channel, Clip
@@ -30,7 +30,7 @@ def actor(clip):
 
 
 def clock(clip, **settings):
-    playback = Playback()
+    playback = Clock()
     playback.show(Scene([actor(clip)]))
     for name, value in settings.items():
         setattr(playback, name, value)
@@ -41,7 +41,7 @@ def clock(clip, **settings):
 def test_shows_the_start_of_all_clips_and_ends_with_the_longest():
     late = actor(captured())
     late.offset = 10.0
-    playback = Playback()
+    playback = Clock()
     playback.show(Scene([actor(keyed()), late]))
     assert playback.time == 1.0
     assert playback.whole == (1.0, 12.0)  # nine frames at 4 a second last 2 s, from second 10 on
@@ -52,7 +52,7 @@ def test_shows_the_start_of_all_clips_and_ends_with_the_longest():
 def test_scene_that_says_its_time_is_shown_there():
     scene = Scene([actor(keyed())])
     scene.time = 2.5
-    playback = Playback()
+    playback = Clock()
     playback.show(scene)
     assert playback.time == 2.5
 
@@ -145,19 +145,19 @@ def test_one_frame_neither_moves_nor_divides_by_zero():
 
 def test_whole_range_grows_with_captures_but_a_chosen_one_stays():
     scene = Scene([actor(captured(frames=5))])
-    playback = Playback()
+    playback = Clock()
     playback.show(scene)
     scene.actors[0].clip = captured(frames=9)
-    playback.follow(scene.actors)
+    playback.follow()
     assert (playback.start, playback.end) == (0.0, 2.0)
     playback.set_range(0.5, 1.0)
     scene.actors[0].clip = captured(frames=13)
-    playback.follow(scene.actors)
+    playback.follow()
     assert (playback.whole, playback.start, playback.end) == ((0.0, 3.0), 0.5, 1.0)
 
 
 def test_nothing_that_moves_does_not_play():
-    playback = Playback()
+    playback = Clock()
     playback.show(Scene([actor(None)]))
     playback.playing = True
     playback.advance(1.0)
@@ -168,11 +168,11 @@ def test_frames_are_those_of_the_chosen_actor_so_that_each_can_be_reached():
     one, other = actor(captured(4, 30.0, 0)), actor(captured(5, 50.0, 0))
     other.offset = 0.005
     scene = Scene([one, other])
-    playback = Playback()
+    playback = Clock()
     playback.show(scene)
     playback.step(1)
     assert playback.time == pytest.approx(1 / 30)
-    playback.follow(scene.actors, other)
+    playback.follow(other)
     assert playback.frame_rate == 50.0
     assert playback.time == pytest.approx(1 / 30)  # another choice moves nothing
     playback.seek(0.0)
@@ -184,5 +184,41 @@ def test_frames_are_those_of_the_chosen_actor_so_that_each_can_be_reached():
     assert playback.frame == 2
     # From 0 to 0.1 s: frames 0 to 4 of that actor lie within.
     assert playback.whole == pytest.approx((0.0, 0.1)) and playback.frame_range == (0, 4)
-    playback.follow(scene.actors, one)
+    playback.follow(one)
     assert playback.frame_range == (0, 3) and playback.frame == 1
+
+
+def test_the_clock_has_no_time_but_that_of_its_scene():
+    scene = Scene([actor(keyed())])
+    playback = Clock()
+    playback.show(scene)
+    playback.seek(2.0)
+    assert scene.time == 2.0
+    scene.time = 3.0
+    assert playback.time == 3.0
+
+
+def test_actors_are_posed_once_until_time_clips_or_gaps_change():
+    scene = Scene([actor(captured())])
+    playback = Clock()
+    playback.show(scene)
+    assert playback.pose() and not playback.pose()
+    playback.seek(1.0)
+    assert playback.posed_for.time == 0.0  # edits still belong to the poses of before
+    assert playback.pose() and playback.posed_for.time == 1.0 and not playback.pose()
+    playback.fill_gaps = True
+    assert playback.pose() and not playback.pose()
+    scene.actors[0].offset = 0.5
+    assert playback.pose() and playback.whole == (0.5, 2.5)
+    scene.actors[0].clip = captured(frames=13)
+    assert playback.pose() and playback.whole == (0.5, 3.5) and not playback.pose()
+    assert playback.pose(again=True) and playback.n_posed == 6
+
+
+def test_another_scene_is_posed_though_time_is_the_same():
+    playback = Clock()
+    for _ in range(2):
+        scene = Scene([actor(captured())])
+        playback.show(scene)
+        assert scene.actors[0].points is None
+        assert playback.pose() and scene.actors[0].points is not None

@@ -1,17 +1,17 @@
-"""The scene's clock: which time is shown, and how it moves on."""
+"""The clock: which time of the scene is shown, how it moves on, and the poses at that time."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.evaluation import DEFAULT_RATE, time_span
 from viewer.rig.motion.instances import pose_actors
 from viewer.rig.scene import Actor, Scene
 
-__all__ = ["FASTEST", "MODES", "Playback"]
+__all__ = ["FASTEST", "MODES", "Clock"]
 
 MODES = {
     "loop": "Loop",
@@ -25,14 +25,34 @@ FASTEST = 4.0
 """Largest speed, forwards and backwards."""
 
 
-@dataclass(slots=True)
-class Playback:
-    """Keeps to the wall clock: a slow machine drops frames, never time.
+class PosedFor(NamedTuple):
+    """Key of the poses: actors are posed again only for another one.
 
     Attributes
     ----------
     time : float
-        Seconds that are shown.
+        Seconds.
+    fill_gaps : bool
+        Whether captures are shown in their gaps.
+    clips : tuple
+        Clip and offset of each actor; clips are replaced, never changed.
+    """
+
+    time: float
+    fill_gaps: bool
+    clips: tuple[object, ...]
+
+
+@dataclass(slots=True)
+class Clock:
+    """Moves the time of a scene, ``Scene.time``, and poses the actors for it.
+
+    It keeps to the wall clock: a slow machine drops frames, never time.
+
+    Attributes
+    ----------
+    scene : Scene
+        Whose time it is.
     playing : bool
         Whether time moves on.
     speed : float
@@ -56,9 +76,13 @@ class Playback:
         Whether some motion consists of frames: each is then shown for its whole duration.
     fill_gaps : bool
         Show captures in their gaps too, in between the frames around them.
+    posed_for : PosedFor or None
+        What the actors were posed for last: time may have moved on since.
+    n_posed : int
+        How often they were.
     """
 
-    time: float = 0.0
+    scene: Scene = field(default_factory=lambda: Scene([]))
     playing: bool = False
     speed: float = 1.0
     mode: str = "loop"
@@ -74,32 +98,41 @@ class Playback:
     has_motion: bool = False
     _over: float = 0.0  # seconds since the last frame of the range became due
     _turned: bool = False  # on the way back of ping-pong
-    _posed: tuple[float, bool] | None = None
+    posed_for: PosedFor | None = None
+    n_posed: int = 0
     _grid: tuple[object, ...] = ()  # whose frames count
 
+    @property
+    def time(self) -> float:
+        """Seconds of the scene that are shown."""
+        return 0.0 if self.scene.time is None else self.scene.time
+
+    @time.setter
+    def time(self, time: float) -> None:
+        self.scene.time = time
+
     def show(self, scene: Scene) -> None:
-        """Take over the range of a scene's clips, and go to its start, or where it is."""
+        """Take over a scene and the range of its clips, and go to its start, or where it is."""
+        self.scene, self.posed_for = scene, None
         self.playing, self.mode, self.speed = False, "loop", 1.0
         self.keyed_rate, self.has_frames = DEFAULT_RATE, False
         self._grid = ()
-        self.follow(scene.actors, scene.actors[0] if scene.actors else None)
+        self.follow(scene.actors[0] if scene.actors else None)
         self.start, self.end = self.whole
         self.seek(self.start if scene.time is None else scene.time)
 
-    def follow(self, actors: Sequence[Actor], chosen: Actor | None = None) -> None:
+    def follow(self, chosen: Actor | None = None) -> None:
         """Keep up with clips that changed or grew; a range that was all of them stays all.
 
         Where the same frames come faster or slower, time and range stay on their frames.
 
         Parameters
         ----------
-        actors : sequence of Actor
-            All of the scene.
         chosen : Actor, optional
             Whose capture gives the frames, if it has one.
         """
         was_whole = (self.start, self.end) == self.whole
-        moving = [actor for actor in actors if actor.clip is not None]
+        moving = [actor for actor in self.scene.actors if actor.clip is not None]
         sampled = [actor for actor in moving if not isinstance(actor.clip, Clip)]
         self.has_motion, self.has_frames = bool(moving), bool(sampled)
         self.whole = time_span(moving)
@@ -246,23 +279,41 @@ class Playback:
         self._turned = place > length
         self.time = self.start + (2.0 * length - place if self._turned else place)
 
-    def pose(self, scene: Scene, again: bool = False) -> bool:
-        """Pose all actors as they are at the time shown, if it changed; return whether it did.
+    def pose(self, chosen: Actor | None = None, again: bool = False) -> bool:
+        """Pose all actors for the time shown, if it or their clips changed; return whether it did.
 
         Parameters
         ----------
-        scene : Scene
-            Its actors' poses are changed in place.
+        chosen : Actor, optional
+            As for ``follow``, which is done first if clips changed.
         again : bool
-            Also if time did not change: clips did.
+            Also if nothing changed.
         """
-        key = self.time, self.fill_gaps
-        if key == self._posed and not again:
+        actors, before = self.scene.actors, self.posed_for
+        clips = tuple((actor.clip, actor.offset) for actor in actors)
+        if before is None or before.clips != clips:
+            self.follow(chosen)
+        wanted = PosedFor(self.time, self.fill_gaps, clips)
+        if wanted == before and not again:
             return False
-        self._posed = key
-        scene.time = self.time
-        pose_actors(scene.actors, self.time, self.fill_gaps)
+        self.posed_for = wanted
+        self.n_posed += 1
+        pose_actors(actors, self.time, self.fill_gaps)
         return True
+
+    def go_back(self, time: float, chosen: Actor | None = None) -> None:
+        """Go to a time with actors and clips that were restored, and pose them for it.
+
+        Parameters
+        ----------
+        time : float
+            Seconds.
+        chosen : Actor, optional
+            As for ``follow``.
+        """
+        self.follow(chosen)
+        self.seek(time)
+        self.pose(chosen, again=True)
 
 
 def _length(actor: Actor) -> float:
