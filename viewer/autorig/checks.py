@@ -46,9 +46,8 @@ def newly_outside(
     carried : (J,) bool or None
         Which are expected inside: a joint of a part that the target lacks is not. None for all.
     """
-    assert template.mesh is not None  # the callers looked
     own = joint_matrices(template, pose)[:, :3, 3]
-    before = outside(posed, template.mesh.triangles, own)
+    before = outside(posed, template.require_mesh().triangles, own)
     asked = np.flatnonzero(~before if carried is None else carried & ~before)
     there = own if joints is None else joints
     after = outside(target.positions, target.triangles, there[asked])
@@ -106,16 +105,14 @@ def check_lines(figure: Figure, guarded: Bools, out: tuple[int, ...], residual: 
 
 def joint_list(figure: Figure, joints: Sequence[int]) -> str:
     """Return the names of the first few joints, and how many more there are."""
-    skeleton = figure.skeleton
-    assert skeleton is not None  # the callers looked
+    skeleton = figure.require_skeleton()
     names = [joint_label(skeleton, joint) for joint in joints[:_LISTED]]
     return ", ".join(names) + (f" and {len(joints) - _LISTED} more" * (len(joints) > _LISTED))
 
 
 def with_joint_name(line: str, figure: Figure) -> str:
     """Give joints that a line tells by number their names."""
-    skeleton = figure.skeleton
-    assert skeleton is not None  # it was just made
+    skeleton = figure.require_skeleton()
     head, mark, number = line.rpartition("joint ")
     is_joint = bool(mark) and number.isdecimal() and int(number) < skeleton.n_joints
     return head + mark + joint_label(skeleton, int(number)) if is_joint else line

@@ -97,6 +97,5 @@ def clip_for(rigged: Rigged, clip: Clip | SampledClip) -> Clip | SampledClip:
     RigError
         If it is a clip of another skeleton.
     """
-    skeleton = rigged.figure.skeleton
-    assert skeleton is not None  # a rigged figure has one
+    skeleton = rigged.figure.require_skeleton()
     return carry_clip(clip, skeleton, rigged.length_scale, rigged.figure_scale, rigged.path_scale)

@@ -104,8 +104,7 @@ def _weighed(
     template: Figure, laid: Floats, target: Mesh, how: TransferSettings, report: Report
 ) -> WeightTransfer:
     """Carry the weights of a template over that lies on the target."""
-    mesh, skin = template.mesh, template.skin
-    assert mesh is not None and skin is not None  # the caller looked
+    mesh, skin = template.require_mesh(), template.require_skin()
     return transferred_weights(
         Template(laid, mesh.triangles),
         skin,
@@ -130,8 +129,7 @@ def _carried_skeleton(
     how: TransferSettings,
 ) -> tuple[RestSkeleton, Bools | None, list[str]]:
     """Place the joints in the target; return which were carried, and what a person should know."""
-    mesh, skeleton, skin = template.mesh, template.skeleton, template.skin
-    assert mesh is not None and skeleton is not None and skin is not None  # the caller looked
+    mesh, skeleton, skin = template.attached()
     joints = alignment.placed.apply(joint_matrices(template, pose)[:, :3, 3])
     if how.joints == "copied":
         rest = fit_rest_skeleton(template, pose, alignment.placed, joints, None, original)
@@ -218,9 +216,8 @@ def _correctives(
 
 def _judged(template: Figure, figure: Figure, weights: WeightTransfer) -> list[str]:
     """Say what was judged of the target: which way round it is wound, and its unit."""
-    assert figure.mesh is not None  # it was just made
     lines = []
-    turned = int(weights.backwards[figure.mesh.triangles].any(axis=1).sum())
+    turned = int(weights.backwards[figure.require_mesh().triangles].any(axis=1).sum())
     if turned:
         lines.append(f"wound inside out, and turned round in the result: {turned} triangles")
     if template.unit in WORDS:

@@ -43,8 +43,7 @@ def nearest(template: Figure, pose: Pose, target: Mesh, report: Report, name: st
     name : str
         Of the new figure.
     """
-    mesh, skeleton, skin = template.mesh, template.skeleton, template.skin
-    assert mesh is not None and skeleton is not None and skin is not None  # the caller looked
+    _, skeleton, skin = template.attached()
     posed = deform(template, pose)[0]
     report(0.1, "boxes")
     box = align_boxes(target.positions, posed)

@@ -75,8 +75,7 @@ def read_clips(
         raise ViewerError("--clip: expected -o FILE to write the motion beside, found none")
     output = Path(arguments.output)
     found: list[CarriedClip] = []
-    assert figure.skeleton is not None  # a template has one
-    suffix = ".anim" if is_course_rig(figure.skeleton) else ".bvh"
+    suffix = ".anim" if is_course_rig(figure.require_skeleton()) else ".bvh"
     for name in arguments.clips:
         path = output.with_name(f"{output.stem}-{Path(name).stem}{suffix}")
         if any(each.path == path for each in found):

@@ -48,8 +48,7 @@ def read_landmarks(source: Source, template: Figure, pose: Pose) -> Floats:
         With the line, if it is no pair, or no joint has the name; with the last one if there are
         fewer than three pairs.
     """
-    skeleton = template.skeleton
-    assert skeleton is not None  # the template is attached
+    skeleton = template.require_skeleton()
     joints = joint_matrices(template, pose)[:, :3, 3]
     pairs = []
     for number, data in enumerate(source.data.splitlines(), start=1):

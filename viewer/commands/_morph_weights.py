@@ -79,9 +79,10 @@ def named_record(scene: Scene, text: str) -> tuple[Actor, PoseRecord]:
 
 
 def _record(actor: Actor, wanted: list[tuple[str, float]]) -> PoseRecord:
-    assert actor.pose is not None and actor.figure.blend_shapes is not None  # the caller looked
+    pose = actor.require_pose()
+    assert actor.figure.blend_shapes is not None  # the caller looked
     weights = np.zeros(actor.figure.n_shapes)
-    weights[: len(actor.pose.shape_weights)] = actor.pose.shape_weights
+    weights[: len(pose.shape_weights)] = pose.shape_weights
     for name, value in wanted:
         rows = _rows(actor.figure, name)
         if len(rows) > 1:

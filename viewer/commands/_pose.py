@@ -201,17 +201,16 @@ def _apply_shape(scene: Scene, text: str) -> list[str]:
     """Set shapes by name, or all from the first on; figures without shapes may have morphs."""
     if is_named(text):
         actor, record = named_record(scene, text)
-        assert actor.pose is not None  # named_record looked
-        return apply_record(record, actor.figure, actor.pose)
+        return apply_record(record, actor.figure, actor.require_pose())
     values = _numbers("--shape", text)
     assert values is not None  # there is a text
     posed = [actor for actor in scene.actors if actor.pose is not None]
     morphed = [actor for actor in posed if has_only_morphs(actor.figure)]
     others = [actor for actor in posed if actor not in morphed]
     if morphed and not any(actor.figure.n_shapes for actor in others):
-        pose = morphed[0].pose
-        assert pose is not None
-        return apply_record(morph_record(morphed[0].figure, values), morphed[0].figure, pose)
+        first = morphed[0]
+        record = morph_record(first.figure, values)
+        return apply_record(record, first.figure, first.require_pose())
     return _apply_record("--shape", PoseRecord(shape=values), scene)
 
 
@@ -222,9 +221,10 @@ def _apply_hands(scene: Scene, which: str) -> None:
     for actor in handed:
         for hand in actor.figure.hands:
             vectors = hand_vectors(hand, np.zeros(0), flat=which == "flat")
-            assert actor.figure.skeleton is not None and actor.pose is not None
             turned = rotation_vector_to_matrix(vectors)
-            set_joint_rotations(actor.figure.skeleton, actor.pose, hand.joints, turned)
+            set_joint_rotations(
+                actor.figure.require_skeleton(), actor.require_pose(), hand.joints, turned
+            )
 
 
 def _mirror(scene: Scene) -> None:
@@ -257,11 +257,11 @@ def apply_dofs(scene: Scene, settings: Sequence[str]) -> list[str]:
         if label.lower().startswith(_FIGURE) and _place(scene, label, setting, text):
             continue
         actor, dof, note = _find(scene, label)
-        skeleton = actor.figure.skeleton
-        assert skeleton is not None and actor.pose is not None  # _find looked
+        skeleton = actor.figure.require_skeleton()
+        pose = actor.require_pose()
         notes += note
         is_rotation = skeleton.dof_kinds[dof] >= 3
-        wanted = actor.pose.dofs.copy()
+        wanted = pose.dofs.copy()
         wanted[dof] = _dof_value(setting, text, is_rotation)
         clamped = clamp_dofs(skeleton, wanted)
         if clamped[dof] != wanted[dof]:
@@ -273,7 +273,7 @@ def apply_dofs(scene: Scene, settings: Sequence[str]) -> list[str]:
             limits = f"{least} to {most}{unit}"
             how = f"locked at {least}{unit}" if low == high else f"clamped to its limits {limits}"
             notes.append(f"{name}={text} is {how}")
-        actor.pose.dofs[:] = clamped
+        pose.dofs[:] = clamped
     return notes
 
 

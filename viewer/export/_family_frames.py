@@ -157,8 +157,7 @@ def family_frames(
     RigError
         If a number of a present frame is not finite.
     """
-    figure, skeleton = animation.figure, animation.figure.skeleton
-    assert skeleton is not None  # whoever has a member has a skeleton
+    figure, skeleton = animation.figure, animation.figure.require_skeleton()
     numbers = {name: joint for joint, name in enumerate(skeleton.names)}
     order = [numbers[name] for name in member.names]
     rotations = frames.rotations[:, order]

@@ -64,10 +64,9 @@ def apply_pose(path: Path, record: PoseRecord, actor: Actor) -> list[str]:
     FormatError
         If it does not fit; the actor is then as it was.
     """
-    assert actor.pose is not None  # the callers looked
     shown = printable(path, 300)
     try:
-        notes = apply_record(record, actor.figure, actor.pose, cut=True)
+        notes = apply_record(record, actor.figure, actor.require_pose(), cut=True)
         return [f"{shown}: {note}" for note in notes]
     except RigError as problem:
         raise pose_error(path, record, problem) from None

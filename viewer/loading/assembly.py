@@ -188,9 +188,8 @@ def _join(parts: list[tuple[Path, Figure]]) -> Figure:
     if len(parts) == 1:
         return parts[0][1]
     paths, figures = [path for path, _ in parts], [figure for _, figure in parts]
-    skeleton, skin = figures[0].skeleton, figures[1].skin
+    skeleton, skin = figures[0].require_skeleton(), figures[1].skin
     skel_path, skin_path = (printable(path, 300) for path in paths)
-    assert skeleton is not None  # the pairs put it first
     if skin is None:
         raise FormatError(
             paths[1],

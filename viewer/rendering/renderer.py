@@ -262,9 +262,8 @@ class Renderer:
         self.joint_pass.draw(skeleton, placement, view, options, selected, opacity, actor.color)
 
     def _draw_markers(self, actor: Actor, view: View, options: DisplayOptions) -> None:
-        assert actor.pose is not None  # it has markers
         markers = self.buffers.keypoints_of(actor)
-        markers.update(actor.pose, options.skinning)
+        markers.update(actor.require_pose(), options.skinning)
         # The markers' place is part of their positions.
         self.late.keypoint_pass.draw(markers, actor.placement, view, options)
 

@@ -128,8 +128,7 @@ def update_skeletons(
         from viewer.rig.motion.instances import worlds
 
         poses = [pose for _, pose in group]
-        skeleton = shaped(group[0][0].figure, poses[0].shape_weights).skeleton
-        assert skeleton is not None  # it is shown
+        skeleton = shaped(group[0][0].figure, poses[0].shape_weights).require_skeleton()
         for (actor, pose), world in zip(group, worlds(skeleton, poses), strict=True):
             buffers.skeleton(actor).update(pose, world)
 

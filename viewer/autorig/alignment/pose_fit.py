@@ -101,9 +101,9 @@ def fit_pose(
     report : callable
         Told the share that is done; may raise to cancel.
     """
-    assert template.mesh is not None and template.skeleton is not None  # the caller looked
-    limbs, skeleton = limbs_of(template), template.skeleton
-    chosen = even_vertices(template.mesh.positions, template.mesh.triangles, _VERTICES)
+    mesh, skeleton, _ = template.attached()
+    limbs = limbs_of(template)
+    chosen = even_vertices(mesh.positions, mesh.triangles, _VERTICES)
     turned = np.zeros((skeleton.n_joints, 3))
     state = Fitted(template, pose.copy(), placed, turned, np.zeros((2, skeleton.n_joints)))
     for number in range(_ROUNDS):
@@ -123,8 +123,7 @@ def fit_pose(
 
 
 def _lay(state: Fitted, limbs: Limbs) -> Laid:
-    mesh, skeleton, skin = state.figure.mesh, state.figure.skeleton, state.figure.skin
-    assert mesh is not None and skeleton is not None and skin is not None  # the caller looked
+    mesh, skeleton, skin = state.figure.attached()
     world = world_matrices(skeleton, state.pose)
     palette = skinning_matrices(world, skin.inverse_bind)
     place = placement_matrix(state.pose)
@@ -157,8 +156,7 @@ def _pairs(laid: Laid, chosen: Ints, target: Side, reach: float) -> Pairs:
 
 def _moved(template: Figure, limbs: Limbs, state: Fitted, step: PoseStep) -> Fitted:
     """Return what a round leads to: the whole goes by x' = e^u R (x - m) + m + t."""
-    placed, skeleton = state.placed, state.figure.skeleton
-    assert skeleton is not None  # the caller looked
+    placed, skeleton = state.placed, state.figure.require_skeleton()
     growths = state.grown + step.limb_growths
     growths = np.clip(0.5 * (growths + growths[:, limbs.partners]), _SMALLEST, _LARGEST)
     pose = state.pose.copy()

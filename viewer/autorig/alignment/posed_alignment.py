@@ -132,9 +132,8 @@ def align_posed(
     RigError
         As ``align``.
     """
-    assert template.mesh is not None  # the caller looked
     posed = deform(template, pose)[0]
-    ours = Posed(posed, template.mesh.triangles)
+    ours = Posed(posed, template.require_mesh().triangles)
     triangles = target.triangles
     if volume(target.positions, triangles) < 0.0:
         triangles = triangles[:, ::-1]  # normals tell which side of a limb is which
@@ -198,10 +197,9 @@ def _if_better(
 
 def _fitted(job: _Job, start: Alignment, report: Callable[[float], None]) -> PosedAlignment:
     template = job.template
-    assert template.mesh is not None  # the caller looked
     found = fit_pose(template, job.pose, start.placed, job.cloud, job.exact, job.scales, report)
     posed = deform(found.figure, found.pose)[0]
-    ours = Triangles(posed, template.mesh.triangles, _SAMPLES)
+    ours = Triangles(posed, template.require_mesh().triangles, _SAMPLES)
     how = start.how if start.how == "landmarks" else "fit"
     alignment = Alignment.of(ours, job.exact, found.placed, how)
     return PosedAlignment(
@@ -290,8 +288,7 @@ def _gaps(after: float, before: float) -> str:
 
 def _lines(found: Fitted) -> tuple[str, ...]:
     """Say which joint was turned most, and which limb resized most."""
-    skeleton = found.figure.skeleton
-    assert skeleton is not None  # the caller looked
+    skeleton = found.figure.require_skeleton()
     angle, name = _most_turned(found)
     longest = int(np.abs(found.grown[0]).argmax())
     change = 100.0 * np.expm1(found.grown[0, longest])
@@ -304,8 +301,7 @@ def _lines(found: Fitted) -> tuple[str, ...]:
 
 def _most_turned(found: Fitted) -> tuple[float, str]:
     """Return the largest turn of a joint in radians, and the joint's name."""
-    skeleton = found.figure.skeleton
-    assert skeleton is not None  # the caller looked
+    skeleton = found.figure.require_skeleton()
     angles = np.linalg.norm(found.turned, axis=1)
     most = int(angles.argmax())
     return float(angles[most]), joint_label(skeleton, most)

@@ -57,8 +57,7 @@ def limbs_of(figure: Figure) -> Limbs:
     figure : Figure
         With mesh, skeleton and skin.
     """
-    mesh, skeleton, skin = figure.mesh, figure.skeleton, figure.skin
-    assert mesh is not None and skeleton is not None and skin is not None  # the caller looked
+    mesh, skeleton, skin = figure.attached()
     parents = skeleton.parents
     weights = _dense(skin)
     shares = weights.copy()
@@ -98,8 +97,7 @@ def resized(figure: Figure, limbs: Limbs, lengths: Floats, girths: Floats) -> Fi
     Figure
         Same joints and weights; all else that belongs to vertices is kept as it is.
     """
-    mesh, skeleton, skin = figure.mesh, figure.skeleton, figure.skin
-    assert mesh is not None and skeleton is not None and skin is not None  # the caller looked
+    mesh, skeleton, skin = figure.attached()
     scales = girths[:, None, None] * np.eye(3) + (lengths - girths)[:, None, None] * np.einsum(
         "ja,jb->jab", limbs.axes, limbs.axes
     )

@@ -87,8 +87,7 @@ def fit_rest_skeleton(
     RestSkeleton
         Lengths in the target's unit.
     """
-    skeleton, skin = template.skeleton, template.skin
-    assert skeleton is not None and skin is not None  # the pipeline looked
+    skeleton, skin = template.require_skeleton(), template.require_skin()
     scale = placed.scale * pose.figure_scale
     turned = world_matrices(skeleton, pose)[:, :3, :3]
     moves = scale * _moves(skeleton, pose)
@@ -141,8 +140,7 @@ def _symmetric(template: Figure, offsets: Floats, scale: float, carried: Bools) 
 
     What is averaged are changes against the scaled template, in its rest axes.
     """
-    skeleton = template.skeleton
-    assert skeleton is not None  # the caller looked
+    skeleton = template.require_skeleton()
     try:
         partners = joint_partners(template)
     except RigError:

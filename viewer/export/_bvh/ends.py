@@ -35,8 +35,7 @@ def end_offsets(figure: Figure, rest: Floats, leaves: Ints) -> Floats:
     (L, 3)
         From the joint, figure space.
     """
-    skeleton = figure.skeleton
-    assert skeleton is not None  # whoever has a motion has a skeleton
+    skeleton = figure.require_skeleton()
     ends = np.zeros((len(leaves), 3))
     size = float(np.ptp(rest[:, :3, 3], axis=0).max())
     for row, leaf in enumerate(leaves):

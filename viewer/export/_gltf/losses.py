@@ -145,8 +145,7 @@ def _reasons(
     weights = weights if len(weights) == 1 else weights[rows]
     if shape.baked is not None and np.ptp(weights, axis=0).any():
         found.append("the shape changes over time, which cannot be held")
-    mesh = shape.figure.mesh
-    assert mesh is not None  # vertices differ
+    mesh = shape.figure.require_mesh()
     coarse = np.abs(mesh.positions - mesh.positions.astype(np.float32)).max(initial=0.0)
     if coarse > least:
         found.append("the mesh is far from its origin for glTF's single precision")

@@ -56,8 +56,7 @@ def add_mesh(
     n_vertices : int
         How many are written: along seams there are several for one of the figure.
     """
-    mesh = shape.figure.mesh
-    assert mesh is not None  # the caller looked
+    mesh = shape.figure.require_mesh()
     sources, uv_indices, triangles = split_seams(mesh)
     attributes = _attributes(document, mesh, sources, uv_indices)
     for number, (joints, weights) in enumerate(

@@ -167,8 +167,7 @@ def anchored(palette: Floats, scales: Floats) -> Floats:
 
 
 def _body(figure: Figure, how: Skinning, still: Floats, columns: Rows) -> Body:
-    mesh, shapes = figure.mesh, figure.blend_shapes
-    assert mesh is not None  # the caller looked
+    mesh, shapes = figure.require_mesh(), figure.blend_shapes
     n_joints = 0 if figure.skeleton is None else figure.skeleton.n_joints
     positions = mesh.positions
     if shapes is not None and still.any():

@@ -84,12 +84,10 @@ def marks_of(actors: Sequence[Actor]) -> list[JointMarks]:
 
 def _worlds(actor: Actor) -> Floats:
     """Return joint-to-figure matrices, remembered for a camera that moves: (J, 4, 4)."""
-    figure, pose = actor.figure, actor.pose
-    assert pose is not None  # the caller looked
+    figure, pose = actor.figure, actor.require_pose()
 
     def make() -> Floats:
-        skeleton = shaped(figure, pose.shape_weights).skeleton
-        assert skeleton is not None  # shaping keeps it
+        skeleton = shaped(figure, pose.shape_weights).require_skeleton()
         return world_matrices(skeleton, pose)
 
     return _known.get(figure, pose_key(pose), make)

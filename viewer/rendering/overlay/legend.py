@@ -222,8 +222,7 @@ _areas: Memo[Figure, Floats] = Memo()
 
 def _vertex_areas(figure: Figure) -> Floats:
     """Return a third of the area of the triangles around each vertex at rest: (V,)."""
-    mesh = figure.mesh
-    assert mesh is not None  # it is drawn
+    mesh = figure.require_mesh()
 
     def make() -> Floats:
         thirds = np.repeat(triangle_areas(mesh.positions, mesh.triangles) / 3.0, 3)

@@ -33,8 +33,7 @@ class SkeletonBuffers:
     """Boxes of one figure's joints, moved by one actor's pose."""
 
     def __init__(self, context: moderngl.Context, figure: Figure, cube: moderngl.Buffer) -> None:
-        skeleton = figure.skeleton
-        assert skeleton is not None  # only figures with a skeleton come here
+        skeleton = figure.require_skeleton()
         self.figure = figure
         self.boxes = BoxBuffers(context, cube, _joint_boxes(skeleton))
         self._key: tuple[bytes, ...] | None = None
@@ -57,8 +56,7 @@ class SkeletonBuffers:
         if key == self._key:
             return
         if world is None:
-            skeleton = shaped(self.figure, pose.shape_weights).skeleton
-            assert skeleton is not None  # shaping keeps it
+            skeleton = shaped(self.figure, pose.shape_weights).require_skeleton()
             world = world_matrices(skeleton, pose)
         self.boxes.move(world)
         self._key = key

@@ -141,8 +141,7 @@ class PosedMesh:
         self, figure: Figure, pose: Pose, how: Skinning, buffers: SkinBuffers
     ) -> None:
         """Upload T(-center') M T(center): the shader sees small numbers on both sides."""
-        skeleton, skin = figure.skeleton, figure.skin
-        assert skeleton is not None and skin is not None  # the caller looked
+        skeleton, skin = figure.require_skeleton(), figure.require_skin()
         palette = skinning_matrices(world_matrices(skeleton, pose), skin.inverse_bind)
         self._is_affine = not is_rigid(palette)
         palette[:, :3, 3] += palette[:, :3, :3] @ self.mesh.center

@@ -50,8 +50,7 @@ def deform_vertices(
     check_vertices(figure, vertices)
     if pose is not None:
         figure = shaped(figure, pose.shape_weights)
-    mesh, skeleton, skin = figure.mesh, figure.skeleton, figure.skin
-    assert mesh is not None  # it has such vertices
+    mesh, skeleton, skin = figure.require_mesh(), figure.skeleton, figure.skin
     normals = mesh.normals[vertices]
     if skeleton is None or skin is None:
         moved, normals = mesh.positions[vertices], unit(normals)
@@ -84,8 +83,7 @@ def rest_vertices(figure: Figure, pose: Pose, vertices: Ints, correct: bool = Tr
     (N, 3)
         Binding space.
     """
-    assert figure.mesh is not None  # the caller looked
-    rest = figure.mesh.positions[vertices]
+    rest = figure.require_mesh().positions[vertices]
     if not correct or figure.correctives is None or figure.skeleton is None:
         return rest
     weights = corrective_weights(joint_rotations(figure.skeleton, pose))

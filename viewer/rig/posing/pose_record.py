@@ -126,8 +126,7 @@ def record_of(figure: Figure, pose: Pose) -> PoseRecord:
     pose : Pose
         Of that figure.
     """
-    skeleton = figure.skeleton
-    assert skeleton is not None  # whoever has a pose has a skeleton
+    skeleton = figure.require_skeleton()
     groups = figure.blend_shapes.groups if figure.blend_shapes else ()
     weights = np.zeros(len(groups))
     weights[: len(pose.shape_weights)] = pose.shape_weights
@@ -245,8 +244,7 @@ def _keep_drawable(before: Pose, pose: Pose) -> list[str]:
 
 
 def _apply_dofs(record: PoseRecord, figure: Figure, pose: Pose) -> list[str]:
-    skeleton = figure.skeleton
-    assert skeleton is not None
+    skeleton = figure.require_skeleton()
     for label, value in record.dofs.items():
         with _part("dofs", label):
             pose.dofs[_dof(figure, label)] = value
@@ -259,9 +257,8 @@ def _apply_dofs(record: PoseRecord, figure: Figure, pose: Pose) -> list[str]:
 
 
 def _dof(figure: Figure, label: str) -> int:
-    assert figure.skeleton is not None
     try:
-        return find_dof(figure.skeleton, label)
+        return find_dof(figure.require_skeleton(), label)
     except RigError as problem:
         why = str(problem).removeprefix(f'"{label}": ')  # once is enough
         raise RigError(f'expected a DOF of {figure.name}, found "{label}": {why}') from None
@@ -276,8 +273,7 @@ def _beyond_limits(skeleton: Skeleton, dofs: Floats) -> list[str]:
 
 def _apply_vector(vector: Floats, figure: Figure, pose: Pose) -> list[str]:
     """Take the model's own numbers, or the vector of another member of the SMPL family."""
-    skeleton = figure.skeleton
-    assert skeleton is not None
+    skeleton = figure.require_skeleton()
     layout = figure.pose_layout
     own = skeleton.n_dofs if layout is None else layout.n_numbers
     if len(vector) == own:
@@ -307,8 +303,7 @@ def _apply_vector(vector: Floats, figure: Figure, pose: Pose) -> list[str]:
 def _apply_part(
     name: str, values: Floats, record: PoseRecord, figure: Figure, pose: Pose
 ) -> list[str]:
-    skeleton = figure.skeleton
-    assert skeleton is not None
+    skeleton = figure.require_skeleton()
     values = np.asarray(values, dtype=np.float64).ravel()
     if name == "body_pose":
         return _apply_body(values, figure, pose)
@@ -327,8 +322,7 @@ def _apply_part(
 
 def _apply_body(values: Floats, figure: Figure, pose: Pose) -> list[str]:
     """Turn the joints after the root; the two hands of SMPL mean nothing to its kin."""
-    skeleton = figure.skeleton
-    assert skeleton is not None
+    skeleton = figure.require_skeleton()
     has_more = "left_wrist" in skeleton.names and "left_hand" not in skeleton.names
     own = _BODY if has_more else skeleton.n_joints - 1
     most = _LONGEST_BODY if has_more else own
@@ -358,8 +352,7 @@ def _apply_hand(
     figure: Figure,
     pose: Pose,
 ) -> list[str]:
-    skeleton = figure.skeleton
-    assert skeleton is not None
+    skeleton = figure.require_skeleton()
     side = _HAND_PARTS[name]
     if hand is None and side and len(figure.hands) == 1 and not figure.hands[0].side:
         hand = figure.hands[0]  # MANO is one hand, whatever its side is called
@@ -387,6 +380,5 @@ def _apply_hand(
 
 
 def _turn(figure: Figure, pose: Pose, joints: Ints, numbers: Floats) -> None:
-    assert figure.skeleton is not None  # the callers looked
     rotations = rotation_vector_to_matrix(numbers.reshape(-1, 3))
-    set_joint_rotations(figure.skeleton, pose, joints, rotations)
+    set_joint_rotations(figure.require_skeleton(), pose, joints, rotations)

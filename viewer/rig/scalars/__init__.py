@@ -193,9 +193,9 @@ def compute(name: str, figure: Figure, pose: Pose | None, skinning: Skinning) ->
     """
     key, about = split_name(name)
     view = SCALARS[key]
-    assert figure.mesh is not None  # the caller draws it
+    mesh = figure.require_mesh()
     if _missing(view.needs, figure) or (view.moves and pose is None):
-        return np.full(figure.mesh.n_vertices, -1.0 if view.kind == "categorical" else 0.0)
+        return np.full(mesh.n_vertices, -1.0 if view.kind == "categorical" else 0.0)
     index = joint_of(figure, about) if view.takes_joint else -1
     module = import_module(f"{__name__}.{view.module}")
     values: Floats = getattr(module, f"{key}_" if iskeyword(key) else key.replace("-", "_"))(
@@ -203,7 +203,7 @@ def compute(name: str, figure: Figure, pose: Pose | None, skinning: Skinning) ->
     )
     if view.moves:
         # Rounding is no effect, and must not fill the colour map where there is nothing else.
-        size = box_size(bounding_box(figure.mesh.positions)) if view.unit == "length" else 1.0
+        size = box_size(bounding_box(mesh.positions)) if view.unit == "length" else 1.0
         values[np.abs(values) < _NOISE * size] = 0.0
     return values
 

@@ -41,8 +41,7 @@ class Asked:
     @property
     def skin(self) -> Skin:
         """The influences that count: all as stored, or cut and scaled as asked."""
-        assert self.figure.skin is not None  # the view needs weights
-        return skin_used(self.figure.skin, self.skinning)
+        return skin_used(self.figure.require_skin(), self.skinning)
 
 
 def influences_kept(skinning: Skinning) -> int:
