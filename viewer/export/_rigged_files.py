@@ -112,7 +112,8 @@ def without_correctives(rigged: Rigged) -> Figure:
 def _arrays(rigged: Rigged) -> dict[str, NDArray[Any]]:
     """Return what a program may want to know beside the figure itself."""
     pose = rigged.pose
-    placed = rigged.alignment.placed.matrix if rigged.alignment else np.linalg.inv(rigged.placement)
+    found = rigged.alignment
+    placed = found.similarity.matrix if found else np.linalg.inv(rigged.placement)
     return {
         "target_dofs": pose.dofs,
         "target_translations": pose.translations,

@@ -1,4 +1,4 @@
-"""A template laid onto a target, its joints turned and limbs resized to what the target is.
+"""Alignment of a template whose pose and proportions differ from the target's.
 
 People in scans stand with lowered arms and have limbs of their own, templates stretch their arms
 out: no alignment of the whole lays one onto the other. So where the alignment leaves a gap, pose
@@ -38,18 +38,18 @@ from viewer.rig.skinning import deform
 
 __all__ = ["PosedAlignment", "align_posed"]
 
-_CLOSE = 0.002  # misfit over size up to which nothing is gained by turning joints
-# Share of the misfit that may be left if turned joints are to be kept: clothes can be fitted a
+_CLOSE = 0.002  # misfit over size up to which nothing is gained by rotating joints
+# Fraction of the misfit that may be left if rotated joints are to be kept: clothes can be fitted a
 # little better by bending the body, but only a figure in another pose much better.
 _KEPT, _PART_KEPT = 0.65, 0.5
-# A fit that leaves more than this and turned a joint by more is of another kind of figure, as of a
+# A fit that leaves more than this and rotated a joint by more is of another kind of figure, as of a
 # fox onto a pig: it bends the spine until the legs meet something.
 _POOR, _BENT = 0.01, np.radians(45.0)
 _SURE = 0.004  # misfit after the fit up to which a figure faces the right way: no other is tried
 _ALIKE = 1.5  # misfits nearer than this do not tell front from back
 _CLEARLY = 0.85  # of the misfit, which standing the other way must reach after the fit
 _SAMPLES, _DENSE = 2_000, 12_000  # as for alignments
-_ROUNDS = 30  # to lay the template the other way round
+_ROUNDS = 30  # to align the template the other way round
 _AXES_ROUNDS = 20
 _FOUND = ("search", "in place")  # alignments that nobody vouches for
 # Scales of their own are looked at where a gap above the first is left, and taken if they leave at
@@ -73,8 +73,8 @@ class PosedAlignment:
         The template's vertices in that pose, in its own frame.
     lines : tuple of str
         What was done to pose and proportions, and what would fit better.
-    most_turned : (float, str)
-        The largest turn of a joint in radians, and its name; (0, "") if none was turned.
+    most_rotated : (float, str)
+        The largest rotation of a joint in radians, and its name; (0, "") if none was rotated.
     """
 
     alignment: Alignment
@@ -82,7 +82,7 @@ class PosedAlignment:
     pose: Pose
     positions: Floats
     lines: tuple[str, ...]
-    most_turned: tuple[float, str] = (0.0, "")
+    most_rotated: tuple[float, str] = (0.0, "")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,7 +104,7 @@ def align_posed(
     fits: bool,
     report: Callable[[float, str], None],
 ) -> PosedAlignment:
-    """Lay a template onto a target, and turn its joints if it stands otherwise.
+    """Align a template with a target, and rotate its joints if its pose differs.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def align_posed(
     fits : bool
         Whether pose and proportions may change.
     report : callable
-        Told the share that is done, and what is being done; may raise to cancel.
+        Told the fraction that is done, and what is being done; may raise to cancel.
 
     Returns
     -------
@@ -172,16 +172,16 @@ def _if_better(
     rigid = kept.alignment
     is_part = rigid.away > PART
     before = misfit(rigid, is_part)
-    found = _fitted(job, rigid, lambda share: report(0.5 + 0.25 * share, "pose"))
+    found = _fitted(job, rigid, lambda fraction: report(0.5 + 0.25 * fraction, "pose"))
     may_turn = rigid.how in _FOUND and facing is None and not is_part
     if may_turn and misfit(found.alignment, False) > _SURE:
-        behind = _turned_round(job, ours, rigid, job.template.up)
+        behind = _facing_back(job, ours, rigid, job.template.up)
         if misfit(behind, False) < _ALIKE * before:
-            other = _fitted(job, behind, lambda share: report(0.75 + 0.25 * share, "pose"))
+            other = _fitted(job, behind, lambda fraction: report(0.75 + 0.25 * fraction, "pose"))
             if misfit(other.alignment, False) < _CLEARLY * misfit(found.alignment, False):
                 found = other
     after = misfit(found.alignment, is_part)
-    bent, name = found.most_turned
+    bent, name = found.most_rotated
     gaps = _gaps(after, before)
     if after > (_PART_KEPT if is_part else _KEPT) * before:
         return replace(kept, lines=(f"pose: not fitted, as that would leave {gaps}",))
@@ -197,26 +197,26 @@ def _if_better(
 
 def _fitted(job: _Job, start: Alignment, report: Callable[[float], None]) -> PosedAlignment:
     template = job.template
-    found = fit_pose(template, job.pose, start.placed, job.cloud, job.exact, job.scales, report)
+    found = fit_pose(template, job.pose, start.similarity, job.cloud, job.exact, job.scales, report)
     posed = deform(found.figure, found.pose)[0]
     ours = Triangles(posed, template.require_mesh().triangles, _SAMPLES)
     how = start.how if start.how == "landmarks" else "fit"
-    alignment = Alignment.of(ours, job.exact, found.placed, how)
+    alignment = Alignment.of(ours, job.exact, found.similarity, how)
     return PosedAlignment(
-        alignment, found.figure, found.pose, posed, _lines(found), _most_turned(found)
+        alignment, found.figure, found.pose, posed, _lines(found), _most_rotated(found)
     )
 
 
-def _turned_round(job: _Job, ours: Posed, rigid: Alignment, up: str) -> Alignment:
-    """Return the template facing the other way, laid onto the target as well as it goes."""
-    placed = rigid.placed
+def _facing_back(job: _Job, ours: Posed, rigid: Alignment, up: str) -> Alignment:
+    """Return the template facing the other way, aligned with the target as well as it goes."""
+    similarity = rigid.similarity
     half = rotation_vector_to_matrix(np.pi * axis_direction(up))
-    middle = placed.apply(ours.positions.mean(axis=0))
-    rotation = placed.rotation @ half
-    shift = middle - placed.scale * rotation @ ours.positions.mean(axis=0)
+    middle = similarity.apply(ours.positions.mean(axis=0))
+    rotation = similarity.rotation @ half
+    shift = middle - similarity.scale * rotation @ ours.positions.mean(axis=0)
     exact = Triangles(ours.positions, ours.triangles, _SAMPLES)
     cloud = Cloud(exact.samples, sample_surface(ours.positions, ours.triangles, _DENSE))
-    start = Similarity(placed.scale, rotation, shift, placed.factors)
+    start = Similarity(similarity.scale, rotation, shift, similarity.factors)
     return Alignment.of(
         exact, job.exact, iterate(cloud, job.cloud, start, _ROUNDS, job.scales), "search"
     )
@@ -227,13 +227,13 @@ def _stretched(ours: Posed, exact: Triangles, kept: PosedAlignment) -> PosedAlig
     rigid = kept.alignment
     template = Triangles(ours.positions, ours.triangles, _SAMPLES)
     trials = [
-        fit_axes(template, exact, rigid.placed, _AXES_ROUNDS, turns=True, own=own)
+        fit_axes(template, exact, rigid.similarity, _AXES_ROUNDS, rotations=True, own=own)
         for own in (False, True)
     ]
     alignments = [
-        Alignment.of(template, exact, placed, "fit")
-        for placed in trials
-        if _stretch(placed) >= _STRETCH
+        Alignment.of(template, exact, similarity, "fit")
+        for similarity in trials
+        if _stretch(similarity) >= _STRETCH
     ]
     if not alignments:
         return None
@@ -246,7 +246,7 @@ def _stretched(ours: Posed, exact: Triangles, kept: PosedAlignment) -> PosedAlig
         kept,
         alignment=alignment,
         lines=(
-            f"proportions: the template stretched by {_scales(alignment.placed)}, pose kept",
+            f"proportions: the template stretched by {_scales(alignment.similarity)}, pose kept",
             f"that leaves {_gaps(after, before)}",
         ),
     )
@@ -261,22 +261,22 @@ def _is_closer(stretched: PosedAlignment, other: PosedAlignment) -> bool:
 
 def _advice(stretched: PosedAlignment, kept: PosedAlignment) -> str:
     gaps = [100.0 * misfit(one.alignment, False) for one in (stretched, kept)]
-    placed = stretched.alignment.placed
-    cure = "fit proportions" if (placed.factors == 1.0).all() else "ask for it (--scale axes)"
+    found = stretched.alignment.similarity
+    cure = "fit proportions" if (found.factors == 1.0).all() else "ask for it (--scale axes)"
     return (
-        f"warning: stretched by {_scales(placed)}, the template fits much better, with a gap of "
+        f"warning: stretched by {_scales(found)}, the template fits much better, with a gap of "
         f"{gaps[0]:.3f} % instead of {gaps[1]:.3f} %: if the target was stretched, {cure}"
     )
 
 
-def _stretch(placed: Similarity) -> float:
-    factors = placed.factors * placed.own_factors
+def _stretch(similarity: Similarity) -> float:
+    factors = similarity.factors * similarity.own_factors
     return float(factors.max() / factors.min())
 
 
-def _scales(placed: Similarity) -> str:
-    is_own = bool((placed.factors == 1.0).all())
-    scales = placed.scale * (placed.own_factors if is_own else placed.factors)
+def _scales(similarity: Similarity) -> str:
+    is_own = bool((similarity.factors == 1.0).all())
+    scales = similarity.scale * (similarity.own_factors if is_own else similarity.factors)
     texts = ", ".join(f"{value:.4g}" for value in scales)
     whose = "its own" if is_own else "the target's"
     return f"{texts} along {whose} x, y and z"
@@ -287,9 +287,9 @@ def _gaps(after: float, before: float) -> str:
 
 
 def _lines(found: Fitted) -> tuple[str, ...]:
-    """Say which joint was turned most, and which limb resized most."""
+    """Say which joint was rotated most, and which limb resized most."""
     skeleton = found.figure.require_skeleton()
-    angle, name = _most_turned(found)
+    angle, name = _most_rotated(found)
     longest = int(np.abs(found.grown[0]).argmax())
     change = 100.0 * np.expm1(found.grown[0, longest])
     longer = number_text(change, "+.0f")
@@ -299,9 +299,9 @@ def _lines(found: Fitted) -> tuple[str, ...]:
     )
 
 
-def _most_turned(found: Fitted) -> tuple[float, str]:
-    """Return the largest turn of a joint in radians, and the joint's name."""
+def _most_rotated(found: Fitted) -> tuple[float, str]:
+    """Return the largest rotation of a joint in radians, and the joint's name."""
     skeleton = found.figure.require_skeleton()
-    angles = np.linalg.norm(found.turned, axis=1)
+    angles = np.linalg.norm(found.rotated, axis=1)
     most = int(angles.argmax())
     return float(angles[most]), joint_label(skeleton, most)

@@ -1,4 +1,4 @@
-"""What a transfer of weights found, and what a person should know about it."""
+"""Result of a transfer of weights, and the lines that report it."""
 
 from __future__ import annotations
 
@@ -57,8 +57,8 @@ class WeightTransfer:
         As in ``Skin``: vertex v owns influences ``starts[v]`` up to ``starts[v + 1]``.
     matched : (V,) bool
         Vertices whose weights are those of the template's surface.
-    filled : (V,) bool
-        Vertices whose weights were solved for. Those neither matched nor filled belong to a
+    inpainted : (V,) bool
+        Vertices whose weights were solved for. Those neither matched nor inpainted belong to a
         rigid island.
     distances : (V,)
         To the template, in the target's unit.
@@ -78,7 +78,7 @@ class WeightTransfer:
     joints: Ints
     weights: Floats
     matched: Bools
-    filled: Bools
+    inpainted: Bools
     distances: Floats
     angles: Floats
     points: SurfacePoints | None
@@ -114,14 +114,14 @@ def template_lines(skin: Skin) -> tuple[str, ...]:
     return (f"negative weights of the template that count as 0: {negative}",) if negative else ()
 
 
-def match_lines(found: Matches, filled: Bools, method: str) -> tuple[str, ...]:
-    """Return what was matched, turned round and filled in, one sentence each.
+def match_lines(found: Matches, inpainted: Bools, method: str) -> tuple[str, ...]:
+    """Return what was matched, reversed and inpainted, one sentence each.
 
     Parameters
     ----------
     found : Matches
         Of the welded vertices.
-    filled : (W,) bool
+    inpainted : (W,) bool
         Which of them were solved for.
     method : str
         How; "direct" is the rule.
@@ -129,7 +129,7 @@ def match_lines(found: Matches, filled: Bools, method: str) -> tuple[str, ...]:
     total = len(found.matched)
     lines = [
         f"matched {int(found.matched.sum())} of {total} vertices ({found.matched.mean():.1%}), "
-        f"filled in {int(filled.sum())}"
+        f"filled in {int(inpainted.sum())}"
     ]
     if found.matched.mean() < _FEW:
         lines.append(
