@@ -54,20 +54,11 @@ def read_clips(
 ) -> list[CarriedClip]:
     """Return the motions that ``--clip`` asks for, before any work is done.
 
-    Parameters
-    ----------
-    arguments : argparse.Namespace
-        Of ``viewer rig``.
-    template : list of Path
-        The template's files.
-    figure : Figure
-        The template.
-
-    Raises
-    ------
-    ViewerError
-        If there is no output to write beside, a file holds no motion of the template, or two
-        would have one name.
+    ``arguments``: of ``viewer rig``.
+    ``template``: the template's files.
+    ``figure``: the template.
+    Raises ViewerError if there is no output to write beside, a file holds no motion of the
+      template, or two would have one name.
     """
     if not arguments.clips:
         return []
@@ -96,19 +87,10 @@ def _clip_of(name: str, template: list[Path], fps: float | None) -> Clip | Sampl
 def write_clips(rigged: Rigged, clips: list[CarriedClip]) -> list[str]:
     """Write the template's motions for the rigged figure; return what was written.
 
-    Parameters
-    ----------
-    rigged : Rigged
-        The result.
-    clips : list of CarriedClip
-        From ``read_clips``.
-
-    Raises
-    ------
-    RigError
-        If a clip is of another skeleton.
-    OutputError
-        If a file cannot be written.
+    ``rigged``: the result.
+    ``clips``: from ``read_clips``.
+    Raises RigError if a clip is of another skeleton.
+    Raises OutputError if a file cannot be written.
     """
     lines = []
     for each in clips:

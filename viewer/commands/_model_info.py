@@ -26,12 +26,8 @@ _CUTS = (4, 8)  # influences of common engines
 def describe_model(actor: Actor, skinning: Skinning) -> dict[str, Any]:
     """Return what a body model has, ready for JSON; empty for a plain rig.
 
-    Parameters
-    ----------
-    actor : Actor
-        Shaped and posed.
-    skinning : Skinning
-        How joints move its mesh.
+    ``actor``: shaped and posed.
+    ``skinning``: how joints move its mesh.
     """
     figure, pose = actor.figure, actor.pose
     model: dict[str, Any] = {"facts": dict(figure.facts)} if figure.facts else {}

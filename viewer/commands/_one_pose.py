@@ -22,10 +22,7 @@ __all__ = ["animation_of_pose", "asks_one_pose", "check_frame_options", "pose_li
 def check_frame_options(arguments: argparse.Namespace) -> None:
     """Refuse a range of frames together with a single one.
 
-    Raises
-    ------
-    ViewerError
-        If both are given.
+    Raises ViewerError if both are given.
     """
     for option in ("frame", "time"):
         if arguments.frames is not None and getattr(arguments, option) is not None:

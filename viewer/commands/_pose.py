@@ -116,15 +116,8 @@ def skinning_of(arguments: argparse.Namespace) -> Skinning:
 def apply_pose(scene: Scene, arguments: argparse.Namespace) -> list[str]:
     """Shape and pose a scene as asked.
 
-    Returns
-    -------
-    list of str
-        What could not be taken over exactly, one line each.
-
-    Raises
-    ------
-    ViewerError
-        If an option makes no sense for what was opened.
+    Returns: what could not be taken over exactly, one line each.
+    Raises ViewerError if an option makes no sense for what was opened.
     """
     apply_time(scene, arguments)
     notes: list[str] = []
@@ -239,15 +232,8 @@ def _mirror(scene: Scene) -> None:
 def apply_dofs(scene: Scene, settings: Sequence[str]) -> list[str]:
     """Set DOFs given as ``NAME.X=VALUE``, on the first actor that has such a joint.
 
-    Returns
-    -------
-    list of str
-        What was clamped, and which of several figures was posed.
-
-    Raises
-    ------
-    ViewerError
-        If the text, the joint or the value is wrong.
+    Returns: what was clamped, and which of several figures was posed.
+    Raises ViewerError if the text, the joint or the value is wrong.
     """
     notes: list[str] = []
     for setting in settings:

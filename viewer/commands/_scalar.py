@@ -69,10 +69,7 @@ def _view_name(text: str) -> str:
 def set_scalar(arguments: argparse.Namespace, options: DisplayOptions) -> None:
     """Set what is asked for of a scalar view.
 
-    Raises
-    ------
-    ViewerError
-        If options need a view and there is none, or a range makes no sense.
+    Raises ViewerError if options need a view and there is none, or a range makes no sense.
     """
     if arguments.scalar:
         options.shading, options.scalar = "scalar", arguments.scalar
@@ -121,10 +118,8 @@ def choose_subject(scene: Scene, options: DisplayOptions) -> list[str]:
 def scalar_notes(scene: Scene, options: DisplayOptions) -> list[str]:
     """Return one line if no figure has what a scalar view shows.
 
-    Raises
-    ------
-    ViewerError
-        If the view is about a joint or field that no figure has; the message has near names.
+    Raises ViewerError if the view is about a joint or field that no figure has; the message has
+      near names.
     """
     if options.shading != "scalar" or not scene.actors:
         return []

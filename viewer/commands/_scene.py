@@ -56,12 +56,8 @@ def add_scene_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT
 def add_file_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT) -> None:
     """Add FILES and the options that say where they are.
 
-    Parameters
-    ----------
-    parser : ArgumentParser
-        Of a command.
-    default : str
-        What is opened without files, for the help; empty if that is refused.
+    ``parser``: of a command.
+    ``default``: what is opened without files, for the help; empty if that is refused.
     """
     group = parser.add_argument_group("files")
     group.add_argument(

@@ -91,10 +91,7 @@ Turntable(degrees=-90.0, seconds=None))
 def shots_of(request: Request, arguments: argparse.Namespace, scene: Scene) -> Shots:
     """Return what is drawn of a scene.
 
-    Raises
-    ------
-    ViewerError
-        If nothing moves, or there are no or too many frames.
+    Raises ViewerError if nothing moves, or there are no or too many frames.
     """
     is_still = arguments.frame is not None or arguments.time is not None
     moves = not is_still and any(actor.clip is not None for actor in scene.actors)

@@ -195,10 +195,8 @@ def display_of(arguments: argparse.Namespace) -> DisplayOptions:
 def lens_notes(arguments: argparse.Namespace, scene: Scene) -> list[str]:
     """Return what looking through a calibrated camera leaves out, if it is to be seen: one line.
 
-    Raises
-    ------
-    ViewerError
-        If there is no such camera, or its files do not say how large its pictures are.
+    Raises ViewerError if there is no such camera, or its files do not say how large its pictures
+      are.
     """
     if arguments.view is None:
         return []
@@ -213,10 +211,7 @@ def lens_notes(arguments: argparse.Namespace, scene: Scene) -> list[str]:
 def hide_parts(arguments: argparse.Namespace, scene: Scene, options: DisplayOptions) -> None:
     """Set the body parts that are left out, by name or index, of the first figure that has any.
 
-    Raises
-    ------
-    ViewerError
-        If no figure has a part of this name; the message lists those there are.
+    Raises ViewerError if no figure has a part of this name; the message lists those there are.
     """
     if not arguments.hide_part:
         return

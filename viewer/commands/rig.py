@@ -227,10 +227,7 @@ def _template(arguments: argparse.Namespace, inputs: list[Path]) -> Actor:
 def _check_frame(scene: Scene, arguments: argparse.Namespace) -> None:
     """Take over --template-frame, and refuse a frame or time of a template that has no motion.
 
-    Raises
-    ------
-    ViewerError
-        If there is nothing to take the frame from, or two frames are given.
+    Raises ViewerError if there is nothing to take the frame from, or two frames are given.
     """
     if arguments.template_frame is not None:
         if arguments.frame is not None:

@@ -30,10 +30,7 @@ _RIG = (".skel", ".skin", ".obj", ".json")
 def files_of(output: Path) -> list[Path]:
     """Return all files that one output stands for.
 
-    Raises
-    ------
-    UnsupportedFormatError
-        If its suffix is none of ``.skel``, ``.skin`` and ``.npz``.
+    Raises UnsupportedFormatError if its suffix is none of ``.skel``, ``.skin`` and ``.npz``.
     """
     suffix = output.suffix.lower()
     if suffix == ".npz":
@@ -49,28 +46,14 @@ def files_of(output: Path) -> list[Path]:
 def write_rigged(rigged: Rigged, output: Path) -> list[str]:
     """Write a rigged mesh, all of its files or none.
 
-    Parameters
-    ----------
-    rigged : Rigged
-        The result.
-    output : Path
-        ``.skel`` or ``.skin``: skeleton and skin at rest, the rest mesh with its texture
-        coordinates as ``.obj``, the target's pose as ``.json``; they hold no pose correctives,
-        see ``without_correctives``. ``.npz``: all of it in one file.
-
-    Returns
-    -------
-    list of str
-        What was written, and what a format cannot hold.
-
-    Raises
-    ------
-    RigError
-        If the skeleton has what ``.skel`` cannot hold.
-    UnsupportedFormatError
-        As ``files_of``.
-    OutputError
-        If a file cannot be written.
+    ``rigged``: the result.
+    ``output``: ``.skel`` or ``.skin``: skeleton and skin at rest, the rest mesh with its texture
+      coordinates as ``.obj``, the target's pose as ``.json``; they hold no pose correctives, see
+      ``without_correctives``. ``.npz``: all of it in one file.
+    Returns: what was written, and what a format cannot hold.
+    Raises RigError if the skeleton has what ``.skel`` cannot hold.
+    Raises UnsupportedFormatError as ``files_of``.
+    Raises OutputError if a file cannot be written.
     """
     files = files_of(output)
     if output.suffix.lower() == ".npz":

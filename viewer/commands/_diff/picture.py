@@ -41,12 +41,8 @@ class Heat:
 def heat_of(name: str, posed: Sequence[tuple[Actor, Difference]]) -> Heat | None:
     """Return what can be coloured of a comparison; None if no mesh was compared.
 
-    Parameters
-    ----------
-    name : str
-        Of what was compared, for the legend.
-    posed : sequence of (Actor, Difference)
-        The reference's actors in their worst poses.
+    ``name``: of what was compared, for the legend.
+    ``posed``: the reference's actors in their worst poses.
     """
     actors, most = [], 0.0
     for actor, difference in posed:
@@ -65,12 +61,8 @@ def heat_of(name: str, posed: Sequence[tuple[Actor, Difference]]) -> Heat | None
 def save_heat(heats: Sequence[Heat], output: Path, skinning: Skinning) -> str:
     """Write one picture, of several comparisons with one scale as a sheet; say what it is.
 
-    Raises
-    ------
-    ViewerError
-        If there is nothing to colour, or no room for so many.
-    OutputError
-        If it cannot be written.
+    Raises ViewerError if there is nothing to colour, or no room for so many.
+    Raises OutputError if it cannot be written.
     """
     from viewer.media.picture_sinks import SheetSink
     from viewer.rendering.offscreen import render

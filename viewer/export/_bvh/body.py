@@ -85,18 +85,11 @@ def rest_matrices(figure: Figure, offsets: Floats) -> Floats:
 def body_of(figure: Figure, frames: Frames, reference: int, order: str, space: Space) -> Body:
     """Return what a file says of a figure's frames.
 
-    Parameters
-    ----------
-    figure : Figure
-        Unshaped; the frames hold the shape.
-    frames : Frames
-        All present.
-    reference : int
-        The frame whose shape and scale all bones have; roots keep those of each frame.
-    order : str
-        Of the rotation channels.
-    space : Space
-        To the file.
+    ``figure``: unshaped; the frames hold the shape.
+    ``frames``: all present.
+    ``reference``: the frame whose shape and scale all bones have; roots keep those of each frame.
+    ``order``: of the rotation channels.
+    ``space``: to the file.
     """
     skeleton = figure.require_skeleton()
     parents, count = skeleton.parents, frames.n_frames

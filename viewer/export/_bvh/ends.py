@@ -21,19 +21,10 @@ _DEFAULT_END = 1.0  # ... whose unit is not known
 def end_offsets(figure: Figure, rest: Floats, leaves: Ints) -> Floats:
     """Return how far the last joints reach at rest; none is 0.
 
-    Parameters
-    ----------
-    figure : Figure
-        Shaped.
-    rest : (J, 4, 4)
-        Joint space to figure space in the rest pose.
-    leaves : (L,)
-        Joints without children.
-
-    Returns
-    -------
-    (L, 3)
-        From the joint, figure space.
+    ``figure``: shaped.
+    ``rest`` (J, 4, 4): joint space to figure space in the rest pose.
+    ``leaves`` (L,): joints without children.
+    Returns (L, 3): from the joint, figure space.
     """
     skeleton = figure.require_skeleton()
     ends = np.zeros((len(leaves), 3))

@@ -69,17 +69,11 @@ class BvhFile:
 def read_back(file: BvhFile, figure: Figure, frames: Frames, how: Skinning) -> Side:
     """Return what a file says of a figure.
 
-    Parameters
-    ----------
-    file : BvhFile
-        What was written.
-    figure : Figure
-        Unshaped, as it moves here.
-    frames : Frames
-        What was to be written. It gives the place of the whole figure, which comes after skinning
-        and is not weighted.
-    how : Skinning
-        Whether pose correctives count.
+    ``file``: what was written.
+    ``figure``: unshaped, as it moves here.
+    ``frames``: what was to be written. It gives the place of the whole figure, which comes after
+      skinning and is not weighted.
+    ``how``: whether pose correctives count.
     """
     space = file.space
     motion = bvh.read(Source(file.path, file.text))

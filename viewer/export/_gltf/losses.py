@@ -60,22 +60,13 @@ def gltf_losses(
 ) -> list[str]:
     """Return lines with the largest distances between a figure as it is posed here and a file.
 
-    Parameters
-    ----------
-    written : Written
-        The file.
-    figure : Figure
-        As it is, unshaped.
-    frames : Frames
-        Its poses.
-    rows : (F,)
-        Those of them to compare.
-    how : Skinning
-        As asked for.
-    shape, influences : Shape, Influences or None
-        What was to be written.
-    first_frame : int or None
-        What the first frame is called; None for a single pose.
+    ``written``: the file.
+    ``figure``: as it is, unshaped.
+    ``frames``: its poses.
+    ``rows`` (F,): those of them to compare.
+    ``how``: as asked for.
+    ``shape``, ``influences``: what was to be written.
+    ``first_frame``: what the first frame is called; None for a single pose.
     """
     weights = frames.shape_weights
     still = weights[min(written.start, len(weights) - 1)] if shape.baked is None else shape.baked

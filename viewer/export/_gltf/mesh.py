@@ -36,25 +36,14 @@ def add_mesh(
 ) -> tuple[int, int]:
     """Add a figure's mesh.
 
-    Parameters
-    ----------
-    document : Document
-        Changed.
-    name : str
-        The figure's.
-    shape : Shape
-        Its figure has a mesh with vertices.
-    influences : Influences or None
-        Of the mesh; None if no joint moves it.
-    color : (r, g, b), optional
-        Linear, of what has no texture.
-
-    Returns
-    -------
-    mesh : int
-        Its index.
-    n_vertices : int
-        How many are written: along seams there are several for one of the figure.
+    ``document``: changed.
+    ``name``: the figure's.
+    ``shape``: its figure has a mesh with vertices.
+    ``influences``: of the mesh; None if no joint moves it.
+    ``color`` (r, g, b): linear, of what has no texture.
+    Returns ``mesh``: its index.
+    Returns ``n_vertices``: how many are written: along seams there are several for one of the
+      figure.
     """
     mesh = shape.figure.require_mesh()
     sources, uv_indices, triangles = split_seams(mesh)

@@ -72,20 +72,12 @@ def read_back(
 ) -> Side:
     """Return what a file says of a figure.
 
-    Parameters
-    ----------
-    file : GltfFile
-        As it was written.
-    tree : Tree
-        Indices of the nodes of joints and figure.
-    node : int or None
-        That of the mesh.
-    sources : (M,)
-        Which of the file's morph targets change over time.
-    start : int
-        The figure's frame that comes first in the file.
-    sets : int, optional
-        Only so many sets of influences, scaled to a sum of 1; all if omitted.
+    ``file``: as it was written.
+    ``tree``: indices of the nodes of joints and figure.
+    ``node``: that of the mesh.
+    ``sources`` (M,): which of the file's morph targets change over time.
+    ``start``: the figure's frame that comes first in the file.
+    ``sets``: only so many sets of influences, scaled to a sum of 1; all if omitted.
     """
     nodes = file.root["nodes"]
     parents = np.full(len(nodes), -1, dtype=np.int32)

@@ -44,14 +44,9 @@ def shape_of(figure: Figure, weights: Floats, reference: int = 0) -> Shape:
     Where joints follow the mesh, morph targets would leave the joints behind: then one shape is
     baked in, and so it is if there are too many.
 
-    Parameters
-    ----------
-    figure : Figure
-        Unshaped.
-    weights : (F, S) or (1, S)
-        Of its blend shapes, over time.
-    reference : int
-        The row to bake in.
+    ``figure``: unshaped.
+    ``weights`` (F, S) or (1, S): of its blend shapes, over time.
+    ``reference``: the row to bake in.
     """
     used = np.flatnonzero(weights.any(axis=0))
     if figure.mesh is None or figure.blend_shapes is None or len(used) == 0:

@@ -25,10 +25,7 @@ _NUMBERS = 9  # of a joint's rotation, which drive the correctives
 class Bounds:
     """Of two bodies with the same vertices and joints.
 
-    Parameters
-    ----------
-    first, second : Body
-        Correctives are those of the first, or none.
+    ``first``, ``second``: correctives are those of the first, or none.
     """
 
     def __init__(self, first: Body, second: Body) -> None:

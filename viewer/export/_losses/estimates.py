@@ -25,10 +25,7 @@ _STEPS = 2.0**-18  # of the largest number in a sum: what sums in single precisi
 class Estimator:
     """Of two bodies with the same vertices.
 
-    Parameters
-    ----------
-    first, second : Body
-        Their arrays are kept in single precision.
+    ``first``, ``second``: their arrays are kept in single precision.
     """
 
     def __init__(self, first: Body, second: Body) -> None:

@@ -115,18 +115,11 @@ def figure_side(
 ) -> Side:
     """Return a figure as it moves here.
 
-    Parameters
-    ----------
-    figure : Figure
-        Unshaped.
-    frames : Frames
-        Its poses.
-    how : Skinning
-        What moves the mesh.
-    reference : (S,)
-        Weights of the shape that changes count from.
-    columns : (M,), optional
-        The blend shapes that change; those that do in these frames if omitted.
+    ``figure``: unshaped.
+    ``frames``: its poses.
+    ``how``: what moves the mesh.
+    ``reference`` (S,): weights of the shape that changes count from.
+    ``columns`` (M,): the blend shapes that change; those that do in these frames if omitted.
     """
     chosen = changing(frames, reference) if columns is None else columns
     body = None if figure.mesh is None else _body(figure, how, reference, chosen)

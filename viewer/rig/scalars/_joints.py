@@ -13,17 +13,10 @@ __all__ = ["joint_of", "joint_text"]
 def joint_of(figure: Figure, text: str) -> int:
     """Return the joint of a name or an index.
 
-    Parameters
-    ----------
-    figure : Figure
-        With a skin; without a skeleton its joints have indices only.
-    text : str
-        A joint's name in any case of letters, ``"NAME#INDEX"``, ``"#INDEX"`` or ``"INDEX"``.
-
-    Raises
-    ------
-    RigError
-        If there is none, with names that are close; or if several joints have that name.
+    ``figure``: with a skin; without a skeleton its joints have indices only.
+    ``text``: a joint's name in any case of letters, ``"NAME#INDEX"``, ``"#INDEX"`` or ``"INDEX"``.
+    Raises RigError if there is none, with names that are close; or if several joints have that
+      name.
     """
     skeleton = figure.skeleton
     count = 0 if figure.skin is None else figure.skin.n_joints

@@ -37,12 +37,8 @@ def telling_field(figure: Figure) -> str:
 def telling_view(key: str, figures: Iterable[Figure]) -> str:
     """Return the name of a view with a joint or field that is not 0 everywhere.
 
-    Parameters
-    ----------
-    key : str
-        Of ``SCALARS``; one that is about neither is its own name.
-    figures : iterable of Figure
-        The first that has something to see counts.
+    ``key``: of ``SCALARS``; one that is about neither is its own name.
+    ``figures``: the first that has something to see counts.
     """
     for figure in figures:
         if key == "weight" and (joint := most_influential(figure)) >= 0:
