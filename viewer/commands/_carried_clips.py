@@ -17,8 +17,6 @@ from viewer.rig.motion.clip import Clip, is_course_rig
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.scene import Actor, Scene, figure_pose
 
-__all__ = ["CarriedClip", "add_clip_argument", "read_clips", "write_clips"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CarriedClip:

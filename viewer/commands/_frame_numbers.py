@@ -12,16 +12,6 @@ from viewer.commands._numbers import number
 from viewer.errors import ViewerError, printable
 from viewer.rig.scene import Actor, Scene
 
-__all__ = [
-    "Numbering",
-    "Range",
-    "add_frame_arguments",
-    "apply_time",
-    "numbering_of",
-    "parse_range",
-    "rate",
-]
-
 _SLOWEST, _FASTEST = 0.001, 100_000.0  # frames a second
 _LAST_NUMBER = 1_000_000_000
 

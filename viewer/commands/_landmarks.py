@@ -20,8 +20,6 @@ from viewer.rig.figure import Figure
 from viewer.rig.pose import Pose
 from viewer.rig.skinning import joint_matrices
 
-__all__ = ["read_landmarks"]
-
 _FARTHEST = 1e9  # any unit
 
 

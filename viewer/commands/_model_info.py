@@ -18,8 +18,6 @@ from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
 from viewer.rig.skinning import Skinning
 
-__all__ = ["describe_model", "model_lines"]
-
 _CUTS = (4, 8)  # influences of common engines
 
 

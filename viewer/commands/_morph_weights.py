@@ -15,8 +15,6 @@ from viewer.rig.morph_target import MORPH_GROUP
 from viewer.rig.posing.pose_record import PoseRecord
 from viewer.rig.scene import Actor, Scene
 
-__all__ = ["has_only_morphs", "is_named", "morph_record", "named_record"]
-
 _LISTED = 12  # names in a message
 
 

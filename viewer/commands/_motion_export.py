@@ -34,19 +34,6 @@ from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import Skinning
 from viewer.rig.units import METRES
 
-__all__ = [
-    "add_motion_arguments",
-    "check_frame_field",
-    "check_kind",
-    "check_numbered",
-    "is_motion",
-    "left_out_lines",
-    "motion_paths",
-    "pose_or_point_actors",
-    "write_motions",
-    "written_actors",
-]
-
 _MOST_DIGITS = 15
 _OF_POINTS = "npz"  # the exporter that takes captured points
 _ONE_A_FRAME = (".obj",)  # their motions are many files, which nobody wants by accident

@@ -10,8 +10,6 @@ from viewer.commands._scene import scene_files
 from viewer.models import resolve
 from viewer.rig.scene import Scene
 
-__all__ = ["PICTURES", "inputs_of"]
-
 PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".ppm", ".tga", ".tif", ".tiff", ".webp")
 """Suffixes of pictures that can be written."""
 

@@ -28,14 +28,6 @@ from viewer.rig.scene import Actor, Scene
 from viewer.rig.skeleton import clamp_dofs, dof_label, find_dof, joint_labels
 from viewer.rig.skinning import METHODS, Skinning
 
-__all__ = [
-    "add_pose_arguments",
-    "add_skinning_arguments",
-    "apply_dofs",
-    "apply_pose",
-    "skinning_of",
-]
-
 _FIGURE = "figure."  # label of the DOFs that a figure has as a whole
 
 

@@ -7,8 +7,6 @@ from collections.abc import Collection, Sequence
 from io import StringIO
 from typing import TextIO
 
-__all__ = ["print_line", "table_lines"]
-
 
 def print_line(*parts: str | tuple[str, str], file: TextIO | None = None) -> None:
     """Print one line.

@@ -11,8 +11,6 @@ from viewer.errors import printable
 if TYPE_CHECKING:
     from rich.progress import Progress as Bar
 
-__all__ = ["Progress"]
-
 _FIRST, _EVERY = 0.7, 0.2  # seconds before the bar appears, and between its changes
 
 

@@ -30,8 +30,6 @@ from viewer.rig.scalars import (
 from viewer.rig.scene import Scene
 from viewer.rig.skeleton import joint_labels
 
-__all__ = ["add_scalar_arguments", "choose_subject", "scalar_notes", "scalar_text", "set_scalar"]
-
 _WHOLE = ("discrete", "categorical")
 
 

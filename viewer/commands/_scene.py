@@ -23,19 +23,6 @@ from viewer.rig.units import METRES
 if TYPE_CHECKING:
     from viewer.loading.capturing import Builder
 
-__all__ = [
-    "add_capture_arguments",
-    "add_file_arguments",
-    "add_scene_arguments",
-    "begin_scene",
-    "finish",
-    "motion_settings",
-    "open_scene",
-    "print_warnings",
-    "scene_files",
-    "size_limit",
-]
-
 LAYOUTS = ("body19", "panoptic", "coco", "h36m")
 """Keypoint layouts that share their number of points with another."""
 

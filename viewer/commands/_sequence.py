@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from viewer.rendering.options import DisplayOptions
     from viewer.rendering.recorder import Recording
 
-__all__ = ["Request", "add_sequence_arguments", "draw_sequence", "request_of"]
-
 _FIELD = re.compile(r"\{frame[:!}]")
 _MOST_CELLS = 1000
 

@@ -19,8 +19,6 @@ from viewer.rig.scene import Scene
 if TYPE_CHECKING:
     from viewer.commands._sequence import Request
 
-__all__ = ["Shots", "Turntable", "parse_turntable", "shots_of"]
-
 _MOST_FRAMES = 1_000_000
 _TURN_SECONDS = 6.0  # of a turntable of something that does not move
 _FULL = 360.0  # degrees

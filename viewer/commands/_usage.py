@@ -17,8 +17,6 @@ from viewer.near_names import did_you_mean, near_names, question
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite
 
-__all__ = ["Parser", "check_command", "require_files"]
-
 _NUMBER = re.compile(r"-\.?\d")  # begins a value or the name of a file, not an option
 _WORD = re.compile(r"[^\W\d_]+")  # as commands are; files mostly have a suffix or a folder
 _LONGEST = 60  # letters of a word in a message

@@ -21,17 +21,6 @@ from viewer.rig.inspection.front import FRONTS, Front, front_axes, guess_front
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.scene import Scene
 
-__all__ = [
-    "add_camera_arguments",
-    "add_display_arguments",
-    "camera_of",
-    "display_of",
-    "hide_parts",
-    "lens_notes",
-    "parse_size",
-    "warn_of_missing",
-]
-
 _SEEN = 0.5  # pixels of the camera's own pictures: smaller errors are not seen
 
 

@@ -11,8 +11,6 @@ from viewer.rig.hierarchy import depth_first
 from viewer.rig.pose import Pose
 from viewer.rig.skeleton import Skeleton, joint_label
 
-__all__ = ["course_skeleton"]
-
 _CUBE = 0.01  # of the skeleton's size: half a side of boxes where a file has none
 
 

@@ -19,8 +19,6 @@ from viewer.rig.number_text import number_text
 from viewer.rig.smpl_family import FAMILY, Member
 from viewer.rig.units import METRES, WORDS
 
-__all__ = ["FamilyFrames", "check_unit", "family_frames", "member_of_figure", "up_axis"]
-
 _OWN_SHAPE = "stature"  # SMPL's shapes have numbers, those of the bundled body names
 _NEGLIGIBLE = 1e-6  # metres, and parts of a scale of 1
 

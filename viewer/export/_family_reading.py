@@ -20,8 +20,6 @@ from viewer.rig.motion.timing import Timing
 from viewer.rig.smpl_family import Member
 from viewer.rig.units import METRES
 
-__all__ = ["Records", "read_frames"]
-
 
 def read_frames(motion: BodyMotion, animation: SampledAnimation, options: MotionOptions) -> Frames:
     """Return the poses that a file holds for an animation's figure, in its own world and unit.

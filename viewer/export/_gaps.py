@@ -13,8 +13,6 @@ from viewer.rig.arrays import Bools, Floats
 from viewer.rig.geometry.quaternion import slerp
 from viewer.rig.motion.evaluation import Frames
 
-__all__ = ["filled", "gaps_text", "kept_gaps", "runs"]
-
 Indices = NDArray[np.intp]
 
 _LISTED = 6  # gaps in a note

@@ -15,8 +15,6 @@ from viewer.rig.captures.sampled_points import SampledPoints
 from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.scene import Actor
 
-__all__ = ["motion_paths", "numbered_paths", "split_paths", "take_files"]
-
 _WITHOUT_SPLITS = ("npz",)  # exporters that write one file, gaps or not
 
 

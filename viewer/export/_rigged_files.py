@@ -19,8 +19,6 @@ from viewer.rig.mesh import vertex_normals
 from viewer.rig.pose import joint_rotations
 from viewer.rig.scene import Actor, figure_pose
 
-__all__ = ["RIGGED_SUFFIXES", "files_of", "without_correctives", "write_rigged"]
-
 RIGGED_SUFFIXES = (".npz", ".skel", ".skin")
 """Those that ``files_of`` knows."""
 

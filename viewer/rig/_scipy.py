@@ -7,8 +7,6 @@ from types import ModuleType
 
 from viewer.errors import RigError
 
-__all__ = ["scipy_part"]
-
 
 def scipy_part(name: str) -> ModuleType:
     """Import a part of SciPy.

@@ -7,8 +7,6 @@ from pathlib import Path
 from viewer.errors import FormatError
 from viewer.formats import FORMATS, Source, detect
 
-__all__ = ["input_files"]
-
 
 def input_files(text: str) -> list[Path]:
     """Return the files that one argument stands for.

@@ -8,8 +8,6 @@ from dataclasses import dataclass, replace
 from viewer.rig.motion.clip import Clip, suits
 from viewer.rig.scene import Actor, Motion, figure_pose
 
-__all__ = ["Pairing", "pair_actors"]
-
 _N_RANKS = 3  # of clips for an actor: of the right name, its own, any that is left
 
 

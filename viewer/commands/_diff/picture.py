@@ -15,8 +15,6 @@ from viewer.rig.scalars import length_unit
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import Skinning
 
-__all__ = ["Heat", "heat_of", "save_heat"]
-
 _SIZE = (1280, 960)
 _SHEET = (2400, 1800)
 _COLORED = ("vertices", "surface, from the first")

@@ -7,8 +7,6 @@ import numpy as np
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.rotation import axis_rotations
 
-__all__ = ["euler_angles", "unrolled"]
-
 _LOCKED = 1e-9  # cosine of the middle angle below which the outer two turn about one axis
 
 

@@ -24,8 +24,6 @@ from viewer.rig.kinematics import forward_kinematics, world_matrices
 from viewer.rig.motion.evaluation import Frames, frames_between, rest_translations_of, world_frames
 from viewer.rig.pose import rest_pose
 
-__all__ = ["Body", "Space", "body_of", "rest_matrices", "shape_at"]
-
 _BLOCK = 4096  # frames at a time, so that matrices of all frames never exist at once
 _NOISE = 1e-9  # of the skeleton's size: what moves less does not move
 

@@ -8,8 +8,6 @@ from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.units import METRES
 
-__all__ = ["end_offsets"]
-
 _MOSTLY = 0.5  # a weight from which on a vertex belongs to a joint
 _FEW = 4  # vertices that say nothing of a joint's extent
 _TOO_SHORT = 0.1  # of the bone before: shorter ends are not believed

@@ -33,8 +33,6 @@ from viewer.rig.motion.evaluation import (
 from viewer.rig.shape import joint_directions
 from viewer.rig.skinning import Skinning
 
-__all__ = ["BvhFile", "read_back"]
-
 Rows = NDArray[np.intp]
 
 

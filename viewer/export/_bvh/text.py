@@ -13,8 +13,6 @@ import numpy as np
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.hierarchy import depth_first
 
-__all__ = ["bvh_text"]
-
 _DEEPEST = 32  # tabs that a line begins with
 _SECONDS_DIGITS = 9  # of the frame time, at least: exact to 1e-8 of itself
 

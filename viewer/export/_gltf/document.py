@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 
 from viewer.errors import RigError
 
-__all__ = ["INDICES", "VERTICES", "Document", "text_of"]
-
 VERTICES, INDICES = 34962, 34963  # targets of buffer views
 
 _TYPES = {np.dtype("u1"): 5121, np.dtype("<u2"): 5123, np.dtype("<u4"): 5125, np.dtype("<f4"): 5126}

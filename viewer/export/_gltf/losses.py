@@ -20,8 +20,6 @@ from viewer.rig.motion.evaluation import Frames
 from viewer.rig.scalars import length_text
 from viewer.rig.skinning import METHODS, Skinning
 
-__all__ = ["Written", "gltf_losses", "not_held", "vertices_text"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Written:

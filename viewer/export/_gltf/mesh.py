@@ -16,8 +16,6 @@ from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.geometry.vectors import unit
 from viewer.rig.mesh import Mesh, split_seams, vertex_normals
 
-__all__ = ["add_mesh"]
-
 _PLAIN = (0.62, 0.60, 0.57)  # linear; what the viewer draws without a texture
 _POINTS = 0  # mode of a primitive without triangles
 _LONG = 65535  # the index itself is reserved, so so many vertices fit 16 bits

@@ -12,8 +12,6 @@ from viewer.rig.arrays import Bools, Floats
 from viewer.rig.motion.evaluation import Frames
 from viewer.rig.skeleton import Skeleton
 
-__all__ = ["add_animation", "moving", "still_locals"]
-
 _NOISE = 1e-9  # of the skeleton's size: what moves less does not move
 
 

@@ -25,8 +25,6 @@ from viewer.rig.pose import Pose, joint_rotations, local_matrices
 from viewer.rig.skeleton import Skeleton
 from viewer.rig.units import METRES, WORDS
 
-__all__ = ["Locals", "Tree", "add_nodes", "locals_of"]
-
 _HALF = float(np.sqrt(0.5))
 _Z_TO_Y = [-_HALF, 0.0, 0.0, _HALF]
 

@@ -11,8 +11,6 @@ from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.shape import shaped
 
-__all__ = ["Shape", "shape_of"]
-
 _MOST_TARGETS = 64  # each costs 12 bytes a vertex, and programs hold only so many
 
 

@@ -19,8 +19,6 @@ from viewer.rig.skin import (
     weight_sums,
 )
 
-__all__ = ["Influences", "influence_sets", "influences_of", "inverse_bind_matrices"]
-
 PER_SET = 4
 _SUM = 1e-6  # sums nearer to 1 are rounding in the figure's file
 _MOST_JOINTS = 65536  # they are numbered in 16 bits

@@ -20,8 +20,6 @@ from viewer.rig.motion.evaluation import Frames, frames_between, world_frames
 from viewer.rig.scalars import length_text
 from viewer.rig.skeleton import joint_label
 
-__all__ = ["Apart", "Farthest", "apart", "apart_lines", "negligible", "shared_extent"]
-
 _BLOCK = 1024  # poses at a time, so that matrices of all frames never exist at once
 _CHUNK = 128  # poses looked at at once
 _LIKELY = 4  # of these, poses whose farthest vertex is measured before all others

@@ -17,8 +17,6 @@ from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
 from viewer.rig.skinning import Skinning
 
-__all__ = ["between_losses", "resampling_losses"]
-
 _PLACES = "between frames"
 _ON_FRAME = 1e-6  # of a frame: nearer than this to a frame is that frame
 

@@ -17,8 +17,6 @@ from viewer.export._losses.skinned import Body, Poses
 from viewer.rig.arrays import Floats
 from viewer.rig.skin import Skin, merged, owners, skin_from_entries
 
-__all__ = ["Bounds"]
-
 _NUMBERS = 9  # of a joint's rotation, which drive the correctives
 
 

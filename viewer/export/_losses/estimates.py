@@ -15,8 +15,6 @@ from viewer.export._losses.skinned import Body, Poses
 from viewer.rig.arrays import Floats
 from viewer.rig.skinning._blocks import blocks_of
 
-__all__ = ["Estimator"]
-
 Single = NDArray[np.float32]
 
 _STEPS = 2.0**-18  # of the largest number in a sum: what sums in single precision may be off

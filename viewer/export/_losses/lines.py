@@ -14,8 +14,6 @@ from viewer.rig.motion.evaluation import Frames
 from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.skinning import Skinning
 
-__all__ = ["driven_losses", "frames_losses", "shape_changes"]
-
 
 def shape_changes(frames: Frames) -> bool:
     """Return whether the shape of a figure changes over the frames that are present."""

@@ -24,19 +24,6 @@ from viewer.rig.skin import Skin, has_influence, owners, skin_from_entries, skin
 from viewer.rig.skinning import Skinning, deform, skin_used
 from viewer.rig.skinning.lbs import move
 
-__all__ = [
-    "Body",
-    "Poses",
-    "Rows",
-    "Side",
-    "anchored",
-    "body_rows",
-    "changing",
-    "figure_side",
-    "poses_of",
-    "vertices",
-]
-
 Rows = NDArray[np.intp]
 
 

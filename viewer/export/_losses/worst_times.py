@@ -28,8 +28,6 @@ from viewer.rig.motion.clip import SHORTEST, Channel, Clip
 from viewer.rig.motion.evaluation import Frames
 from viewer.rig.skinning import Skinning
 
-__all__ = ["Sampler", "WorstTimes", "key_times", "worst_times"]
-
 Sampler = Callable[[Floats], Frames]
 
 _MOST = 8192  # times looked at in all, before the highest are refined

@@ -9,8 +9,6 @@ from viewer.rig.pose import Pose
 from viewer.rig.skin import Skin
 from viewer.rig.skinning import Skinning, skin_used
 
-__all__ = ["Asked", "influences_kept"]
-
 _FOUR = 4  # influences of most engines, if no other number is chosen
 
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 from viewer.rig.annotations import VertexField
 from viewer.rig.figure import Figure
 
-__all__ = ["field_of"]
-
 
 def field_of(figure: Figure, name: str, is_class: bool) -> VertexField | None:
     """Return a figure's field of a name, or its first; None if there is none.

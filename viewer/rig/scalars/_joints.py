@@ -7,8 +7,6 @@ from viewer.near_names import name_hint
 from viewer.rig.figure import Figure
 from viewer.rig.skeleton import find_joint, joint_label, joint_labels
 
-__all__ = ["joint_of", "joint_text"]
-
 
 def joint_of(figure: Figure, text: str) -> int:
     """Return the joint of a name or an index.

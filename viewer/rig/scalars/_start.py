@@ -10,8 +10,6 @@ from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.scalars._joints import joint_text
 
-__all__ = ["joint_influences", "most_influential", "telling_field", "telling_view"]
-
 
 def joint_influences(figure: Figure) -> Floats:
     """Return the sum of the weights, without their signs, that each joint has: (J,)."""

@@ -6,8 +6,6 @@ import numpy as np
 
 from viewer.rig.arrays import Floats
 
-__all__ = ["inverse_transposed"]
-
 _FLAT = 1e-5  # determinant, with entries scaled to at most 1, that rounding may have given its sign
 
 
