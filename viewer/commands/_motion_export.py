@@ -19,7 +19,7 @@ from viewer.export import (
     motion_exporters,
     suited_exporter,
 )
-from viewer.export._motion_paths import motion_paths, take_files
+from viewer.export._motion_paths import animation_files, motion_paths
 from viewer.export._options import GAPS, ROTATION_ORDERS
 from viewer.formats import all_or_none
 from viewer.interrupts import raising
@@ -190,7 +190,9 @@ def _write(
     """Write the motions of whoever is there; return what the exporters say."""
     if key == "easymocap":
         return _write_capture(parts, output, options)
-    files = [file for part in parts for file in take_files(part.animation, part.path, key, options)]
+    files = [
+        file for part in parts for file in animation_files(part.animation, part.path, key, options)
+    ]
     check(files)
     lines: list[str] = []
     with all_or_none(files):

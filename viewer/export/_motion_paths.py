@@ -58,7 +58,7 @@ def numbered_paths(path: Path, frames: Iterable[int]) -> list[Path]:
     return files
 
 
-def take_files(
+def animation_files(
     animation: SampledAnimation | SampledPoints, path: Path, key: str, options: MotionOptions
 ) -> list[Path]:
     """Return all files that ``export_animation`` writes under names that were asked for.

@@ -1,4 +1,4 @@
-"""The field that a scalar view is about, by name."""
+"""The field that a scalar quantity is about, by name."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The joint that a scalar view is about, by name or index."""
+"""The joint that a scalar quantity is about, by name or index."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The first joint or field of a scalar view: one that is not 0 everywhere."""
+"""The first joint or field of a scalar quantity: one that is not 0 everywhere."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ def telling_field(figure: Figure) -> str:
     return next((field.name for field in fields if field.values.any()), "")
 
 
-def telling_view(key: str, figures: Iterable[Figure]) -> str:
-    """Return the name of a view with a joint or field that is not 0 everywhere.
+def telling_quantity(key: str, figures: Iterable[Figure]) -> str:
+    """Return the name of a quantity with a joint or field that is not 0 everywhere.
 
     ``key``: of ``SCALARS``; one that is about neither is its own name.
     ``figures``: the first that has something to see counts.

@@ -1,4 +1,4 @@
-"""Views of what the pose does to the surface: how edges and triangles change their size.
+"""Quantities of what the pose does to the surface: how edges and triangles change their size.
 
 Compared are the posed mesh, the figure's own scale left out, and the shaped mesh in its binding
 space.
@@ -85,7 +85,7 @@ def _edge_changes(asked: Asked) -> tuple[Ints, Floats]:
 
 def _rest_and_posed(asked: Asked) -> tuple[Floats, Floats]:
     """Return the vertices in binding space, and as posed in a figure of scale 1."""
-    assert asked.pose is not None  # the view depends on it
+    assert asked.pose is not None  # the quantity depends on it
     rest = shaped(asked.figure, asked.pose.shape_weights).require_mesh()
     pose = replace(asked.pose, figure_scale=1.0)
     return rest.positions, deform(asked.figure, pose, asked.skinning)[0]
