@@ -5,7 +5,7 @@ in vec3 in_position;    // figure units, minus the posed centre
 in vec3 in_normal;      // unit length
 in vec2 in_uv;          // v = 0 at the bottom row of the texture
 in vec3 in_color;       // linear
-in float in_scalar;     // what a scalar view shows
+in float in_scalar;     // what a scalar quantity shows
 
 uniform mat4 u_model_view;     // to camera space
 uniform mat3 u_normal_matrix;  // its inverse transpose

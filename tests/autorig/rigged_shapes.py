@@ -47,10 +47,10 @@ def tube(around=16, along=21, length=2.0):
 def arm(root_moves=True, limit=np.inf) -> Figure:
     """Return a tube with joints at y = 0 and y = 1, weights blended linearly from 0.8 to 1.2."""
     positions, triangles = tube()
-    share = np.clip((positions[:, 1] - 0.8) / 0.4, 0.0, 1.0)
+    fraction = np.clip((positions[:, 1] - 0.8) / 0.4, 0.0, 1.0)
     vertices = np.tile(np.arange(len(positions)), 2)
     joints = np.repeat([0, 1], len(positions))
-    weights = np.concatenate([1 - share, share])
+    weights = np.concatenate([1 - fraction, fraction])
     bind = np.tile(np.eye(4), (2, 1, 1))
     bind[1, 1, 3] = -1.0
     kept = weights > 0

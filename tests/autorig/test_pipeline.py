@@ -46,14 +46,14 @@ def again(rigged):
 
 
 @pytest.fixture(scope="module")
-def carried():
+def transferred():
     figure, pose = bent_arm()
     target = moved(figure, pose)
     return figure, pose, target, transfer(figure, pose, target)
 
 
-def test_the_templates_own_mesh_gets_its_rig_back(carried):
-    figure, _, _, rigged = carried
+def test_the_templates_own_mesh_gets_its_rig_back(transferred):
+    figure, _, _, rigged = transferred
     size = 30.0 * 2.4
     assert_allclose(rigged.figure.mesh.positions, 30.0 * figure.mesh.positions, atol=1e-6 * size)
     assert_allclose(
@@ -65,20 +65,20 @@ def test_the_templates_own_mesh_gets_its_rig_back(carried):
     skin = rigged.figure.skin
     np.add.at(dense, (np.repeat(np.arange(len(dense)), np.diff(skin.starts)), skin.joints),
               skin.weights)  # fmt: skip
-    share = np.clip((figure.mesh.positions[:, 1] - 0.8) / 0.4, 0.0, 1.0)
-    assert_allclose(dense[:, 1], share, atol=1e-6)
+    fraction = np.clip((figure.mesh.positions[:, 1] - 0.8) / 0.4, 0.0, 1.0)
+    assert_allclose(dense[:, 1], fraction, atol=1e-6)
 
 
-def test_posed_again_it_is_the_target(carried):
-    _, _, target, rigged = carried
+def test_posed_again_it_is_the_target(transferred):
+    _, _, target, rigged = transferred
     assert_allclose(again(rigged), target.positions, atol=1e-10)
     assert rigged.residual < 1e-12
     assert rigged.weights.matched.all() and not rigged.guarded.any()
     assert rigged.confidence.tolist() == [0] * target.n_vertices
 
 
-def test_target_is_not_altered_and_keeps_its_texture_coordinates(carried):
-    figure, pose, target, _ = carried
+def test_target_is_not_altered_and_keeps_its_texture_coordinates(transferred):
+    figure, pose, target, _ = transferred
     uvs = np.random.default_rng(2).random((target.n_vertices, 2))
     with_uvs = replace(target, uvs=uvs)
     rigged = transfer(figure, pose, with_uvs, QUICK)
@@ -86,8 +86,8 @@ def test_target_is_not_altered_and_keeps_its_texture_coordinates(carried):
     assert (rigged.figure.mesh.triangles == target.triangles).all()
 
 
-def test_target_that_is_inside_out_is_turned_round_in_the_result(carried):
-    figure, pose, target, rigged = carried
+def test_target_that_is_inside_out_is_turned_round_in_the_result(transferred):
+    figure, pose, target, rigged = transferred
     backwards = mesh_of(target.positions, target.triangles[:, ::-1])
     found = transfer(figure, pose, backwards, QUICK)
     assert (found.figure.mesh.triangles == target.triangles).all()
@@ -113,8 +113,8 @@ def test_unit_is_judged_by_size(scale, unit, line):
     assert line in told(rigged.lines)
 
 
-def test_the_templates_clip_plays(carried):
-    figure, _, _, rigged = carried
+def test_the_templates_clip_plays(transferred):
+    figure, _, _, rigged = transferred
     times = np.array([0.0, 1.0])
     linear = (("linear", "linear"),) * 2
     rows = [(0, 0.5), (4, 0.8), (8, -1.1)]
@@ -192,11 +192,13 @@ def test_progress_rises_to_1_and_may_cancel():
     figure, pose = bent_arm()
     steps = []
     target = moved(figure, pose)
-    transfer(figure, pose, target, QUICK, report=lambda share, what: steps.append((share, what)))
-    shares = [share for share, _ in steps]
-    assert shares == sorted(shares) and shares[0] == 0.0 and steps[-1] == (1.0, "done")
+    transfer(
+        figure, pose, target, QUICK, report=lambda fraction, what: steps.append((fraction, what))
+    )
+    fractions = [fraction for fraction, _ in steps]
+    assert fractions == sorted(fractions) and fractions[0] == 0.0 and steps[-1] == (1.0, "done")
 
-    def stop(share, what):
+    def stop(fraction, what):
         if what == "joints":
             raise KeyboardInterrupt
 

@@ -2,7 +2,7 @@
 
 Parts, all or those named: ``aligned``, the weights alone, template and target lying on each other;
 ``whole``, the whole way, which looks for the alignment itself, against the seed's whole way;
-``unposed``, the same with the template at rest however the target stands; ``stretched``, targets
+``inverted``, the same with the template at rest however the target stands; ``stretched``, targets
 with another scale along each axis, as they are and with ``--scale axes``; ``scans``, meshes as
 scanners leave them; ``time``, where the time goes.
 """
@@ -72,10 +72,10 @@ def _compare(what: str, part: str, targets: list[made.Target], run) -> None:
             f"matched {full.matched.mean():6.1%}  ratio {after[0] / before[0]:.2f}"
         )
     before, after = np.mean([row[0] for row in kept], 0), np.mean([row[1] for row in kept], 0)
-    share = after[0] / before[0]
+    ratio = after[0] / before[0]
     print(f"  mean (without *): nearest {text(before)}   default {text(after)}")
     print(
-        f"  L1 default / nearest: {share:.2f} (goal: at most {SHARE}, {verdict(share <= SHARE)}); "
+        f"  L1 default / nearest: {ratio:.2f} (goal: at most {SHARE}, {verdict(ratio <= SHARE)}); "
         f"same dominant joint: {after[2]:.1%} (goal: at least {SAME:.0%}, "
         f"{verdict(after[2] >= SAME)})\n"
     )

@@ -1,4 +1,4 @@
-"""Scalar views on the command line: what is drawn, what is said, what is refused."""
+"""Scalar quantities on the command line: what is drawn, what is said, what is refused."""
 
 from __future__ import annotations
 
@@ -103,11 +103,11 @@ def test_legend_stays_in_its_corner(render, body):
         ),
         (
             ["--scalar", "strech"],
-            'argument --scalar: no scalar view "strech"; did you mean stretch?',
+            'argument --scalar: no scalar quantity "strech"; did you mean stretch?',
         ),
         (
             ["--scalar", "stretch:pelvis"],
-            'argument --scalar: scalar view "stretch": expected no joint, found "pelvis"',
+            'argument --scalar: scalar quantity "stretch": expected no joint, found "pelvis"',
         ),
         (["--legend"], "--legend: expected --scalar NAME, whose colours it is about"),
         (["--no-isolines", "--shading", "parts"], None),

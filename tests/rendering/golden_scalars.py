@@ -1,4 +1,4 @@
-"""The pictures in tests/golden of scalar views: one of each, on a figure that has something to see.
+"""The pictures in tests/golden of scalar quantities: one of each, on a figure that shows it.
 
 Without legends: letters look different with every version of Pillow; see test_legend_picture.py.
 """
@@ -77,7 +77,7 @@ _SCENES: dict[str, tuple[Callable[[], Scene], str, tuple[float, float]]] = {
     "field": (_uneven_arm, "field:along", (35.0, 15.0)),
     "class": (_uneven_arm, "class:half", (35.0, 15.0)),
 }
-assert set(_SCENES) == set(SCALARS), "every scalar view has a picture"
+assert set(_SCENES) == set(SCALARS), "every scalar quantity has a picture"
 
 
 def _shot(name: str) -> Shot:

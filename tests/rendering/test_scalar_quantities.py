@@ -1,4 +1,4 @@
-"""Scalar views: the numbers that reach the GPU, their range, and their colours in the picture."""
+"""Scalar quantities: the numbers on the GPU, their range, and their colours in the picture."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from viewer.rendering.gpu.scalar_buffer import ScalarBuffer
 from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.palettes import NOTHING, count_palette, joint_palette
-from viewer.rendering.scalar_views import name_for
+from viewer.rendering.scalar_quantities import name_for
 from viewer.rig import scalars
 from viewer.rig.annotations import BodyParts
 from viewer.rig.blendshapes import Correctives

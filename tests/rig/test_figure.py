@@ -59,3 +59,24 @@ def test_skeleton_points_hold_all_corners_of_turned_boxes():
     # A quarter turn about z sends (x, y) to (-y, x).
     corners = {(10 - y, x, z) for x in (0, 1) for y in (0, 2) for z in (0, 3)}
     assert {tuple(np.round(point, 12) + 0.0) for point in points} == corners
+
+
+def test_attached_figure_has_all_its_parts():
+    bones = skeleton([-1])
+    whole = Figure("whole", mesh=SHAPE, skeleton=bones, skin=SKIN).attached()
+    assert (whole.mesh, whole.skeleton, whole.skin) == (SHAPE, bones, SKIN)
+
+
+@pytest.mark.parametrize(
+    ("parts", "missing"),
+    [
+        ({"skeleton": skeleton([-1])}, "mesh"),
+        ({"mesh": SHAPE, "skin": SKIN}, "skeleton"),
+        ({"mesh": SHAPE, "skeleton": skeleton([-1])}, "skin"),
+    ],
+)
+def test_missing_part_of_an_attached_figure_is_named(parts, missing):
+    figure = Figure("a", **parts)
+    for ask in (figure.attached, getattr(figure, f"require_{missing}")):
+        with pytest.raises(RigError, match=f"^figure a has no {missing}$"):
+            ask()

@@ -1,6 +1,8 @@
 import numpy as np
+import pytest
 from rig.hand_made import mesh, skeleton
 
+from viewer.errors import RigError
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.scene import Actor, Scene, actor_points, scene_box
@@ -64,3 +66,11 @@ def test_scene_box_keeps_every_point_of_a_small_figure():
 def test_scene_is_up_as_its_first_figure():
     assert Scene([]).up == "y"
     assert Scene([Actor(Figure("a", mesh=mesh([[0, 0, 0]]), up="z"))]).up == "z"
+
+
+def test_actor_without_pose_or_motion_says_so():
+    actor = cloud([[0, 0, 0]])
+    with pytest.raises(RigError, match=r"^cloud has no pose, as it has no skeleton$"):
+        actor.require_pose()
+    with pytest.raises(RigError, match=r"^cloud has no motion$"):
+        actor.require_clip()

@@ -1,4 +1,4 @@
-"""What is looked at when a rig has been carried over, and how it is told."""
+"""Checks of a transferred rig, and the lines that report them."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def newly_outside(
     posed: Floats,
     target: Mesh,
     joints: Floats | None = None,
-    carried: Bools | None = None,
+    transferred: Bools | None = None,
 ) -> tuple[int, ...]:
     """Return the joints that lie inside the template, but not inside the target.
 
@@ -43,13 +43,12 @@ def newly_outside(
         The mesh that was rigged.
     joints : (J, 3) or None
         In the target's frame; None if they are the template's.
-    carried : (J,) bool or None
+    transferred : (J,) bool or None
         Which are expected inside: a joint of a part that the target lacks is not. None for all.
     """
-    assert template.mesh is not None  # the callers looked
     own = joint_matrices(template, pose)[:, :3, 3]
-    before = outside(posed, template.mesh.triangles, own)
-    asked = np.flatnonzero(~before if carried is None else carried & ~before)
+    before = outside(posed, template.require_mesh().triangles, own)
+    asked = np.flatnonzero(~before if transferred is None else transferred & ~before)
     there = own if joints is None else joints
     after = outside(target.positions, target.triangles, there[asked])
     return tuple(asked[after].tolist())
@@ -84,7 +83,7 @@ def check_lines(
     figure : Figure
         Names its joints.
     guarded : (V,) bool
-        From ``unpose``.
+        From ``invert_skinning``.
     out : tuple of int
         From ``newly_outside``.
     residual : float

@@ -1,4 +1,4 @@
-"""Give an unrigged mesh a template's rig: align, weigh, carry the joints, unpose, and check."""
+"""Transfer of a rig to a mesh: align, weigh, transfer the joints, invert the pose, and check."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def transfer(
     return with_fields(rigged)
 
 
-def _silent(share: float, what: str) -> None:
+def _silent(fraction: float, what: str) -> None:
     """Tell nobody."""
 
 

@@ -1,4 +1,4 @@
-"""What a rig transfer makes: a figure of the target, and what is known about every vertex."""
+"""Result of a rig transfer: a figure of the target, and what is known about every vertex."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from viewer.autorig.alignment.surface_alignment import Alignment
-from viewer.autorig.transfer.clip_transfer import carry_clip
+from viewer.autorig.transfer.clip_transfer import transfer_clip
 from viewer.autorig.weights.result import WeightTransfer
 from viewer.diagnostics import Diagnostic
 from viewer.rig.annotations import VertexField
@@ -38,7 +38,7 @@ class Rigged:
         From the posed figure to the target's frame; the identity unless the method altered the
         target.
     alignment : Alignment or None
-        Where the template lay; None for a method that only lays boxes onto each other.
+        Where the template lay; None for a method that only aligns boxes.
     weights : WeightTransfer
         Matches, distances and parts that hang rigidly.
     guarded : (V,) bool
@@ -70,14 +70,14 @@ class Rigged:
     def confidence(self) -> Ints:
         """Index into ``CONFIDENCE`` of every vertex: (V,) int32."""
         weights = self.weights
-        return np.where(weights.matched, 0, np.where(weights.filled, 1, 2)).astype(np.int32)
+        return np.where(weights.matched, 0, np.where(weights.inpainted, 1, 2)).astype(np.int32)
 
 
 def with_fields(rigged: Rigged) -> Rigged:
     """Return the same with a figure whose fields say how sure each vertex is.
 
     ``"confidence"`` is the way a vertex came to its weights, ``"distance"`` how far it was from
-    the template's surface as it was laid onto it, ``"guarded"`` where its rest position is a
+    the template's surface as it was aligned with it, ``"guarded"`` where its rest position is a
     guess.
     """
     confidence = rigged.confidence.astype(np.float64)
@@ -91,13 +91,14 @@ def with_fields(rigged: Rigged) -> Rigged:
 
 
 def clip_for(rigged: Rigged, clip: Clip | SampledClip) -> Clip | SampledClip:
-    """Return a clip of the template for the rigged figure; see ``carry_clip``.
+    """Return a clip of the template for the rigged figure; see ``transfer_clip``.
 
     Raises
     ------
     RigError
         If it is a clip of another skeleton.
     """
-    skeleton = rigged.figure.skeleton
-    assert skeleton is not None  # a rigged figure has one
-    return carry_clip(clip, skeleton, rigged.length_scale, rigged.figure_scale, rigged.path_scale)
+    skeleton = rigged.figure.require_skeleton()
+    return transfer_clip(
+        clip, skeleton, rigged.length_scale, rigged.figure_scale, rigged.path_scale
+    )

@@ -1,4 +1,4 @@
-"""The recommended way: alignment, checked closest points, carried joints, unposing."""
+"""The recommended method: alignment, checked closest points, joint transfer, inverse skinning."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from viewer.autorig.checks import (
     residual_of,
     with_joint_name,
 )
-from viewer.autorig.correspondence.inside_out import turned_round
+from viewer.autorig.correspondence.inside_out import with_reversed_winding
 from viewer.autorig.correspondence.matching import Template
 from viewer.autorig.rigged import Rigged
 from viewer.autorig.settings import Report, TransferSettings
-from viewer.autorig.transfer.corrective_transfer import carry_correctives
-from viewer.autorig.transfer.inverse_skinning import mend, unpose
-from viewer.autorig.transfer.joint_transfer import boundary_weights, carry_joints, surface_shifts
+from viewer.autorig.transfer.corrective_transfer import transfer_correctives
+from viewer.autorig.transfer.inverse_skinning import invert_skinning, repair_tears
+from viewer.autorig.transfer.joint_transfer import boundary_weights, surface_shifts, transfer_joints
 from viewer.autorig.transfer.rest_skeleton import RestSkeleton, fit_rest_skeleton
 from viewer.autorig.weights.result import WeightTransfer
 from viewer.autorig.weights.weight_transfer import transferred_weights
@@ -63,16 +63,18 @@ def robust(
     met = align_posed(template, pose, target, how.alignment, how.fits, _within(report, 0.0, 0.4))
     alignment, pose, posed = met.alignment, met.pose, met.positions
     original, template = template.skeleton, met.figure
-    laid = alignment.placed.apply(posed)
-    weights = _weighed(template, laid, target, how, report)
+    aligned = alignment.similarity.apply(posed)
+    weights = _weighed(template, aligned, target, how, report)
     report(0.8, "joints")
-    rest, carried, lines = _carried_skeleton(template, original, pose, alignment, laid, target, how)
+    rest, transferred, lines = _transferred_skeleton(
+        template, original, pose, alignment, aligned, target, how
+    )
     report(0.85, "rest pose")
-    scale = alignment.placed.scale * pose.figure_scale
+    scale = alignment.similarity.scale * pose.figure_scale
     figure, guarded = _at_rest(template, rest, weights, target, scale, how, name)
     report(0.95, "checks")
     joints = joint_matrices(figure, rest.pose)[:, :3, 3]
-    out = newly_outside(template, pose, posed, target, joints, carried)
+    out = newly_outside(template, pose, posed, target, joints, transferred)
     residual = residual_of(figure, rest.pose, np.eye(4), target)
     lines = [
         *alignment_lines(alignment),
@@ -93,7 +95,7 @@ def robust(
         guarded=guarded,
         residual=residual,
         outside=out,
-        length_scale=alignment.placed.scale,
+        length_scale=alignment.similarity.scale,
         figure_scale=pose.figure_scale,
         path_scale=rest.root_scale / pose.figure_scale,
         lines=tuple(lines),
@@ -101,13 +103,12 @@ def robust(
 
 
 def _weighed(
-    template: Figure, laid: Floats, target: Mesh, how: TransferSettings, report: Report
+    template: Figure, aligned: Floats, target: Mesh, how: TransferSettings, report: Report
 ) -> WeightTransfer:
     """Carry the weights of a template over that lies on the target."""
-    mesh, skin = template.mesh, template.skin
-    assert mesh is not None and skin is not None  # the caller looked
+    mesh, skin = template.require_mesh(), template.require_skin()
     return transferred_weights(
-        Template(laid, mesh.triangles),
+        Template(aligned, mesh.triangles),
         skin,
         target.positions,
         target.triangles,
@@ -117,30 +118,30 @@ def _weighed(
 
 
 def _within(report: Report, low: float, high: float) -> Report:
-    return lambda share, what: report(low + (high - low) * share, what)
+    return lambda fraction, what: report(low + (high - low) * fraction, what)
 
 
-def _carried_skeleton(
+def _transferred_skeleton(
     template: Figure,
     original: Skeleton | None,
     pose: Pose,
     alignment: Alignment,
-    laid: Floats,
+    aligned: Floats,
     target: Mesh,
     how: TransferSettings,
 ) -> tuple[RestSkeleton, Bools | None, list[Diagnostic]]:
     """Place the joints in the target; return which were carried, and what a person should know."""
     mesh, skeleton, skin = template.mesh, template.skeleton, template.skin
     assert mesh is not None and skeleton is not None and skin is not None  # the caller looked
-    joints = alignment.placed.apply(joint_matrices(template, pose)[:, :3, 3])
+    joints = alignment.similarity.apply(joint_matrices(template, pose)[:, :3, 3])
     if how.joints == "copied":
-        rest = fit_rest_skeleton(template, pose, alignment.placed, joints, None, original)
+        rest = fit_rest_skeleton(template, pose, alignment.similarity, joints, None, original)
         return rest, None, [Diagnostic("R008.aligned")]
     reach = _JOINT_REACH * box_size(bounding_box(target.positions[target.triangles.ravel()]))
-    normals = vertex_normals(laid, mesh.triangles)
-    ways, matched = surface_shifts(laid, normals, target.positions, target.triangles, reach)
+    normals = vertex_normals(aligned, mesh.triangles)
+    ways, matched = surface_shifts(aligned, normals, target.positions, target.triangles, reach)
     regressor = template.joint_regressor
-    found = carry_joints(
+    found = transfer_joints(
         joints,
         skeleton.parents,
         regressor or boundary_weights(skin, skeleton.parents),
@@ -148,19 +149,19 @@ def _carried_skeleton(
         matched,
     )
     rest = fit_rest_skeleton(
-        template, pose, alignment.placed, found.positions, found.carried, original
+        template, pose, alignment.similarity, found.positions, found.transferred, original
     )
-    missed = np.flatnonzero(found.measurable & ~found.carried)
+    missed = np.flatnonzero(found.measurable & ~found.transferred)
     labels = [joint_label(skeleton, joint) for joint in missed.tolist()]
     without = int((~found.measurable).sum())
     values = {
-        "n": int(found.carried.sum()),
+        "n": int(found.transferred.sum()),
         "all": skeleton.n_joints,
         "by": Phrase("by-joint-regressor" if regressor else "by-boundaries"),
         "missed": Phrase("joints-missed", names=labels) if labels else "",
         "without": Phrase("joints-without-boundary", n=without) if without else "",
     }
-    return rest, found.carried, [Diagnostic("R008.transferred", values=values)]
+    return rest, found.transferred, [Diagnostic("R008.transferred", values=values)]
 
 
 def _at_rest(
@@ -177,15 +178,15 @@ def _at_rest(
     skeleton, pose = rest.skeleton, rest.pose
     palette = skinning_matrices(world_matrices(skeleton, pose), skin.inverse_bind)
     posed = target.positions - pose.figure_translation
-    found = unpose(posed, skin, palette)
-    positions = mend(found, posed, target.triangles) if how.mends else found.positions
+    found = invert_skinning(posed, skin, palette)
+    positions = repair_tears(found, posed, target.triangles) if how.mends else found.positions
     correctives = _correctives(template, weights, target, scale) if how.correctives else None
     if correctives is not None:
         # What the pose adds to the rest mesh is taken off now, and added back when posing.
-        turned = joint_rotations(skeleton, pose)
-        positions = positions - correctives.displacement(corrective_weights(turned))
+        rotated = joint_rotations(skeleton, pose)
+        positions = positions - correctives.displacement(corrective_weights(rotated))
     mesh = replace(target, positions=positions, normals=vertex_normals(positions, target.triangles))
-    mesh = turned_round(mesh, weights.backwards)
+    mesh = with_reversed_winding(mesh, weights.backwards)
     figure = Figure(
         name=name,
         mesh=mesh,
@@ -206,7 +207,7 @@ def _correctives(
 ) -> Correctives | None:
     if template.correctives is None or template.mesh is None or weights.points is None:
         return None
-    return carry_correctives(
+    return transfer_correctives(
         template.correctives,
         weights.points,
         template.mesh.triangles,
@@ -219,9 +220,8 @@ def _correctives(
 
 def _judged(template: Figure, figure: Figure, weights: WeightTransfer) -> list[Diagnostic]:
     """Say what was judged of the target: which way round it is wound, and its unit."""
-    assert figure.mesh is not None  # it was just made
     lines = []
-    turned = int(weights.backwards[figure.mesh.triangles].any(axis=1).sum())
+    turned = int(weights.backwards[figure.require_mesh().triangles].any(axis=1).sum())
     if turned:
         lines.append(Diagnostic("R014.wound", values={"n": turned}))
     if template.unit in WORDS:

@@ -10,7 +10,7 @@ from viewer.autorig.alignment.box_alignment import align_boxes
 from viewer.autorig.checks import check_lines, newly_outside, residual_of
 from viewer.autorig.rigged import Rigged
 from viewer.autorig.settings import Report
-from viewer.autorig.transfer.inverse_skinning import unpose
+from viewer.autorig.transfer.inverse_skinning import invert_skinning
 from viewer.autorig.weights.weight_transfer import nearest_weights
 from viewer.diagnostics import Diagnostic
 from viewer.rig.arrays import Floats
@@ -44,23 +44,22 @@ def nearest(template: Figure, pose: Pose, target: Mesh, report: Report, name: st
     name : str
         Of the new figure.
     """
-    mesh, skeleton, skin = template.mesh, template.skeleton, template.skin
-    assert mesh is not None and skeleton is not None and skin is not None  # the caller looked
+    _, skeleton, skin = template.attached()
     posed = deform(template, pose)[0]
     report(0.1, "boxes")
     box = align_boxes(target.positions, posed)
-    laid = apply_transform(box, target.positions)
+    aligned = apply_transform(box, target.positions)
     report(0.2, "nearest vertices")
-    weights = nearest_weights(posed, skin, laid)
+    weights = nearest_weights(posed, skin, aligned)
     report(0.6, "rest pose")
     bound = weights.skin(skin.inverse_bind)
     palette = skinning_matrices(world_matrices(skeleton, pose), skin.inverse_bind)
-    unplaced = np.asarray(np.linalg.inv(placement_matrix(pose)), dtype=np.float64)
-    found = unpose(apply_transform(unplaced, laid), bound, palette)
+    unaligned = np.asarray(np.linalg.inv(placement_matrix(pose)), dtype=np.float64)
+    found = invert_skinning(apply_transform(unaligned, aligned), bound, palette)
     figure = _figure(template, bound, target, found.positions, name)
     back = np.asarray(np.linalg.inv(box), dtype=np.float64)
     residual = residual_of(figure, pose, back, target)
-    out = newly_outside(template, pose, posed, replace(target, positions=laid))
+    out = newly_outside(template, pose, posed, replace(target, positions=aligned))
     factors = dict(zip("xyz", np.diag(box)[:3].tolist(), strict=True))
     matched = {
         "n": int(weights.matched.sum()),

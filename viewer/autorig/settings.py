@@ -1,4 +1,4 @@
-"""What may be asked for when a rig is carried over."""
+"""Settings of the transfer of a rig."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from viewer.errors import RigError
 __all__ = ["JOINTS", "METHODS", "Report", "TransferSettings"]
 
 Report = Callable[[float, str], None]
-"""Told the share that is done and what is being done; may raise to cancel."""
+"""Told the fraction that is done and what is being done; may raise to cancel."""
 
 METHODS = {
     "robust": "closest surface points, checked, the rest filled in (Abdrashitov et al. 2023)",
@@ -26,7 +26,7 @@ JOINTS = ("carried", "copied")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TransferSettings:
-    """How a rig is carried over.
+    """How a rig is transferred.
 
     Attributes
     ----------
@@ -39,10 +39,10 @@ class TransferSettings:
     joints : str
         One of ``JOINTS``.
     fits : bool
-        Whether the template's joints are turned and its limbs resized, where it stands otherwise
+        Whether the template's joints are rotated and its limbs resized, where it stands otherwise
         than the target or has other proportions.
     correctives : bool
-        Whether pose correctives of the template are carried.
+        Whether pose correctives of the template are transferred.
     mends : bool
         Whether the surroundings of singular vertices are smoothed.
     """

@@ -17,8 +17,6 @@ from viewer.rig.motion.clip import Clip, is_course_rig
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.scene import Actor, Scene, figure_pose
 
-__all__ = ["CarriedClip", "add_clip_argument", "read_clips", "write_clips"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CarriedClip:
@@ -54,20 +52,11 @@ def read_clips(
 ) -> list[CarriedClip]:
     """Return the motions that ``--clip`` asks for, before any work is done.
 
-    Parameters
-    ----------
-    arguments : argparse.Namespace
-        Of ``viewer rig``.
-    template : list of Path
-        The template's files.
-    figure : Figure
-        The template.
-
-    Raises
-    ------
-    ViewerError
-        If there is no output to write beside, a file holds no motion of the template, or two
-        would have one name.
+    ``arguments``: of ``viewer rig``.
+    ``template``: the template's files.
+    ``figure``: the template.
+    Raises ViewerError if there is no output to write beside, a file holds no motion of the
+      template, or two would have one name.
     """
     if not arguments.clips:
         return []
@@ -75,8 +64,7 @@ def read_clips(
         raise ViewerError("--clip: expected -o FILE to write the motion beside, found none")
     output = Path(arguments.output)
     found: list[CarriedClip] = []
-    assert figure.skeleton is not None  # a template has one
-    suffix = ".anim" if is_course_rig(figure.skeleton) else ".bvh"
+    suffix = ".anim" if is_course_rig(figure.require_skeleton()) else ".bvh"
     for name in arguments.clips:
         path = output.with_name(f"{output.stem}-{Path(name).stem}{suffix}")
         if any(each.path == path for each in found):
@@ -97,19 +85,10 @@ def _clip_of(name: str, template: list[Path], fps: float | None) -> Clip | Sampl
 def write_clips(rigged: Rigged, clips: list[CarriedClip]) -> list[str]:
     """Write the template's motions for the rigged figure; return what was written.
 
-    Parameters
-    ----------
-    rigged : Rigged
-        The result.
-    clips : list of CarriedClip
-        From ``read_clips``.
-
-    Raises
-    ------
-    RigError
-        If a clip is of another skeleton.
-    OutputError
-        If a file cannot be written.
+    ``rigged``: the result.
+    ``clips``: from ``read_clips``.
+    Raises RigError if a clip is of another skeleton.
+    Raises OutputError if a file cannot be written.
     """
     lines = []
     for each in clips:

@@ -15,8 +15,6 @@ from viewer.rig.motion.timing import Timing
 from viewer.rig.number_text import number_text
 from viewer.rig.scene import Motion
 
-__all__ = ["clip_lines", "describe_clip"]
-
 _SHOWN_GAPS = 6
 
 

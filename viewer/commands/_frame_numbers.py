@@ -12,16 +12,6 @@ from viewer.commands._numbers import number
 from viewer.errors import ViewerError, printable
 from viewer.rig.scene import Actor, Scene
 
-__all__ = [
-    "Numbering",
-    "Range",
-    "add_frame_arguments",
-    "apply_time",
-    "numbering_of",
-    "parse_range",
-    "rate",
-]
-
 _SLOWEST, _FASTEST = 0.001, 100_000.0  # frames a second
 _LAST_NUMBER = 1_000_000_000
 
@@ -72,17 +62,9 @@ class Numbering:
     def time_of(self, frame: int, option: str = "--frame") -> float:
         """Return the seconds at which a frame is shown.
 
-        Parameters
-        ----------
-        frame : int
-            Its number.
-        option : str
-            That it was given with.
-
-        Raises
-        ------
-        ViewerError
-            If there is no such frame.
+        ``frame``: its number.
+        ``option``: that it was given with.
+        Raises ViewerError if there is no such frame.
         """
         last = _LAST_NUMBER if self.runs_on else self.last
         if not self.first <= frame <= last:
@@ -98,10 +80,7 @@ class Numbering:
         A capture's last frame counts for half a frame's duration: its exact seconds are seldom
         what somebody types.
 
-        Raises
-        ------
-        ViewerError
-            If the time lies outside of captures.
+        Raises ViewerError if the time lies outside of captures.
         """
         if self.runs_on:
             return time
@@ -115,10 +94,7 @@ class Numbering:
     def span(self, asked: Range | None) -> tuple[int, int]:
         """Return the first frame of a range and the one behind its last, counted from 0.
 
-        Raises
-        ------
-        ViewerError
-            If the range begins outside the motions, or leaves a capture.
+        Raises ViewerError if the range begins outside the motions, or leaves a capture.
         """
         if asked is None:
             return 0, self.count
@@ -138,12 +114,8 @@ def numbering_of(actors: Sequence[Actor], rate: float | None = None) -> Numberin
     The longest capture counts: at its own rate its frames have the numbers of its files. At
     another rate, and where there are only clips of keys, frames count from 0.
 
-    Parameters
-    ----------
-    actors : sequence of Actor
-        With or without motions.
-    rate : float, optional
-        Frames a second; those of the longest capture, or 30, if omitted.
+    ``actors``: with or without motions.
+    ``rate``: frames a second; those of the longest capture, or 30, if omitted.
     """
     from viewer.rig.captures.points import PointClip
     from viewer.rig.motion.clip import Clip
@@ -218,10 +190,7 @@ def rate(text: str) -> float:
 def apply_time(scene: Scene, arguments: argparse.Namespace) -> None:
     """Pose every actor that has a motion as it is at the frame or time asked for, in place.
 
-    Raises
-    ------
-    ViewerError
-        If nothing moves, or captures have nothing there.
+    Raises ViewerError if nothing moves, or captures have nothing there.
     """
     if arguments.frame is None and arguments.time is None:
         return

@@ -22,36 +22,20 @@ from viewer.rig.figure import Figure
 from viewer.rig.pose import Pose
 from viewer.rig.skinning import joint_matrices
 
-__all__ = ["read_landmarks"]
-
 _FARTHEST = 1e9  # any unit
 
 
 def read_landmarks(source: Source, template: Figure, pose: Pose) -> Floats:
     """Read pairs of points.
 
-    Parameters
-    ----------
-    source : Source
-        The file.
-    template : Figure
-        Gives the joints that are named.
-    pose : Pose
-        Puts them where they are.
-
-    Returns
-    -------
-    (N, 2, 3)
-        Of each pair the template's point, then the target's.
-
-    Raises
-    ------
-    FormatError
-        With the line, if it is no pair, or no joint has the name; with the last one if there are
-        fewer than three pairs.
+    ``source``: the file.
+    ``template``: gives the joints that are named.
+    ``pose``: puts them where they are.
+    Returns (N, 2, 3): of each pair the template's point, then the target's.
+    Raises FormatError with the line, if it is no pair, or no joint has the name; with the last one
+      if there are fewer than three pairs.
     """
-    skeleton = template.skeleton
-    assert skeleton is not None  # the template is attached
+    skeleton = template.require_skeleton()
     joints = joint_matrices(template, pose)[:, :3, 3]
     pairs = []
     for number, data in enumerate(source.data.splitlines(), start=1):

@@ -18,20 +18,14 @@ from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
 from viewer.rig.skinning import METHODS, PURE, Skinning
 
-__all__ = ["describe_model", "model_lines"]
-
 _CUTS = (4, 8)  # influences of common engines
 
 
 def describe_model(actor: Actor, skinning: Skinning) -> dict[str, Any]:
     """Return what a body model has, ready for JSON; empty for a plain rig.
 
-    Parameters
-    ----------
-    actor : Actor
-        Shaped and posed.
-    skinning : Skinning
-        How joints move its mesh.
+    ``actor``: shaped and posed.
+    ``skinning``: how joints move its mesh.
     """
     figure, pose = actor.figure, actor.pose
     facts = {heading: str(fact) for heading, fact in figure.facts}

@@ -15,8 +15,6 @@ from viewer.rig.morph_target import MORPH_GROUP
 from viewer.rig.posing.pose_record import PoseRecord
 from viewer.rig.scene import Actor, Scene
 
-__all__ = ["has_only_morphs", "is_named", "morph_record", "named_record"]
-
 _LISTED = 12  # names in a message
 
 
@@ -34,10 +32,7 @@ def has_only_morphs(figure: Figure) -> bool:
 def morph_record(figure: Figure, values: Floats) -> PoseRecord:
     """Return what sets the first morphs of a figure, (N,), and the others to 0.
 
-    Raises
-    ------
-    ViewerError
-        If it has fewer; the message names them.
+    Raises ViewerError if it has fewer; the message names them.
     """
     names = () if figure.blend_shapes is None else figure.blend_shapes.names
     if len(values) > len(names) and values[len(names) :].any():
@@ -52,17 +47,10 @@ def morph_record(figure: Figure, values: Floats) -> PoseRecord:
 def named_record(scene: Scene, text: str) -> tuple[Actor, PoseRecord]:
     """Return the first actor that has all shapes named in a text, and what sets them.
 
-    Returns
-    -------
-    actor : Actor
-        With a pose.
-    record : PoseRecord
-        Sets the named shapes and keeps the others.
-
-    Raises
-    ------
-    ViewerError
-        If the text is wrong, or no actor has these shapes; the message lists those there are.
+    Returns ``actor``: with a pose.
+    Returns ``record``: sets the named shapes and keeps the others.
+    Raises ViewerError if the text is wrong, or no actor has these shapes; the message lists those
+      there are.
     """
     wanted = [_pair(part) for part in text.strip().removesuffix(",").split(",")]
     shaped = [actor for actor in scene.actors if actor.pose is not None and actor.figure.n_shapes]
@@ -79,9 +67,10 @@ def named_record(scene: Scene, text: str) -> tuple[Actor, PoseRecord]:
 
 
 def _record(actor: Actor, wanted: list[tuple[str, float]]) -> PoseRecord:
-    assert actor.pose is not None and actor.figure.blend_shapes is not None  # the caller looked
+    pose = actor.require_pose()
+    assert actor.figure.blend_shapes is not None  # the caller looked
     weights = np.zeros(actor.figure.n_shapes)
-    weights[: len(actor.pose.shape_weights)] = actor.pose.shape_weights
+    weights[: len(pose.shape_weights)] = pose.shape_weights
     for name, value in wanted:
         rows = _rows(actor.figure, name)
         if len(rows) > 1:

@@ -19,7 +19,7 @@ from viewer.export import (
     motion_exporters,
     suited_exporter,
 )
-from viewer.export._motion_paths import motion_paths, take_files
+from viewer.export._motion_paths import animation_files, motion_paths
 from viewer.export._options import GAPS, ROTATION_ORDERS
 from viewer.formats import all_or_none
 from viewer.interrupts import raising
@@ -33,19 +33,6 @@ from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import Skinning
 from viewer.rig.units import METRES
-
-__all__ = [
-    "add_motion_arguments",
-    "check_frame_field",
-    "check_kind",
-    "check_numbered",
-    "is_motion",
-    "left_out_lines",
-    "motion_paths",
-    "pose_or_point_actors",
-    "write_motions",
-    "written_actors",
-]
 
 _MOST_DIGITS = 15
 _OF_POINTS = "npz"  # the exporter that takes captured points
@@ -129,11 +116,8 @@ def write_motions(
     in none of the frames are left out, and the others keep the names of their files. ``check`` is
     called with all files before the first is written, and raises if one of them may not be.
 
-    Raises
-    ------
-    ViewerError
-        If no actor has a motion that the format can hold, or nobody is in the frames; nothing has
-        been written then.
+    Raises ViewerError if no actor has a motion that the format can hold, or nobody is in the
+      frames; nothing has been written then.
     """
     options = motion_options(arguments, skinning)
     key = _exporter(arguments, output, scene)
@@ -206,7 +190,9 @@ def _write(
     """Write the motions of whoever is there; return what the exporters say."""
     if key == "easymocap":
         return _write_capture(parts, output, options)
-    files = [file for part in parts for file in take_files(part.animation, part.path, key, options)]
+    files = [
+        file for part in parts for file in animation_files(part.animation, part.path, key, options)
+    ]
     check(files)
     lines: list[str] = []
     with all_or_none(files):
@@ -274,10 +260,7 @@ def pose_or_point_actors(scene: Scene) -> list[Actor]:
 def written_actors(arguments: argparse.Namespace, output: Path, scene: Scene) -> list[Actor]:
     """Return the actors whose motion, or pose as a motion of one frame, is written.
 
-    Raises
-    ------
-    RigError
-        If there is neither.
+    Raises RigError if there is neither.
     """
     if asks_one_pose(arguments, output, scene):
         return posed_actors(scene)
@@ -287,10 +270,7 @@ def written_actors(arguments: argparse.Namespace, output: Path, scene: Scene) ->
 def moving_actors(scene: Scene) -> list[Actor]:
     """Return the actors whose motions are written: bodies, or captured points if there are none.
 
-    Raises
-    ------
-    RigError
-        If nothing moves.
+    Raises RigError if nothing moves.
     """
     moving = [actor for actor in scene.actors if actor.clip is not None]
     bodies = [actor for actor in moving if not isinstance(actor.clip, PointClip)]
@@ -339,10 +319,7 @@ def check_kind(arguments: argparse.Namespace, output: Path) -> None:
 def check_numbered(arguments: argparse.Namespace, output: Path) -> None:
     """Hold the name of numbered files to what can be numbered.
 
-    Raises
-    ------
-    ViewerError
-        If the format holds a whole motion, or the names would all be the same.
+    Raises ViewerError if the format holds a whole motion, or the names would all be the same.
     """
     suffix = output.suffix.lower()
     if "{frame" not in output.name and not (arguments.frames and suffix in _ONE_A_FRAME):

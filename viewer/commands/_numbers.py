@@ -5,8 +5,6 @@ from __future__ import annotations
 import argparse
 import math
 
-__all__ = ["number"]
-
 
 def number(text: str) -> float:
     """Return a finite number; argparse words the refusal."""

@@ -16,16 +16,11 @@ from viewer.rig.motion.single_frame import upright_single_frame
 from viewer.rig.number_text import number_text
 from viewer.rig.scene import Actor, Scene
 
-__all__ = ["animation_of_pose", "asks_one_pose", "check_frame_options", "pose_line", "posed_actors"]
-
 
 def check_frame_options(arguments: argparse.Namespace) -> None:
     """Refuse a range of frames together with a single one.
 
-    Raises
-    ------
-    ViewerError
-        If both are given.
+    Raises ViewerError if both are given.
     """
     for option in ("frame", "time"):
         if arguments.frames is not None and getattr(arguments, option) is not None:

@@ -10,8 +10,6 @@ from viewer.commands._scene import scene_files
 from viewer.models import resolve
 from viewer.rig.scene import Scene
 
-__all__ = ["PICTURES", "inputs_of"]
-
 PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".ppm", ".tga", ".tif", ".tiff", ".webp")
 """Suffixes of pictures that can be written."""
 
@@ -19,12 +17,8 @@ PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".ppm", ".tga", ".tif", ".t
 def inputs_of(arguments: argparse.Namespace, scene: Scene | None = None) -> list[Path]:
     """Return all files that are read: those that are named, and what reading them led to.
 
-    Parameters
-    ----------
-    arguments : argparse.Namespace
-        Of a command that opens a scene.
-    scene : Scene, optional
-        What was opened; before that, only the names are known.
+    ``arguments``: of a command that opens a scene.
+    ``scene``: what was opened; before that, only the names are known.
     """
     model = [] if arguments.model is None else [resolve(arguments.model)]
     named = [Path(file) for file in (*scene_files(arguments), *pose_files(arguments), *model)]

@@ -29,14 +29,6 @@ from viewer.rig.scene import Actor, Scene
 from viewer.rig.skeleton import clamp_dofs, dof_label, find_dof, joint_labels
 from viewer.rig.skinning import METHODS, Skinning
 
-__all__ = [
-    "add_pose_arguments",
-    "add_skinning_arguments",
-    "apply_dofs",
-    "apply_pose",
-    "skinning_of",
-]
-
 _FIGURE = "figure."  # label of the DOFs that a figure has as a whole
 
 
@@ -118,15 +110,8 @@ def skinning_of(arguments: argparse.Namespace) -> Skinning:
 def apply_pose(scene: Scene, arguments: argparse.Namespace) -> list[str | Diagnostic]:
     """Shape and pose a scene as asked.
 
-    Returns
-    -------
-    list of str or Diagnostic
-        What could not be taken over exactly.
-
-    Raises
-    ------
-    ViewerError
-        If an option makes no sense for what was opened.
+    Returns: what could not be taken over exactly, one line each.
+    Raises ViewerError if an option makes no sense for what was opened.
     """
     apply_time(scene, arguments)
     notes: list[str | Diagnostic] = []
@@ -203,17 +188,16 @@ def _apply_shape(scene: Scene, text: str) -> list[Diagnostic]:
     """Set shapes by name, or all from the first on; figures without shapes may have morphs."""
     if is_named(text):
         actor, record = named_record(scene, text)
-        assert actor.pose is not None  # named_record looked
-        return apply_record(record, actor.figure, actor.pose)
+        return apply_record(record, actor.figure, actor.require_pose())
     values = _numbers("--shape", text)
     assert values is not None  # there is a text
     posed = [actor for actor in scene.actors if actor.pose is not None]
     morphed = [actor for actor in posed if has_only_morphs(actor.figure)]
     others = [actor for actor in posed if actor not in morphed]
     if morphed and not any(actor.figure.n_shapes for actor in others):
-        pose = morphed[0].pose
-        assert pose is not None
-        return apply_record(morph_record(morphed[0].figure, values), morphed[0].figure, pose)
+        first = morphed[0]
+        record = morph_record(first.figure, values)
+        return apply_record(record, first.figure, first.require_pose())
     return _apply_record("--shape", PoseRecord(shape=values), scene)
 
 
@@ -224,9 +208,10 @@ def _apply_hands(scene: Scene, which: str) -> None:
     for actor in handed:
         for hand in actor.figure.hands:
             vectors = hand_vectors(hand, np.zeros(0), flat=which == "flat")
-            assert actor.figure.skeleton is not None and actor.pose is not None
             turned = rotation_vector_to_matrix(vectors)
-            set_joint_rotations(actor.figure.skeleton, actor.pose, hand.joints, turned)
+            set_joint_rotations(
+                actor.figure.require_skeleton(), actor.require_pose(), hand.joints, turned
+            )
 
 
 def _mirror(scene: Scene) -> None:
@@ -241,15 +226,8 @@ def _mirror(scene: Scene) -> None:
 def apply_dofs(scene: Scene, settings: Sequence[str]) -> list[str]:
     """Set DOFs given as ``NAME.X=VALUE``, on the first actor that has such a joint.
 
-    Returns
-    -------
-    list of str
-        What was clamped, and which of several figures was posed.
-
-    Raises
-    ------
-    ViewerError
-        If the text, the joint or the value is wrong.
+    Returns: what was clamped, and which of several figures was posed.
+    Raises ViewerError if the text, the joint or the value is wrong.
     """
     notes: list[str] = []
     for setting in settings:
@@ -259,11 +237,11 @@ def apply_dofs(scene: Scene, settings: Sequence[str]) -> list[str]:
         if label.lower().startswith(_FIGURE) and _place(scene, label, setting, text):
             continue
         actor, dof, note = _find(scene, label)
-        skeleton = actor.figure.skeleton
-        assert skeleton is not None and actor.pose is not None  # _find looked
+        skeleton = actor.figure.require_skeleton()
+        pose = actor.require_pose()
         notes += note
         is_rotation = skeleton.dof_kinds[dof] >= 3
-        wanted = actor.pose.dofs.copy()
+        wanted = pose.dofs.copy()
         wanted[dof] = _dof_value(setting, text, is_rotation)
         clamped = clamp_dofs(skeleton, wanted)
         if clamped[dof] != wanted[dof]:
@@ -275,7 +253,7 @@ def apply_dofs(scene: Scene, settings: Sequence[str]) -> list[str]:
             limits = f"{least} to {most}{unit}"
             how = f"locked at {least}{unit}" if low == high else f"clamped to its limits {limits}"
             notes.append(f"{name}={text} is {how}")
-        actor.pose.dofs[:] = clamped
+        pose.dofs[:] = clamped
     return notes
 
 

@@ -7,18 +7,12 @@ from collections.abc import Collection, Sequence
 from io import StringIO
 from typing import TextIO
 
-__all__ = ["print_line", "table_lines"]
-
 
 def print_line(*parts: str | tuple[str, str], file: TextIO | None = None) -> None:
     """Print one line.
 
-    Parameters
-    ----------
-    *parts : str or (str, str)
-        Texts one behind the other, some with a style as rich has it, such as ``"red"``.
-    file : TextIO, optional
-        Standard output if omitted. Where it is no terminal, it gets the plain text.
+    ``*parts``: texts one behind the other, some with a style as rich has it, such as ``"red"``.
+    ``file``: standard output if omitted. Where it is no terminal, it gets the plain text.
     """
     stream = sys.stdout if file is None else file
     if stream is None or not stream.isatty():
@@ -33,12 +27,8 @@ def print_line(*parts: str | tuple[str, str], file: TextIO | None = None) -> Non
 def table_lines(rows: Sequence[Sequence[str]], right: Collection[int] = ()) -> list[str]:
     """Lay out cells in columns as wide as they need.
 
-    Parameters
-    ----------
-    rows : sequence of rows
-        All of one length.
-    right : collection of int
-        Columns whose cells stand at their right.
+    ``rows``: all of one length.
+    ``right``: columns whose cells stand at their right.
 
     >>> table_lines([["", "joints"], ["walk", "0.5"]], right=[1])
     ['      joints', 'walk     0.5']

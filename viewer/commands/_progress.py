@@ -11,20 +11,14 @@ from viewer.errors import printable
 if TYPE_CHECKING:
     from rich.progress import Progress as Bar
 
-__all__ = ["Progress"]
-
 _FIRST, _EVERY = 0.7, 0.2  # seconds before the bar appears, and between its changes
 
 
 class Progress:
     """Shows how far something is; silent where nobody looks, and when it is quick.
 
-    Parameters
-    ----------
-    title : str
-        What is being done.
-    total : int
-        How many steps there are.
+    ``title``: what is being done.
+    ``total``: how many steps there are.
     """
 
     def __init__(self, title: str, total: int) -> None:

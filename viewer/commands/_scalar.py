@@ -1,4 +1,4 @@
-"""Options of scalar views: which number is shown, over which range, with what beside it."""
+"""Options of scalar quantities: which number is shown, over which range, with what beside it."""
 
 from __future__ import annotations
 
@@ -17,20 +17,18 @@ from viewer.rig.scalars import (
     SCALARS,
     categories,
     compute,
-    find_view,
+    find_quantity,
     joint_of,
     length_text,
     menu_title,
     missing_part,
+    quantity_title,
     shown_unit,
     split_name,
-    telling_view,
-    view_title,
+    telling_quantity,
 )
 from viewer.rig.scene import Scene
 from viewer.rig.skeleton import joint_labels
-
-__all__ = ["add_scalar_arguments", "choose_subject", "scalar_notes", "scalar_text", "set_scalar"]
 
 _WHOLE = ("discrete", "categorical")
 
@@ -58,7 +56,7 @@ def add_scalar_arguments(group: argparse._ArgumentGroup) -> None:
 
 
 def _view_name(text: str) -> str:
-    """Return the name of a scalar view; argparse words the refusal."""
+    """Return the name of a scalar quantity; argparse words the refusal."""
     try:
         split_name(text)
     except RigError as problem:
@@ -67,12 +65,9 @@ def _view_name(text: str) -> str:
 
 
 def set_scalar(arguments: argparse.Namespace, options: DisplayOptions) -> None:
-    """Set what is asked for of a scalar view.
+    """Set what is asked for of a scalar quantity.
 
-    Raises
-    ------
-    ViewerError
-        If options need a view and there is none, or a range makes no sense.
+    Raises ViewerError if options need a view and there is none, or a range makes no sense.
     """
     if arguments.scalar:
         options.shading, options.scalar = "scalar", arguments.scalar
@@ -82,7 +77,7 @@ def set_scalar(arguments: argparse.Namespace, options: DisplayOptions) -> None:
             raise ViewerError(f"{option}: expected --scalar NAME, whose colours it is about")
     options.legend, options.isolines = arguments.legend, arguments.isolines
     if arguments.scalar_range is not None:
-        if find_view(options.scalar).kind in _WHOLE:
+        if find_quantity(options.scalar).kind in _WHOLE:
             raise ViewerError(
                 f"--scalar-range: {options.scalar} has a colour for each whole number"
             )
@@ -111,7 +106,7 @@ def choose_subject(scene: Scene, options: DisplayOptions) -> list[str]:
     key, about = split_name(options.scalar)
     if options.shading != "scalar" or about:
         return []
-    options.scalar = telling_view(key, [actor.figure for actor in scene.actors])
+    options.scalar = telling_quantity(key, [actor.figure for actor in scene.actors])
     if not SCALARS[key].takes_joint or options.scalar == key:
         return []
     joint = printable(split_name(options.scalar)[1], 60)
@@ -119,12 +114,10 @@ def choose_subject(scene: Scene, options: DisplayOptions) -> list[str]:
 
 
 def scalar_notes(scene: Scene, options: DisplayOptions) -> list[str]:
-    """Return one line if no figure has what a scalar view shows.
+    """Return one line if no figure has what a scalar quantity shows.
 
-    Raises
-    ------
-    ViewerError
-        If the view is about a joint or field that no figure has; the message has near names.
+    Raises ViewerError if the view is about a joint or field that no figure has; the message has
+      near names.
     """
     if options.shading != "scalar" or not scene.actors:
         return []
@@ -166,7 +159,7 @@ def scalar_text(scene: Scene, options: DisplayOptions) -> str:
     """Return what the numbers shown are, for the line that names the picture."""
     if options.shading != "scalar" or options.show == "skeleton":
         return ""
-    name, view = options.scalar, find_view(options.scalar)
+    name, view = options.scalar, find_quantity(options.scalar)
     having = [
         actor
         for actor in scene.actors
@@ -175,7 +168,7 @@ def scalar_text(scene: Scene, options: DisplayOptions) -> str:
     if not having:
         text = length_text(scene.actors[0].figure, 0.0) if view.unit == "length" else "0"
         return f", {menu_title(split_name(name)[0], options.skinning)}: 0 to {text}"
-    title = view_title(name, having[0].figure, options.skinning)
+    title = quantity_title(name, having[0].figure, options.skinning)
     values = [compute(name, actor.figure, actor.pose, options.skinning) for actor in having]
     if view.kind == "categorical":
         return f", {title}: {_n_different(name, scene, values)}"

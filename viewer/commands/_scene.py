@@ -25,19 +25,6 @@ from viewer.rig.units import METRES
 if TYPE_CHECKING:
     from viewer.loading.capturing import Builder
 
-__all__ = [
-    "add_capture_arguments",
-    "add_file_arguments",
-    "add_scene_arguments",
-    "begin_scene",
-    "finish",
-    "motion_settings",
-    "open_scene",
-    "print_warnings",
-    "scene_files",
-    "size_limit",
-]
-
 LAYOUTS = ("body19", "panoptic", "coco", "h36m")
 """Keypoint layouts that share their number of points with another."""
 
@@ -58,12 +45,8 @@ def add_scene_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT
 def add_file_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT) -> None:
     """Add FILES and the options that say where they are.
 
-    Parameters
-    ----------
-    parser : ArgumentParser
-        Of a command.
-    default : str
-        What is opened without files, for the help; empty if that is refused.
+    ``parser``: of a command.
+    ``default``: what is opened without files, for the help; empty if that is refused.
     """
     group = parser.add_argument_group("files")
     group.add_argument(

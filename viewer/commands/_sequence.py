@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from viewer.rendering.options import DisplayOptions
     from viewer.rendering.recorder import Recording
 
-__all__ = ["Request", "add_sequence_arguments", "draw_sequence", "request_of"]
-
 _FIELD = re.compile(r"\{frame[:!}]")
 _MOST_CELLS = 1000
 
@@ -93,10 +91,8 @@ def add_sequence_arguments(parser: argparse.ArgumentParser) -> None:
 def request_of(arguments: argparse.Namespace, output: Path) -> Request | None:
     """Return what is asked for if it is more than one still picture.
 
-    Raises
-    ------
-    ViewerError
-        If options do not go together, or the name of numbered pictures has no number.
+    Raises ViewerError if options do not go together, or the name of numbered pictures has no
+      number.
     """
     frames = None if arguments.frames is None else parse_range(arguments.frames)
     turntable = None if arguments.turntable is None else parse_turntable(arguments.turntable)
@@ -186,12 +182,9 @@ def draw_sequence(
 ) -> str:
     """Draw and write all frames; return the line that says what is where.
 
-    Raises
-    ------
-    ViewerError
-        If nothing moves, options make no sense for what was opened, or drawing fails.
-    OutputError
-        If a file is there already, or cannot be written.
+    Raises ViewerError if nothing moves, options make no sense for what was opened, or drawing
+      fails.
+    Raises OutputError if a file is there already, or cannot be written.
     """
     from viewer.rendering.gpu.target import check_size
     from viewer.rendering.offscreen import Offscreen

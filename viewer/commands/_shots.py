@@ -19,8 +19,6 @@ from viewer.rig.scene import Scene
 if TYPE_CHECKING:
     from viewer.commands._sequence import Request
 
-__all__ = ["Shots", "Turntable", "parse_turntable", "shots_of"]
-
 _MOST_FRAMES = 1_000_000
 _TURN_SECONDS = 6.0  # of a turntable of something that does not move
 _FULL = 360.0  # degrees
@@ -91,10 +89,7 @@ Turntable(degrees=-90.0, seconds=None))
 def shots_of(request: Request, arguments: argparse.Namespace, scene: Scene) -> Shots:
     """Return what is drawn of a scene.
 
-    Raises
-    ------
-    ViewerError
-        If nothing moves, or there are no or too many frames.
+    Raises ViewerError if nothing moves, or there are no or too many frames.
     """
     is_still = arguments.frame is not None or arguments.time is not None
     moves = not is_still and any(actor.clip is not None for actor in scene.actors)

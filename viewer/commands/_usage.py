@@ -18,8 +18,6 @@ from viewer.near_names import did_you_mean, near_names, question
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite
 
-__all__ = ["Parser", "check_command", "command_parser", "require_files"]
-
 _NUMBER = re.compile(r"-\.?\d")  # begins a value or the name of a file, not an option
 _WORD = re.compile(r"[^\W\d_]+")  # as commands are; files mostly have a suffix or a folder
 _LONGEST = 60  # letters of a word in a message
@@ -46,15 +44,8 @@ class Parser(argparse.ArgumentParser):
 
         ``argparse`` would first ask for what is missing, which may well be what was mistyped.
 
-        Parameters
-        ----------
-        arguments : iterable of str
-            Those before ``--``.
-
-        Raises
-        ------
-        ViewerError
-            With the nearest options.
+        ``arguments``: those before ``--``.
+        Raises ViewerError with the nearest options.
         """
         known = self._option_string_actions  # it has no public name
         for argument in arguments:
@@ -95,15 +86,8 @@ def command_parser(name: str) -> Parser:
 def check_command(word: str) -> None:
     """Refuse a word that is no file and nearly a command.
 
-    Parameters
-    ----------
-    word : str
-        The first argument, where commands are.
-
-    Raises
-    ------
-    ViewerError
-        With the nearest command.
+    ``word``: the first argument, where commands are.
+    Raises ViewerError with the nearest command.
     """
     if not _WORD.fullmatch(word) or os.path.lexists(resolve(word)):
         return
@@ -118,10 +102,7 @@ def check_command(word: str) -> None:
 def require_files(arguments: argparse.Namespace, command: str) -> None:
     """Refuse a command without files where nobody can mean the bundled figure.
 
-    Raises
-    ------
-    ViewerError
-        If there are neither files nor ``--body``.
+    Raises ViewerError if there are neither files nor ``--body``.
     """
     if not arguments.files and not arguments.body:
         raise ViewerError(

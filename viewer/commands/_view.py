@@ -21,17 +21,6 @@ from viewer.rig.inspection.front import FRONTS, Front, front_axes, guess_front
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.scene import Scene
 
-__all__ = [
-    "add_camera_arguments",
-    "add_display_arguments",
-    "camera_of",
-    "display_of",
-    "hide_parts",
-    "lens_notes",
-    "parse_size",
-    "warn_of_missing",
-]
-
 _SEEN = 0.5  # pixels of the camera's own pictures: smaller errors are not seen
 
 
@@ -195,10 +184,8 @@ def display_of(arguments: argparse.Namespace) -> DisplayOptions:
 def lens_notes(arguments: argparse.Namespace, scene: Scene) -> list[str]:
     """Return what looking through a calibrated camera leaves out, if it is to be seen: one line.
 
-    Raises
-    ------
-    ViewerError
-        If there is no such camera, or its files do not say how large its pictures are.
+    Raises ViewerError if there is no such camera, or its files do not say how large its pictures
+      are.
     """
     if arguments.view is None:
         return []
@@ -213,10 +200,7 @@ def lens_notes(arguments: argparse.Namespace, scene: Scene) -> list[str]:
 def hide_parts(arguments: argparse.Namespace, scene: Scene, options: DisplayOptions) -> None:
     """Set the body parts that are left out, by name or index, of the first figure that has any.
 
-    Raises
-    ------
-    ViewerError
-        If no figure has a part of this name; the message lists those there are.
+    Raises ViewerError if no figure has a part of this name; the message lists those there are.
     """
     if not arguments.hide_part:
         return

@@ -13,7 +13,6 @@ from viewer.commands._motion_export import (
     check_numbered,
     is_motion,
     left_out_lines,
-    motion_paths,
     pose_or_point_actors,
     write_motions,
 )
@@ -31,6 +30,7 @@ from viewer.commands._scene import (
 )
 from viewer.errors import RigError, UnsupportedFormatError, printable
 from viewer.export import EXPORTERS, export, files_written
+from viewer.export._motion_paths import motion_paths
 from viewer.formats import all_or_none, check_folder_target, check_targets
 from viewer.interrupts import raising
 from viewer.rig.motion.upright import upright_actor

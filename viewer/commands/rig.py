@@ -165,13 +165,12 @@ def run(arguments: argparse.Namespace) -> int:
     clips = read_clips(arguments, _files(arguments), template.figure)
     files = [] if output is None else [*files_of(output), *(clip.path for clip in clips)]
     check_targets(files, inputs, arguments.force)
-    assert target.mesh is not None and template.pose is not None  # both looked
     title = f"rigging {printable(target.name, 40)}"
     with Progress(title, 100) as progress:
         rigged = transfer(
             template.figure,
-            template.pose,
-            target.mesh,
+            template.require_pose(),
+            target.require_mesh(),
             settings,
             lambda share, what: progress.show(round(100.0 * share)),
             name=target.name,
@@ -204,12 +203,11 @@ def _target(arguments: argparse.Namespace, inputs: list[Path]) -> Figure:
         raise ViewerError(f"expected one mesh to rig, found {len(meshes)}")
     actor = meshes[0]
     figure = actor.figure
-    assert figure.mesh is not None  # it was chosen for it
     if not figure.is_attached:
         return figure
     print_warnings([f"{printable(figure.name, 60)} has a rig already, which is not used"])
     positions, normals = deform(figure, actor.pose)
-    return Figure(figure.name, replace(figure.mesh, positions=positions, normals=normals))
+    return Figure(figure.name, replace(figure.require_mesh(), positions=positions, normals=normals))
 
 
 def _template(arguments: argparse.Namespace, inputs: list[Path]) -> Actor:
@@ -232,10 +230,7 @@ def _template(arguments: argparse.Namespace, inputs: list[Path]) -> Actor:
 def _check_frame(scene: Scene, arguments: argparse.Namespace) -> None:
     """Take over --template-frame, and refuse a frame or time of a template that has no motion.
 
-    Raises
-    ------
-    ViewerError
-        If there is nothing to take the frame from, or two frames are given.
+    Raises ViewerError if there is nothing to take the frame from, or two frames are given.
     """
     if arguments.template_frame is not None:
         if arguments.frame is not None:
@@ -282,9 +277,8 @@ def _settings(
     """Return what is asked for; the course rig's format has no place for correctives."""
     landmarks = None
     if arguments.landmarks is not None:
-        assert template.pose is not None  # it is attached
         source = Source.open(arguments.landmarks)
-        landmarks = read_landmarks(source, template.figure, template.pose)
+        landmarks = read_landmarks(source, template.figure, template.require_pose())
     _check_numbers(arguments)
     as_rig = output is not None and output.suffix.lower() != ".npz"
     angle = math.radians(arguments.max_angle)

@@ -11,32 +11,18 @@ from viewer.rig.hierarchy import depth_first
 from viewer.rig.pose import Pose
 from viewer.rig.skeleton import Skeleton, joint_label
 
-__all__ = ["course_skeleton"]
-
 _CUBE = 0.01  # of the skeleton's size: half a side of boxes where a file has none
 
 
 def course_skeleton(skeleton: Skeleton, pose: Pose) -> tuple[Skeleton, Ints]:
     """Return the skeleton in the form of the course files, posed as its own rest.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Without rest rotations and scales; the figure's scale is part of its lengths already.
-    pose : Pose
-        Becomes the file's pose; the figure's translation goes to the roots' offsets.
-
-    Returns
-    -------
-    skeleton : Skeleton
-        Joints in depth-first order.
-    order : (J,) int32
-        The old index of each new joint.
-
-    Raises
-    ------
-    RigError
-        If a joint has what the format cannot hold.
+    ``skeleton``: without rest rotations and scales; the figure's scale is part of its lengths
+      already.
+    ``pose``: becomes the file's pose; the figure's translation goes to the roots' offsets.
+    Returns ``skeleton``: joints in depth-first order.
+    Returns ``order`` (J,) int32: the old index of each new joint.
+    Raises RigError if a joint has what the format cannot hold.
     """
     _check(skeleton, pose)
     order = depth_first(skeleton.parents)

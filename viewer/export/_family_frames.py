@@ -19,8 +19,6 @@ from viewer.rig.number_text import number_text
 from viewer.rig.smpl_family import FAMILY, Member
 from viewer.rig.units import METRES, WORDS
 
-__all__ = ["FamilyFrames", "check_unit", "family_frames", "member_of_figure", "up_axis"]
-
 _OWN_SHAPE = "stature"  # SMPL's shapes have numbers, those of the bundled body names
 _NEGLIGIBLE = 1e-6  # metres, and parts of a scale of 1
 
@@ -68,19 +66,10 @@ class FamilyFrames:
 def member_of_figure(figure: Figure, what: str, roots: tuple[str, ...]) -> Member:
     """Return the member of the family whose joints a figure has.
 
-    Parameters
-    ----------
-    figure : Figure
-        With a skeleton.
-    what : str
-        What is written, for the message.
-    roots : tuple of str
-        What the root may be called: ``"pelvis"`` for bodies, ``"wrist"`` for hands.
-
-    Raises
-    ------
-    RigError
-        If it has others, or more, or fewer, or if its unit is not known.
+    ``figure``: with a skeleton.
+    ``what``: what is written, for the message.
+    ``roots``: what the root may be called: ``"pelvis"`` for bodies, ``"wrist"`` for hands.
+    Raises RigError if it has others, or more, or fewer, or if its unit is not known.
     """
     names = () if figure.skeleton is None else figure.skeleton.names
     member = FAMILY.get(len(names))
@@ -101,10 +90,7 @@ def member_of_figure(figure: Figure, what: str, roots: tuple[str, ...]) -> Membe
 def check_unit(options: MotionOptions, title: str) -> None:
     """Refuse units other than metres.
 
-    Raises
-    ------
-    RigError
-        If another one is asked for.
+    Raises RigError if another one is asked for.
     """
     if options.unit not in ("", "m"):
         raise RigError(f'unit of {title}: expected m, found "{options.unit}"')
@@ -113,10 +99,7 @@ def check_unit(options: MotionOptions, title: str) -> None:
 def up_axis(options: MotionOptions) -> str:
     """Return the axis that points up in the file: that of the scene unless another is asked for.
 
-    Raises
-    ------
-    RigError
-        If it is neither y nor z; that of the scene may point down.
+    Raises RigError if it is neither y nor z; that of the scene may point down.
     """
     if options.up not in ("", "y", "z"):
         raise RigError(f'up axis: expected y or z, found "{options.up}"')
@@ -134,31 +117,15 @@ def family_frames(
     The root joint is at t + J0, so that t is how far it is from its place at rest. With another up
     axis the world turns by Q about its x axis: R' = Q R, t' = Q (t + J0) - J0.
 
-    Parameters
-    ----------
-    animation : SampledAnimation
-        Gives the figure, whose unit is known.
-    frames : Frames
-        Its frames, where a row that is not present means nothing.
-    member : Member
-        As ``member_of_figure`` found it.
-    options : MotionOptions
-        Its up axes count.
-
-    Returns
-    -------
-    frames : FamilyFrames
-        One row a frame.
-    notes : list of str
-        What the family has no parameters for, and how much that is.
-
-    Raises
-    ------
-    RigError
-        If a number of a present frame is not finite.
+    ``animation``: gives the figure, whose unit is known.
+    ``frames``: its frames, where a row that is not present means nothing.
+    ``member``: as ``member_of_figure`` found it.
+    ``options``: its up axes count.
+    Returns ``frames``: one row a frame.
+    Returns ``notes``: what the family has no parameters for, and how much that is.
+    Raises RigError if a number of a present frame is not finite.
     """
-    figure, skeleton = animation.figure, animation.figure.skeleton
-    assert skeleton is not None  # whoever has a member has a skeleton
+    figure, skeleton = animation.figure, animation.figure.require_skeleton()
     numbers = {name: joint for joint, name in enumerate(skeleton.names)}
     order = [numbers[name] for name in member.names]
     rotations = frames.rotations[:, order]

@@ -20,20 +20,13 @@ from viewer.rig.motion.timing import Timing
 from viewer.rig.smpl_family import Member
 from viewer.rig.units import METRES
 
-__all__ = ["Records", "read_frames"]
-
 
 def read_frames(motion: BodyMotion, animation: SampledAnimation, options: MotionOptions) -> Frames:
     """Return the poses that a file holds for an animation's figure, in its own world and unit.
 
-    Parameters
-    ----------
-    motion : BodyMotion
-        What was read, metres.
-    animation : SampledAnimation
-        What was written.
-    options : MotionOptions
-        Which axis is up in the animation, and in the file.
+    ``motion``: what was read, metres.
+    ``animation``: what was written.
+    ``options``: which axis is up in the animation, and in the file.
     """
     figure, count = animation.figure, motion.timing.n_frames
     timing = Timing(motion.timing.frame_rate, np.arange(count, dtype=np.int32))
@@ -59,10 +52,7 @@ def _turned(frames: Frames, animation: SampledAnimation, vector: Floats) -> Fram
 class Records:
     """The records of one person in EasyMocap's frames, taken from their text.
 
-    Parameters
-    ----------
-    member : Member
-        Whose joints they turn.
+    ``member``: whose joints they turn.
     """
 
     def __init__(self, member: Member) -> None:

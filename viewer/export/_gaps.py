@@ -13,8 +13,6 @@ from viewer.rig.arrays import Bools, Floats
 from viewer.rig.geometry.quaternion import slerp
 from viewer.rig.motion.evaluation import Frames
 
-__all__ = ["filled", "gaps_text", "kept_gaps", "runs"]
-
 Indices = NDArray[np.intp]
 
 _LISTED = 6  # gaps in a note
@@ -44,13 +42,10 @@ def gaps_text(present: Bools, first_frame: int) -> str:
 def filled(frames: Frames, interpolate: bool) -> Frames:
     """Return frames without gaps.
 
-    Parameters
-    ----------
-    frames : Frames
-        At least one of them present.
-    interpolate : bool
-        True: rotations on the shorter arc, all else in a straight line, between the frames around
-        a gap. False: the frame before it. Before the first and after the last frame, that one.
+    ``frames``: at least one of them present.
+    ``interpolate``: true: rotations on the shorter arc, all else in a straight line, between the
+      frames around a gap. False: the frame before it. Before the first and after the last frame,
+      that one.
     """
     if frames.present.all():
         return frames
@@ -79,26 +74,14 @@ def filled(frames: Frames, interpolate: bool) -> Frames:
 def kept_gaps(frames: Frames, gaps: str, first_frame: int) -> tuple[Frames, str]:
     """Return the frames for formats that can leave some out: filled only if that is asked for.
 
-    Parameters
-    ----------
-    frames : Frames
-        With gaps or without.
-    gaps : str
-        A key of ``GAPS``, or empty. Where each frame stands alone, split frames are those there.
-    first_frame : int
-        What the first frame is called.
-
-    Returns
-    -------
-    frames : Frames
-        The same if they are not filled.
-    note : str
-        What was done, as ``"missing frames 3 to 5: the last pose is held"``; empty if nothing was.
-
-    Raises
-    ------
-    RigError
-        If it is no such way.
+    ``frames``: with gaps or without.
+    ``gaps``: a key of ``GAPS``, or empty. Where each frame stands alone, split frames are those
+      there.
+    ``first_frame``: what the first frame is called.
+    Returns ``frames``: the same if they are not filled.
+    Returns ``note``: what was done, as ``"missing frames 3 to 5: the last pose is held"``; empty if
+      nothing was.
+    Raises RigError if it is no such way.
     """
     if gaps not in ("", *GAPS):
         raise RigError(f'way to close gaps: expected one of {", ".join(GAPS)}, found "{gaps}"')

@@ -15,25 +15,15 @@ from viewer.rig.captures.sampled_points import SampledPoints
 from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.scene import Actor
 
-__all__ = ["motion_paths", "numbered_paths", "split_paths", "take_files"]
-
 _WITHOUT_SPLITS = ("npz",)  # exporters that write one file, gaps or not
 
 
 def motion_paths(output: Path, actors: Sequence[Actor]) -> list[Path]:
     """Return the file of each actor: people by their number, others counted from 2 on.
 
-    Parameters
-    ----------
-    output : Path
-        What was asked for; its suffix is kept. One actor alone gets this file.
-    actors : sequence of Actor
-        In the order of the scene.
-
-    Returns
-    -------
-    list of Path
-        As many, all different.
+    ``output``: what was asked for; its suffix is kept. One actor alone gets this file.
+    ``actors``: in the order of the scene.
+    Returns: as many, all different.
     """
     if len(actors) == 1:
         return [output]
@@ -60,10 +50,7 @@ def split_paths(path: Path, count: int) -> list[Path]:
 def numbered_paths(path: Path, frames: Iterable[int]) -> list[Path]:
     """Return the file of each frame, whose number replaces ``{frame}`` in the name.
 
-    Raises
-    ------
-    OutputError
-        If two frames would have one file.
+    Raises OutputError if two frames would have one file.
     """
     files = [path.with_name(path.name.format(frame=int(frame))) for frame in frames]
     if len(set(files)) < len(files):
@@ -71,21 +58,15 @@ def numbered_paths(path: Path, frames: Iterable[int]) -> list[Path]:
     return files
 
 
-def take_files(
+def animation_files(
     animation: SampledAnimation | SampledPoints, path: Path, key: str, options: MotionOptions
 ) -> list[Path]:
     """Return all files that ``export_animation`` writes under names that were asked for.
 
-    Parameters
-    ----------
-    animation : SampledAnimation or SampledPoints
-        A motion.
-    path : Path
-        A file, for numbered ones with ``{frame}``.
-    key : str
-        Of ``EXPORTERS``, but not of one that writes a folder.
-    options : MotionOptions
-        How.
+    ``animation``: a motion.
+    ``path``: a file, for numbered ones with ``{frame}``.
+    ``key``: of ``EXPORTERS``, but not of one that writes a folder.
+    ``options``: how.
     """
     if isinstance(animation, SampledPoints) or key in _WITHOUT_SPLITS:
         return [path]

@@ -6,8 +6,6 @@ from dataclasses import dataclass, field
 
 from viewer.rig.skinning import Skinning
 
-__all__ = ["GAPS", "ROTATION_ORDERS", "MotionOptions"]
-
 ROTATION_ORDERS = ("zyx", "zxy", "xyz", "xzy", "yxz", "yzx")
 """Orders of rotation channels as BVH lists them: the product R = Rz Ry Rx is ``zyx``."""
 

@@ -19,8 +19,6 @@ from viewer.rig.mesh import vertex_normals
 from viewer.rig.pose import joint_rotations
 from viewer.rig.scene import Actor, figure_pose
 
-__all__ = ["RIGGED_SUFFIXES", "files_of", "without_correctives", "write_rigged"]
-
 RIGGED_SUFFIXES = (".npz", ".skel", ".skin")
 """Those that ``files_of`` knows."""
 
@@ -30,10 +28,7 @@ _RIG = (".skel", ".skin", ".obj", ".json")
 def files_of(output: Path) -> list[Path]:
     """Return all files that one output stands for.
 
-    Raises
-    ------
-    UnsupportedFormatError
-        If its suffix is none of ``.skel``, ``.skin`` and ``.npz``.
+    Raises UnsupportedFormatError if its suffix is none of ``.skel``, ``.skin`` and ``.npz``.
     """
     suffix = output.suffix.lower()
     if suffix == ".npz":
@@ -49,28 +44,14 @@ def files_of(output: Path) -> list[Path]:
 def write_rigged(rigged: Rigged, output: Path) -> list[str]:
     """Write a rigged mesh, all of its files or none.
 
-    Parameters
-    ----------
-    rigged : Rigged
-        The result.
-    output : Path
-        ``.skel`` or ``.skin``: skeleton and skin at rest, the rest mesh with its texture
-        coordinates as ``.obj``, the target's pose as ``.json``; they hold no pose correctives,
-        see ``without_correctives``. ``.npz``: all of it in one file.
-
-    Returns
-    -------
-    list of str
-        What was written, and what a format cannot hold.
-
-    Raises
-    ------
-    RigError
-        If the skeleton has what ``.skel`` cannot hold.
-    UnsupportedFormatError
-        As ``files_of``.
-    OutputError
-        If a file cannot be written.
+    ``rigged``: the result.
+    ``output``: ``.skel`` or ``.skin``: skeleton and skin at rest, the rest mesh with its texture
+      coordinates as ``.obj``, the target's pose as ``.json``; they hold no pose correctives, see
+      ``without_correctives``. ``.npz``: all of it in one file.
+    Returns: what was written, and what a format cannot hold.
+    Raises RigError if the skeleton has what ``.skel`` cannot hold.
+    Raises UnsupportedFormatError as ``files_of``.
+    Raises OutputError if a file cannot be written.
     """
     files = files_of(output)
     if output.suffix.lower() == ".npz":
@@ -112,7 +93,8 @@ def without_correctives(rigged: Rigged) -> Figure:
 def _arrays(rigged: Rigged) -> dict[str, NDArray[Any]]:
     """Return what a program may want to know beside the figure itself."""
     pose = rigged.pose
-    placed = rigged.alignment.placed.matrix if rigged.alignment else np.linalg.inv(rigged.placement)
+    found = rigged.alignment
+    placed = found.similarity.matrix if found else np.linalg.inv(rigged.placement)
     return {
         "target_dofs": pose.dofs,
         "target_translations": pose.translations,

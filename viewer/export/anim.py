@@ -62,8 +62,8 @@ def export_animation(animation: SampledAnimation, path: Path, options: MotionOpt
     OutputError
         If a file cannot be written.
     """
-    figure, frames, skeleton = animation.figure, animation.frames, animation.figure.skeleton
-    assert skeleton is not None  # whoever has frames has a skeleton
+    figure, frames = animation.figure, animation.frames
+    skeleton = figure.require_skeleton()
     if not is_course_rig(skeleton):
         raise RigError(
             f".anim moves a root and three angles of each joint, as .skel files do; "
@@ -157,8 +157,7 @@ def _remarks(animation: SampledAnimation, options: MotionOptions) -> list[str]:
 
 def _is_whole(animation: SampledAnimation, clip: Clip) -> bool:
     """Return whether the frames are all of a clip, which has a channel for every DOF."""
-    skeleton, times = animation.figure.skeleton, animation.frames.times
-    assert skeleton is not None  # whoever has frames has a skeleton
+    skeleton, times = animation.figure.require_skeleton(), animation.frames.times
     targets = [channel.target for channel in clip.channels]
     step = 1.0 / animation.frame_rate
     starts = abs(float(times[0]) - clip.start) <= _SAME * step

@@ -134,8 +134,7 @@ def _turn(start: str, end: str) -> Floats:
 
 def _one_root(figure: Figure, frames: Frames, reference: int) -> tuple[Figure, Frames]:
     """Return a figure whose roots, if there are several, hang from a joint at its origin."""
-    skeleton = figure.skeleton
-    assert skeleton is not None  # whoever has frames has a skeleton
+    skeleton = figure.require_skeleton()
     if int((skeleton.parents < 0).sum()) == 1:
         return figure, frames
     still = rest_translations_of(figure, shape_at(frames, reference))[0]
@@ -168,15 +167,14 @@ def _ends(
     """Return the End Sites in the file's space, by joint of the figure that is written."""
     weights = shape_at(animation.frames, reference)
     own = shaped(animation.figure, weights[0])
-    skeleton = animation.figure.skeleton
-    assert skeleton is not None and figure.skeleton is not None  # whoever has frames has one
+    skeleton = animation.figure.require_skeleton()
     leaves = np.setdiff1d(np.arange(skeleton.n_joints), skeleton.parents).astype(np.int32)
     rest = rest_matrices(animation.figure, rest_translations_of(animation.figure, weights)[0])
     scale = float(animation.frames.figure_scales[reference]) * space.factor
     ends = scale * end_offsets(own, rest, leaves) @ space.rest.T
     lengths = np.linalg.norm(ends, axis=1, keepdims=True)
     ends *= np.maximum(1.0, _SHORTEST_END / np.where(lengths > 0.0, lengths, 1.0))
-    shift = figure.skeleton.n_joints - skeleton.n_joints
+    shift = figure.require_skeleton().n_joints - skeleton.n_joints
     return {int(leaf) + shift: end for leaf, end in zip(leaves, ends, strict=True)}
 
 
@@ -194,14 +192,12 @@ class _Writer:
     @property
     def names(self) -> tuple[str, ...]:
         """What the joints are called in the file."""
-        assert self.figure.skeleton is not None  # whoever has frames has a skeleton
-        return plain_names(self.figure.skeleton.names)
+        return plain_names(self.figure.require_skeleton().names)
 
     @property
     def parents(self) -> Ints:
         """Of the joints."""
-        assert self.figure.skeleton is not None  # whoever has frames has a skeleton
-        return self.figure.skeleton.parents
+        return self.figure.require_skeleton().parents
 
     def text(self, start: int, stop: int) -> bytes:
         """Return the file of some frames."""
@@ -226,8 +222,7 @@ class _Writer:
     def losses(self, path: Path, text: bytes, reference: int, span: tuple[int, int]) -> list[str]:
         """Read a file's text back, and say how far joints and vertices are from the motion."""
         animation, how = self.animation, self.options.skinning
-        assert animation.figure.skeleton is not None  # whoever has frames has a skeleton
-        names = self.names[-animation.figure.skeleton.n_joints :]
+        names = self.names[-animation.figure.require_skeleton().n_joints :]
         ahead = int(self.options.rest_frame) - span[0]
         file = BvhFile(path, text, names, self.space, reference, ahead)
         written = read_back(file, animation.figure, animation.frames, how)
@@ -254,10 +249,7 @@ def _remarks(
 ) -> list[str]:
     """Say what was changed or left out."""
     frames, notes = animation.frames, []
-    skeleton = figure.skeleton
-    assert (
-        skeleton is not None and animation.figure.skeleton is not None
-    )  # whoever has frames has one
+    skeleton = figure.require_skeleton()
     if figure is not animation.figure:
         notes.append(f"several roots: they hang from a joint {skeleton.names[0]}, which was added")
     if not frames.present.all():

@@ -223,8 +223,7 @@ def _add_animation(
     up: str,
 ) -> _Built:
     """Add a figure at rest, and some of the frames as an animation."""
-    skeleton = body.figure.skeleton
-    assert skeleton is not None  # whoever has an animation has a skeleton
+    skeleton = body.figure.require_skeleton()
     part = frames_between(frames, slice(*span))
     pose = figure_pose(animation.figure)
     rest = locals_of(skeleton, pose)
@@ -301,16 +300,15 @@ def _motion_remarks(
     animation: SampledAnimation, body: _Body, frames: Frames, options: MotionOptions
 ) -> list[str]:
     """Say what was done with gaps, and which joints move within their parents."""
-    notes, skeleton = [], animation.figure.skeleton
-    assert skeleton is not None  # whoever has an animation has a skeleton
+    notes, skeleton = [], animation.figure.require_skeleton()
     if not animation.frames.present.all():
         done = {"hold": "the last pose is held", "interpolate": "interpolated, held at both ends"}
         text = gaps_text(animation.frames.present, animation.first_frame)
         notes.append(
             f"missing {text}: {done.get(options.closing, 'one file for each run of frames')}"
         )
-    assert body.figure.skeleton is not None  # shaping keeps it
-    moves = np.flatnonzero(moving(body.figure.skeleton, frames) & (skeleton.parents >= 0))
+    own = body.figure.require_skeleton()
+    moves = np.flatnonzero(moving(own, frames) & (skeleton.parents >= 0))
     if len(moves):
         names = ", ".join(joint_label(skeleton, int(joint)) for joint in moves[:_LISTED])
         more = f" and {len(moves) - _LISTED} more" * (len(moves) > _LISTED)

@@ -79,8 +79,7 @@ def export_animation(animation: SampledAnimation, path: Path, options: MotionOpt
     if options.gaps == "split":
         raise RigError('gaps of arrays: expected hold or interpolate, found "split"')
     frames, filling = kept_gaps(animation.frames, options.gaps, animation.first_frame)
-    skeleton = figure.skeleton
-    assert skeleton is not None  # whoever has an animation has a skeleton
+    skeleton = figure.require_skeleton()
     world = world_frames(figure, frames)
     world[~frames.present] = np.nan
     rotations = frames.rotations.copy()

@@ -32,8 +32,7 @@ _PLAIN = "plain"  # the material of triangles that have none
 def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
     """Write ``v``, ``vt``, ``vn`` and triangles; see ``viewer.export.export``."""
     require_mesh(actor, ".obj")
-    mesh = actor.figure.mesh
-    assert mesh is not None  # as was required
+    mesh = actor.figure.require_mesh()
     positions, normals = deform(actor.figure, actor.pose, skinning)
     name = "_".join(printable(actor.figure.name, 100).split()) or "figure"
     beside = _materials(mesh, path)

@@ -19,8 +19,7 @@ __all__ = ["export"]
 def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
     """Write positions and normals as float32, and triangles; see ``viewer.export.export``."""
     require_mesh(actor, ".ply")
-    mesh = actor.figure.mesh
-    assert mesh is not None  # as was required
+    mesh = actor.figure.require_mesh()
     positions, normals = deform(actor.figure, actor.pose, skinning)
     vertices = np.concatenate([positions, normals], axis=1).astype("<f4")
     faces = _faces(mesh)

@@ -64,8 +64,7 @@ def _files(rig: Figure, skel: Path, skin: Path) -> list[Path]:
 
 def _as_rig(figure: Figure, pose: Pose, skinning: Skinning) -> tuple[Figure, np.ndarray | None]:
     """Return what the two files hold of a shaped figure, and the vertex of each split one."""
-    skeleton, mesh, skin = figure.skeleton, figure.mesh, figure.skin
-    assert skeleton is not None  # the caller looked
+    skeleton, mesh, skin = figure.require_skeleton(), figure.mesh, figure.skin
     posed, order = course_skeleton(skeleton, pose)
     if mesh is None:
         return Figure(figure.name, skeleton=posed), None
@@ -128,12 +127,11 @@ def _error(
     actor: Actor, files: list[Source], sources: np.ndarray | None, skinning: Skinning
 ) -> list[str]:
     """Read the files back, pose them as they say, and compare with the figure as it is posed."""
-    figure, pose = actor.figure, actor.pose
+    figure, pose = actor.figure, actor.require_pose()
     skeleton = read(files[0])
     assert isinstance(skeleton, Figure) and skeleton.skeleton is not None
-    assert figure.skeleton is not None and pose is not None  # the caller looked
     there = world_matrices(skeleton.skeleton, rest_pose(skeleton.skeleton))[:, :3, 3]
-    order = depth_first(figure.skeleton.parents)
+    order = depth_first(figure.require_skeleton().parents)
     off = np.linalg.norm(there - joint_matrices(figure, pose)[order, :3, 3], axis=1)
     joint = int(off.argmax())
     one, first = pose_frames(figure, pose)

@@ -210,9 +210,8 @@ class PickPass:
         draw_boxes(program, skeleton.boxes, placement_of(actor, options), view, options)
 
     def _draw_markers(self, index: int, actor: Actor, view: View, options: DisplayOptions) -> None:
-        assert actor.pose is not None  # it has markers
         markers = self.passes.buffers.keypoints_of(actor)
-        markers.update(actor.pose, options.skinning)
+        markers.update(actor.require_pose(), options.skinning)
         program = self.passes.programs.drawing("joint", fragment="pick")
         self._number(program, lambda marker, _, point: Pick(index, -1, -1, marker, point), True)
         draw_boxes(program, markers.boxes, actor.placement, in_front(view), options)

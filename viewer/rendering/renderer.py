@@ -20,7 +20,7 @@ from viewer.rendering.passes.late_passes import LatePasses
 from viewer.rendering.passes.mesh_pass import MeshPass
 from viewer.rendering.passes.see_through import draw_layer
 from viewer.rendering.passes.skin_pass import PosedMesh
-from viewer.rendering.scalar_views import ScalarViews
+from viewer.rendering.scalar_quantities import ScalarQuantities
 from viewer.rendering.shown import (
     Meshes,
     has_joint_marks,
@@ -59,8 +59,8 @@ class Renderer:
     ----------
     notes : list of str
         What the driver could not do as asked, one line each.
-    scalars : ScalarViews
-        Range and legend of the scalar view drawn last.
+    scalars : ScalarQuantities
+        Range and legend of the scalar quantity drawn last.
     buffers : ActorBuffers
         What was uploaded for figures and actors.
     marks : Marks or None
@@ -77,7 +77,7 @@ class Renderer:
     def __init__(self, context: moderngl.Context) -> None:
         self.context = context
         self.notes: list[str] = []
-        self.scalars = ScalarViews()
+        self.scalars = ScalarQuantities()
         self.programs = Programs(context)
         self.mesh_pass = MeshPass(context, self.programs)
         self.joint_pass = JointPass(context, self.programs)
@@ -95,12 +95,12 @@ class Renderer:
 
     @property
     def scalar_range(self) -> tuple[float, float]:
-        """Lowest and highest number of the scalar view drawn last, over all figures."""
+        """Lowest and highest number of the scalar quantity drawn last, over all figures."""
         return self.scalars.range
 
     @property
     def legend(self) -> Legend | None:
-        """What the colours of the scalar view drawn last stand for, None before there was one."""
+        """Legend of the scalar quantity drawn last, None before there was one."""
         return self.scalars.legend
 
     def draw(
@@ -129,7 +129,7 @@ class Renderer:
             the pose in which the scene was opened.
         selected : (int, int)
             An actor's index and a joint of it that is drawn in a highlight colour, and that a
-            scalar view is about which is of no joint by itself; -1 for none.
+            scalar quantity is about which is of no joint by itself; -1 for none.
         """
         self._note_samples(target)
         self.buffers.keep_only(scene.actors)
@@ -262,9 +262,8 @@ class Renderer:
         self.joint_pass.draw(skeleton, placement, view, options, selected, opacity, actor.color)
 
     def _draw_markers(self, actor: Actor, view: View, options: DisplayOptions) -> None:
-        assert actor.pose is not None  # it has markers
         markers = self.buffers.keypoints_of(actor)
-        markers.update(actor.pose, options.skinning)
+        markers.update(actor.require_pose(), options.skinning)
         # The markers' place is part of their positions.
         self.late.keypoint_pass.draw(markers, actor.placement, view, options)
 

@@ -1,4 +1,4 @@
-"""How the numbers of a scalar view become colours."""
+"""How the numbers of a scalar quantity become colours."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from viewer.rendering.palettes import NOTHING, count_palette, joint_palette, par
 from viewer.rendering.srgb import decode_srgb
 from viewer.rig.arrays import Bytes, Floats
 from viewer.rig.figure import Figure
-from viewer.rig.scalars import categories, find_view, shown_unit, split_name
+from viewer.rig.scalars import categories, find_quantity, shown_unit, split_name
 
 __all__ = ["TYPICAL", "ScalarLook", "is_whole", "look_of", "shown_ends", "typical_span"]
 
@@ -64,7 +64,7 @@ class ScalarLook:
 
 def is_whole(name: str) -> bool:
     """Return whether a view's numbers are counts or indices."""
-    return find_view(name).kind in ("discrete", "categorical")
+    return find_quantity(name).kind in ("discrete", "categorical")
 
 
 def typical_span(numbers: Floats) -> tuple[float, float]:
@@ -117,7 +117,7 @@ def shown_ends(
         factor, _ = shown_unit(name, figure)
         return asked[0] / factor, asked[1] / factor
     lows, highs = zip(*ranges, strict=True)
-    return find_view(name).shown(min(lows), max(highs))
+    return find_quantity(name).shown(min(lows), max(highs))
 
 
 def look_of(
@@ -136,7 +136,7 @@ def look_of(
     options : DisplayOptions
         Whether there are isolines.
     """
-    view = find_view(name)
+    view = find_quantity(name)
     if view.kind == "categorical":
         return ScalarLook(_category_colors(name, figure), ends, is_whole=True)
     if view.kind == "discrete":

@@ -7,21 +7,12 @@ from types import ModuleType
 
 from viewer.errors import RigError
 
-__all__ = ["scipy_part"]
-
 
 def scipy_part(name: str) -> ModuleType:
     """Import a part of SciPy.
 
-    Parameters
-    ----------
-    name : str
-        Below ``scipy``, such as ``sparse.linalg``.
-
-    Raises
-    ------
-    RigError
-        If SciPy is not installed: it is the optional extra ``rig``.
+    ``name``: below ``scipy``, such as ``sparse.linalg``.
+    Raises RigError if SciPy is not installed: it is the optional extra ``rig``.
     """
     try:
         return import_module(f"scipy.{name}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
@@ -23,7 +23,15 @@ from viewer.rig.skin import Skin
 if TYPE_CHECKING:
     from viewer.rig.captures.points import PointLayout
 
-__all__ = ["Figure", "skeleton_points"]
+__all__ = ["AttachedFigure", "Figure", "skeleton_points"]
+
+
+class AttachedFigure(NamedTuple):
+    """The parts of a figure whose mesh follows its skeleton; none of them is missing."""
+
+    mesh: Mesh
+    skeleton: Skeleton
+    skin: Skin
 
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
@@ -142,6 +150,52 @@ class Figure:
     def is_attached(self) -> bool:
         """Whether the mesh follows the skeleton."""
         return self.mesh is not None and self.skin is not None and self.skeleton is not None
+
+    def require_mesh(self) -> Mesh:
+        """Return the mesh of a figure that must have one.
+
+        Raises
+        ------
+        RigError
+            If there is none.
+        """
+        if self.mesh is None:
+            raise RigError(f"figure {self.name} has no mesh")
+        return self.mesh
+
+    def require_skeleton(self) -> Skeleton:
+        """Return the skeleton of a figure that must have one.
+
+        Raises
+        ------
+        RigError
+            If there is none.
+        """
+        if self.skeleton is None:
+            raise RigError(f"figure {self.name} has no skeleton")
+        return self.skeleton
+
+    def require_skin(self) -> Skin:
+        """Return the skin of a figure that must have one.
+
+        Raises
+        ------
+        RigError
+            If there is none.
+        """
+        if self.skin is None:
+            raise RigError(f"figure {self.name} has no skin")
+        return self.skin
+
+    def attached(self) -> AttachedFigure:
+        """Return mesh, skeleton and skin of a figure whose mesh must follow its skeleton.
+
+        Raises
+        ------
+        RigError
+            If one of them is missing.
+        """
+        return AttachedFigure(self.require_mesh(), self.require_skeleton(), self.require_skin())
 
 
 def skeleton_points(skeleton: Skeleton, pose: Pose) -> Floats:

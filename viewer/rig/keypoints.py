@@ -82,8 +82,7 @@ def some_vertices(figure: Figure, vertices: Ints) -> Figure:
     Figure
         Without joint regressor: its joints do not follow its shape by themselves.
     """
-    mesh = figure.mesh
-    assert mesh is not None  # the caller looked
+    mesh = figure.require_mesh()
     shapes, correctives = figure.blend_shapes, figure.correctives
     return Figure(
         name=figure.name,

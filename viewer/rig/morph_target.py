@@ -110,8 +110,7 @@ def on_one_joint(figure: Figure) -> Figure:
     figure : Figure
         With a mesh; its skin, which no skeleton moves, is replaced.
     """
-    mesh = figure.mesh
-    assert mesh is not None  # the caller looked
+    mesh = figure.require_mesh()
     empty = np.zeros(0, dtype=np.int32)
     skeleton = Skeleton(
         names=("binding",),

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 import numpy as np
 
 from viewer.diagnostics import Diagnostic
+from viewer.errors import RigError
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.person import person_name
 from viewer.rig.figure import Figure, skeleton_points
@@ -107,6 +108,30 @@ class Actor:
         if self.pose is None and self.figure.skeleton is not None:
             self.pose = figure_pose(self.figure)
 
+    def require_pose(self) -> Pose:
+        """Return the pose of an actor that must have one.
+
+        Raises
+        ------
+        RigError
+            If there is none, as its figure has no skeleton.
+        """
+        if self.pose is None:
+            raise RigError(f"{self.name} has no pose, as it has no skeleton")
+        return self.pose
+
+    def require_clip(self) -> Motion:
+        """Return the motion of an actor that must have one.
+
+        Raises
+        ------
+        RigError
+            If there is none.
+        """
+        if self.clip is None:
+            raise RigError(f"{self.name} has no motion")
+        return self.clip
+
     def copy(self) -> Actor:
         """Return an actor that can be posed and placed by itself; figure and clip are shared."""
         return replace(
@@ -128,8 +153,7 @@ def free_title(actors: Iterable[Actor], title: str) -> str:
 
 def figure_pose(figure: Figure) -> Pose:
     """Return a new pose of a figure with a skeleton: the file's own, all shape weights 0."""
-    assert figure.skeleton is not None  # the caller looked
-    pose = rest_pose(figure.skeleton)
+    pose = rest_pose(figure.require_skeleton())
     pose.shape_weights = np.zeros(figure.n_shapes)
     return pose
 
@@ -233,8 +257,7 @@ def actor_points(actor: Actor, show: str = "skin") -> Floats:
     parts = [] if actor.points is None else [actor.points[actor.points[:, 3] > 0.0, :3]]
     shows_skeleton = show in ("skeleton", "both") or figure.mesh is None
     if figure.skeleton is not None and actor.pose is not None and shows_skeleton:
-        shape = shaped(figure, actor.pose.shape_weights).skeleton
-        assert shape is not None  # shaping keeps it
+        shape = shaped(figure, actor.pose.shape_weights).require_skeleton()
         placement = placement_matrix(actor.pose)
         parts.append(apply_transform(placement, skeleton_points(shape, actor.pose)))
     if figure.mesh is not None and (show != "skeleton" or figure.skeleton is None):

@@ -84,8 +84,7 @@ def with_rest_mesh(figure: Figure, positions: Floats, normals: Floats | None = N
     Figure
         With new normals, rest translations and inverse bind matrices.
     """
-    mesh, skeleton, skin = figure.mesh, figure.skeleton, figure.skin
-    assert mesh is not None  # the caller has its positions
+    mesh, skeleton, skin = figure.require_mesh(), figure.skeleton, figure.skin
     normals = vertex_normals(positions, mesh.triangles) if normals is None else normals
     new_mesh = replace(mesh, positions=positions, normals=normals)
     if figure.joint_regressor is None or skeleton is None:
@@ -141,8 +140,8 @@ def _undeflected(skeleton: Skeleton) -> Pose:
 
 def rest_joints(figure: Figure) -> Floats:
     """Return where the joints are with all DOFs at 0: (J, 3), figure units."""
-    assert figure.skeleton is not None  # the caller looked
-    return world_matrices(figure.skeleton, _undeflected(figure.skeleton))[:, :3, 3]
+    skeleton = figure.require_skeleton()
+    return world_matrices(skeleton, _undeflected(skeleton))[:, :3, 3]
 
 
 _directions: Memo[Figure, Floats] = Memo()
@@ -161,9 +160,8 @@ def joint_directions(figure: Figure) -> Floats:
     (S, J, 3)
         Figure units per weight of 1; zeros where joints do not follow the mesh.
     """
-    assert figure.skeleton is not None  # the caller looked
     regressor, shapes, mesh = figure.joint_regressor, figure.blend_shapes, figure.mesh
-    directions = np.zeros((figure.n_shapes, figure.skeleton.n_joints, 3))
+    directions = np.zeros((figure.n_shapes, figure.require_skeleton().n_joints, 3))
     if regressor is None or shapes is None or mesh is None:
         return directions
 

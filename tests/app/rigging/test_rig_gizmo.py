@@ -259,7 +259,7 @@ def test_run_keeps_what_was_placed_by_hand(hand):
     finish(hand)
     rigged = hand.state.of(Rigging).results["robust"].rigged
     assert rigged.alignment.how == "given"
-    assert_allclose(rigged.alignment.placed.matrix, TRUE, atol=1e-9)
+    assert_allclose(rigged.alignment.similarity.matrix, TRUE, atol=1e-9)
 
 
 def middles(mesh, matrix):

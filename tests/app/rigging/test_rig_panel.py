@@ -194,7 +194,7 @@ def test_stretch_is_kept_when_the_template_is_moved_and_run(rigging):
     finish(hand)
     hand.click("Run")
     finish(hand)
-    placed = hand.state.of(Rigging).results["robust"].rigged.alignment.placed
+    placed = hand.state.of(Rigging).results["robust"].rigged.alignment.similarity
     assert_allclose(placed.own_factors, stretch, atol=1e-9)
 
 

@@ -33,7 +33,7 @@ def test_axes_are_scaled_on_their_own():
 def test_rotation_that_leans_is_put_right():
     rotation = turn([1, 2, -1], 0.12)
     template, target = sides(rotation)
-    found = fit_axes(template, target, START, 40, turns=True)
+    found = fit_axes(template, target, START, 40, rotations=True)
     assert_allclose(found.scale * found.factors, FACTORS, atol=1e-6)
     assert_allclose(found.rotation, rotation, atol=1e-6)
     assert_allclose(found.shift, [0.01, 0.02, -0.01], atol=1e-6)
@@ -45,7 +45,7 @@ def test_axes_may_be_the_templates_own():
     moved = positions * FACTORS @ rotation.T
     template, target = (Triangles(each, triangles, 800) for each in (positions, moved))
     start = Similarity(1.0, turn([1, 2, -1], 0.85), np.zeros(3), np.ones(3))
-    found = fit_axes(template, target, start, 40, turns=True, own=True)
+    found = fit_axes(template, target, start, 40, rotations=True, own=True)
     assert_allclose(found.scale * found.own_factors, FACTORS, atol=1e-6)
     assert_allclose(found.rotation, rotation, atol=1e-6)
     assert (found.factors == 1.0).all()

@@ -10,7 +10,7 @@ pytest.importorskip("scipy")
 from viewer.autorig.alignment.icp import Cloud
 from viewer.autorig.alignment.orientation_search import (
     axis_direction,
-    axis_turns,
+    axis_rotations,
     in_place,
     search,
     unit_scale,
@@ -26,30 +26,30 @@ def cloud(positions, triangles):
 
 
 def test_there_are_24_turns_of_a_cube_and_the_first_is_none():
-    turns = axis_turns("y")
-    assert len(turns) == 24 == len({turn.tobytes() for turn in turns})
-    assert_allclose(turns[0], np.eye(3))
-    assert all(np.linalg.det(turn) == pytest.approx(1.0) for turn in turns)
+    rotations = axis_rotations("y")
+    assert len(rotations) == 24 == len({turn.tobytes() for turn in rotations})
+    assert_allclose(rotations[0], np.eye(3))
+    assert all(np.linalg.det(turn) == pytest.approx(1.0) for turn in rotations)
 
 
 def test_known_axes_leave_fewer_turns():
-    four = axis_turns("y", up="z")
+    four = axis_rotations("y", up="z")
     assert len(four) == 4
     assert all((turn @ [0, 1, 0] == [0, 0, 1]).all() for turn in four)
     # Up and forward known: y to z, z to -y leaves x as it is.
-    (one,) = axis_turns("y", up="z", facing="-y")
+    (one,) = axis_rotations("y", up="z", facing="-y")
     assert_allclose(one, [[1, 0, 0], [0, 0, -1], [0, 1, 0]])
     # Figures with z up face +x.
-    (one,) = axis_turns("z", up="y", facing="z")
+    (one,) = axis_rotations("z", up="y", facing="z")
     assert_allclose(one @ [1, 0, 0], [0, 0, 1])
 
 
 def test_axes_that_contradict_each_other_are_refused():
     with pytest.raises(RigError) as problem:
-        axis_turns("y", up="z", facing="-z")
+        axis_rotations("y", up="z", facing="-z")
     assert str(problem.value) == "expected a facing across the up axis z, found -z"
     with pytest.raises(RigError) as problem:
-        axis_turns("y", up="w")
+        axis_rotations("y", up="w")
     assert str(problem.value) == 'expected an axis, one of x, y, z, -x, -y, -z, found "w"'
 
 
@@ -69,28 +69,28 @@ def test_mesh_in_another_unit_and_axis_lies_in_place():
     positions, triangles = tube()
     quarter = turn([1, 0, 0], np.pi / 2)
     other = cloud(1000.0 * positions @ quarter.T, triangles)
-    found = in_place(cloud(positions, triangles), other, axis_turns("y"), scaled=True)
-    assert found.placed.scale == 1000.0 and found.error < 0.01
-    assert_allclose(found.placed.rotation, quarter, atol=1e-15)
+    found = in_place(cloud(positions, triangles), other, axis_rotations("y"), scaled=True)
+    assert found.similarity.scale == 1000.0 and found.error < 0.01
+    assert_allclose(found.similarity.rotation, quarter, atol=1e-15)
 
 
 def test_mesh_that_fits_hardly_better_turned_is_not_turned():
     positions, triangles = tube()
-    turned = positions * [-1.0, 1.0, -1.0]
-    between = 0.46 * positions + 0.54 * turned  # from behind it is a little nearer
+    rotated = positions * [-1.0, 1.0, -1.0]
+    between = 0.46 * positions + 0.54 * rotated  # from behind it is a little nearer
     template, target = cloud(positions, triangles), cloud(between, triangles)
-    found = in_place(template, target, axis_turns("y"), scaled=False)
-    assert (found.placed.rotation == np.eye(3)).all()
-    found = in_place(template, cloud(turned, triangles), axis_turns("y"), scaled=False)
-    assert (found.placed.rotation == np.diag([-1.0, 1.0, -1.0])).all()
+    found = in_place(template, target, axis_rotations("y"), scaled=False)
+    assert (found.similarity.rotation == np.eye(3)).all()
+    found = in_place(template, cloud(rotated, triangles), axis_rotations("y"), scaled=False)
+    assert (found.similarity.rotation == np.diag([-1.0, 1.0, -1.0])).all()
 
 
 def test_search_finds_a_turned_scaled_and_moved_mesh():
     positions, triangles = tube()
     rotation = turn([0.2, 1, 0.1], 2.2)
     other = cloud(7.0 * positions @ rotation.T + [3.0, 4.0, 5.0], triangles)
-    shares = []
-    found = search(cloud(positions, triangles), other, axis_turns("y"), None, shares.append)
-    assert_allclose(found.placed.rotation, rotation, atol=0.02)
-    assert found.placed.scale == pytest.approx(7.0, rel=0.02)
-    assert shares == sorted(shares) and shares[-1] == 1.0
+    fractions = []
+    found = search(cloud(positions, triangles), other, axis_rotations("y"), None, fractions.append)
+    assert_allclose(found.similarity.rotation, rotation, atol=0.02)
+    assert found.similarity.scale == pytest.approx(7.0, rel=0.02)
+    assert fractions == sorted(fractions) and fractions[-1] == 1.0

@@ -23,12 +23,12 @@ def fitted(target_figure, target_pose, figure, scales=True):
     target = START.apply(deform(target_figure, target_pose)[0])
     side = Triangles(target, figure.mesh.triangles, 1500)
     pose = rest_pose(figure.skeleton)
-    shares = []
-    found = fit_pose(figure, pose, START, side, side, scales, shares.append)
-    assert shares == sorted(shares) and shares[0] == 0.0
+    fractions = []
+    found = fit_pose(figure, pose, START, side, side, scales, fractions.append)
+    assert fractions == sorted(fractions) and fractions[0] == 0.0
     assert (pose.dofs == rest_pose(figure.skeleton).dofs).all()
-    laid = found.placed.apply(deform(found.figure, found.pose)[0])
-    gaps = Surface(target, figure.mesh.triangles).closest(laid).distances
+    aligned = found.similarity.apply(deform(found.figure, found.pose)[0])
+    gaps = Surface(target, figure.mesh.triangles).closest(aligned).distances
     return found, gaps / (20.0 * 2.4)
 
 
@@ -48,7 +48,7 @@ def test_bent_joint_is_found():
     assert gaps.max() < 2e-3
     wanted = joint_rotations(figure.skeleton, bent(figure))[1]
     assert angle_between(joint_rotations(figure.skeleton, found.pose)[1], wanted) < 3.0
-    assert_allclose(np.degrees(np.linalg.norm(found.turned[1])), 40.1, atol=3.0)
+    assert_allclose(np.degrees(np.linalg.norm(found.rotated[1])), 40.1, atol=3.0)
 
 
 def test_dofs_stay_within_limits_and_quaternions_take_the_rest():
@@ -73,7 +73,7 @@ def test_longer_limb_is_found():
 def test_size_is_kept_if_it_is_known():
     figure = arm()
     found, _ = fitted(figure, bent(figure, 0.3), figure, scales=False)
-    assert_allclose(found.placed.scale, 20.0, rtol=1e-6)
+    assert_allclose(found.similarity.scale, 20.0, rtol=1e-6)
     assert np.abs(found.grown).max() < 1e-6
 
 
@@ -82,6 +82,6 @@ def test_too_few_pairs_leave_the_template_as_it_is():
     far = START.apply(deform(figure)[0]) + 1000.0
     side = Triangles(far, figure.mesh.triangles, 500)
     pose = rest_pose(figure.skeleton)
-    found = fit_pose(figure, pose, START, side, side, True, lambda share: None)
-    assert found.placed is START
-    assert (found.pose.dofs == pose.dofs).all() and not found.turned.any()
+    found = fit_pose(figure, pose, START, side, side, True, lambda fraction: None)
+    assert found.similarity is START
+    assert (found.pose.dofs == pose.dofs).all() and not found.rotated.any()

@@ -23,7 +23,7 @@ SAMPLES = 500
 LANDMARKS = np.array([[[0, 0, 0]] * 2, [[1, 0, 0]] * 2, [[0, 0, 1]] * 2], dtype=float)
 
 
-def silent(share, what):
+def silent(fraction, what):
     pass
 
 
@@ -56,11 +56,11 @@ def test_person_with_lowered_arms_is_found_from_behind(standing):
     figure, target, joints = standing
     found, pose = aligned(figure, target)
     assert found.alignment.how == "fit"
-    assert_allclose(found.alignment.placed.rotation @ [0, 0, 1], [0, 0, -1], atol=0.1)
+    assert_allclose(found.alignment.similarity.rotation @ [0, 0, 1], [0, 0, -1], atol=0.1)
     size = np.linalg.norm(np.ptp(target.positions, axis=0))
-    laid = found.alignment.placed.apply(found.positions)
-    assert np.linalg.norm(laid - target.positions, axis=1).mean() < 0.01 * size
-    places = found.alignment.placed.apply(joint_matrices(found.figure, found.pose)[:, :3, 3])
+    on_target = found.alignment.similarity.apply(found.positions)
+    assert np.linalg.norm(on_target - target.positions, axis=1).mean() < 0.01 * size
+    places = found.alignment.similarity.apply(joint_matrices(found.figure, found.pose)[:, :3, 3])
     assert np.linalg.norm(places - joints, axis=1).max() < 0.02 * size
     assert found.figure.mesh is not figure.mesh and found.pose is not pose
     assert len(found.lines) == 2
@@ -72,14 +72,14 @@ def test_person_whose_mesh_is_inside_out_is_found_alike(standing):
     found, _ = aligned(figure, mesh_of(target.positions, target.triangles[:, ::-1]))
     assert found.alignment.how == "fit"
     size = np.linalg.norm(np.ptp(target.positions, axis=0))
-    places = found.alignment.placed.apply(joint_matrices(found.figure, found.pose)[:, :3, 3])
+    places = found.alignment.similarity.apply(joint_matrices(found.figure, found.pose)[:, :3, 3])
     assert np.linalg.norm(places - joints, axis=1).max() < 0.02 * size
 
 
 def test_facing_that_is_given_is_kept(standing):
     figure, target, _ = standing
     found, _ = aligned(figure, target, facing="z")
-    assert (found.alignment.placed.rotation @ [0, 0, 1])[2] > 0.9
+    assert (found.alignment.similarity.rotation @ [0, 0, 1])[2] > 0.9
 
 
 def test_template_is_left_alone_where_that_is_asked(standing):
@@ -100,7 +100,7 @@ def test_shell_that_stands_off_evenly_is_not_fitted():
     shell = mesh_of(figure.mesh.positions + 0.03 * figure.mesh.normals, figure.mesh.triangles)
     found, pose = aligned(figure, shell)
     assert found.pose is pose and found.figure is figure
-    assert (found.alignment.placed.matrix == np.eye(4)).all()
+    assert (found.alignment.similarity.matrix == np.eye(4)).all()
 
 
 def test_scales_of_axes_keep_the_pose():
@@ -125,7 +125,7 @@ def test_stretched_target_gets_a_scale_along_each_axis(own):
     found, pose = aligned(figure, target)
     assert found.alignment.how == "fit" and found.pose is pose
     wanted = rotation @ np.diag([1.3, 1.0, 0.8])
-    assert_allclose(found.alignment.placed.linear, wanted, atol=0.005)
+    assert_allclose(found.alignment.similarity.linear, wanted, atol=0.005)
     assert [re.sub(r"[\d.]+", "N", str(line)) for line in found.lines] == [
         f"proportions: the template stretched by N, N, N along {whose} x, y and z, pose kept",
         "that leaves a gap of N % of the size, before N %",
@@ -146,7 +146,7 @@ def test_scales_that_are_known_are_not_looked_for():
     target = mesh_of(figure.mesh.positions * [1.3, 1.0, 0.8], figure.mesh.triangles)
     asked, _ = aligned(figure, target, fits=False, scale="axes")
     assert asked.lines == ()
-    assert_allclose(asked.alignment.placed.linear, np.diag([1.3, 1.0, 0.8]), atol=0.003)
+    assert_allclose(asked.alignment.similarity.linear, np.diag([1.3, 1.0, 0.8]), atol=0.003)
     known, _ = aligned(figure, target, fits=False, scale="none")
     assert known.lines == ()
 
@@ -160,9 +160,9 @@ def bent(angle):
 
 def fit_of(figure, pose, angle):
     """Return what a fit comes to that turned the tip by an angle, and then stopped."""
-    turned = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, angle]])
-    placed = Similarity(1.0, np.eye(3), np.zeros(3), np.ones(3))
-    return Fitted(figure, pose, placed, turned, np.zeros((2, 2)))
+    rotated = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, angle]])
+    similarity = Similarity(1.0, np.eye(3), np.zeros(3), np.ones(3))
+    return Fitted(figure, pose, similarity, rotated, np.zeros((2, 2)))
 
 
 @pytest.mark.parametrize(
@@ -197,13 +197,13 @@ def test_progress_rises_and_cancels(standing):
     class CancelledError(RuntimeError):
         pass
 
-    shares = []
+    fractions = []
 
-    def report(share, what):
-        shares.append(share)
-        if what == "pose" and share > 0.6:
+    def report(fraction, what):
+        fractions.append(fraction)
+        if what == "pose" and fraction > 0.6:
             raise CancelledError
 
     with pytest.raises(CancelledError):
         aligned(figure, target, report=report)
-    assert shares == sorted(shares) and shares[0] == 0.0
+    assert fractions == sorted(fractions) and fractions[0] == 0.0

@@ -16,11 +16,13 @@ ONES = np.ones(2)
 def test_limbs_lead_to_the_next_joint_or_the_middle_of_what_follows():
     figure = arm()
     limbs = limbs_of(figure)
-    share = np.clip((figure.mesh.positions[:, 1] - 0.8) / 0.4, 0.0, 1.0)
-    assert_allclose(limbs.weights, np.stack([1 - share, share], axis=1), atol=1e-12)
-    assert_allclose(limbs.shares, np.stack([np.ones_like(share), share], axis=1), atol=1e-12)
+    fraction = np.clip((figure.mesh.positions[:, 1] - 0.8) / 0.4, 0.0, 1.0)
+    assert_allclose(limbs.weights, np.stack([1 - fraction, fraction], axis=1), atol=1e-12)
+    assert_allclose(
+        limbs.fractions, np.stack([np.ones_like(fraction), fraction], axis=1), atol=1e-12
+    )
     assert_allclose(limbs.axes[0], [0, 1, 0], atol=1e-12)
-    middle = (share @ figure.mesh.positions) / share.sum() - [0, 1, 0]
+    middle = (fraction @ figure.mesh.positions) / fraction.sum() - [0, 1, 0]
     assert_allclose(limbs.axes[1], middle / np.linalg.norm(middle), atol=1e-12)
 
 
@@ -68,7 +70,7 @@ def test_offsets_are_those_of_a_turned_bind_pose():
     bind = np.linalg.inv(figure.skin.inverse_bind)
     bind[:, :3, :3] = axes
     skin = replace(figure.skin, inverse_bind=np.linalg.inv(bind))
-    turned = replace(figure, skin=skin)
-    longer = resized(turned, limbs_of(turned), np.array([2.0, 1.0]), ONES)
+    rotated = replace(figure, skin=skin)
+    longer = resized(rotated, limbs_of(rotated), np.array([2.0, 1.0]), ONES)
     # One unit more along y is one along x in axes that are turned by a quarter about z.
     assert_allclose(longer.skeleton.rest_translations[1], [1, 1, 0], atol=1e-12)

@@ -38,10 +38,10 @@ def test_kept_scale_stays_and_the_rest_is_fitted():
 
 
 def test_matrix_scales_after_turning_and_undo_is_its_inverse():
-    placed = Similarity(2.0, turn([0, 0, 1], np.pi / 2), np.array([1.0, 0, 0]), [1, 2, 0.5])
-    assert_allclose(placed.apply(np.array([1.0, 0, 1])), [1.0, 4.0, 1.0], atol=EXACT)
-    assert_allclose(placed.matrix @ [1, 0, 1, 1], [1.0, 4.0, 1.0, 1.0], atol=EXACT)
-    assert_allclose(placed.undo(placed.apply(cloud())), cloud(), atol=EXACT)
+    similarity = Similarity(2.0, turn([0, 0, 1], np.pi / 2), np.array([1.0, 0, 0]), [1, 2, 0.5])
+    assert_allclose(similarity.apply(np.array([1.0, 0, 1])), [1.0, 4.0, 1.0], atol=EXACT)
+    assert_allclose(similarity.matrix @ [1, 0, 1, 1], [1.0, 4.0, 1.0, 1.0], atol=EXACT)
+    assert_allclose(similarity.undo(similarity.apply(cloud())), cloud(), atol=EXACT)
 
 
 @pytest.mark.parametrize(

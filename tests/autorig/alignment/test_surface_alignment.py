@@ -25,7 +25,7 @@ SAMPLES = 500
 TEMPLATE = Posed(POSITIONS, TRIANGLES)
 
 
-def silent(share, what):
+def silent(fraction, what):
     pass
 
 
@@ -37,7 +37,7 @@ def aligned(positions, triangles=TRIANGLES, report=silent, up="y", **settings):
 def test_target_in_place_is_left_alone():
     found = aligned(POSITIONS)
     assert found.how == "in place"
-    assert (found.placed.matrix == np.eye(4)).all() and found.error < 1e-12
+    assert (found.similarity.matrix == np.eye(4)).all() and found.error < 1e-12
 
 
 def test_part_in_place_is_left_alone_although_it_stands_off():
@@ -48,7 +48,7 @@ def test_part_in_place_is_left_alone_although_it_stands_off():
     used, corners = np.unique(TRIANGLES[middle], return_inverse=True)
     found = aligned(shirt[used], corners.reshape(-1, 3).astype(np.int32))
     assert found.how == "in place"
-    assert (found.placed.matrix == np.eye(4)).all()
+    assert (found.similarity.matrix == np.eye(4)).all()
     assert found.away > 0.05 > found.error
 
 
@@ -57,7 +57,7 @@ def test_shell_in_place_is_left_alone_although_a_larger_template_is_nearer():
     normals = vertex_normals(POSITIONS, TRIANGLES)
     found = aligned(POSITIONS + 0.05 * normals)
     assert found.how == "in place"
-    assert (found.placed.matrix == np.eye(4)).all()
+    assert (found.similarity.matrix == np.eye(4)).all()
     assert found.error > 0.015 and max(found.uneven) < 0.005
 
 
@@ -65,29 +65,29 @@ def test_turned_scaled_and_moved_target_is_found_exactly():
     rotation = turn([0.3, 1, -0.2], 2.0)
     found = aligned(130.0 * POSITIONS @ rotation.T + [5.0, 6.0, 7.0])
     assert found.how == "search" and found.error < 1e-9
-    assert_allclose(found.placed.rotation, rotation, atol=1e-8)
-    assert_allclose(found.placed.scale, 130.0, rtol=1e-8)
-    assert_allclose(found.placed.shift, [5.0, 6.0, 7.0], atol=1e-6)
+    assert_allclose(found.similarity.rotation, rotation, atol=1e-8)
+    assert_allclose(found.similarity.scale, 130.0, rtol=1e-8)
+    assert_allclose(found.similarity.shift, [5.0, 6.0, 7.0], atol=1e-6)
 
 
 def test_small_turn_is_undone_although_the_boxes_nearly_agree():
     rotation = turn([0, 1, 0], 0.3)
     found = aligned(POSITIONS @ rotation.T)
     assert found.how == "search"
-    assert_allclose(found.placed.rotation, rotation, atol=1e-8)
+    assert_allclose(found.similarity.rotation, rotation, atol=1e-8)
 
 
 def test_template_keeps_its_size_if_asked():
     rotation = turn([0, 1, 0], 0.4)
     found = aligned(POSITIONS @ rotation.T + [0.5, 0, 0], scale="none")
-    assert found.placed.scale == 1.0
-    assert_allclose(found.placed.rotation, rotation, atol=1e-8)
+    assert found.similarity.scale == 1.0
+    assert_allclose(found.similarity.rotation, rotation, atol=1e-8)
 
 
 def test_axes_get_scales_of_their_own_if_asked():
     found = aligned(POSITIONS * [1.15, 1.0, 0.9] + [1.0, 0, 0], scale="axes")
-    assert_allclose(found.placed.scale * found.placed.factors, [1.15, 1.0, 0.9], atol=0.02)
-    assert (found.placed.factors != 1.0).any()
+    assert_allclose(found.similarity.scale * found.similarity.factors, [1.15, 1.0, 0.9], atol=0.02)
+    assert (found.similarity.factors != 1.0).any()
 
 
 def test_landmarks_alone_decide_without_refinement():
@@ -96,8 +96,8 @@ def test_landmarks_alone_decide_without_refinement():
     pairs = np.stack([points, 2.0 * points @ rotation.T + [9.0, 0, 0]], axis=1)
     found = aligned(POSITIONS, landmarks=pairs, refines=False)
     assert found.how == "landmarks"
-    assert_allclose(found.placed.rotation, rotation, atol=1e-12)
-    assert_allclose(found.placed.scale, 2.0, rtol=1e-12)
+    assert_allclose(found.similarity.rotation, rotation, atol=1e-12)
+    assert_allclose(found.similarity.scale, 2.0, rtol=1e-12)
 
 
 def test_rough_landmarks_are_refined():
@@ -106,7 +106,7 @@ def test_rough_landmarks_are_refined():
     rough = target[[3, 50, 200, 300]] + np.random.default_rng(1).normal(0, 0.05, (4, 3))
     pairs = np.stack([POSITIONS[[3, 50, 200, 300]], rough], axis=1)
     found = aligned(target, landmarks=pairs)
-    assert_allclose(found.placed.rotation, rotation, atol=1e-8)
+    assert_allclose(found.similarity.rotation, rotation, atol=1e-8)
 
 
 def test_given_matrix_is_taken_as_it_is():
@@ -115,15 +115,15 @@ def test_given_matrix_is_taken_as_it_is():
     matrix[:3, 3] = 1.0
     found = aligned(POSITIONS, matrix=matrix)
     assert found.how == "given"
-    assert_allclose(found.placed.matrix, matrix, atol=1e-12)
+    assert_allclose(found.similarity.matrix, matrix, atol=1e-12)
 
 
 def test_cancelling_from_the_report_ends_the_search():
     class CancelledError(RuntimeError):
         pass
 
-    def cancel(share, what):
-        if share > 0.3:
+    def cancel(fraction, what):
+        if fraction > 0.3:
             raise CancelledError
 
     with pytest.raises(CancelledError):
@@ -131,9 +131,11 @@ def test_cancelling_from_the_report_ends_the_search():
 
 
 def test_progress_rises():
-    shares = []
-    aligned(POSITIONS @ turn([0, 1, 0], 0.3).T, report=lambda share, what: shares.append(share))
-    assert shares == sorted(shares) and shares[0] == 0.0 and shares[-1] <= 1.0
+    fractions = []
+    aligned(
+        POSITIONS @ turn([0, 1, 0], 0.3).T, report=lambda fraction, what: fractions.append(fraction)
+    )
+    assert fractions == sorted(fractions) and fractions[0] == 0.0 and fractions[-1] <= 1.0
 
 
 @pytest.mark.parametrize(
@@ -193,14 +195,14 @@ def test_matrices_that_stretch_along_either_spaces_axes_are_taken():
     ],
 )
 def test_lines_of_a_shared_origin_say_whether_anything_was_done(scale, angle, words):
-    placed = Similarity(scale, turn([1, 0, 0], angle), np.zeros(3), np.ones(3))
-    lines = alignment_lines(Alignment(placed, 0.0, 0.0, (0.0, 0.0), "in place"))
+    similarity = Similarity(scale, turn([1, 0, 0], angle), np.zeros(3), np.ones(3))
+    lines = alignment_lines(Alignment(similarity, 0.0, 0.0, (0.0, 0.0), "in place"))
     assert str(lines[0]) == f"alignment: {words}, shift (0, 0, 0)"
 
 
 def test_lines_tell_everything_and_warn_of_a_bad_fit():
-    placed = Similarity(2.0, turn([0, 1, 0], np.pi / 2), np.array([1.0, 0, -2]), np.ones(3))
-    lines = alignment_lines(Alignment(placed, 0.05, 0.1, (0.05, 0.1), "search"))
+    similarity = Similarity(2.0, turn([0, 1, 0], np.pi / 2), np.array([1.0, 0, -2]), np.ones(3))
+    lines = alignment_lines(Alignment(similarity, 0.05, 0.1, (0.05, 0.1), "search"))
     assert [line.labelled for line in lines] == [
         "alignment: found by closest points; scale 2, turned by 90.00 degrees, shift (1, 0, -2)",
         "alignment error: 5.000 % of the target's size (RMS of the best 90 %; template to target "

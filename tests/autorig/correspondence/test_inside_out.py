@@ -8,7 +8,7 @@ pytest.importorskip("scipy")
 
 from dataclasses import replace
 
-from viewer.autorig.correspondence.inside_out import turned_round, wound_backwards
+from viewer.autorig.correspondence.inside_out import with_reversed_winding, wound_backwards
 from viewer.autorig.surface.welding import weld
 from viewer.rig.mesh import volume
 
@@ -63,14 +63,14 @@ def test_vertices_of_no_triangle_belong_to_nothing():
 def test_turning_round_keeps_materials_and_texture_with_their_corners():
     positions, triangles = tube()
     mesh = mesh_of(positions, triangles[:, ::-1])
-    again = turned_round(mesh, np.ones(len(positions), dtype=bool))
+    again = with_reversed_winding(mesh, np.ones(len(positions), dtype=bool))
     assert (again.triangles == triangles).all()
     assert np.allclose(again.normals, mesh_of(positions, triangles).normals)
-    assert turned_round(mesh, np.zeros(len(positions), dtype=bool)) is mesh
+    assert with_reversed_winding(mesh, np.zeros(len(positions), dtype=bool)) is mesh
 
 
 def test_texture_corners_turn_with_the_triangles():
     corners = np.arange(36, dtype=np.int32).reshape(-1, 3)
     mesh = replace(mesh_of(CUBE, OUTWARD), uvs=np.zeros((36, 2)), uv_triangles=corners)
-    again = turned_round(mesh, np.ones(8, dtype=bool))
+    again = with_reversed_winding(mesh, np.ones(8, dtype=bool))
     assert (again.uv_triangles == corners[:, ::-1]).all()

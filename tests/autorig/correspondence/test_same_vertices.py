@@ -54,8 +54,8 @@ def test_another_tessellation_has_other_vertices(step, start):
 def test_turned_tessellation_has_other_vertices():
     positions, triangles = grid()
     cosine, sine = np.cos(0.5), np.sin(0.5)
-    turned = (positions - 4.0) @ np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]]) + 4.0
-    same = found((positions, triangles), (turned, triangles))
+    rotated = (positions - 4.0) @ np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]]) + 4.0
+    same = found((positions, triangles), (rotated, triangles))
     assert (same >= 0).mean() < 0.2  # those about the middle of the turn
 
 

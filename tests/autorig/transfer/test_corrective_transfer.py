@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 pytest.importorskip("scipy")
 
 from viewer.autorig.transfer import corrective_transfer as carried_correctives
-from viewer.autorig.transfer.corrective_transfer import carry_correctives
+from viewer.autorig.transfer.corrective_transfer import transfer_correctives
 from viewer.rig.blendshapes import Correctives
 from viewer.rig.geometry.closest_point import SurfacePoints
 
@@ -35,7 +35,7 @@ def strip(count):
 def test_offsets_are_mixed_from_the_corners_and_scaled():
     barycentric = np.array([[1.0, 0, 0], [0, 0, 1], [0.5, 0.25, 0.25], [0, 1, 0]])
     positions, triangles = strip(2)
-    found = carry_correctives(
+    found = transfer_correctives(
         Correctives(OFFSETS), points(barycentric), TRIANGLES, np.ones(4, bool), positions,
         triangles, 10.0,
     )  # fmt: skip
@@ -47,7 +47,7 @@ def test_offsets_fade_out_where_the_target_leaves_the_template():
     positions, triangles = strip(40)
     matched = positions[:, 0] < 20
     barycentric = np.tile([1.0, 0, 0], (80, 1))
-    found = carry_correctives(
+    found = transfer_correctives(
         Correctives(np.ones((9, 3, 3))), points(barycentric), TRIANGLES, matched, positions,
         triangles, 1.0,
     )  # fmt: skip
@@ -61,7 +61,7 @@ def test_offsets_fade_out_where_the_target_leaves_the_template():
 def test_more_numbers_than_fit_are_left_out(monkeypatch):
     monkeypatch.setattr(carried_correctives, "MOST_NUMBERS", 9 * 4 * 3 - 1)
     positions, triangles = strip(2)
-    found = carry_correctives(
+    found = transfer_correctives(
         Correctives(OFFSETS), points(np.tile([1.0, 0, 0], (4, 1))), TRIANGLES, np.ones(4, bool),
         positions, triangles, 1.0,
     )  # fmt: skip

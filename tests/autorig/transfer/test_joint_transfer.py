@@ -9,9 +9,9 @@ pytest.importorskip("scipy")
 
 from viewer.autorig.transfer.joint_transfer import (
     boundary_weights,
-    carry_joints,
     outside,
     surface_shifts,
+    transfer_joints,
 )
 from viewer.rig.blendshapes import JointRegressor
 from viewer.rig.skin import skin_from_lists
@@ -54,25 +54,25 @@ SHIFTS = np.array([[1.0, 0, 0], [0, 2, 0], [0, 0, 3]])
 
 
 def test_joints_move_by_the_weighted_mean_of_their_surface():
-    found = carry_joints(JOINTS, PARENTS, regressor(), SHIFTS, np.array([True, True, True]))
+    found = transfer_joints(JOINTS, PARENTS, regressor(), SHIFTS, np.array([True, True, True]))
     assert_allclose(found.positions, [[0, 0, 0], [0.5, 2, 0], [0, 2, 3]])
-    assert found.carried.tolist() == [False, True, True]
+    assert found.transferred.tolist() == [False, True, True]
     assert found.measurable.tolist() == [False, True, True]
 
 
 def test_joint_without_its_surface_goes_with_its_parent():
-    found = carry_joints(JOINTS, PARENTS, regressor(), SHIFTS, np.array([True, False, False]))
+    found = transfer_joints(JOINTS, PARENTS, regressor(), SHIFTS, np.array([True, False, False]))
     # Half of joint 1's weights are left, which is enough; none of joint 2's.
     assert_allclose(found.positions, [[0, 0, 0], [1, 1, 0], [1, 2, 0]])
-    assert found.carried.tolist() == [False, True, False]
+    assert found.transferred.tolist() == [False, True, False]
     assert found.measurable.tolist() == [False, True, True]
 
 
 def test_rows_that_cancel_out_say_nothing():
     rows = JointRegressor(3, [1, 1], [0, 1], [1.0, -0.9])
-    found = carry_joints(JOINTS, PARENTS, rows, SHIFTS, np.ones(3, bool))
+    found = transfer_joints(JOINTS, PARENTS, rows, SHIFTS, np.ones(3, bool))
     assert_array_equal(found.positions, JOINTS)
-    assert not found.carried.any()
+    assert not found.transferred.any()
 
 
 def test_shifts_are_those_to_the_surface_and_trusted_where_it_is_near_and_alike():

@@ -28,8 +28,10 @@ def bent(figure):
     return pose
 
 
-def placed_joints(figure, pose, placed):
-    return placed.apply((placement_matrix(pose) @ world_matrices(figure.skeleton, pose))[:, :3, 3])
+def placed_joints(figure, pose, similarity):
+    return similarity.apply(
+        (placement_matrix(pose) @ world_matrices(figure.skeleton, pose))[:, :3, 3]
+    )
 
 
 def test_same_proportions_give_the_scaled_skeleton_and_its_bindings():
@@ -133,13 +135,13 @@ def spread() -> Figure:
         ([True, False, False, True], 1.25, 1.25),
     ],
 )
-def test_symmetric_skeletons_stay_symmetric(carried, left, right):
+def test_symmetric_skeletons_stay_symmetric(transferred, left, right):
     figure = spread()
     assert isinstance(figure.skeleton, Skeleton)
     pose = rest_pose(figure.skeleton)
     joints = np.array([[0.0, 1, 0], [1.4, 1, 0], [-1.1, 1, 0], [0.2, 2, 0]])
     straight = Similarity(1.0, np.eye(3), np.zeros(3), np.ones(3))
-    found = fit_rest_skeleton(figure, pose, straight, joints, np.array(carried))
+    found = fit_rest_skeleton(figure, pose, straight, joints, np.array(transferred))
     offsets = found.skeleton.rest_translations
     assert_allclose(offsets[1:3], [[left, 0, 0], [-right, 0, 0]], atol=EXACT)
     # The middle joint is its own partner: it comes back to the middle.
@@ -162,8 +164,8 @@ def test_root_takes_the_angles_that_its_limits_allow():
     # Turned by 120 degrees about y: as angles (180, 60, 180) or (0, 120, 0).
     figure = arm(limit=2.2)
     pose = rest_pose(figure.skeleton)
-    placed = Similarity(1.0, turn([0, 1, 0], np.radians(120)), np.zeros(3), np.ones(3))
-    joints = placed_joints(figure, pose, placed)
-    found = fit_rest_skeleton(figure, pose, placed, joints, None)
+    similarity = Similarity(1.0, turn([0, 1, 0], np.radians(120)), np.zeros(3), np.ones(3))
+    joints = placed_joints(figure, pose, similarity)
+    found = fit_rest_skeleton(figure, pose, similarity, joints, None)
     assert_allclose(found.pose.dofs[3:6], [0.0, np.radians(120), 0.0], atol=EXACT)
     assert found.lines == ()

@@ -3,7 +3,7 @@ import pytest
 
 from viewer.autorig.surface.laplacian import laplacian
 from viewer.autorig.surface.welding import weld
-from viewer.autorig.weights.inpainting import fill
+from viewer.autorig.weights.inpainting import inpaint
 from viewer.errors import RigError
 
 sparse = pytest.importorskip("scipy.sparse")
@@ -57,7 +57,7 @@ def smooth_energy(operator, areas):
 
 
 def run(operator, areas, weights, unknown, report=silent):
-    return fill(operator, areas, sparse.csr_array(weights), ~unknown, unknown, report)
+    return inpaint(operator, areas, sparse.csr_array(weights), ~unknown, unknown, report)
 
 
 def test_fill_minimises_the_energy():
@@ -92,7 +92,7 @@ def test_fill_leaves_out_vertices_that_are_neither_known_nor_wanted():
     weights = np.concatenate([weights, np.full((2, 5), 7.0)])
     matched = np.concatenate([~unknown, [False, False]])
     wanted = np.concatenate([unknown, [False, False]])
-    found, _ = fill(
+    found, _ = inpaint(
         far, np.concatenate([areas, [1.0, 1.0]]), sparse.csr_array(weights), matched, wanted, silent
     )
     expected, _ = run(operator, areas, weights[:-2], unknown)

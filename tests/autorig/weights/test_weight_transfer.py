@@ -23,9 +23,9 @@ def silent(fraction, what):
 
 def tube(rings=13, sides=16, length=3.0):
     """Return an open tube along x, radius 0.5, facing outwards."""
-    turns = np.linspace(0, 2 * np.pi, sides + 1)[:-1]
+    rotations = np.linspace(0, 2 * np.pi, sides + 1)[:-1]
     x = np.repeat(np.linspace(0, length, rings), sides)
-    around = np.tile(turns, rings)
+    around = np.tile(rotations, rings)
     positions = np.stack([x, 0.5 * np.cos(around), 0.5 * np.sin(around)], axis=1)
     index = np.arange(rings * sides).reshape(rings, sides)
     a, b = index[:-1], np.roll(index, -1, axis=1)[:-1]
@@ -73,7 +73,7 @@ def test_transfer_onto_itself_changes_nothing():
     result = transfer(positions, triangles)
     np.testing.assert_allclose(dense(result), along(positions[:, 0]), atol=1e-12)
     assert result.matched.all()
-    assert not result.filled.any()
+    assert not result.inpainted.any()
     assert told(result.lines) == [
         ("R005.matched", {"n": 208, "all": 208, "ratio": 1.0, "filled": 0})
     ]
@@ -108,9 +108,9 @@ def test_transfer_fills_in_what_stands_off_the_template():
     bump = np.abs(x - 0.75) < 0.2
     positions[bump, 1:] *= 2.5
     result = transfer(positions, triangles)
-    assert result.filled.any()
-    assert not result.filled[np.abs(x - 0.75) > 0.5].any()
-    assert (result.matched | result.filled).all()
+    assert result.inpainted.any()
+    assert not result.inpainted[np.abs(x - 0.75) > 0.5].any()
+    assert (result.matched | result.inpainted).all()
     found = dense(result)
     np.testing.assert_allclose(found.sum(axis=1), 1.0, atol=1e-12)
     # The third joint does not reach this far; the others change places across the bump.
@@ -129,7 +129,7 @@ def test_transfer_keeps_seams_closed():
     corners = triangles.ravel()
     split = transfer(positions[corners], np.arange(len(corners), dtype=np.int32).reshape(-1, 3))
     np.testing.assert_allclose(dense(split), dense(whole)[corners], atol=1e-9)
-    assert split.filled.tolist() == whole.filled[corners].tolist()
+    assert split.inpainted.tolist() == whole.inpainted[corners].tolist()
     assert split.points.triangles.shape == corners.shape
 
 
@@ -147,7 +147,7 @@ def test_transfer_hangs_parts_without_match_on_the_closest_point_of_their_middle
     )
     # At x = 1.2 joint 0 has 1 - 0.8 and joint 1 has 0.8.
     np.testing.assert_allclose(dense(result)[-4:], [[0.2, 0.8, 0.0]] * 4, atol=1e-12)
-    assert not (result.matched | result.filled)[-4:].any()
+    assert not (result.matched | result.inpainted)[-4:].any()
     assert result.rigid.vertices.tolist() == [208]
     assert result.rigid.counts.tolist() == [4]
     assert result.rigid.joints.tolist() == [1]

@@ -1,4 +1,4 @@
-"""Scalar views of strain: a square whose corners slide, in closed form."""
+"""Scalar quantities of strain: a square whose corners slide, in closed form."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scalar views of weights: a few vertices, each number worked out by hand."""
+"""Scalar quantities of weights: a few vertices, each number worked out by hand."""
 
 from __future__ import annotations
 

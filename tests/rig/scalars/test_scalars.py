@@ -1,4 +1,4 @@
-"""Scalar views: lengths per vertex, each worked out by hand on a few points."""
+"""Scalar quantities: lengths per vertex, each worked out by hand on a few points."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -18,15 +18,15 @@ from viewer.rig.scalars import (
     SCALARS,
     categories,
     compute,
-    find_view,
+    find_quantity,
     joint_of,
     length_unit,
     menu_title,
     missing_part,
+    quantity_title,
     shown_unit,
     split_name,
     strongest,
-    view_title,
 )
 from viewer.rig.skin import skin_from_lists
 from viewer.rig.skinning import Skinning
@@ -190,10 +190,10 @@ def test_parts_are_the_indices_of_the_parts():
 def test_name_of_a_view_may_hold_a_joint():
     assert split_name("weight:left:knee") == ("weight", "left:knee")
     assert split_name("stretch") == ("stretch", "")
-    assert find_view("weight:#4") is SCALARS["weight"]
+    assert find_quantity("weight:#4") is SCALARS["weight"]
     with pytest.raises(RigError) as caught:
         split_name("stretch:knee")
-    assert str(caught.value) == 'scalar view "stretch": expected no joint, found "knee"'
+    assert str(caught.value) == 'scalar quantity "stretch": expected no joint, found "knee"'
 
 
 def named(*names) -> Figure:
@@ -243,7 +243,7 @@ def test_joints_without_a_skeleton_have_indices():
     figure = Figure("skin", mesh([[0.0, 0, 0]]), None, skin)
     assert compute("weight:#1", figure, None, Skinning()).tolist() == [0.25]
     assert categories("dominant", figure) == ("#0", "#1")
-    assert view_title("weight:1", figure, Skinning()) == "Weight of #1"
+    assert quantity_title("weight:1", figure, Skinning()) == "Weight of #1"
     with pytest.raises(RigError) as caught:
         joint_of(figure, "knee")
     assert str(caught.value) == 'no joint "knee"; without a skeleton there are #0 to #1'
@@ -254,9 +254,9 @@ def test_what_a_figure_lacks_for_the_weight_of_a_joint():
     assert missing_part("weight:knee", figure) == ""
     assert missing_part("weight", figure) == "a selected joint"
     assert missing_part("weight:toe", figure) == 'a joint "toe"'
-    assert view_title("weight:KNEE", figure, Skinning()) == "Weight of knee"
+    assert quantity_title("weight:KNEE", figure, Skinning()) == "Weight of knee"
     for name in ("weight:toe", "weight"):
-        assert view_title(name, figure, Skinning()) == "Weight of a joint"
+        assert quantity_title(name, figure, Skinning()) == "Weight of a joint"
 
 
 def test_units_of_views():
@@ -296,7 +296,7 @@ def test_fields_are_shown_by_name_or_the_first_of_their_kind():
     figure = replace(sliding([[(0, 1.0)]] * 3), fields=(FAR, KINDS_OF_MATCH), unit="m")
     for name in ("field", "field:far", "field:FAR"):
         assert compute(name, figure, None, Skinning()).tolist() == [0.5, 2.0, 0.0]
-        assert view_title(name, figure, Skinning()) == "How far"
+        assert quantity_title(name, figure, Skinning()) == "How far"
         assert shown_unit(name, figure) == (1000.0, "mm")
     assert compute("class:match", figure, None, Skinning()).tolist() == [0.0, 1.0, 1.0]
     assert categories("class", figure) == ("near", "filled")
@@ -308,7 +308,7 @@ def test_fields_are_shown_by_name_or_the_first_of_their_kind():
 
 def test_titles_tell_how_many_influences_are_kept():
     figure = sliding([[(0, 1.0)]] * 3)
-    assert view_title("cut", figure, Skinning()) == "Distance to 4 influences"
+    assert quantity_title("cut", figure, Skinning()) == "Distance to 4 influences"
     assert menu_title("cut", Skinning(max_influences=1)) == "Distance to 1 influence"
     assert menu_title("cut", Skinning(max_influences=8)) == "Distance to 8 influences"
     assert menu_title("entropy", Skinning(max_influences=8)) == "Entropy of weights"

@@ -125,7 +125,8 @@ def _draw_error(found: Alignment | None) -> None:
 
 def _how(found: Alignment) -> str:
     """Say how a template came to where it lies: fitted limbs come with one scale for all axes."""
-    is_even = (found.placed.factors == 1.0).all() and (found.placed.own_factors == 1.0).all()
+    scales = found.similarity.factors, found.similarity.own_factors
+    is_even = all((factors == 1.0).all() for factors in scales)
     return _HOW[found.how] if found.how != "fit" or is_even else _STRETCHED
 
 

@@ -240,7 +240,7 @@ def _stand(result: Result) -> Floats:
     if alignment is None:
         return result.rigged.placement
     stand = np.eye(4)
-    stand[:3, :3], stand[:3, 3] = alignment.placed.rotation, alignment.placed.shift
+    stand[:3, :3], stand[:3, 3] = alignment.similarity.rotation, alignment.similarity.shift
     return stand
 
 

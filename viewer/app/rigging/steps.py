@@ -66,7 +66,7 @@ def align_template(
     is_other = template.figure is not own.figure or pose_key(template.pose) != pose_key(own.pose)
     is_fitted = is_other or bool(found.lines)
     return Placing(
-        similarity=found.alignment.placed,
+        similarity=found.alignment.similarity,
         alignment=found.alignment,
         settings=settings,
         fitted=replace(template, figure=found.figure, pose=found.pose) if is_fitted else None,

@@ -16,7 +16,7 @@ from viewer.rig.scalars import (
     missing_part,
     most_influential,
     split_name,
-    telling_view,
+    telling_quantity,
 )
 
 __all__ = [
@@ -72,7 +72,7 @@ def start_heat_map(state: AppState) -> None:
     if SCALARS[key].takes_joint:
         _start_with_joint(state, key)
     elif SCALARS[key].about:
-        options.scalar = telling_view(key, [actor.figure for actor in state.scene.actors])
+        options.scalar = telling_quantity(key, [actor.figure for actor in state.scene.actors])
 
 
 def _start_with_joint(state: AppState, key: str) -> None:
@@ -83,7 +83,7 @@ def _start_with_joint(state: AppState, key: str) -> None:
         return
     most = most_influential(figure)
     if most < 0:  # the chosen actor has no weights, another one may
-        state.options.scalar = telling_view(key, [actor.figure for actor in state.scene.actors])
+        state.options.scalar = telling_quantity(key, [actor.figure for actor in state.scene.actors])
         return
     if joint >= 0:
         names = (printable(joint_text(figure, one), 60) for one in (joint, most))

@@ -17,12 +17,12 @@ def fit_axes(
     target: Side,
     start: Similarity,
     rounds: int,
-    turns: bool = False,
+    rotations: bool = False,
     own: bool = False,
 ) -> Similarity:
     """Find another scale along each axis.
 
-    Each round solves for factors f, a shift t and, if asked, a small turn w that minimise
+    Each iteration solves for factors f, a shift t and, if asked, a small rotation w that minimise
     sum (n . (x - q))^2 + 1e-5 |x - q|^2 with x = f R p + f' (w x R p) + t, or with the template's
     axes x = R f p + w x R f' p + t, in which f' are the factors so far: linear in all that is
     looked for.
@@ -33,7 +33,7 @@ def fit_axes(
         As for ``slide``.
     start : Similarity
         Roughly right, with one scale.
-    turns : bool
+    rotations : bool
         Whether the rotation is improved too: one that was found with one scale for all axes leans
         towards what a stretched target's diagonal asks for.
     own : bool
@@ -44,29 +44,31 @@ def fit_axes(
     Similarity
         With factors; the best so far where a fit would mirror, or too few pairs are left.
     """
-    placed, scales = start, np.full(3, start.scale)
+    similarity, scales = start, np.full(3, start.scale)
     for _ in range(rounds):
-        pairs = pairs_between(template, target, placed)
+        pairs = pairs_between(template, target, similarity)
         if len(pairs.points) < FEWEST:
             break
         before = scales
-        columns = _columns(pairs.points, placed.rotation, before, turns, own)
+        columns = _columns(pairs.points, similarity.rotation, before, rotations, own)
         found, turn, shift = _solved(pairs, columns)
         if (found <= 0.0).any():
             break
         scales = found
         scale = float(np.cbrt(np.prod(scales)))
-        rotation = rotation_vector_to_matrix(turn) @ placed.rotation
+        rotation = rotation_vector_to_matrix(turn) @ similarity.rotation
         factors, own_factors = np.ones(3), np.ones(3)
         (own_factors if own else factors)[:] = scales / scale
-        placed = Similarity(scale, rotation, shift, factors, own_factors)
+        similarity = Similarity(scale, rotation, shift, factors, own_factors)
         if max(np.abs(scales / before - 1.0).max(), float(np.linalg.norm(turn))) < SETTLED:
             break
-    return placed
+    return similarity
 
 
-def _columns(points: Floats, rotation: Floats, before: Floats, turns: bool, own: bool) -> Floats:
-    """Return what moves points by factors, shift and turn: (N, 3, 6 or 9)."""
+def _columns(
+    points: Floats, rotation: Floats, before: Floats, rotations: bool, own: bool
+) -> Floats:
+    """Return what moves points by factors, shift and rotation: (N, 3, 6 or 9)."""
     if own:
         scaled = points[:, None, :] * rotation
         arms, lift = (points * before) @ rotation.T, np.ones(3)
@@ -74,7 +76,7 @@ def _columns(points: Floats, rotation: Floats, before: Floats, turns: bool, own:
         arms, lift = points @ rotation.T, before
         scaled = arms[:, :, None] * np.eye(3)
     parts = [scaled, np.broadcast_to(np.eye(3), scaled.shape)]
-    if turns:
+    if rotations:
         x, y, z = arms.T
         null = np.zeros_like(x)
         # Columns are the axes crossed with the arm.

@@ -40,11 +40,11 @@ __all__ = [
 
 _FAR = 3.0  # medians: pairs farther apart than this are not used
 _SAME_WAY = 0.5  # cosine of 60 degrees between the normals of a pair
-SETTLED = 1e-5  # relative change of the error, or of scales, at which rounds end
+SETTLED = 1e-5  # relative change of the error, or of scales, at which iterations end
 _EXACT = 1e-12  # error over size at which there is nothing left to improve
 _ON_EDGE = 1e-9  # barycentric coordinate of a point on an edge
 HOLD = 3e-3  # weight of distances between points beside those to planes, before squaring
-_PATIENCE = 3  # rounds without an improvement, as other pairs give another error
+_PATIENCE = 3  # iterations without an improvement, as other pairs give another error
 FEWEST = 8  # pairs that still tell seven numbers
 
 
@@ -179,22 +179,22 @@ def iterate(
     Similarity
         The best so far where too few pairs are left to go on.
     """
-    placed, before = start, np.inf
+    similarity, before = start, np.inf
     for _ in range(rounds):
-        pairs = pairs_between(template, target, placed)
+        pairs = pairs_between(template, target, similarity)
         if len(pairs.points) < FEWEST:
             break
         # Factors belong to the target's axes: without them the rest is a similarity.
         fit = fit_similarity(
             pairs.points, pairs.targets / start.factors, None if scales else start.scale
         )
-        placed = replace(fit, shift=fit.shift * start.factors, factors=start.factors)
-        steps = placed.apply(pairs.points) - pairs.targets
+        similarity = replace(fit, shift=fit.shift * start.factors, factors=start.factors)
+        steps = similarity.apply(pairs.points) - pairs.targets
         error = float(np.sqrt(np.einsum("na,na->", steps, steps) / len(steps)))
         if error <= _EXACT * target.size or abs(before - error) < SETTLED * error:
             break
         before = error
-    return placed
+    return similarity
 
 
 def slide(
@@ -206,9 +206,9 @@ def slide(
 ) -> Similarity:
     """Improve a good alignment by distances to planes, which let surfaces slide along each other.
 
-    Each round solves the linearised problem: with x = placed p, c the middle of all x and
+    Each iteration solves the linearised problem: with x = aligned p, c the middle of all x and
     x' = x + w x (x - c) + u (x - c) + v, minimise sum (n . (x' - q))^2 + 1e-5 |x' - q|^2 over
-    the turn w, the shift v and the relative change of scale u. The second term holds what could
+    the rotation w, the shift v and the relative change of scale u. The second term holds what could
     slide for ever.
 
     Parameters
@@ -221,36 +221,38 @@ def slide(
     Similarity
         The best so far where too few pairs are left to go on.
     """
-    placed, best, lowest, idle = start, start, np.inf, 0
+    similarity, best, lowest, idle = start, start, np.inf, 0
     for _ in range(rounds):
-        pairs = pairs_between(template, target, placed)
+        pairs = pairs_between(template, target, similarity)
         if len(pairs.points) < FEWEST:
             break
-        moved = placed.apply(pairs.points)
+        moved = similarity.apply(pairs.points)
         gaps = np.einsum("na,na->n", pairs.normals, moved - pairs.targets)
         error = float(np.sqrt(np.mean(gaps**2)))
         idle = 0 if error < lowest * (1.0 - SETTLED) else idle + 1
         if error < lowest:
-            best, lowest = placed, error
+            best, lowest = similarity, error
         if idle == _PATIENCE or error <= _EXACT * target.size:
             break
-        placed = _step(placed, moved, pairs, scales)
+        similarity = _step(similarity, moved, pairs, scales)
     return best
 
 
-def _step(placed: Similarity, moved: Floats, pairs: Pairs, scales: bool) -> Similarity:
-    """Solve one linearised round of ``slide``."""
+def _step(similarity: Similarity, moved: Floats, pairs: Pairs, scales: bool) -> Similarity:
+    """Solve one linearised iteration of ``slide``."""
     center = moved.mean(axis=0)
     arms = moved - center
     size = float(np.sqrt(np.einsum("na,na->", arms, arms) / len(arms)))
     arms = arms / size  # makes all unknowns of one magnitude
     gaps = (pairs.targets - moved) / size
-    # Columns: turn, shift, scale; rows: along the normal, then along x, y and z.
+    # Columns: rotation, shift, scale; rows: along the normal, then along x, y and z.
     x, y, z = arms.T
     null = np.zeros_like(x)
-    turns = np.stack([null, z, -y, -z, null, x, y, -x, null], axis=1).reshape(-1, 3, 3)
-    shifts = np.broadcast_to(np.eye(3), turns.shape)
-    whole = np.concatenate([turns, shifts, arms[:, :, None]], axis=2)[:, :, : 7 if scales else 6]
+    rotations = np.stack([null, z, -y, -z, null, x, y, -x, null], axis=1).reshape(-1, 3, 3)
+    shifts = np.broadcast_to(np.eye(3), rotations.shape)
+    whole = np.concatenate([rotations, shifts, arms[:, :, None]], axis=2)[
+        :, :, : 7 if scales else 6
+    ]
     along = np.einsum("na,nak->nk", pairs.normals, whole)
     rows = np.concatenate([along, HOLD * whole.reshape(-1, whole.shape[2])])
     values = np.einsum("na,na->n", pairs.normals, gaps)
@@ -258,42 +260,44 @@ def _step(placed: Similarity, moved: Floats, pairs: Pairs, scales: bool) -> Simi
     turn = rotation_vector_to_matrix(solved[:3])
     grow = 1.0 + (float(solved[6]) if scales else 0.0)
     grow = min(max(grow, 0.5), 2.0)  # a linear step knows nothing of what lies beyond
-    shift = grow * turn @ (placed.shift - center) + center + size * solved[3:6]
-    return Similarity(grow * placed.scale, turn @ placed.rotation, shift, placed.factors)
+    shift = grow * turn @ (similarity.shift - center) + center + size * solved[3:6]
+    return Similarity(
+        grow * similarity.scale, turn @ similarity.rotation, shift, similarity.factors
+    )
 
 
-def pairs_between(template: Side, target: Side, placed: Similarity) -> Pairs:
+def pairs_between(template: Side, target: Side, similarity: Similarity) -> Pairs:
     """Match samples of both sides with the other, and leave out what does not go together."""
     ours, theirs = template.samples, target.samples
-    found = template.find(placed.undo(theirs.positions))
-    towards = _kept(placed, found.positions, found.normals, theirs.positions, theirs.normals)
+    found = template.find(similarity.undo(theirs.positions))
+    towards = _kept(similarity, found.positions, found.normals, theirs.positions, theirs.normals)
     towards &= found.usable
-    reached = target.find(placed.apply(ours.positions))
-    away = _kept(placed, ours.positions, ours.normals, reached.positions, reached.normals)
+    reached = target.find(similarity.apply(ours.positions))
+    away = _kept(similarity, ours.positions, ours.normals, reached.positions, reached.normals)
     away &= reached.usable
     return Pairs(
         np.concatenate([found.positions[towards], ours.positions[away]]),
         np.concatenate([theirs.positions[towards], reached.positions[away]]),
-        np.concatenate([_turned(placed, found.normals[towards]), reached.normals[away]]),
+        np.concatenate([_rotated(similarity, found.normals[towards]), reached.normals[away]]),
     )
 
 
 def _kept(
-    placed: Similarity, points: Floats, normals: Floats, targets: Floats, target_normals: Floats
+    similarity: Similarity, points: Floats, normals: Floats, targets: Floats, target_normals: Floats
 ) -> Bools:
-    distances = np.linalg.norm(placed.apply(points) - targets, axis=1)
-    cosines = np.abs(np.einsum("na,na->n", _turned(placed, normals), target_normals))
+    distances = np.linalg.norm(similarity.apply(points) - targets, axis=1)
+    cosines = np.abs(np.einsum("na,na->n", _rotated(similarity, normals), target_normals))
     return (distances <= _FAR * np.median(distances)) & (cosines >= _SAME_WAY)
 
 
-def _turned(placed: Similarity, normals: Floats) -> Floats:
-    # Normals turn by the inverse transpose.
-    return unit(((normals / placed.own_factors) @ placed.rotation.T) / placed.factors)
+def _rotated(similarity: Similarity, normals: Floats) -> Floats:
+    # Normals rotate by the inverse transpose.
+    return unit(((normals / similarity.own_factors) @ similarity.rotation.T) / similarity.factors)
 
 
-def trimmed_rms(distances: Floats, share: float = 0.9) -> float:
-    """Return the root mean square of the smallest ``share`` of some distances."""
-    count = max(1, int(np.ceil(share * len(distances))))
+def trimmed_rms(distances: Floats, fraction: float = 0.9) -> float:
+    """Return the root mean square of the smallest ``fraction`` of some distances."""
+    count = max(1, int(np.ceil(fraction * len(distances))))
     smallest = np.partition(distances, count - 1)[:count]
     return float(np.sqrt(np.mean(smallest**2)))
 
@@ -324,24 +328,24 @@ class Gaps:
     uneven_away: Floats
 
 
-def gaps_between(template: Side, target: Side, placed: Similarity) -> Gaps:
+def gaps_between(template: Side, target: Side, similarity: Similarity) -> Gaps:
     """Return how far samples lie from the other side's surface.
 
     Parameters
     ----------
     template, target : Side
         As for ``iterate``.
-    placed : Similarity
+    similarity : Similarity
         The alignment to judge.
     """
     ours, theirs = template.samples.positions, target.samples.positions
-    near = template.find(placed.undo(theirs))
-    towards = theirs - placed.apply(near.positions)
-    moved = placed.apply(ours)
+    near = template.find(similarity.undo(theirs))
+    towards = theirs - similarity.apply(near.positions)
+    moved = similarity.apply(ours)
     reached = target.find(moved)
     away = moved - reached.positions
     lengths = (np.linalg.norm(towards, axis=1), np.linalg.norm(away, axis=1))
-    uneven = (_uneven(towards, _turned(placed, near.normals)), _uneven(away, reached.normals))
+    uneven = (_uneven(towards, _rotated(similarity, near.normals)), _uneven(away, reached.normals))
     return Gaps(*lengths, *uneven)
 
 

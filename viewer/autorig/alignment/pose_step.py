@@ -1,4 +1,4 @@
-"""One round of fitting a template: what its joints turn, and its limbs grow, to meet the target.
+"""One iteration of fitting a template: how joints rotate and limbs grow to meet the target.
 
 With x a vertex as it is laid onto the target, m the middle of all, c_j a joint, w_vj the weight of
 vertex v, s_vj its share that hangs on joint j or below it, and P_j the projection onto the limb's
@@ -28,19 +28,19 @@ import numpy as np
 from viewer.autorig.alignment.proportions import Limbs
 from viewer.rig.arrays import Floats, Ints
 
-__all__ = ["Laid", "Pairs", "PoseStep", "solve_step"]
+__all__ = ["AlignedTemplate", "Pairs", "PoseStep", "solve_step"]
 
 _HOLD = 0.2  # h: distances between points beside those to planes
-_TURNED, _GROWN = 3e-6, 3e-5  # prices of a radian, and of a growth by e, squared, in all
-_NOW = 1e-5  # the same in one round, of both
+_ROTATED, _GROWN = 3e-6, 3e-5  # prices of a radian, and of a growth by e, squared, in all
+_NOW = 1e-5  # the same in one iteration, of both
 _WHOLE = 1e-7  # price of moving the whole: a surface may slide along itself
-_MOST = 0.3  # radians that a joint turns in one round: more is no longer linear
+_MOST = 0.3  # radians that a joint rotates in one iteration: more is no longer linear
 _GROWTH = 0.2  # and logarithms that the whole or a limb grows by
 _FIXED = 1e6  # price of what may not change
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Laid:
+class AlignedTemplate:
     """A template as it stands in the target's frame.
 
     Attributes
@@ -82,18 +82,18 @@ class Pairs:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseStep:
-    """What a round changes, in the target's frame.
+    """What an iteration changes, in the target's frame.
 
     Attributes
     ----------
     middle : (3,)
-        What the whole turns and grows about.
+        What the whole rotates and grows about.
     turn, shift : (3,)
         Rotation vector and shift of the whole; the shift in the target's unit.
     growth : float
         Logarithm of the whole's factor.
-    joint_turns : (J, 3)
-        Rotation vectors of the joints, 0 for roots, which turn with the whole.
+    rotation_vectors : (J, 3)
+        Rotation vectors of the joints, 0 for roots, which rotate with the whole.
     limb_growths : (2, J)
         Logarithms of the limbs' factors: along, across.
     """
@@ -102,7 +102,7 @@ class PoseStep:
     turn: Floats
     shift: Floats
     growth: float
-    joint_turns: Floats
+    rotation_vectors: Floats
     limb_growths: Floats
 
 
@@ -112,18 +112,18 @@ class _Frame:
 
     middle: Floats
     size: float
-    laid: Laid
+    aligned: AlignedTemplate
     limbs: Limbs
     parents: Ints
 
 
 def solve_step(
-    laid: Laid,
+    aligned: AlignedTemplate,
     limbs: Limbs,
     parents: Ints,
     pairs: Pairs,
     size: float,
-    turned: Floats,
+    rotated: Floats,
     grown: Floats,
     scales: bool,
 ) -> PoseStep:
@@ -131,18 +131,18 @@ def solve_step(
 
     Parameters
     ----------
-    laid : Laid
+    aligned : AlignedTemplate
         The template.
     limbs : Limbs
-        Weights and shares of its joints.
+        Weights and fractions of its joints.
     parents : (J,)
         -1 for roots.
     pairs : Pairs
         One pair at least.
     size : float
         Of the target.
-    turned : (J, 3)
-        Sum of the turns of former rounds, radians.
+    rotated : (J, 3)
+        Sum of the rotations of former iterations, radians.
     grown : (2, J)
         Sum of the limbs' growths.
     scales : bool
@@ -151,10 +151,10 @@ def solve_step(
     Returns
     -------
     PoseStep
-        No joint turns by more than 0.3 radians, nothing grows by more than a fifth.
+        No joint rotates by more than 0.3 radians, nothing grows by more than a fifth.
     """
-    middle = laid.positions[pairs.vertices].mean(axis=0)
-    frame = _Frame(middle, size, laid, limbs, parents)
+    middle = aligned.positions[pairs.vertices].mean(axis=0)
+    frame = _Frame(middle, size, aligned, limbs, parents)
     matrix, right = _equations(frame, pairs.vertices, pairs.targets, pairs.normals)
     for axis in np.eye(3):
         normals = np.broadcast_to(axis, pairs.end_targets.shape)
@@ -165,29 +165,29 @@ def solve_step(
     below = np.flatnonzero(parents >= 0)
     matrix, right = matrix / count, right / count
     price = _prices(len(below), n_joints)
-    right[7:] -= price @ np.concatenate([turned[below].ravel(), grown.ravel()])
+    right[7:] -= price @ np.concatenate([rotated[below].ravel(), grown.ravel()])
     matrix[7:, 7:] += price
     now = np.full(len(right), _NOW)
     now[:7] = _WHOLE
     if not scales:
         now[6], now[-2 * n_joints :] = _FIXED, _FIXED
     solved = np.asarray(np.linalg.solve(matrix + np.diag(now), right), dtype=np.float64)
-    turns = np.zeros((n_joints, 3))
-    turns[below] = solved[7 : 7 + 3 * len(below)].reshape(-1, 3)
-    angles = np.linalg.norm(turns, axis=1, keepdims=True)
-    turns = turns * (_MOST / np.maximum(angles, _MOST))
+    rotations = np.zeros((n_joints, 3))
+    rotations[below] = solved[7 : 7 + 3 * len(below)].reshape(-1, 3)
+    angles = np.linalg.norm(rotations, axis=1, keepdims=True)
+    rotations = rotations * (_MOST / np.maximum(angles, _MOST))
     growths = np.clip(solved[-2 * n_joints :].reshape(2, -1), -_GROWTH, _GROWTH)
     growth = min(max(float(solved[6]), -_GROWTH), _GROWTH)
-    return PoseStep(middle, solved[:3], size * solved[3:6], growth, turns, growths)
+    return PoseStep(middle, solved[:3], size * solved[3:6], growth, rotations, growths)
 
 
-def _prices(n_turning: int, n_joints: int) -> Floats:
-    """Return the prices of all turns and growths as a quadratic form.
+def _prices(n_rotating: int, n_joints: int) -> Floats:
+    """Return the prices of all rotations and growths as a quadratic form.
 
     That all limbs are thicker, as in clothes, costs nothing: only differences do. Without that
     the whole would grow instead, and reach beyond the target.
     """
-    prices = np.diag(np.repeat([_TURNED, _GROWN], [3 * n_turning, 2 * n_joints]))
+    prices = np.diag(np.repeat([_ROTATED, _GROWN], [3 * n_rotating, 2 * n_joints]))
     prices[-n_joints:, -n_joints:] -= _GROWN / n_joints
     return prices
 
@@ -196,20 +196,20 @@ def _equations(
     frame: _Frame, vertices: Ints, targets: Floats, normals: Floats
 ) -> tuple[Floats, Floats]:
     """Return the normal equations of n . (x' - q) = 0; columns as they are named above."""
-    x = frame.laid.positions[vertices]
+    x = frame.aligned.positions[vertices]
     count = len(x)
     arms = (x - frame.middle) / frame.size
-    spokes = (x[:, None] - frame.laid.joints) / frame.size
+    spokes = (x[:, None] - frame.aligned.joints) / frame.size
     below = np.flatnonzero(frame.parents >= 0)
     # n . (w x a) = w . (a x n)
-    turning = _cross(spokes[:, below], normals[:, None])
-    turning *= frame.limbs.shares[vertices][:, below, None]
+    rotating = _cross(spokes[:, below], normals[:, None])
+    rotating *= frame.limbs.fractions[vertices][:, below, None]
     reach = _reach(frame, vertices, spokes)
     across = np.einsum("na,nja->nj", normals, reach)
-    along = np.einsum("nja,ja->nj", reach, frame.laid.axes) * (normals @ frame.laid.axes.T)
+    along = np.einsum("nja,ja->nj", reach, frame.aligned.axes) * (normals @ frame.aligned.axes.T)
     grow = np.einsum("na,na->n", normals, arms)[:, None]
     rows = np.concatenate(
-        [_cross(arms, normals), normals, grow, turning.reshape(count, -1), along, across - along],
+        [_cross(arms, normals), normals, grow, rotating.reshape(count, -1), along, across - along],
         axis=1,
     )
     gaps = np.einsum("na,na->n", normals, targets - x) / frame.size
@@ -219,11 +219,11 @@ def _equations(
 def _reach(frame: _Frame, vertices: Ints, spokes: Floats) -> Floats:
     """Return e_j above, over the size: (N, J, 3)."""
     reach = frame.limbs.weights[vertices][:, :, None] * spokes
-    shares, joints = frame.limbs.shares[vertices], frame.laid.joints
+    fractions, joints = frame.limbs.fractions[vertices], frame.aligned.joints
     for joint in np.flatnonzero(frame.parents >= 0).tolist():
         parent = frame.parents[joint]
         step = (joints[joint] - joints[parent]) / frame.size
-        reach[:, parent] += shares[:, joint, None] * step
+        reach[:, parent] += fractions[:, joint, None] * step
     return reach
 
 

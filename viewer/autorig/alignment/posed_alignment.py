@@ -1,4 +1,4 @@
-"""A template laid onto a target, its joints turned and limbs resized to what the target is.
+"""Alignment of a template whose pose and proportions differ from the target's.
 
 People in scans stand with lowered arms and have limbs of their own, templates stretch their arms
 out: no alignment of the whole lays one onto the other. So where the alignment leaves a gap, pose
@@ -38,11 +38,11 @@ from viewer.rig.skinning import deform
 
 __all__ = ["PosedAlignment", "align_posed"]
 
-_CLOSE = 0.002  # misfit over size up to which nothing is gained by turning joints
-# Share of the misfit that may be left if turned joints are to be kept: clothes can be fitted a
+_CLOSE = 0.002  # misfit over size up to which nothing is gained by rotating joints
+# Fraction of the misfit that may be left if rotated joints are to be kept: clothes can be fitted a
 # little better by bending the body, but only a figure in another pose much better.
 _KEPT, _PART_KEPT = 0.65, 0.5
-# A fit that leaves more than this and turned a joint by more is of another kind of figure, as of a
+# A fit that leaves more than this and rotated a joint by more is of another kind of figure, as of a
 # fox onto a pig: it bends the spine until the legs meet something.
 _POOR, _BENT = 0.01, np.radians(45.0)
 _SURE = 0.004  # misfit after the fit up to which a figure faces the right way: no other is tried
@@ -72,8 +72,8 @@ class PosedAlignment:
         The template's vertices in that pose, in its own frame.
     lines : tuple of Diagnostic
         What was done to pose and proportions, and what would fit better.
-    most_turned : (float, str)
-        The largest turn of a joint in radians, and its name; (0, "") if none was turned.
+    most_rotated : (float, str)
+        The largest rotation of a joint in radians, and its name; (0, "") if none was rotated.
     """
 
     alignment: Alignment
@@ -81,7 +81,7 @@ class PosedAlignment:
     pose: Pose
     positions: Floats
     lines: tuple[Diagnostic, ...]
-    most_turned: tuple[float, str] = (0.0, "")
+    most_rotated: tuple[float, str] = (0.0, "")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,7 +104,7 @@ def align_posed(
     fits: bool,
     report: Callable[[float, str], None],
 ) -> PosedAlignment:
-    """Lay a template onto a target, and turn its joints if it stands otherwise.
+    """Align a template with a target, and rotate its joints if its pose differs.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def align_posed(
     fits : bool
         Whether pose and proportions may change.
     report : callable
-        Told the share that is done, and what is being done; may raise to cancel.
+        Told the fraction that is done, and what is being done; may raise to cancel.
 
     Returns
     -------
@@ -132,9 +132,8 @@ def align_posed(
     RigError
         As ``align``.
     """
-    assert template.mesh is not None  # the caller looked
     posed = deform(template, pose)[0]
-    ours = Posed(posed, template.mesh.triangles)
+    ours = Posed(posed, template.require_mesh().triangles)
     triangles = target.triangles
     if volume(target.positions, triangles) < 0.0:
         triangles = triangles[:, ::-1]  # normals tell which side of a limb is which
@@ -172,16 +171,16 @@ def _if_better(
     rigid = kept.alignment
     is_part = rigid.away > PART
     before = misfit(rigid, is_part)
-    found = _fitted(job, rigid, lambda share: report(0.5 + 0.25 * share, "pose"))
+    found = _fitted(job, rigid, lambda fraction: report(0.5 + 0.25 * fraction, "pose"))
     may_turn = rigid.how in _FOUND and job.settings.facing is None and not is_part
     if may_turn and misfit(found.alignment, False) > _SURE:
-        behind = _turned_round(job, ours, rigid, job.template.up)
+        behind = _facing_back(job, ours, rigid, job.template.up)
         if misfit(behind, False) < _ALIKE * before:
-            other = _fitted(job, behind, lambda share: report(0.75 + 0.25 * share, "pose"))
+            other = _fitted(job, behind, lambda fraction: report(0.75 + 0.25 * fraction, "pose"))
             if misfit(other.alignment, False) < _CLEARLY * misfit(found.alignment, False):
                 found = other
     after = misfit(found.alignment, is_part)
-    bent, name = found.most_turned
+    bent, name = found.most_rotated
     gap = {"gap": _gap(after, before)}
     if after > (_PART_KEPT if is_part else _KEPT) * before:
         return replace(kept, lines=(Diagnostic("R003.not-fitted", values=gap),))
@@ -195,28 +194,27 @@ def _if_better(
 
 def _fitted(job: _Job, start: Alignment, report: Callable[[float], None]) -> PosedAlignment:
     template = job.template
-    assert template.mesh is not None  # the caller looked
-    found = fit_pose(template, job.pose, start.placed, job.cloud, job.exact, job.scales, report)
+    found = fit_pose(template, job.pose, start.similarity, job.cloud, job.exact, job.scales, report)
     posed = deform(found.figure, found.pose)[0]
-    ours = Triangles(posed, template.mesh.triangles, job.settings.samples)
+    ours = Triangles(posed, template.require_mesh().triangles, job.settings.samples)
     how = start.how if start.how == "landmarks" else "fit"
-    alignment = Alignment.of(ours, job.exact, found.placed, how)
+    alignment = Alignment.of(ours, job.exact, found.similarity, how)
     return PosedAlignment(
-        alignment, found.figure, found.pose, posed, _lines(found), _most_turned(found)
+        alignment, found.figure, found.pose, posed, _lines(found), _most_rotated(found)
     )
 
 
-def _turned_round(job: _Job, ours: Posed, rigid: Alignment, up: str) -> Alignment:
-    """Return the template facing the other way, laid onto the target as well as it goes."""
-    placed = rigid.placed
+def _facing_back(job: _Job, ours: Posed, rigid: Alignment, up: str) -> Alignment:
+    """Return the template facing the other way, aligned with the target as well as it goes."""
+    similarity = rigid.similarity
     half = rotation_vector_to_matrix(np.pi * axis_direction(up))
-    middle = placed.apply(ours.positions.mean(axis=0))
-    rotation = placed.rotation @ half
-    shift = middle - placed.scale * rotation @ ours.positions.mean(axis=0)
+    middle = similarity.apply(ours.positions.mean(axis=0))
+    rotation = similarity.rotation @ half
+    shift = middle - similarity.scale * rotation @ ours.positions.mean(axis=0)
     exact = Triangles(ours.positions, ours.triangles, job.settings.samples)
     dense = sample_surface(ours.positions, ours.triangles, job.settings.dense)
     cloud = Cloud(exact.samples, dense)
-    start = Similarity(placed.scale, rotation, shift, placed.factors)
+    start = Similarity(similarity.scale, rotation, shift, similarity.factors)
     return Alignment.of(
         exact, job.exact, iterate(cloud, job.cloud, start, _ROUNDS, job.scales), "search"
     )
@@ -229,13 +227,13 @@ def _stretched(
     rigid = kept.alignment
     template = Triangles(ours.positions, ours.triangles, samples)
     trials = [
-        fit_axes(template, exact, rigid.placed, _AXES_ROUNDS, turns=True, own=own)
+        fit_axes(template, exact, rigid.similarity, _AXES_ROUNDS, rotations=True, own=own)
         for own in (False, True)
     ]
     alignments = [
-        Alignment.of(template, exact, placed, "fit")
-        for placed in trials
-        if _stretch(placed) >= _STRETCH
+        Alignment.of(template, exact, similarity, "fit")
+        for similarity in trials
+        if _stretch(similarity) >= _STRETCH
     ]
     if not alignments:
         return None
@@ -248,7 +246,7 @@ def _stretched(
         kept,
         alignment=alignment,
         lines=(
-            Diagnostic("R003.proportions", values={"scales": _scales(alignment.placed)}),
+            Diagnostic("R003.proportions", values={"scales": _scales(alignment.similarity)}),
             Diagnostic("R003.gap", values={"gap": _gap(after, before)}),
         ),
     )
@@ -264,21 +262,21 @@ def _is_closer(stretched: PosedAlignment, other: PosedAlignment) -> bool:
 def _advice(stretched: PosedAlignment, kept: PosedAlignment) -> Diagnostic:
     """Return the remark that a stretched template would fit better."""
     gap, other = (100.0 * misfit(one.alignment, False) for one in (stretched, kept))
-    placed = stretched.alignment.placed
-    is_own = (placed.factors == 1.0).all()
+    similarity = stretched.alignment.similarity
+    is_own = (similarity.factors == 1.0).all()
     key = "R004.stretched-along-its-axes" if is_own else "R004.stretched-along-the-target"
-    return Diagnostic(key, values={"scales": _scales(placed), "gap": gap, "kept": other})
+    return Diagnostic(key, values={"scales": _scales(similarity), "gap": gap, "kept": other})
 
 
-def _stretch(placed: Similarity) -> float:
-    factors = placed.factors * placed.own_factors
+def _stretch(similarity: Similarity) -> float:
+    factors = similarity.factors * similarity.own_factors
     return float(factors.max() / factors.min())
 
 
-def _scales(placed: Similarity) -> Phrase:
+def _scales(similarity: Similarity) -> Phrase:
     """Return the scales along the axes of the template or the target."""
-    is_own = bool((placed.factors == 1.0).all())
-    scales = placed.scale * (placed.own_factors if is_own else placed.factors)
+    is_own = bool((similarity.factors == 1.0).all())
+    scales = similarity.scale * (similarity.own_factors if is_own else similarity.factors)
     x, y, z = scales.tolist()
     key = "scales-along-its-axes" if is_own else "scales-along-the-target"
     return Phrase(key, x=x, y=y, z=z)
@@ -293,7 +291,7 @@ def _lines(found: Fitted) -> tuple[Diagnostic, ...]:
     """Say which joint was turned most, and which limb resized most."""
     skeleton = found.figure.skeleton
     assert skeleton is not None  # the caller looked
-    angle, name = _most_turned(found)
+    angle, name = _most_rotated(found)
     longest = int(np.abs(found.grown[0]).argmax())
     values = {
         "joint": name,
@@ -304,10 +302,9 @@ def _lines(found: Fitted) -> tuple[Diagnostic, ...]:
     return (Diagnostic("R003.pose", values=values),)
 
 
-def _most_turned(found: Fitted) -> tuple[float, str]:
-    """Return the largest turn of a joint in radians, and the joint's name."""
-    skeleton = found.figure.skeleton
-    assert skeleton is not None  # the caller looked
-    angles = np.linalg.norm(found.turned, axis=1)
+def _most_rotated(found: Fitted) -> tuple[float, str]:
+    """Return the largest rotation of a joint in radians, and the joint's name."""
+    skeleton = found.figure.require_skeleton()
+    angles = np.linalg.norm(found.rotated, axis=1)
     most = int(angles.argmax())
     return float(angles[most]), joint_label(skeleton, most)

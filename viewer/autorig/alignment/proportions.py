@@ -32,7 +32,7 @@ class Limbs:
     ----------
     weights : (V, J)
         Of the skin, each vertex's adding up to 1.
-    shares : (V, J)
+    fractions : (V, J)
         The same of a joint and all below it.
     axes : (J, 3)
         Unit vectors along the limbs, where the figure is bound; 0 for a joint that moves nothing.
@@ -41,7 +41,7 @@ class Limbs:
     """
 
     weights: Floats
-    shares: Floats
+    fractions: Floats
     axes: Floats
     partners: Ints
 
@@ -57,28 +57,27 @@ def limbs_of(figure: Figure) -> Limbs:
     figure : Figure
         With mesh, skeleton and skin.
     """
-    mesh, skeleton, skin = figure.mesh, figure.skeleton, figure.skin
-    assert mesh is not None and skeleton is not None and skin is not None  # the caller looked
+    mesh, skeleton, skin = figure.attached()
     parents = skeleton.parents
     weights = _dense(skin)
-    shares = weights.copy()
+    fractions = weights.copy()
     for joint in range(len(parents) - 1, -1, -1):
         # Children come after their parents, so this joint's own sum is final.
         if parents[joint] >= 0:
-            shares[:, parents[joint]] += shares[:, joint]
+            fractions[:, parents[joint]] += fractions[:, joint]
     joints = _bound_joints(skin)
     ways = np.zeros_like(joints)
     below = np.flatnonzero(parents >= 0)
-    carried = shares.sum(axis=0)
-    steps = carried[below, None] * (joints[below] - joints[parents[below]])
+    transferred = fractions.sum(axis=0)
+    steps = transferred[below, None] * (joints[below] - joints[parents[below]])
     np.add.at(ways, parents[below], steps)
     last = np.setdiff1d(np.arange(len(parents)), parents[below])
-    ways[last] = weights[:, last].T @ mesh.positions - carried[last, None] * joints[last]
+    ways[last] = weights[:, last].T @ mesh.positions - transferred[last, None] * joints[last]
     try:
         partners = joint_partners(figure)
     except RigError:
         partners = np.arange(len(parents), dtype=np.int32)  # not symmetric: nothing to keep
-    return Limbs(weights, shares, unit(ways), partners)
+    return Limbs(weights, fractions, unit(ways), partners)
 
 
 def resized(figure: Figure, limbs: Limbs, lengths: Floats, girths: Floats) -> Figure:
@@ -98,8 +97,7 @@ def resized(figure: Figure, limbs: Limbs, lengths: Floats, girths: Floats) -> Fi
     Figure
         Same joints and weights; all else that belongs to vertices is kept as it is.
     """
-    mesh, skeleton, skin = figure.mesh, figure.skeleton, figure.skin
-    assert mesh is not None and skeleton is not None and skin is not None  # the caller looked
+    mesh, skeleton, skin = figure.attached()
     scales = girths[:, None, None] * np.eye(3) + (lengths - girths)[:, None, None] * np.einsum(
         "ja,jb->jab", limbs.axes, limbs.axes
     )

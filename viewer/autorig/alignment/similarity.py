@@ -11,7 +11,7 @@ from viewer.rig.arrays import Floats, frozen
 
 __all__ = ["Similarity", "fit_similarity"]
 
-_ON_LINE = 1e-6  # second over first extent: points nearer to a line than this leave a free turn
+_ON_LINE = 1e-6  # second over first extent: points nearer to a line than this leave a free rotation
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,8 +73,8 @@ class Similarity:
 
     def undo(self, points: Floats) -> Floats:
         """Map points (..., 3) of the space mapped to back."""
-        turned = (points - self.shift) / (self.scale * self.factors) @ self.rotation
-        return turned / self.own_factors
+        rotated = (points - self.shift) / (self.scale * self.factors) @ self.rotation
+        return rotated / self.own_factors
 
 
 def fit_similarity(points: Floats, targets: Floats, scale: float | None = None) -> Similarity:
@@ -98,7 +98,7 @@ def fit_similarity(points: Floats, targets: Floats, scale: float | None = None) 
     Raises
     ------
     RigError
-        If there are fewer than three pairs, or the points lie on a line: then any turn about it
+        If there are fewer than three pairs, or the points lie on a line: then any rotation about it
         fits equally well.
 
     >>> corners = np.eye(3)

@@ -1,4 +1,4 @@
-"""Lay a posed template onto a target mesh: where it is already, by landmarks, or by searching."""
+"""Alignment of a posed template with a target mesh: in place, by landmarks, or by searching."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from viewer.autorig.alignment.icp import (
     slide,
     trimmed_rms,
 )
-from viewer.autorig.alignment.orientation_search import axis_turns, in_place, search
+from viewer.autorig.alignment.orientation_search import axis_rotations, in_place, search
 from viewer.autorig.alignment.similarity import Similarity, fit_similarity
 from viewer.autorig.surface.samples import sample_surface
 from viewer.diagnostics import Diagnostic, Phrase
@@ -122,7 +122,7 @@ class Alignment:
 
     Attributes
     ----------
-    placed : Similarity
+    similarity : Similarity
         Template to target, in the target's unit; never a reflection.
     error : float
         Trimmed RMS distance (the best 90 %) of the target from the template, over the target's
@@ -138,29 +138,29 @@ class Alignment:
         proportions were fitted beyond that, unless landmarks were given.
     """
 
-    placed: Similarity
+    similarity: Similarity
     error: float
     away: float
     uneven: tuple[float, ...]
     how: str
 
     @classmethod
-    def of(cls, template: Side, target: Side, placed: Similarity, how: str) -> Alignment:
+    def of(cls, template: Side, target: Side, similarity: Similarity, how: str) -> Alignment:
         """Return an alignment with its errors.
 
         Parameters
         ----------
         template, target : Side
             Both meshes.
-        placed : Similarity
+        similarity : Similarity
             Where the template lies.
         how : str
             See above.
         """
         size = target.size
-        gaps = gaps_between(template, target, placed)
+        gaps = gaps_between(template, target, similarity)
         return cls(
-            placed,
+            similarity,
             error=trimmed_rms(gaps.towards) / size,
             away=trimmed_rms(gaps.away) / size,
             uneven=tuple(
@@ -192,12 +192,12 @@ def align(
     settings: AlignmentSettings,
     report: Callable[[float, str], None],
 ) -> Alignment:
-    """Find the similarity that lays the template onto the target.
+    """Find the similarity that aligns the template with the target.
 
-    A target that lies in place already, in another unit or turned by quarter turns at most, is
+    A target that lies in place already, in another unit or rotated by quarter turns at most, is
     left there: a fit of a part (a shirt, an open shell) would only move it away. Otherwise all
-    quarter turns are tried, each with a few rounds of closest points; the best is refined on the
-    surfaces.
+    quarter turns are tried, each with a few iterations of closest points; the best is refined on
+    the surfaces.
 
     Parameters
     ----------
@@ -208,7 +208,7 @@ def align(
     settings : AlignmentSettings
         What is known or wanted.
     report : callable
-        Told the share that is done, and what is being done; may raise to cancel.
+        Told the fraction that is done, and what is being done; may raise to cancel.
 
     Returns
     -------
@@ -237,27 +237,29 @@ def align(
             report(0.2, "alignment")
             start = iterate(coarse[0], coarse[1], start, _ROUNDS, settings.scale != "none")
         return Alignment.of(ours, theirs, _refined(fine, start, settings, report), "landmarks")
-    turns = axis_turns(template_up, settings.up, settings.facing)
-    stays = in_place(coarse[0], coarse[1], turns, scaled=settings.scale != "none")
+    rotations = axis_rotations(template_up, settings.up, settings.facing)
+    stays = in_place(coarse[0], coarse[1], rotations, scaled=settings.scale != "none")
     report(0.1, "alignment")
     if stays.error <= _SURELY:
-        return Alignment.of(ours, theirs, stays.placed, "in place")
+        return Alignment.of(ours, theirs, stays.similarity, "in place")
     scale = 1.0 if settings.scale == "none" else None
-    best = search(coarse[0], coarse[1], turns, scale, lambda s: report(0.1 + 0.7 * s, "alignment"))
-    left = Alignment.of(ours, theirs, stays.placed, "in place")
-    found = Alignment.of(ours, theirs, best.placed, "search")
+    best = search(
+        coarse[0], coarse[1], rotations, scale, lambda s: report(0.1 + 0.7 * s, "alignment")
+    )
+    left = Alignment.of(ours, theirs, stays.similarity, "in place")
+    found = Alignment.of(ours, theirs, best.similarity, "search")
     is_part = found.away > PART
     # Sliding perfects what nearly fits; in another pose it takes long and leads nowhere.
     if settings.scale == "axes" or misfit(found, True) <= _SLIDING:
-        placed = _refined(fine, best.placed, settings, report)
-        slid = Alignment.of(ours, theirs, placed, "search")
+        similarity = _refined(fine, best.similarity, settings, report)
+        slid = Alignment.of(ours, theirs, similarity, "search")
         is_part &= slid.away > PART
         # It looks at what faces each other alone, and may leave ends of limbs behind.
         if settings.scale == "axes" or misfit(slid, is_part) <= misfit(found, is_part):
             found = slid
-    share = _PART_BETTER if is_part else _BETTER
+    fraction = _PART_BETTER if is_part else _BETTER
     gap = misfit(left, is_part)
-    return found if gap > _IN_PLACE or misfit(found, is_part) < share * gap else left
+    return found if gap > _IN_PLACE or misfit(found, is_part) < fraction * gap else left
 
 
 def _landmark_fit(landmarks: Floats, scale: str) -> Similarity:
@@ -324,19 +326,24 @@ _HOW = {
 
 def alignment_lines(alignment: Alignment) -> list[Diagnostic]:
     """Return what a person should know: scale, turn, shift, error, and whether to doubt it."""
-    placed = alignment.placed
-    angle = np.degrees(np.arccos(np.clip((np.trace(placed.rotation) - 1.0) / 2.0, -1.0, 1.0)))
+    similarity = alignment.similarity
+    angle = np.degrees(np.arccos(np.clip((np.trace(similarity.rotation) - 1.0) / 2.0, -1.0, 1.0)))
     how = Phrase(_HOW[alignment.how])
-    if alignment.how == "in place" and placed.scale == 1.0 and angle == 0.0:
+    if alignment.how == "in place" and similarity.scale == 1.0 and angle == 0.0:
         how = Phrase("aligned-as-it-is")
     factors: Phrase | str = ""
-    for numbers, key in ((placed.factors, "factors"), (placed.own_factors, "own-factors")):
+    for numbers, key in ((similarity.factors, "factors"), (similarity.own_factors, "own-factors")):
         if (numbers != 1.0).any():
             factors = Phrase(key, **_by_axis(numbers))
-    values = {"how": how, "scale": float(placed.scale), "factors": factors, "angle": float(angle)}
+    values = {
+        "how": how,
+        "scale": float(similarity.scale),
+        "factors": factors,
+        "angle": float(angle),
+    }
     errors = {"error": 100.0 * alignment.error, "away": 100.0 * alignment.away}
     lines = [
-        Diagnostic("R001.alignment", values={**values, **_by_axis(placed.shift)}),
+        Diagnostic("R001.alignment", values={**values, **_by_axis(similarity.shift)}),
         Diagnostic("R001.error", values=errors),
     ]
     if alignment.error > _BAD:

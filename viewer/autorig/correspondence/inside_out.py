@@ -1,4 +1,4 @@
-"""Parts of a target whose triangles are wound the wrong way, and turning these round.
+"""Parts of a target whose triangles are wound the wrong way, and their reversal.
 
 A part that faces the other way than the template may be a lining, which is right as it is. It is
 wrong where it encloses a volume, or is most of the target.
@@ -15,14 +15,14 @@ from viewer.autorig.surface.welding import Welded
 from viewer.rig.arrays import Bools, Ints
 from viewer.rig.mesh import Mesh, vertex_normals
 
-__all__ = ["turned_round", "wound_backwards"]
+__all__ = ["with_reversed_winding", "wound_backwards"]
 
 _CLOSED = 0.25  # border edges squared, by triangles: holes up to this leave a volume its sign
 _MOST = 0.5  # of the target's area
 
 
 def wound_backwards(target: Welded, facing_away: Ints) -> Bools:
-    """Return the vertices of parts whose triangles should be turned round.
+    """Return the vertices of parts whose triangles should be reversed.
 
     Parameters
     ----------
@@ -53,8 +53,8 @@ def wound_backwards(target: Welded, facing_away: Ints) -> Bools:
     return chosen[target.islands][target.vertices]
 
 
-def turned_round(mesh: Mesh, vertices: Bools) -> Mesh:
-    """Return a mesh with the triangles at some vertices turned round, and normals to match.
+def with_reversed_winding(mesh: Mesh, vertices: Bools) -> Mesh:
+    """Return a mesh with the triangles at some vertices reversed, and normals to match.
 
     Parameters
     ----------

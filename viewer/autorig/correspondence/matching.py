@@ -1,4 +1,4 @@
-"""Which vertices of a target lie on the template's surface, and where.
+"""Correspondence of a target's vertices with the template's surface.
 
 A vertex is matched if the closest point of the template is near enough and faces the same way
 (Abdrashitov et al. 2023). Skin that touches other skin, such as an arm at rest on the torso,
@@ -24,8 +24,8 @@ from viewer.rig.mesh import vertex_normals
 
 __all__ = ["MatchSettings", "Matches", "Template", "match", "sheet_normals"]
 
-_INSIDE_OUT = math.radians(120.0)  # an angle that says "turned round" rather than "folded"
-_MOST = 0.75  # of an island's near vertices: so many turned round, and the island is
+_INSIDE_OUT = math.radians(120.0)  # an angle that says "reversed" rather than "folded"
+_MOST = 0.75  # of an island's near vertices: so many reversed, and the island is
 _TOGETHER = math.radians(80.0)  # a normal and the middle of its group; see _sides
 _CANCELLED = 1e-3  # of the areas around a vertex: what is left where two sides cancel out
 
@@ -45,7 +45,7 @@ class MatchSettings:
         have normals of their own. Sheets thinner than this are matched on the side that fits.
     flipped_normals : bool
         Let a normal that points the other way count as well. An island that as a whole is
-        inside out is turned round without this.
+        inside out is reversed without this.
     """
 
     max_distance: float = 0.05
@@ -74,7 +74,7 @@ class Matches:
     angles : (W,)
         Radians between the normals there, 0 where the target has no normal.
     inside_out : (I,) int32
-        Islands of the target that were turned round.
+        Islands of the target that were reversed.
     """
 
     points: SurfacePoints
@@ -203,8 +203,8 @@ def _inside_out(target: Welded, angles: Floats, judged: Bools) -> Ints:
     """Return the islands most of whose judged vertices face the other way."""
     of = target.islands[judged]
     total = np.bincount(of, minlength=target.n_islands)
-    turned = np.bincount(of[angles[judged] > _INSIDE_OUT], minlength=target.n_islands)
-    return np.nonzero((turned > _MOST * total) & (total > 0))[0].astype(np.int32)
+    rotated = np.bincount(of[angles[judged] > _INSIDE_OUT], minlength=target.n_islands)
+    return np.nonzero((rotated > _MOST * total) & (total > 0))[0].astype(np.int32)
 
 
 def _sides(template: Template, positions: Floats, normals: Floats) -> SurfacePoints:

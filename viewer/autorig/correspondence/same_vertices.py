@@ -20,7 +20,7 @@ from viewer.rig.geometry.closest_point import SurfacePoints
 
 __all__ = ["at_vertices", "same_vertices"]
 
-_EDGES = 0.8  # share of a vertex's edges that must be edges of the template
+_EDGES = 0.8  # fraction of a vertex's edges that must be edges of the template
 _SLID = 0.5  # of the mean length of its edges: how far a vertex may have slid along the surface
 _FEW = 10_000  # points for which threads take longer to start than they save
 

@@ -1,4 +1,4 @@
-"""How much each vertex differs from its neighbours: Laplace operators of triangle meshes."""
+"""Laplace operators of triangle meshes: how much each vertex differs from its neighbours."""
 
 from __future__ import annotations
 
@@ -122,8 +122,8 @@ def voronoi_areas(positions: Floats, triangles: Ints) -> Floats:
     corners = positions[triangles]
     offsets = np.roll(corners, -1, axis=1) - np.roll(corners, 1, axis=1)  # opposite each corner
     squares = np.einsum("tka,tka->tk", offsets, offsets)
-    shares = squares * cotangents / 8.0
-    parts = np.roll(shares, 1, axis=1) + np.roll(shares, -1, axis=1)
+    fractions = squares * cotangents / 8.0
+    parts = np.roll(fractions, 1, axis=1) + np.roll(fractions, -1, axis=1)
     area = 0.5 * np.linalg.norm(np.cross(offsets[:, 1], offsets[:, 2]), axis=1)
     obtuse: Bools = cotangents < 0.0
     is_obtuse: Bools = np.logical_or.reduce(obtuse, axis=1)

@@ -1,4 +1,4 @@
-"""How often a surface winds around points: 1 inside a closed mesh, 0 outside."""
+"""Winding numbers of a surface around points: 1 inside a closed mesh, 0 outside."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A template's motions for the figure that took over its rig."""
+"""Transfer of a template's motions to the figure that got its rig."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.skeleton import Skeleton
 
-__all__ = ["carry_clip"]
+__all__ = ["transfer_clip"]
 
 _FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
 
 
-def carry_clip(
+def transfer_clip(
     clip: Clip | SampledClip,
     skeleton: Skeleton,
     length_scale: float,

@@ -1,4 +1,4 @@
-"""A template's pose correctives on another mesh."""
+"""Transfer of pose correctives to another mesh."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.blendshapes import Correctives
 from viewer.rig.geometry.closest_point import SurfacePoints, interpolate
 
-__all__ = ["MOST_NUMBERS", "carry_correctives"]
+__all__ = ["MOST_NUMBERS", "transfer_correctives"]
 
 MOST_NUMBERS = 120_000_000
-"""Of all carried correctives, 1 GB: more are left out."""
+"""Of all transferred correctives, 1 GB: more are left out."""
 
-_ROUNDS = 10  # of evening out where correctives fade
+_ROUNDS = 10  # of smoothing where correctives fade
 
 
-def carry_correctives(
+def transfer_correctives(
     correctives: Correctives,
     points: SurfacePoints,
     triangles: Ints,
@@ -57,26 +57,26 @@ def carry_correctives(
     if len(offsets) * len(positions) * 3 > MOST_NUMBERS:
         return None
     factors = scale * _fade(matched, positions, target_triangles)
-    carried = np.empty((len(offsets), len(positions), 3))
+    transferred = np.empty((len(offsets), len(positions), 3))
     # One direction after the other: all at once would take their memory three times.
-    for row, direction in zip(carried, offsets, strict=True):
+    for row, direction in zip(transferred, offsets, strict=True):
         np.multiply(interpolate(points, triangles, direction), factors[:, None], out=row)
-    return Correctives(carried)
+    return Correctives(transferred)
 
 
 def _fade(matched: Bools, positions: Floats, triangles: Ints) -> Floats:
-    """Return 1 on the template, 0 away from it, evened out between: (V,)."""
+    """Return 1 on the template, 0 away from it, smooth between: (V,)."""
     if matched.all():
         return np.ones(len(matched))
     welded = weld(positions, triangles)
     count = len(welded.positions)
-    share = np.zeros(count)
-    share[welded.vertices] = matched
+    fraction = np.zeros(count)
+    fraction[welded.vertices] = matched
     links = edges(welded.triangles)
     degree = np.bincount(links.ravel(), minlength=count)
     for _ in range(_ROUNDS):
-        sums = np.bincount(links[:, 0], share[links[:, 1]], minlength=count)
-        sums += np.bincount(links[:, 1], share[links[:, 0]], minlength=count)
-        mean = np.where(degree > 0, sums / np.maximum(degree, 1), share)
-        share = 0.5 * (share + mean)
-    return np.asarray(share[welded.vertices], dtype=np.float64)
+        sums = np.bincount(links[:, 0], fraction[links[:, 1]], minlength=count)
+        sums += np.bincount(links[:, 1], fraction[links[:, 0]], minlength=count)
+        mean = np.where(degree > 0, sums / np.maximum(degree, 1), fraction)
+        fraction = 0.5 * (fraction + mean)
+    return np.asarray(fraction[welded.vertices], dtype=np.float64)

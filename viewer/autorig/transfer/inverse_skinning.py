@@ -1,4 +1,4 @@
-"""Take a mesh out of its pose: each vertex by the inverse of its blended matrix."""
+"""Inverse skinning: a posed mesh back to rest, each vertex by its inverse blended matrix."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from viewer.rig.geometry.rotation import nearest_rotations
 from viewer.rig.skin import Skin
 from viewer.rig.skinning.lbs import blended_matrices
 
-__all__ = ["SMALLEST_STRETCH", "Unposed", "mend", "unpose"]
+__all__ = ["SMALLEST_STRETCH", "InvertedSkinning", "invert_skinning", "repair_tears"]
 
 SMALLEST_STRETCH = 0.2
 """Singular value below which a blended matrix counts as singular: two joints bent apart by an
 angle a with equal weights give cos(a / 2), and here a = 157 degrees."""
 
-_RINGS = 2  # neighbours of guarded vertices that may move to mend a tear
-_SMOOTH = 0.01  # weight of the shape against the pose when a tear is mended
+_RINGS = 2  # neighbours of guarded vertices that may move to repair a tear
+_SMOOTH = 0.01  # weight of the shape against the pose when a tear is repaired
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Unposed:
+class InvertedSkinning:
     """A mesh at rest.
 
     Attributes
@@ -44,7 +44,7 @@ class Unposed:
     guarded: Bools
 
 
-def unpose(positions: Floats, skin: Skin, palette: Floats) -> Unposed:
+def invert_skinning(positions: Floats, skin: Skin, palette: Floats) -> InvertedSkinning:
     """Undo linear blend skinning: rest = B^-1 (t - d), with sum_j w_j A_j = [B | d].
 
     Only the 3 x 3 part is inverted. Where its smallest singular value is below
@@ -62,7 +62,7 @@ def unpose(positions: Floats, skin: Skin, palette: Floats) -> Unposed:
 
     Returns
     -------
-    Unposed
+    InvertedSkinning
         In the binding space of the skin.
     """
     matrices = blended_matrices(skin, palette)
@@ -73,7 +73,7 @@ def unpose(positions: Floats, skin: Skin, palette: Floats) -> Unposed:
         inverted[guarded] = nearest_rotations(linear[guarded])[0]
     steps = positions - matrices[:, :, 3]
     rest = np.asarray(np.linalg.solve(inverted, steps[..., None])[..., 0], dtype=np.float64)
-    return Unposed(rest, matrices, guarded)
+    return InvertedSkinning(rest, matrices, guarded)
 
 
 def _is_singular(linear: Floats) -> Bools:
@@ -92,7 +92,7 @@ def _is_singular(linear: Floats) -> Bools:
     return singular
 
 
-def mend(unposed: Unposed, posed: Floats, triangles: Ints) -> Floats:
+def repair_tears(inverted: InvertedSkinning, posed: Floats, triangles: Ints) -> Floats:
     """Smooth what surrounds guarded vertices, in the least-squares sense.
 
     Minimises sum_v |B_v x_v + d_v - t_v|^2 + lambda |L x|^2 over the guarded vertices and two
@@ -101,8 +101,8 @@ def mend(unposed: Unposed, posed: Floats, triangles: Ints) -> Floats:
 
     Parameters
     ----------
-    unposed : Unposed
-        What ``unpose`` gave.
+    inverted : InvertedSkinning
+        What ``invert_skinning`` gave.
     posed : (V, 3)
         The vertices t that posing should give back.
     triangles : (T, 3)
@@ -111,22 +111,22 @@ def mend(unposed: Unposed, posed: Floats, triangles: Ints) -> Floats:
     Returns
     -------
     (V, 3)
-        Rest positions; those of ``unposed`` where nothing was guarded.
+        Rest positions; those of ``inverted`` where nothing was guarded.
     """
-    if not unposed.guarded.any():
-        return unposed.positions
+    if not inverted.guarded.any():
+        return inverted.positions
     sparse = scipy_part("sparse")
-    welded = weld(unposed.positions, triangles)
+    welded = weld(inverted.positions, triangles)
     count = len(welded.positions)
     links = edges(welded.triangles)
     free = np.zeros(count, dtype=np.bool_)
-    free[welded.vertices[unposed.guarded]] = True
+    free[welded.vertices[inverted.guarded]] = True
     for _ in range(_RINGS):
         touched = links[free[links].any(axis=1)]
         free[touched.ravel()] = True
     own = np.flatnonzero(free)
     laplacian = _laplacian(count, links)
-    normal, right = _normal_equations(unposed, posed, welded.vertices, free)
+    normal, right = _normal_equations(inverted, posed, welded.vertices, free)
     smooth = sparse.kron(laplacian.T @ laplacian, sparse.diags_array(np.ones(3)))
     dof = (3 * own[:, None] + np.arange(3)).ravel()
     fixed = np.setdiff1d(np.arange(3 * count), dof)
@@ -136,7 +136,7 @@ def mend(unposed: Unposed, posed: Floats, triangles: Ints) -> Floats:
     solved = scipy_part("sparse.linalg").spsolve(
         system, right - _SMOOTH * (smooth[:, fixed] @ places[fixed])
     )
-    moved = unposed.positions.copy()
+    moved = inverted.positions.copy()
     result = welded.positions.copy()
     result[own] = solved.reshape(-1, 3)
     inside = free[welded.vertices]
@@ -145,7 +145,7 @@ def mend(unposed: Unposed, posed: Floats, triangles: Ints) -> Floats:
 
 
 def _laplacian(count: int, links: Ints) -> Any:
-    """Return the mean of the neighbours minus the vertex itself, with the sign turned."""
+    """Return the mean of the neighbours minus the vertex itself, with the sign reversed."""
     sparse = scipy_part("sparse")
     a, b = links[:, 0], links[:, 1]
     degree = np.maximum(np.bincount(links.ravel(), minlength=count), 1)
@@ -155,14 +155,14 @@ def _laplacian(count: int, links: Ints) -> Any:
 
 
 def _normal_equations(
-    unposed: Unposed, posed: Floats, welded: Ints, free: Bools
+    inverted: InvertedSkinning, posed: Floats, welded: Ints, free: Bools
 ) -> tuple[Any, Floats]:
     """Return B^T B as blocks, and B^T (t - d), summed over coincident vertices."""
     number = np.cumsum(free) - 1
     inside = np.flatnonzero(free[welded])
     rows = number[welded[inside]]
-    linear = unposed.matrices[inside, :, :3]
-    steps = posed[inside] - unposed.matrices[inside, :, 3]
+    linear = inverted.matrices[inside, :, :3]
+    steps = posed[inside] - inverted.matrices[inside, :, 3]
     blocks = np.zeros((int(free.sum()), 3, 3))
     right = np.zeros((len(blocks), 3))
     np.add.at(blocks, rows, np.swapaxes(linear, 1, 2) @ linear)

@@ -1,4 +1,4 @@
-"""Where a template's joints belong in another mesh: moved as the surface around them moved."""
+"""Transfer of joints to another mesh: each moves as the surface around it moved."""
 
 from __future__ import annotations
 
@@ -13,29 +13,29 @@ from viewer.rig.blendshapes import JointRegressor
 from viewer.rig.geometry.closest_point import Surface
 from viewer.rig.skin import Skin, influence_counts
 
-__all__ = ["CarriedJoints", "boundary_weights", "carry_joints", "outside", "surface_shifts"]
+__all__ = ["TransferredJoints", "boundary_weights", "outside", "surface_shifts", "transfer_joints"]
 
-_ENOUGH = 0.5  # share of a joint's weights that must have found the target
+_ENOUGH = 0.5  # fraction of a joint's weights that must have found the target
 _SAME_WAY = 0.5  # cosine of 60 degrees between the surfaces
 _INSIDE = 0.5  # winding number between outside and inside
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CarriedJoints:
+class TransferredJoints:
     """Joints in the target's frame.
 
     Attributes
     ----------
     positions : (J, 3)
         In the pose of the target.
-    carried : (J,) bool
+    transferred : (J,) bool
         Which were moved by the surface around them; the others moved along with their parents.
     measurable : (J,) bool
         Which have vertices to be moved by at all.
     """
 
     positions: Floats
-    carried: Bools
+    transferred: Bools
     measurable: Bools
 
 
@@ -113,9 +113,9 @@ def boundary_weights(skin: Skin, parents: Ints) -> JointRegressor:
     )
 
 
-def carry_joints(
+def transfer_joints(
     joints: Floats, parents: Ints, regressor: JointRegressor, shifts: Floats, matched: Bools
-) -> CarriedJoints:
+) -> TransferredJoints:
     """Move joints by what the surface around them was moved by.
 
     J'_j = J_j + sum_v k_jv d_v / sum_v k_jv over matched vertices v, with the way d_v to the
@@ -137,7 +137,7 @@ def carry_joints(
 
     Returns
     -------
-    CarriedJoints
+    TransferredJoints
         In the unit of ``joints``.
     """
     rows, columns, weights = regressor.joints, regressor.vertices, regressor.weights
@@ -147,13 +147,13 @@ def carry_joints(
     present = np.bincount(rows, np.abs(used), minlength=count)
     total = np.bincount(rows, used, minlength=count)
     # Rows of both signs may nearly cancel, and then say nothing.
-    carried = (present >= _ENOUGH * whole) & (total >= _ENOUGH * present) & (whole > 0.0)
+    transferred = (present >= _ENOUGH * whole) & (total >= _ENOUGH * present) & (whole > 0.0)
     sums = [np.bincount(rows, used * shifts[columns, axis], minlength=count) for axis in range(3)]
-    moves = np.stack(sums, axis=1) / np.where(carried, total, 1.0)[:, None]
-    for joint in np.flatnonzero(~carried).tolist():
+    moves = np.stack(sums, axis=1) / np.where(transferred, total, 1.0)[:, None]
+    for joint in np.flatnonzero(~transferred).tolist():
         # Parents come first, so the parent's way is final.
         moves[joint] = moves[parents[joint]] if parents[joint] >= 0 else 0.0
-    return CarriedJoints(joints + moves, carried, whole > 0.0)
+    return TransferredJoints(joints + moves, transferred, whole > 0.0)
 
 
 def outside(positions: Floats, triangles: Ints, joints: Floats) -> Bools:

@@ -1,4 +1,4 @@
-"""How much longer a figure's legs are than another's: what its path and its height go by.
+"""Ratio of the leg lengths of two figures, by which paths and heights are scaled.
 
 A root stands as high as the legs below it are long, and a step is as wide as the leg is long. So
 where limbs were resized, or the whole was stretched, lengths of the root scale with the legs.

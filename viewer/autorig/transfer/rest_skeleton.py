@@ -53,9 +53,9 @@ class RestSkeleton:
 def fit_rest_skeleton(
     template: Figure,
     pose: Pose,
-    placed: Similarity,
+    similarity: Similarity,
     joints: Floats,
-    carried: Bools | None,
+    transferred: Bools | None,
     original: Skeleton | None = None,
 ) -> RestSkeleton:
     """Find rest offsets that put a posed skeleton's joints at given places.
@@ -72,11 +72,11 @@ def fit_rest_skeleton(
         Shaped as posed, with skeleton and skin.
     pose : Pose
         Of the template.
-    placed : Similarity
+    similarity : Similarity
         The posed template, with the pose's own scale and translation, to the target.
     joints : (J, 3)
         In the target's frame.
-    carried : (J,) bool or None
+    transferred : (J,) bool or None
         Which of them were measured on the target. A symmetric template then gives a symmetric
         skeleton: left and right offsets are averaged, or taken from the side that was measured.
         None leaves the joints as they are.
@@ -88,20 +88,19 @@ def fit_rest_skeleton(
     RestSkeleton
         Lengths in the target's unit.
     """
-    skeleton, skin = template.skeleton, template.skin
-    assert skeleton is not None and skin is not None  # the pipeline looked
-    scale = placed.scale * pose.figure_scale
-    turned = world_matrices(skeleton, pose)[:, :3, :3]
+    skeleton, skin = template.require_skeleton(), template.require_skin()
+    scale = similarity.scale * pose.figure_scale
+    rotated = world_matrices(skeleton, pose)[:, :3, :3]
     moves = scale * _moves(skeleton, pose)
-    world = placed.rotation @ turned
+    world = similarity.rotation @ rotated
     offsets = _offsets(skeleton.parents, world, joints) - moves
     roots = skeleton.parents < 0
-    # Roots stand in figure space: what turns them there is taken out of the ways between them.
-    spread = (joints - joints[0]) @ placed.rotation
+    # Roots stand in figure space: what rotates them there is taken out of the ways between them.
+    spread = (joints - joints[0]) @ similarity.rotation
     offsets[roots] = (scale * skeleton.rest_translations[0] + spread - moves + moves[0])[roots]
     offsets[0] = scale * skeleton.rest_translations[0]
-    if carried is not None:
-        offsets = _symmetric(template, offsets, scale, carried)
+    if transferred is not None:
+        offsets = _symmetric(template, offsets, scale, transferred)
     provisional = _with_offsets(skeleton, offsets, np.full(len(roots), scale))
     root_scale = leg_scale(original or skeleton, provisional, template.up, scale)
     offsets[roots] += (root_scale - scale) * skeleton.rest_translations[0]
@@ -111,7 +110,7 @@ def fit_rest_skeleton(
     if skeleton.boxes is not None:
         fitted = replace(fitted, boxes=scale * skeleton.boxes)
     posed = _scaled_pose(skeleton, pose, joint_scales)
-    fitted, lines = _turn_roots(fitted, posed, placed.rotation)
+    fitted, lines = _rotate_roots(fitted, posed, similarity.rotation)
     _move_roots(fitted, posed, joints)
     bind = _bind_matrices(skeleton.parents, skin.inverse_bind, longer, scale)
     inverse_bind = np.asarray(np.linalg.inv(bind), dtype=np.float64)
@@ -137,13 +136,12 @@ def _offsets(parents: Ints, world: Floats, joints: Floats) -> Floats:
     return offsets
 
 
-def _symmetric(template: Figure, offsets: Floats, scale: float, carried: Bools) -> Floats:
+def _symmetric(template: Figure, offsets: Floats, scale: float, transferred: Bools) -> Floats:
     """Let left and right change alike, if the template's joints mirror each other.
 
     What is averaged are changes against the scaled template, in its rest axes.
     """
-    skeleton = template.skeleton
-    assert skeleton is not None  # the caller looked
+    skeleton = template.require_skeleton()
     try:
         partners = joint_partners(template)
     except RigError:
@@ -157,7 +155,7 @@ def _symmetric(template: Figure, offsets: Floats, scale: float, carried: Bools) 
     changes = offsets - scale * skeleton.rest_translations
     straight = np.einsum("jab,jb->ja", frames, changes)
     mirrored = straight[partners] * flip
-    own, other = carried.astype(float), carried[partners].astype(float)
+    own, other = transferred.astype(float), transferred[partners].astype(float)
     neither = own + other == 0.0
     own, other = np.where(neither, 1.0, own), np.where(neither, 1.0, other)
     mixed = (own[:, None] * straight + other[:, None] * mirrored) / (own + other)[:, None]
@@ -203,7 +201,7 @@ def _scaled_pose(skeleton: Skeleton, pose: Pose, joint_scales: Floats) -> Pose:
     return posed
 
 
-def _turn_roots(
+def _rotate_roots(
     skeleton: Skeleton, pose: Pose, rotation: Floats
 ) -> tuple[Skeleton, list[Diagnostic]]:
     """Turn the roots by the alignment, in place: by their DOFs where they are ball joints.

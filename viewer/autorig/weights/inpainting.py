@@ -20,7 +20,7 @@ from viewer.errors import RigError
 from viewer.rig._scipy import scipy_part
 from viewer.rig.arrays import Bools, Floats
 
-__all__ = ["NEGLIGIBLE", "Report", "fill"]
+__all__ = ["NEGLIGIBLE", "Report", "inpaint"]
 
 Report = Callable[[float, str], None]
 
@@ -34,7 +34,7 @@ _CONVERGED = 1e-9  # relative residual
 _Solve = Callable[[Floats], Floats]
 
 
-def fill(
+def inpaint(
     laplacian: Any, areas: Floats, weights: Any, matched: Bools, unknown: Bools, report: Report
 ) -> tuple[Any, str]:
     """Solve for the weights of unmatched vertices.

@@ -1,4 +1,4 @@
-"""What a transfer of weights found, and what a person should know about it."""
+"""Result of a transfer of weights, and the lines that report it."""
 
 from __future__ import annotations
 
@@ -57,8 +57,8 @@ class WeightTransfer:
         As in ``Skin``: vertex v owns influences ``starts[v]`` up to ``starts[v + 1]``.
     matched : (V,) bool
         Vertices whose weights are those of the template's surface.
-    filled : (V,) bool
-        Vertices whose weights were solved for. Those neither matched nor filled belong to a
+    inpainted : (V,) bool
+        Vertices whose weights were solved for. Those neither matched nor inpainted belong to a
         rigid island.
     distances : (V,)
         To the template, in the target's unit.
@@ -78,7 +78,7 @@ class WeightTransfer:
     joints: Ints
     weights: Floats
     matched: Bools
-    filled: Bools
+    inpainted: Bools
     distances: Floats
     angles: Floats
     points: SurfacePoints | None
@@ -116,14 +116,14 @@ def template_lines(skin: Skin) -> tuple[Diagnostic, ...]:
     return (Diagnostic("R005.negative-weights", values={"n": negative}),)
 
 
-def match_lines(found: Matches, filled: Bools, method: str) -> tuple[Diagnostic, ...]:
-    """Return what was matched, turned round and filled in.
+def match_lines(found: Matches, inpainted: Bools, method: str) -> tuple[Diagnostic, ...]:
+    """Return what was matched, turned round and inpainted.
 
     Parameters
     ----------
     found : Matches
         Of the welded vertices.
-    filled : (W,) bool
+    inpainted : (W,) bool
         Which of them were solved for.
     method : str
         How; "direct" is the rule.
@@ -133,7 +133,7 @@ def match_lines(found: Matches, filled: Bools, method: str) -> tuple[Diagnostic,
         "n": int(found.matched.sum()),
         "all": len(found.matched),
         "ratio": ratio,
-        "filled": int(filled.sum()),
+        "filled": int(inpainted.sum()),
     }
     lines = [Diagnostic("R005.matched", values=values)]
     if ratio < _FEW:

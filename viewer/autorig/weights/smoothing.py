@@ -1,4 +1,4 @@
-"""Weights evened out along edges, around the vertices whose weights were filled in."""
+"""Smoothing of weights along edges, around the vertices whose weights were inpainted."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from viewer.rig.arrays import Bools, Floats, Ints
 __all__ = ["ROUNDS", "smooth", "within"]
 
 ROUNDS = 10
-_SHARE = 0.2  # of the neighbours' mean in each round
-_NEGLIGIBLE = 1e-6  # weights spread by an edge a round; below this they are dropped at the end
+_FRACTION = 0.2  # of the neighbours' mean in each iteration
+_NEGLIGIBLE = 1e-6  # weights spread by an edge an iteration; below this they are dropped at the end
 
 
 def smooth(weights: Any, triangles: Ints, active: Bools, rounds: int = ROUNDS) -> Any:
@@ -44,9 +44,9 @@ def smooth(weights: Any, triangles: Ints, active: Bools, rounds: int = ROUNDS) -
     degrees = np.bincount(both[:, 0], minlength=count)
     mixed = degrees > 0  # a vertex without neighbours keeps its weights
     mean = sparse.csr_array(
-        (_SHARE / degrees[both[:, 0]], (both[:, 0], both[:, 1])), shape=(count, count)
+        (_FRACTION / degrees[both[:, 0]], (both[:, 0], both[:, 1])), shape=(count, count)
     )
-    step = sparse.csr_array(mean + sparse.diags_array(np.where(mixed, 1.0 - _SHARE, 1.0)))
+    step = sparse.csr_array(mean + sparse.diags_array(np.where(mixed, 1.0 - _FRACTION, 1.0)))
     result = weights
     for _ in range(rounds):
         result = step @ result

@@ -1,4 +1,4 @@
-"""A template's skin weights on another mesh: matched where they meet, filled in elsewhere."""
+"""Transfer of skin weights to another mesh: matched where they meet, inpainted elsewhere."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from viewer.autorig.correspondence.matching import Matches, MatchSettings, Templ
 from viewer.autorig.correspondence.nearest import nearest_vertices
 from viewer.autorig.surface.laplacian import laplacian
 from viewer.autorig.surface.welding import Welded, weld
-from viewer.autorig.weights.inpainting import NEGLIGIBLE, Report, fill
+from viewer.autorig.weights.inpainting import NEGLIGIBLE, Report, inpaint
 from viewer.autorig.weights.result import (
     RigidIslands,
     WeightTransfer,
@@ -35,14 +35,14 @@ __all__ = ["WeightSettings", "nearest_weights", "transferred_weights"]
 
 @dataclass(frozen=True, slots=True)
 class WeightSettings:
-    """How weights are carried over.
+    """How weights are transferred.
 
     Attributes
     ----------
     match : MatchSettings
         When a vertex counts as lying on the template.
     smoothing_rounds : int
-        Rounds of evening out the filled-in weights and their surroundings; 0 for none.
+        Iterations of smoothing the inpainted weights and their surroundings; 0 for none.
     max_influences : int or None
         The strongest that are kept of each vertex; None for all.
     """
@@ -66,7 +66,7 @@ def transferred_weights(
     settings: WeightSettings,
     report: Report,
 ) -> WeightTransfer:
-    """Carry weights over by closest points, and fill in what does not meet the template.
+    """Transfer weights by closest points, and inpaint what does not meet the template.
 
     Parameters
     ----------
@@ -111,22 +111,22 @@ def transferred_weights(
     rows = interpolate(_without_residue(found.points), template.triangles, source)
     has_match = np.bincount(target.islands, found.matched, target.n_islands) > 0
     rows, rigid = _with_rigid(template, source, target, rows, np.nonzero(~has_match)[0])
-    filled = ~found.matched & has_match[target.islands]
-    rows, method = _filled(target, size, rows, found.matched, filled, report)
-    if settings.smoothing_rounds and filled.any():
+    inpainted = ~found.matched & has_match[target.islands]
+    rows, method = _inpainted(target, size, rows, found.matched, inpainted, report)
+    if settings.smoothing_rounds and inpainted.any():
         report(0.95, "smoothing")
         reach = settings.match.max_distance * size
-        active = within(target.positions, target.triangles, filled, reach)
+        active = within(target.positions, target.triangles, inpainted, reach)
         rows = smooth(rows, target.triangles, active, settings.smoothing_rounds)
     report(1.0, "weights found")
     lines = (
         *template_lines(weights),
-        *match_lines(found, filled, method),
+        *match_lines(found, inpainted, method),
         *rigid_lines(rigid),
     )
     skin = skin_of(rows, weights.inverse_bind, settings.max_influences)
     backwards = wound_backwards(target, found.inside_out)
-    return _in_vertices(target.vertices, skin, found, filled, backwards, rigid, lines)
+    return _in_vertices(target.vertices, skin, found, inpainted, backwards, rigid, lines)
 
 
 def _without_residue(points: SurfacePoints) -> SurfacePoints:
@@ -166,7 +166,7 @@ def nearest_weights(
         joints=skin.joints,
         weights=skin.weights,
         matched=near,
-        filled=np.zeros(len(near), dtype=bool),
+        inpainted=np.zeros(len(near), dtype=bool),
         distances=distances,
         angles=np.zeros(len(near)),
         points=None,
@@ -202,7 +202,7 @@ def _with_rigid(
     return rows, RigidIslands(first, sizes, strongest, points.distances)
 
 
-def _filled(
+def _inpainted(
     target: Welded, size: float, rows: Any, matched: Bools, unknown: Bools, report: Report
 ) -> tuple[Any, str]:
     """Solve for the unknown rows on the mesh made of size 1, as the operator has no unit."""
@@ -214,7 +214,7 @@ def _filled(
     def part(fraction: float, what: str) -> None:
         report(0.55 + 0.4 * fraction, what)
 
-    values, method = fill(operator, areas, rows, matched, unknown, part)
+    values, method = inpaint(operator, areas, rows, matched, unknown, part)
     return put_rows(rows, np.nonzero(unknown)[0], values), method
 
 
@@ -222,7 +222,7 @@ def _in_vertices(
     welded: Ints,
     skin: Skin,
     found: Matches,
-    filled: Bools,
+    inpainted: Bools,
     backwards: Bools,
     rigid: RigidIslands,
     lines: tuple[Diagnostic, ...],
@@ -235,7 +235,7 @@ def _in_vertices(
         joints=rows.joints,
         weights=rows.weights,
         matched=found.matched[welded],
-        filled=filled[welded],
+        inpainted=inpainted[welded],
         distances=points.distances[welded],
         angles=found.angles[welded],
         points=SurfacePoints(

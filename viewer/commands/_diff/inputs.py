@@ -7,22 +7,13 @@ from pathlib import Path
 from viewer.errors import FormatError
 from viewer.formats import FORMATS, Source, detect
 
-__all__ = ["input_files"]
-
 
 def input_files(text: str) -> list[Path]:
     """Return the files that one argument stands for.
 
-    Parameters
-    ----------
-    text : str
-        A file; several joined by ``+``; a folder of a known kind (PIG, EasyMocap); or any folder
-        with rig files, all of which are opened together, as for a submission.
-
-    Raises
-    ------
-    FormatError
-        If it is a folder without a file that opens.
+    ``text``: a file; several joined by ``+``; a folder of a known kind (PIG, EasyMocap); or any
+      folder with rig files, all of which are opened together, as for a submission.
+    Raises FormatError if it is a folder without a file that opens.
 
     >>> input_files("arm.skel+arm.skin") == [Path("arm.skel"), Path("arm.skin")]
     True

@@ -8,8 +8,6 @@ from dataclasses import dataclass, replace
 from viewer.rig.motion.clip import Clip, suits
 from viewer.rig.scene import Actor, Motion, figure_pose
 
-__all__ = ["Pairing", "pair_actors"]
-
 _N_RANKS = 3  # of clips for an actor: of the right name, its own, any that is left
 
 
@@ -48,10 +46,7 @@ def pair_actors(first: Sequence[Actor], second: Sequence[Actor]) -> Pairing:
     files are opened: the one of the partner's name counts, else the actor's own, else one that
     an actor without partner was given.
 
-    Parameters
-    ----------
-    first, second : sequence of Actor
-        Of the reference and of what is held against it; left as they are.
+    ``first``, ``second``: of the reference and of what is held against it; left as they are.
     """
     found: dict[int, int] = {}
     taken: set[int] = set()
@@ -101,14 +96,9 @@ def _with_clips(
 ) -> tuple[list[Actor], list[Clip]]:
     """Return actors with the clips of keys that are compared, and the clips left over.
 
-    Parameters
-    ----------
-    actors : sequence of Actor
-        Those with a partner.
-    lone : sequence of Actor
-        Those of the same scene without one: their clips may be meant for the others.
-    partners : sequence of Motion or None
-        What moves each one's partner.
+    ``actors``: those with a partner.
+    ``lone``: those of the same scene without one: their clips may be meant for the others.
+    ``partners``: what moves each one's partner.
     """
     pool = [actor.clip for actor in (*actors, *lone) if isinstance(actor.clip, Clip)]
     if not pool:

@@ -15,8 +15,6 @@ from viewer.rig.scalars import length_unit
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import Skinning
 
-__all__ = ["Heat", "heat_of", "save_heat"]
-
 _SIZE = (1280, 960)
 _SHEET = (2400, 1800)
 _COLORED = ("vertices", "surface, from the first")
@@ -41,12 +39,8 @@ class Heat:
 def heat_of(name: str, posed: Sequence[tuple[Actor, Difference]]) -> Heat | None:
     """Return what can be coloured of a comparison; None if no mesh was compared.
 
-    Parameters
-    ----------
-    name : str
-        Of what was compared, for the legend.
-    posed : sequence of (Actor, Difference)
-        The reference's actors in their worst poses.
+    ``name``: of what was compared, for the legend.
+    ``posed``: the reference's actors in their worst poses.
     """
     actors, most = [], 0.0
     for actor, difference in posed:
@@ -65,12 +59,8 @@ def heat_of(name: str, posed: Sequence[tuple[Actor, Difference]]) -> Heat | None
 def save_heat(heats: Sequence[Heat], output: Path, skinning: Skinning) -> str:
     """Write one picture, of several comparisons with one scale as a sheet; say what it is.
 
-    Raises
-    ------
-    ViewerError
-        If there is nothing to colour, or no room for so many.
-    OutputError
-        If it cannot be written.
+    Raises ViewerError if there is nothing to colour, or no room for so many.
+    Raises OutputError if it cannot be written.
     """
     from viewer.media.picture_sinks import SheetSink
     from viewer.rendering.offscreen import render

@@ -13,8 +13,6 @@ from viewer.errors import printable
 from viewer.rig.comparison import Difference, Measure
 from viewer.rig.units import METRES
 
-__all__ = ["Compared", "json_text", "lines_of", "table_of"]
-
 
 @dataclass(frozen=True, slots=True)
 class Compared:

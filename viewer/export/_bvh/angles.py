@@ -7,8 +7,6 @@ import numpy as np
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.rotation import axis_rotations
 
-__all__ = ["euler_angles", "unrolled"]
-
 _LOCKED = 1e-9  # cosine of the middle angle below which the outer two turn about one axis
 
 
@@ -18,17 +16,9 @@ def euler_angles(matrices: Floats, order: str) -> Floats:
     With e = 1 where i, j, k is a turn of x, y, z and -1 otherwise: R[j, k] = -e sin a cos b,
     R[k, k] = cos a cos b, and R_i(a)^T R = R_j(b) R_k(c) gives b and c.
 
-    Parameters
-    ----------
-    matrices : (..., 3, 3)
-        Rotations for column vectors.
-    order : str
-        ``"zyx"`` for R = Rz Ry Rx.
-
-    Returns
-    -------
-    (..., 3)
-        Radians, in the order of the axes; the middle one from -pi / 2 to pi / 2.
+    ``matrices`` (..., 3, 3): rotations for column vectors.
+    ``order``: ``"zyx"`` for R = Rz Ry Rx.
+    Returns (..., 3): radians, in the order of the axes; the middle one from -pi / 2 to pi / 2.
     """
     i, j, k = ("xyz".index(letter) for letter in order)
     sign = _sign(order)
@@ -48,17 +38,9 @@ def unrolled(angles: Floats, order: str) -> Floats:
     (a, b, c) and (a + pi, pi - b, c + pi) are one rotation, and so is every full turn more.
     Where the middle angle is a right one, the outer two are any with the same sum or difference.
 
-    Parameters
-    ----------
-    angles : (N, ..., 3)
-        Radians, by frames; as ``euler_angles`` gives them.
-    order : str
-        Of the axes.
-
-    Returns
-    -------
-    (N, ..., 3)
-        Radians, of any size.
+    ``angles`` (N, ..., 3): radians, by frames; as ``euler_angles`` gives them.
+    ``order``: of the axes.
+    Returns (N, ..., 3): radians, of any size.
     """
     if len(angles) < 2:
         return angles.copy()

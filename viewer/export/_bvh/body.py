@@ -24,8 +24,6 @@ from viewer.rig.kinematics import forward_kinematics, world_matrices
 from viewer.rig.motion.evaluation import Frames, frames_between, rest_translations_of, world_frames
 from viewer.rig.pose import rest_pose
 
-__all__ = ["Body", "Space", "body_of", "rest_matrices", "shape_at"]
-
 _BLOCK = 4096  # frames at a time, so that matrices of all frames never exist at once
 _NOISE = 1e-9  # of the skeleton's size: what moves less does not move
 
@@ -76,8 +74,7 @@ class Body:
 
 def rest_matrices(figure: Figure, offsets: Floats) -> Floats:
     """Return joint space to figure space with all DOFs at 0, for given rest translations."""
-    assert figure.skeleton is not None  # whoever has frames has a skeleton
-    skeleton = replace(figure.skeleton, rest_translations=offsets)
+    skeleton = replace(figure.require_skeleton(), rest_translations=offsets)
     pose = rest_pose(skeleton)
     pose.dofs[:] = 0.0
     return world_matrices(skeleton, pose)
@@ -86,21 +83,13 @@ def rest_matrices(figure: Figure, offsets: Floats) -> Floats:
 def body_of(figure: Figure, frames: Frames, reference: int, order: str, space: Space) -> Body:
     """Return what a file says of a figure's frames.
 
-    Parameters
-    ----------
-    figure : Figure
-        Unshaped; the frames hold the shape.
-    frames : Frames
-        All present.
-    reference : int
-        The frame whose shape and scale all bones have; roots keep those of each frame.
-    order : str
-        Of the rotation channels.
-    space : Space
-        To the file.
+    ``figure``: unshaped; the frames hold the shape.
+    ``frames``: all present.
+    ``reference``: the frame whose shape and scale all bones have; roots keep those of each frame.
+    ``order``: of the rotation channels.
+    ``space``: to the file.
     """
-    skeleton = figure.skeleton
-    assert skeleton is not None  # whoever has frames has a skeleton
+    skeleton = figure.require_skeleton()
     parents, count = skeleton.parents, frames.n_frames
     weights = shape_at(frames, reference)
     scale = float(frames.figure_scales[reference])
@@ -136,8 +125,7 @@ def shape_at(frames: Frames, frame: int) -> Floats:
 
 def _places(figure: Figure, frames: Frames, weights: Floats, scale: float) -> Floats:
     """Return joints in the world, bones of one shape and scale, roots where they are: (F, J, 3)."""
-    skeleton = figure.skeleton
-    assert skeleton is not None  # the caller looked
+    skeleton = figure.require_skeleton()
     fixed = replace(frames, shape_weights=weights, figure_scales=np.full(frames.n_frames, scale))
     places = world_frames(figure, fixed)[..., :3, 3]
     is_shaped = len(frames.shape_weights) > 1
@@ -162,8 +150,7 @@ def _roots(parents: Ints) -> Ints:
 
 def _rotations(figure: Figure, frames: Frames, space: Space) -> Floats:
     """Return the file's local rotations: (F, J, 3, 3)."""
-    skeleton = figure.skeleton
-    assert skeleton is not None  # the caller looked
+    skeleton = figure.require_skeleton()
     parents = skeleton.parents
     rest = quaternion_to_matrix(skeleton.rest_rotations)
     above = forward_kinematics(parents, rest)[parents]

@@ -8,8 +8,6 @@ from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.units import METRES
 
-__all__ = ["end_offsets"]
-
 _MOSTLY = 0.5  # a weight from which on a vertex belongs to a joint
 _FEW = 4  # vertices that say nothing of a joint's extent
 _TOO_SHORT = 0.1  # of the bone before: shorter ends are not believed
@@ -21,22 +19,12 @@ _DEFAULT_END = 1.0  # ... whose unit is not known
 def end_offsets(figure: Figure, rest: Floats, leaves: Ints) -> Floats:
     """Return how far the last joints reach at rest; none is 0.
 
-    Parameters
-    ----------
-    figure : Figure
-        Shaped.
-    rest : (J, 4, 4)
-        Joint space to figure space in the rest pose.
-    leaves : (L,)
-        Joints without children.
-
-    Returns
-    -------
-    (L, 3)
-        From the joint, figure space.
+    ``figure``: shaped.
+    ``rest`` (J, 4, 4): joint space to figure space in the rest pose.
+    ``leaves`` (L,): joints without children.
+    Returns (L, 3): from the joint, figure space.
     """
-    skeleton = figure.skeleton
-    assert skeleton is not None  # whoever has a motion has a skeleton
+    skeleton = figure.require_skeleton()
     ends = np.zeros((len(leaves), 3))
     size = float(np.ptp(rest[:, :3, 3], axis=0).max())
     for row, leaf in enumerate(leaves):

@@ -33,8 +33,6 @@ from viewer.rig.motion.evaluation import (
 from viewer.rig.shape import joint_directions
 from viewer.rig.skinning import Skinning
 
-__all__ = ["BvhFile", "read_back"]
-
 Rows = NDArray[np.intp]
 
 
@@ -69,22 +67,15 @@ class BvhFile:
 def read_back(file: BvhFile, figure: Figure, frames: Frames, how: Skinning) -> Side:
     """Return what a file says of a figure.
 
-    Parameters
-    ----------
-    file : BvhFile
-        What was written.
-    figure : Figure
-        Unshaped, as it moves here.
-    frames : Frames
-        What was to be written. It gives the place of the whole figure, which comes after skinning
-        and is not weighted.
-    how : Skinning
-        Whether pose correctives count.
+    ``file``: what was written.
+    ``figure``: unshaped, as it moves here.
+    ``frames``: what was to be written. It gives the place of the whole figure, which comes after
+      skinning and is not weighted.
+    ``how``: whether pose correctives count.
     """
     space = file.space
     motion = bvh.read(Source(file.path, file.text))
-    skeleton, clip = motion.figure.skeleton, motion.clip
-    assert skeleton is not None and figure.skeleton is not None  # the reader gives one
+    skeleton, clip = motion.figure.require_skeleton(), motion.clip
     numbers = {name: joint for joint, name in enumerate(skeleton.names)}
     order = [numbers[name] for name in file.names]
     weights = frames.shape_weights
@@ -117,9 +108,8 @@ def read_back(file: BvhFile, figure: Figure, frames: Frames, how: Skinning) -> S
 
 def _bound(figure: Figure, weights: Floats) -> Floats:
     """Return the inverse bind matrices of a shape; identities without a skin."""
-    assert figure.skeleton is not None  # the caller looked
     if figure.skin is None or not figure.is_attached:
-        return np.tile(np.eye(4), (figure.skeleton.n_joints, 1, 1))
+        return np.tile(np.eye(4), (figure.require_skeleton().n_joints, 1, 1))
     bound = figure.skin.inverse_bind.copy()
     moved = np.einsum("s,sjc->jc", weights, joint_directions(figure))
     bound[:, :3, 3] -= np.einsum("jab,jb->ja", bound[:, :3, :3], moved)
@@ -128,8 +118,7 @@ def _bound(figure: Figure, weights: Floats) -> Floats:
 
 def _turns(figure: Figure, world: Floats) -> Floats:
     """Return what drives the correctives: R - I of every joint within its parent, (F, P)."""
-    assert figure.skeleton is not None  # the caller looked
     turned = world[:, 1:, :3, :3]
-    above = world[:, figure.skeleton.parents[1:], :3, :3]
+    above = world[:, figure.require_skeleton().parents[1:], :3, :3]
     local = np.swapaxes(above, -1, -2) @ turned - np.eye(3)
     return local.reshape(len(world), -1)

@@ -13,8 +13,6 @@ import numpy as np
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.hierarchy import depth_first
 
-__all__ = ["bvh_text"]
-
 _DEEPEST = 32  # tabs that a line begins with
 _SECONDS_DIGITS = 9  # of the frame time, at least: exact to 1e-8 of itself
 
@@ -32,26 +30,15 @@ def bvh_text(
 ) -> str:
     """Return a whole file.
 
-    Parameters
-    ----------
-    names : J str
-        Unique, of letters, digits and underscores.
-    parents : (J,)
-        With one root, the first joint.
-    offsets : (J, 3)
-        Within the parent; the root's is written as 0.
-    ends : dict of (3,)
-        Offset of the End Site of every joint without children.
-    moves : (J,) bool
-        Which joints have position channels.
-    rotation_order : str
-        ``"zyx"`` for Zrotation Yrotation Xrotation.
-    rate : float
-        Frames a second.
-    rows : (F, J, 3), (F, J, 3)
-        Positions, and angles in degrees in that order.
-    digits : int
-        Decimals.
+    ``names``: unique, of letters, digits and underscores.
+    ``parents`` (J,): with one root, the first joint.
+    ``offsets`` (J, 3): within the parent; the root's is written as 0.
+    ``ends``: offset of the End Site of every joint without children.
+    ``moves`` (J,) bool: which joints have position channels.
+    ``rotation_order``: ``"zyx"`` for Zrotation Yrotation Xrotation.
+    ``rate``: frames a second.
+    ``rows`` (F, J, 3), (F, J, 3): positions, and angles in degrees in that order.
+    ``digits``: decimals.
     """
     order = depth_first(parents)
     lines = _hierarchy(names, parents, order, offsets, ends, moves, rotation_order, digits)

@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 
 from viewer.errors import RigError
 
-__all__ = ["INDICES", "VERTICES", "Document", "text_of"]
-
 VERTICES, INDICES = 34962, 34963  # targets of buffer views
 
 _TYPES = {np.dtype("u1"): 5121, np.dtype("<u2"): 5123, np.dtype("<u4"): 5125, np.dtype("<f4"): 5126}
@@ -29,10 +27,7 @@ _HEADER = 28  # bytes of a .glb that are neither JSON nor arrays
 class Document:
     """What a file will hold; everything in it is told apart by index.
 
-    Parameters
-    ----------
-    name : str
-        What errors call it.
+    ``name``: what errors call it.
 
     Attributes
     ----------
@@ -55,22 +50,12 @@ class Document:
     def array(self, values: NDArray[Any], kind: str, target: int = 0, bounds: bool = False) -> int:
         """Add an array; return its accessor.
 
-        Parameters
-        ----------
-        values : (N, ...)
-            Unsigned integers as they are, floating-point numbers in single precision; one row an
-            element, N > 0.
-        kind : str
-            ``"SCALAR"``, ``"VEC3"`` ….
-        target : int
-            ``VERTICES``, ``INDICES``, or 0 for what no mesh draws.
-        bounds : bool
-            Give the least and greatest value of each component.
-
-        Raises
-        ------
-        RigError
-            If a number is too large for single precision, or not one.
+        ``values`` (N, ...): unsigned integers as they are, floating-point numbers in single
+          precision; one row an element, N > 0.
+        ``kind``: ``"SCALAR"``, ``"VEC3"`` ….
+        ``target``: ``VERTICES``, ``INDICES``, or 0 for what no mesh draws.
+        ``bounds``: give the least and greatest value of each component.
+        Raises RigError if a number is too large for single precision, or not one.
         """
         return self.arrays(values[None], kind, target, bounds)[0]
 
@@ -79,12 +64,8 @@ class Document:
     ) -> list[int]:
         """Add several arrays of one size, which lie behind one another; return their accessors.
 
-        Parameters
-        ----------
-        values : (A, N, ...)
-            As for ``array``, A times.
-        kind, target, bounds
-            As for ``array``.
+        ``values`` (A, N, ...): as for ``array``, A times.
+        ``kind``, ``target``, ``bounds``: as for ``array``.
         """
         stored = self._stored(values)
         rows = stored.reshape(len(stored), -1, _SIZES[kind])
@@ -113,10 +94,7 @@ class Document:
     def glb(self) -> bytes:
         """Return the whole as one binary file.
 
-        Raises
-        ------
-        RigError
-            If it is longer than such files can be.
+        Raises RigError if it is longer than such files can be.
         """
         content = self._json({"byteLength": self._size})
         content += b" " * (-len(content) % _PADDING)

@@ -20,8 +20,6 @@ from viewer.rig.motion.evaluation import Frames
 from viewer.rig.scalars import length_text
 from viewer.rig.skinning import METHODS, Skinning
 
-__all__ = ["Written", "gltf_losses", "not_held", "vertices_text"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Written:
@@ -60,22 +58,13 @@ def gltf_losses(
 ) -> list[str]:
     """Return lines with the largest distances between a figure as it is posed here and a file.
 
-    Parameters
-    ----------
-    written : Written
-        The file.
-    figure : Figure
-        As it is, unshaped.
-    frames : Frames
-        Its poses.
-    rows : (F,)
-        Those of them to compare.
-    how : Skinning
-        As asked for.
-    shape, influences : Shape, Influences or None
-        What was to be written.
-    first_frame : int or None
-        What the first frame is called; None for a single pose.
+    ``written``: the file.
+    ``figure``: as it is, unshaped.
+    ``frames``: its poses.
+    ``rows`` (F,): those of them to compare.
+    ``how``: as asked for.
+    ``shape``, ``influences``: what was to be written.
+    ``first_frame``: what the first frame is called; None for a single pose.
     """
     weights = frames.shape_weights
     still = weights[min(written.start, len(weights) - 1)] if shape.baked is None else shape.baked
@@ -145,8 +134,7 @@ def _reasons(
     weights = weights if len(weights) == 1 else weights[rows]
     if shape.baked is not None and np.ptp(weights, axis=0).any():
         found.append("the shape changes over time, which cannot be held")
-    mesh = shape.figure.mesh
-    assert mesh is not None  # vertices differ
+    mesh = shape.figure.require_mesh()
     coarse = np.abs(mesh.positions - mesh.positions.astype(np.float32)).max(initial=0.0)
     if coarse > least:
         found.append("the mesh is far from its origin for glTF's single precision")

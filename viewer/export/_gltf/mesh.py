@@ -16,8 +16,6 @@ from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.geometry.vectors import unit
 from viewer.rig.mesh import Mesh, split_seams, vertex_normals
 
-__all__ = ["add_mesh"]
-
 _PLAIN = (0.62, 0.60, 0.57)  # linear; what the viewer draws without a texture
 _POINTS = 0  # mode of a primitive without triangles
 _LONG = 65535  # the index itself is reserved, so so many vertices fit 16 bits
@@ -36,28 +34,16 @@ def add_mesh(
 ) -> tuple[int, int]:
     """Add a figure's mesh.
 
-    Parameters
-    ----------
-    document : Document
-        Changed.
-    name : str
-        The figure's.
-    shape : Shape
-        Its figure has a mesh with vertices.
-    influences : Influences or None
-        Of the mesh; None if no joint moves it.
-    color : (r, g, b), optional
-        Linear, of what has no texture.
-
-    Returns
-    -------
-    mesh : int
-        Its index.
-    n_vertices : int
-        How many are written: along seams there are several for one of the figure.
+    ``document``: changed.
+    ``name``: the figure's.
+    ``shape``: its figure has a mesh with vertices.
+    ``influences``: of the mesh; None if no joint moves it.
+    ``color`` (r, g, b): linear, of what has no texture.
+    Returns ``mesh``: its index.
+    Returns ``n_vertices``: how many are written: along seams there are several for one of the
+      figure.
     """
-    mesh = shape.figure.mesh
-    assert mesh is not None  # the caller looked
+    mesh = shape.figure.require_mesh()
     sources, uv_indices, triangles = split_seams(mesh)
     attributes = _attributes(document, mesh, sources, uv_indices)
     for number, (joints, weights) in enumerate(

@@ -12,8 +12,6 @@ from viewer.rig.arrays import Bools, Floats
 from viewer.rig.motion.evaluation import Frames
 from viewer.rig.skeleton import Skeleton
 
-__all__ = ["add_animation", "moving", "still_locals"]
-
 _NOISE = 1e-9  # of the skeleton's size: what moves less does not move
 
 
@@ -45,32 +43,15 @@ def add_animation(
     Quaternions are on the side of the frame before, so that programs that blend components do
     right. Times begin at 0.
 
-    Parameters
-    ----------
-    document : Document
-        Changed.
-    name : str
-        The motion's.
-    rate : float
-        Frames a second.
-    skeleton : Skeleton
-        In the shape that is written.
-    frames : Frames
-        Without gaps.
-    tree : Tree
-        The nodes.
-    morph : (int, (F, M)) or None
-        The mesh's node and its targets' weights, if these change.
-
-    Returns
-    -------
-    int
-        Number of joints that have translations.
-
-    Raises
-    ------
-    RigError
-        If numbers do not fit single precision.
+    ``document``: changed.
+    ``name``: the motion's.
+    ``rate``: frames a second.
+    ``skeleton``: in the shape that is written.
+    ``frames``: without gaps.
+    ``tree``: the nodes.
+    ``morph``: the mesh's node and its targets' weights, if these change.
+    Returns: number of joints that have translations.
+    Raises RigError if numbers do not fit single precision.
     """
     # Single precision tells eight million frames apart, whatever their rate.
     times = (np.arange(frames.n_frames) / rate).astype(np.float32)

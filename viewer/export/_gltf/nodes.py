@@ -25,8 +25,6 @@ from viewer.rig.pose import Pose, joint_rotations, local_matrices
 from viewer.rig.skeleton import Skeleton
 from viewer.rig.units import METRES, WORDS
 
-__all__ = ["Locals", "Tree", "add_nodes", "locals_of"]
-
 _HALF = float(np.sqrt(0.5))
 _Z_TO_Y = [-_HALF, 0.0, 0.0, _HALF]
 
@@ -71,12 +69,8 @@ class Tree:
 def locals_of(skeleton: Skeleton, pose: Pose) -> Locals:
     """Return the joints of a pose.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        In shape.
-    pose : Pose
-        DOFs in lengths and radians.
+    ``skeleton``: in shape.
+    ``pose``: DOFs in lengths and radians.
     """
     rotations = matrix_to_quaternion(joint_rotations(skeleton, pose))
     return Locals(local_matrices(skeleton, pose)[:, :3, 3], rotations, pose.scales)
@@ -94,27 +88,14 @@ def add_nodes(
 ) -> Tree:
     """Add all nodes but that of the mesh.
 
-    Parameters
-    ----------
-    document : Document
-        Changed.
-    name : str
-        The figure's.
-    up : "y" or "z"
-        The axis that points up in the world that the figure is in.
-    unit : str
-        As in ``Figure.unit``.
-    skeleton, still : Skeleton and Locals, or None
-        The joints and where they are.
-    pose : Pose or None
-        Gives the figure's place.
-    fixes : bool
-        Whether vertices need something that never moves.
-
-    Raises
-    ------
-    RigError
-        If a number is not finite.
+    ``document``: changed.
+    ``name``: the figure's.
+    ``up``: the axis that points up in the world that the figure is in.
+    ``unit``: as in ``Figure.unit``.
+    ``skeleton``, ``still``: the joints and where they are.
+    ``pose``: gives the figure's place.
+    ``fixes``: whether vertices need something that never moves.
+    Raises RigError if a number is not finite.
     """
     top: dict[str, Any] = {"name": text_of(name)}
     place = root = document.add("nodes", top)

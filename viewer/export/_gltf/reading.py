@@ -22,8 +22,6 @@ from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.kinematics import forward_kinematics
 from viewer.rig.skin import Skin, skin_from_entries
 
-__all__ = ["GltfFile", "parsed", "read_back"]
-
 _TYPES = {5121: "<u1", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _SIZES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 _DEFAULTS = {"translation": (0.0, 0, 0), "rotation": (0.0, 0, 0, 1), "scale": (1.0, 1, 1)}
@@ -72,20 +70,12 @@ def read_back(
 ) -> Side:
     """Return what a file says of a figure.
 
-    Parameters
-    ----------
-    file : GltfFile
-        As it was written.
-    tree : Tree
-        Indices of the nodes of joints and figure.
-    node : int or None
-        That of the mesh.
-    sources : (M,)
-        Which of the file's morph targets change over time.
-    start : int
-        The figure's frame that comes first in the file.
-    sets : int, optional
-        Only so many sets of influences, scaled to a sum of 1; all if omitted.
+    ``file``: as it was written.
+    ``tree``: indices of the nodes of joints and figure.
+    ``node``: that of the mesh.
+    ``sources`` (M,): which of the file's morph targets change over time.
+    ``start``: the figure's frame that comes first in the file.
+    ``sets``: only so many sets of influences, scaled to a sum of 1; all if omitted.
     """
     nodes = file.root["nodes"]
     parents = np.full(len(nodes), -1, dtype=np.int32)

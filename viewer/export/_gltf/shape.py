@@ -11,8 +11,6 @@ from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.shape import shaped
 
-__all__ = ["Shape", "shape_of"]
-
 _MOST_TARGETS = 64  # each costs 12 bytes a vertex, and programs hold only so many
 
 
@@ -44,14 +42,9 @@ def shape_of(figure: Figure, weights: Floats, reference: int = 0) -> Shape:
     Where joints follow the mesh, morph targets would leave the joints behind: then one shape is
     baked in, and so it is if there are too many.
 
-    Parameters
-    ----------
-    figure : Figure
-        Unshaped.
-    weights : (F, S) or (1, S)
-        Of its blend shapes, over time.
-    reference : int
-        The row to bake in.
+    ``figure``: unshaped.
+    ``weights`` (F, S) or (1, S): of its blend shapes, over time.
+    ``reference``: the row to bake in.
     """
     used = np.flatnonzero(weights.any(axis=0))
     if figure.mesh is None or figure.blend_shapes is None or len(used) == 0:

@@ -19,8 +19,6 @@ from viewer.rig.skin import (
     weight_sums,
 )
 
-__all__ = ["Influences", "influence_sets", "influences_of", "inverse_bind_matrices"]
-
 PER_SET = 4
 _SUM = 1e-6  # sums nearer to 1 are rounding in the figure's file
 _MOST_JOINTS = 65536  # they are numbered in 16 bits
@@ -59,15 +57,8 @@ class Influences:
 def influences_of(skin: Skin) -> Influences:
     """Return what glTF can hold of a skin.
 
-    Parameters
-    ----------
-    skin : Skin
-        Any weights.
-
-    Raises
-    ------
-    RigError
-        If there are more joints than a file can number.
+    ``skin``: any weights.
+    Raises RigError if there are more joints than a file can number.
     """
     merged = limit_influences(skin, max(1, int(influence_counts(skin).max(initial=0))))
     owners = np.repeat(np.arange(skin.n_vertices, dtype=np.int32), influence_counts(merged))
@@ -97,20 +88,11 @@ def influence_sets(
 ) -> Iterator[tuple[NDArray[np.unsignedinteger], Floats]]:
     """Yield JOINTS_0 and WEIGHTS_0, JOINTS_1 and WEIGHTS_1, and so on.
 
-    Parameters
-    ----------
-    influences : Influences
-        Of V vertices.
-    sources : (R,)
-        The vertices, or copies of them, that are written.
-
-    Yields
-    ------
-    joints : (R, 4) uint8 or uint16
-        Places in the skin's list of joints; the last one there is what fixed vertices hold on
-        to. 0 in unused slots, as the specification asks.
-    weights : (R, 4)
-        0 in unused slots.
+    ``influences``: of V vertices.
+    ``sources`` (R,): the vertices, or copies of them, that are written.
+    Yields ``joints`` (R, 4) uint8 or uint16: places in the skin's list of joints; the last one
+      there is what fixed vertices hold on to. 0 in unused slots, as the specification asks.
+    Yields ``weights`` (R, 4): 0 in unused slots.
     """
     skin = influences.skin
     counts, starts = influence_counts(skin)[sources], skin.starts[sources]
@@ -130,12 +112,8 @@ def influence_sets(
 def inverse_bind_matrices(influences: Influences, inverse_bind: Floats) -> Floats:
     """Return the matrices of all joints that the skin lists, column after column: (N, 16).
 
-    Parameters
-    ----------
-    influences : Influences
-        Says whether vertices are fixed: what they hold on to was bound at the origin.
-    inverse_bind : (J, 4, 4)
-        Of the figure's joints.
+    ``influences``: says whether vertices are fixed: what they hold on to was bound at the origin.
+    ``inverse_bind`` (J, 4, 4): of the figure's joints.
     """
     matrices = np.concatenate([inverse_bind, np.eye(4)[None]])[: influences.n_joints]
     matrices[:, 3] = 0.0, 0.0, 0.0, 1.0  # exactly, as readers expect

@@ -20,8 +20,6 @@ from viewer.rig.motion.evaluation import Frames, frames_between, world_frames
 from viewer.rig.scalars import length_text
 from viewer.rig.skeleton import joint_label
 
-__all__ = ["Apart", "Farthest", "apart", "apart_lines", "negligible", "shared_extent"]
-
 _BLOCK = 1024  # poses at a time, so that matrices of all frames never exist at once
 _CHUNK = 128  # poses looked at at once
 _LIKELY = 4  # of these, poses whose farthest vertex is measured before all others
@@ -65,15 +63,10 @@ class Apart:
 def negligible(figure: Figure, frames: Frames, rows: Rows) -> float:
     """Return the distance, in figure units, that single precision may cost without a word.
 
-    Parameters
-    ----------
-    figure : Figure
-        Gives the size.
-    frames : Frames
-        Say how far from the origin its joints are. Numbers are coarser there, but not without
-        limit: what costs five times as much as usual is told.
-    rows : (F,)
-        Which of them count.
+    ``figure``: gives the size.
+    ``frames``: say how far from the origin its joints are. Numbers are coarser there, but not
+      without limit: what costs five times as much as usual is told.
+    ``rows`` (F,): which of them count.
     """
     size, reach = 0.0, 0.0
     if figure.mesh is not None and figure.mesh.n_vertices:
@@ -92,16 +85,10 @@ def apart(first: Side, second: Side, rows: Rows, least: float, frames: Rows | No
     What cannot hold the farthest vertex is passed over, so that the result is exact, in double
     precision, although few vertices are skinned so.
 
-    Parameters
-    ----------
-    first, second : Side
-        With the same joints and vertices, in the same space.
-    rows : (F,)
-        The first's frames.
-    least : float
-        Smaller distances count as none.
-    frames : (F,), optional
-        The second's frames; the same if omitted.
+    ``first``, ``second``: with the same joints and vertices, in the same space.
+    ``rows`` (F,): the first's frames.
+    ``least``: smaller distances count as none.
+    ``frames`` (F,): the second's frames; the same if omitted.
     """
     others = rows if frames is None else frames
     if first.exact is not None or second.exact is not None:
@@ -226,22 +213,13 @@ def apart_lines(
 ) -> list[str]:
     """Return a line that says by how much a file differs, or none if it does not.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    figure : Figure
-        As it is here.
-    found : Apart
-        What was measured.
-    first_frame : int or None
-        What the first frame is called; None for a single pose.
-    sources : (V,), optional
-        The figure's vertex for each that was compared.
-    meshes : str
-        Whose vertices these are, in words.
-    versus : str
-        What the file differs from; the motion or pose if empty.
+    ``path``: the file.
+    ``figure``: as it is here.
+    ``found``: what was measured.
+    ``first_frame``: what the first frame is called; None for a single pose.
+    ``sources`` (V,): the figure's vertex for each that was compared.
+    ``meshes``: whose vertices these are, in words.
+    ``versus``: what the file differs from; the motion or pose if empty.
     """
 
     def place(far: Farthest, label: str) -> str:

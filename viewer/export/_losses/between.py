@@ -17,8 +17,6 @@ from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
 from viewer.rig.skinning import Skinning
 
-__all__ = ["between_losses", "resampling_losses"]
-
 _PLACES = "between frames"
 _ON_FRAME = 1e-6  # of a frame: nearer than this to a frame is that frame
 
@@ -29,14 +27,9 @@ def resampling_losses(path: Path, animation: SampledAnimation, how: Skinning) ->
     What is between the frames that are written has rotations on the shorter arc, and all else in
     straight lines.
 
-    Parameters
-    ----------
-    path : Path
-        What was written.
-    animation : SampledAnimation
-        What was written into it.
-    how : Skinning
-        What moves the mesh.
+    ``path``: what was written.
+    ``animation``: what was written into it.
+    ``how``: what moves the mesh.
     """
     motion, frames, rate = animation.motion, animation.frames, animation.frame_rate
     written = SampledClip(
@@ -69,18 +62,11 @@ def between_losses(
     Keyed curves are searched for the times at which they differ most. A capture is known on its
     own frames alone, and is compared there.
 
-    Parameters
-    ----------
-    path : Path
-        What was written.
-    animation : SampledAnimation
-        What was written into it.
-    found : callable
-        From seconds (T,) to the poses that a reader of the file makes of it.
-    how : Skinning
-        What moves the mesh.
-    also : (T,), optional
-        Seconds at which captures are compared, too.
+    ``path``: what was written.
+    ``animation``: what was written into it.
+    ``found``: from seconds (T,) to the poses that a reader of the file makes of it.
+    ``how``: what moves the mesh.
+    ``also`` (T,): seconds at which captures are compared, too.
     """
     note = ""
     if isinstance(animation.motion, Clip):

@@ -17,18 +17,13 @@ from viewer.export._losses.skinned import Body, Poses
 from viewer.rig.arrays import Floats
 from viewer.rig.skin import Skin, merged, owners, skin_from_entries
 
-__all__ = ["Bounds"]
-
 _NUMBERS = 9  # of a joint's rotation, which drive the correctives
 
 
 class Bounds:
     """Of two bodies with the same vertices and joints.
 
-    Parameters
-    ----------
-    first, second : Body
-        Correctives are those of the first, or none.
+    ``first``, ``second``: correctives are those of the first, or none.
     """
 
     def __init__(self, first: Body, second: Body) -> None:

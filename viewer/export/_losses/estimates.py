@@ -15,8 +15,6 @@ from viewer.export._losses.skinned import Body, Poses
 from viewer.rig.arrays import Floats
 from viewer.rig.skinning._blocks import blocks_of
 
-__all__ = ["Estimator"]
-
 Single = NDArray[np.float32]
 
 _STEPS = 2.0**-18  # of the largest number in a sum: what sums in single precision may be off
@@ -25,10 +23,7 @@ _STEPS = 2.0**-18  # of the largest number in a sum: what sums in single precisi
 class Estimator:
     """Of two bodies with the same vertices.
 
-    Parameters
-    ----------
-    first, second : Body
-        Their arrays are kept in single precision.
+    ``first``, ``second``: their arrays are kept in single precision.
     """
 
     def __init__(self, first: Body, second: Body) -> None:

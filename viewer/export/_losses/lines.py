@@ -14,8 +14,6 @@ from viewer.rig.motion.evaluation import Frames
 from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.skinning import Skinning
 
-__all__ = ["driven_losses", "frames_losses", "shape_changes"]
-
 
 def shape_changes(frames: Frames) -> bool:
     """Return whether the shape of a figure changes over the frames that are present."""
@@ -34,20 +32,12 @@ def driven_losses(
 ) -> list[str]:
     """Return a line with the largest differences of a file without a mesh, or none.
 
-    Parameters
-    ----------
-    path : Path
-        What was written.
-    animation : SampledAnimation
-        What was to be written; frames that are missing are not compared.
-    written : Side
-        What the file says, by the animation's frames.
-    how : Skinning
-        What moves the mesh here; blended linearly.
-    span : (int, int)
-        The frames that are in the file: the first, and the one behind the last.
-    shape : (S,)
-        Weights of the shape that the file's skeleton has.
+    ``path``: what was written.
+    ``animation``: what was to be written; frames that are missing are not compared.
+    ``written``: what the file says, by the animation's frames.
+    ``how``: what moves the mesh here; blended linearly.
+    ``span``: the frames that are in the file: the first, and the one behind the last.
+    ``shape`` (S,): weights of the shape that the file's skeleton has.
     """
     rows = span[0] + np.flatnonzero(animation.frames.present[slice(*span)])
     meant = figure_side(animation.figure, animation.frames, replace(how, method="lbs"), shape)
@@ -66,20 +56,14 @@ def frames_losses(
 ) -> list[str]:
     """Return a line with the largest differences of poses that were read back, or none.
 
-    Parameters
-    ----------
-    path : Path
-        What was written.
-    animation : SampledAnimation
-        What was to be written; frames that are missing are not compared.
-    written : Frames
-        What the file says: poses of the animation's figure, as many as the span has.
-    how : Skinning
-        What moves the mesh; blended linearly, by the motion here and the one that was read alike.
-    span : (int, int), optional
-        The frames that are in the file: the first, and the one behind the last; all if omitted.
-    places : str
-        Where these poses are, in words, if not on the frames.
+    ``path``: what was written.
+    ``animation``: what was to be written; frames that are missing are not compared.
+    ``written``: what the file says: poses of the animation's figure, as many as the span has.
+    ``how``: what moves the mesh; blended linearly, by the motion here and the one that was read
+      alike.
+    ``span``: the frames that are in the file: the first, and the one behind the last; all if
+      omitted.
+    ``places``: where these poses are, in words, if not on the frames.
     """
     figure, frames = animation.figure, animation.frames
     first, stop = (0, frames.n_frames) if span is None else span

@@ -24,19 +24,6 @@ from viewer.rig.skin import Skin, has_influence, owners, skin_from_entries, skin
 from viewer.rig.skinning import Skinning, deform, skin_used
 from viewer.rig.skinning.lbs import move
 
-__all__ = [
-    "Body",
-    "Poses",
-    "Rows",
-    "Side",
-    "anchored",
-    "body_rows",
-    "changing",
-    "figure_side",
-    "poses_of",
-    "vertices",
-]
-
 Rows = NDArray[np.intp]
 
 
@@ -115,18 +102,11 @@ def figure_side(
 ) -> Side:
     """Return a figure as it moves here.
 
-    Parameters
-    ----------
-    figure : Figure
-        Unshaped.
-    frames : Frames
-        Its poses.
-    how : Skinning
-        What moves the mesh.
-    reference : (S,)
-        Weights of the shape that changes count from.
-    columns : (M,), optional
-        The blend shapes that change; those that do in these frames if omitted.
+    ``figure``: unshaped.
+    ``frames``: its poses.
+    ``how``: what moves the mesh.
+    ``reference`` (S,): weights of the shape that changes count from.
+    ``columns`` (M,): the blend shapes that change; those that do in these frames if omitted.
     """
     chosen = changing(frames, reference) if columns is None else columns
     body = None if figure.mesh is None else _body(figure, how, reference, chosen)
@@ -167,8 +147,7 @@ def anchored(palette: Floats, scales: Floats) -> Floats:
 
 
 def _body(figure: Figure, how: Skinning, still: Floats, columns: Rows) -> Body:
-    mesh, shapes = figure.mesh, figure.blend_shapes
-    assert mesh is not None  # the caller looked
+    mesh, shapes = figure.require_mesh(), figure.blend_shapes
     n_joints = 0 if figure.skeleton is None else figure.skeleton.n_joints
     positions = mesh.positions
     if shapes is not None and still.any():

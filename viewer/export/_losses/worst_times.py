@@ -28,8 +28,6 @@ from viewer.rig.motion.clip import SHORTEST, Channel, Clip
 from viewer.rig.motion.evaluation import Frames
 from viewer.rig.skinning import Skinning
 
-__all__ = ["Sampler", "WorstTimes", "key_times", "worst_times"]
-
 Sampler = Callable[[Floats], Frames]
 
 _MOST = 8192  # times looked at in all, before the highest are refined
@@ -94,18 +92,11 @@ def worst_times(
 ) -> WorstTimes:
     """Return when joints or vertices of a figure that moves in two ways are farthest apart.
 
-    Parameters
-    ----------
-    figure : Figure
-        Unshaped.
-    one, other : callable
-        From seconds (T,) to poses of the figure, none of them missing.
-    edges : (E,)
-        Seconds between which both are smooth, rising.
-    rate : float
-        Frames a second, by which spans are too short to matter.
-    how : Skinning
-        What moves the mesh; blended linearly.
+    ``figure``: unshaped.
+    ``one``, ``other``: from seconds (T,) to poses of the figure, none of them missing.
+    ``edges`` (E,): seconds between which both are smooth, rising.
+    ``rate``: frames a second, by which spans are too short to matter.
+    ``how``: what moves the mesh; blended linearly.
     """
     spans = _spans(edges, _SHORT / rate)
     if len(spans) == 0:

@@ -82,8 +82,7 @@ class InstanceBuffers:
     def __init__(self, context: moderngl.Context, mesh: MeshBuffers, way: str = "") -> None:
         self.context, self.mesh = context, mesh
         self.count = self.n_updates = 0
-        assert mesh.figure.skin is not None  # only attached figures come here
-        self._n_joints = mesh.figure.skin.n_joints
+        self._n_joints = mesh.figure.require_skin().n_joints
         self._rest = RestBuffers(context, mesh, way)
         self._offsets = SummedOffsets(context, mesh, self._rest.way)
         self._how = Skinning()
@@ -145,8 +144,8 @@ class InstanceBuffers:
 
     def _write(self, figure: Figure, poses: list[Pose], rows: NDArray[np.intp]) -> None:
         """Upload T(-center') M T(center) of the poses at ``rows``, as ``PosedMesh`` does of one."""
-        skeleton, skin, how = figure.skeleton, figure.skin, self._how
-        assert skeleton is not None and skin is not None and self._palette is not None
+        skeleton, skin, how = figure.require_skeleton(), figure.require_skin(), self._how
+        assert self._palette is not None
         rotations = local_rotations(skeleton, poses)
         palette = skinning_matrices(posed_worlds(skeleton, poses, rotations), skin.inverse_bind)
         self._is_rigid[rows] = is_rigid(palette)

@@ -47,8 +47,7 @@ class MeshBuffers:
     """
 
     def __init__(self, context: moderngl.Context, figure: Figure, notes: list[str]) -> None:
-        mesh = figure.mesh
-        assert mesh is not None  # only figures with a mesh come here
+        mesh = figure.require_mesh()
         self.context, self.figure = context, figure
         self.sources, uv_indices, self.triangles = split_seams(mesh)
         self.n_vertices = len(self.sources)
@@ -98,8 +97,7 @@ class MeshBuffers:
         return self._index_sets[key]
 
     def _make_index_set(self, reduced: bool, hidden: tuple[int, ...], as_listed: bool) -> IndexSet:
-        mesh, coarse = self.figure.mesh, self.figure.reduced
-        assert mesh is not None
+        mesh, coarse = self.figure.require_mesh(), self.figure.reduced
         if reduced and coarse is not None:
             of_figure = coarse.vertices[coarse.triangles]
             split, materials = self.copies[of_figure], np.full(len(of_figure), -1, dtype=np.int32)

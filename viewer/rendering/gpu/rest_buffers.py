@@ -92,8 +92,7 @@ class RestBuffers:
 
     def _write(self, figure: Figure, weights: Floats | None, normals: bool) -> None:
         """Upload positions, and normals if the shape changed, of every split vertex."""
-        shape = figure.mesh
-        assert shape is not None  # the mesh buffers have one
+        shape = figure.require_mesh()
         if self._own is None:
             size = self.mesh.positions.size
             self._own = (

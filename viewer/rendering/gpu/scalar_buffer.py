@@ -1,4 +1,4 @@
-"""The numbers of a scalar view on the GPU: one per vertex, computed when one of them may change."""
+"""The numbers of a scalar quantity on the GPU: one per vertex, computed when one may change."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from viewer.rendering.gpu.upload import float32, ramp_texture
 from viewer.rendering.scalar_look import ScalarLook, typical_span
 from viewer.rig.arrays import Floats
 from viewer.rig.pose import Pose, pose_key
-from viewer.rig.scalars import compute, find_view, missing_part
+from viewer.rig.scalars import compute, find_quantity, missing_part
 from viewer.rig.skinning import Skinning
 
 __all__ = ["ScalarBuffer"]
@@ -58,7 +58,7 @@ class ScalarBuffer:
         self._key: tuple[object, ...] | None = None
 
     def update(self, name: str, pose: Pose | None, skinning: Skinning) -> None:
-        """Compute a scalar view if what its numbers depend on changed.
+        """Compute a scalar quantity if what its numbers depend on changed.
 
         Parameters
         ----------
@@ -69,11 +69,11 @@ class ScalarBuffer:
         skinning : Skinning
             How the mesh is drawn.
         """
-        depends = find_view(name).moves and pose is not None
+        depends = find_quantity(name).moves and pose is not None
         key = (name, repr(skinning), pose is None, pose_key(pose) if depends and pose else None)
         if key == self._key:
             return
-        figure, view = self.mesh.figure, find_view(name)
+        figure, view = self.mesh.figure, find_quantity(name)
         if view.about and missing_part(name, figure):
             # Another figure of the scene may have this joint or field.
             nothing = -1.0 if view.kind == "categorical" else 0.0

@@ -141,12 +141,8 @@ def _settle(places: Places, taken: _Taken, gap: float) -> Ints:
 class _Taken:
     """The pixels beneath labels and lines.
 
-    Parameters
-    ----------
-    picture : (int, int)
-        Width and height, pixels.
-    gap : float
-        Pixels between a point and its label.
+    ``picture``: width and height, pixels.
+    ``gap``: pixels between a point and its label.
     """
 
     def __init__(self, picture: tuple[int, int], gap: float) -> None:

@@ -1,4 +1,4 @@
-"""What the colours of a scalar view stand for, as data that pictures and panels draw alike."""
+"""What the colours of a scalar quantity stand for, as data that pictures and panels draw alike."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from viewer.rig.mesh import triangle_areas
 from viewer.rig.number_text import short_number
 from viewer.rig.scalars import (
     categories,
-    find_view,
+    find_quantity,
     menu_title,
     missing_part,
+    quantity_title,
     shown_unit,
     split_name,
-    view_title,
 )
 from viewer.rig.skinning import Skinning
 
@@ -120,8 +120,8 @@ def legend_of(
     """
     if not having:
         return _empty(name, skinning, figures)
-    title = view_title(name, having[0].figure, skinning)
-    kind = find_view(name).kind
+    title = quantity_title(name, having[0].figure, skinning)
+    kind = find_quantity(name).kind
     if kind == "categorical":
         return Legend(title, entries=_entries(name, having))
     if kind == "discrete":
@@ -134,9 +134,9 @@ def _empty(name: str, skinning: Skinning, figures: Sequence[Figure]) -> Legend:
     missing = [missing_part(name, figure) for figure in figures]
     hidden = [figure for figure, lacks in zip(figures, missing, strict=True) if not lacks]
     if hidden:
-        return Legend(view_title(name, hidden[0], skinning), note="not known of what is shown")
+        return Legend(quantity_title(name, hidden[0], skinning), note="not known of what is shown")
     if missing[0] == "a selected joint":
-        return Legend(find_view(name).title, note="no joint is selected")
+        return Legend(find_quantity(name).title, note="no joint is selected")
     return Legend(menu_title(split_name(name)[0], skinning), note=f"no figure has {missing[0]}")
 
 
@@ -173,7 +173,7 @@ def _bar(name: str, title: str, shown: Sequence[Shown]) -> Legend:
     look = shown[0].look
     low = factor * min(float(one.numbers.min()) for one in shown)
     high = factor * max(float(one.numbers.max()) for one in shown)
-    is_signed = find_view(name).kind == "diverging"
+    is_signed = find_quantity(name).kind == "diverging"
     ends = factor * look.ends[0], factor * look.ends[1]
     is_flat = low == high == 0.0
     span = f"from {_text(low, is_signed)} to {_text(high, is_signed)}"
@@ -222,8 +222,7 @@ _areas: Memo[Figure, Floats] = Memo()
 
 def _vertex_areas(figure: Figure) -> Floats:
     """Return a third of the area of the triangles around each vertex at rest: (V,)."""
-    mesh = figure.mesh
-    assert mesh is not None  # it is drawn
+    mesh = figure.require_mesh()
 
     def make() -> Floats:
         thirds = np.repeat(triangle_areas(mesh.positions, mesh.triangles) / 3.0, 3)

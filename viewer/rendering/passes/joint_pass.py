@@ -34,8 +34,7 @@ class SkeletonBuffers:
     """Boxes of one figure's joints, moved by one actor's pose."""
 
     def __init__(self, context: moderngl.Context, figure: Figure, cube: moderngl.Buffer) -> None:
-        skeleton = figure.skeleton
-        assert skeleton is not None  # only figures with a skeleton come here
+        skeleton = figure.require_skeleton()
         self.figure = figure
         self.boxes = BoxBuffers(context, cube, _joint_boxes(skeleton))
         self._key: NumberKey | None = None

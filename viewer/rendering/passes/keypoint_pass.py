@@ -36,9 +36,9 @@ class KeypointBuffers:
     """
 
     def __init__(self, context: moderngl.Context, figure: Figure, cube: moderngl.Buffer) -> None:
-        assert figure.keypoints is not None and figure.mesh is not None  # the caller looked
+        assert figure.keypoints is not None  # the caller looked
         self.figure = figure
-        half = _CUBE_SIZE * box_size(bounding_box(figure.mesh.positions))
+        half = _CUBE_SIZE * box_size(bounding_box(figure.require_mesh().positions))
         cubes = np.tile([[-half] * 3, [half] * 3], (len(figure.keypoints.names), 1, 1))
         self.boxes = BoxBuffers(context, cube, cubes)
         self._key: tuple[object, ...] | None = None

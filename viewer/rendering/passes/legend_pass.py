@@ -1,4 +1,4 @@
-"""Draws the legend of a scalar view into the corner of a picture."""
+"""Draws the legend of a scalar quantity into the corner of a picture."""
 
 from __future__ import annotations
 

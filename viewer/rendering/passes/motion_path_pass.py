@@ -112,8 +112,8 @@ def _still(actor: Actor) -> tuple[object, ...]:
 
 
 def _place(actor: Actor) -> tuple[bytes, float]:
-    assert actor.pose is not None  # the caller looked
-    return actor.pose.figure_translation.tobytes(), actor.pose.figure_scale
+    pose = actor.require_pose()
+    return pose.figure_translation.tobytes(), pose.figure_scale
 
 
 class MotionPathPass:

@@ -59,7 +59,7 @@ class PosedMesh:
     center : (3,)
         Add it to the positions for figure space; it is part of the model matrix.
     scalars : ScalarBuffer
-        The numbers of a scalar view, computed when one is shown.
+        The numbers of a scalar quantity, computed when one is shown.
     """
 
     def __init__(

@@ -217,8 +217,7 @@ class _Comparison:
         other = second.skin
         if not self.is_same:
             found = _closest(self._posed(self.first), self._posed(self.second), self.second)
-            assert second.mesh is not None  # a skin has one
-            other = skin_at(second.skin, second.mesh.triangles, found)
+            other = skin_at(second.skin, second.require_mesh().triangles, found)
         tally = self._tally("weights", "weight", first.skin.n_vertices)
         tally.add("", row_distances(first.skin, other, self.joints))
 
@@ -227,8 +226,7 @@ class _Comparison:
 
 
 def _closest(points: Floats, positions: Floats, actor: Actor) -> SurfacePoints:
-    assert actor.figure.mesh is not None  # the caller has its positions
-    return Surface(positions, actor.figure.mesh.triangles).closest(points)
+    return Surface(positions, actor.figure.require_mesh().triangles).closest(points)
 
 
 def _counts(mesh: Mesh) -> str:
@@ -245,10 +243,9 @@ def _is_same_topology(first: Mesh, second: Mesh) -> bool:
 
 def _joint_frames(actor: Actor) -> Floats:
     """Return the joints' matrices with the figure's own place: (J, 4, 4)."""
-    assert actor.pose is not None  # a figure with a skeleton has one
-    shape = shaped(actor.figure, actor.pose.shape_weights).skeleton
-    assert shape is not None  # shaping keeps it
-    return placement_matrix(actor.pose) @ world_matrices(shape, actor.pose)
+    pose = actor.require_pose()
+    shape = shaped(actor.figure, pose.shape_weights).require_skeleton()
+    return placement_matrix(pose) @ world_matrices(shape, pose)
 
 
 def _size(actor: Actor) -> float:

@@ -64,17 +64,15 @@ class Steps:
         if len(self.times):
             # Both from their own start: captures may count from any frame.
             for actor in (first, second):
-                assert actor.clip is not None  # or there were no times
-                time = float(self.times[number]) + actor.clip.start + actor.offset
+                time = float(self.times[number]) + actor.require_clip().start + actor.offset
                 pose_actor(actor, time)
             return f"frame {self.first_frame + number}"
         for actor, own in zip((first, second), self.own, strict=True):
             actor.pose = None if own is None else own.copy()
         if number == 0:
             return "own pose"
-        assert first.pose is not None and second.pose is not None  # or there were no DOFs
-        first.pose.dofs[self.first] = self.dofs[number - 1]
-        second.pose.dofs[self.second] = self.dofs[number - 1]
+        first.require_pose().dofs[self.first] = self.dofs[number - 1]
+        second.require_pose().dofs[self.second] = self.dofs[number - 1]
         return f"test pose {number}"
 
 
@@ -125,16 +123,16 @@ def _still_steps(first: Actor, second: Actor, n_poses: int) -> Steps:
 
 
 def _motion_steps(first: Actor, second: Actor, frames: FrameRange | None) -> Steps:
-    assert first.clip is not None and second.clip is not None  # the caller looked
-    rates = frame_rate(first.clip), frame_rate(second.clip)
-    lasts = first.clip.end - first.clip.start, second.clip.end - second.clip.start
+    clips = first.require_clip(), second.require_clip()
+    rates = frame_rate(clips[0]), frame_rate(clips[1])
+    lasts = clips[0].end - clips[0].start, clips[1].end - clips[1].start
     mismatches = []
     if abs(lasts[0] - lasts[1]) > 0.5 / rates[0]:
         mismatches.append(f"one lasts {lasts[0]:.6g} s, the other {lasts[1]:.6g} s")
     notes = []
     if abs(rates[0] - rates[1]) > _SAME_TIME * rates[0]:
         notes.append(f"{rates[0]:g} and {rates[1]:g} frames a second: compared at the first's")
-    base = 0 if isinstance(first.clip, Clip) else first.clip.timing.first_frame
+    base = 0 if isinstance(clips[0], Clip) else clips[0].timing.first_frame
     last = base + int(np.floor(min(lasts) * rates[0] + _SAME_TIME))
     start, end = (None, None) if frames is None else frames
     chosen = np.arange(

@@ -153,10 +153,8 @@ def explain(figure: Figure, pose: Pose, skinning: Skinning, vertex: int) -> Expl
         raise RigError(f"figure {figure.name} has no skin that follows a skeleton")
     chosen = np.array([vertex], dtype=np.int32)
     check_vertices(figure, chosen)
-    assert figure.mesh is not None  # it is attached
-    stored, figure = figure.mesh.positions[vertex], shaped(figure, pose.shape_weights)
-    mesh, skeleton, skin = figure.mesh, figure.skeleton, figure.skin
-    assert mesh is not None and skeleton is not None and skin is not None  # it is attached
+    stored, figure = figure.require_mesh().positions[vertex], shaped(figure, pose.shape_weights)
+    mesh, skeleton, skin = figure.attached()
     rest = rest_vertices(figure, pose, chosen, skinning.correctives)[0]
     row = strongest_first(skin_rows(skin_used(skin, skinning), chosen))
     palette = posed_skeleton(skeleton, pose).palette(skin)

@@ -78,8 +78,7 @@ def rest_vertices(figure: Figure, pose: Pose, vertices: Ints, correct: bool = Tr
     (N, 3)
         Binding space.
     """
-    assert figure.mesh is not None  # the caller looked
-    rest = figure.mesh.positions[vertices]
+    rest = figure.require_mesh().positions[vertices]
     if not correct or figure.correctives is None or figure.skeleton is None:
         return rest
     weights = corrective_weights(joint_rotations(figure.skeleton, pose))

@@ -82,8 +82,7 @@ def vertex_facts(
     """
     chosen = np.array([vertex], dtype=np.int32)
     check_vertices(figure, chosen)
-    mesh, parts, skin = figure.mesh, figure.body_parts, figure.skin
-    assert mesh is not None  # it has this vertex
+    mesh, parts, skin = figure.require_mesh(), figure.body_parts, figure.skin
     if not -1 <= triangle < mesh.n_triangles:
         raise RigError(f"triangle: expected -1 to {mesh.n_triangles - 1}, found {triangle}")
     positions, normals = deform_vertices(figure, pose, skinning, chosen)
@@ -144,8 +143,7 @@ def facts_text(facts: VertexFacts) -> list[str]:
 
 def _uvs(figure: Figure, vertex: int, triangle: int) -> Floats:
     """Return a vertex's texture coordinates, each once, that of a triangle first: (N, 2)."""
-    mesh = figure.mesh
-    assert mesh is not None  # the caller looked
+    mesh = figure.require_mesh()
     if mesh.uvs is None or len(mesh.uvs) == 0:
         return np.zeros((0, 2))
     if mesh.uv_triangles is None:

@@ -228,7 +228,6 @@ def _keyed_frames(skeleton: Skeleton, clip: Clip, times: Floats, pose: Pose) -> 
 
 def pose_of(figure: Figure, frames: Frames, frame: int) -> Pose:
     """Return one frame as a pose of its own."""
-    assert figure.skeleton is not None  # whoever has frames has a skeleton
     pose = figure_pose(figure)
     row = SampledRows(
         frames.present,
@@ -238,7 +237,7 @@ def pose_of(figure: Figure, frames: Frames, frame: int) -> Pose:
         frames.figure_scales,
         np.broadcast_to(frames.shape_weights, (frames.n_frames, frames.shape_weights.shape[1])),
     )
-    _apply(row, frame, figure.skeleton, pose)
+    _apply(row, frame, figure.require_skeleton(), pose)
     return pose
 
 
@@ -271,8 +270,7 @@ def world_frames(figure: Figure, frames: Frames) -> Floats:
     (F, J, 4, 4)
         Joint space to figure space, the figure's own scale and translation included.
     """
-    skeleton = figure.skeleton
-    assert skeleton is not None  # whoever has frames has a skeleton
+    skeleton = figure.require_skeleton()
     count = frames.n_frames
     local = np.zeros((skeleton.n_joints, count, 4, 4))
     local[..., 3, 3] = 1.0
@@ -290,8 +288,7 @@ def world_frames(figure: Figure, frames: Frames) -> Floats:
 
 def rest_translations_of(figure: Figure, shape_weights: Floats) -> Floats:
     """Return the rest translations of many shapes: (F, J, 3) for weights (F, S)."""
-    skeleton = figure.skeleton
-    assert skeleton is not None  # the callers looked
+    skeleton = figure.require_skeleton()
     if not shape_weights.any():
         return skeleton.rest_translations[None]
     shifts = np.einsum("fs,sjc->fjc", shape_weights, joint_directions(figure))

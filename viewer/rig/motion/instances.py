@@ -204,8 +204,9 @@ def palettes(figure: Figure, poses: Sequence[Pose]) -> Floats:
         Bind-to-posed matrices; the figure's own place is not part of them.
     """
     figure = shaped(figure, poses[0].shape_weights)
-    assert figure.skeleton is not None and figure.skin is not None  # the caller looked
-    return skinning_matrices(worlds(figure.skeleton, poses), figure.skin.inverse_bind)
+    return skinning_matrices(
+        worlds(figure.require_skeleton(), poses), figure.require_skin().inverse_bind
+    )
 
 
 def placements(poses: Sequence[Pose]) -> Floats:

@@ -170,8 +170,7 @@ def _rotated_upright(figure: Figure, frames: Frames) -> Frames:
     """
     half = np.array([1.0, 0.0, 0.0, 0.0])
     rotations = frames.rotations.copy()
-    assert figure.skeleton is not None  # whoever has an animation has a skeleton
-    roots = np.flatnonzero(figure.skeleton.parents < 0)
+    roots = np.flatnonzero(figure.require_skeleton().parents < 0)
     rotations[:, roots] = multiply(half, rotations[:, roots])
     rest = rest_translations_of(figure, frames.shape_weights)[:, 0]
     inner = frames.figure_scales[:, None] * (rest + frames.translations[:, 0])

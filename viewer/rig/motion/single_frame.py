@@ -52,8 +52,7 @@ def single_frame(
     if figure.skeleton is None or pose is None:
         raise RigError(f"figure {figure.name} has no joints to pose")
     figure, frames = pose_frames(figure, pose, actor.is_present, time)
-    skeleton = figure.skeleton
-    assert skeleton is not None  # as above
+    skeleton = figure.require_skeleton()
     if is_course_rig(skeleton) and not isinstance(actor.clip, SampledClip):
         motion: Clip | SampledClip = clip_from_pose(skeleton, pose, actor.name, time, time)
     else:

@@ -79,8 +79,7 @@ def _rotated_upright(figure: Figure, pose: Pose) -> Pose:
 
     The first root stays where it is within the figure, l' = l; the figure's translation T moves it.
     """
-    skeleton = shaped(figure, pose.shape_weights).skeleton
-    assert skeleton is not None  # whoever has a pose has one
+    skeleton = shaped(figure, pose.shape_weights).require_skeleton()
     turned = pose.copy()
     roots = np.flatnonzero(skeleton.parents < 0).astype(np.int32)
     within = pose.figure_scale * local_matrices(skeleton, pose)[roots, :3, 3]

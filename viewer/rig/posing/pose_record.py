@@ -127,8 +127,7 @@ def record_of(figure: Figure, pose: Pose) -> PoseRecord:
     pose : Pose
         Of that figure.
     """
-    skeleton = figure.skeleton
-    assert skeleton is not None  # whoever has a pose has a skeleton
+    skeleton = figure.require_skeleton()
     groups = figure.blend_shapes.groups if figure.blend_shapes else ()
     weights = np.zeros(len(groups))
     weights[: len(pose.shape_weights)] = pose.shape_weights
@@ -263,9 +262,8 @@ def _apply_dofs(record: PoseRecord, figure: Figure, pose: Pose) -> list[Diagnost
 
 
 def _dof(figure: Figure, label: str) -> int:
-    assert figure.skeleton is not None
     try:
-        return find_dof(figure.skeleton, label)
+        return find_dof(figure.require_skeleton(), label)
     except RigError as problem:
         why = str(problem).removeprefix(f'"{label}": ')  # once is enough
         values = {"figure": figure.name, "found": label, "reason": why}
@@ -279,8 +277,7 @@ def _beyond_limits(skeleton: Skeleton, dofs: Floats) -> list[Diagnostic]:
 
 def _apply_vector(vector: Floats, figure: Figure, pose: Pose) -> list[Diagnostic]:
     """Take the model's own numbers, or the vector of another member of the SMPL family."""
-    skeleton = figure.skeleton
-    assert skeleton is not None
+    skeleton = figure.require_skeleton()
     layout = figure.pose_layout
     own = skeleton.n_dofs if layout is None else layout.n_numbers
     if len(vector) == own:
@@ -329,8 +326,7 @@ def _apply_part(
 
 def _apply_body(values: Floats, figure: Figure, pose: Pose) -> list[Diagnostic]:
     """Turn the joints after the root; the two hands of SMPL mean nothing to its kin."""
-    skeleton = figure.skeleton
-    assert skeleton is not None
+    skeleton = figure.require_skeleton()
     has_more = "left_wrist" in skeleton.names and "left_hand" not in skeleton.names
     own = _BODY if has_more else skeleton.n_joints - 1
     most = _LONGEST_BODY if has_more else own
@@ -395,6 +391,5 @@ def _apply_hand(
 
 
 def _turn(figure: Figure, pose: Pose, joints: Ints, numbers: Floats) -> None:
-    assert figure.skeleton is not None  # the callers looked
     rotations = rotation_vector_to_matrix(numbers.reshape(-1, 3))
-    set_joint_rotations(figure.skeleton, pose, joints, rotations)
+    set_joint_rotations(figure.require_skeleton(), pose, joints, rotations)

@@ -44,10 +44,11 @@ def asymmetry(figure: Figure) -> Floats:
 
 
 def _mirror_distances(figure: Figure, axis: int) -> Floats:
-    assert figure.mesh is not None and figure.symmetry is not None  # the callers looked
-    partner = figure.mesh.positions[figure.symmetry].copy()
+    mesh = figure.require_mesh()
+    assert figure.symmetry is not None  # the callers looked
+    partner = mesh.positions[figure.symmetry].copy()
     partner[:, axis] *= -1.0
-    return np.linalg.norm(figure.mesh.positions - partner, axis=1)
+    return np.linalg.norm(mesh.positions - partner, axis=1)
 
 
 def joint_partners(figure: Figure) -> Ints:
@@ -105,9 +106,8 @@ def mirror_pose(figure: Figure, pose: Pose) -> Pose:
     RigError
         If the skeleton is not symmetric.
     """
-    skeleton = figure.skeleton
     partners = joint_partners(figure)
-    assert skeleton is not None  # joint_partners looked
+    skeleton = figure.require_skeleton()
     flip = np.ones(3)
     flip[mirror_axis(figure)] = -1.0
     zero = rest_pose(skeleton)

@@ -84,8 +84,7 @@ def joint_turns(figure: Figure, pose: Pose) -> JointTurns:
     pose : Pose
         Of that figure.
     """
-    skeleton = figure.skeleton
-    assert skeleton is not None  # whoever has a pose has a skeleton
+    skeleton = figure.require_skeleton()
     turns = _turned(skeleton, pose) @ np.swapaxes(_turned(skeleton, _unturned(skeleton)), 1, 2)
     return JointTurns(
         figure.name,
@@ -108,8 +107,7 @@ def dof_layout(figure: Figure) -> str:
     figure : Figure
         With a skeleton.
     """
-    skeleton = figure.skeleton
-    assert skeleton is not None  # whoever has a pose has a skeleton
+    skeleton = figure.require_skeleton()
     rest = quaternion_to_matrix(skeleton.rest_rotations).round(_REST_DIGITS) + 0.0  # no -0
     parts = (
         repr((skeleton.names, figure.up)).encode("utf-8", "surrogatepass"),
@@ -132,8 +130,7 @@ def shares_layout(source: JointTurns, figure: Figure) -> bool:
     figure : Figure
         With a skeleton.
     """
-    skeleton = figure.skeleton
-    assert skeleton is not None  # whoever has a pose has a skeleton
+    skeleton = figure.require_skeleton()
     # Files are edited by hand: the word alone does not make their lists as long as the skeleton.
     return source.layout == dof_layout(figure) and source.names == skeleton.names
 

@@ -1,7 +1,7 @@
-"""Scalar views: a number for every vertex of a posed figure, to be shown as a colour.
+"""Scalar quantities: a number for every vertex of a posed figure, to be shown as a colour.
 
-A view is named by its key, one that is about something as ``"weight:left_knee"``, ``"weight:#4"``,
-``"field:distance"``.
+A quantity is named by its key, one that is about something as ``"weight:left_knee"``,
+``"weight:#4"``, ``"field:distance"``.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from viewer.rig.scalars._asked import Asked, influences_kept
 from viewer.rig.scalars._fields import field_of
 from viewer.rig.scalars._joints import joint_of, joint_text
 from viewer.rig.scalars._lengths import length_text, length_unit
-from viewer.rig.scalars._start import joint_influences, most_influential, telling_view
+from viewer.rig.scalars._start import joint_influences, most_influential, telling_quantity
 from viewer.rig.skeleton import joint_labels
 from viewer.rig.skinning import METHODS, PURE, Skinning
 
 __all__ = [
     "SCALARS",
-    "Scalar",
+    "Quantity",
     "categories",
     "compute",
-    "find_view",
+    "find_quantity",
     "joint_influences",
     "joint_of",
     "joint_text",
@@ -40,19 +40,19 @@ __all__ = [
     "menu_title",
     "missing_part",
     "most_influential",
+    "quantity_title",
     "shown_unit",
     "split_name",
     "strongest",
-    "telling_view",
-    "view_title",
+    "telling_quantity",
 ]
 
 _NOISE = 1e-9  # of the figure's size for lengths, else of 1
 
 
 @dataclass(frozen=True, slots=True)
-class Scalar:
-    """A scalar view.
+class Quantity:
+    """A scalar quantity.
 
     Attributes
     ----------
@@ -70,7 +70,8 @@ class Scalar:
     moves : bool
         Whether the numbers depend on the pose.
     about : str
-        ``"joint"`` or ``"field"`` for a view of one of those, which its name may say; else empty.
+        ``"joint"`` or ``"field"`` for a quantity of one of those, which its name may say; else
+        empty.
     isolines : bool
         Whether lines of equal number are drawn unless asked otherwise.
     least : float
@@ -93,7 +94,7 @@ class Scalar:
 
     @property
     def takes_joint(self) -> bool:
-        """Whether the view is about one joint."""
+        """Whether the quantity is about one joint."""
         return self.about == "joint"
 
     def shown(self, low: float, high: float) -> tuple[float, float]:
@@ -111,33 +112,43 @@ class Scalar:
 _FIRST, *_OTHERS = (METHODS[name].short for name in PURE)
 
 SCALARS = {
-    "weight": Scalar(
-        "Weight of a joint", "weights", "weights", unit="", moves=False, about="joint",
-        isolines=True, least=1.0,
+    "weight": Quantity(
+        "Weight of a joint",
+        "weights",
+        "weights",
+        unit="",
+        moves=False,
+        about="joint",
+        isolines=True,
+        least=1.0,
     ),
-    "dominant": Scalar("Dominant joint", "weights", "weights", "categorical", "", moves=False),
-    "influences": Scalar(
+    "dominant": Quantity("Dominant joint", "weights", "weights", "categorical", "", moves=False),
+    "influences": Quantity(
         "Number of influences", "weights", "weights", "discrete", "", moves=False
     ),
-    "sums": Scalar("|sum of weights - 1|", "weights", "weights", unit="", moves=False),
-    "entropy": Scalar("Entropy of weights", "weights", "weights", unit="bits", moves=False),
-    "stretch": Scalar("Edge stretch, largest", "strain", "a skin", "diverging", "%", robust=True),
-    "stretch-mean": Scalar("Edge stretch, mean", "strain", "a skin", "diverging", "%", robust=True),
-    "area": Scalar("Area change", "strain", "a skin", "diverging", "%", robust=True),
-    "methods": Scalar(f"Distance {_FIRST} to {' or '.join(_OTHERS)}", "distances", "a skin"),
-    "cut": Scalar("Distance to few influences", "distances", "a skin"),
-    "normalized": Scalar("Effect of normalising weights", "distances", "a skin"),
-    "correctives": Scalar("Effect of pose correctives", "distances", "pose correctives"),
-    "asymmetry": Scalar("Asymmetry", "distances", "a symmetry map"),
-    "parts": Scalar("Body parts", "parts", "body parts", "categorical", "", moves=False),
-    "field": Scalar("Field", "fields", "fields", unit="", moves=False, about="field"),
-    "class": Scalar("Classes", "fields", "classes", "categorical", "", moves=False, about="field"),
-}  # fmt: skip
-"""Views by name, in the order of menus."""
+    "sums": Quantity("|sum of weights - 1|", "weights", "weights", unit="", moves=False),
+    "entropy": Quantity("Entropy of weights", "weights", "weights", unit="bits", moves=False),
+    "stretch": Quantity("Edge stretch, largest", "strain", "a skin", "diverging", "%", robust=True),
+    "stretch-mean": Quantity(
+        "Edge stretch, mean", "strain", "a skin", "diverging", "%", robust=True
+    ),
+    "area": Quantity("Area change", "strain", "a skin", "diverging", "%", robust=True),
+    "methods": Quantity(f"Distance {_FIRST} to {' or '.join(_OTHERS)}", "distances", "a skin"),
+    "cut": Quantity("Distance to few influences", "distances", "a skin"),
+    "normalized": Quantity("Effect of normalising weights", "distances", "a skin"),
+    "correctives": Quantity("Effect of pose correctives", "distances", "pose correctives"),
+    "asymmetry": Quantity("Asymmetry", "distances", "a symmetry map"),
+    "parts": Quantity("Body parts", "parts", "body parts", "categorical", "", moves=False),
+    "field": Quantity("Field", "fields", "fields", unit="", moves=False, about="field"),
+    "class": Quantity(
+        "Classes", "fields", "classes", "categorical", "", moves=False, about="field"
+    ),
+}
+"""Quantities by name, in the order of menus."""
 
 
 def split_name(name: str) -> tuple[str, str]:
-    """Return a view's key and what stands behind its colon: a joint or field, empty for none.
+    """Return a quantity's key and what stands behind its colon: a joint or field, empty for none.
 
     Parameters
     ----------
@@ -147,18 +158,18 @@ def split_name(name: str) -> tuple[str, str]:
     Raises
     ------
     RigError
-        If there is no such view, or it is about nothing and something is given.
+        If there is no such quantity, or it is about nothing and something is given.
     """
     key, colon, about = name.partition(":")
     if key not in SCALARS:
-        raise RigError(f'no scalar view "{key}"; {name_hint(key, SCALARS)}')
+        raise RigError(f'no scalar quantity "{key}"; {name_hint(key, SCALARS)}')
     if colon and not SCALARS[key].about:
-        raise RigError(f'scalar view "{key}": expected no joint, found "{about}"')
+        raise RigError(f'scalar quantity "{key}": expected no joint, found "{about}"')
     return key, about
 
 
-def find_view(name: str) -> Scalar:
-    """Return the view of a name, with or without a joint.
+def find_quantity(name: str) -> Quantity:
+    """Return the quantity of a name, with or without a joint.
 
     Raises
     ------
@@ -169,12 +180,12 @@ def find_view(name: str) -> Scalar:
 
 
 def compute(name: str, figure: Figure, pose: Pose | None, skinning: Skinning) -> Floats:
-    """Return a scalar view's numbers.
+    """Return a scalar quantity's numbers.
 
     Parameters
     ----------
     name : str
-        A key of ``SCALARS``, with a joint if the view is about one.
+        A key of ``SCALARS``, with a joint if the quantity is about one.
     figure : Figure
         With a mesh.
     pose : Pose or None
@@ -185,33 +196,33 @@ def compute(name: str, figure: Figure, pose: Pose | None, skinning: Skinning) ->
     Returns
     -------
     (V,)
-        In figure units or the view's own; zeros if the figure lacks what the view shows, -1 where
-        that is a thing with a name.
+        In figure units or the quantity's own; zeros if the figure lacks what the quantity shows, -1
+        where that is a thing with a name.
 
     Raises
     ------
     RigError
-        If the view is unknown, or is about a joint or field and the figure has not that one.
+        If the quantity is unknown, or is about a joint or field and the figure has not that one.
     """
     key, about = split_name(name)
-    view = SCALARS[key]
-    assert figure.mesh is not None  # the caller draws it
-    if _missing(view.needs, figure) or (view.moves and pose is None):
-        return np.full(figure.mesh.n_vertices, -1.0 if view.kind == "categorical" else 0.0)
-    index = joint_of(figure, about) if view.takes_joint else -1
-    module = import_module(f"{__name__}.{view.module}")
+    quantity = SCALARS[key]
+    mesh = figure.require_mesh()
+    if _missing(quantity.needs, figure) or (quantity.moves and pose is None):
+        return np.full(mesh.n_vertices, -1.0 if quantity.kind == "categorical" else 0.0)
+    index = joint_of(figure, about) if quantity.takes_joint else -1
+    module = import_module(f"{__name__}.{quantity.module}")
     values: Floats = getattr(module, f"{key}_" if iskeyword(key) else key.replace("-", "_"))(
         Asked(figure, pose, skinning, index, about)
     )
-    if view.moves:
+    if quantity.moves:
         # Rounding is no effect, and must not fill the colour map where there is nothing else.
-        size = box_size(bounding_box(figure.mesh.positions)) if view.unit == "length" else 1.0
+        size = box_size(bounding_box(mesh.positions)) if quantity.unit == "length" else 1.0
         values[np.abs(values) < _NOISE * size] = 0.0
     return values
 
 
 def categories(name: str, figure: Figure) -> tuple[str, ...]:
-    """Return what the numbers of a categorical view stand for: names of joints, parts, classes."""
+    """Return what a categorical quantity's numbers stand for: names of joints, parts, classes."""
     key, about = split_name(name)
     if key == "parts":
         return () if figure.body_parts is None else figure.body_parts.names
@@ -225,7 +236,7 @@ def categories(name: str, figure: Figure) -> tuple[str, ...]:
 
 
 def menu_title(key: str, skinning: Skinning) -> str:
-    """Return what a view is called, with the number if it is about one: ``"... 4 influences"``.
+    """Return what a quantity is called, with the number if it is about one: ``"... 4 influences"``.
 
     Parameters
     ----------
@@ -240,8 +251,8 @@ def menu_title(key: str, skinning: Skinning) -> str:
     return f"Distance to {count} influence{'s' if count > 1 else ''}"
 
 
-def view_title(name: str, figure: Figure, skinning: Skinning) -> str:
-    """Return what a view of a figure is called: ``"Weight of left_knee"``.
+def quantity_title(name: str, figure: Figure, skinning: Skinning) -> str:
+    """Return what a quantity of a figure is called: ``"Weight of left_knee"``.
 
     Parameters
     ----------
@@ -255,45 +266,45 @@ def view_title(name: str, figure: Figure, skinning: Skinning) -> str:
     Raises
     ------
     RigError
-        If the view is unknown.
+        If the quantity is unknown.
     """
-    view, (key, about) = find_view(name), split_name(name)
+    quantity, (key, about) = find_quantity(name), split_name(name)
     title = menu_title(key, skinning)
     if missing_part(name, figure):
         return title
-    field = field_of(figure, about, key == "class") if view.about == "field" else None
+    field = field_of(figure, about, key == "class") if quantity.about == "field" else None
     if field is not None:
         return field.title
     return f"Weight of {joint_text(figure, joint_of(figure, about))}" if about else title
 
 
 def shown_unit(name: str, figure: Figure) -> tuple[float, str]:
-    """Return the factor and the word for a view's numbers as people read them.
+    """Return the factor and the word for a quantity's numbers as people read them.
 
     Raises
     ------
     RigError
-        If the view is unknown.
+        If the quantity is unknown.
     """
-    view, (key, about) = find_view(name), split_name(name)
-    field = field_of(figure, about, key == "class") if view.about == "field" else None
-    unit = view.unit if field is None else field.unit
+    quantity, (key, about) = find_quantity(name), split_name(name)
+    field = field_of(figure, about, key == "class") if quantity.about == "field" else None
+    unit = quantity.unit if field is None else field.unit
     return length_unit(figure) if unit == "length" else (1.0, unit)
 
 
 def missing_part(name: str, figure: Figure) -> str:
-    """Return what a figure lacks for a view, in words; empty if it has it.
+    """Return what a figure lacks for a quantity, in words; empty if it has it.
 
     Raises
     ------
     RigError
-        If the view is unknown.
+        If the quantity is unknown.
     """
-    view, (key, about) = find_view(name), split_name(name)
-    lacks = _missing(view.needs, figure)
-    if lacks or not view.about:
+    quantity, (key, about) = find_quantity(name), split_name(name)
+    lacks = _missing(quantity.needs, figure)
+    if lacks or not quantity.about:
         return lacks
-    if view.about == "field":
+    if quantity.about == "field":
         return "" if field_of(figure, about, key == "class") else f'a field "{about}"'
     if not about:
         return "a selected joint"

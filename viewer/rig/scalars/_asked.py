@@ -1,4 +1,4 @@
-"""What the numbers of a scalar view are computed from."""
+"""What the numbers of a scalar quantity are computed from."""
 
 from __future__ import annotations
 
@@ -9,27 +9,25 @@ from viewer.rig.pose import Pose
 from viewer.rig.skin import Skin
 from viewer.rig.skinning import Skinning, skin_used
 
-__all__ = ["Asked", "influences_kept"]
-
 _FOUR = 4  # influences of most engines, if no other number is chosen
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Asked:
-    """A figure as it is drawn, and the joint that a view is about.
+    """A figure as it is drawn, and the joint that a quantity is about.
 
     Attributes
     ----------
     figure : Figure
-        Has what the view needs.
+        Has what the quantity needs.
     pose : Pose or None
-        Never None for views that depend on the pose.
+        Never None for quantities that depend on the pose.
     skinning : Skinning
         How the mesh is drawn.
     joint : int
-        Of the skin, -1 for views that are about no joint.
+        Of the skin, -1 for quantities that are about no joint.
     about : str
-        What the view's name says behind its colon.
+        What the quantity's name says behind its colon.
     """
 
     figure: Figure
@@ -41,8 +39,7 @@ class Asked:
     @property
     def skin(self) -> Skin:
         """The influences that count: all as stored, or cut and scaled as asked."""
-        assert self.figure.skin is not None  # the view needs weights
-        return skin_used(self.figure.skin, self.skinning)
+        return skin_used(self.figure.require_skin(), self.skinning)
 
 
 def influences_kept(skinning: Skinning) -> int:

@@ -1,24 +1,17 @@
-"""The field that a scalar view is about, by name."""
+"""The field that a scalar quantity is about, by name."""
 
 from __future__ import annotations
 
 from viewer.rig.annotations import VertexField
 from viewer.rig.figure import Figure
 
-__all__ = ["field_of"]
-
 
 def field_of(figure: Figure, name: str, is_class: bool) -> VertexField | None:
     """Return a figure's field of a name, or its first; None if there is none.
 
-    Parameters
-    ----------
-    figure : Figure
-        With any number of fields.
-    name : str
-        In any case of letters; empty for the first.
-    is_class : bool
-        Whether its numbers stand for names.
+    ``figure``: with any number of fields.
+    ``name``: in any case of letters; empty for the first.
+    ``is_class``: whether its numbers stand for names.
     """
     suited = [field for field in figure.fields if bool(field.names) == is_class]
     named = [field for field in suited if not name or field.name.lower() == name.lower()]

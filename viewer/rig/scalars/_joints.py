@@ -1,4 +1,4 @@
-"""The joint that a scalar view is about, by name or index."""
+"""The joint that a scalar quantity is about, by name or index."""
 
 from __future__ import annotations
 
@@ -7,23 +7,14 @@ from viewer.near_names import name_hint
 from viewer.rig.figure import Figure
 from viewer.rig.skeleton import find_joint, joint_label, joint_labels
 
-__all__ = ["joint_of", "joint_text"]
-
 
 def joint_of(figure: Figure, text: str) -> int:
     """Return the joint of a name or an index.
 
-    Parameters
-    ----------
-    figure : Figure
-        With a skin; without a skeleton its joints have indices only.
-    text : str
-        A joint's name in any case of letters, ``"NAME#INDEX"``, ``"#INDEX"`` or ``"INDEX"``.
-
-    Raises
-    ------
-    RigError
-        If there is none, with names that are close; or if several joints have that name.
+    ``figure``: with a skin; without a skeleton its joints have indices only.
+    ``text``: a joint's name in any case of letters, ``"NAME#INDEX"``, ``"#INDEX"`` or ``"INDEX"``.
+    Raises RigError if there is none, with names that are close; or if several joints have that
+      name.
     """
     skeleton = figure.skeleton
     count = 0 if figure.skin is None else figure.skin.n_joints

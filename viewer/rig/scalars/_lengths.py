@@ -6,8 +6,6 @@ from viewer.rig.figure import Figure
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.units import METRES
 
-__all__ = ["length_text", "length_unit"]
-
 
 def length_unit(figure: Figure) -> tuple[float, str]:
     """Return the factor and the word for small lengths: millimetres if the unit is known."""

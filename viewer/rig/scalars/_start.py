@@ -1,4 +1,4 @@
-"""The first joint or field of a scalar view: one that is not 0 everywhere."""
+"""The first joint or field of a scalar quantity: one that is not 0 everywhere."""
 
 from __future__ import annotations
 
@@ -9,8 +9,6 @@ import numpy as np
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.scalars._joints import joint_text
-
-__all__ = ["joint_influences", "most_influential", "telling_field", "telling_view"]
 
 
 def joint_influences(figure: Figure) -> Floats:
@@ -34,15 +32,11 @@ def telling_field(figure: Figure) -> str:
     return next((field.name for field in fields if field.values.any()), "")
 
 
-def telling_view(key: str, figures: Iterable[Figure]) -> str:
-    """Return the name of a view with a joint or field that is not 0 everywhere.
+def telling_quantity(key: str, figures: Iterable[Figure]) -> str:
+    """Return the name of a quantity with a joint or field that is not 0 everywhere.
 
-    Parameters
-    ----------
-    key : str
-        Of ``SCALARS``; one that is about neither is its own name.
-    figures : iterable of Figure
-        The first that has something to see counts.
+    ``key``: of ``SCALARS``; one that is about neither is its own name.
+    ``figures``: the first that has something to see counts.
     """
     for figure in figures:
         if key == "weight" and (joint := most_influential(figure)) >= 0:

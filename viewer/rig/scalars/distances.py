@@ -1,4 +1,4 @@
-"""Views of how far a choice moves each vertex: skinning methods, fewer influences, correctives."""
+"""Distances by which a choice moves each vertex: skinning method, influences, correctives."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["asymmetry", "correctives", "cut", "methods", "normalized"]
 def cut(asked: Asked) -> Floats:
     """Return the distance between all influences and the strongest few: (V,), figure units."""
     count = influences_kept(asked.skinning)
-    # Against normalised weights: what scaling alone does is a view of its own.
+    # Against normalised weights: what scaling alone does is a quantity of its own.
     whole = replace(asked.skinning, max_influences=0, normalize=True)
     return _distance(asked, whole, replace(asked.skinning, max_influences=count))
 
@@ -43,7 +43,7 @@ def correctives(asked: Asked) -> Floats:
 def asymmetry(asked: Asked) -> Floats:
     """Return how far each vertex is from the mirror image of its partner: (V,), figure units."""
     figure, pose = asked.figure, asked.pose
-    assert figure.symmetry is not None and pose is not None  # the view needs them
+    assert figure.symmetry is not None and pose is not None  # the quantity needs them
     positions = deform(figure, pose, asked.skinning)[0]
     positions -= pose.figure_translation  # a figure that stands aside is no less symmetric
     mirrored = positions[figure.symmetry].copy()

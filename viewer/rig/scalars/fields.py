@@ -1,4 +1,4 @@
-"""Views of what somebody computed for a figure: distances to another one, how a rig was found."""
+"""Fields that came with a figure: distances to another one, how a rig was found."""
 
 from __future__ import annotations
 

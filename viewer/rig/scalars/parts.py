@@ -1,4 +1,4 @@
-"""The view of body parts."""
+"""The quantity of body parts."""
 
 from __future__ import annotations
 
@@ -12,5 +12,5 @@ __all__ = ["parts"]
 
 def parts(asked: Asked) -> Floats:
     """Return the body part of each vertex: (V,), whole, an index into the parts' names."""
-    assert asked.figure.body_parts is not None  # the view needs them
+    assert asked.figure.body_parts is not None  # the quantity needs them
     return asked.figure.body_parts.of_vertex.astype(np.float64)

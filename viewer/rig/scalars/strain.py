@@ -1,4 +1,4 @@
-"""Views of what the pose does to the surface: how edges and triangles change their size.
+"""Quantities of what the pose does to the surface: how edges and triangles change their size.
 
 Compared are the posed mesh, the figure's own scale left out, and the shaped mesh in its binding
 space.
@@ -33,8 +33,7 @@ def stretch(asked: Asked) -> Floats:
     """
     figure = asked.figure
     edges, changes = _edge_changes(asked)
-    assert figure.mesh is not None  # it is attached
-    longest, shortest = np.zeros((2, figure.mesh.n_vertices))
+    longest, shortest = np.zeros((2, figure.require_mesh().n_vertices))
     for end in edges.T:
         np.maximum.at(longest, end, changes)
         np.minimum.at(shortest, end, changes)
@@ -45,10 +44,10 @@ def stretch_mean(asked: Asked) -> Floats:
     """Return the mean change of the edges around each vertex: (V,), percent."""
     figure = asked.figure
     edges, changes = _edge_changes(asked)
-    assert figure.mesh is not None  # it is attached
+    mesh = figure.require_mesh()
     ends = edges.ravel()
-    counts = np.bincount(ends, minlength=figure.mesh.n_vertices)
-    totals = np.bincount(ends, np.repeat(changes, 2), figure.mesh.n_vertices)
+    counts = np.bincount(ends, minlength=mesh.n_vertices)
+    totals = np.bincount(ends, np.repeat(changes, 2), mesh.n_vertices)
     return totals / np.maximum(counts, 1)
 
 
@@ -58,15 +57,15 @@ def area(asked: Asked) -> Floats:
     100 (sum of their posed areas / sum of their rest areas - 1); 0 where they have none at rest.
     """
     figure = asked.figure
-    assert figure.mesh is not None  # it is attached
-    corners = figure.mesh.triangles
+    mesh = figure.require_mesh()
+    corners = mesh.triangles
     rest, posed = (
         np.bincount(
             corners.ravel(), np.repeat(triangle_areas(places, corners), 3), len(places)
         ).astype(np.float64, copy=False)
         for places in _rest_and_posed(asked)
     )
-    has_area = rest > (_NO_LENGTH * box_size(bounding_box(figure.mesh.positions))) ** 2
+    has_area = rest > (_NO_LENGTH * box_size(bounding_box(mesh.positions))) ** 2
     ratio = np.divide(posed, rest, out=np.ones_like(rest), where=has_area)
     return _PERCENT * (ratio - 1.0)
 
@@ -86,19 +85,18 @@ def _edge_changes(asked: Asked) -> tuple[Ints, Floats]:
 
 def _rest_and_posed(asked: Asked) -> tuple[Floats, Floats]:
     """Return the vertices in binding space, and as posed in a figure of scale 1."""
-    assert asked.pose is not None  # the view depends on it
-    rest = shaped(asked.figure, asked.pose.shape_weights).mesh
-    assert rest is not None  # shaping keeps it
+    assert asked.pose is not None  # the quantity depends on it
+    rest = shaped(asked.figure, asked.pose.shape_weights).require_mesh()
     pose = replace(asked.pose, figure_scale=1.0)
     return rest.positions, deform(asked.figure, pose, asked.skinning)[0]
 
 
 def _edges_of(figure: Figure) -> Ints:
     """Return each edge of the triangles once: (E, 2) int32, the lower index first."""
-    assert figure.mesh is not None  # it is attached
-    corners = figure.mesh.triangles
+    mesh = figure.require_mesh()
+    corners = mesh.triangles
     pairs = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
     pairs.sort(axis=1)
     pairs = pairs[pairs[:, 0] != pairs[:, 1]].astype(np.int64)
-    keys = np.unique(pairs[:, 0] * figure.mesh.n_vertices + pairs[:, 1])
-    return np.stack(np.divmod(keys, figure.mesh.n_vertices), axis=1).astype(np.int32)
+    keys = np.unique(pairs[:, 0] * mesh.n_vertices + pairs[:, 1])
+    return np.stack(np.divmod(keys, mesh.n_vertices), axis=1).astype(np.int32)

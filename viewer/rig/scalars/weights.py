@@ -1,4 +1,4 @@
-"""Views of the weights themselves, as they count: after cutting and normalising, if that is on.
+"""Quantities of the weights as they count: after cutting and normalising, if that is on.
 
 Weights that a vertex lists for one joint several times are one influence.
 """

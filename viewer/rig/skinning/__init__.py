@@ -146,8 +146,7 @@ def deform(
         raise RigError(f'no skinning method "{how.method}"; {name_hint(how.method, METHODS)}')
     if pose is not None:
         figure = shaped(figure, pose.shape_weights)
-    mesh = figure.mesh
-    assert mesh is not None  # shaping keeps it
+    mesh = figure.require_mesh()
     if figure.skeleton is None or figure.skin is None:
         moved, normals = mesh.positions, unit(mesh.normals)
     else:
@@ -226,8 +225,7 @@ def deform_frames(
     from viewer.rig.skinning import lbs
 
     figure = shaped(figure, poses[0].shape_weights)
-    mesh, skeleton, skin = figure.mesh, figure.skeleton, figure.skin
-    assert mesh is not None and skeleton is not None and skin is not None  # it is attached
+    mesh, skeleton, skin = figure.attached()
     used = skin_used(skin, how)
     frames = np.empty((len(poses), mesh.n_vertices, 3))
     for frame, pose in zip(frames, poses, strict=True):

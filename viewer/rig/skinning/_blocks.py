@@ -15,8 +15,6 @@ from viewer.rig.arrays import Floats, Ints
 from viewer.rig.memo import Memo
 from viewer.rig.skin import Skin, has_influence
 
-__all__ = ["Block", "blocks_of"]
-
 _VERTICES = 512  # in a block: fewer cost calls, more cost zeros (bench_deform)
 _MOST = 1 << 24  # weights kept, 128 MB: a file without any order would take more
 

@@ -6,8 +6,6 @@ import numpy as np
 
 from viewer.rig.arrays import Floats
 
-__all__ = ["inverse_transposed"]
-
 _FLAT = 1e-5  # determinant, with entries scaled to at most 1, that rounding may have given its sign
 
 
@@ -19,17 +17,9 @@ def inverse_transposed(matrices: Floats, normals: Floats) -> Floats:
     outward normals stay outward where a joint mirrors (glTF 2.0, section 3.7.4, likewise turns
     the winding and not the normals).
 
-    Parameters
-    ----------
-    matrices : (3, 3, N)
-        One matrix for each normal, with the normals' index last.
-    normals : (N, 3)
-        Binding space, any length.
-
-    Returns
-    -------
-    (N, 3)
-        Posed, any length.
+    ``matrices`` (3, 3, N): one matrix for each normal, with the normals' index last.
+    ``normals`` (N, 3): binding space, any length.
+    Returns (N, 3): posed, any length.
     """
     largest = np.abs(matrices).max(axis=(0, 1))
     # Only directions count, and entries near 1 neither overflow nor underflow when multiplied.

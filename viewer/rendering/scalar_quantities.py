@@ -1,4 +1,4 @@
-"""Scalar views of all figures of a scene: computed, coloured alike, and explained by one legend."""
+"""Scalar quantities of a scene: computed, coloured alike, and explained by one legend."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from viewer.rendering.overlay.legend import Legend, Shown, legend_of
 from viewer.rendering.passes.skin_pass import PosedMesh
 from viewer.rendering.scalar_look import look_of, shown_ends
 from viewer.rig.figure import Figure
-from viewer.rig.scalars import find_view, joint_text, missing_part
+from viewer.rig.scalars import find_quantity, joint_text, missing_part
 from viewer.rig.scene import Actor
 
-__all__ = ["ScalarViews", "name_for"]
+__all__ = ["ScalarQuantities", "name_for"]
 
 
-class ScalarViews:
+class ScalarQuantities:
     """Keeps the numbers of all figures that are drawn up to date.
 
     Attributes
@@ -110,7 +110,7 @@ def name_for(name: str, actor: Actor | None, joint: int) -> str:
     joint : int
         Its index, -1 for none.
     """
-    if actor is None or joint < 0 or ":" in name or not find_view(name).takes_joint:
+    if actor is None or joint < 0 or ":" in name or not find_quantity(name).takes_joint:
         return name
     if actor.figure.skin is None or joint >= actor.figure.skin.n_joints:
         return name
