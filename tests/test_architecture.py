@@ -4,6 +4,7 @@ import ast
 import re
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -69,7 +70,8 @@ HOMES = {
 }
 
 
-def imports(path: Path) -> set[str]:
+@cache
+def imports(path: Path) -> frozenset[str]:
     """Return the modules that a file imports anywhere, those for type checking left out."""
     tree = ast.parse(path.read_text())
     guarded = {
@@ -86,7 +88,7 @@ def imports(path: Path) -> set[str]:
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
             names.add(node.module)
-    return names
+    return frozenset(names)
 
 
 def part_of(path: Path) -> str:
@@ -155,6 +157,7 @@ def test_reading_a_figure_needs_no_opengl() -> None:
     assert not loaded & {"moderngl", "imgui_bundle", "glfw", "scipy", "pyrr"}
 
 
+@pytest.mark.slow
 def test_drawing_headlessly_needs_no_window_library() -> None:
     loaded = loaded_modules("import viewer; viewer.render(viewer.load(), size=(32, 32))")
     assert "moderngl" in loaded
