@@ -28,6 +28,8 @@ from viewer.app.view_frame import view_frame
 from viewer.rig.geometry.transform import apply_transform, translation_matrix
 from viewer.rig.mesh import bounding_box
 
+pytestmark = pytest.mark.usefixtures("quick_fits")
+
 
 @pytest.fixture
 def hand(drive):
