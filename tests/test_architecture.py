@@ -4,6 +4,7 @@ import ast
 import re
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -79,7 +80,8 @@ HOMES = {
 }
 
 
-def imports(path: Path, with_types: bool = False) -> set[str]:
+@cache
+def imports(path: Path, with_types: bool = False) -> frozenset[str]:
     """Return the modules that a file imports anywhere, with or without those for type checking."""
     tree = ast.parse(path.read_text())
     guarded = {
@@ -97,7 +99,7 @@ def imports(path: Path, with_types: bool = False) -> set[str]:
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
             names.add(node.module)
-    return names
+    return frozenset(names)
 
 
 def part_of(path: Path) -> str:
@@ -197,6 +199,7 @@ def test_reading_a_figure_needs_no_opengl() -> None:
     assert not loaded & {"moderngl", "imgui_bundle", "glfw", "scipy", "pyrr"}
 
 
+@pytest.mark.slow
 def test_drawing_headlessly_needs_no_window_library() -> None:
     loaded = loaded_modules("import viewer; viewer.render(viewer.load(), size=(32, 32))")
     assert "moderngl" in loaded

@@ -107,12 +107,13 @@ def outermost(points: Floats, n_directions: int = _N_DIRECTIONS) -> Floats:
     """
     if len(points) <= n_directions:
         return points
-    directions = np.concatenate([np.eye(3), -np.eye(3), _directions(n_directions)]).T
-    best = points[np.zeros(directions.shape[1], dtype=np.int64)]
+    directions = np.concatenate([np.eye(3), -np.eye(3), _directions(n_directions)])
+    best = points[np.zeros(len(directions), dtype=np.int64)]
     for start in range(0, len(points), _BLOCK):
         block = points[start : start + _BLOCK]
-        candidates = block[np.argmax(block @ directions, axis=0)]
-        further = ((candidates - best).T * directions).sum(axis=0) > 0.0
+        # A direction per row: looking along rows takes half the time of looking down columns.
+        candidates = block[np.argmax(directions @ block.T, axis=1)]
+        further = ((candidates - best) * directions).sum(axis=1) > 0.0
         best[further] = candidates[further]
     return np.unique(best, axis=0)
 

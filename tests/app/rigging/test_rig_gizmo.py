@@ -29,6 +29,8 @@ from viewer.app.rigging.template_gizmo import RADIUS
 from viewer.rig.geometry.transform import apply_transform, translation_matrix
 from viewer.rig.mesh import bounding_box
 
+pytestmark = pytest.mark.usefixtures("quick_fits")
+
 
 @pytest.fixture
 def hand(drive):

@@ -33,6 +33,9 @@ from viewer.rig.skinning import deform
 SIZE = (900, 1250)
 
 
+pytestmark = pytest.mark.usefixtures("quick_fits")
+
+
 @pytest.fixture
 def rigging(drive):
     """A hand on an app with the mesh and its template, which lies on it, the panel open."""

@@ -44,7 +44,7 @@ def test_line_runs_from_half_a_gap_to_a_pixel_before_its_label():
     assert pixels[8, are_part[8]].tolist() == [[x, 100] for x in range(154, 173)]
 
 
-@pytest.fixture(params=[60, 300, 1500])
+@pytest.fixture(params=[60, 300, 1500], scope="module")
 def scene(request):
     """Return points a quarter of a pixel apart or more, their labels' places, and their dots."""
     rng = np.random.default_rng(2)
@@ -52,6 +52,13 @@ def scene(request):
     sizes = rng.integers(2, 30, (len(points), 2)).astype(np.int32)
     places = places_of(points, sizes, PICTURE, GAP)
     return points, places, Dots(Cells(PICTURE, 4), points)
+
+
+@pytest.fixture(scope="module")
+def room(scene):
+    """Return how far the scene's places and their lines are from other points."""
+    points, places, _ = scene
+    return by_hand(points, places)
 
 
 def by_hand(points, places):
@@ -68,9 +75,9 @@ def by_hand(points, places):
     return clear, beside
 
 
-def test_places_are_clear_of_other_points_and_the_best_come_first(scene):
+def test_places_are_clear_of_other_points_and_the_best_come_first(scene, room):
     points, places, dots = scene
-    clear, beside = by_hand(points, places)
+    clear, beside = room
     least = 1.5 * np.where(places.has_line, GAP, places.own)
     fits = (clear >= least) & (beside >= 0.75 * GAP)
     manner = np.where(places.has_line, 2, np.where(clear >= 3.0 * places.own, 0, 1))
@@ -82,9 +89,9 @@ def test_places_are_clear_of_other_points_and_the_best_come_first(scene):
     assert len(wanted) > 0 or len(points) > 1000
 
 
-def test_what_is_found_crowded_is_so_and_most_of_it_is_found(scene):
+def test_what_is_found_crowded_is_so_and_most_of_it_is_found(scene, room):
     points, places, dots = scene
-    clear, beside = by_hand(points, places)
+    clear, beside = room
     found = crowded(places, points, dots, GAP)
     is_near = clear < 1.5 * np.where(places.has_line, GAP, places.own)
     assert not (found & ~is_near).any()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -27,6 +27,7 @@ from viewer.rig.arrays import Floats, Ints, frozen
 
 __all__ = [
     "PART",
+    "SAMPLES",
     "SCALES",
     "Alignment",
     "AlignmentSettings",
@@ -39,6 +40,9 @@ __all__ = [
 
 SCALES = ("uniform", "axes", "none")
 """One scale; one along each axis of the target; or the template's size as it is."""
+
+SAMPLES = 2_000
+"""Points of each surface that an alignment uses, if nothing else is asked for."""
 
 _ROUNDS, _SLIDES = 60, 25  # of points to points, and to planes
 _AXES_ROUNDS = 20
@@ -99,7 +103,7 @@ class AlignmentSettings:
     landmarks: Floats | None = None
     refines: bool = True
     matrix: Floats | None = None
-    samples: int = 2_000
+    samples: int = field(default_factory=lambda: SAMPLES)
 
     @property
     def dense(self) -> int:
