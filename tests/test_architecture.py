@@ -89,6 +89,7 @@ HOMES = {
     },
     "av": {"media/video.py"},
     "rich": {"commands"},
+    "shtab": {"commands/completion.py"},
 }
 
 
@@ -193,7 +194,16 @@ def loaded_modules(script: str) -> set[str]:
 
 def test_import_viewer_is_lean() -> None:
     loaded = loaded_modules("import viewer")
-    assert not loaded & {"numpy", "moderngl", "PIL", "imgui_bundle", "glfw", "scipy", "pyrr"}
+    assert not loaded & {
+        "numpy",
+        "moderngl",
+        "PIL",
+        "imgui_bundle",
+        "glfw",
+        "scipy",
+        "pyrr",
+        "rich",
+    }
 
 
 def test_reading_a_figure_needs_no_opengl() -> None:

@@ -54,7 +54,7 @@ def test_exporters_write_what_they_say() -> None:
     for name, kind in EXPORTERS.items():
         module = import_module(f"viewer.export.{name}")
         assert hasattr(module, "export") == kind.writes_pose
-        assert hasattr(module, "export_take") == kind.writes_motion
+        assert hasattr(module, "export_animation") == kind.writes_motion
 
 
 def test_table_of_panels_is_exactly_the_panels_of_all_features() -> None:

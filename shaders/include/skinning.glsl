@@ -1,4 +1,4 @@
-// What skin.vert and crowd.vert share: a vertex at rest, its influences, what joints do to it.
+// What skin.vert and instance.vert share: a vertex at rest, its influences, what joints do to it.
 // Positions are in figure units, relative to the rest centre on the way in and to the posed
 // centre on the way out, so that float32 keeps its digits far from the origin.
 

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from autorig.rigged_shapes import arm, mesh_of, turn
 from numpy.testing import assert_allclose
-from rigged_shapes import arm, mesh_of, turn
 
 pytest.importorskip("scipy")
 
-from viewer.autorig.alignment import AlignmentSettings
+from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.autorig.pipeline import METHODS, TransferSettings, transfer
 from viewer.autorig.rigged import clip_for
 from viewer.errors import RigError

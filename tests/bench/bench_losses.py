@@ -10,18 +10,18 @@ import numpy as np
 from measure import interleaved, report
 
 import viewer
-from viewer.export import MotionOptions, export_take
+from viewer.export import MotionOptions, export_animation
 from viewer.loading import bundled_body
 from viewer.rig.geometry.quaternion import rotation_vector_to_quaternion
+from viewer.rig.motion.sampled_animation import SampledAnimation, sample_animation
 from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.take import Take, take_of
 from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor
 
 FRAMES = 1000
 
 
-def walk() -> Take:
+def walk() -> SampledAnimation:
     """Return every joint swinging at its own rate, by half a radian at most."""
     figure = viewer.load(bundled_body()).actors[0].figure
     assert figure.skeleton is not None
@@ -30,12 +30,12 @@ def walk() -> Take:
     times = np.arange(FRAMES)[:, None, None] / 30.0
     turns = rotation_vector_to_quaternion(sizes * np.sin(rates * times + phases))
     clip = SampledClip("walk", Timing(30.0, np.arange(FRAMES)), turns)
-    return take_of(Actor(figure, clip=clip))
+    return sample_animation(Actor(figure, clip=clip))
 
 
 def main(rounds: int = 7) -> None:
     """Print times with and without the comparison, and their ratios."""
-    take = walk()
+    animation = walk()
     with tempfile.TemporaryDirectory() as folder:
         for key, name, lost in (
             ("gltf", "a.glb", "gltf_losses"),
@@ -44,14 +44,14 @@ def main(rounds: int = 7) -> None:
             path = Path(folder) / name
 
             def export(key: str = key, path: Path = path) -> None:
-                export_take(take, path, key, MotionOptions())
+                export_animation(animation, path, key, MotionOptions())
 
             def alone(key: str = key, path: Path = path, lost: str = lost) -> None:
                 with patch(f"viewer.export.{key}.{lost}", lambda *_: []):
-                    export_take(take, path, key, MotionOptions())
+                    export_animation(animation, path, key, MotionOptions())
 
             times = interleaved({"compared": export, "not compared": alone}, rounds)
-            shown = f"{key}: {FRAMES} frames of {take.figure.name}"
+            shown = f"{key}: {FRAMES} frames of {animation.figure.name}"
             report(shown, times, ("compared", "not compared"))
 
 

@@ -19,10 +19,14 @@ import scipy.spatial
 import transfer_targets as made
 
 import viewer
-from viewer.autorig.alignment import AlignmentSettings
-from viewer.autorig.matching import Template
+from viewer.autorig.alignment.surface_alignment import AlignmentSettings
+from viewer.autorig.correspondence.matching import Template
 from viewer.autorig.pipeline import TransferSettings, transfer
-from viewer.autorig.weights import WeightSettings, nearest_weights, transferred_weights
+from viewer.autorig.weights.weight_transfer import (
+    WeightSettings,
+    nearest_weights,
+    transferred_weights,
+)
 from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.skin import Skin, skin_from_entries
 

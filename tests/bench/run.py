@@ -13,7 +13,7 @@ NAMES = [
     "skinning",
     "bodies",
     "deform",
-    "crowd",
+    "instances",
     "motion",
     "read",
     "captures",

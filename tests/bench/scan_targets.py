@@ -19,11 +19,11 @@ import scipy.sparse as sp
 import transfer_targets as made
 
 import viewer
-from viewer.export import MotionOptions, export, export_take
+from viewer.export import MotionOptions, export, export_animation
 from viewer.rig.geometry.quaternion import multiply
 from viewer.rig.mesh import vertex_normals
+from viewer.rig.motion.sampled_animation import sample_animation
 from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.take import take_of
 from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor
 
@@ -286,8 +286,9 @@ def main() -> None:
         print(f"{scan.name}.obj: {len(scan.positions)} vertices, from {scan.template}")
     for what, figure in (("body", made.body()), ("fox", made.fox())):
         actor = Actor(figure, viewer.rest_pose(figure.skeleton), clip=walk(figure, what))
-        print("\n".join(export_take(take_of(actor), folder / f"walk_{what}.bvh", "bvh",
-                                    MotionOptions())))  # fmt: skip
+        path = folder / f"walk_{what}.bvh"
+        lines = export_animation(sample_animation(actor), path, "bvh", MotionOptions())
+        print("\n".join(lines))
 
 
 if __name__ == "__main__":

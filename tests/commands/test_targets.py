@@ -127,7 +127,7 @@ def test_old_files_stay_where_companions_find_other_names(inputs, folder):
 
 
 def test_two_files_of_one_run_that_are_the_same_are_refused(inputs, folder, refuse):
-    command = ["convert", *inputs.take, "-o", f"{folder}/m.bvh", "--force"]
+    command = ["convert", *inputs.recording, "-o", f"{folder}/m.bvh", "--force"]
     (folder / "m-7.bvh").symlink_to("m-0.bvh")
     refuse(command, f"{folder}/m-7.bvh: is the same file as {folder}/m-0.bvh")
     (folder / "m-0.bvh").write_bytes(b"precious")
@@ -152,11 +152,21 @@ def test_one_old_frame_among_many_keeps_them_all(inputs, folder, refuse):
 
 
 def test_folder_of_frames_is_an_input(inputs, folder, refuse):
-    take = Path(inputs.take[0])
-    command = ["convert", *inputs.take, "-o"]
-    refuse([*command, str(take), "--force"], "is an input folder")
-    refuse(["convert", str(take / "smpl"), *inputs.take[1:], "-o", str(take), "--force"], "input")
-    (folder / "link").symlink_to(take)
+    recording = Path(inputs.recording[0])
+    command = ["convert", *inputs.recording, "-o"]
+    refuse([*command, str(recording), "--force"], "is an input folder")
+    refuse(
+        [
+            "convert",
+            str(recording / "smpl"),
+            *inputs.recording[1:],
+            "-o",
+            str(recording),
+            "--force",
+        ],
+        "input",
+    )
+    (folder / "link").symlink_to(recording)
     refuse([*command, f"{folder}/link", "--force"], "is an input folder")
     (folder / "file").write_bytes(b"precious")
     refuse([*command, f"{folder}/file"], f"{folder}/file: expected a folder")

@@ -25,7 +25,7 @@ def inputs(tmp_path_factory):
 
 def command_of(inputs: Inputs, case: str, folder: Path) -> list[str]:
     if case == "people as a folder":
-        return ["convert", *inputs.take, "-o", str(folder / "new"), "--force"]
+        return ["convert", *inputs.recording, "-o", str(folder / "new"), "--force"]
     return into(folder, (converting(inputs) | drawing(inputs))[case], "--force")
 
 

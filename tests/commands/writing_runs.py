@@ -23,7 +23,7 @@ class Inputs:
 
     roof: tuple[str, ...] = ()
     twist: tuple[str, ...] = ()
-    take: tuple[str, ...] = ()
+    recording: tuple[str, ...] = ()
     of_roof: tuple[Path, ...] = ()
     of_twist: tuple[Path, ...] = ()
     of_take: tuple[Path, ...] = ()
@@ -34,7 +34,7 @@ class Inputs:
 
     def read_by(self, command: list[str]) -> tuple[Path, ...]:
         """Return all that a command reads, pictures and the frames of a folder too."""
-        if any(word in command for word in self.take[:1]):
+        if any(word in command for word in self.recording[:1]):
             return self.of_take
         return self.of_roof if self.roof[1] in command else self.of_twist
 
@@ -75,7 +75,13 @@ def converting(inputs: Inputs) -> dict[str, list[str]]:
         for name in ("w_{frame:03}.obj", "w.bvh", "w.anim", "w.glb", "w.gltf", "w.npz")
     }
     people = {
-        f"people as {name} {' '.join(more)}": ["convert", *inputs.take, "-o", f"OUT/{name}", *more]
+        f"people as {name} {' '.join(more)}": [
+            "convert",
+            *inputs.recording,
+            "-o",
+            f"OUT/{name}",
+            *more,
+        ]
         for name, *more in (
             ("m.bvh",),
             ("m.bvh", "--gaps", "split"),

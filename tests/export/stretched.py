@@ -8,8 +8,8 @@ from viewer.rig.blendshapes import BlendShapes, JointRegressor
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.mesh import Mesh
+from viewer.rig.motion.sampled_animation import SampledAnimation, sample_animation
 from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.take import Take, take_of
 from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import ball_skeleton
@@ -43,7 +43,7 @@ def chain(unit: str = "m") -> Figure:
     )
 
 
-def chain_take(unit: str = "m", weights=WEIGHTS, **tracks) -> Take:
+def chain_animation(unit: str = "m", weights=WEIGHTS, **tracks) -> SampledAnimation:
     """Return the chain, its root turned by a right angle about z in all frames."""
     count = len(weights)
     turns = np.zeros((count, 3, 4))
@@ -56,4 +56,4 @@ def chain_take(unit: str = "m", weights=WEIGHTS, **tracks) -> Take:
         shape_weights=np.asarray(weights, dtype=float)[:, None],
         **tracks,
     )
-    return take_of(Actor(chain(unit), clip=clip))
+    return sample_animation(Actor(chain(unit), clip=clip))

@@ -3,21 +3,21 @@
 import numpy as np
 import pytest
 from export.plain_smpl import rotation
-from family_models import family_figure
-from family_takes import (
-    clip_take,
+from family_animations import (
+    clip_animation,
+    family_animation,
     family_motion,
-    family_take,
     vertices_about_origin,
     vertices_about_pelvis,
     waves,
 )
+from family_models import family_figure
 from formats.synthetic_smpl import model
 from numpy.testing import assert_allclose, assert_array_equal
 
 import viewer
 from viewer.errors import OutputError, RigError
-from viewer.export import MotionOptions, export_take, motion_exporters
+from viewer.export import MotionOptions, export_animation, motion_exporters
 from viewer.formats import Source, read
 from viewer.rig.motion.body_motion import BodyMotion, body_clip
 from viewer.rig.motion.sampled_clip import SampledClip
@@ -42,9 +42,9 @@ def family(tmp_path_factory):
     return get
 
 
-def written(take, path, **options):
-    """Export a take; return the arrays of the file and the notes."""
-    notes = export_take(take, path, "amass", MotionOptions(**options))
+def written(animation, path, **options):
+    """Export an animation; return the arrays of the file and the notes."""
+    notes = export_animation(animation, path, "amass", MotionOptions(**options))
     with np.load(path) as arrays:
         return dict(arrays), notes
 
@@ -57,7 +57,7 @@ def test_suffix_finds_the_exporter():
 def test_file_poses_the_model_as_it_was(family, tmp_path, kind):
     motion = family_motion(COUNTS[kind])
     path = tmp_path / "walk.npz"
-    arrays, notes = written(family_take(family(kind), motion), path, world_up="z")
+    arrays, notes = written(family_animation(family(kind), motion), path, world_up="z")
     title = {"smpl": "SMPL", "smplh": "SMPL+H", "smplx": "SMPL-X"}[kind]
     assert notes == [f"{path}: 4 frames of {title} at 50 a second, z up"]
     assert (arrays["poses"].shape, arrays["betas"].shape) == ((4, 3 * COUNTS[kind]), (16,))
@@ -82,7 +82,7 @@ def test_file_poses_the_model_as_it_was(family, tmp_path, kind):
 
 def test_transl_is_the_formula_of_the_specification(family, tmp_path):
     motion = family_motion(24)
-    arrays, _ = written(family_take(family("smpl"), motion), tmp_path / "a.npz")
+    arrays, _ = written(family_animation(family("smpl"), motion), tmp_path / "a.npz")
     numbers = model("smpl")
     shape = numbers["v_template"] + numbers["shapedirs"] @ motion.shape[0]
     pelvis = (numbers["J_regressor"] @ shape)[0]
@@ -97,7 +97,7 @@ def test_transl_is_the_formula_of_the_specification(family, tmp_path):
 def test_file_is_read_back(family, tmp_path):
     motion = family_motion(55, expression=waves(4, 10, seed=5.0))
     path = tmp_path / "walk.npz"
-    arrays, _ = written(family_take(family("smplx"), motion), path)
+    arrays, _ = written(family_animation(family("smplx"), motion), path)
     assert_array_equal(arrays["expressions"], waves(4, 10, seed=5.0))
     source = Source.open(path)
     back = read(source)
@@ -114,7 +114,7 @@ def test_large_angles_keep_their_rotation(family, tmp_path):
     vectors[:, 0] = [[0, 4.0, 0], [0, np.pi, 0], [0, 0, 1e-9]]
     motion = family_motion(24, frames=3)
     motion = BodyMotion("a", motion.timing, motion.joint_names, vectors, motion.translations)
-    arrays, _ = written(family_take(family("smpl"), motion), tmp_path / "a.npz")
+    arrays, _ = written(family_animation(family("smpl"), motion), tmp_path / "a.npz")
     found = arrays["poses"][:, :3]
     assert_allclose(found[0], [0, 4.0 - 2 * np.pi, 0], rtol=0, atol=ATOL)
     assert_allclose(found[1], [0, np.pi, 0], rtol=0, atol=ATOL)
@@ -123,9 +123,9 @@ def test_large_angles_keep_their_rotation(family, tmp_path):
 
 def test_other_up_axis_turns_the_world(family, tmp_path):
     motion = family_motion(24)
-    take = family_take(family("smpl"), motion)
-    plain, _ = written(take, tmp_path / "y.npz", world_up="y")
-    turned, notes = written(take, tmp_path / "z.npz", world_up="y", up="z")
+    animation = family_animation(family("smpl"), motion)
+    plain, _ = written(animation, tmp_path / "y.npz", world_up="y")
+    turned, notes = written(animation, tmp_path / "z.npz", world_up="y", up="z")
     assert notes[0].endswith("z up") and str(turned["up"]) == "z"
     for frame in range(4):
         before, after = (
@@ -142,7 +142,7 @@ def test_other_up_axis_turns_the_world(family, tmp_path):
 def test_changing_shapes_have_a_row_a_frame(family, tmp_path):
     shapes = waves(4, 10, seed=7.0)
     motion = family_motion(24, shape=shapes)
-    arrays, notes = written(family_take(family("smpl"), motion), tmp_path / "a.npz")
+    arrays, notes = written(family_animation(family("smpl"), motion), tmp_path / "a.npz")
     assert_array_equal(arrays["betas"][:, :10], shapes)
     assert notes[1:] == ["the shape changes: betas has one row a frame, which few programs read"]
     for frame in (0, 3):
@@ -159,7 +159,7 @@ def test_changing_shapes_have_a_row_a_frame(family, tmp_path):
 
 def test_gaps_are_held_and_marked(family, tmp_path):
     motion = family_motion(24, rows=GAPS, first_frame=10)
-    arrays, notes = written(family_take(family("smpl"), motion), tmp_path / "a.npz")
+    arrays, notes = written(family_animation(family("smpl"), motion), tmp_path / "a.npz")
     assert arrays["present"].tolist() == [False, True, True, False, False, True, True]
     rows = np.array([0, 0, 1, 1, 1, 2, 3])
     expected = motion.vectors.reshape(4, 72)[rows]
@@ -178,7 +178,7 @@ def test_gaps_are_bridged(family, tmp_path):
     motion = BodyMotion("a", Timing(30.0, np.array([0, -1, -1, 1])),
                         family_motion(24).joint_names, vectors, moves)  # fmt: skip
     arrays, notes = written(
-        family_take(family("smpl"), motion), tmp_path / "a.npz", gaps="interpolate"
+        family_animation(family("smpl"), motion), tmp_path / "a.npz", gaps="interpolate"
     )
     assert_allclose(arrays["poses"][:, 1], [0, 0.3, 0.6, 0.9], rtol=0, atol=ATOL)
     assert_allclose(arrays["trans"][:, 0], [0, 1, 2, 3], rtol=0, atol=ATOL)
@@ -187,8 +187,8 @@ def test_gaps_are_bridged(family, tmp_path):
 
 def test_gaps_split_the_file(family, tmp_path):
     motion = family_motion(24, rows=GAPS)
-    notes = export_take(
-        family_take(family("smpl"), motion), tmp_path / "a.npz", "amass",
+    notes = export_animation(
+        family_animation(family("smpl"), motion), tmp_path / "a.npz", "amass",
         MotionOptions(gaps="split"),
     )  # fmt: skip
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a-1.npz", "a-2.npz"]
@@ -212,7 +212,7 @@ def test_losses_are_told(family, tmp_path):
     moved[:, 0], moved[1, 5] = [1.0, 2.0, 3.0], [0.15, 0.2, 0.0]
     clip = SampledClip("a", Timing(30.0, np.arange(2)), rotations, moved,
                        np.array([[0.5, 0, 0]] * 2), np.array([1.0, 1.5]))  # fmt: skip
-    arrays, notes = written(clip_take(figure, clip), tmp_path / "a.npz")
+    arrays, notes = written(clip_animation(figure, clip), tmp_path / "a.npz")
     # A root that moves within the figure is a body that moves.
     assert_array_equal(arrays["trans"], [[1.5, 2.0, 3.0]] * 2)
     assert notes[1].startswith(f"{tmp_path}/a.npz: joints differ from the motion by up to ")
@@ -227,7 +227,7 @@ def test_bundled_body_says_whose_shape_it_is(tmp_path):
 
     figure = viewer.load(bundled_body()).actors[0].figure
     motion = family_motion(24, shape=None)
-    _, notes = written(family_take(figure, motion), tmp_path / "a.npz")
+    _, notes = written(family_animation(figure, motion), tmp_path / "a.npz")
     assert notes[1].startswith(f"shape and translation are meant for {figure.name}, which is no")
 
 
@@ -235,7 +235,7 @@ def test_figures_of_other_kinds_are_refused(family, tmp_path):
     rotations = np.tile([0.0, 0, 0, 1], (1, 16, 1))
     hand = SampledClip("a", Timing(30.0, np.arange(1)), rotations)
     with pytest.raises(RigError) as caught:
-        written(clip_take(family("mano"), hand), tmp_path / "a.npz")
+        written(clip_animation(family("mano"), hand), tmp_path / "a.npz")
     assert str(caught.value) == (
         "mano cannot be written as an AMASS motion: expected the joints of SMPL, SMPL+H or "
         "SMPL-X, found others"
@@ -244,23 +244,23 @@ def test_figures_of_other_kinds_are_refused(family, tmp_path):
 
 
 def test_options_and_empty_motions_are_refused(family, tmp_path):
-    take = family_take(family("smpl"), family_motion(24, rows=np.array([0, -1, 1])))
+    animation = family_animation(family("smpl"), family_motion(24, rows=np.array([0, -1, 1])))
     for words, message in (
         ({"gaps": "close"}, 'gaps: expected one of hold, interpolate, split, found "close"'),
         ({"up": "x"}, 'up axis: expected y or z, found "x"'),
     ):
         with pytest.raises(RigError) as caught:
-            written(take, tmp_path / "a.npz", **words)
+            written(animation, tmp_path / "a.npz", **words)
         assert str(caught.value) == message
     from dataclasses import replace
 
-    nobody = replace(take, frames=replace(take.frames, present=np.zeros(3, dtype=bool)))
+    nobody = replace(animation, frames=replace(animation.frames, present=np.zeros(3, dtype=bool)))
     with pytest.raises(RigError, match=r"every frame is missing, there is nothing to write$"):
         written(nobody, tmp_path / "a.npz")
     assert not list(tmp_path.iterdir())
 
 
 def test_folder_that_is_not_there(family, tmp_path):
-    take = family_take(family("smpl"), family_motion(24))
+    animation = family_animation(family("smpl"), family_motion(24))
     with pytest.raises(OutputError):
-        written(take, tmp_path / "none" / "a.npz")
+        written(animation, tmp_path / "none" / "a.npz")

@@ -13,13 +13,13 @@ from rig import hand_made
 
 import viewer
 from viewer.errors import OutputError, RigError
-from viewer.export import MotionOptions, export_take, motion_exporters
+from viewer.export import MotionOptions, export_animation, motion_exporters
 from viewer.formats import Source, read
 from viewer.rig.figure import Figure
 from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.motion.clip_table import evaluate_all
+from viewer.rig.motion.sampled_animation import sample_animation
 from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.take import take_of
 from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor
 
@@ -62,10 +62,10 @@ def turning(angles, rate=2.0, rows=None, **more):
 
 
 def written(actor, path, **settings):
-    take = take_of(
+    animation = sample_animation(
         actor, **{key: settings.pop(key) for key in ("rate", "frames") if key in settings}
     )
-    notes = export_take(take, path, "anim", MotionOptions(**settings))
+    notes = export_animation(animation, path, "anim", MotionOptions(**settings))
     return read(Source.open(path)) if path.exists() else None, notes
 
 

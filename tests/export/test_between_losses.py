@@ -10,20 +10,20 @@ import numpy as np
 import pytest
 from rig import hand_made
 
-from viewer.export import MotionOptions, export_take
+from viewer.export import MotionOptions, export_animation
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh
 from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.motion.clip_sampling import evaluate
-from viewer.rig.motion.take import Take, take_of
+from viewer.rig.motion.sampled_animation import SampledAnimation, sample_animation
 from viewer.rig.scene import Actor
 from viewer.rig.skin import skin_from_lists
 
 TOLD = 5e-3  # three digits are told
 
 
-def write(take: Take, folder: Path, kind: str, name: str) -> list[str]:
-    return export_take(take, folder / name, kind, MotionOptions())
+def write(animation: SampledAnimation, folder: Path, kind: str, name: str) -> list[str]:
+    return export_animation(animation, folder / name, kind, MotionOptions())
 
 
 def swinging(extrapolation=("constant", "constant"), end=4.0, times=(0.0, 1, 2, 3, 4)) -> Actor:
@@ -59,7 +59,7 @@ def between(notes: list[str]) -> float:
 @pytest.mark.parametrize(("kind", "name"), [("bvh", "a.bvh"), ("gltf", "a.glb")])
 def test_curves_between_keys_that_lie_on_frames_are_told(tmp_path, kind, name):
     """From 0 to 2 with slopes 2 and 0: 2 u^2 (1 - u) above the line, 8/27 where u is 2/3."""
-    notes = write(take_of(swinging(), 1.0), tmp_path, kind, name)
+    notes = write(sample_animation(swinging(), 1.0), tmp_path, kind, name)
     assert between(notes) == pytest.approx(2.0 * np.sin(4.0 / 27.0), rel=TOLD)
 
 
@@ -67,7 +67,7 @@ def test_curves_between_keys_that_lie_on_frames_are_told(tmp_path, kind, name):
 def test_curves_between_frames_are_told_as_dense_samples_have_them(tmp_path, rate):
     actor = swinging()
     size = pytest.approx(densest(actor, rate), rel=TOLD)
-    assert between(write(take_of(actor, rate), tmp_path, "bvh", "a.bvh")) == size
+    assert between(write(sample_animation(actor, rate), tmp_path, "bvh", "a.bvh")) == size
 
 
 @pytest.mark.parametrize("mode", ["cycle", "cycle_offset", "bounce"])
@@ -75,7 +75,7 @@ def test_curves_that_repeat_are_told_where_their_keys_do(tmp_path, mode):
     """Three keys within 1.9 s, of which a clip of 40 s repeats kinks and jumps."""
     actor = swinging((mode, mode), 40.0, (0.0, 0.3, 1.9))
     size = pytest.approx(densest(actor, 1.0), rel=TOLD)
-    assert between(write(take_of(actor, 1.0), tmp_path, "bvh", "a.bvh")) == size
+    assert between(write(sample_animation(actor, 1.0), tmp_path, "bvh", "a.bvh")) == size
 
 
 def test_vertices_between_frames_are_told_too(tmp_path):
@@ -84,7 +84,7 @@ def test_vertices_between_frames_are_told_too(tmp_path):
     mesh = Mesh(np.diag([3.0, 1, 1]), np.eye(3), np.array([[0, 1, 2]]))
     skin = skin_from_lists([[(0, 1.0)]] * 3, np.tile(np.eye(4), (2, 1, 1)))
     figure = replace(actor.figure, mesh=mesh, skin=skin, unit="m")
-    notes = write(take_of(Actor(figure, clip=actor.clip), 1.0), tmp_path, "gltf", "a.glb")
+    notes = write(sample_animation(Actor(figure, clip=actor.clip), 1.0), tmp_path, "gltf", "a.glb")
     (line,) = [note for note in notes if " between frames " in note]
     size = 2000.0 * np.sin(4.0 / 27.0)
     found = re.findall(r"by up to (\S+) mm \((.*?)\)", line)
@@ -95,7 +95,7 @@ def test_vertices_between_frames_are_told_too(tmp_path):
 def test_motions_too_long_to_be_sure_of_say_so(tmp_path):
     """Two minutes at 20 a second: more spans between frames than are all sampled."""
     actor = swinging(end=120.0)
-    notes = write(take_of(actor, 20.0), tmp_path, "bvh", "a.bvh")
+    notes = write(sample_animation(actor, 20.0), tmp_path, "bvh", "a.bvh")
     (line,) = [note for note in notes if " between frames " in note]
     assert re.search(r"\(an estimate: \d+ times were looked at\)", line)
     size = float(re.search(r"by up to (\S+) units", line)[1])

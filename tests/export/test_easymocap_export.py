@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from export.plain_smpl import rotation
+from family_animations import family_animation, family_motion, vertices_about_origin, waves
 from family_models import family_figure
-from family_takes import family_motion, family_take, vertices_about_origin, waves
 from formats.synthetic_smpl import model
 from numpy.testing import assert_allclose
 
 from viewer.errors import OutputError, RigError
-from viewer.export import MotionOptions, easymocap, export_take, motion_exporters
+from viewer.export import MotionOptions, easymocap, export_animation, motion_exporters
 from viewer.formats import Source, read
 from viewer.rig.motion.body_motion import body_clip
 from viewer.rig.motion.sampled_clip import joined
@@ -40,8 +40,8 @@ def frames_in(folder):
     return {int(file.stem): json.loads(file.read_text()) for file in files}
 
 
-def written(take, path, **options):
-    notes = export_take(take, path, "easymocap", MotionOptions(**options))
+def written(animation, path, **options):
+    notes = export_animation(animation, path, "easymocap", MotionOptions(**options))
     return frames_in(path), notes
 
 
@@ -64,7 +64,7 @@ def test_folder_finds_the_exporter():
 def test_records_place_the_body_by_the_formula(family, tmp_path, kind):
     shape = waves(1, family(kind).blend_shapes.groups.count("shape"), seed=2.0)
     motion = family_motion(COUNTS[kind], shape=shape)
-    frames, notes = written(family_take(family(kind), motion), tmp_path / "out", world_up="z")
+    frames, notes = written(family_animation(family(kind), motion), tmp_path / "out", world_up="z")
     assert notes == [
         f"{tmp_path}/out/smpl: 4 frames of 1 person, z up; EasyMocap keeps no frame rate: it is "
         "50 a second"
@@ -92,7 +92,7 @@ def test_records_place_the_body_by_the_formula(family, tmp_path, kind):
 
 def test_text_is_as_easymocap_writes_it(family, tmp_path):
     motion = family_motion(24, frames=1)
-    written(family_take(family("smpl"), motion), tmp_path / "out")
+    written(family_animation(family("smpl"), motion), tmp_path / "out")
     data = (tmp_path / "out" / "smpl" / "000000.json").read_bytes()
     assert data.startswith(b'[\n    {\n        "id": 0,\n        "Rh": [\n          [')
     assert data.endswith(b"]\n        ]\n    }\n]\n")
@@ -102,22 +102,22 @@ def test_text_is_as_easymocap_writes_it(family, tmp_path):
 @pytest.mark.parametrize("kind", ["smpl", "smplx"])
 def test_round_trip_through_amass(family, tmp_path, kind):
     figure, motion = family(kind), family_motion(COUNTS[kind])
-    written(family_take(figure, motion), tmp_path / "a")
-    there = take_of_clip(figure, clip_of(tmp_path / "a", figure))
-    export_take(there, tmp_path / "a.npz", "amass", MotionOptions(world_up="z"))
+    written(family_animation(figure, motion), tmp_path / "a")
+    there = animation_of_clip(figure, clip_of(tmp_path / "a", figure))
+    export_animation(there, tmp_path / "a.npz", "amass", MotionOptions(world_up="z"))
     back = read(Source.open(tmp_path / "a.npz"))
-    again = take_of_clip(figure, body_clip(back, figure)[0])
+    again = animation_of_clip(figure, body_clip(back, figure)[0])
     frames, _ = written(again, tmp_path / "b")
     for first, second in zip(frames_in(tmp_path / "a").values(), frames.values(), strict=True):
         for key in ("Rh", "Th", "poses", "shapes"):
             assert_allclose(second[0][key], first[0][key], rtol=0, atol=ATOL)
 
 
-def take_of_clip(figure, clip):
-    from viewer.rig.motion.take import take_of
+def animation_of_clip(figure, clip):
+    from viewer.rig.motion.sampled_animation import sample_animation
     from viewer.rig.scene import Actor
 
-    return take_of(Actor(figure, clip=clip))
+    return sample_animation(Actor(figure, clip=clip))
 
 
 def test_recording_comes_back(shared_data, tmp_path):
@@ -125,10 +125,11 @@ def test_recording_comes_back(shared_data, tmp_path):
     if not folder.is_dir():
         pytest.skip("no synthetic recording")
     figure = read(Source.open(folder / "SMPL_NEUTRAL.npz"))
-    takes = [
-        take_of_clip(figure, clip_of(folder / "easymocap", figure, person)) for person in (0, 1)
+    animations = [
+        animation_of_clip(figure, clip_of(folder / "easymocap", figure, person))
+        for person in (0, 1)
     ]
-    notes = easymocap.export_takes(takes, tmp_path / "out", MotionOptions(world_up="z"))
+    notes = easymocap.export_animations(animations, tmp_path / "out", MotionOptions(world_up="z"))
     assert notes[0].startswith(f"{tmp_path}/out/smpl: 30 frames of 2 people, z up")
     found = frames_in(tmp_path / "out")
     wanted = frames_in(folder / "easymocap")
@@ -143,9 +144,11 @@ def test_recording_comes_back(shared_data, tmp_path):
 
 def test_people_and_gaps_land_in_the_same_files(family, tmp_path):
     figure = family("smpl")
-    first = family_take(figure, family_motion(24, rows=np.array([0, -1, 1]), first_frame=5))
-    second = family_take(figure, family_motion(24, first_frame=9, shape=waves(1, 10, seed=9.0)))
-    notes = easymocap.export_takes([first, second], tmp_path, MotionOptions(), [7, 3])
+    first = family_animation(figure, family_motion(24, rows=np.array([0, -1, 1]), first_frame=5))
+    second = family_animation(
+        figure, family_motion(24, first_frame=9, shape=waves(1, 10, seed=9.0))
+    )
+    notes = easymocap.export_animations([first, second], tmp_path, MotionOptions(), [7, 3])
     frames = frames_in(tmp_path)
     assert {frame: [record["id"] for record in people] for frame, people in frames.items()} == {
         5: [7], 6: [], 7: [7], 8: [], 9: [3], 10: [3], 11: [3], 12: [3],
@@ -159,14 +162,14 @@ def test_people_and_gaps_land_in_the_same_files(family, tmp_path):
 
 def test_expression_is_written(family, tmp_path):
     motion = family_motion(55, expression=waves(4, 10, seed=5.0))
-    frames, _ = written(family_take(family("smplx"), motion), tmp_path / "out")
+    frames, _ = written(family_animation(family("smplx"), motion), tmp_path / "out")
     found = [people[0]["expression"][0] for people in frames.values()]
     assert_allclose(found, waves(4, 10, seed=5.0), rtol=0, atol=1e-7)
 
 
 def test_other_up_axis_turns_rh_and_th(family, tmp_path):
-    take = family_take(family("smpl"), family_motion(24))
-    frames, notes = written(take, tmp_path / "out", up="z")
+    animation = family_animation(family("smpl"), family_motion(24))
+    frames, notes = written(animation, tmp_path / "out", up="z")
     quarter = rotation([np.pi / 2, 0, 0])
     motion = family_motion(24)
     for frame, people in frames.items():
@@ -181,8 +184,8 @@ def test_other_up_axis_turns_rh_and_th(family, tmp_path):
 
 
 def test_older_frames_do_not_stay(family, tmp_path):
-    long = family_take(family("smpl"), family_motion(24, frames=6))
-    short = family_take(family("smpl"), family_motion(24, frames=2))
+    long = family_animation(family("smpl"), family_motion(24, frames=6))
+    short = family_animation(family("smpl"), family_motion(24, frames=2))
     written(long, tmp_path / "out")
     (tmp_path / "out" / "intri.yml").write_text("kept")
     frames, _ = written(short, tmp_path / "out")
@@ -191,11 +194,11 @@ def test_older_frames_do_not_stay(family, tmp_path):
 
 
 def test_other_files_are_never_deleted(family, tmp_path):
-    take = family_take(family("smpl"), family_motion(24))
+    animation = family_animation(family("smpl"), family_motion(24))
     (tmp_path / "smpl").mkdir()
     (tmp_path / "smpl" / "000000.jpg").write_text("mine")
     with pytest.raises(OutputError) as caught:
-        written(take, tmp_path)
+        written(animation, tmp_path)
     assert str(caught.value) == (
         f"{tmp_path}/smpl: holds other files than frames (000000.jpg), and is not replaced"
     )
@@ -206,17 +209,17 @@ def test_file_in_the_way_is_refused(family, tmp_path):
     path = tmp_path / "out"
     path.write_text("mine")
     with pytest.raises(OutputError, match=r"out: expected a folder, found a file$"):
-        written(family_take(family("smpl"), family_motion(24)), path)
+        written(family_animation(family("smpl"), family_motion(24)), path)
     assert path.read_text() == "mine"
 
 
 @pytest.mark.parametrize("problem", [OSError(28, "No space left on device"), KeyboardInterrupt()])
 @pytest.mark.parametrize("exists", [False, True])
 def test_interrupted_export_leaves_what_was_there(family, tmp_path, monkeypatch, exists, problem):
-    take = family_take(family("smpl"), family_motion(24))
+    animation = family_animation(family("smpl"), family_motion(24))
     path = tmp_path / "out"
     if exists:
-        written(take, path)
+        written(animation, path)
     before = {file: file.read_bytes() for file in tmp_path.rglob("*.json")}
     calls = []
 
@@ -229,7 +232,7 @@ def test_interrupted_export_leaves_what_was_there(family, tmp_path, monkeypatch,
     monkeypatch.setattr(easymocap._Records, "text", text)
     wanted = OutputError if isinstance(problem, OSError) else KeyboardInterrupt
     with pytest.raises(wanted) as caught:
-        written(take, path)
+        written(animation, path)
     if wanted is OutputError:
         assert str(caught.value) == f"{path}: No space left on device"
     assert {file: file.read_bytes() for file in tmp_path.rglob("*.json")} == before
@@ -241,20 +244,20 @@ def test_interrupted_export_leaves_what_was_there(family, tmp_path, monkeypatch,
 
 
 def test_people_must_fit_each_other(family, tmp_path):
-    take = family_take(family("smpl"), family_motion(24))
-    other = replace(take, frame_rate=25.0)
-    for takes, persons, message in (
+    animation = family_animation(family("smpl"), family_motion(24))
+    other = replace(animation, frame_rate=25.0)
+    for animations, persons, message in (
         ([], [], "expected somebody to write, found nobody"),
-        ([take, take], [1, 1], "expected a number for each of 2 people, found [1, 1]"),
-        ([take, other], None, "expected one frame rate for all people, found 25, 50"),
-        ([replace(take, first_frame=-2)], None, "walk: expected frames from 0 on, found -2"),
+        ([animation, animation], [1, 1], "expected a number for each of 2 people, found [1, 1]"),
+        ([animation, other], None, "expected one frame rate for all people, found 25, 50"),
+        ([replace(animation, first_frame=-2)], None, "walk: expected frames from 0 on, found -2"),
     ):
         with pytest.raises(RigError) as caught:
-            easymocap.export_takes(takes, tmp_path / "out", MotionOptions(), persons)
-        assert str(caught.value).replace(f"{take.name}:", "walk:") == message
-    nobody = replace(take, frames=replace(take.frames, present=np.zeros(4, dtype=bool)))
+            easymocap.export_animations(animations, tmp_path / "out", MotionOptions(), persons)
+        assert str(caught.value).replace(f"{animation.name}:", "walk:") == message
+    nobody = replace(animation, frames=replace(animation.frames, present=np.zeros(4, dtype=bool)))
     with pytest.raises(RigError, match=r"every frame is missing, there is nothing to write$"):
-        easymocap.export_takes([nobody], tmp_path / "out", MotionOptions())
+        easymocap.export_animations([nobody], tmp_path / "out", MotionOptions())
     assert not list(tmp_path.iterdir())
 
 
@@ -264,7 +267,7 @@ def test_other_figures_are_refused(tmp_path):
     scene = viewer.load()
     clip = body_less(scene.actors[0].figure)
     with pytest.raises(RigError) as caught:
-        written(take_of_clip(scene.actors[0].figure, clip), tmp_path / "out")
+        written(animation_of_clip(scene.actors[0].figure, clip), tmp_path / "out")
     assert str(caught.value) == (
         "fox cannot be written as an EasyMocap folder: expected the joints of SMPL, SMPL+H, "
         "SMPL-X or MANO, found others"

@@ -16,7 +16,7 @@ from plain_bvh import PlainBvh, about
 
 import viewer
 from viewer.errors import OutputError, RigError
-from viewer.export import MotionOptions, export_take, motion_exporters
+from viewer.export import MotionOptions, export_animation, motion_exporters
 from viewer.export._bvh.angles import euler_angles, unrolled
 from viewer.export._options import ROTATION_ORDERS
 from viewer.formats import Source, bvh
@@ -25,8 +25,8 @@ from viewer.rig.figure import Figure
 from viewer.rig.motion.body_motion import BodyMotion, body_clip
 from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.motion.evaluation import world_frames
+from viewer.rig.motion.sampled_animation import SampledAnimation, sample_animation
 from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.take import Take, take_of
 from viewer.rig.motion.timing import Timing
 from viewer.rig.retargeting.retarget import retarget
 from viewer.rig.scene import Actor
@@ -42,9 +42,9 @@ def quaternions(vectors: np.ndarray) -> np.ndarray:
     return np.concatenate([axes * np.sin(angles / 2), np.cos(angles / 2)], axis=-1)
 
 
-def body_take(
+def body_animation(
     figure: Figure, count: int = 12, rows: list[int] | None = None, seed: int = 0
-) -> Take:
+) -> SampledAnimation:
     """Return random large rotations of a body, one shape, some frames missing."""
     rng = np.random.default_rng(seed)
     timing = Timing(30.0, np.arange(count) if rows is None else np.array(rows))
@@ -52,14 +52,14 @@ def body_take(
     vectors = rng.uniform(-1.5, 1.5, (count, len(names), 3))
     shape = rng.normal(0, 1, (1, 10))
     motion = BodyMotion("walk", timing, names, vectors, rng.normal(0, 2, (count, 3)), True, shape)
-    return take_of(Actor(figure, clip=body_clip(motion, figure)[0]))
+    return sample_animation(Actor(figure, clip=body_clip(motion, figure)[0]))
 
 
-def rig_take(skeleton: Skeleton, count: int = 6, seed: int = 0, **changes) -> Take:
+def rig_animation(skeleton: Skeleton, count: int = 6, seed: int = 0, **changes) -> SampledAnimation:
     rng = np.random.default_rng(seed)
     turns = quaternions(rng.uniform(-2, 2, (count, skeleton.n_joints, 3)))
     clip = SampledClip("dance", Timing(25.0, np.arange(count)), turns, **changes)
-    return take_of(Actor(Figure("rig", skeleton=skeleton), clip=clip))
+    return sample_animation(Actor(Figure("rig", skeleton=skeleton), clip=clip))
 
 
 def chain(count: int = 3) -> Skeleton:
@@ -67,26 +67,31 @@ def chain(count: int = 3) -> Skeleton:
     return ball_skeleton(names, np.arange(count) - 1, np.arange(count)[:, None] * [0.0, 1.0, 0.5])
 
 
-def write(take: Take, folder: Path, **options) -> tuple[PlainBvh, list[str]]:
+def write(animation: SampledAnimation, folder: Path, **options) -> tuple[PlainBvh, list[str]]:
     path = folder / "out.bvh"
-    notes = export_take(take, path, "bvh", MotionOptions(**options))
+    notes = export_animation(animation, path, "bvh", MotionOptions(**options))
     return PlainBvh(path), [note.replace(str(path), "PATH") for note in notes]
 
 
-def joints_of(take: Take) -> np.ndarray:
-    """Return where the take's joints are: (F, J, 3)."""
-    return world_frames(take.figure, take.frames)[..., :3, 3]
+def joints_of(animation: SampledAnimation) -> np.ndarray:
+    """Return where the animation's joints are: (F, J, 3)."""
+    return world_frames(animation.figure, animation.frames)[..., :3, 3]
 
 
 def assert_places(
-    found: PlainBvh, take: Take, factor: float = 1.0, turn=None, atol: float = TENTH, skip: int = 0
+    found: PlainBvh,
+    animation: SampledAnimation,
+    factor: float = 1.0,
+    turn=None,
+    atol: float = TENTH,
+    skip: int = 0,
 ) -> None:
-    wanted = joints_of(take) * factor
+    wanted = joints_of(animation) * factor
     wanted = wanted if turn is None else wanted @ turn.T
     assert found.n_frames == len(wanted) + skip
-    for frame in np.flatnonzero(take.frames.present):
+    for frame in np.flatnonzero(animation.frames.present):
         places = found.places(int(frame) + skip)
-        for joint, name in enumerate(take.figure.skeleton.names):
+        for joint, name in enumerate(animation.figure.skeleton.names):
             np.testing.assert_allclose(places[name], wanted[frame, joint], atol=atol * factor)
 
 
@@ -100,9 +105,9 @@ def test_registry_knows_it() -> None:
 
 
 def test_a_body_s_joints_are_where_a_second_reader_finds_them(body: Figure, tmp_path: Path) -> None:
-    take = body_take(body)
-    found, notes = write(take, tmp_path)
-    assert_places(found, take, 100.0)
+    animation = body_animation(body)
+    found, notes = write(animation, tmp_path)
+    assert_places(found, animation, 100.0)
     assert notes[0] == (
         "PATH: 24 joints, 12 frames (0 to 11) at 30 a second, centimetres, y up, channels ZYX"
     )
@@ -110,7 +115,7 @@ def test_a_body_s_joints_are_where_a_second_reader_finds_them(body: Figure, tmp_
 
 
 def test_the_file_is_what_every_reader_takes(body: Figure, tmp_path: Path) -> None:
-    found, _ = write(body_take(body), tmp_path)  # the second reader checks the grammar
+    found, _ = write(body_animation(body), tmp_path)  # the second reader checks the grammar
     assert found.offsets[0] == [0.0, 0.0, 0.0]
     positions = ["Xposition", "Yposition", "Zposition"]
     turns = ["Zrotation", "Yrotation", "Xrotation"]
@@ -125,9 +130,9 @@ def test_the_file_is_what_every_reader_takes(body: Figure, tmp_path: Path) -> No
 
 @pytest.mark.parametrize("order", ROTATION_ORDERS)
 def test_every_rotation_order(body: Figure, order: str, tmp_path: Path) -> None:
-    take = body_take(body, seed=3)
-    found, notes = write(take, tmp_path, rotation_order=order)
-    assert_places(found, take, 100.0)
+    animation = body_animation(body, seed=3)
+    found, notes = write(animation, tmp_path, rotation_order=order)
+    assert_places(found, animation, 100.0)
     assert found.channels[5] == [f"{axis.upper()}rotation" for axis in order]
     assert notes[0].endswith(f"channels {order.upper()}")
 
@@ -136,10 +141,10 @@ def test_every_rotation_order(body: Figure, order: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("kind", ["smpl", "smplx"])
 def test_units_and_hands_and_face(kind: str, unit: str, factor: float, tmp_path: Path) -> None:
     figure = family_figure(kind, tmp_path)
-    take = body_take(figure)
-    found, notes = write(take, tmp_path, unit=unit)
+    animation = body_animation(figure)
+    found, notes = write(animation, tmp_path, unit=unit)
     assert len(found.names) == figure.skeleton.n_joints
-    assert_places(found, take, factor)
+    assert_places(found, animation, factor)
     assert len(notes) == 1
 
 
@@ -154,9 +159,9 @@ def test_units_and_hands_and_face(kind: str, unit: str, factor: float, tmp_path:
     ],
 )
 def test_up_axes(body: Figure, world: str, up: str, turn: np.ndarray, tmp_path: Path) -> None:
-    take = body_take(body)
-    found, notes = write(take, tmp_path, world_up=world, up=up)
-    assert_places(found, take, 100.0, turn)
+    animation = body_animation(body)
+    found, notes = write(animation, tmp_path, world_up=world, up=up)
+    assert_places(found, animation, 100.0, turn)
     # With all channels 0 the rest pose stands along the file's up axis.
     height = np.array(found.offsets[found.names.index("left_knee")])
     assert np.abs(height).argmax() == (2 if up == "z" else 1)
@@ -164,34 +169,34 @@ def test_up_axes(body: Figure, world: str, up: str, turn: np.ndarray, tmp_path: 
 
 
 def test_a_figure_with_z_up_rests_upright_in_a_y_up_file(tmp_path: Path) -> None:
-    take = rig_take(chain())
-    take = replace(take, figure=replace(take.figure, up="z"))
-    found, _ = write(take, tmp_path, world_up="z")
-    assert_places(found, take, turn=TO_Y)
+    animation = rig_animation(chain())
+    animation = replace(animation, figure=replace(animation.figure, up="z"))
+    found, _ = write(animation, tmp_path, world_up="z")
+    assert_places(found, animation, turn=TO_Y)
     np.testing.assert_allclose(found.offsets[1], [0.0, 0.5, -1.0])
 
 
 @pytest.mark.parametrize("rate", [24.0, 25.0, 29.97, 30.0, 59.94, 60.0, 120.0, 240.0, 1000.0, 0.25])
 def test_frame_time_is_exact(body: Figure, rate: float, tmp_path: Path) -> None:
-    take = replace(body_take(body), frame_rate=rate)
-    found, _ = write(take, tmp_path)
+    animation = replace(body_animation(body), frame_rate=rate)
+    found, _ = write(animation, tmp_path)
     assert found.frame_time * rate == pytest.approx(1.0, abs=1e-8)
     again = bvh.read(Source.open(tmp_path / "out.bvh"))
     assert again.clip.timing.frame_rate == pytest.approx(rate, rel=1e-8)
 
 
 def test_rest_frame_comes_first(body: Figure, tmp_path: Path) -> None:
-    take = body_take(body)
-    found, notes = write(take, tmp_path, rest_frame=True)
-    assert_places(found, take, 100.0, skip=1)
+    animation = body_animation(body)
+    found, notes = write(animation, tmp_path, rest_frame=True)
+    assert_places(found, animation, 100.0, skip=1)
     assert found.frames[0][3:] == [0.0] * 72
     assert "the rest pose and 12 frames (0 to 11)" in notes[0]
 
 
 def test_offsets_are_those_of_the_shape(body: Figure, tmp_path: Path) -> None:
-    take = body_take(body)
-    found, _ = write(take, tmp_path)
-    shaped = viewer.rig.shape.shaped(body, take.frames.shape_weights[0]).skeleton
+    animation = body_animation(body)
+    found, _ = write(animation, tmp_path)
+    shaped = viewer.rig.shape.shaped(body, animation.frames.shape_weights[0]).skeleton
     for name, offset in list(zip(found.names, found.offsets, strict=True))[1:]:
         joint = body.skeleton.names.index(name)
         np.testing.assert_allclose(offset, 100 * shaped.rest_translations[joint], atol=1e-6)
@@ -199,10 +204,10 @@ def test_offsets_are_those_of_the_shape(body: Figure, tmp_path: Path) -> None:
 
 def test_a_shape_that_changes_is_said_with_its_size(tmp_path: Path) -> None:
     figure = family_figure("smpl", tmp_path)
-    take = body_take(figure)
-    weights = np.repeat(take.frames.shape_weights, 12, axis=0)
+    animation = body_animation(figure)
+    weights = np.repeat(animation.frames.shape_weights, 12, axis=0)
     weights[7] += 3.0
-    changing = replace(take, frames=replace(take.frames, shape_weights=weights))
+    changing = replace(animation, frames=replace(animation.frames, shape_weights=weights))
     found, notes = write(changing, tmp_path)
     found_names = figure.skeleton.names
     wanted = 100 * joints_of(changing)
@@ -234,9 +239,9 @@ GAPS = [0, 1, -1, -1, 2, 3, -1, 4, -1]
 
 
 def test_gaps_hold_the_last_pose(body: Figure, tmp_path: Path) -> None:
-    take = body_take(body, 5, GAPS)
-    found, notes = write(take, tmp_path)
-    assert_places(found, take, 100.0)
+    animation = body_animation(body, 5, GAPS)
+    found, notes = write(animation, tmp_path)
+    assert_places(found, animation, 100.0)
     for gap, shown in ((2, 1), (3, 1), (6, 5), (8, 7)):
         assert found.frames[gap] == found.frames[shown]
     assert notes[1] == "missing frames 2 to 3, 6, 8: the last pose is held"
@@ -244,7 +249,7 @@ def test_gaps_hold_the_last_pose(body: Figure, tmp_path: Path) -> None:
 
 
 def test_a_gap_at_the_start_holds_the_first_pose(body: Figure, tmp_path: Path) -> None:
-    found, notes = write(body_take(body, 2, [-1, -1, 0, 1]), tmp_path)
+    found, notes = write(body_animation(body, 2, [-1, -1, 0, 1]), tmp_path)
     assert found.frames[0] == found.frames[1] == found.frames[2] != found.frames[3]
     assert notes[1] == "missing frames 0 to 1: the last pose is held"
 
@@ -254,18 +259,18 @@ def test_gaps_are_interpolated_on_the_shorter_arc(tmp_path: Path) -> None:
     turns[1] *= -1.0
     shifts = np.array([[[0.0, 0, 0]], [[3.0, 0, 6]]])
     clip = SampledClip("turn", Timing(10.0, np.array([0, -1, -1, 1])), turns, shifts)
-    take = take_of(Actor(Figure("rig", skeleton=chain(1)), clip=clip))
-    found, notes = write(take, tmp_path, gaps="interpolate")
+    animation = sample_animation(Actor(Figure("rig", skeleton=chain(1)), clip=clip))
+    found, notes = write(animation, tmp_path, gaps="interpolate")
     expected = [[1.0, 0, 2, np.degrees(0.4), 0, 0], [2.0, 0, 4, np.degrees(0.6), 0, 0]]
     np.testing.assert_allclose(found.frames[1:3], expected, atol=1e-6)
     assert notes[1] == "missing frames 1 to 2: interpolated, held at both ends"
 
 
 def test_gaps_split_into_files(body: Figure, tmp_path: Path) -> None:
-    take = body_take(body, 5, GAPS)
-    notes = export_take(take, tmp_path / "out.bvh", "bvh", MotionOptions(gaps="split"))
+    animation = body_animation(body, 5, GAPS)
+    notes = export_animation(animation, tmp_path / "out.bvh", "bvh", MotionOptions(gaps="split"))
     assert sorted(path.name for path in tmp_path.iterdir()) == [f"out-{i}.bvh" for i in (1, 2, 3)]
-    wanted = joints_of(take) * 100
+    wanted = joints_of(animation) * 100
     for number, frames in ((1, (0, 1)), (2, (4, 5)), (3, (7,))):
         found = PlainBvh(tmp_path / f"out-{number}.bvh")
         assert found.n_frames == len(frames)
@@ -280,8 +285,8 @@ def test_a_failing_file_of_several_leaves_none(body: Figure, tmp_path: Path) -> 
     (tmp_path / "out-1.bvh").write_text("old")
     (tmp_path / "out-3.bvh").mkdir()
     with pytest.raises(OutputError):
-        export_take(
-            body_take(body, 5, GAPS), tmp_path / "out.bvh", "bvh", MotionOptions(gaps="split")
+        export_animation(
+            body_animation(body, 5, GAPS), tmp_path / "out.bvh", "bvh", MotionOptions(gaps="split")
         )
     assert sorted(path.name for path in tmp_path.iterdir()) == ["out-1.bvh", "out-3.bvh"]
     assert (tmp_path / "out-1.bvh").read_text() == "old"
@@ -292,28 +297,28 @@ def test_joints_turned_at_rest_rest_without_rotation(tmp_path: Path) -> None:
     skeleton = chain(4)
     skeleton = replace(skeleton, rest_rotations=quaternions(rng.uniform(-2, 2, (4, 3))))
     still = SampledClip("still", Timing(25.0, np.array([0])), skeleton.rest_rotations[None])
-    take = take_of(Actor(Figure("rig", skeleton=skeleton), clip=still))
-    found, _ = write(take, tmp_path)
-    assert_places(found, take)
+    animation = sample_animation(Actor(Figure("rig", skeleton=skeleton), clip=still))
+    found, _ = write(animation, tmp_path)
+    assert_places(found, animation)
     np.testing.assert_allclose(found.frames[0], np.zeros(15), atol=1e-6)
-    moving = rig_take(skeleton, 6)
+    moving = rig_animation(skeleton, 6)
     assert_places(write(moving, tmp_path)[0], moving)
 
 
 def test_scales_at_rest_are_baked(tmp_path: Path) -> None:
     skeleton = replace(chain(4), rest_scales=np.array([[2.0] * 3, [0.5] * 3, [3.0] * 3, [1.0] * 3]))
-    take = rig_take(skeleton)
-    found, notes = write(take, tmp_path)
-    assert_places(found, take)
+    animation = rig_animation(skeleton)
+    found, notes = write(animation, tmp_path)
+    assert_places(found, animation)
     np.testing.assert_allclose(found.offsets[1:], [[0, 2, 1], [0, 1, 0.5], [0, 3, 1.5]])
     assert all(len(channels) == 3 for channels in found.channels[1:]) and len(notes) == 1
 
 
 def test_uneven_scales_give_position_channels(tmp_path: Path) -> None:
     skeleton = replace(chain(4), rest_scales=np.array([[2.0, 1.0, 0.5], *[[1.0] * 3] * 3]))
-    take = rig_take(skeleton)
-    found, notes = write(take, tmp_path)
-    assert_places(found, take)
+    animation = rig_animation(skeleton)
+    found, notes = write(animation, tmp_path)
+    assert_places(found, animation)
     assert [len(channels) for channels in found.channels] == [6, 3, 6, 6]
     assert notes[1] == (
         "2 joints below the root move within their parents and have position channels: c, d"
@@ -324,9 +329,9 @@ def test_joints_that_move_get_position_channels_and_shifted_ones_an_offset(tmp_p
     shifts = np.zeros((6, 4, 3))
     shifts[:, 1] = 0.25, 0.5, -1.0
     shifts[3:, 3, 0] = 2.0
-    take = rig_take(chain(4), translations=shifts)
-    found, notes = write(take, tmp_path)
-    assert_places(found, take)
+    animation = rig_animation(chain(4), translations=shifts)
+    found, notes = write(animation, tmp_path)
+    assert_places(found, animation)
     assert [len(channels) for channels in found.channels] == [6, 3, 3, 6]
     np.testing.assert_allclose(found.offsets[1], [0.25, 1.5, -0.5])
     assert notes[1] == (
@@ -335,12 +340,14 @@ def test_joints_that_move_get_position_channels_and_shifted_ones_an_offset(tmp_p
 
 
 def test_scaled_figures(tmp_path: Path) -> None:
-    take = rig_take(chain(), figure_scales=np.full(6, 2.5), figure_translations=np.ones((6, 3)))
-    found, notes = write(take, tmp_path)
-    assert_places(found, take)
+    animation = rig_animation(
+        chain(), figure_scales=np.full(6, 2.5), figure_translations=np.ones((6, 3))
+    )
+    found, notes = write(animation, tmp_path)
+    assert_places(found, animation)
     np.testing.assert_allclose(found.offsets[1], [0, 2.5, 1.25])
     assert len(notes) == 1
-    growing = rig_take(chain(), figure_scales=np.linspace(1, 2, 6))
+    growing = rig_animation(chain(), figure_scales=np.linspace(1, 2, 6))
     notes = write(growing, tmp_path)[1]
     assert notes[1].startswith("PATH: joints differ from the motion by up to ")
     assert notes[1].endswith(" units (c, frame 5)")
@@ -351,42 +358,42 @@ def test_several_roots_hang_from_one(tmp_path: Path) -> None:
     skeleton = replace(chain(4), parents=np.array([-1, 0, -1, 2]), names=("root", "b", "c", "d"))
     shifts = np.zeros((6, 4, 3))
     shifts[:, 2, 1] = np.arange(6)
-    take = rig_take(skeleton, translations=shifts, figure_translations=np.ones((6, 3)))
-    found, notes = write(take, tmp_path, world_up="z")
+    animation = rig_animation(skeleton, translations=shifts, figure_translations=np.ones((6, 3)))
+    found, notes = write(animation, tmp_path, world_up="z")
     assert found.names[0] == "common_root" and found.parents == [-1, 0, 1, 0, 3]
-    assert_places(found, take, turn=TO_Y)
+    assert_places(found, animation, turn=TO_Y)
     assert [len(channels) for channels in found.channels] == [6, 3, 3, 6, 3]
     assert notes[1] == "several roots: they hang from a joint common_root, which was added"
 
 
 def test_names_become_unique_and_plain(tmp_path: Path) -> None:
     skeleton = replace(chain(4), names=("left leg", "", "left leg", "é:x"))
-    found, _ = write(rig_take(skeleton), tmp_path)
+    found, _ = write(rig_animation(skeleton), tmp_path)
     assert found.names == ["left_leg", "joint1", "left_leg_2", "e_x"]
 
 
 def test_lengths_of_a_figure_without_a_unit_stay(tmp_path: Path) -> None:
-    take = rig_take(chain())
-    found, notes = write(take, tmp_path, unit="cm")
-    assert_places(found, take)
+    animation = rig_animation(chain())
+    found, notes = write(animation, tmp_path, unit="cm")
+    assert_places(found, animation)
     assert "the figure's own unit, y up" in notes[0]
     assert notes[1] == "lengths stay as they are: rig does not say its unit"
 
 
 def test_end_sites_are_half_the_last_bone_or_reach_to_the_skin(tmp_path: Path) -> None:
-    found, _ = write(rig_take(chain()), tmp_path)
+    found, _ = write(rig_animation(chain()), tmp_path)
     np.testing.assert_allclose(found.ends[2], [0, 0.5, 0.25])
     boxes = np.zeros((3, 2, 3))
     boxes[2] = [[-0.1, 0, -0.1], [0.1, 0.75, 0.1]]
-    found, _ = write(rig_take(replace(chain(), boxes=boxes)), tmp_path)
+    found, _ = write(rig_animation(replace(chain(), boxes=boxes)), tmp_path)
     np.testing.assert_allclose(found.ends[2], [0, 0.75, 0])
-    found, _ = write(rig_take(chain(1)), tmp_path)
+    found, _ = write(rig_animation(chain(1)), tmp_path)
     np.testing.assert_allclose(found.ends[0], [0, 0.5, 0])  # no bone to go by
 
 
 def test_end_sites_of_the_bundled_body_lie_at_its_skin(tmp_path: Path) -> None:
     figure = viewer.load(bundled_body()).actors[0].figure
-    found, _ = write(body_take(figure, 2), tmp_path, unit="m")
+    found, _ = write(body_animation(figure, 2), tmp_path, unit="m")
     head = found.ends[found.names.index("head")]
     top = figure.mesh.positions[:, 1].max() - viewer.rig.shape.rest_joints(figure)[15, 1]
     # Shape and slant of the neck move it by a few centimetres.
@@ -395,28 +402,28 @@ def test_end_sites_of_the_bundled_body_lie_at_its_skin(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("unit", ["m", "cm"])
 def test_the_bundled_body_is_exact(unit: str, tmp_path: Path) -> None:
-    take = body_take(viewer.load(bundled_body()).actors[0].figure, 20, seed=7)
-    found, notes = write(take, tmp_path, unit=unit)
-    assert_places(found, take, {"m": 1.0, "cm": 100.0}[unit])
+    animation = body_animation(viewer.load(bundled_body()).actors[0].figure, 20, seed=7)
+    found, notes = write(animation, tmp_path, unit=unit)
+    assert_places(found, animation, {"m": 1.0, "cm": 100.0}[unit])
     assert len(notes) == 1
 
 
 def test_the_wasp_walks_in_and_out(shared: Path, tmp_path: Path) -> None:
     actor = viewer.load(shared / "wasp.skel", shared / "wasp_walk.anim").actors[0]
-    take = take_of(actor)
-    found, _ = write(take, tmp_path)
-    assert_places(found, take)
+    animation = sample_animation(actor)
+    found, _ = write(animation, tmp_path)
+    assert_places(found, animation)
     clip, notes = retarget(bvh.read(Source.open(tmp_path / "out.bvh")), actor.figure)
     assert notes[0].endswith("moves 23 of 23 joints of wasp")
-    again = take_of(Actor(actor.figure, clip=clip))
-    np.testing.assert_allclose(joints_of(again), joints_of(take), atol=1e-6)
+    again = sample_animation(Actor(actor.figure, clip=clip))
+    np.testing.assert_allclose(joints_of(again), joints_of(animation), atol=1e-6)
 
 
 def test_a_bvh_comes_back_with_its_end_sites(tmp_path: Path) -> None:
-    first, _ = write(rig_take(chain(4)), tmp_path)
+    first, _ = write(rig_animation(chain(4)), tmp_path)
     motion = bvh.read(Source.open(tmp_path / "out.bvh"))
-    take = take_of(Actor(motion.figure, clip=motion.clip))
-    again, _ = write(take, tmp_path, unit="m")
+    animation = sample_animation(Actor(motion.figure, clip=motion.clip))
+    again, _ = write(animation, tmp_path, unit="m")
     assert again.ends == first.ends and again.offsets == first.offsets
     np.testing.assert_allclose(again.frames, first.frames, atol=2e-6)
 
@@ -428,18 +435,18 @@ def test_keyed_clips_with_root_translation(tmp_path: Path) -> None:
         Channel(dof, np.array([0.0, 1.0]), rng.uniform(-0.5, 0.5, 2), (("smooth", "smooth"),) * 2)
         for dof in range(figure.skeleton.n_dofs)
     )
-    take = take_of(Actor(figure, clip=Clip("walk", channels, 0.0, 1.0)))
-    found, notes = write(take, tmp_path, rotation_order="xyz")
+    animation = sample_animation(Actor(figure, clip=Clip("walk", channels, 0.0, 1.0)))
+    found, notes = write(animation, tmp_path, rotation_order="xyz")
     assert found.n_frames == 31
-    assert_places(found, take)
+    assert_places(found, animation)
     assert np.ptp(np.array(found.frames)[:, :3], axis=0).min() > 0.0
     assert not [note for note in notes[1:] if " between frames " not in note]
 
 
 def test_fewer_digits_are_less_exact_and_said(body: Figure, tmp_path: Path) -> None:
-    take = body_take(body)
-    found, notes = write(take, tmp_path, digits=2)
-    wanted = joints_of(take) * 100
+    animation = body_animation(body)
+    found, notes = write(animation, tmp_path, digits=2)
+    wanted = joints_of(animation) * 100
     worst = max(
         np.linalg.norm(np.array(found.places(f)[n]) - wanted[f, j])
         for f in range(12)
@@ -451,14 +458,14 @@ def test_fewer_digits_are_less_exact_and_said(body: Figure, tmp_path: Path) -> N
 
 
 def test_a_file_moves_the_body_it_was_made_from(body: Figure, tmp_path: Path) -> None:
-    take = body_take(body)
-    flat = replace(take.frames, shape_weights=np.zeros((1, body.n_shapes)))
-    take = replace(take, frames=flat)
-    write(take, tmp_path, rotation_order="yxz")
+    animation = body_animation(body)
+    flat = replace(animation.frames, shape_weights=np.zeros((1, body.n_shapes)))
+    animation = replace(animation, frames=flat)
+    write(animation, tmp_path, rotation_order="yxz")
     motion = bvh.read(Source.open(tmp_path / "out.bvh"))
     clip, _ = retarget(motion, body)
-    again = take_of(Actor(body, clip=clip))
-    np.testing.assert_allclose(joints_of(again), joints_of(take), atol=1e-6)
+    again = sample_animation(Actor(body, clip=clip))
+    np.testing.assert_allclose(joints_of(again), joints_of(animation), atol=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -479,19 +486,21 @@ def test_a_file_moves_the_body_it_was_made_from(body: Figure, tmp_path: Path) ->
 )
 def test_unknown_options_are_refused(options: dict, message: str, tmp_path: Path) -> None:
     with pytest.raises(RigError) as caught:
-        write(rig_take(chain()), tmp_path, **options)
+        write(rig_animation(chain()), tmp_path, **options)
     assert str(caught.value) == message
 
 
 def test_nothing_present_or_not_finite_is_refused(body: Figure, tmp_path: Path) -> None:
-    take = body_take(body)
-    none = replace(take, frames=replace(take.frames, present=np.zeros(12, dtype=bool)))
+    animation = body_animation(body)
+    none = replace(animation, frames=replace(animation.frames, present=np.zeros(12, dtype=bool)))
     with pytest.raises(RigError, match="every frame is missing, there is nothing to write"):
         write(none, tmp_path)
-    wild = take.frames.figure_translations.copy()
+    wild = animation.frames.figure_translations.copy()
     wild[3, 0] = np.inf
     with pytest.raises(RigError, match="expected finite numbers in every frame"):
-        write(replace(take, frames=replace(take.frames, figure_translations=wild)), tmp_path)
+        write(
+            replace(animation, frames=replace(animation.frames, figure_translations=wild)), tmp_path
+        )
     assert not (tmp_path / "out.bvh").exists()
 
 
@@ -499,8 +508,8 @@ def test_deep_chains_are_written(tmp_path: Path) -> None:
     count = 3000
     names = tuple(f"j{i}" for i in range(count))
     deep = ball_skeleton(names, np.arange(count) - 1, np.arange(count)[:, None] * [0.0, 0.001, 0.0])
-    take = rig_take(deep, 2)
-    found, _ = write(take, tmp_path)
+    animation = rig_animation(deep, 2)
+    found, _ = write(animation, tmp_path)
     assert found.parents == list(range(-1, count - 1))
     assert len(found.text) < 2e6
 

@@ -14,8 +14,8 @@ import viewer
 from viewer.errors import RigError
 from viewer.export import MotionOptions, export
 from viewer.export.npz import export_points
-from viewer.rig.captures.point_take import PointTake
 from viewer.rig.captures.points import PointLayout
+from viewer.rig.captures.sampled_points import SampledPoints
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import ball_skeleton
@@ -124,17 +124,17 @@ def test_arrays_are_listed(tmp_path):
 LAYOUT = PointLayout("two", ("a", "b"), np.array([[0, 1]]), np.array([-1, 1]))
 
 
-def point_take(present=(True, False)):
+def sampled_points(present=(True, False)):
     points = np.full((2, 2, 3), np.nan)
     points[0, 0] = 1.0, 2.0, 3.0
     confidences = np.array([[0.5, 0.0], [0.0, 0.0]])
     times = np.array([0.0, 0.1])
-    return PointTake("two 4", LAYOUT, 10.0, 7, times, np.array(present), points, confidences)
+    return SampledPoints("two 4", LAYOUT, 10.0, 7, times, np.array(present), points, confidences)
 
 
 def test_points_of_all_frames(tmp_path):
     path = tmp_path / "two.npz"
-    (line,) = export_points(point_take(), path, MotionOptions(world_up="z"))
+    (line,) = export_points(sampled_points(), path, MotionOptions(world_up="z"))
     assert line == (
         f"{path}: 2 frames at 10 a second; 1 of them missing, NaN, z up: name, up, frame_rate, "
         "times, frames, present, points, confidences, joint_names, limbs, sides, layout"
@@ -144,7 +144,7 @@ def test_points_of_all_frames(tmp_path):
         assert (str(arrays["layout"]), float(arrays["frame_rate"])) == ("two", 10.0)
         assert arrays["frames"].tolist() == [7, 8] and arrays["present"].tolist() == [True, False]
         assert arrays["joint_names"].tolist() == ["a", "b"]
-        assert_array_equal(arrays["points"], point_take().points)
+        assert_array_equal(arrays["points"], sampled_points().points)
         assert arrays["confidences"].tolist() == [[0.5, 0.0], [0.0, 0.0]]
         assert (arrays["limbs"].tolist(), arrays["sides"].tolist()) == ([[0, 1]], [-1, 1])
 
@@ -163,7 +163,7 @@ def test_points_of_all_frames(tmp_path):
 )
 def test_points_that_cannot_be_written_are_refused(tmp_path, options, present, message):
     with pytest.raises(RigError) as caught:
-        export_points(point_take((present, False)), tmp_path / "two.npz", options)
+        export_points(sampled_points((present, False)), tmp_path / "two.npz", options)
     assert str(caught.value) == message and not any(tmp_path.iterdir())
 
 

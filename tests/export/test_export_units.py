@@ -17,11 +17,11 @@ from seamed import POSITIONS, seamed_actor
 import viewer
 from viewer.cli import run
 from viewer.errors import RigError
-from viewer.export import MotionOptions, export, export_take
+from viewer.export import MotionOptions, export, export_animation
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import rotation_vector_to_quaternion
+from viewer.rig.motion.sampled_animation import sample_animation
 from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.take import take_of
 from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import ball_skeleton
@@ -40,7 +40,7 @@ def walk(tmp_path):
 
 def take_in(path):
     (actor,) = viewer.load(path).actors
-    return take_of(actor)
+    return sample_animation(actor)
 
 
 def bvh_places(path, frame=1):
@@ -88,9 +88,9 @@ def test_the_error_in_millimetres_is_that_of_the_file(tmp_path):
     shifts = np.array([[[7.04, 0.0, 0.0], [0.0, 0.0, 0.0]]])
     clip = SampledClip("a", Timing(30.0, np.arange(1)), turns, translations=shifts)
     for unit, millimetres in (("cm", 10.0), ("mm", 1.0), ("in", 25.4)):
-        take = take_of(Actor(Figure("a", skeleton=skeleton, unit=unit), clip=clip))
+        animation = sample_animation(Actor(Figure("a", skeleton=skeleton, unit=unit), clip=clip))
         options = MotionOptions(unit=unit, digits=1)
-        notes = export_take(take, tmp_path / "a.bvh", "bvh", options)
+        notes = export_animation(animation, tmp_path / "a.bvh", "bvh", options)
         assert f"joints differ from the motion by up to {0.04 * millimetres:.3g} mm (" in notes[1]
 
 
@@ -136,7 +136,7 @@ def test_gltf_turns_and_scales_a_skinned_mesh_at_once(tmp_path):
 ROOT = np.array([1.0, 95.0, 2.0])  # centimetres: J0
 
 
-def smpl_take(unit="cm", n_frames=3):
+def smpl_animation(unit="cm", n_frames=3):
     """Return a bare skeleton with SMPL's joints, its places and its root's rotations."""
     names = FAMILY[24].names
     joints = ROOT + np.arange(24)[:, None] * [0.0, 3.0, 0.5]
@@ -148,13 +148,13 @@ def smpl_take(unit="cm", n_frames=3):
     turns = rotation_vector_to_quaternion(vectors)
     clip = SampledClip("walk", Timing(30.0, np.arange(n_frames)), turns, translations=shifts)
     figure = Figure("walk", skeleton=ball_skeleton(names, parents, joints), unit=unit)
-    return take_of(Actor(figure, clip=clip)), vectors, ROOT + shifts[:, 0]
+    return sample_animation(Actor(figure, clip=clip)), vectors, ROOT + shifts[:, 0]
 
 
 @pytest.mark.parametrize("up", ["", "z"])
 def test_amass_of_a_skeleton_is_in_metres_from_its_own_root(tmp_path, up):
-    take, vectors, places = smpl_take()
-    notes = export_take(take, tmp_path / "a.npz", "amass", MotionOptions(up=up))
+    animation, vectors, places = smpl_animation()
+    notes = export_animation(animation, tmp_path / "a.npz", "amass", MotionOptions(up=up))
     turn = TO_Z if up else np.eye(3)
     with np.load(tmp_path / "a.npz") as arrays:
         for frame in range(3):
@@ -173,8 +173,8 @@ def test_amass_of_a_skeleton_is_in_metres_from_its_own_root(tmp_path, up):
 
 
 def test_easymocap_of_a_skeleton_turns_about_the_origin(tmp_path):
-    take, vectors, places = smpl_take()
-    notes = export_take(take, tmp_path / "out", "easymocap", MotionOptions())
+    animation, vectors, places = smpl_animation()
+    notes = export_animation(animation, tmp_path / "out", "easymocap", MotionOptions())
     for frame in range(3):
         (record,) = json.loads((tmp_path / "out" / "smpl" / f"{frame:06}.json").read_text())
         # V = R X + T, of the pelvis X = J0.
@@ -188,9 +188,9 @@ def test_easymocap_of_a_skeleton_turns_about_the_origin(tmp_path):
     ("kind", "what"), [("amass", "an AMASS motion"), ("easymocap", "an EasyMocap folder")]
 )
 def test_skeletons_of_unknown_unit_are_refused(tmp_path, kind, what):
-    take, _, _ = smpl_take("")
+    animation, _, _ = smpl_animation("")
     with pytest.raises(RigError) as caught:
-        export_take(take, tmp_path / "out.npz", kind, MotionOptions())
+        export_animation(animation, tmp_path / "out.npz", kind, MotionOptions())
     assert str(caught.value) == (
         f"walk cannot be written as {what}, which is in metres: its unit is not known (of a BVH, "
         "--unit says it)"
@@ -200,12 +200,12 @@ def test_skeletons_of_unknown_unit_are_refused(tmp_path, kind, what):
 
 @pytest.mark.parametrize(("kind", "title"), [("amass", "AMASS"), ("easymocap", "EasyMocap")])
 def test_other_units_than_metres_are_refused_for_the_family(tmp_path, kind, title):
-    take, _, _ = smpl_take("m")
+    animation, _, _ = smpl_animation("m")
     with pytest.raises(RigError) as caught:
-        export_take(take, tmp_path / "out.npz", kind, MotionOptions(unit="cm"))
+        export_animation(animation, tmp_path / "out.npz", kind, MotionOptions(unit="cm"))
     assert str(caught.value) == f'unit of {title}: expected m, found "cm"'
     assert not any(tmp_path.iterdir())
-    assert export_take(take, tmp_path / "out.npz", kind, MotionOptions(unit="m"))
+    assert export_animation(animation, tmp_path / "out.npz", kind, MotionOptions(unit="m"))
 
 
 def test_obj_says_its_unit(tmp_path):
@@ -221,6 +221,6 @@ def test_ends_of_a_skeleton_without_bones_are_a_hand_long_in_any_unit(tmp_path):
     turns = np.tile([0.0, 0, 0, 1], (1, 1, 1))
     clip = SampledClip("a", Timing(30.0, np.arange(1)), turns)
     for unit in ("m", "cm", "mm", "in"):
-        take = take_of(Actor(Figure("a", skeleton=skeleton, unit=unit), clip=clip))
-        export_take(take, tmp_path / "a.bvh", "bvh", MotionOptions(unit="m"))
+        animation = sample_animation(Actor(Figure("a", skeleton=skeleton, unit=unit), clip=clip))
+        export_animation(animation, tmp_path / "a.bvh", "bvh", MotionOptions(unit="m"))
         assert_allclose(PlainBvh(tmp_path / "a.bvh").ends[0], [0, 0.05, 0], rtol=0, atol=1e-6)

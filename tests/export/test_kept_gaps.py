@@ -5,15 +5,15 @@ import json
 import numpy as np
 import pytest
 from export.plain_readers import read_obj
+from family_animations import family_animation, family_motion
 from family_models import family_figure
-from family_takes import family_motion, family_take
 from numpy.testing import assert_allclose, assert_array_equal
 from seamed import POSITIONS, seamed_actor
 
 from viewer.errors import RigError
-from viewer.export import MotionOptions, export_take
+from viewer.export import MotionOptions, export_animation
+from viewer.rig.motion.sampled_animation import sample_animation
 from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.take import take_of
 from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor
 
@@ -33,7 +33,7 @@ def moving_roof():
         np.tile([0.0, 0.0, 0.0, 1.0], (2, figure.skeleton.n_joints, 1)),
         figure_translations=np.array([[0.0, 0.0, 0.0], [3.0, 0.0, 0.0]]),
     )
-    return take_of(Actor(figure, clip=clip))
+    return sample_animation(Actor(figure, clip=clip))
 
 
 @pytest.mark.parametrize(
@@ -47,7 +47,7 @@ def moving_roof():
 )
 def test_numbered_meshes(tmp_path, gaps, places):
     name = tmp_path / "m_{frame:02}.obj"
-    notes = export_take(moving_roof(), name, "obj", MotionOptions(gaps=gaps))
+    notes = export_animation(moving_roof(), name, "obj", MotionOptions(gaps=gaps))
     files = {int(path.stem[2:]): read_obj(path).v for path in tmp_path.iterdir()}
     assert files.keys() == places.keys()
     for frame, x in places.items():
@@ -65,7 +65,7 @@ def test_numbered_meshes(tmp_path, gaps, places):
 )
 def test_arrays(tmp_path, gaps, x):
     path = tmp_path / "a.npz"
-    notes = export_take(moving_roof(), path, "npz", MotionOptions(gaps=gaps))
+    notes = export_animation(moving_roof(), path, "npz", MotionOptions(gaps=gaps))
     with np.load(path) as arrays:
         assert_allclose(arrays["vertices"][:, :, 0], np.add.outer(x, POSITIONS[:, 0]), atol=1e-12)
         assert_array_equal(arrays["present"], ~np.isnan(x))
@@ -76,7 +76,7 @@ def test_arrays(tmp_path, gaps, x):
 def test_arrays_are_not_split(tmp_path):
     message = 'gaps of arrays: expected hold or interpolate, found "split"'
     with pytest.raises(RigError, match=f"^{message}$"):
-        export_take(moving_roof(), tmp_path / "a.npz", "npz", MotionOptions(gaps="split"))
+        export_animation(moving_roof(), tmp_path / "a.npz", "npz", MotionOptions(gaps="split"))
     assert not any(tmp_path.iterdir())
 
 
@@ -90,9 +90,9 @@ def test_arrays_are_not_split(tmp_path):
 )
 def test_folders(tmp_path, gaps, rows, note):
     motion = family_motion(24, rows=np.array([0, -1, 2]), first_frame=5)
-    take = family_take(family_figure("smpl", tmp_path), motion)
+    animation = family_animation(family_figure("smpl", tmp_path), motion)
     out = tmp_path / "out"
-    notes = export_take(take, out, "easymocap", MotionOptions(gaps=gaps))
+    notes = export_animation(animation, out, "easymocap", MotionOptions(gaps=gaps))
     assert notes[1:] == [note]
     for frame, row in enumerate(rows, 5):
         people = json.loads((out / "smpl" / f"{frame:06}.json").read_text())
@@ -104,8 +104,8 @@ def test_folders(tmp_path, gaps, rows, note):
 def test_folders_of_interpolated_frames(tmp_path):
     # Half-way between two unit quaternions lies their sum, at length 1.
     motion = family_motion(24, rows=np.array([0, -1, 2]), first_frame=5)
-    take = family_take(family_figure("smpl", tmp_path), motion)
-    export_take(take, tmp_path / "out", "easymocap", MotionOptions(gaps="interpolate"))
+    animation = family_animation(family_figure("smpl", tmp_path), motion)
+    export_animation(animation, tmp_path / "out", "easymocap", MotionOptions(gaps="interpolate"))
     (person,) = json.loads((tmp_path / "out" / "smpl" / "000006.json").read_text())
     ends = [quaternion(motion.vectors[row, 4]) for row in (0, 2)]
     ends[1] = ends[1] if ends[0] @ ends[1] > 0 else -ends[1]
@@ -121,11 +121,11 @@ def quaternion(vector):
 
 @pytest.mark.parametrize("key", ["obj", "npz", "easymocap"])
 def test_unknown_ways_are_refused(tmp_path, key):
-    take = moving_roof()
+    animation = moving_roof()
     if key == "easymocap":
-        take = family_take(family_figure("smpl", tmp_path), family_motion(24))
+        animation = family_animation(family_figure("smpl", tmp_path), family_motion(24))
     before = sorted(tmp_path.iterdir())
     message = 'way to close gaps: expected one of hold, interpolate, split, found "jump"'
     with pytest.raises(RigError, match=f"^{message}$"):
-        export_take(take, tmp_path / "m_{frame}", key, MotionOptions(gaps="jump"))
+        export_animation(animation, tmp_path / "m_{frame}", key, MotionOptions(gaps="jump"))
     assert sorted(tmp_path.iterdir()) == before

@@ -8,24 +8,28 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from family_animations import family_animation, family_motion, waves
 from family_models import family_figure
-from family_takes import family_motion, family_take, waves
 from formats.synthetic_smpl import model
 from numpy.testing import assert_allclose
 from plain_bvh import PlainBvh
 from plain_gltf import Gltf
 from rig import hand_made
-from stretched import GROWTH, JOINTS, NAMES, POSITIONS, WEIGHTS, WORST, chain_take
+from stretched import GROWTH, JOINTS, NAMES, POSITIONS, WEIGHTS, WORST, chain_animation
 
 import viewer
-from viewer.export import MotionOptions, export, export_take
+from viewer.export import MotionOptions, export, export_animation
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.mesh import Mesh
 from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.motion.evaluation import pose_of
+from viewer.rig.motion.sampled_animation import (
+    SampledAnimation,
+    sample_animation,
+    upright_animation,
+)
 from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.take import Take, take_of, upright_take
 from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skeleton import ball_skeleton
@@ -45,8 +49,8 @@ def said(notes: list[str]) -> dict[str, tuple[float, str]]:
     return {what: (float(size), place) for what, size, place in found}
 
 
-def write(take: Take, folder: Path, kind: str, name: str, **options) -> list[str]:
-    return export_take(take, folder / name, kind, MotionOptions(**options))
+def write(animation: SampledAnimation, folder: Path, kind: str, name: str, **options) -> list[str]:
+    return export_animation(animation, folder / name, kind, MotionOptions(**options))
 
 
 # A shape that changes
@@ -55,8 +59,8 @@ def write(take: Take, folder: Path, kind: str, name: str, **options) -> list[str
 @pytest.mark.parametrize("unit", ["m", "cm", "in"])
 def test_bvh_tells_how_far_joints_and_a_driven_skin_are_where_bones_grow(tmp_path, unit):
     """Each bone grows by 0.1, so the highest joint is 0.2 away, and what it carries 0.5."""
-    take = chain_take(unit)
-    found = said(write(take, tmp_path, "bvh", "a.bvh", digits=9))
+    animation = chain_animation(unit)
+    found = said(write(animation, tmp_path, "bvh", "a.bvh", digits=9))
     metres = {"m": 1.0, "cm": 0.01, "in": 0.0254}[unit]
     assert found == {
         "joints": (pytest.approx(200 * metres, rel=TOLD), f"high, frame {WORST}"),
@@ -73,11 +77,11 @@ def test_bvh_tells_how_far_joints_and_a_driven_skin_are_where_bones_grow(tmp_pat
 def test_frames_that_are_missing_are_not_compared(tmp_path):
     rows = np.arange(len(WEIGHTS))
     rows[WORST] = -1
-    whole = chain_take()
+    whole = chain_animation()
     clip = replace(whole.motion, timing=Timing(10.0, rows))
-    take = take_of(Actor(whole.figure, clip=clip))
+    animation = sample_animation(Actor(whole.figure, clip=clip))
     for kind, name in (("bvh", "a.bvh"), ("gltf", "a.glb")):
-        found = said(write(take, tmp_path, kind, name))
+        found = said(write(animation, tmp_path, kind, name))
         # The next one has three quarters of the weight.
         assert found["joints"] == (pytest.approx(150, rel=TOLD), "high, frame 4")
         assert found["vertices"] == (pytest.approx(375, rel=TOLD), "vertex 3, frame 4")
@@ -85,11 +89,11 @@ def test_frames_that_are_missing_are_not_compared(tmp_path):
 
 def test_files_of_parts_tell_their_own_losses(tmp_path):
     rows = np.array([0, 1, -1, 3, 4])
-    whole = chain_take()
+    whole = chain_animation()
     clip = replace(whole.motion, timing=Timing(10.0, rows))
-    take = take_of(Actor(whole.figure, clip=clip))
+    animation = sample_animation(Actor(whole.figure, clip=clip))
     for kind, suffix in (("bvh", "bvh"), ("gltf", "glb")):
-        notes = write(take, tmp_path, kind, f"a.{suffix}", gaps="split")
+        notes = write(animation, tmp_path, kind, f"a.{suffix}", gaps="split")
         lines = [note for note in notes if " differ from " in note]
         assert [line.split(":")[0] for line in lines] == [
             str(tmp_path / f"a-{number}.{suffix}") for number in (1, 2)
@@ -99,7 +103,7 @@ def test_files_of_parts_tell_their_own_losses(tmp_path):
 
 
 def test_gltf_tells_the_same_of_the_shape_that_is_baked_in(tmp_path):
-    notes = write(chain_take(), tmp_path, "gltf", "a.glb")
+    notes = write(chain_animation(), tmp_path, "gltf", "a.glb")
     assert said(notes) == {
         "joints": (pytest.approx(200, rel=TOLD), f"high, frame {WORST}"),
         "vertices": (pytest.approx(500, rel=TOLD), f"vertex 3, frame {WORST}"),
@@ -114,10 +118,10 @@ def test_expressions_are_no_part_of_a_bvh(tmp_path):
     """SMPL-X, faces that move: what a skin on the file's joints lacks, by plain formulas."""
     figure = replace(family_figure("smplx", tmp_path), correctives=None)
     motion = family_motion(55, frames=12, expression=4.0 * waves(12, 10, seed=5.0))
-    take = family_take(figure, motion)
-    found = said(write(take, tmp_path, "bvh", "a.bvh", unit="m", digits=12))
+    animation = family_animation(figure, motion)
+    found = said(write(animation, tmp_path, "bvh", "a.bvh", unit="m", digits=12))
     file, names = PlainBvh(tmp_path / "a.bvh"), figure.skeleton.names
-    weights = take.frames.shape_weights
+    weights = animation.frames.shape_weights
     shaped = viewer.rig.shape.shaped(figure, weights[0])
     rest = viewer.rig.shape.rest_joints(shaped)
     dense = np.zeros((figure.mesh.n_vertices, len(names)))
@@ -125,7 +129,7 @@ def test_expressions_are_no_part_of_a_bvh(tmp_path):
     np.add.at(dense, (owners, figure.skin.joints), figure.skin.weights)
     joints, vertices = [], []
     for frame in range(12):
-        pose = pose_of(figure, take.frames, frame)
+        pose = pose_of(figure, animation.frames, frame)
         there = viewer.joint_matrices(figure, pose)[:, :3, 3]
         turned, places = (
             np.array([file.joints(frame)[name][part] for name in names]) for part in (0, 1)
@@ -145,7 +149,7 @@ def test_expressions_are_no_part_of_a_bvh(tmp_path):
 # Weights
 
 
-def weighted(weights, count: int, peak: int, far: float) -> Take:
+def weighted(weights, count: int, peak: int, far: float) -> SampledAnimation:
     """Return points at the origin of a joint each; the last joint jumps aside in one frame."""
     n_joints = len(weights[0])
     joints = np.zeros((n_joints, 3))
@@ -160,7 +164,7 @@ def weighted(weights, count: int, peak: int, far: float) -> Take:
     moves = np.zeros((count, n_joints, 3))
     moves[peak, -1, 0] = far
     clip = SampledClip("jump", Timing(30.0, np.arange(count)), turns, translations=moves)
-    return take_of(Actor(Figure("points", mesh, skeleton, skin, unit="m"), clip=clip))
+    return sample_animation(Actor(Figure("points", mesh, skeleton, skin, unit="m"), clip=clip))
 
 
 @pytest.mark.parametrize("peak", [0, 7, 50, 101, 119])
@@ -182,20 +186,22 @@ def test_raw_weights_tell_what_scaling_them_moves_in_the_worst_frame(tmp_path, p
 
 def test_weights_that_were_scaled_as_asked_lose_nothing(tmp_path):
     weights = [(1.0, 0.0), (1.0, 0.0), (0.499, 0.499)]
-    take = weighted(weights, 5, 2, 3.0)
-    assert said(write(take, tmp_path, "gltf", "a.glb", skinning=Skinning(normalize=True))) == {}
+    animation = weighted(weights, 5, 2, 3.0)
+    assert (
+        said(write(animation, tmp_path, "gltf", "a.glb", skinning=Skinning(normalize=True))) == {}
+    )
 
 
 @pytest.mark.parametrize("peak", [13, 77])
 def test_programs_that_read_four_influences_are_told_of_the_worst_frame(tmp_path, peak):
     """The weakest of five influences, 0.05, is cut; its joint jumps by 2 m."""
     row = (0.3, 0.3, 0.2, 0.15, 0.05)
-    take = weighted([row, (1.0, 0, 0, 0, 0), (1.0, 0, 0, 0, 0)], 100, peak, 2.0)
-    notes = write(take, tmp_path, "gltf", "a.glb")
+    animation = weighted([row, (1.0, 0, 0, 0, 0), (1.0, 0, 0, 0, 0)], 100, peak, 2.0)
+    notes = write(animation, tmp_path, "gltf", "a.glb")
     assert said(notes) == {}
     (line,) = [note for note in notes if "JOINTS_0" in note]
     assert line.startswith("up to 5 influences a vertex") and line.endswith("by up to 100 mm")
-    cut = write(take, tmp_path, "gltf", "b.glb", skinning=Skinning(max_influences=4))
+    cut = write(animation, tmp_path, "gltf", "b.glb", skinning=Skinning(max_influences=4))
     assert said(cut) == {} and not [note for note in cut if "JOINTS_0" in note]
 
 
@@ -206,16 +212,16 @@ def test_programs_that_read_four_influences_are_held_against_the_motion(tmp_path
     scaled, leave it where it was. All five, scaled, would take it to (0.1 / 0.95, 1, 0).
     """
     row = (0.3, 0.3, 0.2, 0.1, 0.05)
-    take = weighted([row, row, (1.0, 0, 0, 0, 0)], 20, 7, 2.0)
-    notes = write(take, tmp_path, "gltf", "a.glb")
+    animation = weighted([row, row, (1.0, 0, 0, 0, 0)], 20, 7, 2.0)
+    notes = write(animation, tmp_path, "gltf", "a.glb")
     (line,) = [note for note in notes if "JOINTS_0" in note]
     size = float(re.search(r"off by up to (\S+) mm", line)[1])
     assert size == pytest.approx(1000 * np.hypot(0.1, 0.05), rel=TOLD)
 
 
 def test_influences_that_never_matter_are_told_without_a_number(tmp_path):
-    take = weighted([(0.3, 0.3, 0.2, 0.15, 0.05)] * 3, 4, 1, 0.0)
-    notes = write(take, tmp_path, "gltf", "a.glb")
+    animation = weighted([(0.3, 0.3, 0.2, 0.15, 0.05)] * 3, 4, 1, 0.0)
+    notes = write(animation, tmp_path, "gltf", "a.glb")
     assert "up to 5 influences a vertex, all of them written, strongest first" in notes
 
 
@@ -231,7 +237,7 @@ def test_amass_and_easymocap_tell_what_they_leave_out(tmp_path):
     moved[17, knee] = [0.15, 0.2, 0.0]
     clip = SampledClip("a", Timing(30.0, np.arange(40)), rotations, moved)
     for kind, name in (("amass", "a.npz"), ("easymocap", "out")):
-        found = said(write(take_of(Actor(figure, clip=clip)), tmp_path, kind, name))
+        found = said(write(sample_animation(Actor(figure, clip=clip)), tmp_path, kind, name))
         size, place = found["joints"]
         assert size == pytest.approx(250, rel=TOLD) and place.endswith(", frame 17")
         assert found["vertices"][0] <= 250 * (1 + TOLD)
@@ -249,8 +255,8 @@ def test_anim_tells_of_the_mesh_too(tmp_path):
     turns[..., 3] = 1.0
     turns[1, 1] = [0.0, 0.0, np.sin(0.5), np.cos(0.5)]
     clip = SampledClip("bend", Timing(10.0, np.arange(3)), turns)
-    take = take_of(Actor(Figure("arm", mesh, skeleton, skin, unit="m"), clip=clip))
-    notes = export_take(take, tmp_path / "a.anim", "anim", MotionOptions())
+    animation = sample_animation(Actor(Figure("arm", mesh, skeleton, skin, unit="m"), clip=clip))
+    notes = export_animation(animation, tmp_path / "a.anim", "anim", MotionOptions())
     found = said([notes[1]])
     assert found == {
         "vertices": (pytest.approx(2000 * np.sin(0.25), rel=TOLD), "vertex 1, frame 1")
@@ -262,14 +268,14 @@ def test_anim_tells_of_the_mesh_too(tmp_path):
 
 def test_nothing_is_said_where_nothing_is_lost(tmp_path):
     figure = replace(family_figure("smpl", tmp_path), correctives=None)
-    take = family_take(figure, family_motion(24, frames=30))
+    animation = family_animation(figure, family_motion(24, frames=30))
     for kind, name in (("bvh", "a.bvh"), ("gltf", "a.glb"), ("amass", "a.npz"), ("easymocap", "e")):
-        assert said(write(take, tmp_path, kind, name)) == {}
+        assert said(write(animation, tmp_path, kind, name)) == {}
     actor = viewer.load().actors[0]
     still = tuple(Channel(d, np.zeros(0), np.zeros(0), ()) for d in range(len(actor.pose.dofs)))
     actor.clip = Clip("still", still, 0.0, 1.0)
     for kind, name in (("bvh", "f.bvh"), ("gltf", "f.glb"), ("anim", "f.anim")):
-        assert said(write(take_of(actor), tmp_path, kind, name)) == {}
+        assert said(write(sample_animation(actor), tmp_path, kind, name)) == {}
 
 
 @pytest.mark.parametrize("suffix", ["glb", "gltf", "skel"])
@@ -286,11 +292,11 @@ def test_bodies_at_rest_in_another_shape_lose_nothing(tmp_path, suffix):
 def test_correctives_count_in_the_worst_of_many_frames(tmp_path):
     """More frames than are looked at at once, by all of them the slow way."""
     figure = family_figure("smpl", tmp_path)
-    take = family_take(figure, family_motion(24, frames=150))
-    notes = write(take, tmp_path, "gltf", "a.glb")
+    animation = family_animation(figure, family_motion(24, frames=150))
+    notes = write(animation, tmp_path, "gltf", "a.glb")
     off = []
     for frame in range(150):
-        pose = pose_of(figure, take.frames, frame)
+        pose = pose_of(figure, animation.frames, frame)
         plain = deform(figure, pose, Skinning(correctives=False))[0]
         off.append(np.linalg.norm(deform(figure, pose)[0] - plain, axis=1))
     frame, vertex = np.unravel_index(np.argmax(off), np.shape(off))
@@ -301,7 +307,7 @@ def test_correctives_count_in_the_worst_of_many_frames(tmp_path):
 # Between frames
 
 
-def spike(at: float) -> Take:
+def spike(at: float) -> SampledAnimation:
     """Return the chain moved along x, by 3 m at one key and back, a frame a second."""
     rows = [(0, kind, 0.0) for kind in ("tx", "ty", "tz", "x", "y", "z")]
     skeleton = hand_made.skeleton([-1], rows, None, [[0.0] * 3])
@@ -311,19 +317,19 @@ def spike(at: float) -> Take:
     moves = Channel(0, times, values, (("linear", "linear"),) * 3)
     still = [Channel(dof, np.zeros(0), np.zeros(0), ()) for dof in range(1, 6)]
     figure = Figure("point", mesh, skeleton, skin, unit="m")
-    return take_of(Actor(figure, clip=Clip("spike", (moves, *still), 0.0, 4.0)), rate=1.0)
+    return sample_animation(Actor(figure, clip=Clip("spike", (moves, *still), 0.0, 4.0)), rate=1.0)
 
 
 @pytest.mark.parametrize("at", [1.25, 2.5])
 def test_a_peak_between_frames_is_told(tmp_path, at):
     """Frames on both sides of the peak lie on its flanks; straight between them is lower."""
-    take = spike(at)
+    animation = spike(at)
     before, after = np.floor(at), np.ceil(at)
     ends = 3.0 * before / at, 3.0 * (4.0 - after) / (4.0 - at)
     low = ends[0] + (at - before) * (ends[1] - ends[0])
     size = pytest.approx(1000 * (3.0 - low), rel=TOLD)
     for kind, name in (("bvh", "a.bvh"), ("gltf", "a.glb")):
-        notes = write(take, tmp_path, kind, name)
+        notes = write(animation, tmp_path, kind, name)
         (line,) = [note for note in notes if " differ from " in note]
         assert line.endswith(": 1 a second are written") and " between frames by " in line
         found = said([line])
@@ -334,12 +340,14 @@ def test_captures_at_another_rate_tell_what_is_left_out(tmp_path):
     """Every second frame is written; the one between stands 2 m aside."""
     moves = np.zeros((7, 3))
     moves[3, 0] = 2.0
-    figure = chain_take().figure
+    figure = chain_animation().figure
     turns = np.tile([0.0, 0, 0, 1], (7, 3, 1))
     clip = SampledClip("jump", Timing(20.0, np.arange(7)), turns, figure_translations=moves)
     for kind, name in (("bvh", "a.bvh"), ("gltf", "a.glb")):
         for rate, size in ((10.0, 2000.0), (20.0, None)):
-            found = said(write(take_of(Actor(figure, clip=clip), rate), tmp_path, kind, name))
+            found = said(
+                write(sample_animation(Actor(figure, clip=clip), rate), tmp_path, kind, name)
+            )
             assert found.get("joints", (None,))[0] == (size and pytest.approx(size, rel=TOLD))
 
 
@@ -348,12 +356,12 @@ def test_motions_that_hang_are_compared_as_they_are_written(tmp_path):
     moves = np.zeros((7, 3))
     moves[:, 1] = np.arange(7)
     moves[3, 0] = 2.0
-    figure = chain_take().figure
+    figure = chain_animation().figure
     turns = np.tile([1.0, 0, 0, 0], (7, 3, 1))
     turns[:, 1:] = [0.0, 0.0, 0.0, 1.0]
     clip = SampledClip("hang", Timing(20.0, np.arange(7)), turns, figure_translations=moves)
     actor = Actor(figure, clip=clip, placement=np.diag([1.0, -1.0, -1.0, 1.0]))
-    take, _ = upright_take(Scene([actor], world_up="y"), actor, 10.0)
-    assert take.is_turned
-    found = said(write(take, tmp_path, "bvh", "a.bvh"))
+    animation, _ = upright_animation(Scene([actor], world_up="y"), actor, 10.0)
+    assert animation.is_rotated
+    found = said(write(animation, tmp_path, "bvh", "a.bvh"))
     assert found["joints"][0] == pytest.approx(2000.0, rel=TOLD)

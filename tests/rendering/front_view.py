@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from drawn_figures import skeleton
+from rendering.drawn_figures import skeleton
 
 from viewer.rendering.camera import Camera
 from viewer.rendering.options import DisplayOptions

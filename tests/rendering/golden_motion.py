@@ -1,4 +1,4 @@
-"""The pictures in tests/golden of motion: crowds, captured points, paths, calibrated cameras."""
+"""The pictures in tests/golden of motion: instances, captured points, paths, calibrated cameras."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from drawn_figures import arm, bent, checker
-from golden_scenes import LINES, Shot, options, posed_fox
+from rendering.drawn_figures import arm, bent, checker
+from rendering.golden_scenes import LINES, Shot, options, posed_fox
 
 import viewer
 from viewer.loading import bundled_body
@@ -46,7 +46,7 @@ def _colors() -> Scene:
     return Scene(actors)
 
 
-def _crowd() -> Scene:
+def _instances() -> Scene:
     """Twelve bodies, each in its own pose, every third with a colour of its own."""
     figure = viewer.load(bundled_body()).actors[0].figure
     rng = np.random.default_rng(4)
@@ -121,16 +121,18 @@ def _calibrated() -> Shot:
     return replace(shot, fixed=view)
 
 
-_TRAILS = ((0, 1), (0, 2), (0, 3))
+_PATHS = ((0, 1), (0, 2), (0, 3))
 
 SHOTS: dict[str, Callable[[], Shot]] = {
     "actor-colors": lambda: Shot(_colors(), DisplayOptions(show="both")),
-    "crowd": lambda: Shot(_crowd(), DisplayOptions(), (25.0, 20.0)),
+    "instances": lambda: Shot(_instances(), DisplayOptions(), (25.0, 20.0)),
     "points": lambda: Shot(_people(), DisplayOptions(), (30.0, 10.0)),
     "points-over-body": lambda: Shot(_fitted(), options(), (20.0, 5.0)),
-    "trails": lambda: Shot(_waving(0.8), DisplayOptions(trail_joints=_TRAILS), ssim_limit=LINES),
-    "trails-around-now": lambda: Shot(
-        _waving(0.8), options(trail_joints=_TRAILS, trail_seconds=0.5), "front", ssim_limit=LINES
+    "motion-paths": lambda: Shot(
+        _waving(0.8), DisplayOptions(path_joints=_PATHS), ssim_limit=LINES
+    ),
+    "motion-paths-around-now": lambda: Shot(
+        _waving(0.8), options(path_joints=_PATHS, path_seconds=0.5), "front", ssim_limit=LINES
     ),
     "calibrated": _calibrated,
 }

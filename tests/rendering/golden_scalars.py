@@ -10,8 +10,8 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-from drawn_figures import arm, bent
-from golden_scenes import BEND, Shot, options, posed_fox
+from rendering.drawn_figures import arm, bent
+from rendering.golden_scenes import BEND, Shot, options, posed_fox
 
 import viewer
 from viewer.resources import resource

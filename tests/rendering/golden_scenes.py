@@ -7,8 +7,17 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 
 import numpy as np
-from drawn_figures import arm, bent, checker, picture, random_figure, scene_of, sphere, square
-from picture_metrics import OTHER_SSIM_ERROR
+from rendering.drawn_figures import (
+    arm,
+    bent,
+    checker,
+    picture,
+    random_figure,
+    scene_of,
+    sphere,
+    square,
+)
+from rendering.picture_metrics import OTHER_SSIM_ERROR
 
 import viewer
 from viewer.rendering.camera import VIEWS, Camera, fit

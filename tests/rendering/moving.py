@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from drawn_figures import arm
+from rendering.drawn_figures import arm
 
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn_figures import arm
-from moving import moving_arm
+from rendering.drawn_figures import arm
+from rendering.moving import moving_arm
 
 from viewer.errors import RigError
 from viewer.rendering.camera import Camera, fit

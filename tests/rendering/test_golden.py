@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drawn_figures import arm, bent
-from golden_motion import SHOTS as MOTION_SHOTS
-from golden_scalars import SHOTS as SCALAR_SHOTS
-from golden_scenes import BEND, SIZE, Shot, options
-from golden_scenes import SHOTS as STILL_SHOTS
-from picture_metrics import complaints, silhouette_share, ssim_error
 from PIL import Image
+from rendering.drawn_figures import arm, bent
+from rendering.golden_motion import SHOTS as MOTION_SHOTS
+from rendering.golden_scalars import SHOTS as SCALAR_SHOTS
+from rendering.golden_scenes import BEND, SIZE, Shot, options
+from rendering.golden_scenes import SHOTS as STILL_SHOTS
+from rendering.picture_metrics import complaints, silhouette_share, ssim_error
 
 import viewer
 from viewer.rendering.camera import camera_axes

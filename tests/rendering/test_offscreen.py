@@ -10,7 +10,7 @@ from pathlib import Path
 import moderngl
 import numpy as np
 import pytest
-from drawn_figures import arm, bent, checker, scene_of, square
+from rendering.drawn_figures import arm, bent, checker, scene_of, square
 
 import viewer
 from viewer.errors import RenderError, ViewerError
@@ -164,7 +164,7 @@ def test_an_offscreen_may_be_used_by_one_thread_after_another(scene):
 
 def run_alone(code: str) -> str:
     """Run code in a fresh process and return what it prints; it must say nothing else."""
-    head = f"import sys; sys.path[:0] = [{str(ROOT)!r}, {str(Path(__file__).parent)!r}]\n"
+    head = f"import sys; sys.path[:0] = [{str(ROOT)!r}, {str(ROOT / 'tests')!r}]\n"
     result = subprocess.run(
         [sys.executable, "-c", head + code],
         capture_output=True,
@@ -178,7 +178,7 @@ def run_alone(code: str) -> str:
 
 MEMORY = """
 import threading, viewer
-from drawn_figures import arm
+from rendering.drawn_figures import arm
 from viewer.rig.scene import Actor, Scene
 from viewer.rendering.options import DisplayOptions
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn_figures import scene_of, square
-from front_view import alone, drawn, front_view, grid_figure, pixel
+from rendering.drawn_figures import scene_of, square
+from rendering.front_view import alone, drawn, front_view, grid_figure, pixel
 
 from viewer.rendering.camera import Camera
 from viewer.rendering.gpu.index_sets import kept_triangles

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn_figures import arm, bent, skeleton, square
-from front_view import PIXELS, grid_figure
+from rendering.drawn_figures import arm, bent, skeleton, square
+from rendering.front_view import PIXELS, grid_figure
 
 from viewer.rendering.camera import Camera
 from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.passes import instance_pass as crowd_pass
+from viewer.rendering.passes import instance_pass
 from viewer.rendering.passes.skin_pass import PosedMesh
 from viewer.rig.annotations import Keypoints, ReducedMesh
 from viewer.rig.captures.points import PointLayout
@@ -184,8 +184,8 @@ def test_a_keypoint_within_two_pixels_comes_before_the_surface_behind_it(offscre
 
 
 @pytest.mark.parametrize("count", [3, 12])
-def test_actors_of_a_crowd_are_told_apart(offscreen, monkeypatch, count):
-    monkeypatch.setattr(crowd_pass, "FEWEST", 4)
+def test_instances_are_told_apart(offscreen, monkeypatch, count):
+    monkeypatch.setattr(instance_pass, "FEWEST", 4)
     figure = arm(2)
     actors = []
     for number in range(count):
@@ -196,7 +196,7 @@ def test_actors_of_a_crowd_are_told_apart(offscreen, monkeypatch, count):
     other = Actor(replace(figure, name="other"))
     other.placement[:3, 3] = -1.0, 1.6, 0.0
     scene = Scene([other, *actors])
-    assert len(crowd_pass.crowds_of(scene.actors, DisplayOptions())) == (count > 4)
+    assert len(instance_pass.instance_groups(scene.actors, DisplayOptions())) == (count > 4)
     for number, actor in enumerate(actors):
         x, y = actor.placement[:2, 3]
         found = click(offscreen, scene, x + 0.05, y, size=(400, 400))

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from drawn_figures import square
+from rendering.drawn_figures import square
 
 from viewer.errors import RigError
 from viewer.rendering.camera import Camera, camera_axes, camera_from_view, eye, orbit

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn_figures import arm, bent, picture, scene_of, skeleton, sphere, square
+from rendering.drawn_figures import arm, bent, picture, scene_of, skeleton, sphere, square
 
 from viewer.errors import ViewerError
 from viewer.rendering.camera import Camera

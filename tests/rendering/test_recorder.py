@@ -7,8 +7,8 @@ import threading
 
 import numpy as np
 import pytest
-from drawn_figures import arm
-from moving import moving_arm
+from rendering.drawn_figures import arm
+from rendering.moving import moving_arm
 
 from viewer.errors import OutputError, ViewerError
 from viewer.rendering.camera import Camera

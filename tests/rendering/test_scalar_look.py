@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from front_view import alone, front_view, grid_figure
+from rendering.front_view import alone, front_view, grid_figure
 
 from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions

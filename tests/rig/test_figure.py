@@ -2,8 +2,8 @@ import math
 
 import numpy as np
 import pytest
-from hand_made import mesh, skeleton
 from numpy.testing import assert_allclose
+from rig.hand_made import mesh, skeleton
 
 from viewer.errors import RigError
 from viewer.rig.figure import Figure, skeleton_points

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from family_models import family_figure
-from hand_made import matrix, mesh, skeleton
 from numpy.testing import assert_allclose
+from rig.hand_made import matrix, mesh, skeleton
 
 from viewer.errors import RigError
 from viewer.rig.annotations import BodyParts, Keypoints, ReducedMesh, keypoint_positions

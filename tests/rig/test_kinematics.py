@@ -2,8 +2,8 @@ import math
 
 import numpy as np
 import pytest
-from hand_made import matrix, plain_kinematics, skeleton, turn_x, turn_y, turn_z
 from numpy.testing import assert_allclose
+from rig.hand_made import matrix, plain_kinematics, skeleton, turn_x, turn_y, turn_z
 
 from viewer.rig.kinematics import forward_kinematics, skinning_matrices, world_matrices
 from viewer.rig.pose import rest_pose

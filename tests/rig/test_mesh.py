@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
-from hand_made import mesh
 from numpy.testing import assert_allclose
+from rig.hand_made import mesh
 
 from viewer.errors import RigError
 from viewer.rig.mesh import (

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from hand_made import mesh, plain_skinning, skeleton, turn_z
 from numpy.testing import assert_allclose, assert_array_equal
+from rig.hand_made import mesh, plain_skinning, skeleton, turn_z
 
 from viewer.errors import RigError
 from viewer.rig.arrays import Deferred

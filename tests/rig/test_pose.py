@@ -2,8 +2,8 @@ import math
 
 import numpy as np
 import pytest
-from hand_made import matrix, skeleton, turn_x, turn_y, turn_z
 from numpy.testing import assert_allclose
+from rig.hand_made import matrix, skeleton, turn_x, turn_y, turn_z
 
 from viewer.rig.pose import local_matrices, rest_pose
 

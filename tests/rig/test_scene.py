@@ -1,5 +1,5 @@
 import numpy as np
-from hand_made import mesh, skeleton
+from rig.hand_made import mesh, skeleton
 
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import translation_matrix

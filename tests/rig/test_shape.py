@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from family_models import family_figure
 from formats.synthetic_smpl import model
-from hand_made import matrix, mesh, skeleton, turn_x, turn_y, turn_z
 from numpy.testing import assert_allclose
+from rig.hand_made import matrix, mesh, skeleton, turn_x, turn_y, turn_z
 
 from viewer.errors import RigError
 from viewer.rig.blendshapes import BlendShapes, Correctives, JointRegressor

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hand_made import skeleton
+from rig.hand_made import skeleton
 
 from viewer.errors import RigError
 from viewer.rig.skeleton import (

@@ -53,7 +53,7 @@ class PictureKeys:
         place = (camera.target.tobytes(), camera.distance, camera.azimuth, camera.inclination)
         lens = (camera.fov, camera.orthographic, camera.up, id(camera.fixed))
         # Motion paths show a part of the motion that goes along with time.
-        time = state.scene.time if options.trail_joints else None
+        time = state.scene.time if options.path_joints else None
         actors = self._actors(state.scene.actors)
         selected = (state.chosen_actor, state.selected_joint)
         drawn_over = marks, ghost, *annotations

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from viewer.autorig.joint_carrying import outside
+from viewer.autorig.transfer.joint_transfer import outside
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import apply_transform

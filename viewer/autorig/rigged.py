@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from viewer.autorig.alignment import Alignment
-from viewer.autorig.carried_clip import carry_clip
-from viewer.autorig.result import WeightTransfer
+from viewer.autorig.alignment.surface_alignment import Alignment
+from viewer.autorig.transfer.clip_transfer import carry_clip
+from viewer.autorig.weights.result import WeightTransfer
 from viewer.rig.annotations import VertexField
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure

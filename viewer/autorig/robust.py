@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from viewer.autorig.alignment import Alignment, alignment_lines
-from viewer.autorig.carried_correctives import carry_correctives
+from viewer.autorig.alignment.posed_alignment import align_posed
+from viewer.autorig.alignment.surface_alignment import Alignment, alignment_lines
 from viewer.autorig.checks import (
     check_lines,
     joint_list,
@@ -15,16 +15,16 @@ from viewer.autorig.checks import (
     residual_of,
     with_joint_name,
 )
-from viewer.autorig.inside_out import turned_round
-from viewer.autorig.joint_carrying import boundary_weights, carry_joints, surface_shifts
-from viewer.autorig.matching import Template
-from viewer.autorig.posed_alignment import align_posed
-from viewer.autorig.rest_skeleton import RestSkeleton, fit_rest_skeleton
-from viewer.autorig.result import WeightTransfer
+from viewer.autorig.correspondence.inside_out import turned_round
+from viewer.autorig.correspondence.matching import Template
 from viewer.autorig.rigged import Rigged
 from viewer.autorig.settings import Report, TransferSettings
-from viewer.autorig.unposing import mend, unpose
-from viewer.autorig.weights import transferred_weights
+from viewer.autorig.transfer.corrective_transfer import carry_correctives
+from viewer.autorig.transfer.inverse_skinning import mend, unpose
+from viewer.autorig.transfer.joint_transfer import boundary_weights, carry_joints, surface_shifts
+from viewer.autorig.transfer.rest_skeleton import RestSkeleton, fit_rest_skeleton
+from viewer.autorig.weights.result import WeightTransfer
+from viewer.autorig.weights.weight_transfer import transferred_weights
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.blendshapes import Correctives, corrective_weights
 from viewer.rig.figure import Figure

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from viewer.autorig.box_alignment import align_boxes
+from viewer.autorig.alignment.box_alignment import align_boxes
 from viewer.autorig.checks import check_lines, newly_outside, residual_of
 from viewer.autorig.rigged import Rigged
 from viewer.autorig.settings import Report
-from viewer.autorig.unposing import unpose
-from viewer.autorig.weights import nearest_weights
+from viewer.autorig.transfer.inverse_skinning import unpose
+from viewer.autorig.weights.weight_transfer import nearest_weights
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import apply_transform

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from viewer.autorig.alignment import AlignmentSettings
-from viewer.autorig.weights import WeightSettings
+from viewer.autorig.alignment.surface_alignment import AlignmentSettings
+from viewer.autorig.weights.weight_transfer import WeightSettings
 from viewer.errors import RigError
 
 __all__ = ["JOINTS", "METHODS", "Report", "TransferSettings"]

@@ -14,5 +14,6 @@ COMMANDS = {
     "lint": "check rigs and motions: what is wrong, where, and what to do about it",
     "doctor": "check what this machine offers, and how to get what is missing",
     "help": "show a page of the manual",
+    "completion": "print a script that completes commands and options in bash, zsh or tcsh",
 }
 """Modules in this folder, each with ``add_arguments(parser)`` and ``run(arguments)``."""

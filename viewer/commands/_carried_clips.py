@@ -9,7 +9,7 @@ from pathlib import Path
 from viewer.autorig.rigged import Rigged, clip_for
 from viewer.commands._scene import print_warnings
 from viewer.errors import RigError, ViewerError, printable
-from viewer.export import MotionOptions, export_take, take_for
+from viewer.export import MotionOptions, animation_for, export_animation
 from viewer.loading import MotionSettings, load
 from viewer.models import resolve
 from viewer.rig.figure import Figure
@@ -115,6 +115,6 @@ def write_clips(rigged: Rigged, clips: list[CarriedClip]) -> list[str]:
     for each in clips:
         actor = Actor(rigged.figure, figure_pose(rigged.figure), clip_for(rigged, each.clip))
         key, options = each.path.suffix[1:], MotionOptions()
-        take, _ = take_for(key, options, Scene([actor]), actor)
-        lines += export_take(take, each.path, key, options)
+        animation, _ = animation_for(key, options, Scene([actor]), actor)
+        lines += export_animation(animation, each.path, key, options)
     return lines

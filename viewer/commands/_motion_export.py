@@ -9,15 +9,15 @@ from pathlib import Path
 
 from viewer.commands._frame_numbers import numbering_of, parse_range
 from viewer.commands._numbers import number
-from viewer.commands._one_pose import asks_one_pose, pose_line, posed_actors, take_of_pose
+from viewer.commands._one_pose import animation_of_pose, asks_one_pose, pose_line, posed_actors
 from viewer.errors import RigError, UnsupportedFormatError, ViewerError, printable
 from viewer.export import (
     EXPORTERS,
     MotionOptions,
-    export_take,
+    animation_for,
+    export_animation,
     motion_exporters,
     suited_exporter,
-    take_for,
 )
 from viewer.export._motion_paths import motion_paths, take_files
 from viewer.export._options import GAPS, ROTATION_ORDERS
@@ -25,11 +25,11 @@ from viewer.formats import all_or_none
 from viewer.interrupts import raising
 from viewer.rig.arrays import Bools
 from viewer.rig.captures.person import is_tracked, person_label
-from viewer.rig.captures.point_take import PointTake, upright_point_take
 from viewer.rig.captures.points import PointClip
+from viewer.rig.captures.sampled_points import SampledPoints, sample_upright_points
 from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.take import Take
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import Skinning
 from viewer.rig.units import METRES
@@ -142,31 +142,33 @@ def write_motions(
     parts = []
     for actor, path in zip(actors, motion_paths(output, actors), strict=True):
         if is_pose:
-            take: Take | PointTake
-            take, up = take_of_pose(arguments, key, options, scene, actor)
+            animation: SampledAnimation | SampledPoints
+            animation, up = animation_of_pose(arguments, key, options, scene, actor)
         else:
-            take, up = _whole_take(arguments, key, options, scene, actor)
-        parts.append(_Part(actor, take, up, path))
+            animation, up = _whole_animation(arguments, key, options, scene, actor)
+        parts.append(_Part(actor, animation, up, path))
     there = [part for part in parts if part.present.any()]
     if not there:
         raise RigError(f"nobody is there in {parts[0].span}: there is nothing to write")
     lines = _write(there, output, key, options, check) + _untracked_lines(there, key)
     away = [part for part in parts if not part.present.any()]
-    lines += [f"{printable(p.take.name)}: not there in {p.span}, and not written" for p in away]
+    lines += [
+        f"{printable(p.animation.name)}: not there in {p.span}, and not written" for p in away
+    ]
     return [*lines, *[pose_line(arguments)] * is_pose, *left_out_lines(scene, actors)]
 
 
-def _whole_take(
+def _whole_animation(
     arguments: argparse.Namespace, key: str, options: MotionOptions, scene: Scene, actor: Actor
-) -> tuple[Take | PointTake, str]:
+) -> tuple[SampledAnimation | SampledPoints, str]:
     """Return the frames of an actor that are asked for, and what is up in them."""
     frames, fills = _frames(arguments, actor), bool(arguments.fill_gaps)
     if not isinstance(actor.clip, PointClip):
-        return take_for(key, options, scene, actor, arguments.fps, frames, fills)
+        return animation_for(key, options, scene, actor, arguments.fps, frames, fills)
     if options.gaps not in ("", "interpolate"):
         raise ViewerError(f"--gaps: expected interpolate for keypoints, found {options.gaps}")
     fills = options.gaps == "interpolate"
-    return upright_point_take(scene, actor, arguments.fps, frames, fills)
+    return sample_upright_points(scene, actor, arguments.fps, frames, fills)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -174,18 +176,22 @@ class _Part:
     """What is written of one actor: its frames, the axis that is up in them, and their file."""
 
     actor: Actor
-    take: Take | PointTake
+    animation: SampledAnimation | SampledPoints
     up: str
     path: Path
 
     @property
     def present(self) -> Bools:
-        take = self.take
-        return take.frames.present if isinstance(take, Take) else take.present
+        animation = self.animation
+        return (
+            animation.frames.present
+            if isinstance(animation, SampledAnimation)
+            else animation.present
+        )
 
     @property
     def span(self) -> str:
-        first = self.take.first_frame
+        first = self.animation.first_frame
         last = first + len(self.present) - 1
         return f"frame {first}" if first == last else f"frames {first} to {last}"
 
@@ -200,7 +206,7 @@ def _write(
     """Write the motions of whoever is there; return what the exporters say."""
     if key == "easymocap":
         return _write_capture(parts, output, options)
-    files = [file for part in parts for file in take_files(part.take, part.path, key, options)]
+    files = [file for part in parts for file in take_files(part.animation, part.path, key, options)]
     check(files)
     lines: list[str] = []
     with all_or_none(files):
@@ -212,25 +218,25 @@ def _write(
 
 
 def _write_one(part: _Part, key: str, options: MotionOptions) -> list[str]:
-    if isinstance(part.take, Take):
-        return export_take(part.take, part.path, key, options)
+    if isinstance(part.animation, SampledAnimation):
+        return export_animation(part.animation, part.path, key, options)
     from viewer.export.npz import export_points
 
-    return export_points(part.take, part.path, options)
+    return export_points(part.animation, part.path, options)
 
 
 def _write_capture(parts: list[_Part], output: Path, options: MotionOptions) -> list[str]:
     """Write everybody into one folder."""
-    from viewer.export.easymocap import export_takes
+    from viewer.export.easymocap import export_animations
 
     ups = sorted({part.up for part in parts})
     if len(ups) > 1:
         raise RigError(f"expected one up axis for all people, found {' and '.join(ups)}")
     options.world_up = parts[0].up
-    takes = [part.take for part in parts if isinstance(part.take, Take)]
+    animations = [part.animation for part in parts if isinstance(part.animation, SampledAnimation)]
     actors = [part.actor for part in parts]
     people = [index if a.person is None else a.person for index, a in enumerate(actors)]
-    return export_takes(takes, output, options, people)
+    return export_animations(animations, output, options, people)
 
 
 def _untracked_lines(parts: list[_Part], key: str) -> list[str]:

@@ -10,13 +10,13 @@ from viewer.commands._frame_numbers import numbering_of
 from viewer.errors import ViewerError
 from viewer.export import EXPORTERS, MotionOptions
 from viewer.rig.motion.clip import Clip
-from viewer.rig.motion.pose_take import posed_take
+from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.take import Take
+from viewer.rig.motion.single_frame import upright_single_frame
 from viewer.rig.number_text import number_text
 from viewer.rig.scene import Actor, Scene
 
-__all__ = ["asks_one_pose", "check_frame_options", "pose_line", "posed_actors", "take_of_pose"]
+__all__ = ["animation_of_pose", "asks_one_pose", "check_frame_options", "pose_line", "posed_actors"]
 
 
 def check_frame_options(arguments: argparse.Namespace) -> None:
@@ -45,10 +45,10 @@ def posed_actors(scene: Scene) -> list[Actor]:
     return _moving(scene) or [actor for actor in scene.actors if actor.pose is not None]
 
 
-def take_of_pose(
+def animation_of_pose(
     arguments: argparse.Namespace, key: str, options: MotionOptions, scene: Scene, actor: Actor
-) -> tuple[Take, str]:
-    """Return an actor's present pose as a take, and what is up in it, as an exporter wants it.
+) -> tuple[SampledAnimation, str]:
+    """Return an actor's current pose as an animation, and its up axis, as an exporter wants it.
 
     The frame is called as ``--frame`` counts; between two frames it is the one that is shown.
     """
@@ -56,7 +56,7 @@ def take_of_pose(
     time = frames.start if scene.time is None else scene.time
     number = frames.first + math.floor((time - frames.start) * frames.rate + 1e-6)
     keeps_world = EXPORTERS[key].keeps_world and not options.up
-    return posed_take(scene, actor, frames.rate, number, time, keeps_world)
+    return upright_single_frame(scene, actor, frames.rate, number, time, keeps_world)
 
 
 def pose_line(arguments: argparse.Namespace) -> str:

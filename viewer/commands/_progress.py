@@ -1,15 +1,19 @@
-"""One line of progress at a terminal, for work that takes longer than a second."""
+"""Progress bars at a terminal, for work that takes longer than a second."""
 
 from __future__ import annotations
 
 import sys
 import time
+from typing import TYPE_CHECKING
 
 from viewer.errors import printable
 
+if TYPE_CHECKING:
+    from rich.progress import Progress as Bar
+
 __all__ = ["Progress"]
 
-_FIRST, _EVERY = 0.7, 0.2  # seconds before the first line, and between lines
+_FIRST, _EVERY = 0.7, 0.2  # seconds before the bar appears, and between its changes
 
 
 class Progress:
@@ -25,23 +29,44 @@ class Progress:
 
     def __init__(self, title: str, total: int) -> None:
         self.title, self.total = title, total
-        self._started = time.monotonic()
-        self._shown: float | None = None
+        self._due = time.monotonic() + _FIRST
+        self._bar: Bar | None = None
 
     def show(self, done: int) -> None:
         """Tell that so many steps are done."""
         now = time.monotonic()
-        due = self._started + _FIRST if self._shown is None else self._shown + _EVERY
-        if now < due or not sys.stderr.isatty() or done <= 0:
+        if now < self._due or not sys.stderr.isatty() or done <= 0:
             return
-        self._shown = now
-        left = (now - self._started) * (self.total - done) / done
-        text = f"{printable(self.title, 60)}: {done:,} of {self.total:,}, {left:.0f} s left"
-        print(f"\r{text:<78.78}", end="", file=sys.stderr, flush=True)
+        self._due = now + _EVERY
+        title = printable(self.title, 60)
+        if self._bar is None:
+            self._bar = _bar()
+            self._bar.add_task(title, total=self.total, completed=done)
+            self._bar.start()
+        task = self._bar.task_ids[0]
+        self._bar.update(task, description=title, total=self.total, completed=done, refresh=True)
 
     def __enter__(self) -> Progress:
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._shown is not None:
-            print(f"\r{'':78}\r", end="", file=sys.stderr, flush=True)
+        if self._bar is not None:
+            self._bar.stop()
+
+
+def _bar() -> Bar:
+    """Return a bar that nothing but ``show`` redraws: no thread, and no stream is replaced."""
+    from rich import progress
+    from rich.console import Console
+
+    return progress.Progress(
+        progress.TextColumn("{task.description}", markup=False),
+        progress.BarColumn(),
+        progress.MofNCompleteColumn(),
+        progress.TimeRemainingColumn(),
+        console=Console(stderr=True),
+        transient=True,
+        auto_refresh=False,
+        redirect_stdout=False,
+        redirect_stderr=False,
+    )

@@ -13,6 +13,7 @@ from importlib import metadata
 from pathlib import Path
 
 import viewer
+from viewer.commands._printing import print_line
 from viewer.errors import RenderError, printable
 
 __all__ = ["Finding", "add_arguments", "examine", "run"]
@@ -27,8 +28,10 @@ _PACKAGES = (
     "pillow",
     "platformdirs",
     "rich",
+    "shtab",
 )
 _WINDOW_SECONDS = 20
+_STYLES = {"ok": "green", "note": "yellow", "missing": "bold red"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,9 +53,11 @@ def run(arguments: argparse.Namespace) -> int:
     """Print the report; 4 if nothing can be drawn here."""
     code = 0
     for finding in examine():
-        print(f"{finding.state:<8}{finding.subject:<12}{printable(finding.found, 300)}", flush=True)
+        found = f"{finding.subject:<12}{printable(finding.found, 300)}"
+        print_line((f"{finding.state:<8}", _STYLES[finding.state]), found)
         if finding.cure:
-            print(f"{'':<20}-> {printable(finding.cure, 400)}", flush=True)
+            print_line(f"{'':<20}-> {printable(finding.cure, 400)}")
+        sys.stdout.flush()  # the next ones may take seconds
         if finding.is_vital and finding.state == "missing":
             code = RenderError.exit_code
     return code

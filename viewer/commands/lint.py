@@ -10,6 +10,7 @@ import numpy as np
 
 from viewer.commands._frame_numbers import rate
 from viewer.commands._numbers import number
+from viewer.commands._printing import print_line, table_lines
 from viewer.commands._progress import Progress
 from viewer.commands._scene import (
     add_capture_arguments,
@@ -37,6 +38,7 @@ from viewer.rig.motion.evaluation import DEFAULT_RATE
 __all__ = ["add_arguments", "run"]
 
 _FOUND = 1  # exit code
+_STYLES = {"error": "red", "warning": "yellow"}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -128,7 +130,9 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print(json.dumps(describe(findings, scene), indent=1, allow_nan=False))
     else:
-        print("\n".join([*map(finding_text, findings), summary(findings, len(files))]))
+        for finding in findings:
+            print_line((finding_text(finding), _STYLES.get(finding.severity, "")))
+        print(summary(findings, len(files)))
     if arguments.fail_on == "never":
         return 0
     limit = SEVERITIES.index(arguments.fail_on)
@@ -152,6 +156,6 @@ def _ignored(text: str) -> set[str]:
 
 
 def _code_lines() -> list[str]:
-    return [
-        f"{name}  {code.severity:<7}  {code.title}: {code.hint}" for name, code in CODES.items()
-    ]
+    return table_lines(
+        [[name, code.severity, f"{code.title}: {code.hint}"] for name, code in CODES.items()]
+    )

@@ -11,13 +11,13 @@ from typing import TextIO
 
 import numpy as np
 
-from viewer.autorig.alignment import SCALES, AlignmentSettings
-from viewer.autorig.matching import MatchSettings
-from viewer.autorig.orientation_search import AXES
+from viewer.autorig.alignment.orientation_search import AXES
+from viewer.autorig.alignment.surface_alignment import SCALES, AlignmentSettings
+from viewer.autorig.correspondence.matching import MatchSettings
 from viewer.autorig.pipeline import transfer
 from viewer.autorig.rigged import Rigged
 from viewer.autorig.settings import JOINTS, METHODS, TransferSettings
-from viewer.autorig.weights import WeightSettings
+from viewer.autorig.weights.weight_transfer import WeightSettings
 from viewer.commands._carried_clips import add_clip_argument, read_clips, write_clips
 from viewer.commands._frame_numbers import add_frame_arguments
 from viewer.commands._landmarks import read_landmarks

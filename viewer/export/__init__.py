@@ -11,7 +11,7 @@ from types import ModuleType
 from viewer.errors import RigError, UnsupportedFormatError
 from viewer.export._options import MotionOptions
 from viewer.rig.figure import Figure
-from viewer.rig.motion.take import Take, upright_take
+from viewer.rig.motion.sampled_animation import SampledAnimation, upright_animation
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import Skinning
 from viewer.rig.smpl_family import member_of
@@ -20,13 +20,13 @@ __all__ = [
     "EXPORTERS",
     "Exporter",
     "MotionOptions",
+    "animation_for",
     "export",
-    "export_take",
+    "export_animation",
     "exporter_for",
     "files_written",
     "motion_exporters",
     "suited_exporter",
-    "take_for",
 ]
 
 
@@ -43,7 +43,7 @@ class Exporter:
     writes_pose : bool
         Whether its module has ``export(actor, path, skinning)``.
     writes_motion : bool
-        Whether its module has ``export_take(take, path, options)``.
+        Whether its module has ``export_animation(animation, path, options)``.
     keeps_world : bool
         Whether it writes a motion as its own world has it, even where people hang head down.
     """
@@ -167,12 +167,14 @@ def suited_exporter(path: str | Path, figure: Figure) -> str:
     return "amass" if is_member else next(key for key in found if key != "amass")
 
 
-def export_take(take: Take, path: str | Path, key: str, options: MotionOptions) -> list[str]:
+def export_animation(
+    animation: SampledAnimation, path: str | Path, key: str, options: MotionOptions
+) -> list[str]:
     """Write a motion; the actor's placement in the scene is left out.
 
     Parameters
     ----------
-    take : Take
+    animation : SampledAnimation
         A figure in many poses.
     path : str or Path
         Files of that name are replaced; all of an export's files appear, or none.
@@ -194,11 +196,11 @@ def export_take(take: Take, path: str | Path, key: str, options: MotionOptions) 
         If a file cannot be written.
     """
     module = import_module(f"{__name__}.{key}")
-    notes: list[str] = module.export_take(take, Path(path), options)
+    notes: list[str] = module.export_animation(animation, Path(path), options)
     return notes
 
 
-def take_for(
+def animation_for(
     key: str,
     options: MotionOptions,
     scene: Scene,
@@ -206,7 +208,7 @@ def take_for(
     rate: float | None = None,
     frames: tuple[int, int | None] | None = None,
     fill: bool = False,
-) -> tuple[Take, str]:
+) -> tuple[SampledAnimation, str]:
     """Sample an actor's clip as an exporter wants it, and return what is up in it.
 
     What comes from a capture goes back as it was, unless another up axis is asked for; other
@@ -219,10 +221,10 @@ def take_for(
     options : MotionOptions
         Whether an up axis is asked for.
     scene, actor, rate, frames, fill
-        As for ``viewer.rig.motion.take.upright_take``.
+        As for ``viewer.rig.motion.sampled_animation.upright_animation``.
     """
     keeps_world = EXPORTERS[key].keeps_world and not options.up
-    return upright_take(scene, actor, rate, frames, fill, keeps_world)
+    return upright_animation(scene, actor, rate, frames, fill, keeps_world)
 
 
 def files_written(path: str | Path) -> list[Path]:

@@ -7,10 +7,11 @@ import numpy as np
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.rotation import quaternion_to_matrix
+from viewer.rig.hierarchy import depth_first
 from viewer.rig.pose import Pose
 from viewer.rig.skeleton import Skeleton, joint_label
 
-__all__ = ["course_skeleton", "depth_first"]
+__all__ = ["course_skeleton"]
 
 _CUBE = 0.01  # of the skeleton's size: half a side of boxes where a file has none
 
@@ -62,21 +63,6 @@ def course_skeleton(skeleton: Skeleton, pose: Pose) -> tuple[Skeleton, Ints]:
         dof_limits=np.concatenate([np.tile([-np.inf, np.inf], (3, 1)), limits]),
         boxes=_boxes(skeleton)[order],
     ), order
-
-
-def depth_first(parents: Ints) -> Ints:
-    """Return joints in the order in which a file that nests them lists them: (J,) int32."""
-    children: list[list[int]] = [[] for _ in parents]
-    stack: list[int] = []
-    for joint, parent in enumerate(parents.tolist()):
-        (children[parent] if parent >= 0 else stack).append(joint)
-    stack.reverse()
-    order = []
-    while stack:
-        joint = stack.pop()
-        order.append(joint)
-        stack.extend(reversed(children[joint]))
-    return np.array(order, dtype=np.int32)
 
 
 def _check(skeleton: Skeleton, pose: Pose) -> None:

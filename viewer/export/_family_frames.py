@@ -1,4 +1,4 @@
-"""A take of a body of the SMPL family, as the family's own parameters."""
+"""An animation of a body of the SMPL family, as the family's own parameters."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from viewer.rig.geometry.quaternion import multiply, rotation_vector_to_quaterni
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 from viewer.rig.motion.body_motion import root_positions
 from viewer.rig.motion.evaluation import Frames
-from viewer.rig.motion.take import Take
+from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.number_text import number_text
 from viewer.rig.smpl_family import FAMILY, Member
 from viewer.rig.units import METRES, WORDS
@@ -127,16 +127,16 @@ def up_axis(options: MotionOptions) -> str:
 
 
 def family_frames(
-    take: Take, frames: Frames, member: Member, options: MotionOptions
+    animation: SampledAnimation, frames: Frames, member: Member, options: MotionOptions
 ) -> tuple[FamilyFrames, list[str]]:
-    """Return a take as parameters of the family.
+    """Return an animation as parameters of the family.
 
     The root joint is at t + J0, so that t is how far it is from its place at rest. With another up
     axis the world turns by Q about its x axis: R' = Q R, t' = Q (t + J0) - J0.
 
     Parameters
     ----------
-    take : Take
+    animation : SampledAnimation
         Gives the figure, whose unit is known.
     frames : Frames
         Its frames, where a row that is not present means nothing.
@@ -157,7 +157,7 @@ def family_frames(
     RigError
         If a number of a present frame is not finite.
     """
-    figure, skeleton = take.figure, take.figure.skeleton
+    figure, skeleton = animation.figure, animation.figure.skeleton
     assert skeleton is not None  # whoever has a member has a skeleton
     numbers = {name: joint for joint, name in enumerate(skeleton.names)}
     order = [numbers[name] for name in member.names]
@@ -189,7 +189,7 @@ def family_frames(
     present = frames.present
     parts = (found.vectors, found.translations)
     if not all(np.isfinite(part[present]).all() for part in parts):
-        raise RigError(f"{take.name}: expected finite numbers in every frame")
+        raise RigError(f"{animation.name}: expected finite numbers in every frame")
     notes = _losses(frames, moved[:, 1:]) + _own_shapes(figure)
     return found, notes + _bare_skeleton(figure, roots[0])
 

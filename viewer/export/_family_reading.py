@@ -15,7 +15,7 @@ from viewer.rig.geometry.quaternion import multiply, rotation_vector_to_quaterni
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 from viewer.rig.motion.body_motion import BodyMotion, body_clip
 from viewer.rig.motion.evaluation import Frames, frames_of, rest_translations_of
-from viewer.rig.motion.take import Take
+from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.motion.timing import Timing
 from viewer.rig.smpl_family import Member
 from viewer.rig.units import METRES
@@ -23,19 +23,19 @@ from viewer.rig.units import METRES
 __all__ = ["Records", "read_frames"]
 
 
-def read_frames(motion: BodyMotion, take: Take, options: MotionOptions) -> Frames:
-    """Return the poses of a take's figure that a file holds, in the take's own world and unit.
+def read_frames(motion: BodyMotion, animation: SampledAnimation, options: MotionOptions) -> Frames:
+    """Return the poses that a file holds for an animation's figure, in its own world and unit.
 
     Parameters
     ----------
     motion : BodyMotion
         What was read, metres.
-    take : Take
+    animation : SampledAnimation
         What was written.
     options : MotionOptions
-        Which axis is up in the take, and in the file.
+        Which axis is up in the animation, and in the file.
     """
-    figure, count = take.figure, motion.timing.n_frames
+    figure, count = animation.figure, motion.timing.n_frames
     timing = Timing(motion.timing.frame_rate, np.arange(count, dtype=np.int32))
     moved = motion.translations / METRES[figure.unit]
     clip, _ = body_clip(replace(motion, timing=timing, translations=moved), figure)
@@ -43,14 +43,14 @@ def read_frames(motion: BodyMotion, take: Take, options: MotionOptions) -> Frame
     if up_axis(options) == options.world_up:
         return found
     angle = -np.pi / 2 if up_axis(options) == "z" else np.pi / 2
-    return _turned(found, take, np.array([angle, 0.0, 0.0]))
+    return _turned(found, animation, np.array([angle, 0.0, 0.0]))
 
 
-def _turned(frames: Frames, take: Take, vector: Floats) -> Frames:
+def _turned(frames: Frames, animation: SampledAnimation, vector: Floats) -> Frames:
     """Return frames with the world turned: R' = Q R, T' = Q (p + T) - p, the root at rest at p."""
     rotations = frames.rotations.copy()
     rotations[:, 0] = multiply(rotation_vector_to_quaternion(vector), rotations[:, 0])
-    root = rest_translations_of(take.figure, frames.shape_weights)[:, 0]
+    root = rest_translations_of(animation.figure, frames.shape_weights)[:, 0]
     turned = np.round(rotation_vector_to_matrix(vector))  # a quarter turn has no fractions
     places = (root + frames.figure_translations) @ turned.T - root
     return replace(frames, rotations=rotations, figure_translations=places)

@@ -11,8 +11,8 @@ from viewer.errors import OutputError, printable
 from viewer.export._gaps import runs
 from viewer.export._options import MotionOptions
 from viewer.rig.captures.person import person_name
-from viewer.rig.captures.point_take import PointTake
-from viewer.rig.motion.take import Take
+from viewer.rig.captures.sampled_points import SampledPoints
+from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.scene import Actor
 
 __all__ = ["motion_paths", "numbered_paths", "split_paths", "take_files"]
@@ -71,12 +71,14 @@ def numbered_paths(path: Path, frames: Iterable[int]) -> list[Path]:
     return files
 
 
-def take_files(take: Take | PointTake, path: Path, key: str, options: MotionOptions) -> list[Path]:
-    """Return all files that ``export_take`` writes under names that were asked for.
+def take_files(
+    animation: SampledAnimation | SampledPoints, path: Path, key: str, options: MotionOptions
+) -> list[Path]:
+    """Return all files that ``export_animation`` writes under names that were asked for.
 
     Parameters
     ----------
-    take : Take or PointTake
+    animation : SampledAnimation or SampledPoints
         A motion.
     path : Path
         A file, for numbered ones with ``{frame}``.
@@ -85,13 +87,13 @@ def take_files(take: Take | PointTake, path: Path, key: str, options: MotionOpti
     options : MotionOptions
         How.
     """
-    if isinstance(take, PointTake) or key in _WITHOUT_SPLITS:
+    if isinstance(animation, SampledPoints) or key in _WITHOUT_SPLITS:
         return [path]
-    present = take.frames.present
+    present = animation.frames.present
     if key == "obj":
         is_whole = options.gaps in ("hold", "interpolate")
         frames = np.arange(len(present)) if is_whole else np.flatnonzero(present)
-        return numbered_paths(path, take.first_frame + frames)
+        return numbered_paths(path, animation.first_frame + frames)
     is_split = options.closing == "split" and not present.all()
     files = split_paths(path, len(runs(present)) if is_split else 1)
     beside = [file.with_suffix(".bin") for file in files if file.suffix.lower() == ".gltf"]

@@ -41,7 +41,7 @@ class MotionOptions:
     digits : int
         Decimals of text formats.
     world_up : "y", "z", "-y" or "-z"
-        The axis that points up in the world of the take; the last two only for exporters that
+        The axis that points up in the world of the animation; the last two only for exporters that
         keep that world.
     skinning : Skinning
         How joints move the mesh, where vertices are written.

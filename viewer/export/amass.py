@@ -34,20 +34,20 @@ from viewer.export._options import GAPS, MotionOptions
 from viewer.formats import Source, all_or_none, keeping_written, save_arrays
 from viewer.formats.amass import read
 from viewer.rig.arrays import Bools, Floats
-from viewer.rig.motion.take import Take
+from viewer.rig.motion.sampled_animation import SampledAnimation
 
-__all__ = ["export_take"]
+__all__ = ["export_animation"]
 
 _FEWEST = 16  # shape numbers that readers of AMASS ask for
 _TYPES = {"SMPL": "smpl", "SMPL+H": "smplh", "SMPL-X": "smplx"}
 
 
-def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
+def export_animation(animation: SampledAnimation, path: Path, options: MotionOptions) -> list[str]:
     """Write a motion, its world as it is unless another up axis is asked for.
 
     Parameters
     ----------
-    take : Take
+    animation : SampledAnimation
         Of a body with the joints of SMPL, SMPL+H or SMPL-X.
     path : Path
         With ``gaps="split"`` and gaps, files are called ``name-1.npz``, ``name-2.npz`` ….
@@ -68,14 +68,14 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
         If a file cannot be written.
     """
     check_unit(options, "AMASS")
-    member = member_of_figure(take.figure, "an AMASS motion", ("pelvis",))
-    present = take.frames.present
+    member = member_of_figure(animation.figure, "an AMASS motion", ("pelvis",))
+    present = animation.frames.present
     if options.closing not in GAPS:
         raise RigError(f'gaps: expected one of {", ".join(GAPS)}, found "{options.closing}"')
     if not present.any():
-        raise RigError(f"{take.name}: every frame is missing, there is nothing to write")
-    frames = filled(take.frames, options.closing == "interpolate")
-    body, notes = family_frames(take, frames, member, options)
+        raise RigError(f"{animation.name}: every frame is missing, there is nothing to write")
+    frames = filled(animation.frames, options.closing == "interpolate")
+    body, notes = family_frames(animation, frames, member, options)
     is_split = options.closing == "split" and not present.all()
     spans = runs(present) if is_split else [(0, len(present))]
     paths = split_paths(path, len(spans))
@@ -83,21 +83,21 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
     written = []
     with keeping_written() as saved, all_or_none(paths):
         for file, (start, stop) in zip(paths, spans, strict=True):
-            arrays = _arrays(body, slice(start, stop), take.frame_rate, up)
+            arrays = _arrays(body, slice(start, stop), animation.frame_rate, up)
             if not is_split and not present.all():
                 arrays["present"] = present
             save_arrays(file, arrays)
             length = "1 frame" if stop - start == 1 else f"{stop - start} frames"
             written.append(
                 f"{printable(file, 300)}: {length} of {member.title} at "
-                f"{take.frame_rate:g} a second, {up} up"
+                f"{animation.frame_rate:g} a second, {up} up"
             )
     lost = []
     for file, span in zip(paths, spans, strict=True):
-        again = read_frames(read(Source(file, saved[file])), take, options)
-        lost += frames_losses(file, take, again, options.skinning, span)
-    lost += resampling_losses(path, take, options.skinning)
-    return [*written, *lost, *_remarks(body, take, present, options), *notes]
+        again = read_frames(read(Source(file, saved[file])), animation, options)
+        lost += frames_losses(file, animation, again, options.skinning, span)
+    lost += resampling_losses(path, animation, options.skinning)
+    return [*written, *lost, *_remarks(body, animation, present, options), *notes]
 
 
 def _arrays(body: FamilyFrames, part: slice, rate: float, up: str) -> dict[str, NDArray[Any]]:
@@ -129,12 +129,14 @@ def _padded(shape: Floats) -> Floats:
     return padded
 
 
-def _remarks(body: FamilyFrames, take: Take, present: Bools, options: MotionOptions) -> list[str]:
+def _remarks(
+    body: FamilyFrames, animation: SampledAnimation, present: Bools, options: MotionOptions
+) -> list[str]:
     notes = []
     if len(body.shape) > 1:
         notes.append("the shape changes: betas has one row a frame, which few programs read")
     if not present.all():
-        missing = gaps_text(present, take.first_frame)
+        missing = gaps_text(present, animation.first_frame)
         how = {
             "hold": "filled with the last pose, and marked in present",
             "interpolate": "bridged on the shorter arc, and marked in present",

@@ -22,20 +22,20 @@ from viewer.rig.motion.clip import Clip, Tangent, is_course_rig
 from viewer.rig.motion.clip_edit import clip_from_frames
 from viewer.rig.motion.clip_table import evaluate_all
 from viewer.rig.motion.evaluation import Frames, frames_between, frames_of, world_frames
-from viewer.rig.motion.take import Take, frames_at
+from viewer.rig.motion.sampled_animation import SampledAnimation, frames_at
 from viewer.rig.number_text import number_text
 from viewer.rig.scalars import length_text
 from viewer.rig.skeleton import Skeleton
 
-__all__ = ["export_take"]
+__all__ = ["export_animation"]
 
 _RULES: tuple[Tangent, ...] = ("linear", "smooth")
 _BLOCK = 4096  # frames measured at a time
 _SAME = 1e-9  # of a frame, or of a length: less is no difference
 
 
-def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
-    """Write a motion as a clip of keys, see ``viewer.export.export_take``.
+def export_animation(animation: SampledAnimation, path: Path, options: MotionOptions) -> list[str]:
+    """Write a motion as a clip of keys, see ``viewer.export.export_animation``.
 
     A keyed clip whose frames are all asked for is written with its own keys, exactly. Any other
     motion gets a key per frame at the seconds it has; between them straight or smooth curves,
@@ -43,7 +43,7 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
 
     Parameters
     ----------
-    take : Take
+    animation : SampledAnimation
         Of a figure that moves as ``.skel`` files do.
     path : Path
         With ``gaps="split"`` and gaps, files are called ``name-1.anim``, ``name-2.anim`` ….
@@ -62,7 +62,7 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
     OutputError
         If a file cannot be written.
     """
-    figure, frames, skeleton = take.figure, take.frames, take.figure.skeleton
+    figure, frames, skeleton = animation.figure, animation.frames, animation.figure.skeleton
     assert skeleton is not None  # whoever has frames has a skeleton
     if not is_course_rig(skeleton):
         raise RigError(
@@ -74,35 +74,37 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
             f'way to close gaps: expected one of {", ".join(GAPS)}, found "{options.closing}"'
         )
     if not frames.present.any():
-        raise RigError(f"{take.name}: every frame is missing, there is nothing to write")
-    if isinstance(take.motion, Clip) and _is_whole(take, take.motion):
+        raise RigError(f"{animation.name}: every frame is missing, there is nothing to write")
+    if isinstance(animation.motion, Clip) and _is_whole(animation, animation.motion):
         with keeping_written() as saved:
-            write(take.motion, path)
-        own = ", the clip's own" if take.motion.end > take.motion.start else ""
-        notes = [f"{_summary(path, take.motion)}{own}"]
-        notes += _losses(take, Source(path, saved[path]), (0, frames.n_frames), options)
+            write(animation.motion, path)
+        own = ", the clip's own" if animation.motion.end > animation.motion.start else ""
+        notes = [f"{_summary(path, animation.motion)}{own}"]
+        notes += _losses(animation, Source(path, saved[path]), (0, frames.n_frames), options)
         if frames.figure_translations.any():
             notes.append("the place of the whole figure is no part of its clip: it is left out")
         return notes + _left_out(figure, frames)
-    return _export_frames(take, skeleton, path, options)
+    return _export_frames(animation, skeleton, path, options)
 
 
-def _export_frames(take: Take, skeleton: Skeleton, path: Path, options: MotionOptions) -> list[str]:
+def _export_frames(
+    animation: SampledAnimation, skeleton: Skeleton, path: Path, options: MotionOptions
+) -> list[str]:
     """Write a key per frame, in one file or one for each run of frames."""
-    frames = take.frames
+    frames = animation.frames
     whole = filled(frames, options.closing == "interpolate")
-    dofs = _dofs(take, skeleton, whole)
+    dofs = _dofs(animation, skeleton, whole)
     is_split = options.closing == "split" and not frames.present.all()
     spans = runs(frames.present) if is_split else [(0, frames.n_frames)]
     clips, rules = [], []
     for start, stop in spans:
         part = slice(start, stop)
         trials = [
-            clip_from_frames(take.motion.name, dofs[part], frames.times[part], rule)
+            clip_from_frames(animation.motion.name, dofs[part], frames.times[part], rule)
             for rule in _RULES
         ]
         middles = _middles(frames.times[part])
-        best = int(np.argmin([_distance(take, trial, middles) for trial in trials]))
+        best = int(np.argmin([_distance(animation, trial, middles) for trial in trials]))
         clips.append(trials[best])
         rules.append(_RULES[best])
     paths = split_paths(path, len(clips))
@@ -114,24 +116,26 @@ def _export_frames(take: Take, skeleton: Skeleton, path: Path, options: MotionOp
         for file, clip, rule in zip(paths, clips, rules, strict=True)
     ]
     for file, span in zip(paths, spans, strict=True):
-        notes += _losses(take, Source(file, saved[file]), span, options)
-    return notes + _remarks(take, options)
+        notes += _losses(animation, Source(file, saved[file]), span, options)
+    return notes + _remarks(animation, options)
 
 
-def _losses(take: Take, source: Source, span: tuple[int, int], options: MotionOptions) -> list[str]:
+def _losses(
+    animation: SampledAnimation, source: Source, span: tuple[int, int], options: MotionOptions
+) -> list[str]:
     """Read a file back, and say how far it is off on the frames, and between them.
 
     Between them captures are compared half-way, and on frames of their own.
     """
     clip, path = read(source), source.path
     assert isinstance(clip, Clip)  # as was written
-    figure, how, part = take.figure, options.skinning, slice(*span)
-    times = take.frames.times[part]
+    figure, how, part = animation.figure, options.skinning, slice(*span)
+    times = animation.frames.times[part]
     on_frames = frames_of(figure, clip, times)
-    notes = frames_losses(path, take, on_frames, how, span)
-    there = take.frames.present[part]
+    notes = frames_losses(path, animation, on_frames, how, span)
+    there = animation.frames.present[part]
     middles = _middles(times)[there[1:] & there[:-1]]
-    spanned = replace(take, frames=frames_between(take.frames, part))
+    spanned = replace(animation, frames=frames_between(animation.frames, part))
     notes += between_losses(path, spanned, lambda t: frames_of(figure, clip, t), how, middles)
     return notes
 
@@ -140,30 +144,30 @@ def _middles(times: Floats) -> Floats:
     return 0.5 * (times[1:] + times[:-1])
 
 
-def _remarks(take: Take, options: MotionOptions) -> list[str]:
-    notes, frames = [], take.frames
+def _remarks(animation: SampledAnimation, options: MotionOptions) -> list[str]:
+    notes, frames = [], animation.frames
     if not frames.present.all():
         done = {"hold": "the last pose is held", "interpolate": "interpolated"}
-        text = gaps_text(frames.present, take.first_frame)
+        text = gaps_text(frames.present, animation.first_frame)
         notes.append(
             f"missing {text}: {done.get(options.closing, 'one file for each run of frames')}"
         )
-    return notes + _left_out(take.figure, frames)
+    return notes + _left_out(animation.figure, frames)
 
 
-def _is_whole(take: Take, clip: Clip) -> bool:
+def _is_whole(animation: SampledAnimation, clip: Clip) -> bool:
     """Return whether the frames are all of a clip, which has a channel for every DOF."""
-    skeleton, times = take.figure.skeleton, take.frames.times
+    skeleton, times = animation.figure.skeleton, animation.frames.times
     assert skeleton is not None  # whoever has frames has a skeleton
     targets = [channel.target for channel in clip.channels]
-    step = 1.0 / take.frame_rate
+    step = 1.0 / animation.frame_rate
     starts = abs(float(times[0]) - clip.start) <= _SAME * step
     # The last frame may come up to a frame before the end.
     ends = clip.end - float(times[-1]) < step * (1.0 - _SAME)
     return targets == list(range(skeleton.n_dofs)) and starts and ends
 
 
-def _dofs(take: Take, skeleton: Skeleton, frames: Frames) -> Floats:
+def _dofs(animation: SampledAnimation, skeleton: Skeleton, frames: Frames) -> Floats:
     """Return every frame's DOFs: (F, D)."""
     base = quaternion_to_matrix(skeleton.rest_rotations)
     within = np.swapaxes(base, -1, -2) @ quaternion_to_matrix(frames.rotations)
@@ -174,21 +178,21 @@ def _dofs(take: Take, skeleton: Skeleton, frames: Frames) -> Floats:
     dofs = np.zeros((frames.n_frames, skeleton.n_dofs))
     dofs[:, 3:] = angles[..., ::-1].reshape(frames.n_frames, -1)
     dofs[:, :3] = frames.translations[:, 0]
-    if isinstance(take.motion, Clip):
+    if isinstance(animation.motion, Clip):
         # Its own numbers instead of angles that make the same rotations.
-        targets, values = evaluate_all(take.motion, frames.times)
+        targets, values = evaluate_all(animation.motion, frames.times)
         dofs[:, targets] = values
     dofs = np.clip(dofs, *skeleton.dof_limits.T)
     dofs[:, :3] += frames.figure_translations / frames.figure_scales[:, None]
     return dofs
 
 
-def _distance(take: Take, clip: Clip, times: Floats) -> float:
+def _distance(animation: SampledAnimation, clip: Clip, times: Floats) -> float:
     """Return how far joints are off at most, the figure's scale left out."""
-    figure, worst = take.figure, 0.0
+    figure, worst = animation.figure, 0.0
     for start in range(0, len(times), _BLOCK):
         block = times[start : start + _BLOCK]
-        wanted = frames_at(take, block)
+        wanted = frames_at(animation, block)
         found = frames_of(figure, clip, block)
         place = wanted.figure_translations / wanted.figure_scales[:, None]
         one = np.ones(len(block))

@@ -23,13 +23,13 @@ from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import axis_rotations
 from viewer.rig.motion.evaluation import Frames, rest_translations_of
-from viewer.rig.motion.take import Take
+from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.retargeting.joint_names import plain_names
 from viewer.rig.shape import shaped
 from viewer.rig.skeleton import joint_label
 from viewer.rig.units import METRES, WORDS
 
-__all__ = ["export_take"]
+__all__ = ["export_animation"]
 
 _DEFAULT_UNIT = "cm"
 _SHORTEST_END = 2e-3  # Blender invents a direction for bones below 1e-3
@@ -37,7 +37,7 @@ _MOST_DIGITS = 15
 _LISTED = 8  # joints in a note
 
 
-def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
+def export_animation(animation: SampledAnimation, path: Path, options: MotionOptions) -> list[str]:
     """Write a motion, read it back, and say how far its joints and a skin on them are off.
 
     Offsets are those of the shape in the first frame that is present. The root has offset 0 and
@@ -50,7 +50,7 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
 
     Parameters
     ----------
-    take : Take
+    animation : SampledAnimation
         A figure in many poses.
     path : Path
         With ``gaps="split"`` and gaps, files are called ``name-1.bvh``, ``name-2.bvh`` ….
@@ -72,19 +72,21 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
         If a file cannot be written.
     """
     _check(options)
-    if not take.frames.present.any():
-        raise RigError(f"{take.name}: every frame is missing, there is nothing to write")
-    reference = int(take.frames.present.argmax())
-    is_split = options.closing == "split" and not take.frames.present.all()
-    frames = filled(take.frames, options.closing == "interpolate")
-    figure, rigged = _one_root(take.figure, frames, reference)
+    if not animation.frames.present.any():
+        raise RigError(f"{animation.name}: every frame is missing, there is nothing to write")
+    reference = int(animation.frames.present.argmax())
+    is_split = options.closing == "split" and not animation.frames.present.all()
+    frames = filled(animation.frames, options.closing == "interpolate")
+    figure, rigged = _one_root(animation.figure, frames, reference)
     space = _space(figure, options)
     with np.errstate(invalid="ignore", over="ignore"):
         body = body_of(figure, rigged, reference, options.rotation_order, space)
     if not all(np.isfinite(part).all() for part in (body.angles, body.places, body.offsets)):
-        raise RigError(f"{take.name}: expected finite numbers in every frame")
-    writer = _Writer(take, figure, body, _ends(take, figure, space, reference), space, options)
-    spans = runs(take.frames.present) if is_split else [(0, frames.n_frames)]
+        raise RigError(f"{animation.name}: expected finite numbers in every frame")
+    writer = _Writer(
+        animation, figure, body, _ends(animation, figure, space, reference), space, options
+    )
+    spans = runs(animation.frames.present) if is_split else [(0, frames.n_frames)]
     paths = split_paths(path, len(spans))
     texts = [writer.text(*span) for span in spans]
     lost = [
@@ -96,8 +98,8 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
         for file, text in zip(paths, texts, strict=True):
             save_bytes(file, text)
     notes = [writer.summary(file, *span) for file, span in zip(paths, spans, strict=True)]
-    lost += resampling_losses(path, take, options.skinning)
-    return notes + lost + _remarks(take, figure, body, reference, options)
+    lost += resampling_losses(path, animation, options.skinning)
+    return notes + lost + _remarks(animation, figure, body, reference, options)
 
 
 def _check(options: MotionOptions) -> None:
@@ -160,15 +162,17 @@ def _one_root(figure: Figure, frames: Frames, reference: int) -> tuple[Figure, F
     )
 
 
-def _ends(take: Take, figure: Figure, space: Space, reference: int) -> dict[int, Floats]:
+def _ends(
+    animation: SampledAnimation, figure: Figure, space: Space, reference: int
+) -> dict[int, Floats]:
     """Return the End Sites in the file's space, by joint of the figure that is written."""
-    weights = shape_at(take.frames, reference)
-    own = shaped(take.figure, weights[0])
-    skeleton = take.figure.skeleton
+    weights = shape_at(animation.frames, reference)
+    own = shaped(animation.figure, weights[0])
+    skeleton = animation.figure.skeleton
     assert skeleton is not None and figure.skeleton is not None  # whoever has frames has one
     leaves = np.setdiff1d(np.arange(skeleton.n_joints), skeleton.parents).astype(np.int32)
-    rest = rest_matrices(take.figure, rest_translations_of(take.figure, weights)[0])
-    scale = float(take.frames.figure_scales[reference]) * space.factor
+    rest = rest_matrices(animation.figure, rest_translations_of(animation.figure, weights)[0])
+    scale = float(animation.frames.figure_scales[reference]) * space.factor
     ends = scale * end_offsets(own, rest, leaves) @ space.rest.T
     lengths = np.linalg.norm(ends, axis=1, keepdims=True)
     ends *= np.maximum(1.0, _SHORTEST_END / np.where(lengths > 0.0, lengths, 1.0))
@@ -178,9 +182,9 @@ def _ends(take: Take, figure: Figure, space: Space, reference: int) -> dict[int,
 
 @dataclass(frozen=True, slots=True)
 class _Writer:
-    """All files of one take."""
+    """All files of one animation."""
 
-    take: Take
+    animation: SampledAnimation
     figure: Figure  # with one root
     body: Body
     ends: dict[int, Floats]
@@ -214,54 +218,56 @@ class _Writer:
             self.ends,
             self.body.moves,
             self.options.rotation_order,
-            self.take.frame_rate,
+            self.animation.frame_rate,
             (positions, angles),
             self.options.digits,
         ).encode("ascii")
 
     def losses(self, path: Path, text: bytes, reference: int, span: tuple[int, int]) -> list[str]:
         """Read a file's text back, and say how far joints and vertices are from the motion."""
-        take, how = self.take, self.options.skinning
-        assert take.figure.skeleton is not None  # whoever has frames has a skeleton
-        names = self.names[-take.figure.skeleton.n_joints :]
+        animation, how = self.animation, self.options.skinning
+        assert animation.figure.skeleton is not None  # whoever has frames has a skeleton
+        names = self.names[-animation.figure.skeleton.n_joints :]
         ahead = int(self.options.rest_frame) - span[0]
         file = BvhFile(path, text, names, self.space, reference, ahead)
-        written = read_back(file, take.figure, take.frames, how)
-        shape = shape_at(take.frames, reference)[0]
-        return driven_losses(path, take, written, how, span, shape)
+        written = read_back(file, animation.figure, animation.frames, how)
+        shape = shape_at(animation.frames, reference)[0]
+        return driven_losses(path, animation, written, how, span, shape)
 
     def summary(self, path: Path, start: int, stop: int) -> str:
         """Return what a file holds."""
         unit = WORDS[self.options.unit or _DEFAULT_UNIT]
         unit = unit if self.figure.unit in METRES else "the figure's own unit"
-        first = self.take.first_frame + start
+        first = self.animation.first_frame + start
         rest = "the rest pose and " * self.options.rest_frame
         span = f"{stop - start} frames ({first} to {first + stop - start - 1})"
         span = span if stop - start > 1 else f"1 frame ({first})"
         return (
             f"{printable(path, 300)}: {counted(len(self.names), 'joint')}, {rest}{span} at "
-            f"{self.take.frame_rate:g} a second, "
+            f"{self.animation.frame_rate:g} a second, "
             f"{unit}, {self.options.up or 'y'} up, channels {self.options.rotation_order.upper()}"
         )
 
 
 def _remarks(
-    take: Take, figure: Figure, body: Body, reference: int, options: MotionOptions
+    animation: SampledAnimation, figure: Figure, body: Body, reference: int, options: MotionOptions
 ) -> list[str]:
     """Say what was changed or left out."""
-    frames, notes = take.frames, []
+    frames, notes = animation.frames, []
     skeleton = figure.skeleton
-    assert skeleton is not None and take.figure.skeleton is not None  # whoever has frames has one
-    if figure is not take.figure:
+    assert (
+        skeleton is not None and animation.figure.skeleton is not None
+    )  # whoever has frames has one
+    if figure is not animation.figure:
         notes.append(f"several roots: they hang from a joint {skeleton.names[0]}, which was added")
     if not frames.present.all():
         done = {"hold": "the last pose is held", "interpolate": "interpolated, held at both ends"}
-        text = gaps_text(frames.present, take.first_frame)
+        text = gaps_text(frames.present, animation.first_frame)
         notes.append(
             f"missing {text}: {done.get(options.closing, 'one file for each run of frames')}"
         )
     if figure.unit not in METRES and options.unit:
-        notes.append(f"lengths stay as they are: {take.figure.name} does not say its unit")
+        notes.append(f"lengths stay as they are: {animation.figure.name} does not say its unit")
     moving = [joint_label(skeleton, int(joint)) for joint in np.flatnonzero(body.moves)]
     if moving:
         more = f" and {len(moving) - _LISTED} more" * (len(moving) > _LISTED)
@@ -273,7 +279,7 @@ def _remarks(
         )
         notes.append(f"{moved}: {', '.join(moving[:_LISTED])}{more}")
     if shape_changes(frames):
-        first = reference + take.first_frame
+        first = reference + animation.first_frame
         notes.append(f"the shape changes over time: bones are written as in frame {first}")
     scales = frames.figure_scales[frames.present]
     if np.ptp(scales) > 0.0:

@@ -39,9 +39,9 @@ from viewer.interrupts import hold, poll
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.person import person_label
 from viewer.rig.motion.evaluation import frames_between
-from viewer.rig.motion.take import Take
+from viewer.rig.motion.sampled_animation import SampledAnimation
 
-__all__ = ["export_take", "export_takes"]
+__all__ = ["export_animation", "export_animations"]
 
 _FOLDER = "smpl"
 _FRAME = re.compile(r"[0-9]+\.json")
@@ -49,24 +49,24 @@ _DIGITS = 7  # as EasyMocap's newer writer has them
 _SHAPES = 10  # of which EasyMocap's layers take that many
 
 
-def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
-    """Write one person, called 0; see ``export_takes``."""
-    return export_takes([take], path, options)
+def export_animation(animation: SampledAnimation, path: Path, options: MotionOptions) -> list[str]:
+    """Write one person, called 0; see ``export_animations``."""
+    return export_animations([animation], path, options)
 
 
-def export_takes(
-    takes: Sequence[Take],
+def export_animations(
+    animations: Sequence[SampledAnimation],
     path: Path,
     options: MotionOptions,
     persons: Sequence[int] | None = None,
 ) -> list[str]:
     """Write several people into one folder, seven decimals.
 
-    Frames are numbered as the takes number them. Frames without anybody hold an empty list.
+    Frames are numbered as the animations number them. Frames without anybody hold an empty list.
 
     Parameters
     ----------
-    takes : sequence of Take
+    animations : sequence of SampledAnimation
         At least one, of bodies of the SMPL family, all at one frame rate.
     path : Path
         The folder; ``smpl`` in it is replaced if it holds nothing but numbered frames.
@@ -89,36 +89,36 @@ def export_takes(
     OutputError
         If the folder cannot be written, or holds something else.
     """
-    persons = range(len(takes)) if persons is None else persons
+    persons = range(len(animations)) if persons is None else persons
     check_unit(options, "EasyMocap")
-    _check(takes, persons)
+    _check(animations, persons)
     people, notes = [], []
-    for taken, person in zip(takes, persons, strict=True):
+    for taken, person in zip(animations, persons, strict=True):
         frames, filling = kept_gaps(taken.frames, options.gaps, taken.first_frame)
-        take = replace(taken, frames=frames)
-        member = member_of_figure(take.figure, "an EasyMocap folder", ("pelvis", "wrist"))
-        body, losses = family_frames(take, frames, member, options)
-        people.append(_Person(taken, take, _Records(person, body), Records(member)))
-        who = f"{person_label(person)}: " if len(takes) > 1 else ""
+        animation = replace(taken, frames=frames)
+        member = member_of_figure(animation.figure, "an EasyMocap folder", ("pelvis", "wrist"))
+        body, losses = family_frames(animation, frames, member, options)
+        people.append(_Person(taken, animation, _Records(person, body), Records(member)))
+        who = f"{person_label(person)}: " if len(animations) > 1 else ""
         notes += [f"{who}{loss}" for loss in losses]
         if filling:
             notes.append(f"{who}{filling}")
-        if not take.frames.present.all():
-            missing = gaps_text(take.frames.present, take.first_frame)
+        if not animation.frames.present.all():
+            missing = gaps_text(animation.frames.present, animation.first_frame)
             notes.append(f"{who}{missing} missing, as in the motion")
-    first = min(take.first_frame for take in takes)
-    stop = max(take.first_frame + take.frames.n_frames for take in takes)
+    first = min(animation.first_frame for animation in animations)
+    stop = max(animation.first_frame + animation.frames.n_frames for animation in animations)
     with _new_folder(path) as folder:
         for frame in range(first, stop):
             poll()
             rows = [person.text(frame) for person in people if person.is_there(frame)]
             text = "[\n" + ",\n".join(rows) + "\n]\n"
             (folder / f"{frame:06}.json").write_text(text, encoding="ascii", newline="\n")
-    who = "1 person" if len(takes) == 1 else f"{len(takes)} people"
+    who = "1 person" if len(animations) == 1 else f"{len(animations)} people"
     count = "1 frame" if stop - first == 1 else f"{stop - first} frames"
     return [
         f"{printable(path / _FOLDER, 300)}: {count} of {who}, {up_axis(options)} up; "
-        f"EasyMocap keeps no frame rate: it is {takes[0].frame_rate:g} a second",
+        f"EasyMocap keeps no frame rate: it is {animations[0].frame_rate:g} a second",
         *(line for person in people for line in person.losses(path / _FOLDER, options)),
         *notes,
     ]
@@ -128,45 +128,49 @@ def export_takes(
 class _Person:
     """Somebody who is written: the motion, with its gaps closed as asked, as text, as text says."""
 
-    meant: Take
-    take: Take
+    meant: SampledAnimation
+    animation: SampledAnimation
     records: _Records
     again: Records
 
     def is_there(self, frame: int) -> bool:
         """Return whether a frame has a record of the person."""
-        row, present = frame - self.take.first_frame, self.take.frames.present
+        row, present = frame - self.animation.first_frame, self.animation.frames.present
         return 0 <= row < len(present) and bool(present[row])
 
     def text(self, frame: int) -> str:
         """Return the record of a frame, and keep what it says."""
-        text = self.records.text(frame - self.take.first_frame)
+        text = self.records.text(frame - self.animation.first_frame)
         self.again.add(text)
         return text
 
     def losses(self, path: Path, options: MotionOptions) -> list[str]:
         """Return a line with the largest differences, or none."""
-        place = np.maximum(np.cumsum(self.take.frames.present) - 1, 0)
-        found = read_frames(self.again.motion(self.take.frame_rate), self.meant, options)
+        place = np.maximum(np.cumsum(self.animation.frames.present) - 1, 0)
+        found = read_frames(self.again.motion(self.animation.frame_rate), self.meant, options)
         how = options.skinning
         lines = frames_losses(path, self.meant, frames_between(found, place), how)
         return lines + resampling_losses(path, self.meant, how)
 
 
-def _check(takes: Sequence[Take], persons: Sequence[int]) -> None:
-    if not takes:
+def _check(animations: Sequence[SampledAnimation], persons: Sequence[int]) -> None:
+    if not animations:
         raise RigError("expected somebody to write, found nobody")
-    if len(set(persons)) < len(takes) or len(persons) != len(takes):
-        raise RigError(f"expected a number for each of {len(takes)} people, found {list(persons)}")
-    rates = {take.frame_rate for take in takes}
+    if len(set(persons)) < len(animations) or len(persons) != len(animations):
+        raise RigError(
+            f"expected a number for each of {len(animations)} people, found {list(persons)}"
+        )
+    rates = {animation.frame_rate for animation in animations}
     if max(rates) - min(rates) > 1e-6 * max(rates):
         listed = ", ".join(f"{rate:g}" for rate in sorted(rates))
         raise RigError(f"expected one frame rate for all people, found {listed}")
-    for take in takes:
-        if take.first_frame < 0:
-            raise RigError(f"{take.name}: expected frames from 0 on, found {take.first_frame}")
-        if not take.frames.present.any():
-            raise RigError(f"{take.name}: every frame is missing, there is nothing to write")
+    for animation in animations:
+        if animation.first_frame < 0:
+            raise RigError(
+                f"{animation.name}: expected frames from 0 on, found {animation.first_frame}"
+            )
+        if not animation.frames.present.any():
+            raise RigError(f"{animation.name}: every frame is missing, there is nothing to write")
 
 
 class _Records:

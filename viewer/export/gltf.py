@@ -29,15 +29,15 @@ from viewer.export._options import GAPS, MotionOptions
 from viewer.formats import all_or_none, save_bytes
 from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import Frames, frames_between
-from viewer.rig.motion.pose_take import pose_frames
-from viewer.rig.motion.take import Take
+from viewer.rig.motion.sampled_animation import SampledAnimation
+from viewer.rig.motion.single_frame import pose_frames
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor, figure_pose
 from viewer.rig.skeleton import joint_label
 from viewer.rig.skinning import Skinning, skin_used
 from viewer.rig.units import METRES, WORDS
 
-__all__ = ["export", "export_take"]
+__all__ = ["export", "export_animation"]
 
 _LISTED = 8  # joints in a note
 
@@ -62,14 +62,14 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
     return notes + not_held(figure, body.shape)
 
 
-def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
-    """Write a figure at rest and its motion; see ``viewer.export.export_take``.
+def export_animation(animation: SampledAnimation, path: Path, options: MotionOptions) -> list[str]:
+    """Write a figure at rest and its motion; see ``viewer.export.export_animation``.
 
     Of a shape that is baked in and changes, that of the first frame that is present is written.
 
     Parameters
     ----------
-    take : Take
+    animation : SampledAnimation
         A figure in many poses.
     path : Path
         With ``gaps="split"`` and gaps, files are called ``name-1.glb``, ``name-2.glb`` ….
@@ -88,32 +88,28 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
     OutputError
         If a file cannot be written.
     """
-    _check(take, options)
-    present = take.frames.present
-    frames = filled(take.frames, options.closing == "interpolate")
+    _check(animation, options)
+    present = animation.frames.present
+    frames = filled(animation.frames, options.closing == "interpolate")
     reference = int(present.argmax())
-    shape = shape_of(take.figure, frames.shape_weights, reference)
-    body = _body_of(take.figure, shape, options.skinning)
+    shape = shape_of(animation.figure, frames.shape_weights, reference)
+    body = _body_of(animation.figure, shape, options.skinning)
     spans = [(0, frames.n_frames)]
     if options.closing == "split" and not present.all():
         spans = runs(present)
     paths = split_paths(path, len(spans))
     documents, built = [], []
     for start, stop in spans:
-        document = Document(take.name)
-        built.append(_add_take(document, take, body, frames, (start, stop), options.world_up))
+        document = Document(animation.name)
+        built.append(
+            _add_animation(document, animation, body, frames, (start, stop), options.world_up)
+        )
         documents.append(document)
     notes, lost = [], []
     saved = _files(list(zip(paths, documents, strict=True)))
     for file, (start, stop), data, made in zip(paths, spans, saved, built, strict=True):
-        first = take.first_frame + start
-        count = stop - start
-        motion = (
-            f"{count} frames ({first} to {first + count - 1})"
-            if count > 1
-            else f"1 frame ({first})"
-        )
-        rate = f"at {take.frame_rate:g} a second"
+        motion = _frames_text(animation.first_frame + start, stop - start)
+        rate = f"at {animation.frame_rate:g} a second"
         size = f"{len(data[file])} bytes"
         notes += [f"{printable(file, 300)}: {made.counts}, {motion} {rate}, {size}"]
         notes += _beside(data, file)
@@ -121,20 +117,24 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
         rows = start + np.flatnonzero(present[start:stop])
         lost += gltf_losses(
             written,
-            take.figure,
+            animation.figure,
             frames,
             rows,
             options.skinning,
             shape,
             body.influences,
-            take.first_frame,
+            animation.first_frame,
         )
-    notes += _remarks(body, options.world_up) + _motion_remarks(take, body, frames, options)
-    lost += resampling_losses(path, take, options.skinning)
-    return notes + lost + not_held(take.figure, shape)
+    notes += _remarks(body, options.world_up) + _motion_remarks(animation, body, frames, options)
+    lost += resampling_losses(path, animation, options.skinning)
+    return notes + lost + not_held(animation.figure, shape)
 
 
-def _check(take: Take, options: MotionOptions) -> None:
+def _frames_text(first: int, count: int) -> str:
+    return f"{count} frames ({first} to {first + count - 1})" if count > 1 else f"1 frame ({first})"
+
+
+def _check(animation: SampledAnimation, options: MotionOptions) -> None:
     for what, value, known in (
         ("unit", options.unit, ("", "m")),
         ("up axis", options.up, ("", "y")),
@@ -145,8 +145,8 @@ def _check(take: Take, options: MotionOptions) -> None:
             listed = ", ".join(filter(None, known))
             one = "one of " * (len(list(filter(None, known))) > 1)
             raise RigError(f'{what} of glTF: expected {one}{listed}, found "{value}"')
-    if not take.frames.present.any():
-        raise RigError(f"{take.name}: every frame is missing, there is nothing to write")
+    if not animation.frames.present.any():
+        raise RigError(f"{animation.name}: every frame is missing, there is nothing to write")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -214,14 +214,19 @@ def _add_body(
     return _Built(tree, node, ", ".join(counts))
 
 
-def _add_take(
-    document: Document, take: Take, body: _Body, frames: Frames, span: tuple[int, int], up: str
+def _add_animation(
+    document: Document,
+    animation: SampledAnimation,
+    body: _Body,
+    frames: Frames,
+    span: tuple[int, int],
+    up: str,
 ) -> _Built:
     """Add a figure at rest, and some of the frames as an animation."""
     skeleton = body.figure.skeleton
-    assert skeleton is not None  # whoever has a take has a skeleton
+    assert skeleton is not None  # whoever has an animation has a skeleton
     part = frames_between(frames, slice(*span))
-    pose = figure_pose(take.figure)
+    pose = figure_pose(animation.figure)
     rest = locals_of(skeleton, pose)
     pose.figure_translation = part.figure_translations[0]
     pose.figure_scale = float(part.figure_scales[0])
@@ -233,8 +238,8 @@ def _add_take(
     morph = None
     if built.mesh_node is not None and np.ptp(weights, axis=0).any():
         morph = built.mesh_node, weights
-    name = take.motion.name or take.name
-    add_animation(document, name, take.frame_rate, skeleton, part, built.tree, morph)
+    name = animation.motion.name or animation.name
+    add_animation(document, name, animation.frame_rate, skeleton, part, built.tree, morph)
     return built
 
 
@@ -292,13 +297,15 @@ def _remarks(body: _Body, up: str) -> list[str]:
     return notes
 
 
-def _motion_remarks(take: Take, body: _Body, frames: Frames, options: MotionOptions) -> list[str]:
+def _motion_remarks(
+    animation: SampledAnimation, body: _Body, frames: Frames, options: MotionOptions
+) -> list[str]:
     """Say what was done with gaps, and which joints move within their parents."""
-    notes, skeleton = [], take.figure.skeleton
-    assert skeleton is not None  # whoever has a take has a skeleton
-    if not take.frames.present.all():
+    notes, skeleton = [], animation.figure.skeleton
+    assert skeleton is not None  # whoever has an animation has a skeleton
+    if not animation.frames.present.all():
         done = {"hold": "the last pose is held", "interpolate": "interpolated, held at both ends"}
-        text = gaps_text(take.frames.present, take.first_frame)
+        text = gaps_text(animation.frames.present, animation.first_frame)
         notes.append(
             f"missing {text}: {done.get(options.closing, 'one file for each run of frames')}"
         )

@@ -29,15 +29,15 @@ from viewer.export import MotionOptions
 from viewer.export._gaps import kept_gaps
 from viewer.formats import save_arrays
 from viewer.rig.arrays import Bools, Floats
-from viewer.rig.captures.point_take import PointTake
 from viewer.rig.captures.points import PointLayout
+from viewer.rig.captures.sampled_points import SampledPoints
 from viewer.rig.motion.evaluation import pose_of, world_frames
-from viewer.rig.motion.take import Take
+from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.posing.pose_vector import write_vector
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import Skinning, deform, joint_matrices
 
-__all__ = ["export", "export_points", "export_take"]
+__all__ = ["export", "export_animation", "export_points"]
 
 
 def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
@@ -72,26 +72,26 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
     return [f"{printable(path, 300)}: {', '.join(arrays)}"]
 
 
-def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
-    """Write float64 arrays of all frames; see ``viewer.export.export_take``."""
-    figure = take.figure
-    _check(take.name, take.frames.present, figure.unit, options)
+def export_animation(animation: SampledAnimation, path: Path, options: MotionOptions) -> list[str]:
+    """Write float64 arrays of all frames; see ``viewer.export.export_animation``."""
+    figure = animation.figure
+    _check(animation.name, animation.frames.present, figure.unit, options)
     if options.gaps == "split":
         raise RigError('gaps of arrays: expected hold or interpolate, found "split"')
-    frames, filling = kept_gaps(take.frames, options.gaps, take.first_frame)
+    frames, filling = kept_gaps(animation.frames, options.gaps, animation.first_frame)
     skeleton = figure.skeleton
-    assert skeleton is not None  # whoever has a take has a skeleton
+    assert skeleton is not None  # whoever has an animation has a skeleton
     world = world_frames(figure, frames)
     world[~frames.present] = np.nan
     rotations = frames.rotations.copy()
     rotations[~frames.present] = np.nan
     arrays = {
-        "name": np.array(take.name),
+        "name": np.array(animation.name),
         "up": np.array(options.world_up),
         "unit": np.array(figure.unit),
-        "frame_rate": np.array(take.frame_rate),
+        "frame_rate": np.array(animation.frame_rate),
         "times": frames.times,
-        "frames": take.first_frame + np.arange(frames.n_frames),
+        "frames": animation.first_frame + np.arange(frames.n_frames),
         "present": frames.present,
         "joints": world[:, :, :3, 3],
         "world": world,
@@ -108,16 +108,16 @@ def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
             vertices[frame] = deform(figure, pose, options.skinning)[0]
         arrays["vertices"] = vertices
     save_arrays(path, arrays)
-    count = _count(frames.present, take.frame_rate)
+    count = _count(frames.present, animation.frame_rate)
     return [f"{printable(path, 300)}: {count}: {', '.join(arrays)}", *[filling] * bool(filling)]
 
 
-def export_points(take: PointTake, path: Path, options: MotionOptions) -> list[str]:
+def export_points(animation: SampledPoints, path: Path, options: MotionOptions) -> list[str]:
     """Write captured points of all frames as float64 arrays.
 
     Parameters
     ----------
-    take : PointTake
+    animation : SampledPoints
         One person's.
     path : Path
         Replaced if it exists.
@@ -136,18 +136,18 @@ def export_points(take: PointTake, path: Path, options: MotionOptions) -> list[s
     OutputError
         If the file cannot be written.
     """
-    _check(take.name, take.present, "", options)
+    _check(animation.name, animation.present, "", options)
     arrays: dict[str, NDArray[Any]] = {
-        "name": np.array(take.name),
+        "name": np.array(animation.name),
         "up": np.array(options.world_up),
-        "frame_rate": np.array(take.frame_rate),
-        "times": take.times,
-        "frames": take.first_frame + np.arange(len(take.times)),
-        "present": take.present,
+        "frame_rate": np.array(animation.frame_rate),
+        "times": animation.times,
+        "frames": animation.first_frame + np.arange(len(animation.times)),
+        "present": animation.present,
     }
-    arrays |= _point_arrays(take.layout, take.points, take.confidences)
+    arrays |= _point_arrays(animation.layout, animation.points, animation.confidences)
     save_arrays(path, arrays)
-    count = _count(take.present, take.frame_rate)
+    count = _count(animation.present, animation.frame_rate)
     return [f"{printable(path, 300)}: {count}, {options.world_up} up: {', '.join(arrays)}"]
 
 

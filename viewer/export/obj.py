@@ -19,12 +19,12 @@ from viewer.media.image import encode_png
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.mesh import Mesh
 from viewer.rig.motion.evaluation import pose_of
-from viewer.rig.motion.take import Take
+from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import Skinning, deform
 from viewer.rig.units import WORDS
 
-__all__ = ["export", "export_take"]
+__all__ = ["export", "export_animation"]
 
 _PLAIN = "plain"  # the material of triangles that have none
 
@@ -57,20 +57,20 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
     return [f"{printable(path, 300)}: {counts}", *notes]
 
 
-def export_take(take: Take, path: Path, options: MotionOptions) -> list[str]:
-    """Write one numbered file a frame; see ``viewer.export.export_take``.
+def export_animation(animation: SampledAnimation, path: Path, options: MotionOptions) -> list[str]:
+    """Write one numbered file a frame; see ``viewer.export.export_animation``.
 
     ``{frame}`` in the name becomes the frame's number, as in ``walk_{frame:05}.obj``. Missing
     frames have no file unless ``options.gaps`` asks to hold or to interpolate.
     """
-    poses, filling = kept_gaps(take.frames, options.gaps, take.first_frame)
+    poses, filling = kept_gaps(animation.frames, options.gaps, animation.first_frame)
     frames = np.flatnonzero(poses.present)
-    files = numbered_paths(path, take.first_frame + frames)
+    files = numbered_paths(path, animation.first_frame + frames)
     written: list[str] = []
     with all_or_none(files):
         for frame, file in zip(frames, files, strict=True):
-            pose = pose_of(take.figure, poses, int(frame))
-            written += export(Actor(take.figure, pose), file, options.skinning)
+            pose = pose_of(animation.figure, poses, int(frame))
+            written += export(Actor(animation.figure, pose), file, options.skinning)
     missing = poses.n_frames - len(files)
     if not files:
         return [f"{printable(path, 300)}: nobody is there in these frames, nothing was written"]

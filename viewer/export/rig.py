@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from viewer.errors import RigError, counted, printable
-from viewer.export._course_rig import course_skeleton, depth_first
+from viewer.export._course_rig import course_skeleton
 from viewer.export._losses.apart import Apart, Farthest, apart_lines, negligible
 from viewer.formats import Source, all_or_none, keeping_written, read, write
 from viewer.rig.figure import Figure
+from viewer.rig.hierarchy import depth_first
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.mesh import Mesh, split_seams
-from viewer.rig.motion.pose_take import pose_frames
+from viewer.rig.motion.single_frame import pose_frames
 from viewer.rig.pose import Pose, rest_pose
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped

@@ -1,12 +1,13 @@
-"""The colour maps of scalar views: even steps as the eye sees them, also with other eyes."""
+"""Colour maps of scalar quantities: even steps as the eye sees them, also with other eyes."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from viewer.rendering.srgb import encode_srgb
 from viewer.rig.arrays import Bytes, Floats
 
-__all__ = ["colormap", "diverging_map", "from_linear", "oklab", "to_linear"]
+__all__ = ["colormap", "diverging_map", "oklab"]
 
 # Anchors in OKLab (Ottosson 2020): lightness rises evenly from violet over red to yellow, so
 # the map reads in grey and to colour-blind eyes, like matplotlib's "inferno".
@@ -70,19 +71,8 @@ def _pixels(anchors: Floats, places: Floats, count: int) -> Bytes:
     wanted = np.linspace(0.0, 1.0, count)
     lab = np.stack([np.interp(wanted, places, column) for column in anchors.T], axis=1)
     pixels = np.full((count, 4), 255, dtype=np.uint8)
-    pixels[:, :3] = np.round(255.0 * from_linear((lab @ _FROM_OKLAB.T) ** 3 @ _TO_LINEAR_RGB.T))
+    pixels[:, :3] = np.round(255.0 * encode_srgb((lab @ _FROM_OKLAB.T) ** 3 @ _TO_LINEAR_RGB.T))
     return pixels
-
-
-def from_linear(colors: Floats) -> Floats:
-    """Return linear colours as sRGB, 0 to 1, cut to what screens show (IEC 61966-2-1)."""
-    linear = np.clip(colors, 0.0, 1.0)
-    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-
-
-def to_linear(colors: Floats) -> Floats:
-    """Return sRGB colours, 0 to 1, as linear ones (IEC 61966-2-1)."""
-    return np.where(colors <= 0.04045, colors / 12.92, ((colors + 0.055) / 1.055) ** 2.4)
 
 
 def oklab(colors: Floats) -> Floats:

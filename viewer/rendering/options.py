@@ -108,9 +108,9 @@ class DisplayOptions:
         Draw the figure's keypoints as markers.
     hidden_parts : tuple of int
         Body parts that are left out.
-    trail_joints : tuple of (actor, joint)
+    path_joints : tuple of (actor, joint)
         Whose paths are drawn.
-    trail_seconds : float
+    path_seconds : float
         How far back and forth in time paths go; 0 for the whole motion.
     min_confidence : float
         Captured keypoints that are less certain are left out.
@@ -141,8 +141,8 @@ class DisplayOptions:
     reduced: bool = False
     keypoints: bool = False
     hidden_parts: tuple[int, ...] = ()
-    trail_joints: tuple[tuple[int, int], ...] = ()
-    trail_seconds: float = 0.0
+    path_joints: tuple[tuple[int, int], ...] = ()
+    path_seconds: float = 0.0
     min_confidence: float = 0.1
     xray: bool = False
     joint_names: bool = False

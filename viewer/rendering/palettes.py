@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.rendering.colormap import colormap, from_linear, oklab, to_linear
+from viewer.rendering.colormap import colormap, oklab
 from viewer.rendering.part_colors import part_colors
+from viewer.rendering.srgb import decode_srgb, encode_srgb
 from viewer.rig.arrays import Bytes, Floats, Ints
 
 __all__ = ["NOTHING", "count_palette", "joint_palette", "part_palette"]
@@ -65,7 +66,7 @@ def joint_palette(parents: Ints) -> Bytes:
     >>> joint_palette(np.array([-1, 0, 1])).shape
     (3, 4)
     """
-    bright = to_linear(_DISTINCT / 255.0)
+    bright = decode_srgb(_DISTINCT / 255.0)
     linear = np.concatenate([brightness * bright for brightness in _ROUNDS])
     distances = _distances(linear)
     # Bright colours come first where both would do.
@@ -116,5 +117,5 @@ def _distances(linear: Floats) -> Floats:
 
 def _pixels(linear: Floats) -> Bytes:
     pixels = np.full((len(linear), 4), 255, dtype=np.uint8)
-    pixels[:, :3] = np.round(255.0 * from_linear(linear))
+    pixels[:, :3] = np.round(255.0 * encode_srgb(linear))
     return pixels

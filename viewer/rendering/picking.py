@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.rendering.gpu.actor_buffers import ActorBuffers
-from viewer.rendering.gpu.instance_buffers import CrowdBuffers
+from viewer.rendering.gpu.instance_buffers import InstanceBuffers
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.overlay.joint_marks import joint_at, marks_of
@@ -169,9 +169,9 @@ class PickPass:
             self.context.enable(moderngl.CULL_FACE)
         for actor, mesh in meshes.singles:
             self._draw_mesh(index[id(actor)], mesh, placement_of(actor, options), view, options)
-        for actors, crowd in meshes.crowds:
-            crowd.place(actors, view)
-            self._draw_crowd([index[id(actor)] for actor in actors], crowd, view, options)
+        for actors, instances in meshes.instanced:
+            instances.place(actors, view)
+            self._draw_instances([index[id(actor)] for actor in actors], instances, view, options)
         self.context.disable(moderngl.CULL_FACE)
 
     def _draw_mesh(
@@ -185,12 +185,12 @@ class PickPass:
         array = self.passes.meshes.array(mesh, program, indices)
         array.render(moderngl.TRIANGLES, vertices=indices.n_indices)
 
-    def _draw_crowd(
-        self, numbers: list[int], crowd: CrowdBuffers, view: View, options: DisplayOptions
+    def _draw_instances(
+        self, numbers: list[int], instances: InstanceBuffers, view: View, options: DisplayOptions
     ) -> None:
-        program = self.passes.programs.drawing("crowd", fragment="pick", skin=crowd.method)
-        indices = crowd.mesh.index_set(options.reduced, options.hidden_parts)
-        crowd.use(program, view)
+        program = self.passes.programs.drawing("instance", fragment="pick", skin=instances.method)
+        indices = instances.mesh.index_set(options.reduced, options.hidden_parts)
+        instances.use(program, view)
         order = indices.order
 
         def found(instance: int, triangle: int, point: Floats) -> Pick:
@@ -198,8 +198,8 @@ class PickPass:
             return Pick(numbers[instance], -1, int(order[triangle % len(order)]), -1, point)
 
         self._number(program, found)
-        array = crowd.array(program, indices)
-        array.render(moderngl.TRIANGLES, vertices=indices.n_indices, instances=crowd.count)
+        array = instances.array(program, indices)
+        array.render(moderngl.TRIANGLES, vertices=indices.n_indices, instances=instances.count)
 
     def _draw_boxes(self, index: int, actor: Actor, view: View, options: DisplayOptions) -> None:
         skeleton = self.passes.buffers.skeleton(actor)
@@ -207,16 +207,7 @@ class PickPass:
         view = in_front(view) if shows_mesh(actor.figure, options) else view
         program = self.passes.programs.drawing("joint", fragment="pick")
         self._number(program, lambda joint, _, point: Pick(index, joint, -1, -1, point))
-        draw_boxes(
-            program,
-            skeleton.array(program),
-            skeleton.n_joints,
-            skeleton.world,
-            placement_of(actor, options),
-            skeleton.center,
-            view,
-            options,
-        )
+        draw_boxes(program, skeleton.boxes, placement_of(actor, options), view, options)
 
     def _draw_markers(self, index: int, actor: Actor, view: View, options: DisplayOptions) -> None:
         assert actor.pose is not None  # it has markers
@@ -224,16 +215,7 @@ class PickPass:
         markers.update(actor.pose, options.skinning)
         program = self.passes.programs.drawing("joint", fragment="pick")
         self._number(program, lambda marker, _, point: Pick(index, -1, -1, marker, point), True)
-        draw_boxes(
-            program,
-            markers.array(program),
-            markers.count,
-            markers.world,
-            actor.placement,
-            markers.center,
-            in_front(view),
-            options,
-        )
+        draw_boxes(program, markers.boxes, actor.placement, in_front(view), options)
 
     def _draw_points(self, index: int, actor: Actor, view: View, options: DisplayOptions) -> None:
         points = self.passes.buffers.points_of(actor)

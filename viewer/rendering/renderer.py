@@ -14,7 +14,7 @@ from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.target import Target
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.ground_pass import GroundPass
-from viewer.rendering.passes.instance_pass import draw_crowd
+from viewer.rendering.passes.instance_pass import draw_instances
 from viewer.rendering.passes.joint_pass import JointPass
 from viewer.rendering.passes.late_passes import LatePasses
 from viewer.rendering.passes.mesh_pass import MeshPass
@@ -151,7 +151,7 @@ class Renderer:
             points = self.buffers.points_of(actor)
             points.update(actor, actor.placement, view, options.min_confidence)
             self.late.point_pass.draw(points, actor.placement, view, options, has_meshes)
-        self._draw_trails(scene, view, options, target.size)
+        self._draw_motion_paths(scene, view, options, target.size)
         for actor, joint in skeletons:
             if shows_mesh(actor.figure, options):
                 self._draw_skeleton(actor, view, options, joint, options.skeleton_opacity)
@@ -232,8 +232,8 @@ class Renderer:
             self.context.enable(moderngl.CULL_FACE)
         for actor, mesh in meshes.singles:
             self.mesh_pass.draw(mesh, placement_of(actor, options), view, options, actor.color)
-        for actors, crowd in meshes.crowds:
-            draw_crowd(self.programs, crowd, actors, view, options)
+        for actors, instances in meshes.instanced:
+            draw_instances(self.programs, instances, actors, view, options)
         self.context.disable(moderngl.CULL_FACE)
 
     def _prepare(self, target: Target) -> None:
@@ -302,21 +302,21 @@ class Renderer:
 
         return [mark_annotation(self.marks)]
 
-    def _draw_trails(
+    def _draw_motion_paths(
         self, scene: Scene, view: View, options: DisplayOptions, size: tuple[int, int]
     ) -> None:
-        if not options.trail_joints:
+        if not options.path_joints:
             return
         from viewer.rendering.passes.motion_path_pass import Moment
 
-        at = Moment(scene.time or 0.0, options.trail_seconds)
+        at = Moment(scene.time or 0.0, options.path_seconds)
         for index, actor in enumerate(scene.actors):
-            joints = tuple(joint for owner, joint in options.trail_joints if owner == index)
+            joints = tuple(joint for owner, joint in options.path_joints if owner == index)
             # Paths outlast gaps: they show where somebody was and will be.
             if joints and actor.visible and actor.clip is not None:
-                paths = self.buffers.trail(actor)
+                paths = self.buffers.motion_path(actor)
                 paths.update(actor, joints, options.min_confidence)
-                self.late.trail_pass.draw(paths, actor.placement, view, size, at)
+                self.late.motion_path_pass.draw(paths, actor.placement, view, size, at)
 
     def posed_mesh(self, actor: Actor) -> PosedMesh:
         """Return an actor's posed buffer, made on first use; the figure's mesh must exist."""

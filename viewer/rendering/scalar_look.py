@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from viewer.rendering.colormap import colormap, diverging_map, to_linear
+from viewer.rendering.colormap import colormap, diverging_map
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.palettes import NOTHING, count_palette, joint_palette, part_palette
+from viewer.rendering.srgb import decode_srgb
 from viewer.rig.arrays import Bytes, Floats
 from viewer.rig.figure import Figure
 from viewer.rig.scalars import categories, find_view, shown_unit, split_name
@@ -19,7 +20,7 @@ __all__ = ["TYPICAL", "ScalarLook", "is_whole", "look_of", "shown_ends", "typica
 TYPICAL = 0.99
 """Share of the numbers other than 0 that a robust range holds at least."""
 
-_NOTHING_LINEAR = tuple(float(channel) for channel in to_linear(np.array(NOTHING) / 255.0))
+_NOTHING_LINEAR = tuple(float(channel) for channel in decode_srgb(np.array(NOTHING) / 255.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

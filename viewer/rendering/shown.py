@@ -1,4 +1,4 @@
-"""What of a scene is drawn, and the posed meshes and crowds that it takes."""
+"""What of a scene is drawn, and the posed meshes and instances that it needs."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from viewer.rendering.gpu.actor_buffers import ActorBuffers
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.passes.instance_pass import crowds_of
+from viewer.rendering.passes.instance_pass import instance_groups
 from viewer.rendering.passes.skin_pass import PosedMesh
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
@@ -17,7 +17,7 @@ from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
 
 if TYPE_CHECKING:
-    from viewer.rendering.gpu.instance_buffers import CrowdBuffers
+    from viewer.rendering.gpu.instance_buffers import InstanceBuffers
 
 __all__ = [
     "Meshes",
@@ -38,10 +38,10 @@ class Meshes:
     """The meshes of a picture: those drawn one by one, and those drawn together."""
 
     singles: list[tuple[Actor, PosedMesh]] = field(default_factory=list)
-    crowds: list[tuple[list[Actor], CrowdBuffers]] = field(default_factory=list)
+    instanced: list[tuple[list[Actor], InstanceBuffers]] = field(default_factory=list)
 
     def __bool__(self) -> bool:
-        return bool(self.singles or self.crowds)
+        return bool(self.singles or self.instanced)
 
 
 def prepare_meshes(
@@ -66,15 +66,15 @@ def prepare_meshes(
     meshes = Meshes()
     actors = [actor for actor in actors if shows_mesh(actor.figure, options)]
     of_figure: dict[int, list[list[Actor]]] = {}
-    for group in crowds_of(actors, options):
+    for group in instance_groups(actors, options):
         of_figure.setdefault(id(group[0].figure), []).append(group)
     for groups in of_figure.values():
-        crowds = buffers.crowds(groups[0][0].figure, len(groups))
-        for group, crowd in zip(groups, crowds, strict=True):
+        instanced = buffers.instanced(groups[0][0].figure, len(groups))
+        for group, instances in zip(groups, instanced, strict=True):
             poses = [actor.pose for actor in group if actor.pose is not None]
-            crowd.update(poses, options.skinning)
-            meshes.crowds.append((group, crowd))
-    together = {id(actor) for group, _ in meshes.crowds for actor in group}
+            instances.update(poses, options.skinning)
+            meshes.instanced.append((group, instances))
+    together = {id(actor) for group, _ in meshes.instanced for actor in group}
     for actor in actors:
         if id(actor) not in together:
             meshes.singles.append((actor, buffers.posed_mesh(actor)))

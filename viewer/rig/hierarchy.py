@@ -1,4 +1,4 @@
-"""What may be wrong with a list of parents."""
+"""Lists of parents: cycles in them, and joints in depth-first order."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from viewer.rig.arrays import Bools, Floats, Ints
 
-__all__ = ["cycle_members"]
+__all__ = ["cycle_members", "depth_first"]
 
 
 def cycle_members(parents: Floats | Ints) -> Bools:
@@ -37,3 +37,32 @@ def cycle_members(parents: Floats | Ints) -> Bools:
     members: Bools = np.zeros(count, dtype=np.bool_)
     members[above[above >= 0]] = True
     return members
+
+
+def depth_first(parents: Ints) -> Ints:
+    """Return joints as a file that nests them lists them: each before its children, these by index.
+
+    Parameters
+    ----------
+    parents : (J,)
+        Smaller than the joint's own index; -1 for a root.
+
+    Returns
+    -------
+    (J,) int32
+        Indices of joints.
+
+    >>> depth_first(np.array([-1, 0, 0, 1])).tolist()
+    [0, 1, 3, 2]
+    """
+    children: list[list[int]] = [[] for _ in parents]
+    stack: list[int] = []
+    for joint, parent in enumerate(parents.tolist()):
+        (children[parent] if parent >= 0 else stack).append(joint)
+    stack.reverse()
+    order = []
+    while stack:
+        joint = stack.pop()
+        order.append(joint)
+        stack.extend(reversed(children[joint]))
+    return np.array(order, dtype=np.int32)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from app.captured import people, walk
 
-from viewer.app.core.srgb import decode_srgb, encode_srgb
 from viewer.app.playback.tracks import bars, present_spans, ruler_text_place
+from viewer.rendering.srgb import decode_color, encode_color
 
 
 @pytest.mark.parametrize(
@@ -52,8 +52,8 @@ def test_last_number_of_the_ruler_is_not_cut_off(drive, rig):
 def test_srgb_and_back():
     color = (0.001, 0.2, 0.9)
     # IEC 61966-2-1: the dark end is 12.92 times the light; 0.2 is 0.4845 by its formula.
-    assert encode_srgb(color)[:2] == pytest.approx((0.01292, 0.484529), abs=1e-6)
-    assert decode_srgb(encode_srgb(color)) == pytest.approx(color, abs=1e-12)
+    assert encode_color(color)[:2] == pytest.approx((0.01292, 0.484529), abs=1e-6)
+    assert decode_color(encode_color(color)) == pytest.approx(color, abs=1e-12)
 
 
 def _row(hand, index):
@@ -67,8 +67,8 @@ def test_lone_frame_is_seen_and_tracks_carry_their_actors_colour(drive, rig):
     lone = np.zeros(2000, dtype=bool)
     lone[1000] = True
     scene = people(rig, np.ones(2000, dtype=bool), lone)
-    scene.actors[0].color = decode_srgb((0.2, 0.8, 0.4))
-    scene.actors[1].color = decode_srgb((0.9, 0.1, 0.1))
+    scene.actors[0].color = decode_color((0.2, 0.8, 0.4))
+    scene.actors[1].color = decode_color((0.9, 0.1, 0.1))
     hand = drive(scene=scene, size=(1280, 800), samples=1)
     first = _row(hand, 0)
     # The middle of the bar, where neither ruler nor present time are drawn.

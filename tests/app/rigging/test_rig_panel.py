@@ -23,7 +23,7 @@ from viewer.app.rigging.sources import current_template, target_mesh, template_t
 from viewer.app.rigging.state import Rigging
 from viewer.app.rigging.steps import align_template
 from viewer.app.rigging.work import start_adding, start_reading
-from viewer.autorig.alignment import Alignment, AlignmentSettings
+from viewer.autorig.alignment.surface_alignment import Alignment, AlignmentSettings
 from viewer.export import export
 from viewer.formats.rigged import save
 from viewer.rig.geometry.transform import apply_transform

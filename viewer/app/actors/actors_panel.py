@@ -36,7 +36,7 @@ def draw(state: AppState) -> None:
     imgui.separator()
     _draw_place(state, actor)
     _draw_following(state)
-    _draw_trails(state, actor)
+    _draw_motion_paths(state, actor)
     _draw_fit(state, actor)
 
 
@@ -117,25 +117,25 @@ def _draw_following(state: AppState) -> None:
             stop_following(state)
 
 
-def _draw_trails(state: AppState, actor: Actor) -> None:
+def _draw_motion_paths(state: AppState, actor: Actor) -> None:
     """Choose the joint whose path is drawn."""
     options, joint = state.options, state.selected_joint
     key = (state.chosen_actor, joint)
     if actor.clip is not None and joint >= 0:
-        shown = key in options.trail_joints
+        shown = key in options.path_joints
         if checkbox(state, "Path of the selected joint", shown) != shown:
-            others = tuple(one for one in options.trail_joints if one != key)
-            options.trail_joints = others if shown else (*others, key)
-    if options.trail_joints:
+            others = tuple(one for one in options.path_joints if one != key)
+            options.path_joints = others if shown else (*others, key)
+    if options.path_joints:
         if button(state, "Clear paths"):
-            options.trail_joints = ()
+            options.path_joints = ()
         changed, value = imgui.drag_float(
-            "Seconds around now", options.trail_seconds, 0.02, 0.0, 1e4, "%.2f s"
+            "Seconds around now", options.path_seconds, 0.02, 0.0, 1e4, "%.2f s"
         )
         note_item(state, "Seconds around now")
         explain("how far paths go back and forth; 0 shows all of the motion")
         if changed:
-            options.trail_seconds = max(value, 0.0)
+            options.path_seconds = max(value, 0.0)
 
 
 def _draw_fit(state: AppState, actor: Actor) -> None:

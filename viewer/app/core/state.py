@@ -159,7 +159,7 @@ class AppState:
         self.framing.restart()
         # Body parts and levels of detail mean something else on another model.
         self.options.hidden_parts, self.options.reduced = (), False
-        self.options.trail_joints = ()
+        self.options.path_joints = ()
         self.choose_actor(0)
         self._begin()
 

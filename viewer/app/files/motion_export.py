@@ -12,9 +12,9 @@ from viewer.errors import RigError, ViewerError, printable
 from viewer.export import (
     EXPORTERS,
     MotionOptions,
-    export_take,
+    animation_for,
+    export_animation,
     suited_exporter,
-    take_for,
 )
 from viewer.export._motion_paths import motion_paths
 from viewer.formats import all_or_none, check_folder_target, check_targets
@@ -147,8 +147,8 @@ def _parts(state: AppState, path: Path, everyone: bool) -> tuple[list[_Part], li
 def _write(scene: Scene, parts: Sequence[_Part], key: str, options: MotionOptions) -> list[str]:
     lines: list[str] = []
     for part in parts:
-        take, up = take_for(key, options, scene, part.actor, part.rate, part.frames)
-        lines += export_take(take, part.path, key, replace(options, world_up=up))
+        animation, up = animation_for(key, options, scene, part.actor, part.rate, part.frames)
+        lines += export_animation(animation, part.path, key, replace(options, world_up=up))
     return lines
 
 
@@ -156,17 +156,18 @@ def _write_capture(
     scene: Scene, parts: Sequence[_Part], path: Path, options: MotionOptions
 ) -> list[str]:
     """Write everybody into one folder."""
-    from viewer.export.easymocap import export_takes
+    from viewer.export.easymocap import export_animations
 
     found = [
-        take_for("easymocap", options, scene, part.actor, part.rate, part.frames) for part in parts
+        animation_for("easymocap", options, scene, part.actor, part.rate, part.frames)
+        for part in parts
     ]
     ups = sorted({up for _, up in found})
     if len(ups) > 1:
         raise RigError(f"expected one up axis for all people, found {' and '.join(ups)}")
     people = [part.number if part.actor.person is None else part.actor.person for part in parts]
-    takes = [take for take, _ in found]
-    return export_takes(takes, path, replace(options, world_up=ups[0]), people)
+    animations = [animation for animation, _ in found]
+    return export_animations(animations, path, replace(options, world_up=ups[0]), people)
 
 
 def _range(state: AppState, actor: Actor) -> tuple[int, int] | None:

@@ -9,10 +9,10 @@ import numpy as np
 from imgui_bundle import imgui
 
 from viewer.app.core.playback import Playback
-from viewer.app.core.srgb import encode_srgb
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import note_item
 from viewer.errors import printable
+from viewer.rendering.srgb import encode_color
 from viewer.rig.motion.clip import Clip
 from viewer.rig.scene import Actor, Motion
 
@@ -98,7 +98,7 @@ def _draw_track(
     gap = 0.16 * height
     back = imgui.get_color_u32(_BACK)
     draw_list.add_rect_filled((left, top + gap), (left + width, top + height - gap), back)
-    red, green, blue = encode_srgb(actor.color) if actor.color is not None else _PLAIN
+    red, green, blue = encode_color(actor.color) if actor.color is not None else _PLAIN
     color = imgui.get_color_u32((red, green, blue, 1.0 if chosen else _QUIET))
     edge = imgui.get_color_u32(_CHOSEN_EDGE)
     assert actor.clip is not None  # it has a track

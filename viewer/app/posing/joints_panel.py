@@ -26,6 +26,7 @@ from viewer.app.posing.joint_tree import joint_tree
 from viewer.app.posing.pose_actions import copy_numbers, copy_pose, mirror, paste_pose, reset_pose
 from viewer.app.posing.state import Posing
 from viewer.errors import printable
+from viewer.rig.hierarchy import depth_first
 from viewer.rig.memo import Memo
 from viewer.rig.mesh import box_size
 from viewer.rig.number_text import angle_text, number_text
@@ -199,25 +200,8 @@ def _rows(skeleton: Skeleton, opened: frozenset[int], wanted: str, has_own: bool
                 if has_own:
                     listed.append((joint, OWN_NUMBERS, depths[joint] + 1))
     # Parents come before children in a skeleton, but not always right before them.
-    order = _depth_first(skeleton.parents.tolist())
-    return tuple(sorted(listed, key=lambda row: order[row[0]]))
-
-
-def _depth_first(parents: list[int]) -> list[int]:
-    """Return each joint's place in depth-first order."""
-    children: list[list[int]] = [[] for _ in parents]
-    stack: list[int] = []
-    for joint, parent in enumerate(parents):
-        (children[parent] if parent >= 0 else stack).append(joint)
-    stack.reverse()
-    place = [0] * len(parents)
-    count = 0
-    while stack:
-        joint = stack.pop()
-        place[joint] = count
-        count += 1
-        stack.extend(reversed(children[joint]))
-    return place
+    place = np.argsort(depth_first(skeleton.parents)).tolist()
+    return tuple(sorted(listed, key=lambda row: place[row[0]]))
 
 
 def _draw_joint(state: AppState, skeleton: Skeleton, joint: int, depth: int, label: str) -> None:

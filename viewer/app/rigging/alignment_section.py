@@ -33,9 +33,9 @@ from viewer.app.rigging.sources import target_mesh
 from viewer.app.rigging.state import GHOSTS, TOOLS, Placing, Rigging, Template
 from viewer.app.rigging.tools import choose_rig_tool
 from viewer.app.rigging.work import landmark_settings, start_align
-from viewer.autorig.alignment import SCALES, Alignment, AlignmentSettings
-from viewer.autorig.orientation_search import AXES
-from viewer.autorig.similarity import Similarity
+from viewer.autorig.alignment.orientation_search import AXES
+from viewer.autorig.alignment.similarity import Similarity
+from viewer.autorig.alignment.surface_alignment import SCALES, Alignment, AlignmentSettings
 from viewer.errors import ViewerError
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.rotation import axis_rotations, matrix_to_euler

@@ -7,8 +7,8 @@ import numpy as np
 from viewer.app.core.state import AppState
 from viewer.app.rigging.sources import current_template, target_mesh
 from viewer.app.rigging.state import Placing, Rigging, Template
-from viewer.autorig.alignment import AlignmentSettings
-from viewer.autorig.similarity import Similarity
+from viewer.autorig.alignment.similarity import Similarity
+from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.rendering.camera import camera_axes
 from viewer.rendering.passes.ghost_pass import Ghost
 from viewer.rig.arrays import Floats

@@ -10,9 +10,9 @@ import numpy as np
 
 from viewer.app.core.jobs import CountedJob
 from viewer.app.core.state import AppState
-from viewer.autorig.alignment import Alignment, AlignmentSettings
+from viewer.autorig.alignment.similarity import Similarity
+from viewer.autorig.alignment.surface_alignment import Alignment, AlignmentSettings
 from viewer.autorig.rigged import Rigged
-from viewer.autorig.similarity import Similarity
 from viewer.rendering.passes.ghost_pass import Ghost
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure

@@ -9,15 +9,15 @@ from dataclasses import replace
 import numpy as np
 
 from viewer.app.rigging.state import Placing, RigChoices, Template
-from viewer.autorig.alignment import AlignmentSettings, alignment_lines
-from viewer.autorig.matching import MatchSettings, match
-from viewer.autorig.matching import Template as Surface
-from viewer.autorig.posed_alignment import align_posed
+from viewer.autorig.alignment.posed_alignment import align_posed
+from viewer.autorig.alignment.similarity import Similarity
+from viewer.autorig.alignment.surface_alignment import AlignmentSettings, alignment_lines
+from viewer.autorig.correspondence.matching import MatchSettings, match
+from viewer.autorig.correspondence.matching import Template as Surface
 from viewer.autorig.rigged import Rigged
 from viewer.autorig.settings import TransferSettings
-from viewer.autorig.similarity import Similarity
-from viewer.autorig.weights import WeightSettings
-from viewer.autorig.welding import weld
+from viewer.autorig.surface.welding import weld
+from viewer.autorig.weights.weight_transfer import WeightSettings
 from viewer.rig.annotations import VertexField
 from viewer.rig.mesh import Mesh, bounding_box, box_size
 from viewer.rig.pose import pose_key

@@ -37,7 +37,7 @@ from viewer.app.rigging.steps import (
     retold,
     transfer_settings,
 )
-from viewer.autorig.alignment import AlignmentSettings
+from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.autorig.pipeline import transfer
 from viewer.autorig.settings import METHODS
 from viewer.errors import RigError, printable

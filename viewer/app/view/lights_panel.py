@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from viewer.app.core.srgb import decode_srgb, encode_srgb
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import button, checkbox, note_item, plain_zero, slider
 from viewer.app.view.display_actions import reset_lights
 from viewer.rendering.options import Light
+from viewer.rendering.srgb import decode_color, encode_color
 
 __all__ = ["draw"]
 
@@ -33,11 +33,11 @@ def draw(state: AppState) -> None:
 
 def _draw_light(state: AppState, name: str, light: Light) -> None:
     changed, picked = imgui.color_edit3(
-        f"{name} light", list(encode_srgb(light.color)), imgui.ColorEditFlags_.no_inputs
+        f"{name} light", list(encode_color(light.color)), imgui.ColorEditFlags_.no_inputs
     )
     note_item(state, f"{name} light")
     if changed:
-        light.color = decode_srgb((picked[0], picked[1], picked[2]))
+        light.color = decode_color((picked[0], picked[1], picked[2]))
     imgui.push_id(name)
     for attribute, text, low, high, unit in (
         ("strength", "Strength", 0.0, 4.0, "%.2f"),

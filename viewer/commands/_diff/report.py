@@ -7,6 +7,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from viewer.commands._printing import table_lines
 from viewer.errors import printable
 from viewer.rig.comparison import Difference, Measure
 from viewer.rig.units import METRES
@@ -97,14 +98,7 @@ def table_of(rows: Sequence[Compared], tolerance: float | None) -> list[str]:
     """Return one line for each comparison, largest differences of all its actors."""
     heads = ["", *_COLUMNS, "result"]
     table = [heads, *([printable(row.name, 60), *_cells(row, tolerance)] for row in rows)]
-    widths = [max(len(line[column]) for line in table) for column in range(len(heads))]
-    return [
-        "  ".join(
-            cell.ljust(width) if not column or column == len(heads) - 1 else cell.rjust(width)
-            for column, (cell, width) in enumerate(zip(line, widths, strict=True))
-        ).rstrip()
-        for line in table
-    ]
+    return table_lines(table, right=range(1, len(heads) - 1))
 
 
 def _cells(row: Compared, tolerance: float | None) -> list[str]:

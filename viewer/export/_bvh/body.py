@@ -1,4 +1,4 @@
-"""A take as BVH has it: offsets at rest without rotation, and what turns and moves each joint.
+"""A sampled animation as BVH has it: offsets at rest without rotation, motions of each joint.
 
 With W the world rotations of a joint at rest and P its place there, x the file's axes to the
 world's, e the figure's axes to the file's, R the local rotation of a frame, R_0 the one at rest::

@@ -11,26 +11,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.hierarchy import depth_first
 
-__all__ = ["bvh_text", "depth_first"]
+__all__ = ["bvh_text"]
 
 _DEEPEST = 32  # tabs that a line begins with
 _SECONDS_DIGITS = 9  # of the frame time, at least: exact to 1e-8 of itself
-
-
-def depth_first(parents: Ints) -> Ints:
-    """Return the joints in the order in which the file nests them, children by index: (J,)."""
-    children: list[list[int]] = [[] for _ in parents]
-    stack: list[int] = []
-    for joint, parent in enumerate(parents):
-        (stack if parent < 0 else children[parent]).append(joint)
-    stack.reverse()
-    order = []
-    while stack:
-        joint = stack.pop()
-        order.append(joint)
-        stack += reversed(children[joint])
-    return np.array(order, dtype=np.int32)
 
 
 def bvh_text(

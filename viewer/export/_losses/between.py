@@ -12,8 +12,8 @@ from viewer.export._losses.worst_times import Sampler, key_times, worst_times
 from viewer.rig.arrays import Floats
 from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.evaluation import Frames, frames_of
+from viewer.rig.motion.sampled_animation import SampledAnimation, frames_at
 from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.take import Take, frames_at
 from viewer.rig.motion.timing import Timing
 from viewer.rig.skinning import Skinning
 
@@ -23,7 +23,7 @@ _PLACES = "between frames"
 _ON_FRAME = 1e-6  # of a frame: nearer than this to a frame is that frame
 
 
-def resampling_losses(path: Path, take: Take, how: Skinning) -> list[str]:
+def resampling_losses(path: Path, animation: SampledAnimation, how: Skinning) -> list[str]:
     """Return a line that says what frames at a fixed rate leave out of a motion, or none.
 
     What is between the frames that are written has rotations on the shorter arc, and all else in
@@ -33,12 +33,12 @@ def resampling_losses(path: Path, take: Take, how: Skinning) -> list[str]:
     ----------
     path : Path
         What was written.
-    take : Take
+    animation : SampledAnimation
         What was written into it.
     how : Skinning
         What moves the mesh.
     """
-    motion, frames, rate = take.motion, take.frames, take.frame_rate
+    motion, frames, rate = animation.motion, animation.frames, animation.frame_rate
     written = SampledClip(
         motion.name,
         Timing(rate, np.where(frames.present, np.arange(frames.n_frames), -1).astype(np.int32)),
@@ -51,16 +51,20 @@ def resampling_losses(path: Path, take: Take, how: Skinning) -> list[str]:
     first = frames.times[0]
 
     def found(times: Floats) -> Frames:
-        return frames_of(take.figure, written, np.maximum(times - first, 0.0))
+        return frames_of(animation.figure, written, np.maximum(times - first, 0.0))
 
-    lines = between_losses(path, take, found, how)
+    lines = between_losses(path, animation, found, how)
     return [f"{line}: {rate:g} a second are written" for line in lines]
 
 
 def between_losses(
-    path: Path, take: Take, found: Sampler, how: Skinning, also: Floats | None = None
+    path: Path,
+    animation: SampledAnimation,
+    found: Sampler,
+    how: Skinning,
+    also: Floats | None = None,
 ) -> list[str]:
-    """Return a line with the largest differences between a take's frames, or none.
+    """Return a line with the largest differences between an animation's frames, or none.
 
     Keyed curves are searched for the times at which they differ most. A capture is known on its
     own frames alone, and is compared there.
@@ -69,7 +73,7 @@ def between_losses(
     ----------
     path : Path
         What was written.
-    take : Take
+    animation : SampledAnimation
         What was written into it.
     found : callable
         From seconds (T,) to the poses that a reader of the file makes of it.
@@ -79,32 +83,38 @@ def between_losses(
         Seconds at which captures are compared, too.
     """
     note = ""
-    if isinstance(take.motion, Clip):
+    if isinstance(animation.motion, Clip):
         edges = np.union1d(
-            take.frames.times, key_times(take.motion, *take.frames.times[[0, -1]].tolist())
+            animation.frames.times,
+            key_times(animation.motion, *animation.frames.times[[0, -1]].tolist()),
         )
         worst = worst_times(
-            take.figure, lambda times: frames_at(take, times), found, edges, take.frame_rate, how
+            animation.figure,
+            lambda times: frames_at(animation, times),
+            found,
+            edges,
+            animation.frame_rate,
+            how,
         )
         times = worst.times
         if worst.is_estimate:
             note = f" (an estimate: {worst.looked} times were looked at)"
     else:
-        times = _own_times(take, take.motion)
+        times = _own_times(animation, animation.motion)
         times = times if also is None else np.union1d(times, also)
     if len(times) == 0:
         return []
-    read, wanted = found(times), frames_at(take, times)
+    read, wanted = found(times), frames_at(animation, times)
     wanted = replace(wanted, present=wanted.present & read.present)
     if not wanted.present.any():
         return []
-    lines = frames_losses(path, replace(take, frames=wanted), read, how, places=_PLACES)
+    lines = frames_losses(path, replace(animation, frames=wanted), read, how, places=_PLACES)
     return [line + note for line in lines]
 
 
-def _own_times(take: Take, motion: SampledClip) -> Floats:
-    """Return the seconds of a capture's own frames that lie between frames of a take."""
+def _own_times(animation: SampledAnimation, motion: SampledClip) -> Floats:
+    """Return the seconds of a capture's own frames that lie between frames of an animation."""
     own = motion.start + np.arange(motion.timing.n_frames) / motion.timing.frame_rate
-    place = (own - take.frames.times[0]) * take.frame_rate
+    place = (own - animation.frames.times[0]) * animation.frame_rate
     is_between = np.abs(place - np.round(place)) > _ON_FRAME
-    return own[is_between & (place > 0.0) & (place < take.frames.n_frames - 1)]
+    return own[is_between & (place > 0.0) & (place < animation.frames.n_frames - 1)]

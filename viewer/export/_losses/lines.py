@@ -11,7 +11,7 @@ from viewer.export._losses.apart import apart, apart_lines, negligible
 from viewer.export._losses.skinned import Side, changing, figure_side
 from viewer.rig.arrays import Floats
 from viewer.rig.motion.evaluation import Frames
-from viewer.rig.motion.take import Take
+from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.skinning import Skinning
 
 __all__ = ["driven_losses", "frames_losses", "shape_changes"]
@@ -25,7 +25,12 @@ def shape_changes(frames: Frames) -> bool:
 
 
 def driven_losses(
-    path: Path, take: Take, written: Side, how: Skinning, span: tuple[int, int], shape: Floats
+    path: Path,
+    animation: SampledAnimation,
+    written: Side,
+    how: Skinning,
+    span: tuple[int, int],
+    shape: Floats,
 ) -> list[str]:
     """Return a line with the largest differences of a file without a mesh, or none.
 
@@ -33,10 +38,10 @@ def driven_losses(
     ----------
     path : Path
         What was written.
-    take : Take
+    animation : SampledAnimation
         What was to be written; frames that are missing are not compared.
     written : Side
-        What the file says, by the take's frames.
+        What the file says, by the animation's frames.
     how : Skinning
         What moves the mesh here; blended linearly.
     span : (int, int)
@@ -44,16 +49,16 @@ def driven_losses(
     shape : (S,)
         Weights of the shape that the file's skeleton has.
     """
-    rows = span[0] + np.flatnonzero(take.frames.present[slice(*span)])
-    meant = figure_side(take.figure, take.frames, replace(how, method="lbs"), shape)
-    found = apart(meant, written, rows, negligible(take.figure, take.frames, rows))
+    rows = span[0] + np.flatnonzero(animation.frames.present[slice(*span)])
+    meant = figure_side(animation.figure, animation.frames, replace(how, method="lbs"), shape)
+    found = apart(meant, written, rows, negligible(animation.figure, animation.frames, rows))
     meshes = "vertices of a skin driven by it"
-    return apart_lines(path, take.figure, found, take.first_frame, meshes=meshes)
+    return apart_lines(path, animation.figure, found, animation.first_frame, meshes=meshes)
 
 
 def frames_losses(
     path: Path,
-    take: Take,
+    animation: SampledAnimation,
     written: Frames,
     how: Skinning,
     span: tuple[int, int] | None = None,
@@ -65,10 +70,10 @@ def frames_losses(
     ----------
     path : Path
         What was written.
-    take : Take
+    animation : SampledAnimation
         What was to be written; frames that are missing are not compared.
     written : Frames
-        What the file says: poses of the take's figure, as many as the span has.
+        What the file says: poses of the animation's figure, as many as the span has.
     how : Skinning
         What moves the mesh; blended linearly, by the motion here and the one that was read alike.
     span : (int, int), optional
@@ -76,7 +81,7 @@ def frames_losses(
     places : str
         Where these poses are, in words, if not on the frames.
     """
-    figure, frames = take.figure, take.frames
+    figure, frames = animation.figure, animation.frames
     first, stop = (0, frames.n_frames) if span is None else span
     rows = first + np.flatnonzero(frames.present[first:stop])
     still = written.shape_weights[0]
@@ -87,4 +92,6 @@ def frames_losses(
     least = negligible(figure, frames, rows)
     found = apart(meant, found_side, rows, least, rows - first)
     versus = f"the motion {places}" if places else ""
-    return apart_lines(path, figure, found, None if places else take.first_frame, versus=versus)
+    return apart_lines(
+        path, figure, found, None if places else animation.first_frame, versus=versus
+    )

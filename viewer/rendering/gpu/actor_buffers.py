@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING
 
 import moderngl
 
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
+from viewer.rendering.gpu.ownership import Kept
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.passes.joint_pass import SkeletonBuffers
 from viewer.rendering.passes.skin_pass import PosedMesh
@@ -15,65 +16,23 @@ from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor
 
 if TYPE_CHECKING:
-    from viewer.rendering.gpu.instance_buffers import CrowdBuffers
+    from viewer.rendering.gpu.instance_buffers import InstanceBuffers
     from viewer.rendering.passes.keypoint_pass import KeypointBuffers
-    from viewer.rendering.passes.motion_path_pass import TrailBuffers
+    from viewer.rendering.passes.motion_path_pass import MotionPathBuffers
     from viewer.rendering.passes.point_pass import PointBuffers
 
-__all__ = ["ActorBuffers", "Kept"]
+__all__ = ["ActorBuffers"]
 
 
-class _Releasable(Protocol):
-    def release(self) -> object: ...
-
-
-_Owner = TypeVar("_Owner")
-_Item = TypeVar("_Item", bound=_Releasable)
-
-
-class Kept(Generic[_Owner, _Item]):
-    """One item for each owner, told apart by identity, made when first asked for."""
+class _InstancedShapes:
+    """Instances of one figure: buffers for each of its shapes that several actors have."""
 
     def __init__(self) -> None:
-        # Owners are kept too, so that no other object can take over their identity.
-        self._items: dict[int, tuple[_Owner, _Item]] = {}
-
-    def __len__(self) -> int:
-        return len(self._items)
-
-    def get(self, owner: _Owner, make: Callable[[], _Item]) -> _Item:
-        """Return an owner's item, made now if there is none."""
-        if id(owner) not in self._items:
-            self._items[id(owner)] = (owner, make())
-        return self._items[id(owner)][1]
-
-    def drop(self, owner: _Owner, before: Callable[[_Item], object]) -> None:
-        """Free one owner's item; ``before`` is called with it."""
-        item = self._items.pop(id(owner))[1]
-        before(item)
-        item.release()
-
-    def keep_only(
-        self, owners: Sequence[_Owner], before: Callable[[_Item], object] | None = None
-    ) -> None:
-        """Free the items of all other owners; ``before`` is called with each."""
-        present = {id(owner) for owner in owners}
-        for key in [key for key in self._items if key not in present]:
-            item = self._items.pop(key)[1]
-            if before is not None:
-                before(item)
-            item.release()
-
-
-class _Crowds:
-    """The crowds of one figure: one for each of its shapes that several actors have."""
-
-    def __init__(self) -> None:
-        self.items: list[CrowdBuffers] = []
+        self.items: list[InstanceBuffers] = []
 
     def release(self) -> None:
-        for crowd in self.items:
-            crowd.release()
+        for instances in self.items:
+            instances.release()
         self.items.clear()
 
 
@@ -105,12 +64,12 @@ class ActorBuffers:
         self.context, self.programs, self._cube, self._notes = context, programs, cube, notes
         self._forget = forget
         self.meshes: Kept[Figure, MeshBuffers] = Kept()
-        self._crowds: Kept[Figure, _Crowds] = Kept()
+        self._instanced: Kept[Figure, _InstancedShapes] = Kept()
         self.posed: Kept[Actor, PosedMesh] = Kept()
         self.skeletons: Kept[Actor, SkeletonBuffers] = Kept()
         self.keypoints: Kept[Actor, KeypointBuffers] = Kept()
         self.points: Kept[Actor, PointBuffers] = Kept()
-        self.trails: Kept[Actor, TrailBuffers] = Kept()
+        self.motion_paths: Kept[Actor, MotionPathBuffers] = Kept()
 
     def mesh(self, figure: Figure) -> MeshBuffers:
         """Return a figure's mesh; it must have one."""
@@ -148,28 +107,28 @@ class ActorBuffers:
         assert layout is not None  # the caller looked
         return self.points.get(actor, lambda: PointBuffers(self.context, layout))
 
-    def trail(self, actor: Actor) -> TrailBuffers:
+    def motion_path(self, actor: Actor) -> MotionPathBuffers:
         """Return an actor's paths."""
-        from viewer.rendering.passes.motion_path_pass import TrailBuffers
+        from viewer.rendering.passes.motion_path_pass import MotionPathBuffers
 
-        return self.trails.get(actor, lambda: TrailBuffers(self.context))
+        return self.motion_paths.get(actor, lambda: MotionPathBuffers(self.context))
 
-    def crowds(self, figure: Figure, count: int) -> list[CrowdBuffers]:
-        """Return as many crowds of a figure, the same ones in the same order as before."""
-        from viewer.rendering.gpu.instance_buffers import CrowdBuffers
+    def instanced(self, figure: Figure, count: int) -> list[InstanceBuffers]:
+        """Return as many buffers of a figure, the same ones in the same order as before."""
+        from viewer.rendering.gpu.instance_buffers import InstanceBuffers
 
-        kept = self._crowds.get(figure, _Crowds).items
+        kept = self._instanced.get(figure, _InstancedShapes).items
         while len(kept) > count:
             kept.pop().release()
         while len(kept) < count:
-            kept.append(CrowdBuffers(self.context, self.mesh(figure)))
+            kept.append(InstanceBuffers(self.context, self.mesh(figure)))
         return kept
 
     def keep_only(self, actors: Sequence[Actor]) -> None:
         """Free what belongs to actors that left the scene, and to figures that nobody has."""
         self.posed.keep_only(actors, self._forget)
-        for kept in (self.skeletons, self.keypoints, self.points, self.trails):
+        for kept in (self.skeletons, self.keypoints, self.points, self.motion_paths):
             kept.keep_only(actors)
         figures = [actor.figure for actor in actors]
-        self._crowds.keep_only(figures)
+        self._instanced.keep_only(figures)
         self.meshes.keep_only(figures)

@@ -2,7 +2,7 @@
 
 Drivers keep the last few vertices that they computed, at best a few hundred. Files often list
 triangles in an order that finds none of them there, so that every vertex is computed three to five
-times; along a space-filling curve it is once or twice (``tests/bench/bench_crowd.py``).
+times; along a space-filling curve it is once or twice (``tests/bench/bench_instances.py``).
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 No posed vertices are kept: the vertex shader skins each instance by its own row of matrices, which
 on a driver in software takes less time than to write posed vertices and to read them again
-(``tests/bench/bench_crowd.py``). Every draw skins anew, so a camera that moves is not free, and
+(``tests/bench/bench_instances.py``). Every draw skins anew, so a camera that moves is not free, and
 views that draw a mesh several times take the posed buffers of single actors.
 """
 
@@ -28,6 +28,7 @@ from viewer.rendering.gpu.upload import (
     rigid_texture,
     write_stacked,
 )
+from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rendering.passes.mesh_pass import SKIN_COLOR
 from viewer.rendering.passes.skin_pass import skinning_words
 from viewer.rendering.view import View
@@ -43,7 +44,7 @@ from viewer.rig.skin import bind_positions
 from viewer.rig.skinning import METHODS, Skinning
 from viewer.rig.skinning.dqs import split_palette
 
-__all__ = ["CrowdBuffers"]
+__all__ = ["InstanceBuffers"]
 
 _PALETTE_UNIT, _PAIRS_UNIT, _RIGID_UNIT, _LIST_UNIT, _OFFSETS_UNIT = range(5)
 _PER_INSTANCE = (
@@ -58,7 +59,7 @@ _PER_INSTANCE = (
 _FLOATS = sum(count for _, count in _PER_INSTANCE)
 
 
-class CrowdBuffers:
+class InstanceBuffers:
     """Matrices, places and colours of actors that share figure and shape.
 
     Parameters
@@ -95,7 +96,7 @@ class CrowdBuffers:
         self._palette: moderngl.Texture | None = None
         self._rigid: moderngl.Texture | None = None
         self._instances: moderngl.Buffer | None = None
-        self._arrays: dict[tuple[int, ...], moderngl.VertexArray] = {}
+        self._arrays = VertexArrays(context)
 
     def update(self, poses: Sequence[Pose], how: Skinning) -> None:
         """Send the matrices of poses that changed.
@@ -128,7 +129,7 @@ class CrowdBuffers:
         self._keys = keys
 
     def _reserve(self, count: int) -> None:
-        """Make room; textures grow by half, so that a growing crowd is not copied each time."""
+        """Make room; textures grow by half, so that growing numbers are not copied each time."""
         if self._palette is not None and count <= len(self._rows):
             return
         room = max(count, len(self._rows) * 3 // 2)
@@ -186,7 +187,7 @@ class CrowdBuffers:
         self._instances.write(float32(np.concatenate(rows, axis=1)))
 
     def use(self, program: moderngl.Program, view: View) -> None:
-        """Set what ``crowd.vert`` needs beside its attributes."""
+        """Set what ``instances.vert`` needs beside its attributes."""
         skin = self.mesh.skin(self._how)
         values = {
             "u_projection": as_uniform(view.projection),
@@ -224,10 +225,11 @@ class CrowdBuffers:
     ) -> moderngl.VertexArray:
         """Return the vertex array for a program; without indices it draws single vertices."""
         mesh, skin = self.mesh, self.mesh.skin(self._how)
-        key = (id(program), id(indices), id(skin), id(self._rest.positions))
-        if key not in self._arrays:
-            content: list[Any] = self._rest.attributes(program, skin)
-            content += [
+        key = (id(indices), id(skin), id(self._rest.positions))
+
+        def content() -> list[Any]:
+            found: list[Any] = self._rest.attributes(program, skin)
+            found += [
                 (buffer, layout, name)
                 for buffer, layout, name in (
                     (mesh.uvs, "2f4", "in_uv"),
@@ -240,18 +242,16 @@ class CrowdBuffers:
                 f"{size}f4" if name in program else f"{4 * size}x" for name, size in _PER_INSTANCE
             )
             names = [name for name, _ in _PER_INSTANCE if name in program]
-            content.append((self._instances, f"{layout}/i", *names))
-            index_buffer = None if indices is None else indices.indices
-            self._arrays[key] = self.context.vertex_array(
-                program, content, index_buffer=index_buffer
-            )
-        return self._arrays[key]
+            return [*found, (self._instances, f"{layout}/i", *names)]
+
+        index_buffer = None if indices is None else indices.indices
+        return self._arrays.get(program, content, index_buffer, key)
 
     def _release_textures(self) -> None:
-        for item in (*self._arrays.values(), self._palette, self._rigid, self._instances):
+        self._arrays.release()
+        for item in (self._palette, self._rigid, self._instances):
             if item is not None:
                 item.release()
-        self._arrays.clear()
         self._palette = self._rigid = self._instances = None
 
     def release(self) -> None:

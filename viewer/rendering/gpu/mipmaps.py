@@ -14,6 +14,7 @@ import moderngl
 import numpy as np
 
 from viewer.rendering.gpu.context import is_software
+from viewer.rendering.srgb import decode_srgb, encode_srgb
 from viewer.rig.arrays import Bytes
 
 __all__ = ["add_mipmaps", "halved_pictures"]
@@ -73,13 +74,10 @@ def halved_pictures(pixels: Bytes) -> list[Bytes]:
 
 
 def _tables() -> tuple[np.ndarray, Bytes]:
-    """Return sRGB bytes to steps of linear light, and back (IEC 61966-2-1)."""
-    coded = np.arange(256) / 255.0
-    linear = np.where(coded <= 0.04045, coded / 12.92, ((coded + 0.055) / 1.055) ** 2.4)
-    steps = np.arange(_STEPS) / (_STEPS - 1)
-    bytes_ = np.where(steps <= 0.0031308, 12.92 * steps, 1.055 * steps ** (1 / 2.4) - 0.055)
-    decode = np.rint(linear * (_STEPS - 1)).astype(np.uint16)
-    return decode, np.rint(255.0 * bytes_).astype(np.uint8)
+    """Return sRGB bytes to steps of linear light, and back."""
+    decode = np.rint(decode_srgb(np.arange(256) / 255.0) * (_STEPS - 1)).astype(np.uint16)
+    encoded = encode_srgb(np.arange(_STEPS) / (_STEPS - 1))
+    return decode, np.rint(255.0 * encoded).astype(np.uint8)
 
 
 def _upload_function() -> Any:

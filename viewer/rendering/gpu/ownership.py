@@ -1,12 +1,12 @@
-"""Who frees what: OpenGL objects that belong to one Python object, also if making it fails."""
+"""Ownership of OpenGL objects: who frees what, also if making an object fails."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from typing import Protocol, TypeVar
+from typing import Generic, Protocol, TypeVar
 
-__all__ = ["Owner"]
+__all__ = ["Kept", "Owner"]
 
 
 class _Releasable(Protocol):
@@ -14,6 +14,7 @@ class _Releasable(Protocol):
 
 
 _Item = TypeVar("_Item", bound=_Releasable)
+_Key = TypeVar("_Key")
 
 
 class Owner:
@@ -39,3 +40,36 @@ class Owner:
     def release(self) -> None:
         """Free everything that was taken over."""
         self._stack.close()
+
+
+class Kept(Generic[_Key, _Item]):
+    """One item for each of some objects, told apart by identity, made when first asked for."""
+
+    def __init__(self) -> None:
+        # The objects are kept too, so that no other one can take over their identity.
+        self._items: dict[int, tuple[_Key, _Item]] = {}
+
+    def __len__(self) -> int:
+        return len(self._items)
+
+    def get(self, of: _Key, make: Callable[[], _Item]) -> _Item:
+        """Return an object's item, made now if there is none."""
+        if id(of) not in self._items:
+            self._items[id(of)] = (of, make())
+        return self._items[id(of)][1]
+
+    def drop(self, of: _Key, before: Callable[[_Item], object] | None = None) -> None:
+        """Free an object's item if there is one; ``before`` is called with it."""
+        if id(of) in self._items:
+            item = self._items.pop(id(of))[1]
+            if before is not None:
+                before(item)
+            item.release()
+
+    def keep_only(
+        self, those: Sequence[_Key], before: Callable[[_Item], object] | None = None
+    ) -> None:
+        """Free the items of all other objects; ``before`` is called with each."""
+        present = {id(one) for one in those}
+        for of in [of for key, (of, _) in self._items.items() if key not in present]:
+            self.drop(of, before)

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from viewer.rendering.colormap import from_linear
+from viewer.rendering.gpu.box_buffers import joint_colors
 from viewer.rendering.overlay.segments import Segments, dots
-from viewer.rendering.passes.joint_pass import joint_colors
 from viewer.rendering.projection import picture_scale, project, project_segments
+from viewer.rendering.srgb import encode_srgb
 from viewer.rendering.view import View
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.vectors import unit
@@ -159,7 +159,7 @@ def _axis_lengths(points: Floats, skeleton: Skeleton) -> Floats:
 def _colors(skeleton: Skeleton, selected: int) -> Floats:
     """Return the colours of the joints' boxes: (J, 4), sRGB and opacity."""
     colors = np.ones((skeleton.n_joints, 4))
-    colors[:, :3] = from_linear(joint_colors(skeleton.n_joints))
+    colors[:, :3] = encode_srgb(joint_colors(skeleton.n_joints))
     if selected >= 0:
         colors[selected] = HIGHLIGHT
     return colors

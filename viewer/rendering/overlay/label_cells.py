@@ -13,7 +13,7 @@ __all__ = ["Cells", "Dots", "summed", "sums_within"]
 
 _FINE = 4  # parts of a pixel, both ways, of which each has one dot
 _BLOCK = 4  # cells, both ways
-_CROWD = 8  # dots in a block on average, from which on they are looked at in layers
+_DENSE = 8  # dots in a block on average, from which on they are looked at in layers
 _PAIRS = 1 << 18  # pairs of a rectangle and a dot that are looked at together
 
 
@@ -111,7 +111,7 @@ class Dots:
 
     @property
     def n_layers(self) -> int:
-        """Parts of the dots; the first has few of them, enough to see most crowds."""
+        """Parts of the dots; the first has few of them, enough to see most dense blocks."""
         return len(self._layers)
 
     def _starts(self, places: Ints) -> Ints:
@@ -165,7 +165,7 @@ class Dots:
 def _levels(places: Ints) -> Ints:
     """Return the layers of dots by their cells: one of a block, of a cell, and the others; (N,)."""
     firsts = _firsts(places // _BLOCK)
-    if len(places) < _CROWD * len(firsts):
+    if len(places) < _DENSE * len(firsts):
         return np.zeros(len(places), dtype=np.int32)
     levels = np.full(len(places), 2, dtype=np.int32)
     levels[_firsts(places)] = 1

@@ -83,7 +83,7 @@ def lay_out(
     ends, has_line = [np.zeros((0, 2))], [np.zeros(0, np.bool_)]
     for some in _portions(order):
         places = places_of(anchors[some], sizes[some], picture, gap)
-        # Most places without room in a crowd are found out here, all at once.
+        # Most places without room among others are found out here, all at once.
         may = np.flatnonzero(~crowded(places, anchors[some], dots, gap))
         places = places.take(may[taken.may_be_open(places.low[may], places.high[may])])
         places = places.take(_with_free_lines(places, taken, dots, gap))

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import moderngl
 import numpy as np
 
+from viewer.rendering.gpu.draw_state import opacities, without_depth_writes
+from viewer.rendering.gpu.instance_rows import InstanceRows
 from viewer.rendering.gpu.program import Programs, set_uniforms
-from viewer.rendering.gpu.upload import checked, float32
 from viewer.rendering.options import Color
 from viewer.rendering.view import View, set_model
 from viewer.rig.arrays import Floats
@@ -106,8 +107,8 @@ class SegmentPass:
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
         self.context = context
         self._program = programs.drawing("segment")
-        self._buffer: moderngl.Buffer | None = None
-        self._array: moderngl.VertexArray | None = None
+        names = "in_start", "in_end", "in_color", "in_width"
+        self._rows = InstanceRows(context, self._program, "3f4 3f4 4f4 f4", names, "segments")
 
     def draw(self, segments: Segments, view: View, size: tuple[int, int], manner: Manner) -> None:
         """Draw segments over what is bound.
@@ -123,14 +124,12 @@ class SegmentPass:
         manner : Manner
             How they are drawn.
         """
-        count = len(segments.widths)
-        if not count:
+        if not len(segments.widths):
             return
         # Relative to their middle, so that float32 counts from there.
         center = 0.5 * (segments.starts.min(axis=0) + segments.starts.max(axis=0))
         places = segments.starts - center, segments.ends - center
-        rows = np.hstack([*places, segments.colors, segments.widths[:, None]])
-        array = self._filled(float32(rows).tobytes())
+        self._rows.write(np.hstack([*places, segments.colors, segments.widths[:, None]]))
         set_model(self._program, view, np.eye(4), center)
         values = {
             "u_size": size,
@@ -140,33 +139,11 @@ class SegmentPass:
             "u_border_color": manner.border_color,
         }
         set_uniforms(self._program, values)
-        target = self.context.fbo
-        target.depth_mask = False  # segments over one another all count
-        target.use()  # moderngl hands masks to OpenGL only then
-        steps = (("1", 1.0),) if manner.on_top else ((">", manner.hidden), ("<=", 1.0))
-        for order, opacity in steps:
-            self.context.depth_func = order
-            set_uniforms(self._program, {"u_opacity": opacity})
-            array.render(moderngl.TRIANGLE_STRIP, vertices=4, instances=count)
-        self.context.depth_func = "<"
-        target.depth_mask = True
-        target.use()
-
-    def _filled(self, data: bytes) -> moderngl.VertexArray:
-        """Return a vertex array of these rows; its buffer grows when it has to."""
-        if self._buffer is None or self._array is None or self._buffer.size < len(data):
-            self.release()
-            buffer = self.context.buffer(reserve=2 * len(data), dynamic=True)
-            self._buffer = checked(self.context, buffer, "segments")
-            names = "in_start", "in_end", "in_color", "in_width"
-            content = [(self._buffer, "3f4 3f4 4f4 f4/i", *names)]
-            self._array = self.context.vertex_array(self._program, content)
-        self._buffer.write(data)
-        return self._array
+        with without_depth_writes(self.context):  # segments over one another all count
+            for opacity in opacities(self.context, None if manner.on_top else manner.hidden):
+                set_uniforms(self._program, {"u_opacity": opacity})
+                self._rows.draw()
 
     def release(self) -> None:
-        """Free buffer and vertex array."""
-        for item in (self._array, self._buffer):
-            if item is not None:
-                item.release()
-        self._array = self._buffer = None
+        """Free what holds the segments."""
+        self._rows.release()

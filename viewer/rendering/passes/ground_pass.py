@@ -8,6 +8,7 @@ import moderngl
 import numpy as np
 
 from viewer.errors import ViewerError
+from viewer.rendering.gpu.draw_state import without_depth_test, without_depth_writes
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.upload import buffer
 from viewer.rendering.view import View, set_model
@@ -82,9 +83,8 @@ class GroundPass:
         program["u_bottom"], program["u_top"] = bottom, top
         if self._background is None:
             self._background = self.context.vertex_array(program, [])
-        self.context.disable(moderngl.DEPTH_TEST)
-        self._background.render(moderngl.TRIANGLES, vertices=3)
-        self.context.enable(moderngl.DEPTH_TEST)
+        with without_depth_test(self.context):
+            self._background.render(moderngl.TRIANGLES, vertices=3)
 
     def draw_grid(self, view: View, box: Floats, background: str) -> None:
         """Draw the grid under a box.
@@ -119,12 +119,8 @@ class GroundPass:
         if self._ground is None:
             content = [(self._corners, "2f4", "in_corner")]
             self._ground = self.context.vertex_array(program, content)
-        target = self.context.fbo
-        target.depth_mask = False  # the translucent grid hides nothing
-        target.use()  # moderngl hands masks to OpenGL only then
-        self._ground.render(moderngl.TRIANGLE_STRIP)
-        target.depth_mask = True
-        target.use()
+        with without_depth_writes(self.context):  # the translucent grid hides nothing
+            self._ground.render(moderngl.TRIANGLE_STRIP)
 
     def release(self) -> None:
         """Free vertex arrays and buffers."""

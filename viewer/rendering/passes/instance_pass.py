@@ -12,15 +12,15 @@ from viewer.rendering.view import View, set_lights
 from viewer.rig.scene import Actor
 
 if TYPE_CHECKING:
-    from viewer.rendering.gpu.instance_buffers import CrowdBuffers
+    from viewer.rendering.gpu.instance_buffers import InstanceBuffers
 
-__all__ = ["FEWEST", "crowds_of", "draw_crowd"]
+__all__ = ["FEWEST", "draw_instances", "instance_groups"]
 
 FEWEST = 8
-"""Actors from which on they are drawn as a crowd; see ``crowds_of``."""
+"""Actors from which on they are drawn as instances; see ``instance_groups``."""
 
 
-def crowds_of(actors: Sequence[Actor], options: DisplayOptions) -> list[list[Actor]]:
+def instance_groups(actors: Sequence[Actor], options: DisplayOptions) -> list[list[Actor]]:
     """Return which actors are drawn together: those of one figure and one shape.
 
     Few actors keep their posed buffers, which a camera that moves does not skin anew, and so do all
@@ -50,20 +50,20 @@ def crowds_of(actors: Sequence[Actor], options: DisplayOptions) -> list[list[Act
     return [group for group in groups.values() if len(group) >= FEWEST]
 
 
-def draw_crowd(
+def draw_instances(
     programs: Programs,
-    crowd: CrowdBuffers,
+    instances: InstanceBuffers,
     actors: Sequence[Actor],
     view: View,
     options: DisplayOptions,
 ) -> None:
-    """Draw the surfaces of a crowd.
+    """Draw the surfaces of actors that share a mesh.
 
     Parameters
     ----------
     programs : Programs
         Gives the shading programs.
-    crowd : CrowdBuffers
+    instances : InstanceBuffers
         Already updated.
     actors : sequence of Actor
         The same, in the same order.
@@ -73,11 +73,13 @@ def draw_crowd(
         Shading and lights.
     """
     program = programs.drawing(
-        "crowd", options.shading, "mesh", skin=crowd.method, affine=crowd.is_affine
+        "instance", options.shading, "mesh", skin=instances.method, affine=instances.is_affine
     )
-    crowd.place(actors, view)
-    crowd.use(program, view)
+    instances.place(actors, view)
+    instances.use(program, view)
     set_lights(program, view, options.lights)
-    set_surface(program, crowd.mesh, options)
-    indices = crowd.mesh.index_set(options.reduced, options.hidden_parts)
-    draw_runs(crowd.array(program, indices), indices, options.texture, instances=crowd.count)
+    set_surface(program, instances.mesh, options)
+    indices = instances.mesh.index_set(options.reduced, options.hidden_parts)
+    draw_runs(
+        instances.array(program, indices), indices, options.texture, instances=instances.count
+    )

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import colorsys
-from typing import Any
+from functools import partial
 
 import moderngl
 import numpy as np
 
-from viewer.rendering.gpu.ownership import Owner
+from viewer.rendering.gpu.box_buffers import BoxBuffers
 from viewer.rendering.gpu.program import Programs, set_uniforms
-from viewer.rendering.gpu.upload import buffer, matrix_texture, write_matrices
+from viewer.rendering.gpu.upload import buffer
 from viewer.rendering.options import Color, DisplayOptions
+from viewer.rendering.passes.see_through import draw_nearest
 from viewer.rendering.view import View, in_front, set_lights, set_model
-from viewer.rig.arrays import Bools, Floats
+from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.kinematics import posed_skeleton, world_matrices
 from viewer.rig.mesh import bounding_box, box_size
@@ -22,47 +22,22 @@ from viewer.rig.pose import Pose, rest_pose
 from viewer.rig.shape import shaped
 from viewer.rig.skeleton import Skeleton
 
-__all__ = ["JointPass", "SkeletonBuffers", "box_content", "draw_boxes", "joint_colors"]
+__all__ = ["JointPass", "SkeletonBuffers", "draw_boxes"]
 
 _HIGHLIGHT = (1.0, 0.55, 0.02)  # linear
 _CUBE_SIZE = 0.015  # of a skeleton without boxes
-_GOLDEN = 0.618033988749895
 _WORLD_UNIT = 0
 _CUBE_VERTICES = 36
-_CROWD = 1000  # joints from which on it pays to look for coincident boxes
-
-
-def joint_colors(n_joints: int) -> Floats:
-    """Return a colour for each joint: hues a golden ratio apart, so neighbours differ.
-
-    Returns
-    -------
-    (J, 3)
-        Linear.
-    """
-    hues = 0.58 + _GOLDEN * np.arange(n_joints)
-    return np.array([colorsys.hsv_to_rgb(hue % 1.0, 0.42, 0.72) for hue in hues])
 
 
 class SkeletonBuffers:
-    """Boxes and colours of one figure's joints, and the matrices of one actor's pose."""
+    """Boxes of one figure's joints, moved by one actor's pose."""
 
     def __init__(self, context: moderngl.Context, figure: Figure, cube: moderngl.Buffer) -> None:
         skeleton = figure.skeleton
         assert skeleton is not None  # only figures with a skeleton come here
-        self.context, self.figure, self._cube = context, figure, cube
-        self.n_joints = skeleton.n_joints
-        boxes = skeleton.boxes if skeleton.boxes is not None else _cubes(skeleton)
-        self._boxes = boxes
-        self._owner = Owner()
-        with self._owner.guard():
-            keep = self._owner.keep
-            self._low = keep(buffer(context, boxes[:, 0], "f4"))
-            self._high = keep(buffer(context, boxes[:, 1], "f4"))
-            self._colors = keep(buffer(context, joint_colors(skeleton.n_joints), "f4"))
-            self.world = keep(matrix_texture(context, skeleton.n_joints))
-        self.center: Floats = np.zeros(3)
-        self._arrays: dict[int, moderngl.VertexArray] = {}
+        self.figure = figure
+        self.boxes = BoxBuffers(context, cube, _joint_boxes(skeleton))
         self._key: NumberKey | None = None
 
     def is_current(self, pose: Pose) -> bool:
@@ -82,37 +57,12 @@ class SkeletonBuffers:
             return
         skeleton = shaped(self.figure, pose.shape_weights).skeleton
         assert skeleton is not None  # shaping keeps it
-        world = posed_skeleton(skeleton, pose).world.copy()
-        self.center = bounding_box(world[:, :3, 3]).mean(axis=0)
-        world[:, :3, 3] -= self.center
-        if self.n_joints > _CROWD:
-            world[self._hidden(world)] = 0.0
-        write_matrices(self.world, world)
+        self.boxes.move(posed_skeleton(skeleton, pose).world.copy())
         self._key = key
-
-    def _hidden(self, world: Floats) -> Bools:
-        """Return which joints' boxes coincide with another's; shrunk to a point, they cost nothing.
-
-        A hundred thousand boxes over one another would take minutes to draw in software.
-        """
-        rows = np.concatenate([world[:, :3].reshape(-1, 12), self._boxes.reshape(-1, 6)], axis=1)
-        _, first = np.unique(rows.astype(np.float32), axis=0, return_index=True)
-        hidden = np.ones(len(rows), dtype=bool)
-        hidden[first] = False
-        return hidden
-
-    def array(self, program: moderngl.Program) -> moderngl.VertexArray:
-        """Return the instanced cubes for a program."""
-        if id(program) not in self._arrays:
-            content = box_content(program, self._cube, self._low, self._high, self._colors)
-            self._arrays[id(program)] = self.context.vertex_array(program, content)
-        return self._arrays[id(program)]
 
     def release(self) -> None:
         """Free every buffer."""
-        for array in self._arrays.values():
-            array.release()
-        self._owner.release()
+        self.boxes.release()
 
 
 class JointPass:
@@ -163,56 +113,31 @@ class JointPass:
         overlays = opacity < 1.0
         view = in_front(view) if overlays else view
         program = self.programs.drawing("joint", "phong", fragment="mesh")
-        array, count = skeleton.array(program), skeleton.n_joints
+        how = placement, view, options, selected, opacity, color
+        draw = partial(draw_boxes, program, skeleton.boxes, *how)
         if overlays:
             # Only the nearest boxes count: the others would show through them.
-            target = self.context.fbo
-            target.color_mask = False, False, False, False
-            target.use()  # moderngl hands masks to OpenGL only then
-        place = placement, skeleton.center, view, options, selected, opacity, color
-        draw_boxes(program, array, count, skeleton.world, *place)
-        if overlays:
-            target.color_mask = True, True, True, True
-            target.use()
-            self.context.depth_func = "<="
-            draw_boxes(program, array, count, skeleton.world, *place)
-        self.context.depth_func = "<"
+            draw_nearest(self.context, draw)
+        else:
+            draw()
 
     def release(self) -> None:
         """Free the cube."""
         self.cube.release()
 
 
-def box_content(
-    program: moderngl.Program,
-    cube: moderngl.Buffer,
-    low: moderngl.Buffer,
-    high: moderngl.Buffer,
-    colors: moderngl.Buffer,
-) -> list[Any]:
-    """Return what a vertex array of boxes is made of: those attributes that the compiler kept."""
-    content: list[Any] = [(cube, "3f4 3f4", "in_corner", "in_normal")]
-    if "in_normal" not in program:
-        content = [(cube, "3f4 12x", "in_corner")]
-    content += [(low, "3f4/i", "in_low"), (high, "3f4/i", "in_high")]
-    return content + ([(colors, "3f4/i", "in_color")] if "in_color" in program else [])
-
-
 def draw_boxes(
     program: moderngl.Program,
-    array: moderngl.VertexArray,
-    count: int,
-    world: moderngl.Texture,
+    boxes: BoxBuffers,
     placement: Floats,
-    center: Floats,
     view: View,
     options: DisplayOptions,
     selected: int = -1,
     opacity: float = 1.0,
     color: Color | None = None,
 ) -> None:
-    """Draw instances of the cube, each by its own matrix of ``world``."""
-    set_model(program, view, placement, center)
+    """Draw boxes that were moved to where they belong."""
+    set_model(program, view, placement, boxes.center)
     set_lights(program, view, options.lights)
     values = {
         "u_world": _WORLD_UNIT,
@@ -225,12 +150,15 @@ def draw_boxes(
         "u_opacity": opacity,
     }
     set_uniforms(program, values)
-    world.use(_WORLD_UNIT)
-    array.render(moderngl.TRIANGLES, vertices=_CUBE_VERTICES, instances=count)
+    boxes.world.use(_WORLD_UNIT)
+    array = boxes.array(program)
+    array.render(moderngl.TRIANGLES, vertices=_CUBE_VERTICES, instances=boxes.count)
 
 
-def _cubes(skeleton: Skeleton) -> Floats:
-    """Return small cubes for joints that no file gave a box: (J, 2, 3)."""
+def _joint_boxes(skeleton: Skeleton) -> Floats:
+    """Return the joints' boxes, small cubes if no file gave any: (J, 2, 3)."""
+    if skeleton.boxes is not None:
+        return skeleton.boxes
     points = world_matrices(skeleton, rest_pose(skeleton))[:, :3, 3]
     half = _CUBE_SIZE * (box_size(bounding_box(points)) or 1.0)
     return np.tile([[-half] * 3, [half] * 3], (skeleton.n_joints, 1, 1))

@@ -7,8 +7,10 @@ from collections.abc import Sequence
 import moderngl
 import numpy as np
 
+from viewer.rendering.gpu.draw_state import without_depth_test
+from viewer.rendering.gpu.instance_rows import InstanceRows
 from viewer.rendering.gpu.program import Programs
-from viewer.rendering.gpu.upload import checked, float32
+from viewer.rendering.gpu.upload import checked
 from viewer.rendering.overlay.lettering import Lettering, shelves
 from viewer.rig.arrays import Floats, Ints
 
@@ -35,6 +37,8 @@ class LabelPass:
         self._places: dict[str, tuple[int, int]] = {}
         self._letters = 0
         self._texture: moderngl.Texture | None = None
+        names = "in_corner", "in_source", "in_extent", "in_color"
+        self._rows = InstanceRows(context, self._program, "2f4 2f4 2f4 3f4", names, "labels")
 
     def draw(
         self,
@@ -66,18 +70,12 @@ class LabelPass:
         assert self._texture is not None  # it was filled
         shown = np.array([word in self._places for word in words])
         sources = np.array([self._places.get(word, (0, 0)) for word in words])
-        rows = np.hstack([corners, sources, lettering.sizes(words), colors])[shown]
-        buffer = self.context.buffer(float32(rows).tobytes())
-        names = "in_corner", "in_source", "in_extent", "in_color"
-        array = self.context.vertex_array(self._program, [(buffer, "2f4 2f4 2f4 3f4/i", *names)])
+        self._rows.write(np.hstack([corners, sources, lettering.sizes(words), colors])[shown])
         self._program["u_picture"] = size
         self._program["u_texture"] = 0
         self._texture.use(0)
-        self.context.disable(moderngl.DEPTH_TEST)
-        array.render(moderngl.TRIANGLE_STRIP, vertices=4, instances=len(rows))
-        self.context.enable(moderngl.DEPTH_TEST)
-        array.release()
-        buffer.release()
+        with without_depth_test(self.context):
+            self._rows.draw()
 
     def _fill(self, words: Sequence[str], lettering: Lettering) -> None:
         """Draw a new texture: of the words that are new, and of those it had if they are few."""
@@ -92,14 +90,18 @@ class LabelPass:
         for word, (x, y) in self._places.items():
             drawn = lettering.pixels(word)
             pixels[y : y + drawn.shape[0], x : x + drawn.shape[1]] = drawn
-        self.release()
+        self._free_texture()
         texture = self.context.texture((_WIDTH, height), 2, pixels.tobytes())
         self._texture = checked(self.context, texture, "names of joints")
         self._texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._letters = lettering.letters
 
     def release(self) -> None:
-        """Free the texture."""
+        """Free texture and rows."""
+        self._free_texture()
+        self._rows.release()
+
+    def _free_texture(self) -> None:
         if self._texture is not None:
             self._texture.release()
         self._texture = None

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from viewer.rendering.passes.ghost_pass import GhostPass
     from viewer.rendering.passes.keypoint_pass import KeypointPass
     from viewer.rendering.passes.legend_pass import LegendPass
-    from viewer.rendering.passes.motion_path_pass import TrailPass
+    from viewer.rendering.passes.motion_path_pass import MotionPathPass
     from viewer.rendering.passes.point_pass import PointPass
     from viewer.rendering.picking import PickPass
 
@@ -68,11 +68,11 @@ class LatePasses:
         return points
 
     @cached_property
-    def trail_pass(self) -> TrailPass:
+    def motion_path_pass(self) -> MotionPathPass:
         """Draws paths of joints."""
-        from viewer.rendering.passes.motion_path_pass import TrailPass
+        from viewer.rendering.passes.motion_path_pass import MotionPathPass
 
-        return TrailPass(self._context, self._programs)
+        return MotionPathPass(self._context, self._programs)
 
     @cached_property
     def pick_pass(self) -> PickPass:

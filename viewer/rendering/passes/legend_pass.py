@@ -5,6 +5,7 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 
+from viewer.rendering.gpu.draw_state import without_depth_test
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.overlay.legend import Legend
 
@@ -56,9 +57,8 @@ class LegendPass:
         self._program["u_picture"] = size
         self._program["u_texture"] = 0
         self._texture.use(0)
-        self.context.disable(moderngl.DEPTH_TEST)
-        self._array.render(moderngl.TRIANGLE_STRIP, vertices=4)
-        self.context.enable(moderngl.DEPTH_TEST)
+        with without_depth_test(self.context):
+            self._array.render(moderngl.TRIANGLE_STRIP, vertices=4)
         return True
 
     def _prepare(self, legend: Legend, size: tuple[int, int]) -> None:

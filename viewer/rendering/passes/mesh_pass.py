@@ -9,7 +9,9 @@ import numpy as np
 
 from viewer.rendering.gpu.index_sets import IndexSet
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
+from viewer.rendering.gpu.ownership import Kept
 from viewer.rendering.gpu.program import Programs, set_uniforms
+from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rendering.options import Color, DisplayOptions
 from viewer.rendering.passes.see_through import surface_opacity
 from viewer.rendering.passes.skin_pass import PosedMesh
@@ -42,7 +44,7 @@ class MeshPass:
 
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
         self.context, self.programs = context, programs
-        self._arrays: dict[tuple[int, int, int], tuple[PosedMesh, moderngl.VertexArray]] = {}
+        self._arrays: Kept[PosedMesh, VertexArrays] = Kept()
 
     def draw(
         self,
@@ -110,43 +112,40 @@ class MeshPass:
         set_model(program, view, placement, mesh.center)
         program["u_line_color"] = _premultiplied(_NORMAL_COLOR)
         program["u_length"] = _NORMAL_LENGTH * size
-        key = (id(mesh), id(program), 0)
-        if key not in self._arrays:
-            content = [(mesh.posed, "3f4 3f4/i", "in_position", "in_normal")]
-            self._arrays[key] = (mesh, self.context.vertex_array(program, content))
-        instances = mesh.mesh.n_vertices
-        self._arrays[key][1].render(moderngl.LINES, vertices=2, instances=instances)
+        content = [(mesh.posed, "3f4 3f4/i", "in_position", "in_normal")]
+        array = self._arrays_of(mesh).get(program, lambda: content)
+        array.render(moderngl.LINES, vertices=2, instances=mesh.mesh.n_vertices)
 
     def array(
         self, mesh: PosedMesh, program: moderngl.Program, indices: IndexSet
     ) -> moderngl.VertexArray:
         """Return the mesh's vertex array for a program, with what the compiler kept."""
-        key = (id(mesh), id(program), id(indices))
-        if key not in self._arrays:
-            content: list[Any] = [(mesh.posed, "3f4 12x", "in_position")]
+
+        def content() -> list[Any]:
+            found: list[Any] = [(mesh.posed, "3f4 12x", "in_position")]
             if "in_normal" in program:
-                content = [(mesh.posed, "3f4 3f4", "in_position", "in_normal")]
+                found = [(mesh.posed, "3f4 3f4", "in_position", "in_normal")]
             for values, layout, name in (
                 (mesh.mesh.uvs, "2f4", "in_uv"),
                 (mesh.mesh.colors, "3f4", "in_color"),
                 (mesh.scalars.values, "f4", "in_scalar"),
             ):
                 if name in program and values is not None:
-                    content.append((values, layout, name))
-            array = self.context.vertex_array(program, content, index_buffer=indices.indices)
-            self._arrays[key] = (mesh, array)
-        return self._arrays[key][1]
+                    found.append((values, layout, name))
+            return found
+
+        return self._arrays_of(mesh).get(program, content, indices.indices, (id(indices),))
+
+    def _arrays_of(self, mesh: PosedMesh) -> VertexArrays:
+        return self._arrays.get(mesh, lambda: VertexArrays(self.context))
 
     def forget(self, mesh: PosedMesh) -> None:
         """Free what was made for a mesh that is about to be released."""
-        for key in [key for key, (owner, _) in self._arrays.items() if owner is mesh]:
-            self._arrays.pop(key)[1].release()
+        self._arrays.drop(mesh)
 
     def release(self) -> None:
         """Free all vertex arrays."""
-        for _, array in self._arrays.values():
-            array.release()
-        self._arrays.clear()
+        self._arrays.keep_only([])
 
 
 def _shading(mesh: PosedMesh, options: DisplayOptions) -> str:

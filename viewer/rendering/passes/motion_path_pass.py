@@ -8,18 +8,20 @@ from dataclasses import dataclass
 import moderngl
 import numpy as np
 
+from viewer.rendering.gpu.draw_state import opacities, without_depth_writes
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.upload import buffer
+from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rendering.view import View, set_model
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.points import PointClip
 from viewer.rig.mesh import bounding_box
 from viewer.rig.motion.clip import Clip
-from viewer.rig.motion.motion_paths import Trail, segments, trail
+from viewer.rig.motion.motion_paths import MotionPath, motion_path, segments
 from viewer.rig.scene import Actor, Motion
 
-__all__ = ["Moment", "TrailBuffers", "TrailPass", "trail_colors"]
+__all__ = ["Moment", "MotionPathBuffers", "MotionPathPass", "path_colors"]
 
 _WIDTH = 2.5  # pixels
 _HIDDEN = 0.3  # opacity of what lies behind something
@@ -34,13 +36,13 @@ class Moment:
     reach: float
 
 
-def trail_colors(count: int) -> Floats:
+def path_colors(count: int) -> Floats:
     """Return a strong colour for each of some paths: (N, 3), sRGB."""
     hues = 0.1 + _GOLDEN * np.arange(count)
     return np.array([colorsys.hsv_to_rgb(hue % 1.0, 0.85, 0.95) for hue in hues]).reshape(-1, 3)
 
 
-class TrailBuffers:
+class MotionPathBuffers:
     """Segments of one actor's paths; computed again only if what they follow from changed.
 
     Parameters
@@ -54,7 +56,7 @@ class TrailBuffers:
         self.count = 0
         self.center: Floats = np.zeros(3)
         self._owner = Owner()
-        self._arrays: dict[int, moderngl.VertexArray] = {}
+        self._arrays = VertexArrays(context)
         self._clip: Motion | None = None
         self._key: tuple[object, ...] | None = None
 
@@ -64,36 +66,32 @@ class TrailBuffers:
         if key == self._key or actor.clip is None:
             return
         self._clip = actor.clip  # kept, so that its id stays its own
-        path = trail(
+        path = motion_path(
             actor.figure, actor.clip, joints, base=actor.pose, min_confidence=min_confidence
         )
         self._upload(path, actor.offset)
         self._key = key
 
-    def _upload(self, path: Trail, offset: float) -> None:
+    def _upload(self, path: MotionPath, offset: float) -> None:
         self.release()
         points, times, which = segments(path)
         self.count = len(points)
         if not self.count:
             return
         self.center = bounding_box(points.reshape(-1, 3)).mean(axis=0)
-        colors = trail_colors(path.points.shape[1])[which]
+        colors = path_colors(path.points.shape[1])[which]
         content = [(points - self.center).reshape(-1, 6), times + offset, colors]
         self._segments = self._owner.keep(buffer(self.context, np.hstack(content), "f4"))
 
     def array(self, program: moderngl.Program) -> moderngl.VertexArray:
         """Return the segments as instances for a program."""
-        if id(program) not in self._arrays:
-            names = "in_start", "in_end", "in_times", "in_color"
-            content = [(self._segments, "3f4 3f4 2f4 3f4/i", *names)]
-            self._arrays[id(program)] = self.context.vertex_array(program, content)
-        return self._arrays[id(program)]
+        names = "in_start", "in_end", "in_times", "in_color"
+        content = [(self._segments, "3f4 3f4 2f4 3f4/i", *names)]
+        return self._arrays.get(program, lambda: content)
 
     def release(self) -> None:
         """Free the buffers."""
-        for array in self._arrays.values():
-            array.release()
-        self._arrays.clear()
+        self._arrays.release()
         self._owner.release()
 
 
@@ -118,7 +116,7 @@ def _place(actor: Actor) -> tuple[bytes, float]:
     return actor.pose.figure_translation.tobytes(), actor.pose.figure_scale
 
 
-class TrailPass:
+class MotionPathPass:
     """Draws paths.
 
     Parameters
@@ -133,13 +131,18 @@ class TrailPass:
         self.context, self.programs = context, programs
 
     def draw(
-        self, paths: TrailBuffers, placement: Floats, view: View, size: tuple[int, int], at: Moment
+        self,
+        paths: MotionPathBuffers,
+        placement: Floats,
+        view: View,
+        size: tuple[int, int],
+        at: Moment,
     ) -> None:
         """Draw one actor's paths; what lies behind something is drawn faintly.
 
         Parameters
         ----------
-        paths : TrailBuffers
+        paths : MotionPathBuffers
             Already updated.
         placement : (4, 4)
             Figure space to scene.
@@ -152,7 +155,7 @@ class TrailPass:
         """
         if not paths.count:
             return
-        program = self.programs.drawing("trail")
+        program = self.programs.drawing("motion_path")
         set_model(program, view, placement, paths.center)
         values = {
             "u_size": size,
@@ -161,14 +164,8 @@ class TrailPass:
             "u_reach": at.reach,
         }
         set_uniforms(program, values)
-        target = self.context.fbo
-        target.depth_mask = False  # lines over one another all count
-        target.use()  # moderngl hands masks to OpenGL only then
-        for order, opacity in ((">", _HIDDEN), ("<=", 1.0)):
-            self.context.depth_func = order
-            set_uniforms(program, {"u_opacity": opacity})
-            array = paths.array(program)
-            array.render(moderngl.TRIANGLE_STRIP, vertices=4, instances=paths.count)
-        self.context.depth_func = "<"
-        target.depth_mask = True
-        target.use()
+        array = paths.array(program)
+        with without_depth_writes(self.context):  # lines over one another all count
+            for opacity in opacities(self.context, _HIDDEN):
+                set_uniforms(program, {"u_opacity": opacity})
+                array.render(moderngl.TRIANGLE_STRIP, vertices=4, instances=paths.count)

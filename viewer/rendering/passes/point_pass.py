@@ -12,9 +12,11 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.rendering.gpu.draw_state import without_depth_writes
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.upload import buffer, float32
+from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rendering.options import Color, DisplayOptions
 from viewer.rendering.view import View, set_lights, set_model
 from viewer.rig.arrays import Bools, Floats, Ints
@@ -102,13 +104,13 @@ class PointBuffers:
     """
 
     def __init__(self, context: moderngl.Context, layout: PointLayout) -> None:
-        self.context, self.layout = context, layout
+        self.layout = layout
         self.elements: Ints = np.zeros(0, dtype=np.int32)
         self.center: Floats = np.zeros(3)
         self._owner = Owner()
         room = len(layout.names) + len(layout.limbs)
         self._rows = self._owner.keep(context.buffer(reserve=4 * _FLOATS * max(room, 1)))
-        self._arrays: dict[int, moderngl.VertexArray] = {}
+        self._arrays = self._owner.keep(VertexArrays(context))
         self._key: tuple[object, ...] | None = None
         self._numbers: Ints = self.elements
         self._measured: tuple[object, Floats] | None = None
@@ -174,21 +176,13 @@ class PointBuffers:
         self, program: moderngl.Program, capsule: tuple[moderngl.Buffer, moderngl.Buffer]
     ) -> moderngl.VertexArray:
         """Return the instanced capsules for a program."""
-        if id(program) not in self._arrays:
-            layout = "3f4 3f4 f4 4f4/i" if "in_color" in program else "3f4 3f4 f4 16x/i"
-            names = [
-                name for name in ("in_start", "in_end", "in_radius", "in_color") if name in program
-            ]
-            content = [(capsule[0], "4f4", "in_corner"), (self._rows, layout, *names)]
-            self._arrays[id(program)] = self.context.vertex_array(
-                program, content, index_buffer=capsule[1]
-            )
-        return self._arrays[id(program)]
+        layout = "3f4 3f4 f4 4f4/i" if "in_color" in program else "3f4 3f4 f4 16x/i"
+        names = [n for n in ("in_start", "in_end", "in_radius", "in_color") if n in program]
+        content = [(capsule[0], "4f4", "in_corner"), (self._rows, layout, *names)]
+        return self._arrays.get(program, lambda: content, capsule[1])
 
     def release(self) -> None:
         """Free the buffer."""
-        for array in self._arrays.values():
-            array.release()
         self._owner.release()
 
 
@@ -254,16 +248,12 @@ class PointPass:
         self.context.front_face = "ccw"
 
     def _draw_hidden(self, array: moderngl.VertexArray, count: int, opacity: float) -> None:
-        target = self.context.fbo
-        target.depth_mask = False
-        target.use()  # moderngl hands masks to OpenGL only then
         self.context.depth_func = ">"
         set_uniforms(array.program, {"u_opacity": opacity})
-        array.render(moderngl.TRIANGLES, instances=count)
+        with without_depth_writes(self.context):
+            array.render(moderngl.TRIANGLES, instances=count)
         set_uniforms(array.program, {"u_opacity": 1.0})
         self.context.depth_func = "<"
-        target.depth_mask = True
-        target.use()
 
     def release(self) -> None:
         """Free the capsule."""

@@ -6,9 +6,10 @@ from collections.abc import Callable
 
 import moderngl
 
+from viewer.rendering.gpu.draw_state import without_colors
 from viewer.rendering.options import DisplayOptions
 
-__all__ = ["draw_layer", "surface_opacity"]
+__all__ = ["draw_layer", "draw_nearest", "surface_opacity"]
 
 _XRAY_OPACITY = 0.4
 
@@ -37,13 +38,14 @@ def draw_layer(
     """
     if surface_opacity(options) == 1.0:
         draw()
-        return
-    target = context.fbo
-    target.color_mask = False, False, False, False
-    target.use()  # moderngl hands masks to OpenGL only then
-    draw()
-    target.color_mask = True, True, True, True
-    target.use()
+    else:
+        draw_nearest(context, draw)
+
+
+def draw_nearest(context: moderngl.Context, draw: Callable[[], object]) -> None:
+    """Draw something translucent twice: its depths, then what is nearest, as one layer."""
+    with without_colors(context):
+        draw()
     context.depth_func = "<="
     draw()
     context.depth_func = "<"

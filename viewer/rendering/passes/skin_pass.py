@@ -22,6 +22,7 @@ from viewer.rendering.gpu.upload import (
     write_matrices,
     write_rigid,
 )
+from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.kinematics import is_rigid, posed_skeleton
@@ -79,7 +80,7 @@ class PosedMesh:
         self._rigid: moderngl.Texture | None = None
         self._rest = self._owner.keep(RestBuffers(context, mesh, way))
         self.scalars = self._owner.keep(ScalarBuffer(context, mesh))
-        self._arrays: dict[tuple[object, ...], moderngl.VertexArray] = {}
+        self._arrays = self._owner.keep(VertexArrays(context))
         self._key: tuple[object, ...] | None = None
         self._is_affine = False
         self.n_updates = 0
@@ -160,12 +161,11 @@ class PosedMesh:
     def _array(self, method: str, skin: SkinBuffers, attached: bool) -> moderngl.VertexArray:
         # Rigid joints, by far the most common, get a program that does not pay for the others.
         affine = attached and self._is_affine
-        key = (method, affine, id(skin), attached and id(self._rest.positions))
-        if key not in self._arrays:
-            program = self.programs.feedback("skin", method, ("v_position", "v_normal"), affine)
-            attributes = self._rest.attributes(program, skin, attached)
-            self._arrays[key] = self.context.vertex_array(program, attributes)
-        return self._arrays[key]
+        program = self.programs.feedback("skin", method, ("v_position", "v_normal"), affine)
+        key = (id(skin), attached and id(self._rest.positions))
+        return self._arrays.get(
+            program, lambda: self._rest.attributes(program, skin, attached), key=key
+        )
 
     def read(self) -> tuple[Floats, Floats]:
         """Return what was drawn last: positions in figure space and normals, (V, 3) each.
@@ -178,8 +178,6 @@ class PosedMesh:
 
     def release(self) -> None:
         """Free what belongs to this actor alone."""
-        for array in self._arrays.values():
-            array.release()
         self._owner.release()
 
 

@@ -15,7 +15,7 @@ from viewer.rig.motion.evaluation import frames_of, world_frames
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Motion
 
-__all__ = ["Trail", "segments", "trail", "trail_times"]
+__all__ = ["MotionPath", "motion_path", "path_times", "segments"]
 
 _KEYED_RATE = 60.0  # points a second along curves, which have no frames of their own
 _MOST = 20_000  # points of one path along curves
@@ -23,7 +23,7 @@ _BLOCK = 1 << 14  # matrices at a time, which bounds the memory of long captures
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Trail:
+class MotionPath:
     """Where some joints of a figure are at F times.
 
     Attributes
@@ -41,7 +41,7 @@ class Trail:
     present: Bools
 
 
-def trail_times(motion: Motion) -> Floats:
+def path_times(motion: Motion) -> Floats:
     """Return the times at which a path is drawn: a capture's frames, 60 a second on curves."""
     if isinstance(motion, Clip):
         length = motion.end - motion.start
@@ -51,14 +51,14 @@ def trail_times(motion: Motion) -> Floats:
     return timing.start + np.arange(timing.n_frames) / timing.frame_rate
 
 
-def trail(
+def motion_path(
     figure: Figure,
     motion: Motion,
     joints: Sequence[int],
     times: Floats | None = None,
     base: Pose | None = None,
     min_confidence: float = 0.0,
-) -> Trail:
+) -> MotionPath:
     """Return the paths of joints, or of captured points.
 
     Parameters
@@ -70,7 +70,7 @@ def trail(
     joints : sequence of N int
         Joints, or points of a ``PointClip``.
     times : (F,), optional
-        Seconds of the motion's own clock; ``trail_times`` if omitted.
+        Seconds of the motion's own clock; ``path_times`` if omitted.
     base : Pose, optional
         Gives shape and place where the motion has none.
     min_confidence : float
@@ -81,10 +81,10 @@ def trail(
     RigError
         If the motion does not fit the figure.
     """
-    times = trail_times(motion) if times is None else np.asarray(times, dtype=np.float64)
+    times = path_times(motion) if times is None else np.asarray(times, dtype=np.float64)
     chosen: Ints = np.asarray(joints, dtype=np.int32)
     if isinstance(motion, PointClip):
-        return _point_trail(motion, chosen, times, min_confidence)
+        return _point_path(motion, chosen, times, min_confidence)
     points = np.zeros((len(times), len(chosen), 3))
     present = np.zeros((len(times), len(chosen)), dtype=np.bool_)
     count = 1 if figure.skeleton is None else figure.skeleton.n_joints
@@ -94,20 +94,22 @@ def trail(
         frames = frames_of(figure, motion, times[rows], base)
         points[rows] = world_frames(figure, frames)[:, chosen][..., :3, 3]
         present[rows] = frames.present[:, None]
-    return Trail(times, points, present)
+    return MotionPath(times, points, present)
 
 
-def _point_trail(motion: PointClip, chosen: Ints, times: Floats, min_confidence: float) -> Trail:
+def _point_path(
+    motion: PointClip, chosen: Ints, times: Floats, min_confidence: float
+) -> MotionPath:
     before, _, _ = motion.timing.locate(times)
     if not len(motion.points):
         nothing = np.zeros((len(times), len(chosen)), dtype=np.bool_)
-        return Trail(times, np.zeros((len(times), len(chosen), 3)), nothing)
+        return MotionPath(times, np.zeros((len(times), len(chosen), 3)), nothing)
     rows = motion.points[np.maximum(before, 0)][:, chosen]
     certain = (rows[..., 3] > 0.0) & (rows[..., 3] >= min_confidence)
-    return Trail(times, rows[..., :3], certain & (before >= 0)[:, None])
+    return MotionPath(times, rows[..., :3], certain & (before >= 0)[:, None])
 
 
-def segments(path: Trail) -> tuple[Floats, Floats, Ints]:
+def segments(path: MotionPath) -> tuple[Floats, Floats, Ints]:
     """Return the pieces between neighbouring times that both have the point: gaps break the line.
 
     Returns

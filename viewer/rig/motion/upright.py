@@ -65,7 +65,7 @@ def upright_actor(scene: Scene, actor: Actor) -> Actor:
     figure = actor.figure if actor.figure.up == up else replace(actor.figure, up=up)
     pose = actor.pose
     if hangs and pose is not None:
-        pose = _turned_over(actor.figure, pose)
+        pose = _rotated_upright(actor.figure, pose)
     points = actor.points
     if hangs and points is not None:
         points = points * np.append(_OVER, 1.0)  # confidences stay
@@ -74,7 +74,7 @@ def upright_actor(scene: Scene, actor: Actor) -> Actor:
     return replace(actor, figure=figure, pose=pose, points=points)
 
 
-def _turned_over(figure: Figure, pose: Pose) -> Pose:
+def _rotated_upright(figure: Figure, pose: Pose) -> Pose:
     """Return a pose turned by half a turn Q about x: R' = Q R and s l' + T' = Q (s l + T) at roots.
 
     The first root stays where it is within the figure, l' = l; the figure's translation T moves it.

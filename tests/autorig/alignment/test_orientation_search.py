@@ -1,0 +1,96 @@
+"""Candidates for an orientation, and the one that fits."""
+
+import numpy as np
+import pytest
+from autorig.rigged_shapes import tube, turn
+from numpy.testing import assert_allclose
+
+pytest.importorskip("scipy")
+
+from viewer.autorig.alignment.icp import Cloud
+from viewer.autorig.alignment.orientation_search import (
+    axis_direction,
+    axis_turns,
+    in_place,
+    search,
+    unit_scale,
+)
+from viewer.autorig.surface.samples import sample_surface
+from viewer.errors import RigError
+
+
+def cloud(positions, triangles):
+    return Cloud(
+        sample_surface(positions, triangles, 600), sample_surface(positions, triangles, 4000)
+    )
+
+
+def test_there_are_24_turns_of_a_cube_and_the_first_is_none():
+    turns = axis_turns("y")
+    assert len(turns) == 24 == len({turn.tobytes() for turn in turns})
+    assert_allclose(turns[0], np.eye(3))
+    assert all(np.linalg.det(turn) == pytest.approx(1.0) for turn in turns)
+
+
+def test_known_axes_leave_fewer_turns():
+    four = axis_turns("y", up="z")
+    assert len(four) == 4
+    assert all((turn @ [0, 1, 0] == [0, 0, 1]).all() for turn in four)
+    # Up and forward known: y to z, z to -y leaves x as it is.
+    (one,) = axis_turns("y", up="z", facing="-y")
+    assert_allclose(one, [[1, 0, 0], [0, 0, -1], [0, 1, 0]])
+    # Figures with z up face +x.
+    (one,) = axis_turns("z", up="y", facing="z")
+    assert_allclose(one @ [1, 0, 0], [0, 0, 1])
+
+
+def test_axes_that_contradict_each_other_are_refused():
+    with pytest.raises(RigError) as problem:
+        axis_turns("y", up="z", facing="-z")
+    assert str(problem.value) == "expected a facing across the up axis z, found -z"
+    with pytest.raises(RigError) as problem:
+        axis_turns("y", up="w")
+    assert str(problem.value) == 'expected an axis, one of x, y, z, -x, -y, -z, found "w"'
+
+
+def test_axis_direction_has_a_sign():
+    assert axis_direction("-z").tolist() == [0.0, 0.0, -1.0]
+
+
+@pytest.mark.parametrize(
+    ("ratio", "scale"),
+    [(0.9, 1.0), (1.2, 1.2), (110.0, 100.0), (0.0011, 0.001), (40.0, 39.37), (0.025, 1 / 39.37)],
+)
+def test_ratios_near_a_unit_are_that_unit(ratio, scale):
+    assert unit_scale(ratio) == pytest.approx(scale)
+
+
+def test_mesh_in_another_unit_and_axis_lies_in_place():
+    positions, triangles = tube()
+    quarter = turn([1, 0, 0], np.pi / 2)
+    other = cloud(1000.0 * positions @ quarter.T, triangles)
+    found = in_place(cloud(positions, triangles), other, axis_turns("y"), scaled=True)
+    assert found.placed.scale == 1000.0 and found.error < 0.01
+    assert_allclose(found.placed.rotation, quarter, atol=1e-15)
+
+
+def test_mesh_that_fits_hardly_better_turned_is_not_turned():
+    positions, triangles = tube()
+    turned = positions * [-1.0, 1.0, -1.0]
+    between = 0.46 * positions + 0.54 * turned  # from behind it is a little nearer
+    template, target = cloud(positions, triangles), cloud(between, triangles)
+    found = in_place(template, target, axis_turns("y"), scaled=False)
+    assert (found.placed.rotation == np.eye(3)).all()
+    found = in_place(template, cloud(turned, triangles), axis_turns("y"), scaled=False)
+    assert (found.placed.rotation == np.diag([-1.0, 1.0, -1.0])).all()
+
+
+def test_search_finds_a_turned_scaled_and_moved_mesh():
+    positions, triangles = tube()
+    rotation = turn([0.2, 1, 0.1], 2.2)
+    other = cloud(7.0 * positions @ rotation.T + [3.0, 4.0, 5.0], triangles)
+    shares = []
+    found = search(cloud(positions, triangles), other, axis_turns("y"), None, shares.append)
+    assert_allclose(found.placed.rotation, rotation, atol=0.02)
+    assert found.placed.scale == pytest.approx(7.0, rel=0.02)
+    assert shares == sorted(shares) and shares[-1] == 1.0

@@ -1,0 +1,87 @@
+"""A template that stands otherwise than the target: its joints find the target's pose."""
+
+import numpy as np
+import pytest
+from autorig.rigged_shapes import arm, turn
+from numpy.testing import assert_allclose
+
+pytest.importorskip("scipy")
+
+from viewer.autorig.alignment.icp import Triangles
+from viewer.autorig.alignment.pose_fit import fit_pose
+from viewer.autorig.alignment.proportions import limbs_of, resized
+from viewer.autorig.alignment.similarity import Similarity
+from viewer.rig.geometry.closest_point import Surface
+from viewer.rig.pose import joint_rotations, rest_pose
+from viewer.rig.skinning import deform
+
+ROTATION = turn([0.2, 1, 0.3], 1.5)
+START = Similarity(20.0, ROTATION, np.array([3.0, 4.0, 5.0]), np.ones(3))
+
+
+def fitted(target_figure, target_pose, figure, scales=True):
+    target = START.apply(deform(target_figure, target_pose)[0])
+    side = Triangles(target, figure.mesh.triangles, 1500)
+    pose = rest_pose(figure.skeleton)
+    shares = []
+    found = fit_pose(figure, pose, START, side, side, scales, shares.append)
+    assert shares == sorted(shares) and shares[0] == 0.0
+    assert (pose.dofs == rest_pose(figure.skeleton).dofs).all()
+    laid = found.placed.apply(deform(found.figure, found.pose)[0])
+    gaps = Surface(target, figure.mesh.triangles).closest(laid).distances
+    return found, gaps / (20.0 * 2.4)
+
+
+def bent(figure, angle=0.7):
+    pose = rest_pose(figure.skeleton)
+    pose.dofs[6:] = 0.0, 0.0, angle
+    return pose
+
+
+def angle_between(a, b):
+    return np.degrees(np.arccos(np.clip((np.trace(a.T @ b) - 1) / 2, -1, 1)))
+
+
+def test_bent_joint_is_found():
+    figure = arm()
+    found, gaps = fitted(figure, bent(figure), figure)
+    assert gaps.max() < 2e-3
+    wanted = joint_rotations(figure.skeleton, bent(figure))[1]
+    assert angle_between(joint_rotations(figure.skeleton, found.pose)[1], wanted) < 3.0
+    assert_allclose(np.degrees(np.linalg.norm(found.turned[1])), 40.1, atol=3.0)
+
+
+def test_dofs_stay_within_limits_and_quaternions_take_the_rest():
+    figure = arm(limit=0.2)
+    free = arm()
+    found, gaps = fitted(free, bent(free), figure)
+    assert gaps.max() < 2e-3
+    assert np.abs(found.pose.dofs[6:]).max() <= 0.2
+    assert angle_between(np.eye(3), joint_rotations(figure.skeleton, found.pose)[1]) > 35.0
+
+
+def test_longer_limb_is_found():
+    figure = arm()
+    longer = resized(figure, limbs_of(figure), np.array([1.0, 1.3]), np.ones(2))
+    found, gaps = fitted(longer, bent(longer), figure)
+    assert np.sqrt(np.mean(gaps**2)) < 2e-3
+    # How much the whole grew is for all limbs: only their ratio is known.
+    along = found.grown[0]
+    assert_allclose(along[1] - along[0], np.log(1.3), atol=0.08)
+
+
+def test_size_is_kept_if_it_is_known():
+    figure = arm()
+    found, _ = fitted(figure, bent(figure, 0.3), figure, scales=False)
+    assert_allclose(found.placed.scale, 20.0, rtol=1e-6)
+    assert np.abs(found.grown).max() < 1e-6
+
+
+def test_too_few_pairs_leave_the_template_as_it_is():
+    figure = arm()
+    far = START.apply(deform(figure)[0]) + 1000.0
+    side = Triangles(far, figure.mesh.triangles, 500)
+    pose = rest_pose(figure.skeleton)
+    found = fit_pose(figure, pose, START, side, side, True, lambda share: None)
+    assert found.placed is START
+    assert (found.pose.dofs == pose.dofs).all() and not found.turned.any()

@@ -1,0 +1,206 @@
+"""Alignment with pose and proportions: people with lowered arms, of other sizes, from behind."""
+
+import re
+
+import numpy as np
+import pytest
+from autorig.rigged_shapes import arm, mesh_of, turn
+from numpy.testing import assert_allclose
+
+pytest.importorskip("scipy")
+
+from viewer.autorig.alignment import posed_alignment
+from viewer.autorig.alignment.pose_fit import Fitted
+from viewer.autorig.alignment.posed_alignment import align_posed
+from viewer.autorig.alignment.similarity import Similarity
+from viewer.autorig.alignment.surface_alignment import AlignmentSettings
+from viewer.loading import bundled_body, load
+from viewer.rig.pose import rest_pose
+from viewer.rig.skinning import deform, joint_matrices
+
+LANDMARKS = np.array([[[0, 0, 0]] * 2, [[1, 0, 0]] * 2, [[0, 0, 1]] * 2], dtype=float)
+
+
+def silent(share, what):
+    pass
+
+
+def aligned(figure, target, fits=True, report=silent, **settings):
+    pose = rest_pose(figure.skeleton)
+    return align_posed(figure, pose, target, AlignmentSettings(**settings), fits, report), pose
+
+
+@pytest.fixture(scope="module")
+def standing():
+    """The bundled body with lowered arms and longer legs, turned to face -z."""
+    figure = load(bundled_body()).actors[0].figure
+    pose = rest_pose(figure.skeleton)
+    names = figure.skeleton.names
+    for side, sign in (("left", -1.0), ("right", 1.0)):
+        pose.dofs[3 * names.index(f"{side}_shoulder") + 2] = sign * 0.8
+    pose.shape_weights = np.zeros(figure.n_shapes)
+    pose.shape_weights[figure.blend_shapes.names.index("leg length")] = 2.0
+    half_turn = np.array([-1.0, 1.0, -1.0])
+    positions = deform(figure, pose)[0] * half_turn
+    return (
+        figure,
+        mesh_of(positions, figure.mesh.triangles),
+        joint_matrices(figure, pose)[:, :3, 3] * half_turn,
+    )
+
+
+def test_person_with_lowered_arms_is_found_from_behind(standing):
+    figure, target, joints = standing
+    found, pose = aligned(figure, target)
+    assert found.alignment.how == "fit"
+    assert_allclose(found.alignment.placed.rotation @ [0, 0, 1], [0, 0, -1], atol=0.1)
+    size = np.linalg.norm(np.ptp(target.positions, axis=0))
+    laid = found.alignment.placed.apply(found.positions)
+    assert np.linalg.norm(laid - target.positions, axis=1).mean() < 0.01 * size
+    places = found.alignment.placed.apply(joint_matrices(found.figure, found.pose)[:, :3, 3])
+    assert np.linalg.norm(places - joints, axis=1).max() < 0.02 * size
+    assert found.figure.mesh is not figure.mesh and found.pose is not pose
+    assert len(found.lines) == 2
+    assert found.lines[0].startswith("pose: the template's joints turned to fit, ")
+
+
+def test_person_whose_mesh_is_inside_out_is_found_alike(standing):
+    figure, target, joints = standing
+    found, _ = aligned(figure, mesh_of(target.positions, target.triangles[:, ::-1]))
+    assert found.alignment.how == "fit"
+    size = np.linalg.norm(np.ptp(target.positions, axis=0))
+    places = found.alignment.placed.apply(joint_matrices(found.figure, found.pose)[:, :3, 3])
+    assert np.linalg.norm(places - joints, axis=1).max() < 0.02 * size
+
+
+def test_facing_that_is_given_is_kept(standing):
+    figure, target, _ = standing
+    found, _ = aligned(figure, target, facing="z")
+    assert (found.alignment.placed.rotation @ [0, 0, 1])[2] > 0.9
+
+
+def test_template_is_left_alone_where_that_is_asked(standing):
+    figure, target, _ = standing
+    found, pose = aligned(figure, target, fits=False)
+    assert found.pose is pose and found.figure is figure and found.lines == ()
+
+
+def test_template_that_fits_is_left_alone():
+    figure = arm()
+    found, pose = aligned(figure, figure.mesh)
+    assert found.pose is pose and found.figure is figure and found.lines == ()
+    assert found.alignment.how == "in place"
+
+
+def test_shell_that_stands_off_evenly_is_not_fitted():
+    figure = arm()
+    shell = mesh_of(figure.mesh.positions + 0.03 * figure.mesh.normals, figure.mesh.triangles)
+    found, pose = aligned(figure, shell)
+    assert found.pose is pose and found.figure is figure
+    assert (found.alignment.placed.matrix == np.eye(4)).all()
+
+
+def test_scales_of_axes_keep_the_pose():
+    figure = arm()
+    pose = rest_pose(figure.skeleton)
+    pose.dofs[6:] = 0.0, 0.0, 0.8
+    target = mesh_of(deform(figure, pose)[0] * [1.2, 1.0, 0.9], figure.mesh.triangles)
+    found, own = aligned(figure, target, scale="axes")
+    assert found.pose is own and found.figure is figure
+
+
+@pytest.mark.parametrize("own", [False, True])
+def test_stretched_target_gets_a_scale_along_each_axis(own):
+    figure = load(bundled_body()).actors[0].figure
+    target = mesh_of(figure.mesh.positions * [1.3, 1.0, 0.8], figure.mesh.triangles)
+    whose, cure = "the target's", "ask for it (--scale axes)"
+    rotation = np.eye(3)
+    if own:
+        whose, cure = "its own", "fit proportions"
+        rotation = turn([0, 1, 0], 0.5)
+        target = mesh_of(target.positions @ rotation.T, target.triangles)
+    found, pose = aligned(figure, target)
+    assert found.alignment.how == "fit" and found.pose is pose
+    wanted = rotation @ np.diag([1.3, 1.0, 0.8])
+    assert_allclose(found.alignment.placed.linear, wanted, atol=0.005)
+    assert [re.sub(r"[\d.]+", "N", line) for line in found.lines] == [
+        f"proportions: the template stretched by N, N, N along {whose} x, y and z, pose kept",
+        "that leaves a gap of N % of the size, before N %",
+    ]
+    unfitted, _ = aligned(figure, target, fits=False)
+    (line,) = unfitted.lines
+    told = re.fullmatch(
+        rf"warning: stretched by (.+) along {whose} x, y and z, the template fits much better, "
+        rf"with a gap of 0\.\d+ % instead of \d\.\d+ %: if the target was stretched, (.+)",
+        line,
+    )
+    assert_allclose([float(each) for each in told[1].split(", ")], [1.3, 1.0, 0.8], atol=0.005)
+    assert told[2] == cure
+
+
+def test_scales_that_are_known_are_not_looked_for():
+    figure = load(bundled_body()).actors[0].figure
+    target = mesh_of(figure.mesh.positions * [1.3, 1.0, 0.8], figure.mesh.triangles)
+    asked, _ = aligned(figure, target, fits=False, scale="axes")
+    assert asked.lines == ()
+    assert_allclose(asked.alignment.placed.linear, np.diag([1.3, 1.0, 0.8]), atol=0.003)
+    known, _ = aligned(figure, target, fits=False, scale="none")
+    assert known.lines == ()
+
+
+def bent(angle):
+    figure = arm()
+    pose = rest_pose(figure.skeleton)
+    pose.dofs[8] = angle
+    return figure, pose, mesh_of(deform(figure, pose)[0], figure.mesh.triangles)
+
+
+def fit_of(figure, pose, angle):
+    """Return what a fit comes to that turned the tip by an angle, and then stopped."""
+    turned = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, angle]])
+    placed = Similarity(1.0, np.eye(3), np.zeros(3), np.ones(3))
+    return Fitted(figure, pose, placed, turned, np.zeros((2, 2)))
+
+
+@pytest.mark.parametrize(
+    ("target", "reached", "lines"),
+    [
+        (1.5, 1.38, ("warning: pose: not fitted, as that would leave a gap of G % of the size, "
+                     "before G %, with tip turned by 79 degrees: is the template of the same kind "
+                     "as the target?",)),
+        (0.9, 0.7, ("pose: the template's joints turned to fit, tip by 40 degrees; its limbs "
+                    "resized, base by +0 % in length",
+                    "warning: that leaves a gap of G % of the size, before G %: is the template of "
+                    "the same kind as the target?")),
+        (1.5, 1.5, ("pose: the template's joints turned to fit, tip by 86 degrees; its limbs "
+                    "resized, base by +0 % in length",
+                    "that leaves a gap of G % of the size, before G %")),
+        (1.5, 0.1, ("pose: not fitted, as that would leave a gap of G % of the size, "
+                    "before G %",)),
+    ],
+)  # fmt: skip
+def test_fit_that_leaves_a_gap_is_doubted_or_left(monkeypatch, target, reached, lines):
+    figure, _, mesh = bent(target)
+    half = bent(reached)[1]
+    monkeypatch.setattr(posed_alignment, "fit_pose", lambda *_: fit_of(figure, half, reached))
+    found, own = aligned(figure, mesh, landmarks=LANDMARKS, refines=False)
+    assert tuple(re.sub(r"\d+\.\d+", "G", line) for line in found.lines) == lines
+    assert (found.pose is own) == ("not fitted" in lines[0])
+
+
+def test_progress_rises_and_cancels(standing):
+    figure, target, _ = standing
+
+    class CancelledError(RuntimeError):
+        pass
+
+    shares = []
+
+    def report(share, what):
+        shares.append(share)
+        if what == "pose" and share > 0.6:
+            raise CancelledError
+
+    with pytest.raises(CancelledError):
+        aligned(figure, target, report=report)
+    assert shares == sorted(shares) and shares[0] == 0.0

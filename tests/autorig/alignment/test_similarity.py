@@ -1,0 +1,66 @@
+"""Similarities: fitted to pairs that one was made from, and to pairs worked out by hand."""
+
+import numpy as np
+import pytest
+from autorig.rigged_shapes import turn
+from numpy.testing import assert_allclose
+
+from viewer.autorig.alignment.similarity import Similarity, fit_similarity
+from viewer.errors import RigError
+
+EXACT = 1e-12
+
+
+def cloud(count=20):
+    return np.random.default_rng(3).normal(size=(count, 3))
+
+
+def test_fit_finds_the_similarity_that_pairs_were_made_with():
+    rotation, points = turn([1, 2, -1], 2.5), cloud()
+    found = fit_similarity(points, 40.0 * points @ rotation.T + [1.0, -2.0, 3.0])
+    assert_allclose(found.rotation, rotation, atol=EXACT)
+    assert_allclose(found.scale, 40.0, rtol=EXACT)
+    assert_allclose(found.shift, [1.0, -2.0, 3.0], atol=1e-10)
+
+
+def test_fit_never_mirrors():
+    points = cloud()
+    found = fit_similarity(points, points * [-1.0, 1.0, 1.0])
+    assert_allclose(np.linalg.det(found.rotation), 1.0, atol=EXACT)
+
+
+def test_kept_scale_stays_and_the_rest_is_fitted():
+    # Two lengths, 1 and 3, of which the fit may only move the middle.
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    found = fit_similarity(points, 3.0 * points, scale=1.0)
+    assert found.scale == 1.0
+    assert_allclose(found.shift, [2 / 3, 2 / 3, 0.0], atol=EXACT)
+
+
+def test_matrix_scales_after_turning_and_undo_is_its_inverse():
+    placed = Similarity(2.0, turn([0, 0, 1], np.pi / 2), np.array([1.0, 0, 0]), [1, 2, 0.5])
+    assert_allclose(placed.apply(np.array([1.0, 0, 1])), [1.0, 4.0, 1.0], atol=EXACT)
+    assert_allclose(placed.matrix @ [1, 0, 1, 1], [1.0, 4.0, 1.0, 1.0], atol=EXACT)
+    assert_allclose(placed.undo(placed.apply(cloud())), cloud(), atol=EXACT)
+
+
+@pytest.mark.parametrize(
+    ("points", "message"),
+    [
+        (np.eye(3)[:2], "alignment: expected 3 or more pairs of points, found 2 and 2"),
+        (
+            np.array([[0.0, 0, 0], [1, 1, 1], [3, 3, 3]]),
+            "alignment: expected points in a plane or in space, found them in line",
+        ),
+    ],
+)
+def test_pairs_that_leave_a_free_turn_are_refused(points, message):
+    with pytest.raises(RigError) as problem:
+        fit_similarity(points, points)
+    assert str(problem.value) == message
+
+
+def test_scale_of_nothing_is_refused():
+    with pytest.raises(RigError) as problem:
+        Similarity(0.0, np.eye(3), np.zeros(3), np.ones(3))
+    assert str(problem.value) == "alignment: expected a scale above 0, found 0"

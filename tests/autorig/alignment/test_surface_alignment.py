@@ -1,0 +1,207 @@
+"""Alignment as a whole: left alone, searched, by landmarks, given; and what is said of it."""
+
+import numpy as np
+import pytest
+from autorig.rigged_shapes import tube, turn
+from numpy.testing import assert_allclose
+
+pytest.importorskip("scipy")
+
+from viewer.autorig.alignment.similarity import Similarity
+from viewer.autorig.alignment.surface_alignment import (
+    Alignment,
+    AlignmentSettings,
+    Posed,
+    align,
+    alignment_lines,
+    similarity_of,
+)
+from viewer.errors import RigError
+from viewer.rig.mesh import vertex_normals
+
+POSITIONS, TRIANGLES = tube()
+TEMPLATE = Posed(POSITIONS, TRIANGLES)
+
+
+def silent(share, what):
+    pass
+
+
+def aligned(positions, triangles=TRIANGLES, report=silent, up="y", **settings):
+    return align(TEMPLATE, Posed(positions, triangles), up, AlignmentSettings(**settings), report)
+
+
+def test_target_in_place_is_left_alone():
+    found = aligned(POSITIONS)
+    assert found.how == "in place"
+    assert (found.placed.matrix == np.eye(4)).all() and found.error < 1e-12
+
+
+def test_part_in_place_is_left_alone_although_it_stands_off():
+    # A shirt: the middle of the tube, 2 % of its size away from it.
+    middle = (POSITIONS[TRIANGLES][:, :, 1] > 0.5).all(axis=1)
+    middle &= (POSITIONS[TRIANGLES][:, :, 1] < 1.5).all(axis=1)
+    shirt = POSITIONS * [1.06, 1.0, 1.06]
+    used, corners = np.unique(TRIANGLES[middle], return_inverse=True)
+    found = aligned(shirt[used], corners.reshape(-1, 3).astype(np.int32))
+    assert found.how == "in place"
+    assert (found.placed.matrix == np.eye(4)).all()
+    assert found.away > 0.05 > found.error
+
+
+def test_shell_in_place_is_left_alone_although_a_larger_template_is_nearer():
+    # Evenly 2 % of the size away all round: a larger tube would be nearer nearly everywhere.
+    normals = vertex_normals(POSITIONS, TRIANGLES)
+    found = aligned(POSITIONS + 0.05 * normals)
+    assert found.how == "in place"
+    assert (found.placed.matrix == np.eye(4)).all()
+    assert found.error > 0.015 and max(found.uneven) < 0.005
+
+
+def test_turned_scaled_and_moved_target_is_found_exactly():
+    rotation = turn([0.3, 1, -0.2], 2.0)
+    found = aligned(130.0 * POSITIONS @ rotation.T + [5.0, 6.0, 7.0])
+    assert found.how == "search" and found.error < 1e-9
+    assert_allclose(found.placed.rotation, rotation, atol=1e-8)
+    assert_allclose(found.placed.scale, 130.0, rtol=1e-8)
+    assert_allclose(found.placed.shift, [5.0, 6.0, 7.0], atol=1e-6)
+
+
+def test_small_turn_is_undone_although_the_boxes_nearly_agree():
+    rotation = turn([0, 1, 0], 0.3)
+    found = aligned(POSITIONS @ rotation.T)
+    assert found.how == "search"
+    assert_allclose(found.placed.rotation, rotation, atol=1e-8)
+
+
+def test_template_keeps_its_size_if_asked():
+    rotation = turn([0, 1, 0], 0.4)
+    found = aligned(POSITIONS @ rotation.T + [0.5, 0, 0], scale="none")
+    assert found.placed.scale == 1.0
+    assert_allclose(found.placed.rotation, rotation, atol=1e-8)
+
+
+def test_axes_get_scales_of_their_own_if_asked():
+    found = aligned(POSITIONS * [1.15, 1.0, 0.9] + [1.0, 0, 0], scale="axes")
+    assert_allclose(found.placed.scale * found.placed.factors, [1.15, 1.0, 0.9], atol=0.02)
+    assert (found.placed.factors != 1.0).any()
+
+
+def test_landmarks_alone_decide_without_refinement():
+    rotation = turn([0, 0, 1], 1.1)
+    points = POSITIONS[[3, 50, 200, 300]]
+    pairs = np.stack([points, 2.0 * points @ rotation.T + [9.0, 0, 0]], axis=1)
+    found = aligned(POSITIONS, landmarks=pairs, refines=False)
+    assert found.how == "landmarks"
+    assert_allclose(found.placed.rotation, rotation, atol=1e-12)
+    assert_allclose(found.placed.scale, 2.0, rtol=1e-12)
+
+
+def test_rough_landmarks_are_refined():
+    rotation = turn([0, 1, 0], 2.0)
+    target = POSITIONS @ rotation.T + [1.0, 2.0, 3.0]
+    rough = target[[3, 50, 200, 300]] + np.random.default_rng(1).normal(0, 0.05, (4, 3))
+    pairs = np.stack([POSITIONS[[3, 50, 200, 300]], rough], axis=1)
+    found = aligned(target, landmarks=pairs)
+    assert_allclose(found.placed.rotation, rotation, atol=1e-8)
+
+
+def test_given_matrix_is_taken_as_it_is():
+    matrix = np.eye(4)
+    matrix[:3, :3] *= 3.0
+    matrix[:3, 3] = 1.0
+    found = aligned(POSITIONS, matrix=matrix)
+    assert found.how == "given"
+    assert_allclose(found.placed.matrix, matrix, atol=1e-12)
+
+
+def test_cancelling_from_the_report_ends_the_search():
+    class CancelledError(RuntimeError):
+        pass
+
+    def cancel(share, what):
+        if share > 0.3:
+            raise CancelledError
+
+    with pytest.raises(CancelledError):
+        aligned(POSITIONS @ turn([0, 1, 0], 0.3).T, report=cancel)
+
+
+def test_progress_rises():
+    shares = []
+    aligned(POSITIONS @ turn([0, 1, 0], 0.3).T, report=lambda share, what: shares.append(share))
+    assert shares == sorted(shares) and shares[0] == 0.0 and shares[-1] <= 1.0
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"scale": "some"}, 'scale: expected uniform, axes, none, found "some"'),
+        ({"landmarks": np.zeros((2, 2, 3))}, "landmarks: expected 3 or more pairs, found 2"),
+        ({"landmarks": np.zeros((3, 3))}, "landmarks: expected shape any x 2 x 3, found 3 x 3"),
+    ],
+)
+def test_settings_that_make_no_sense_are_refused(settings, message):
+    with pytest.raises(RigError) as problem:
+        AlignmentSettings(**settings)
+    assert str(problem.value) == message
+
+
+def test_matrices_that_mirror_or_shear_are_refused():
+    with pytest.raises(RigError) as problem:
+        similarity_of(np.diag([1.0, 1, -1, 1]))
+    assert str(problem.value) == ("alignment: expected a matrix that does not mirror or flatten")
+    shear = np.eye(4)
+    shear[0, 1] = 0.5
+    with pytest.raises(RigError) as problem:
+        similarity_of(shear)
+    assert str(problem.value) == (
+        "alignment: expected a rotation, a shift, and one scale or one along each axis, found a "
+        "shear"
+    )
+
+
+def test_matrices_that_stretch_along_either_spaces_axes_are_taken():
+    rotation = turn([1, 2, 3], 0.7)
+    stretch, matrix = np.diag([1.2, 1.0, 0.7]), np.eye(4)
+    matrix[:3, 3] = 4.0, 5.0, 6.0
+    for linear, stretched, plain in (
+        (stretch @ rotation, "factors", "own_factors"),
+        (rotation @ stretch, "own_factors", "factors"),
+    ):
+        matrix[:3, :3] = 3.0 * linear
+        found = similarity_of(matrix)
+        assert_allclose(found.matrix, matrix, atol=1e-12)
+        assert_allclose(found.rotation, rotation, atol=1e-12)
+        assert_allclose(found.scale * getattr(found, stretched), [3.6, 3.0, 2.1])
+        assert (getattr(found, plain) == 1.0).all() and not found.is_plain
+
+
+@pytest.mark.parametrize(
+    ("scale", "angle", "words"),
+    [
+        (1.0, 0.0, "the target lies on the template as it is; scale 1, turned by 0.00 degrees"),
+        (
+            1000.0,
+            np.pi / 2,
+            "the template is scaled and turned about the origin that both share; scale 1000, "
+            "turned by 90.00 degrees",
+        ),
+    ],
+)
+def test_lines_of_a_shared_origin_say_whether_anything_was_done(scale, angle, words):
+    placed = Similarity(scale, turn([1, 0, 0], angle), np.zeros(3), np.ones(3))
+    lines = alignment_lines(Alignment(placed, 0.0, 0.0, (0.0, 0.0), "in place"))
+    assert lines[0] == f"alignment: {words}, shift (0, 0, 0)"
+
+
+def test_lines_tell_everything_and_warn_of_a_bad_fit():
+    placed = Similarity(2.0, turn([0, 1, 0], np.pi / 2), np.array([1.0, 0, -2]), np.ones(3))
+    lines = alignment_lines(Alignment(placed, 0.05, 0.1, (0.05, 0.1), "search"))
+    assert lines == [
+        "alignment: found by closest points; scale 2, turned by 90.00 degrees, shift (1, 0, -2)",
+        "alignment error: 5.000 % of the target's size (RMS of the best 90 %; template to target "
+        "10.000 %)",
+        "warning: the alignment is doubtful, above 3 %: give --up, --facing or landmarks, or pose "
+        "the template like the target",
+    ]

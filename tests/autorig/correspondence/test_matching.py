@@ -1,0 +1,130 @@
+import math
+
+import numpy as np
+import pytest
+
+from viewer.autorig.correspondence.matching import MatchSettings, Template, match, sheet_normals
+from viewer.autorig.surface.welding import weld
+from viewer.errors import RigError
+
+pytest.importorskip("scipy")
+
+FLAT = Template(
+    np.array([[-9.0, -9, 0], [9, -9, 0], [9, 9, 0], [-9, 9, 0]]), np.array([[0, 1, 2], [0, 2, 3]])
+)  # faces +z
+
+
+def triangle(height=0.0, tilt=0.0, flipped=False):
+    """Return a triangle about the z axis: raised, turned about x, facing +z if not flipped."""
+    positions = 0.1 * np.array([[1.0, 0, 0], [-0.5, 0.8, 0], [-0.5, -0.8, 0]])
+    turn = np.array(
+        [[1, 0, 0], [0, math.cos(tilt), -math.sin(tilt)], [0, math.sin(tilt), math.cos(tilt)]]
+    )
+    corners = [[0, 2, 1]] if flipped else [[0, 1, 2]]
+    return weld(positions @ turn.T + [0, 0, height], np.array(corners))
+
+
+def test_match_accepts_by_distance():
+    # 5 % of a size of 10.
+    assert match(FLAT, triangle(0.499), 10.0, MatchSettings()).matched.all()
+    found = match(FLAT, triangle(0.501), 10.0, MatchSettings())
+    assert not found.matched.any()
+    np.testing.assert_allclose(found.points.distances, 0.501, atol=1e-12)
+
+
+def test_match_accepts_by_angle():
+    for degrees, expected in ((29.0, True), (31.0, False)):
+        found = match(FLAT, triangle(0.3, math.radians(degrees)), 10.0, MatchSettings())
+        assert found.matched.tolist() == [expected] * 3
+        np.testing.assert_allclose(np.degrees(found.angles), degrees, atol=1e-9)
+
+
+def test_match_accepts_wider_angles_where_the_surfaces_touch():
+    # All corners within 0.1, that is 0.5 % of 20.
+    for degrees, expected in ((59.0, True), (61.0, False)):
+        found = match(FLAT, triangle(0.0, math.radians(degrees)), 20.0, MatchSettings())
+        assert found.matched.tolist() == [expected] * 3
+
+
+def test_match_turns_an_island_round_that_is_inside_out():
+    found = match(FLAT, triangle(0.3, flipped=True), 10.0, MatchSettings())
+    assert found.matched.all()
+    assert found.inside_out.tolist() == [0]
+    np.testing.assert_allclose(found.angles, 0.0, atol=1e-7)
+
+
+def test_match_turns_no_island_round_whose_smaller_part_is_folded_over():
+    positions = np.array([[0.0, 0, 0.3], [1, 0, 0.3], [1, 1, 0.3], [0, 1, 0.3], [0.5, 0.9, 0.3]])
+    triangles = np.array([[0, 1, 2], [0, 2, 3], [2, 3, 4]])
+    # The last triangle lies on the others; vertex 4 alone faces only down.
+    found = match(FLAT, weld(positions, triangles), 10.0, MatchSettings())
+    assert found.inside_out.tolist() == []
+    assert not found.matched[4] or found.angles[4] < math.radians(30)
+
+
+def test_match_lets_flipped_normals_count_if_asked():
+    # A strip of two triangles that face up and two that face down.
+    positions = np.array([[x, 0.5 * (x % 2), 0.3] for x in range(6)]) * [0.2, 1, 1]
+    mesh = weld(positions, np.array([[0, 2, 1], [1, 2, 3], [2, 3, 4], [3, 5, 4]]))
+    as_given = match(FLAT, mesh, 10.0, MatchSettings())
+    assert as_given.inside_out.tolist() == []
+    # Vertex 0 and 1 have only triangles facing up, 4 and 5 only such facing down.
+    assert as_given.matched[[0, 1]].tolist() == [True, True]
+    assert as_given.matched[[4, 5]].tolist() == [False, False]
+    either = match(FLAT, mesh, 10.0, MatchSettings(flipped_normals=True))
+    assert either.matched.all()
+    np.testing.assert_allclose(either.angles, 0.0, atol=1e-7)
+
+
+def test_match_judges_vertices_without_normal_by_distance_alone():
+    positions = np.array([[0.0, 0, 0.4], [3, 3, 0.6], [1, 0, 0], [2, 0, 0], [2, 1, 0]])
+    found = match(FLAT, weld(positions, np.array([[2, 3, 4]])), 10.0, MatchSettings())
+    assert found.matched.tolist() == [True, False, True, True, True]
+    assert found.angles[:2].tolist() == [0.0, 0.0]
+
+
+def test_match_takes_the_side_of_a_thin_sheet_that_faces_the_same_way():
+    # The template is a plate of thickness 0.02; the target its upper side, sunk below the middle.
+    x = np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]])
+    upper = np.column_stack([x, np.full(4, 0.01)])
+    lower = np.column_stack([x, np.full(4, -0.01)])
+    plate = Template(
+        np.concatenate([upper, lower]), np.array([[0, 1, 2], [0, 2, 3], [4, 6, 5], [4, 7, 6]])
+    )
+    # One island of two triangles: right way up far right, sunk on the left.
+    target = weld(
+        np.array([[-0.5, -0.2, -0.006], [-0.3, -0.2, -0.006], [-0.4, 0.2, -0.006],
+                  [0.5, -0.2, 0.01], [0.7, -0.2, 0.01], [0.6, 0.2, 0.01], [0.55, 0.3, 0.01],
+                  [0.6, -0.4, 0.01]]),
+        np.array([[0, 1, 2], [1, 3, 2], [3, 4, 5], [3, 5, 6], [3, 7, 4]]),
+    )  # fmt: skip
+    found = match(plate, target, 4.0, MatchSettings())  # near is 0.02
+    assert found.inside_out.tolist() == []
+    assert found.matched.all()
+    np.testing.assert_allclose(found.points.positions[:, 2], 0.01, atol=1e-12)
+    np.testing.assert_allclose(found.points.distances[:3], 0.016, atol=1e-12)
+    far = match(plate, target, 4.0, MatchSettings(near_distance=0.003))  # 0.012 < 0.016
+    assert far.matched.tolist() == [False] * 3 + [True] * 5
+
+
+def test_sheet_normals_of_two_sides_cancel_out():
+    positions = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [2, 2, 2]])
+    normals = sheet_normals(weld(positions, np.array([[0, 1, 2], [0, 2, 1]])))
+    assert normals.tolist() == np.zeros((4, 3)).tolist()
+    normals = sheet_normals(weld(positions, np.array([[0, 1, 2]])))
+    assert normals.tolist() == [[0.0, 0.0, 1.0]] * 3 + [[0.0, 0.0, 0.0]]
+
+
+def test_template_has_smooth_normals_across_seams():
+    positions = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0], [0, 1, 0], [0, 0, 1.0]])
+    template = Template(positions, np.array([[0, 1, 2], [3, 4, 5]]))  # face +z and +x
+    half = math.sqrt(0.5)
+    np.testing.assert_allclose(template.normals[[0, 3]], [[half, 0, half]] * 2, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["max_distance", "max_angle", "near_distance", "near_angle"])
+@pytest.mark.parametrize("value", [-0.1, math.nan, math.inf])
+def test_match_settings_refuse_odd_numbers(name, value):
+    with pytest.raises(RigError) as caught:
+        MatchSettings(**{name: value})
+    assert str(caught.value) == f"{name}: expected a number of at least 0, found {value}"

@@ -1,0 +1,80 @@
+"""Vertices that two meshes share, and vertices that only lie close to each other."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+pytest.importorskip("scipy")
+
+from viewer.autorig.correspondence.same_vertices import at_vertices, same_vertices
+from viewer.autorig.surface.welding import weld
+from viewer.rig.geometry.closest_point import Surface
+
+COUNT = 9
+
+
+def grid(step=1.0, start=0.0):
+    """Return a square of two triangles a cell in the plane z = 0."""
+    line = start + step * np.arange(COUNT)
+    x, y = np.meshgrid(line, line, indexing="ij")
+    positions = np.stack([x.ravel(), y.ravel(), np.zeros(COUNT * COUNT)], axis=1)
+    number = np.arange(COUNT * COUNT).reshape(COUNT, COUNT)
+    a, b, c, d = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
+    triangles = np.concatenate([np.stack([a, b, c], -1), np.stack([a, c, d], -1)])
+    return positions, triangles.reshape(-1, 3).astype(np.int32)
+
+
+def found(template, target):
+    distances = Surface(*template).closest(target[0]).distances
+    one, other = weld(*template), weld(*target)
+    return same_vertices(one, other, distances)
+
+
+def test_moved_vertices_are_known_again_in_any_order():
+    rng = np.random.default_rng(4)
+    positions, triangles = grid()
+    order = rng.permutation(len(positions))
+    rank = np.argsort(order)
+    moved = positions[order] + rng.uniform(-0.2, 0.2, positions.shape)
+    assert (found((positions, triangles), (moved, rank[triangles].astype(np.int32))) == order).all()
+
+
+def test_shell_that_stands_off_still_has_the_same_vertices():
+    positions, triangles = grid()
+    lifted = positions + np.array([0.0, 0.0, 3.0])
+    assert (found((positions, triangles), (lifted, triangles)) == np.arange(81)).all()
+
+
+@pytest.mark.parametrize(("step", "start"), [(0.5, 0.0), (1.0, 0.5), (2.0, 0.0)])
+def test_another_tessellation_has_other_vertices(step, start):
+    same = found(grid(), grid(step, start))
+    assert (same >= 0).mean() < 0.05
+
+
+def test_turned_tessellation_has_other_vertices():
+    positions, triangles = grid()
+    cosine, sine = np.cos(0.5), np.sin(0.5)
+    turned = (positions - 4.0) @ np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]]) + 4.0
+    same = found((positions, triangles), (turned, triangles))
+    assert (same >= 0).mean() < 0.2  # those about the middle of the turn
+
+
+def test_points_move_to_the_vertices_and_others_stay():
+    positions, triangles = grid()
+    asked = np.array([[0.2, 0.1, 1.0], [3.4, 3.3, 0.0]])
+    points = Surface(positions, triangles).closest(asked)
+    moved = at_vertices(points, asked, triangles, positions, np.array([0, -1]))
+    assert_allclose(moved.positions, [[0, 0, 0], [3.4, 3.3, 0]], atol=1e-12)
+    assert_allclose(moved.distances, [np.sqrt(1.05), 0.0], atol=1e-12)
+    corner = triangles[moved.triangles[0]][moved.barycentric[0].argmax()]
+    assert corner == 0 and sorted(moved.barycentric[0]) == [0, 0, 1]
+    assert moved.triangles[1] == points.triangles[1]
+
+
+def test_vertex_of_no_triangle_is_no_place_on_the_surface():
+    positions, triangles = grid()
+    places = np.concatenate([positions, [[0.1, 0.1, 0.0]]])
+    asked = np.array([[0.1, 0.1, 0.0]])
+    points = Surface(positions, triangles).closest(asked)
+    same = at_vertices(points, asked, triangles, places, np.array([81]))
+    assert_allclose(same.positions, asked, atol=1e-12)

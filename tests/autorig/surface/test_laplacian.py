@@ -1,0 +1,126 @@
+import numpy as np
+import pytest
+
+from viewer.autorig.surface.laplacian import (
+    cotangent_laplacian,
+    graph_laplacian,
+    laplacian,
+    voronoi_areas,
+)
+from viewer.autorig.surface.welding import weld
+from viewer.rig.mesh import triangle_areas
+
+pytest.importorskip("scipy")
+
+ROUNDING = 1e-12
+
+
+def grid(count, rng=None):
+    """Return a flat grid of count x count vertices, the inner ones shaken."""
+    x, y = np.meshgrid(np.arange(count, dtype=float), np.arange(count, dtype=float))
+    positions = np.stack([x.ravel(), y.ravel(), np.zeros(count * count)], axis=1)
+    index = np.arange(count * count).reshape(count, count)
+    a, b, c, d = (
+        part.ravel() for part in (index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1])
+    )
+    triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    inner = index[1:-1, 1:-1].ravel()
+    if rng is not None:
+        positions[inner, :2] += rng.uniform(-0.2, 0.2, (len(inner), 2))
+    return positions, triangles.astype(np.int32), inner
+
+
+def test_cotangent_laplacian_of_a_right_triangle():
+    positions = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    # Cotangents: 0 at the right angle, 1 at the others; each edge gets half of the opposite one.
+    expected = [[1.0, -0.5, -0.5], [-0.5, 0.5, 0.0], [-0.5, 0.0, 0.5]]
+    found = cotangent_laplacian(positions, np.array([[0, 1, 2]])).toarray()
+    np.testing.assert_allclose(found, expected, atol=ROUNDING)
+
+
+def test_cotangent_laplacian_of_a_linear_function_is_zero_inside_a_flat_mesh():
+    positions, triangles, inner = grid(6, np.random.default_rng(1))
+    values = 2.0 * positions[:, 0] - 3.0 * positions[:, 1]
+    found = cotangent_laplacian(positions, triangles) @ values
+    np.testing.assert_allclose(found[inner], 0.0, atol=1e-11)
+
+
+def test_cotangent_laplacian_of_a_square_is_minus_its_calculus_twin_times_the_area():
+    positions, triangles, inner = grid(7)
+    operator = cotangent_laplacian(positions, triangles)
+    values = positions[:, 0] ** 2 + positions[:, 1] ** 2  # Laplacian 4
+    areas = voronoi_areas(positions, triangles)
+    np.testing.assert_allclose((operator @ values / areas)[inner], -4.0, atol=1e-11)
+
+
+def test_cotangent_laplacian_stays_positive_with_slivers():
+    rng = np.random.default_rng(2)
+    positions, triangles, _ = grid(5, rng)
+    positions[:, 1] *= rng.choice([1e-6, 1.0], len(positions))  # needles and caps
+    positions[7] = 0.5 * (positions[6] + positions[8])  # without area
+    operator = cotangent_laplacian(positions, triangles).toarray()
+    assert np.isfinite(operator).all()
+    np.testing.assert_allclose(operator, operator.T, atol=ROUNDING)
+    # The largest eigenvalue is of order 100: rounding of that.
+    np.testing.assert_allclose(operator.sum(axis=1), 0.0, atol=1e-10)
+    assert np.linalg.eigvalsh(operator).min() > -1e-10
+
+
+def test_cotangent_laplacian_takes_a_triangle_without_area_for_an_equilateral_one():
+    positions = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]])
+    found = cotangent_laplacian(positions, np.array([[0, 1, 2]])).toarray()
+    half = 0.5 / np.sqrt(3.0)
+    expected = half * np.array([[2.0, -1, -1], [-1, 2, -1], [-1, -1, 2]])
+    np.testing.assert_allclose(found, expected, atol=ROUNDING)
+
+
+def test_graph_laplacian_counts_neighbours():
+    found = graph_laplacian(4, np.array([[0, 1, 2], [2, 1, 3]])).toarray()
+    expected = [[2, -1, -1, 0], [-1, 3, -1, -1], [-1, -1, 3, -1], [0, -1, -1, 2]]
+    assert found.tolist() == expected
+
+
+def test_voronoi_areas_of_an_equilateral_triangle_are_thirds():
+    positions = np.array([[0.0, 0, 0], [1, 0, 0], [0.5, np.sqrt(0.75), 0]])
+    found = voronoi_areas(positions, np.array([[0, 1, 2]]))
+    np.testing.assert_allclose(found, np.sqrt(0.75) / 6.0, atol=ROUNDING)
+
+
+def test_voronoi_areas_of_an_obtuse_triangle_are_half_and_quarters():
+    positions = np.array([[0.0, 1, 0], [-3, 0, 0], [3, 0, 0]])  # area 3, obtuse at the first
+    found = voronoi_areas(positions, np.array([[0, 1, 2]]))
+    np.testing.assert_allclose(found, [1.5, 0.75, 0.75], atol=ROUNDING)
+
+
+def test_voronoi_areas_add_up_to_the_area():
+    rng = np.random.default_rng(3)
+    positions = rng.normal(size=(30, 3))
+    triangles = rng.permuted(np.tile(np.arange(30), (50, 1)), axis=1)[:, :3]
+    found = voronoi_areas(positions, triangles)
+    assert found.min() > 0.0
+    assert found.sum() == pytest.approx(triangle_areas(positions, triangles).sum(), rel=1e-12)
+
+
+def test_laplacian_of_an_island_with_a_non_manifold_edge_is_that_of_its_graph():
+    fan = np.array([[0.0, 0, 0], [0, 0, 1], [1, 0, 0], [-1, 0.5, 0], [-1, -0.5, 0]])
+    other = np.array([[9.0, 0, 0], [10, 0, 0], [9, 1, 0]])
+    mesh = weld(
+        np.concatenate([fan, other]), np.array([[0, 1, 2], [1, 0, 3], [0, 1, 4], [5, 6, 7]])
+    )
+    operator, areas = laplacian(mesh)
+    dense = operator.toarray()
+    assert dense[:5, :5].diagonal().tolist() == [4.0, 4.0, 2.0, 2.0, 2.0]
+    assert dense[0, 1] == -1.0
+    np.testing.assert_allclose(dense[5:, 5:].diagonal(), [1.0, 0.5, 0.5], atol=ROUNDING)
+    assert (dense[:5, 5:] == 0.0).all()
+    assert np.ptp(areas[:5]) == 0.0
+    np.testing.assert_allclose(areas[5:], [0.25, 0.125, 0.125], atol=ROUNDING)
+
+
+def test_laplacian_gives_every_vertex_some_area():
+    positions = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [5, 5, 5]])
+    _, areas = laplacian(weld(positions, np.array([[0, 1, 2]])))
+    # 1e-9 of the mean of 1/4, 1/8 and 1/8.
+    assert areas[3] == pytest.approx(1e-9 / 6.0, rel=1e-9)
+    _, areas = laplacian(weld(positions, np.zeros((0, 3), dtype=np.int32)))
+    assert areas.tolist() == [1.0, 1.0, 1.0, 1.0]

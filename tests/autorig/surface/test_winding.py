@@ -1,0 +1,30 @@
+"""Winding numbers of a cube, whole and with a side missing."""
+
+import numpy as np
+from numpy.testing import assert_allclose
+
+from viewer.autorig.surface.winding import winding_numbers
+
+CORNERS = np.array([[x, y, z] for x in (0.0, 1) for y in (0.0, 1) for z in (0.0, 1)])
+# Corner k has x = k // 4, y = k // 2 % 2, z = k % 2; counter-clockwise from outside.
+SIDES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+CUBE = np.array([t for a, b, c, d in SIDES for t in ((a, b, c), (a, c, d))])
+MIDDLE, OUTSIDE = np.array([0.5, 0.5, 0.5]), np.array([3.0, 0.2, 0.1])
+
+
+def test_cube_winds_once_around_its_inside():
+    found = winding_numbers(CORNERS, CUBE, np.array([MIDDLE, OUTSIDE, [0.01, 0.01, 0.99]]))
+    assert_allclose(found, [1.0, 0.0, 1.0], atol=1e-12)
+
+
+def test_cube_inside_out_winds_backwards():
+    assert_allclose(winding_numbers(CORNERS, CUBE[:, ::-1], MIDDLE[None]), [-1.0], atol=1e-12)
+
+
+def test_missing_side_takes_its_solid_angle():
+    # Seen from the middle each of the six sides covers a sixth.
+    assert_allclose(winding_numbers(CORNERS, CUBE[2:], MIDDLE[None]), [5 / 6], atol=1e-12)
+
+
+def test_no_points_give_no_numbers():
+    assert winding_numbers(CORNERS, CUBE, np.zeros((0, 3))).shape == (0,)

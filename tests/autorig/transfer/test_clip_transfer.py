@@ -1,0 +1,81 @@
+"""A template's clips for the figure that took over its rig."""
+
+import numpy as np
+import pytest
+from autorig.rigged_shapes import arm
+from numpy.testing import assert_allclose, assert_array_equal
+
+from viewer.autorig.transfer.clip_transfer import carry_clip
+from viewer.errors import RigError
+from viewer.rig.motion.clip import Channel, Clip
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.timing import Timing
+
+SKELETON = arm().skeleton  # DOFs 0 to 2 move, the others turn
+
+
+def curve(target):
+    tangents = (("flat", 3.0), (-1.0, "smooth"))
+    return Channel(target, np.array([0.0, 1.0]), np.array([1.0, 2.0]), tangents)
+
+
+def test_lengths_and_their_slopes_are_scaled_and_angles_are_not():
+    clip = Clip("walk", (curve(1), curve(4)), 0.0, 1.0)
+    found = carry_clip(clip, SKELETON, 10.0, 2.0)
+    moved, turned = found.channels
+    assert_allclose(moved.values, [20.0, 40.0])
+    assert moved.tangents == (("flat", 60.0), (-20.0, "smooth"))
+    assert turned is clip.channels[1]
+    assert (found.name, found.start, found.end) == ("walk", 0.0, 1.0)
+
+
+def test_frames_keep_their_turns_and_scale_their_paths():
+    rotations = np.tile([0.0, 0.0, 0.0, 1.0], (2, 2, 1))
+    clip = SampledClip(
+        "run",
+        Timing(30.0, np.array([0, 1])),
+        rotations,
+        translations=np.ones((2, 2, 3)),
+        figure_translations=np.array([[1.0, 0, 0], [2, 0, 0]]),
+        figure_scales=np.array([2.0, 3.0]),
+        shape_weights=np.ones((1, 4)),
+    )
+    found = carry_clip(clip, SKELETON, 10.0, 2.0)
+    assert_array_equal(found.rotations, rotations)
+    # Joints move inside the figure, whose scale of 2 is part of the lengths already.
+    assert_allclose(found.translations, 20.0)
+    assert_allclose(found.figure_translations, [[10.0, 0, 0], [20.0, 0, 0]])
+    assert_allclose(found.figure_scales, [1.0, 1.5])
+    assert found.shape_weights is None
+
+
+def test_path_goes_by_the_legs():
+    clip = Clip("walk", (curve(1), curve(4)), 0.0, 1.0)
+    found = carry_clip(clip, SKELETON, 10.0, 2.0, path_scale=12.0)
+    assert_allclose(found.channels[0].values, [24.0, 48.0])
+    frames = SampledClip(
+        "run",
+        Timing(30.0, np.array([0])),
+        np.tile([0.0, 0.0, 0.0, 1.0], (1, 2, 1)),
+        translations=np.ones((1, 2, 3)),
+        figure_translations=np.ones((1, 3)),
+    )
+    found = carry_clip(frames, SKELETON, 10.0, 2.0, path_scale=12.0)
+    assert_allclose(found.translations[0], [[24.0] * 3, [20.0] * 3])
+    assert_allclose(found.figure_translations, 12.0)
+
+
+def test_frames_without_paths_stay_without():
+    clip = SampledClip("turn", Timing(30.0, np.array([0])), np.ones((1, 2, 4)))
+    found = carry_clip(clip, SKELETON, 10.0)
+    assert found.translations is None and found.figure_translations is None
+
+
+def test_clips_of_other_skeletons_are_refused():
+    three = SampledClip("x", Timing(30.0, np.array([0])), np.ones((1, 3, 4)))
+    with pytest.raises(RigError) as problem:
+        carry_clip(three, SKELETON, 1.0)
+    assert str(problem.value) == "clip x has 3 joints, the figure has 2"
+    with pytest.raises(RigError) as problem:
+        carry_clip(Clip("y", (curve(9),), 0.0, 1.0), SKELETON, 1.0)
+    assert str(problem.value) == "a channel moves DOF 9, the figure has 9 DOFs"

@@ -1,0 +1,278 @@
+import numpy as np
+import pytest
+
+from viewer.autorig.correspondence.matching import MatchSettings, Template
+from viewer.autorig.weights.weight_transfer import (
+    WeightSettings,
+    nearest_weights,
+    transferred_weights,
+)
+from viewer.errors import RigError
+from viewer.rig.mesh import Mesh
+from viewer.rig.skin import Skin, skin_from_entries, skin_from_lists
+
+sparse = pytest.importorskip("scipy.sparse")
+
+BIND = np.tile(np.eye(4), (3, 1, 1))
+
+
+def silent(fraction, what):
+    pass
+
+
+def tube(rings=13, sides=16, length=3.0):
+    """Return an open tube along x, radius 0.5, facing outwards."""
+    turns = np.linspace(0, 2 * np.pi, sides + 1)[:-1]
+    x = np.repeat(np.linspace(0, length, rings), sides)
+    around = np.tile(turns, rings)
+    positions = np.stack([x, 0.5 * np.cos(around), 0.5 * np.sin(around)], axis=1)
+    index = np.arange(rings * sides).reshape(rings, sides)
+    a, b = index[:-1], np.roll(index, -1, axis=1)[:-1]
+    c, d = np.roll(index, -1, axis=1)[1:], index[1:]
+    a, b, c, d = (part.ravel() for part in (a, b, c, d))
+    triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    return positions, triangles.astype(np.int32)
+
+
+def along(x):
+    """Return weights of three joints that vary linearly along the tube."""
+    return np.maximum(0.0, 1.0 - np.abs(x[:, None] / 1.5 - np.arange(3)))
+
+
+def skin_of_rows(rows) -> Skin:
+    vertices, joints = np.nonzero(rows)
+    return skin_from_entries(len(rows), vertices, joints, rows[vertices, joints], BIND)
+
+
+def dense(result, n_joints=3):
+    shape = (len(result.starts) - 1, n_joints)
+    return sparse.csr_array((result.weights, result.joints, result.starts), shape=shape).toarray()
+
+
+def template():
+    positions, triangles = tube()
+    return Template(positions, triangles), skin_of_rows(along(positions[:, 0]))
+
+
+def transfer(positions, triangles, settings=None, report=silent):
+    surface, skin = template()
+    return transferred_weights(
+        surface, skin, positions, triangles, settings or WeightSettings(), report
+    )
+
+
+def test_tube_faces_outwards():
+    positions, triangles = tube()
+    normals = Template(positions, triangles).normals
+    assert (normals[:, 1:] * positions[:, 1:]).sum(axis=1).min() > 0.0
+
+
+def test_transfer_onto_itself_changes_nothing():
+    positions, triangles = tube()
+    result = transfer(positions, triangles)
+    np.testing.assert_allclose(dense(result), along(positions[:, 0]), atol=1e-12)
+    assert result.matched.all()
+    assert not result.filled.any()
+    assert result.lines == ("matched 208 of 208 vertices (100.0%), filled in 0",)
+    np.testing.assert_allclose(result.distances, 0.0, atol=1e-12)
+
+
+def test_transfer_mixes_weights_between_vertices():
+    # Rings elsewhere: on the surface of the flat-sided tube weights depend on x alone.
+    positions, triangles = tube(rings=29)
+    result = transfer(positions, triangles)
+    np.testing.assert_allclose(dense(result), along(positions[:, 0]), atol=1e-12)
+
+
+def test_transfer_leaves_no_residue_of_corners_that_a_point_is_not_on():
+    # Rings between the template's sides: closest points lie on edges, but for a rounding.
+    positions, triangles = tube()
+    x = positions[:, 0].copy()
+    half = np.pi / 16
+    rotation = np.array([[np.cos(half), -np.sin(half)], [np.sin(half), np.cos(half)]])
+    positions[:, 1:] = positions[:, 1:] @ rotation.T
+    positions[:, 0] += 1e-9
+    result = transfer(positions, triangles)
+    assert result.matched.all()
+    assert np.diff(result.starts).tolist() == (along(x) > 1e-6).sum(axis=1).tolist()
+    np.testing.assert_allclose(dense(result), along(x), atol=1e-8)
+    np.testing.assert_allclose(dense(result).sum(axis=1), 1.0, atol=1e-12)
+
+
+def test_transfer_fills_in_what_stands_off_the_template():
+    positions, triangles = tube(rings=25)
+    x = positions[:, 0]
+    bump = np.abs(x - 0.75) < 0.2
+    positions[bump, 1:] *= 2.5
+    result = transfer(positions, triangles)
+    assert result.filled.any()
+    assert not result.filled[np.abs(x - 0.75) > 0.5].any()
+    assert (result.matched | result.filled).all()
+    found = dense(result)
+    np.testing.assert_allclose(found.sum(axis=1), 1.0, atol=1e-12)
+    # The third joint does not reach this far; the others change places across the bump.
+    assert found[bump, 2].max() < 0.05
+    order = [found[np.isclose(x, value), 0].mean() for value in np.unique(x[bump])]
+    assert order == sorted(order, reverse=True)
+    assert found[np.isclose(x, 0.75), :2] == pytest.approx(0.5, abs=0.05)
+
+
+def test_transfer_keeps_seams_closed():
+    positions, triangles = tube(rings=25)
+    bump = np.abs(positions[:, 0] - 0.75) < 0.2
+    positions[bump, 1:] *= 2.5
+    whole = transfer(positions, triangles)
+    # Every triangle with vertices of its own.
+    corners = triangles.ravel()
+    split = transfer(positions[corners], np.arange(len(corners), dtype=np.int32).reshape(-1, 3))
+    np.testing.assert_allclose(dense(split), dense(whole)[corners], atol=1e-9)
+    assert split.filled.tolist() == whole.filled[corners].tolist()
+    assert split.points.triangles.shape == corners.shape
+
+
+def button(x):
+    """Return a tetrahedron that hovers over the tube at x."""
+    corners = 0.02 * np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
+    return corners + np.array([x, 1.5, 0.0]), np.array([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
+
+
+def test_transfer_hangs_parts_without_match_on_the_closest_point_of_their_middle():
+    positions, triangles = tube()
+    corners, faces = button(1.2)
+    result = transfer(
+        np.concatenate([positions, corners]), np.concatenate([triangles, faces + len(positions)])
+    )
+    # At x = 1.2 joint 0 has 1 - 0.8 and joint 1 has 0.8.
+    np.testing.assert_allclose(dense(result)[-4:], [[0.2, 0.8, 0.0]] * 4, atol=1e-12)
+    assert not (result.matched | result.filled)[-4:].any()
+    assert result.rigid.vertices.tolist() == [208]
+    assert result.rigid.counts.tolist() == [4]
+    assert result.rigid.joints.tolist() == [1]
+    np.testing.assert_allclose(result.rigid.distances, 1.0, atol=1e-12)
+    assert result.lines[1] == (
+        "a part of 4 vertices at vertex 208 meets the template nowhere: it moves rigidly, "
+        "mostly with joint 1"
+    )
+
+
+def test_transfer_does_not_depend_on_unit_and_place():
+    positions, triangles = tube(rings=25)
+    bump = np.abs(positions[:, 0] - 0.75) < 0.2
+    positions[bump, 1:] *= 2.5
+    here = transfer(positions, triangles)
+    source, faces = tube()
+    turn = np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]])
+    surface = Template(source @ turn.T * 100.0 + 40.0, faces)
+    there = transferred_weights(
+        surface,
+        skin_of_rows(along(source[:, 0])),
+        positions @ turn.T * 100.0 + 40.0,
+        triangles,
+        WeightSettings(),
+        silent,
+    )
+    # Rounding of coordinates of order 100, through a system of condition 1e6.
+    np.testing.assert_allclose(dense(there), dense(here), atol=1e-7)
+
+
+def test_transfer_can_smooth_and_cut():
+    positions, triangles = tube(rings=25)
+    bump = np.abs(positions[:, 0] - 0.75) < 0.2
+    positions[bump, 1:] *= 2.5
+    plain = transfer(positions, triangles)
+    smooth = transfer(positions, triangles, WeightSettings(smoothing_rounds=10))
+    difference = np.abs(dense(smooth) - dense(plain)).max(axis=1)
+    assert difference.max() > 1e-3
+    assert difference[positions[:, 0] > 2.5].max() == 0.0
+    cut = transfer(positions, triangles, WeightSettings(max_influences=1))
+    assert np.diff(cut.starts).max() == 1
+    np.testing.assert_allclose(cut.weights, 1.0, atol=1e-12)
+
+
+def test_transfer_reports_its_progress_and_can_be_cancelled():
+    positions, triangles = tube(rings=25)
+    positions[np.abs(positions[:, 0] - 0.75) < 0.2, 1:] *= 2.5
+    seen = []
+    transfer(positions, triangles, report=lambda *step: seen.append(step))
+    fractions = [fraction for fraction, _ in seen]
+    assert fractions == sorted(fractions)
+    assert (fractions[0], fractions[-1]) == (0.0, 1.0)
+
+    class StoppedError(Exception):
+        pass
+
+    def stop(fraction, what):
+        if what == "factorising":
+            raise StoppedError
+
+    with pytest.raises(StoppedError):
+        transfer(positions, triangles, report=stop)
+
+
+def test_transfer_refuses_a_target_elsewhere():
+    positions, triangles = tube()
+    with pytest.raises(RigError) as caught:
+        transfer(positions + np.array([0.0, 100.0, 0.0]), triangles)
+    # The target's box is 3 x 1 x 1; the median distance is 100 less a radius or so.
+    assert str(caught.value).startswith(
+        "no vertex of the target meets the template: expected a target aligned with it, "
+        "found it at a median distance of 30"
+    )
+
+
+def test_transfer_refuses_a_target_without_size():
+    with pytest.raises(RigError) as caught:
+        transfer(np.ones((3, 3)), np.array([[0, 1, 2]]))
+    assert str(caught.value) == (
+        "target: expected a mesh with a size, found 3 vertices at one place"
+    )
+
+
+def test_transfer_takes_points_without_triangles():
+    result = transfer(
+        np.array([[0.0, 0.5, 0], [3, 0.5, 0], [1.5, 0, 0.5]]), np.zeros((0, 3), dtype=np.int32)
+    )
+    assert result.matched.all()
+    np.testing.assert_allclose(dense(result), [[1, 0, 0], [0, 0, 1], [0, 1, 0]], atol=1e-12)
+
+
+def test_transfer_says_that_the_template_has_negative_weights():
+    positions, triangles = tube()
+    rows = along(positions[:, 0])
+    rows[0] = 1.0, -0.5, 0.0
+    result = transferred_weights(
+        template()[0], skin_of_rows(rows), positions, triangles, WeightSettings(), silent
+    )
+    assert result.lines[0] == "negative weights of the template that count as 0: 1"
+    np.testing.assert_allclose(dense(result)[0], [1.0, 0.0, 0.0], atol=1e-12)
+
+
+def test_result_makes_a_skin():
+    positions, triangles = tube()
+    skin = transfer(positions, triangles).skin(BIND)
+    assert skin.n_vertices == len(positions)
+    assert Mesh(positions, positions, triangles).n_vertices == skin.n_vertices
+
+
+def test_nearest_weights_copies_rows():
+    skin = skin_from_lists([[(0, 0.5), (1, 0.25)], [(2, 1.0)]], BIND)
+    result = nearest_weights(
+        np.array([[0.0, 0, 0], [1, 0, 0]]), skin, np.array([[0.9, 0, 0], [0.1, 0, 0], [0, 0, 5.0]])
+    )
+    assert result.starts.tolist() == [0, 1, 3, 5]
+    assert result.joints.tolist() == [2, 0, 1, 0, 1]
+    assert result.weights.tolist() == [1.0, 0.5, 0.25, 0.5, 0.25]
+    # 5 % of the diagonal of a box of 0.9 x 0 x 5 is 0.254.
+    assert result.matched.tolist() == [True, True, False]
+    assert result.lines == ("nearest vertex within the limit for 2 of 3 vertices",)
+    assert result.points is None
+
+
+def test_settings_refuse_odd_numbers():
+    with pytest.raises(RigError) as caught:
+        WeightSettings(smoothing_rounds=-1)
+    assert str(caught.value) == "smoothing: expected at least 0 rounds, found -1"
+    with pytest.raises(RigError) as caught:
+        WeightSettings(max_influences=0)
+    assert str(caught.value) == "influences: expected at least 1, found 0"
+    assert WeightSettings().match == MatchSettings()

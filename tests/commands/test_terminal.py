@@ -1,0 +1,69 @@
+"""Progress, tables and colours: what a terminal shows and what a pipe gets."""
+
+import io
+
+import pytest
+
+from viewer.commands import _progress
+from viewer.commands._printing import print_line, table_lines
+from viewer.commands._progress import Progress
+
+
+class Terminal(io.StringIO):
+    """A stream that says that a person reads it."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.fixture
+def terminal(monkeypatch) -> Terminal:
+    monkeypatch.setattr(_progress, "_FIRST", 0.0)
+    monkeypatch.setattr(_progress, "_EVERY", 0.0)
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "100")
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    return Terminal()
+
+
+def test_progress_shows_title_and_count_and_leaves_nothing(terminal, monkeypatch):
+    monkeypatch.setattr("sys.stderr", terminal)
+    with Progress("reading [b]walk[/b]", 1200) as progress:
+        progress.show(300)
+        progress.title = "comparing"
+        progress.show(1200)
+    text = terminal.getvalue()
+    assert "reading [b]walk[/b]" in text and " 300/1200" in text
+    assert "comparing" in text and "1200/1200" in text
+    assert text.endswith("\x1b[2K")  # the line is erased
+
+
+def test_progress_is_silent_in_pipes_and_when_it_is_quick(terminal, monkeypatch):
+    monkeypatch.setattr("sys.stderr", pipe := io.StringIO())
+    with Progress("reading", 2) as progress:
+        progress.show(1)
+    assert pipe.getvalue() == ""
+    monkeypatch.setattr("sys.stderr", terminal)
+    monkeypatch.setattr(_progress, "_FIRST", 60.0)
+    with Progress("reading", 2) as progress:
+        progress.show(1)
+    assert terminal.getvalue() == ""
+
+
+def test_lines_have_colours_at_a_terminal_alone(monkeypatch):
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    monkeypatch.setattr("sys.stdout", pipe := io.StringIO())
+    print_line(("missing ", "red"), "[x] " + 200 * "a")
+    assert pipe.getvalue() == "missing [x] " + 200 * "a" + "\n"
+    print_line(("missing ", "red"), "[x] " + 200 * "a", file=(screen := Terminal()))
+    assert screen.getvalue() == "\x1b[31mmissing \x1b[0m[x] " + 200 * "a" + "\n"
+
+
+def test_tables_are_as_wide_as_their_cells_and_end_with_them():
+    rows = [["", "joints", "result"], ["a" * 150, "1 mm", ""], ["[red]b", "-", "DIFFERS"]]
+    assert table_lines(rows, right=[1]) == [
+        f"{'':150}  joints  result",
+        f"{'a' * 150}    1 mm",
+        f"{'[red]b':150}       -  DIFFERS",
+    ]

@@ -1,0 +1,53 @@
+"""Animations of made-up bodies of the SMPL family, and the plain formulas for what they show."""
+
+from __future__ import annotations
+
+import numpy as np
+from plain_smpl import rotation, smpl_forward
+
+from viewer.rig.figure import Figure
+from viewer.rig.motion.body_motion import BodyMotion, body_clip
+from viewer.rig.motion.sampled_animation import SampledAnimation, sample_animation
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.timing import Timing
+from viewer.rig.scene import Actor
+from viewer.rig.smpl_family import FAMILY
+
+
+def waves(*shape: int, seed: float = 0.0) -> np.ndarray:
+    """Return numbers from -0.5 to 0.5, all different."""
+    count = int(np.prod(shape))
+    return 0.5 * np.sin(seed + 1.7 * np.arange(1, count + 1) ** 1.3).reshape(shape)
+
+
+def family_motion(count: int, frames: int = 4, rows=None, first_frame: int = 0, **words):
+    """Return a motion of all joints, the root turned far, about the model's origin."""
+    vectors = waves(frames, count, 3, seed=0.1 * frames)
+    vectors[:, 0] += [1.2, -0.4, 0.9]
+    words = {"shape": waves(1, 10, seed=2.0), "about_origin": True, **words}
+    timing = Timing(50.0, np.arange(frames) if rows is None else rows, first_frame, holds=False)
+    moves = waves(frames, 3, seed=3.0)
+    return BodyMotion("walk", timing, FAMILY[count].names, vectors, moves, **words)
+
+
+def family_animation(figure: Figure, motion: BodyMotion, fill: bool = False) -> SampledAnimation:
+    """Return a figure's animation of a motion, every frame of it."""
+    clip = body_clip(motion, figure)[0]
+    return sample_animation(Actor(figure, clip=clip), fill=fill)
+
+
+def clip_animation(figure: Figure, clip: SampledClip) -> SampledAnimation:
+    """Return a figure's animation of a clip."""
+    return sample_animation(Actor(figure, clip=clip))
+
+
+def vertices_about_origin(arrays, vectors, root, move, shape=()) -> np.ndarray:
+    """Return V = R X + T, where ``vectors`` turn all joints but the root."""
+    pose = np.array(vectors)
+    pose[0] = 0.0
+    return smpl_forward(arrays, shape, pose)[0] @ rotation(root).T + move
+
+
+def vertices_about_pelvis(arrays, vectors, move, shape=()) -> np.ndarray:
+    """Return what smplx makes of poses and trans: the whole body posed, then moved."""
+    return smpl_forward(arrays, shape, vectors)[0] + move

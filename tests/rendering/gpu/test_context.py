@@ -1,0 +1,302 @@
+"""Machines without a usable OpenGL, brought about by the environment; each has its message."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import moderngl
+import numpy as np
+import pytest
+
+from viewer.cli import run
+from viewer.errors import RenderError, ViewerError
+from viewer.rendering.gpu.context import check_errors, device_count, explain, headless_context
+from viewer.rendering.gpu.upload import buffer
+from viewer.rendering.offscreen import Offscreen
+
+ROOT = Path(__file__).resolve().parents[3]
+LINUX = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="EGL is Linux's way")
+
+TINY_SKEL = """balljoint root {
+  boxmin -0.1 0 -0.1
+  boxmax 0.1 1 0.1
+}
+"""
+
+
+def viewer_render(tmp_path, *arguments: str, **environment: str):
+    """Run ``viewer render`` on one joint in a fresh process; return it and the picture's path."""
+    skel, output = tmp_path / "one.skel", tmp_path / "one.png"
+    skel.write_text(TINY_SKEL)
+    command = [sys.executable, "-m", "viewer", "render", str(skel), "-o", str(output)]
+    size = [] if "--size" in arguments else ["--size", "64x48"]
+    result = subprocess.run(
+        [*command, *size, *arguments],
+        cwd=ROOT,
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    return result, output
+
+
+def check_refusal(result, output: Path, code: int, message: str) -> None:
+    assert result.returncode == code, result.stderr
+    assert result.stderr == f"viewer: {message}\n"
+    assert result.stdout == ""
+    assert not output.exists()
+
+
+INSTALL = "(on Debian or Ubuntu: apt install libegl1 libgl1 libgl1-mesa-dri)"
+
+
+@LINUX
+def test_no_egl_device_names_the_cures(tmp_path):
+    result = viewer_render(tmp_path, __EGL_VENDOR_LIBRARY_FILENAMES="/nonexistent")
+    check_refusal(
+        *result,
+        code=4,
+        message="EGL found 0 devices: in a container start it with "
+        "NVIDIA_DRIVER_CAPABILITIES=all, or install Mesa for drawing in software " + INSTALL,
+    )
+
+
+@LINUX
+def test_missing_driver_files_are_named_in_one_line(tmp_path):
+    """Mesa's own warnings must not come before ours."""
+    result = viewer_render(tmp_path, LIBGL_DRIVERS_PATH="/nonexistent")
+    check_refusal(
+        *result,
+        code=4,
+        message="EGL could not be initialised: its driver files are missing or broken "
+        f"{INSTALL} [eglInitialize failed (0x3001)]",
+    )
+
+
+@LINUX
+def test_an_old_opengl_is_named_with_its_version_and_renderer(tmp_path):
+    result, output = viewer_render(tmp_path, MESA_GL_VERSION_OVERRIDE="3.1")
+    assert result.returncode == 4
+    assert result.stderr.startswith(
+        "viewer: OpenGL 3.3 is needed; this machine offers 3.1 (renderer "
+    )
+    assert "MESA_GL_VERSION_OVERRIDE=3.1" in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert not output.exists()
+
+
+@LINUX
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("MESA_GLSL_VERSION_OVERRIDE", "130", ("GLSL 3.30 is needed", "offers GLSL 1.30")),
+        ("MESA_GLSL_VERSION_OVERRIDE", "150", ("OpenGL 3.3 is needed", "3.2 with GLSL 1.50")),
+        ("MESA_GL_VERSION_OVERRIDE", "2.1", ("OpenGL 3.3 is needed", "offers 2.1")),
+    ],
+)
+def test_an_old_shading_language_is_told_apart_from_an_old_opengl(tmp_path, name, value, words):
+    result, output = viewer_render(tmp_path, **{name: value})
+    assert result.returncode == 4 and result.stderr.count("\n") == 1, result.stderr
+    for word in (*words, "renderer ", f"{name}={value}"):
+        assert word in result.stderr
+    assert not output.exists()
+
+
+@LINUX
+@pytest.mark.parametrize(
+    ("environment", "code", "words"),
+    [
+        ({"DISPLAY": ""}, 0, ("note    display", "DISPLAY is not set")),
+        ({"MESA_GLSL_VERSION_OVERRIDE": "130", "DISPLAY": ""}, 4, ("missing drawing", "GLSL 1.30")),
+        ({"MESA_GL_VERSION_OVERRIDE": "3.1", "DISPLAY": ""}, 4, ("missing drawing", "offers 3.1")),
+        (
+            {"__EGL_VENDOR_LIBRARY_FILENAMES": "/nonexistent", "DISPLAY": ""},
+            4,
+            ("missing drawing", "EGL found 0 devices"),
+        ),
+        # No server has this number.
+        ({"DISPLAY": ":654321"}, 0, ("note    display", ":654321", "-> ")),
+    ],
+)
+def test_doctor_says_the_same(environment, code, words):
+    variables = {**os.environ, "WAYLAND_DISPLAY": "", **environment}
+    done = subprocess.run(
+        [sys.executable, "-m", "viewer", "doctor"],
+        cwd=ROOT, env=variables, capture_output=True, text=True, timeout=60, check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (code, "")
+    assert all(word in done.stdout for word in words)
+
+
+@LINUX
+def test_a_missing_libegl_names_its_package(tmp_path):
+    result = viewer_render(tmp_path, GLCONTEXT_LINUX_LIBEGL="libnope.so")
+    check_refusal(
+        *result, code=4, message=f"libEGL was not found {INSTALL} [libnope.so not loaded]"
+    )
+
+
+@LINUX
+def test_a_missing_libgl_names_its_package(tmp_path):
+    result = viewer_render(tmp_path, GLCONTEXT_LINUX_LIBGL="libnope.so")
+    check_refusal(*result, code=4, message=f"libGL was not found {INSTALL} [libnope.so not loaded]")
+
+
+@LINUX
+def test_a_device_that_is_not_there_gives_the_number_of_devices(tmp_path):
+    count = device_count()
+    known = "0, the only one," if count == 1 else f"0 to {count - 1},"
+    for number in ("99", "-1"):
+        result, output = viewer_render(tmp_path, "--gpu", number)
+        assert result.returncode == 2 and result.stderr.count("\n") == 1
+        for word in ("--gpu", f"expected {known}", f"found {number} "):
+            assert word in result.stderr
+        assert not output.exists()
+
+
+@LINUX
+def test_a_device_that_is_not_there_is_said_before_anything_is_read(tmp_path, capsys):
+    assert run(["render", "missing.skel", "-o", str(tmp_path / "x.png"), "--gpu", "-1"]) == 2
+    assert "found -1" in capsys.readouterr().err
+
+
+@LINUX
+def test_no_device_at_all_is_no_usage_error_but_a_negative_number_is(tmp_path):
+    for number, code, word in (("0", 4, "EGL found 0 devices"), ("-1", 2, "expected 0 or more")):
+        result, _ = viewer_render(
+            tmp_path, "--gpu", number, __EGL_VENDOR_LIBRARY_FILENAMES="/nonexistent"
+        )
+        assert result.returncode == code and word in result.stderr
+
+
+@LINUX
+def test_the_first_device_can_be_asked_for(tmp_path):
+    result, output = viewer_render(tmp_path, "--gpu", "0")
+    assert (result.returncode, result.stderr) == (0, "")
+    assert output.is_file()
+
+
+@pytest.mark.parametrize("size", ["0x48", "64x0", "0x0", "100000x48", "64x100000"])
+def test_a_size_that_cannot_be_drawn_is_a_usage_error(tmp_path, size):
+    result, output = viewer_render(tmp_path, "--size", size)
+    width, height = size.split("x")
+    assert result.returncode == 2
+    assert "Traceback" not in result.stderr
+    assert result.stderr.rstrip().endswith((f"found {width} x {height}", f"found {size}"))
+    assert result.stderr.count("\n") == 1
+    assert not output.exists()
+
+
+def test_too_many_samples_are_drawn_with_what_there_is(tmp_path):
+    result, output = viewer_render(tmp_path, "--samples", "4096")
+    assert result.returncode == 0
+    assert result.stderr.startswith("warning: 4096 samples a pixel asked for, ")
+    assert result.stderr.count("\n") == 1
+    assert output.is_file()
+
+
+@LINUX
+def test_another_rasteriser_draws_without_complaint(tmp_path):
+    result, output = viewer_render(tmp_path, "--samples", "1", GALLIUM_DRIVER="softpipe")
+    assert (result.returncode, result.stderr) == (0, "")
+    assert output.is_file()
+
+
+@LINUX
+def test_drawing_needs_no_display(tmp_path):
+    result, output = viewer_render(tmp_path, DISPLAY="", WAYLAND_DISPLAY="")
+    assert (result.returncode, result.stderr) == (0, "")
+    assert output.is_file()
+
+
+@pytest.mark.parametrize(
+    ("text", "start"),
+    [
+        ("requested device index 0, but found 0 devices", "EGL found 0 devices: in a container"),
+        (
+            "requested device index 9, but found 1 devices",
+            "there is no graphics device 9: EGL found 1 device, counted from 0",
+        ),
+        (
+            "requested device index 9, but found 3 devices",
+            "there is no graphics device 9: EGL found 3 devices, counted from 0",
+        ),
+        ("eglInitialize failed (0x3001)", "EGL could not be initialised: its driver files"),
+        ("eglInitialize failed (0x3002)", "EGL was refused access to the graphics device"),
+        ("eglCreateContext failed (0x3003)", "the driver is out of memory"),
+        ("eglGetDisplay failed (0x3008)", "EGL does not accept this display"),
+        ("eglCreateContext failed (0x3009)", "OpenGL 3.3 is needed and the driver"),
+        ("eglMakeCurrent failed (0x300B)", "EGL refused"),
+        ("libEGL.so.1 not loaded", "libEGL was not found"),
+        ("libGL.so.1 not loaded", "libGL was not found"),
+        ("Requested OpenGL version 330, got version 310", "OpenGL 3.3 is needed: Requested"),
+        ("something new", "no OpenGL context: something new"),
+    ],
+)
+def test_library_messages_are_explained(text, start):
+    assert explain(text).startswith(start)
+    assert "\n" not in explain(text)
+
+
+@LINUX
+def test_an_impossible_device_is_an_error_in_process_too():
+    for number in (99, -1):
+        with pytest.raises(ViewerError, match=f"found {number} ") as caught:
+            headless_context(number)
+        assert caught.value.exit_code == 2
+
+
+def test_errors_of_opengl_are_raised_with_what_was_done(ctx):
+    check_errors(ctx, "nothing")
+    ctx.enable_direct(0xFFFF)  # no such capability
+    with pytest.raises(RenderError, match=r"^a mistake: GL_INVALID_ENUM on "):
+        check_errors(ctx, "a mistake")
+
+
+def test_an_upload_without_room_says_how_much_was_asked(ctx, monkeypatch):
+    """moderngl raises nothing; only the context's error tells."""
+    monkeypatch.setattr(moderngl.Context, "error", property(lambda self: "GL_OUT_OF_MEMORY"))
+    with pytest.raises(
+        RenderError,
+        match=r"^a mesh buffer of 2\.4 MB: not enough graphics memory on .* \(GL_OUT_OF_MEMORY\)$",
+    ):
+        buffer(ctx, np.zeros((200_000, 3)), "f4")
+    monkeypatch.undo()
+
+
+def test_two_contexts_live_side_by_side():
+    first, second = headless_context(), headless_context()
+    with first:
+        ours = first.buffer(b"ours")
+    with second:
+        theirs = second.buffer(b"theirs")
+    with first:
+        assert ours.read() == b"ours"
+    with second:
+        assert theirs.read() == b"theirs"
+    second.release()
+    with first:
+        assert ours.read() == b"ours"
+    first.release()
+
+
+def test_graphics_card_that_may_not_be_opened_is_a_note(monkeypatch):
+    monkeypatch.setattr("viewer.rendering.offscreen.is_software", lambda context: True)
+    nodes = ["/dev/dri/renderD128"]
+    monkeypatch.setattr("viewer.rendering.offscreen.unreadable_devices", lambda: nodes)
+    with Offscreen() as offscreen:
+        assert offscreen.renderer.notes == [
+            "drawing in software: /dev/dri/renderD128 exists but you may not open it (group render)"
+        ]
+
+
+def test_display_without_opengl_3_says_what_is_needed():
+    assert explain("GLX: Failed to create context: GLXBadFBConfig") == (
+        "OpenGL 3.3 is needed and this display's driver does not offer it "
+        "[GLX: Failed to create context: GLXBadFBConfig]"
+    )

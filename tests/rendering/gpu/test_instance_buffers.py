@@ -1,0 +1,328 @@
+"""Actors drawn as instances: held to the float64 reference, and to the picture of single actors."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rendering.drawn_figures import arm, bent, checker, random_figure, random_pose
+
+import viewer
+from viewer.errors import RenderError
+from viewer.loading import bundled_body
+from viewer.rendering.camera import Camera
+from viewer.rendering.gpu import instance_buffers
+from viewer.rendering.gpu.instance_buffers import InstanceBuffers
+from viewer.rendering.gpu.mesh_buffers import MeshBuffers
+from viewer.rendering.gpu.program import Programs
+from viewer.rendering.gpu.rest_buffers import WAYS
+from viewer.rendering.offscreen import Offscreen, default_camera
+from viewer.rendering.options import DisplayOptions
+from viewer.rendering.passes import instance_pass
+from viewer.rendering.passes.instance_pass import FEWEST, instance_groups
+from viewer.rendering.view import View
+from viewer.rig.captures.points import PointLayout
+from viewer.rig.figure import Figure
+from viewer.rig.kinematics import world_matrices
+from viewer.rig.mesh import bounding_box, box_size
+from viewer.rig.scene import Actor, Scene, figure_pose, scene_box
+from viewer.rig.skinning import METHODS, Skinning
+
+TOLERANCE = 1e-5  # of the figure's size, as for single actors
+VARYINGS = "v_position", "v_normal"
+
+
+class Instances:
+    """Instances that are read back instead of drawn."""
+
+    def __init__(self, ctx, figure: Figure, way: str = "") -> None:
+        self.context, self.programs = ctx, Programs(ctx)
+        self.mesh = MeshBuffers(ctx, figure, [])
+        self.instances = InstanceBuffers(ctx, self.mesh, way)
+
+    def vertices(self, actors, how: Skinning, eye=(0.0, 0.0, 0.0)):
+        """Return what the vertex shader of the picture writes, relative to the eye."""
+        matrix = np.eye(4)
+        matrix[:3, 3] = -np.asarray(eye)
+        view = View(matrix, np.eye(4), Camera())
+        self.instances.update([actor.pose for actor in actors], how)
+        program = self.programs.feedback("instance", how.method, VARYINGS)
+        self.instances.place(actors, view)
+        self.instances.use(program, view)
+        count = self.mesh.n_vertices
+        out = self.context.buffer(reserve=24 * count * len(actors))
+        array = self.instances.array(program)
+        array.transform(out, vertices=count, instances=len(actors))
+        rows = np.frombuffer(out.read(), dtype="f4").reshape(len(actors), count, 6).astype(float)
+        out.release()
+        rows = rows[:, self.mesh.copies]
+        return rows[..., :3], rows[..., 3:]
+
+    def release(self) -> None:
+        for item in (self.instances, self.mesh, self.programs):
+            item.release()
+
+
+def cast(figure: Figure, count: int, seed: int = 0, reach: float = 1.0) -> list[Actor]:
+    """Return actors of a figure in random poses."""
+    rng = np.random.default_rng(seed)
+    return [Actor(figure, random_pose(figure.skeleton, rng, reach)) for _ in range(count)]
+
+
+def check(instances: Instances, actors, how: Skinning, eye=(0.0, 0.0, 0.0)) -> None:
+    positions, normals = instances.vertices(actors, how, eye)
+    figure = actors[0].figure
+    size = box_size(bounding_box(figure.mesh.positions))
+    for actor, found, turned in zip(actors, positions, normals, strict=True):
+        wanted, directions = viewer.deform(figure, actor.pose, how)
+        assert np.abs(found - (wanted - eye)).max() <= TOLERANCE * size
+        lengths = np.linalg.norm(directions, axis=1)
+        cosines = np.einsum("va,va->v", turned, directions)
+        assert (cosines[lengths > 0] > 1.0 - 1e-5).all()
+
+
+HOW = [Skinning("lbs"), Skinning("dqs"), Skinning("mix", share=0.3)]
+assert {how.method for how in HOW} == set(METHODS)
+
+
+@pytest.mark.parametrize("how", HOW, ids=lambda how: how.method)
+@pytest.mark.parametrize("n_joints", [1, 40, 257])
+def test_every_instance_matches_the_reference(ctx, how, n_joints):
+    rng = np.random.default_rng(n_joints)
+    figure = random_figure(rng, n_joints, counts=(1, 13), empty=0.1)
+    instances = Instances(ctx, figure)
+    check(instances, cast(figure, 9), how)
+    instances.release()
+
+
+@pytest.mark.parametrize("how", HOW, ids=lambda how: how.method)
+@pytest.mark.parametrize("way", WAYS)
+def test_the_bundled_body_with_correctives_and_shape(ctx, how, way):
+    figure = viewer.load(bundled_body()).actors[0].figure
+    assert figure.correctives is not None
+    instances = Instances(ctx, figure, way)
+    actors = cast(figure, 5, reach=0.6)
+    for actor in actors:
+        actor.pose.shape_weights = np.zeros(figure.n_shapes)
+    check(instances, actors, how)
+    for actor in actors:
+        actor.pose.shape_weights[:2] = 1.5, -1.0
+    check(instances, actors, how)
+    # Some rest, then all: their offsets must not stay.
+    actors[1].pose = figure_pose(figure)
+    actors[1].pose.shape_weights[:2] = 1.5, -1.0
+    check(instances, actors, how)
+    for actor in actors:
+        actor.pose.dofs[:] = 0.0
+    check(instances, actors, how)
+    actors[2].pose.dofs[5] = 0.4
+    check(instances, actors, how)
+    instances.release()
+
+
+@pytest.mark.parametrize("how", HOW, ids=lambda how: how.method)
+def test_figures_far_from_the_origin_keep_their_digits(ctx, how):
+    origin = (1e4, -2e4, 5e3)
+    figure = random_figure(np.random.default_rng(3), 20, origin=origin)
+    instances = Instances(ctx, figure)
+    actors = [Actor(figure) for _ in range(5)]
+    check(instances, actors, how, origin)
+    instances.release()
+
+
+@pytest.mark.parametrize("sums", [(0.5, 0.5), (0.0, 2.0), (-1.0, 1.0)])
+def test_weights_are_used_as_stored(ctx, sums):
+    figure = random_figure(np.random.default_rng(3), 20, sums=sums)
+    instances = Instances(ctx, figure)
+    actors = cast(figure, 5)
+    positions, _ = instances.vertices(actors, Skinning())
+    size = box_size(bounding_box(figure.mesh.positions))
+    for actor, found in zip(actors, positions, strict=True):
+        assert np.abs(found - viewer.deform(figure, actor.pose)[0]).max() <= TOLERANCE * size
+    instances.release()
+
+
+def test_instances_grow_shrink_and_change_their_method(ctx):
+    figure = random_figure(np.random.default_rng(4), 12)
+    instances, actors = Instances(ctx, figure), cast(figure, 12)
+    for chosen, how in (
+        (actors[:5], HOW[1]),
+        (actors, HOW[1]),
+        (actors[3:9], HOW[2]),
+        (actors[2:], HOW[0]),
+        (actors[::-1], HOW[1]),
+    ):
+        check(instances, chosen, how)
+    before = instances.instances.n_updates
+    check(instances, actors[::-1], HOW[1])
+    assert instances.instances.n_updates == before
+    actors[4].pose.dofs[2] += 0.5
+    check(instances, actors[::-1], HOW[1])
+    assert instances.instances.n_updates == before + 1
+    instances.release()
+
+
+def test_place_and_scale_of_each_actor_count(ctx):
+    figure = random_figure(np.random.default_rng(5), 8)
+    instances, actors = Instances(ctx, figure), cast(figure, 4)
+    for number, actor in enumerate(actors):
+        actor.pose.figure_scale = 1.0 + 0.5 * number
+        actor.pose.figure_translation[:] = number, 0.0, -number
+        actor.placement = np.array([[0, -1, 0, 3], [2, 0, 0, number], [0, 0, 1, 0], [0, 0, 0, 1.0]])
+    positions, normals = instances.vertices(actors, Skinning())
+    for actor, found, turned in zip(actors, positions, normals, strict=True):
+        posed, directions = viewer.deform(figure, actor.pose)
+        matrix = actor.placement[:3, :3]
+        assert np.allclose(found, posed @ matrix.T + actor.placement[:3, 3], atol=1e-5 * 10)
+        # Normals turn by the inverse transpose: the placement stretches x to twice its length.
+        wanted = directions @ np.linalg.inv(matrix)
+        wanted /= np.linalg.norm(wanted, axis=1, keepdims=True)
+        turned = turned / np.linalg.norm(turned, axis=1, keepdims=True)
+        assert np.allclose(turned, wanted, atol=1e-4)
+    instances.release()
+
+
+@pytest.fixture(scope="module")
+def offscreen():
+    with Offscreen() as result:
+        yield result
+
+
+def rows_of_arms(count: int, **parts) -> Scene:
+    figure = replace(arm(3, material=checker(8)), **parts)
+    rng = np.random.default_rng(6)
+    actors = []
+    for number in range(count):
+        turns = rng.uniform(-0.8, 0.8, 3)
+        actor = bent(figure, (1, "z", turns[0]), (2, "z", turns[1]), (1, "y", turns[2]))
+        actor.placement[:3, 3] = 0.0, 0.9 * number, 0.4 * (number % 3)
+        if number % 3 == 1:
+            actor.color = 0.5, 0.1, 0.05
+        actors.append(actor)
+    return Scene(actors)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"texture": False},
+        {"shading": "normals"},
+        {"shading": "checker", "cull": True},
+        {"show": "both", "flat": True},
+        {"skinning": Skinning("dqs")},
+    ],
+    ids=str,
+)
+def test_instances_look_like_their_actors_drawn_one_by_one(offscreen, monkeypatch, changes):
+    scene = rows_of_arms(FEWEST)
+    options = DisplayOptions(**changes)
+    camera, box = default_camera(scene, (200, 150)), scene_box(scene)
+    assert len(instance_groups(scene.actors, options)) == 1
+    together = offscreen.render(scene, (200, 150), camera, options, box)
+    monkeypatch.setattr(instance_pass, "FEWEST", 100)
+    assert instance_groups(scene.actors, options) == []
+    alone = offscreen.render(scene, (200, 150), camera, options, box)
+    difference = np.abs(together.astype(int) - alone).max(axis=-1)
+    assert (difference > 2).mean() < 0.001
+
+
+def test_only_actors_of_one_figure_and_shape_are_drawn_together():
+    body = viewer.load(bundled_body()).actors[0].figure
+    fox = viewer.load().actors[0].figure
+    actors = [Actor(body) for _ in range(2 * FEWEST)] + [Actor(fox) for _ in range(FEWEST - 1)]
+    for actor in actors[:FEWEST]:
+        actor.pose.shape_weights[0] = 1.0
+    groups = instance_groups(actors, DisplayOptions())
+    assert groups == [actors[:FEWEST], actors[FEWEST : 2 * FEWEST]]
+    actors[0].pose.shape_weights[0] = 2.0
+    assert instance_groups(actors, DisplayOptions()) == [actors[FEWEST : 2 * FEWEST]]
+
+
+@pytest.mark.parametrize(
+    "changes", [{"wireframe": True}, {"normals": True}, {"shading": "scalar"}, {"show": "binding"}]
+)
+def test_views_of_single_vertices_draw_actors_one_by_one(changes):
+    assert instance_groups(rows_of_arms(FEWEST).actors, DisplayOptions(**changes)) == []
+
+
+def test_meshes_that_follow_no_skeleton_are_no_instances():
+    figure = replace(arm(3), skin=None)
+    assert instance_groups([Actor(figure) for _ in range(FEWEST)], DisplayOptions()) == []
+
+
+def test_absent_and_hidden_actors_are_not_drawn(offscreen):
+    scene = rows_of_arms(FEWEST + 2)
+    camera, box, size = default_camera(scene, (100, 75)), scene_box(scene), (100, 75)
+    options = DisplayOptions(background="transparent", grid=False)
+    whole = offscreen.render(scene, size, camera, options, box)
+    scene.actors[0].is_present = False
+    scene.actors[1].visible = False
+    fewer = offscreen.render(scene, size, camera, options, box)
+    assert (fewer[..., 3] > 0).sum() < 0.9 * (whole[..., 3] > 0).sum()
+    for actor in scene.actors:
+        actor.visible = False
+    assert not offscreen.render(scene, size, camera, options, box)[..., 3].any()
+
+
+def test_instances_of_a_figure_that_left_are_freed(offscreen):
+    scene = rows_of_arms(FEWEST)
+    camera, box = default_camera(scene, (50, 50)), scene_box(scene)
+    offscreen.render(scene, (50, 50), camera, DisplayOptions(), box)
+    instances = offscreen.renderer.buffers.instanced(scene.actors[0].figure, 1)[0]
+    offscreen.render(rows_of_arms(2), (50, 50), camera, DisplayOptions(), box)
+    assert instances._palette is None
+    assert len(offscreen.renderer.buffers._instanced) == 0
+
+
+def test_a_refused_upload_is_tried_again(ctx, monkeypatch):
+    figure = random_figure(np.random.default_rng(7), 6)
+    instances, actors = Instances(ctx, figure), cast(figure, 3)
+    poses = [actor.pose for actor in actors]
+
+    def refuse(*_):
+        raise RenderError("no room")
+
+    with monkeypatch.context() as patch, pytest.raises(RenderError):
+        patch.setattr(instance_buffers, "write_stacked", refuse)
+        instances.instances.update(poses, Skinning())
+    check(instances, actors, Skinning())
+    instances.release()
+
+
+def test_skeletons_of_many_actors_are_those_of_each(offscreen):
+    scene = rows_of_arms(5)
+    scene.actors[3].pose.scales[:] = 1.5
+    options = DisplayOptions(show="both")
+    camera, box = default_camera(scene, (50, 50)), scene_box(scene)
+    offscreen.render(scene, (50, 50), camera, options, box)
+    with offscreen.context:
+        for actor in scene.actors:
+            boxes = offscreen.renderer.buffers.skeleton(actor).boxes
+            rows = np.frombuffer(boxes.world.read(), dtype="f4").reshape(-1, 3, 4)[:3]
+            wanted = world_matrices(actor.figure.skeleton, actor.pose)[:, :3]
+            assert np.allclose(rows[..., :3], wanted[..., :3], atol=1e-6)
+            assert np.allclose(rows[..., 3] + boxes.center, wanted[..., 3], atol=1e-6)
+
+
+def test_figures_of_points_alone_go_through_every_view(offscreen):
+    layout = PointLayout("one", ("a", "b"), [[0, 1]], [0, 0])
+    actors = [Actor(Figure("points", points=layout)) for _ in range(FEWEST)]
+    for number, actor in enumerate(actors[1:]):
+        actor.points = np.array([[number, 0, 0, 1.0], [number, 1, 0, 1.0]])
+    scene = Scene(actors)
+    offscreen.renderer.buffers.keep_only([])
+    with offscreen.context:
+        offscreen.renderer.prepare(scene)
+    for changes in (
+        {},
+        {"show": "both"},
+        {"show": "skeleton"},
+        {"show": "binding"},
+        {"shading": "scalar"},
+        {"wireframe": True, "normals": True, "keypoints": True},
+    ):
+        options = DisplayOptions(**changes)
+        camera = default_camera(scene, (60, 60))
+        assert offscreen.render(scene, (60, 60), camera, options, scene_box(scene)).any()

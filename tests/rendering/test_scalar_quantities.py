@@ -1,0 +1,390 @@
+"""Scalar views: the numbers that reach the GPU, their range, and their colours in the picture."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from family_models import family_figure
+from rendering.drawn_figures import arm, bent, scene_of, skeleton, square
+from rendering.front_view import alone, drawn, front_view, grid_figure, pixel
+
+from viewer.rendering.camera import Camera
+from viewer.rendering.colormap import colormap
+from viewer.rendering.gpu.mesh_buffers import MeshBuffers
+from viewer.rendering.gpu.scalar_buffer import ScalarBuffer
+from viewer.rendering.offscreen import Offscreen
+from viewer.rendering.options import DisplayOptions
+from viewer.rendering.palettes import NOTHING, count_palette, joint_palette
+from viewer.rendering.scalar_views import name_for
+from viewer.rig import scalars
+from viewer.rig.annotations import BodyParts
+from viewer.rig.blendshapes import Correctives
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import Mesh
+from viewer.rig.pose import rest_pose
+from viewer.rig.scalars import compute
+from viewer.rig.scene import Actor, Scene, figure_pose, scene_box
+from viewer.rig.skin import skin_from_lists
+from viewer.rig.skinning import Skinning
+
+LUMA = np.array([0.2126, 0.7152, 0.0722])
+
+
+@pytest.fixture(scope="module")
+def offscreen():
+    with Offscreen() as result:
+        yield result
+
+
+def rising(largest=1.0):
+    """Return a scene whose view "correctives" rises from 0 at the left edge to the right one's."""
+    figure = grid_figure()
+    offsets = np.zeros((9, figure.mesh.n_vertices, 3))
+    # Half a turn about z drives row 0 with -2.
+    offsets[0, :, 1] = largest * (figure.mesh.positions[:, 0] + 1.5) / 6.0
+    scene = alone(grid_figure(correctives=Correctives(offsets)))
+    scene.actors[0].pose.dofs[5] = np.pi
+    return scene
+
+
+def view_of(offscreen, scene, name="correctives"):
+    """Draw without the correctives, so that the square stays where it is."""
+    how = Skinning(correctives=False)
+    return front_view(offscreen, scene, shading="scalar", scalar=name, skinning=how)
+
+
+@pytest.mark.parametrize("largest", [1.0, 1e-4, 300.0])
+def test_colours_of_the_map_run_from_zero_to_the_largest_value(offscreen, largest):
+    picture = view_of(offscreen, rising(largest))
+    pixels = colormap()[:, :3].astype(int)
+    for x in (-1.4, -0.7, 0.0, 0.7, 1.4):
+        # Pixel centres are 0.025 apart from the place asked for, eight rows of 256.
+        row = round(255 * (x + 1.5) / 3.0)
+        near = pixels[max(row - 8, 0) : row + 9]
+        assert np.abs(near - pixel(picture, x, 0.5)[:3]).max(axis=1).min() <= 6
+
+
+def test_brightest_place_is_where_the_value_is_largest(offscreen):
+    picture = view_of(offscreen, rising())
+    brightness = picture[..., :3] @ LUMA
+    row = brightness[40, drawn(picture)[40]]
+    assert len(row) == 60
+    assert (np.diff(row) > -1.0).all()
+    assert row[-1] > row[0] + 150
+
+
+def test_figure_without_differences_is_dark_all_over(offscreen):
+    scene = alone(grid_figure())
+    picture = view_of(offscreen, scene, "methods")
+    found = picture[drawn(picture)][:, :3].astype(int)
+    assert np.abs(found - colormap()[0, :3]).max() <= 3
+
+
+def test_view_follows_the_pose(offscreen):
+    scene = rising()
+    before = view_of(offscreen, scene)
+    scene.actors[0].pose.dofs[5] = 0.0
+    flat = view_of(offscreen, scene)
+    assert pixel(before, 1.4, 0)[:3] != pixel(flat, 1.4, 0)[:3]
+    assert pixel(flat, 1.4, 0) == pixel(flat, -1.4, 0)
+
+
+def test_view_of_an_arm_is_brightest_at_its_twisted_elbow(offscreen):
+    actor = bent(arm(3), (2, "x", 2.8))
+    actor.placement[:3, 3] = -1.5, 0.0, 0.0
+    picture = view_of(offscreen, Scene([actor]), "methods")
+    brightness = picture[..., :3] @ LUMA * drawn(picture)
+    _, column = np.unravel_index(brightness.argmax(), brightness.shape)
+    # The elbow between joints 1 and 2 is at x = 2, half a unit right of the middle.
+    assert abs((column + 0.5) / 20 - 2.0 - 0.5) < 0.3
+
+
+@pytest.fixture
+def buffers(ctx, tmp_path):
+    mesh = MeshBuffers(ctx, family_figure("smplx", tmp_path), [])
+    scalar = ScalarBuffer(ctx, mesh)
+    yield scalar
+    scalar.release()
+    mesh.release()
+
+
+def values_of(buffer: ScalarBuffer):
+    return np.frombuffer(buffer.values.read(), dtype="f4")
+
+
+def posed(figure, seed=0):
+    pose = figure_pose(figure)
+    pose.dofs[:] = np.random.default_rng(seed).uniform(-1, 1, len(pose.dofs))
+    return pose
+
+
+@pytest.mark.parametrize("name", ["methods", "correctives", "cut"])
+def test_every_split_vertex_has_the_number_of_its_vertex(buffers, name):
+    figure = buffers.mesh.figure
+    pose, how = posed(figure), Skinning(max_influences=2)
+    buffers.update(name, pose, how)
+    numbers = compute(name, figure, pose, how)
+    assert numbers.max() > 0.0
+    np.testing.assert_allclose(values_of(buffers), numbers[buffers.mesh.sources], rtol=1e-6)
+    assert buffers.range == (numbers.min(), numbers.max())
+
+
+def test_numbers_are_computed_when_something_changed_only(buffers, monkeypatch):
+    calls = []
+    original = scalars.compute
+
+    def counted(*parts):
+        calls.append(parts[0])
+        return original(*parts)
+
+    monkeypatch.setattr("viewer.rendering.gpu.scalar_buffer.compute", counted)
+    pose, how = posed(buffers.mesh.figure), Skinning()
+    for change in (
+        lambda: None,
+        lambda: pose.dofs.__setitem__(5, 0.5),
+        lambda: setattr(how, "method", "dqs"),
+        lambda: pose.shape_weights.__setitem__(0, 1.0),
+        lambda: setattr(pose, "figure_scale", 3.0),
+    ):
+        change()
+        before = len(calls)
+        buffers.update("cut", pose, how)
+        buffers.update("cut", pose, how)
+        assert len(calls) == before + 1
+    buffers.update("methods", pose, how)
+    assert calls[-1] == "methods"
+
+
+def test_numbers_of_weights_are_computed_for_all_poses_at_once(buffers):
+    pose, how = posed(buffers.mesh.figure), Skinning()
+    versions = []
+    for change in (
+        lambda: None,
+        lambda: pose.dofs.__setitem__(5, 0.5),
+        lambda: setattr(pose, "figure_scale", 3.0),
+        lambda: setattr(how, "max_influences", 2),
+    ):
+        change()
+        buffers.update("entropy", pose, how)
+        versions.append(buffers.version)
+    assert versions == [1, 1, 1, 2]
+
+
+def test_joint_that_a_figure_has_not_is_no_weight(buffers):
+    buffers.update("weight:nobody", None, Skinning())
+    assert buffers.range == (0.0, 0.0)
+    assert not values_of(buffers).any()
+
+
+def test_numbers_grow_with_the_figure(buffers):
+    pose = posed(buffers.mesh.figure)
+    buffers.update("methods", pose, Skinning())
+    before = buffers.range[1]
+    pose.figure_scale = 2.0
+    buffers.update("methods", pose, Skinning())
+    assert buffers.range[1] == pytest.approx(2.0 * before)
+
+
+def test_binding_space_has_numbers_of_zero_and_a_range(buffers):
+    buffers.update("cut", posed(buffers.mesh.figure), Skinning(max_influences=1))
+    buffers.update("cut", None, Skinning(max_influences=1))
+    assert not values_of(buffers).any()
+    assert buffers.range == (0.0, 0.0)
+
+
+def test_figure_without_a_skin_can_be_drawn_so(offscreen):
+    picture = view_of(offscreen, scene_of(square()), "cut")
+    assert drawn(picture).sum() == 40 * 40
+
+
+def test_rest_pose_of_this_file_differs_from_its_poses(buffers):
+    rest = rest_pose(buffers.mesh.figure.skeleton)
+    buffers.update("methods", rest, Skinning())
+    assert buffers.range[1] == pytest.approx(0.0, abs=1e-14)
+
+
+# Colours, lines and ranges
+
+
+def two_joints(influences):
+    """Return a scene of a square from -1.5 to 1.5 whose corners list these influences."""
+    corners = [[-1.5, -1.5, 0], [1.5, -1.5, 0], [1.5, 1.5, 0], [-1.5, 1.5, 0]]
+    surface = Mesh(
+        np.array(corners), np.tile([0.0, 0, 1], (4, 1)), np.array([[0, 1, 2], [0, 2, 3]])
+    )
+    skin = skin_from_lists(influences, np.tile(np.eye(4), (3, 1, 1)))
+    return alone(Figure("square", surface, skeleton([-1, 0, 1], np.zeros((3, 3))), skin))
+
+
+def shown(offscreen, scene, name, **options):
+    options = {"shading": "scalar", "scalar": name, "isolines": False, **options}
+    return front_view(offscreen, scene, **options)
+
+
+LEFT_TO_RIGHT = [[(0, 1.0)], [(1, 1.0)], [(1, 1.0)], [(0, 1.0)]]
+
+
+def near(found, wanted, by=6):
+    return np.abs(np.array(found[:3], int) - np.array(wanted[:3], int)).max() <= by
+
+
+def test_weight_is_dark_grey_only_where_the_whole_triangle_has_none(offscreen):
+    # Only the corner at the lower right has weight of joint 2: the upper left triangle has none.
+    rows = [[(0, 1.0)], [(2, 1.0)], [(0, 1.0)], [(0, 1.0)]]
+    picture = shown(offscreen, two_joints(rows), "weight:j2")
+    assert near(pixel(picture, -0.8, 0.8), NOTHING, 1)
+    low, high = pixel(picture, 0.0, -0.1), pixel(picture, 1.4, -1.4)
+    assert not near(low, NOTHING) and high[0] > 200
+
+
+def test_fixed_range_moves_the_colours_and_cuts_what_is_beyond(offscreen):
+    scene = two_joints(LEFT_TO_RIGHT)
+    pixels = colormap()[:, :3].astype(int)
+    picture = shown(offscreen, scene, "weight:j1", scalar_range=(0.25, 0.5))
+    # The weight is (x + 1.5) / 3: 0.25 at -0.75, 0.5 at 0.
+    for x, row in ((-1.2, 0), (-0.8, 0), (-0.375, 127), (0.1, 255), (1.3, 255)):
+        close = pixels[max(row - 10, 0) : row + 11]
+        assert np.abs(close - pixel(picture, x, 0.3)[:3]).max(axis=1).min() <= 6
+
+
+def test_fixed_range_is_in_the_unit_of_the_legend(offscreen):
+    scene = rising(0.002)
+    scene.actors[0] = Actor(replace(scene.actors[0].figure, unit="m"), scene.actors[0].pose)
+    whole = view_of(offscreen, scene)
+    # 2 mm at the right edge.
+    same = shown(offscreen, scene, "correctives", scalar_range=(0.0, 2.0),
+                 skinning=Skinning(correctives=False))  # fmt: skip
+    np.testing.assert_array_equal(same, whole)
+    assert offscreen.renderer.legend.unit == "mm"
+
+
+def test_isolines_lie_at_tenths_of_the_range(offscreen):
+    scene = two_joints(LEFT_TO_RIGHT)
+    plain = shown(offscreen, scene, "weight:j1")
+    lined = shown(offscreen, scene, "weight:j1", isolines=True)
+    changed = (np.abs(plain.astype(int) - lined).sum(axis=2) > 12).any(axis=0)
+    columns = np.flatnonzero(changed)
+    # A tenth is 0.3 units, six pixels; none at the edges, where the weight is 0 or 1.
+    lines = (columns + 0.5) / 20 - 2.0
+    tenths = (lines + 1.5) / 0.3
+    assert set(np.round(tenths)) == set(range(1, 10))
+    assert np.abs(tenths - np.round(tenths)).max() <= 0.27
+
+
+def test_isolines_are_usual_for_weights_only(offscreen):
+    scene = two_joints(LEFT_TO_RIGHT)
+    usual = shown(offscreen, scene, "weight:j1", isolines=None)
+    np.testing.assert_array_equal(usual, shown(offscreen, scene, "weight:j1", isolines=True))
+    usual = shown(offscreen, scene, "entropy", isolines=None)
+    np.testing.assert_array_equal(usual, shown(offscreen, scene, "entropy"))
+
+
+def test_place_of_one_value_has_no_isoline(offscreen):
+    rows = [[(0, 0.5), (1, 0.5)]] * 4
+    picture = shown(offscreen, two_joints(rows), "weight:j1", isolines=True)
+    found = picture[drawn(picture)]
+    assert (found == found[0]).all()
+
+
+def test_dominant_joints_meet_in_a_sharp_border(offscreen):
+    picture = shown(offscreen, two_joints(LEFT_TO_RIGHT), "dominant")
+    colors = joint_palette(np.array([-1, 0, 1]))
+    row = picture[40, drawn(picture)[40]]
+    is_first = np.array([near(found, colors[0]) for found in row])
+    is_second = np.array([near(found, colors[1]) for found in row])
+    # In the middle, and at most two pixels are of neither colour.
+    assert is_first[:29].all() and is_second[31:].all()
+    assert (is_first | is_second).sum() >= 58
+
+
+def test_three_categories_of_a_triangle_each_have_their_corner(offscreen):
+    rows = [[(0, 1.0)], [(1, 1.0)], [(2, 1.0)], [(0, 1.0)]]
+    picture = shown(offscreen, two_joints(rows), "dominant")
+    colors = joint_palette(np.array([-1, 0, 1]))
+    for x, y, joint in ((-1.3, -1.3, 0), (1.4, -1.3, 1), (1.4, 1.3, 2), (1.4, -0.2, 1)):
+        assert near(pixel(picture, x, y), colors[joint]), (x, y)
+
+
+def test_count_between_two_others_is_not_shown(offscreen):
+    one, three = [(0, 1.0)], [(0, 0.4), (1, 0.3), (2, 0.3)]
+    picture = shown(offscreen, two_joints([one, three, three, one]), "influences")
+    colors = count_palette(3)
+    row = picture[40, drawn(picture)[40]]
+    assert not any(near(found, colors[2]) for found in row)
+    assert near(row[5], colors[1]) and near(row[-5], colors[3])
+
+
+def test_vertex_without_influence_is_grey_among_dominant_joints(offscreen):
+    picture = shown(offscreen, two_joints([[], [], [], []]), "dominant")
+    assert near(pixel(picture, 0.2, 0.1), NOTHING, 1)
+
+
+def test_parts_have_the_colours_of_the_shading_of_parts(offscreen):
+    scene = two_joints(LEFT_TO_RIGHT)
+    parts = BodyParts(("a", "b"), np.array([0, 1, 1, 0]))
+    scene = alone(replace(scene.actors[0].figure, body_parts=parts))
+    one = shown(offscreen, scene, "parts")
+    other = front_view(offscreen, scene, shading="parts")
+    for x in (-1.4, 1.4):
+        assert near(pixel(one, x, 0.1), pixel(other, x, 0.1), 12)
+
+
+def test_selected_joint_is_shown_by_a_view_without_a_joint(offscreen):
+    scene = two_joints(LEFT_TO_RIGHT)
+    wanted = shown(offscreen, scene, "weight:j1")
+    camera = Camera(azimuth=0.0, inclination=0.0, fov=90.0, distance=2.0, orthographic=True)
+    options = DisplayOptions(background="transparent", grid=False, samples=1, shading="scalar",
+                             scalar="weight", isolines=False)  # fmt: skip
+    with offscreen.context:
+        target = offscreen.target((80, 80), 1)
+        offscreen.renderer.draw(scene, camera, options, target, scene_box(scene), (0, 1))
+        found = target.read()
+        assert offscreen.renderer.legend.title == "Weight of j1"
+        offscreen.renderer.draw(scene, camera, options, target, scene_box(scene), (0, -1))
+        assert offscreen.renderer.legend.note == "no joint is selected"
+    np.testing.assert_array_equal(found, wanted)
+
+
+def test_name_for_the_selected_joint():
+    actor = two_joints(LEFT_TO_RIGHT).actors[0]
+    assert name_for("weight", actor, 2) == "weight:j2"
+    assert name_for("weight:j0", actor, 2) == "weight:j0"
+    assert name_for("cut", actor, 2) == "cut"
+    assert name_for("weight", actor, -1) == name_for("weight", None, 1) == "weight"
+    assert name_for("weight", alone(grid_figure()).actors[0], 7) == "weight"
+
+
+def test_same_colour_is_the_same_number_on_all_figures(offscreen):
+    small, large = rising(0.5).actors[0], rising(1.0).actors[0]
+    both = Scene([small, large])
+    how = Skinning(correctives=False)
+    options = {"shading": "scalar", "scalar": "correctives", "skinning": how}
+    front_view(offscreen, both, **options)
+    ends = [offscreen.renderer.posed_mesh(actor).scalars.look.ends for actor in both.actors]
+    assert ends == [(0.0, 1.0), (0.0, 1.0)]
+    assert offscreen.renderer.scalar_range == (0.0, 1.0)
+
+
+def test_figure_without_what_is_shown_is_drawn_as_usual(offscreen):
+    having = rising().actors[0]
+    lacking = alone(grid_figure()).actors[0]
+    having.placement[0, 3], lacking.placement[0, 3] = -2.0, 2.0
+    colors = {"shading": "scalar", "skinning": Skinning(correctives=False)}
+    together = front_view(offscreen, Scene([having, lacking]), scalar="correctives", **colors)
+    legend = offscreen.renderer.legend
+    assert legend.title == "Effect of pose correctives" and len(legend.colors)
+    apart = [front_view(offscreen, Scene([having]), scalar="correctives", **colors),
+             front_view(offscreen, Scene([lacking]))]  # fmt: skip
+    half = together.shape[1] // 2
+    np.testing.assert_array_equal(together[:, :half], apart[0][:, :half])
+    np.testing.assert_array_equal(together[:, half:], apart[1][:, half:])
+    # The one that has it hidden: the other stays as it is, and the legend keeps its title.
+    having.visible = False
+    alone_now = front_view(offscreen, Scene([having, lacking]), scalar="correctives", **colors)
+    np.testing.assert_array_equal(alone_now[:, half:], apart[1][:, half:])
+    legend = offscreen.renderer.legend
+    assert legend.title == "Effect of pose correctives"
+    assert legend.note == "not known of what is shown"
+    assert offscreen.renderer.scalar_range == (0.0, 0.0)

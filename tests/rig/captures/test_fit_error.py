@@ -1,0 +1,57 @@
+"""Keypoints against fitted bodies: whose body it is, and distances by hand."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from rig.hand_made import mesh, skeleton
+
+from viewer.rig.captures.fit_error import fitted_body, keypoint_distances
+from viewer.rig.captures.keypoint_layouts import keypoint_layout
+from viewer.rig.figure import Figure
+from viewer.rig.scene import Actor
+from viewer.rig.skeleton import ball_skeleton
+
+
+def pointed(person):
+    """Return keypoints of body25, all at (1, 2, 3), only the right elbow and the nose seen."""
+    layout = keypoint_layout(25)
+    points = np.zeros((25, 4))
+    points[:, :3] = 1.0, 2.0, 3.0
+    for name in ("right_elbow", "nose"):
+        points[layout.names.index(name), 3] = 0.5
+    return Actor(Figure("points", points=layout), person=person, points=points)
+
+
+def body(person):
+    bones = ball_skeleton(
+        ("pelvis", "right_elbow"), np.array([-1, 0]), np.array([[0.0] * 3, [1, 2, 0]])
+    )
+    return Actor(Figure("body", mesh(np.eye(3)), bones), person=person)
+
+
+def test_body_of_the_same_person_is_found():
+    bodies = [body(2), body(3)]
+    assert fitted_body(pointed(3), bodies) is bodies[1]
+    assert fitted_body(pointed(4), bodies) is None
+
+
+@pytest.mark.parametrize("person", [None, -1, -2])
+def test_who_has_no_track_has_no_body(person):
+    assert fitted_body(pointed(person), [body(person)]) is None
+
+
+def test_skeleton_alone_is_no_body():
+    assert (
+        fitted_body(pointed(1), [Actor(Figure("bones", skeleton=skeleton((-1,))), person=1)])
+        is None
+    )
+
+
+def test_distances_are_those_of_seen_keypoints():
+    seen, fitted = pointed(1), body(1)
+    fitted.placement[:3, 3] = 0.0, 0.0, -1.0  # the elbow is then at (1, 2, -1), 4 from the point
+    found = keypoint_distances(seen, fitted)
+    assert list(found) == ["right_elbow"]
+    assert_allclose(found["right_elbow"], 4.0, atol=1e-12)
+    fitted.is_present = False
+    assert keypoint_distances(seen, fitted) == {}

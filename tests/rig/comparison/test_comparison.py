@@ -1,0 +1,223 @@
+"""Comparison of figures and motions: against differences that were put in by hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from rig.hand_made import skeleton
+
+from viewer.errors import RigError
+from viewer.rig.comparison import compare, rotation_distance
+from viewer.rig.figure import Figure
+from viewer.rig.geometry.rotation import axis_rotations
+from viewer.rig.mesh import Mesh
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.timing import Timing
+from viewer.rig.scene import Actor
+from viewer.rig.skin import skin_from_lists
+
+CORNERS = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+TWO = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
+MIXED = [[(0, 1.0)], [(0, 0.5), (1, 0.5)], [(1, 1.0)], [(0, 1.0)]]
+
+
+def arm(second=(1.0, 0.0, 0.0), low=-1.0):
+    """Two joints; the second, ``second`` away from the first, turns about z."""
+    return skeleton(
+        [-1, 0], [(1, "z", 0.0, low, 1.0)], ("base", "tip"), np.array([[0.0, 0, 0], second])
+    )
+
+
+def figure(positions=CORNERS, triangles=TWO, influences=MIXED, joints=None) -> Figure:
+    rig = joints or arm()
+    bind = np.tile(np.eye(4), (2, 1, 1))
+    bind[1, :3, 3] = -rig.rest_translations[1]
+    normals = np.tile([0.0, 0, 1], (len(positions), 1))
+    mesh = Mesh(np.array(positions), normals, np.array(triangles))
+    return Figure("square", mesh, rig, skin_from_lists(influences, bind))
+
+
+def measures(difference):
+    return {measure.name: measure for measure in difference.measures}
+
+
+def test_figure_does_not_differ_from_itself() -> None:
+    found = compare(Actor(figure()), Actor(figure()))
+    assert found.mismatches == () and found.notes == ()
+    assert [(m.name, m.maximum) for m in found.measures] == [
+        ("joint positions", 0.0),
+        ("joint orientations", 0.0),
+        ("vertices", 0.0),
+        ("weights", 0.0),
+    ]
+    assert not found.exceeds(0.0)
+    assert_allclose(found.size, np.sqrt(2.0))
+
+
+def test_joint_that_is_elsewhere_is_named_with_its_distance() -> None:
+    found = compare(Actor(figure()), Actor(figure(joints=arm((1.0, 0.03, 0.04)))), n_poses=0)
+    places = measures(found)["joint positions"]
+    assert_allclose(places.maximum, 0.05)
+    assert_allclose(places.mean, 0.025)  # two joints, one in place
+    assert (places.item, places.step) == ("tip", "own pose")
+    assert_allclose(places.item_maxima, [0.0, 0.05])
+    assert found.exceeds(0.03) and not found.exceeds(0.05 / np.sqrt(2) + 1e-9)
+
+
+def test_vertex_that_is_elsewhere_is_numbered() -> None:
+    moved = CORNERS.copy()
+    moved[3] += [0.0, 0.0, 0.2]
+    vertices = measures(compare(Actor(figure()), Actor(figure(moved)), n_poses=0))["vertices"]
+    assert_allclose(vertices.item_maxima, [0, 0, 0, 0.2])
+    assert_allclose(vertices.mean, 0.05)
+    assert vertices.item == "vertex 3"
+
+
+def test_weights_differ_by_the_l1_distance_of_rows_however_they_are_listed() -> None:
+    # Vertex 0: split in two entries, the same. Vertex 1: 0.5/0.5 against 0.2/0.8, so 0.6.
+    other = [[(0, 0.4), (0, 0.6)], [(1, 0.8), (0, 0.2)], [(1, 1.0)], [(1, 1.0)]]
+    found = compare(Actor(figure()), Actor(figure(influences=other)), n_poses=0)
+    weights = measures(found)["weights"]
+    assert_allclose(weights.item_maxima, [0.0, 0.6, 0.0, 2.0], atol=1e-12)
+    assert (weights.item, weights.step) == ("vertex 3", "")  # they are the same in every pose
+    assert measures(found)["vertices"].maximum == 0.0  # at rest nothing shows
+
+
+def test_weights_that_are_the_same_at_rest_show_in_test_poses() -> None:
+    other = [[(0, 1.0)], [(1, 1.0)], [(1, 1.0)], [(0, 1.0)]]
+    vertices = measures(compare(Actor(figure()), Actor(figure(influences=other))))["vertices"]
+    # Vertex 1 lies in the joint: it stays. With one more vertex weighted otherwise it moves.
+    assert vertices.maximum < 1e-12
+    other = [[(0, 1.0)], [(0, 0.5), (1, 0.5)], [(0, 1.0)], [(0, 1.0)]]
+    moved = measures(compare(Actor(figure()), Actor(figure(influences=other)), n_poses=20))
+    # Vertex 2 is 1 from the joint, so a turn by a moves it by 2 sin(a / 2), a <= 0.7.
+    assert 0.1 < moved["vertices"].maximum <= 2 * np.sin(0.35) + 1e-12
+    assert moved["vertices"].step.startswith("test pose ")
+    assert moved["vertices"].item == "vertex 2"
+
+
+def test_meshes_with_other_triangles_are_compared_by_closest_points_both_ways() -> None:
+    # The same square as four triangles about its middle, lifted by 0.1, weights as in between.
+    positions = np.array([*CORNERS, [0.5, 0.5, 0.0]]) + np.array([0.0, 0.0, 0.1])
+    fan = [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]
+    influences = [*MIXED, [(0, 0.625), (1, 0.375)]]
+    other = figure(positions, fan, influences)
+    found = compare(Actor(figure()), Actor(other), n_poses=0)
+    names = measures(found)
+    assert_allclose(names["surface, from the first"].item_maxima, [0.1] * 4)
+    assert_allclose(names["surface, from the second"].item_maxima, [0.1] * 5)
+    assert_allclose(names["weights"].item_maxima, 0.0, atol=1e-12)
+    assert found.notes == (
+        "meshes differ (4 vertices, 2 triangles; 5 vertices, 4 triangles): closest points are "
+        "compared",
+    )
+
+
+def test_what_only_one_has_is_a_mismatch_that_no_tolerance_covers() -> None:
+    names = skeleton([-1, 0, 1], names=("base", "tip", "claw"))
+    found = compare(Actor(Figure("a", skeleton=names)), Actor(figure()), n_poses=0)
+    assert found.mismatches == ("1 joint only in the first: claw", "only the second has a mesh")
+    assert found.exceeds(1e9)
+
+
+def test_joints_without_a_name_are_told_by_number() -> None:
+    one = Figure("a", skeleton=skeleton([-1, 0], names=("base", "")))
+    other = Figure("b", skeleton=skeleton([-1], names=("base",)))
+    found = compare(Actor(one), Actor(other))
+    assert found.mismatches == ("1 joint only in the first: joint 1 (no name)",)
+    found = compare(Actor(one), Actor(one))
+    assert measures(found)["joint positions"].items == ("base", "joint 1 (no name)")
+
+
+def test_joints_in_another_order_are_told() -> None:
+    one = Figure("a", skeleton=skeleton([-1, 0, 0, 0], names=("a", "b", "c", "d")))
+    other = Figure("b", skeleton=skeleton([-1, 0, 0], names=("a", "d", "b")))
+    found = compare(Actor(one), Actor(other))
+    assert found.notes == (
+        "joints come in another order, which .skin and .anim files go by: where the first has b, "
+        "the second has d",
+    )
+    less = Figure("c", skeleton=skeleton([-1, 0, 0], names=("a", "c", "d")))
+    assert compare(Actor(one), Actor(less)).notes == ()
+
+
+def test_joint_with_another_parent_is_a_mismatch() -> None:
+    one = Figure("a", skeleton=skeleton([-1, 0, 1], names=("a", "b", "c")))
+    other = Figure("b", skeleton=skeleton([-1, 0, 0], names=("a", "b", "c")))
+    assert compare(Actor(one), Actor(other)).mismatches == ("other parents: c",)
+
+
+def test_joints_without_a_common_name_are_compared_by_number() -> None:
+    one = Figure("a", skeleton=skeleton([-1, 0], names=("a", "b")))
+    other = Figure("b", skeleton=skeleton([-1, 0], names=("x", "y")))
+    assert compare(Actor(one), Actor(other)).notes == ("joints share no name: compared by number",)
+
+
+def test_other_limits_are_told_with_both() -> None:
+    found = compare(Actor(figure()), Actor(figure(joints=arm(low=-0.5))))
+    assert found.mismatches == ("other limits of 1 DOF, as tip.z: -1 to 1 and -0.5 to 1",)
+
+
+def walk(angles, rate=10.0, name="walk") -> SampledClip:
+    """Turn the arm's base about z."""
+    half = np.array(angles) / 2
+    turns = np.zeros((len(half), 2, 4))
+    turns[:, :, 3] = 1.0
+    turns[:, 0, 2], turns[:, 0, 3] = np.sin(half), np.cos(half)
+    return SampledClip(name, Timing(rate, np.arange(len(half))), rotations=turns)
+
+
+def bare() -> Figure:
+    return Figure(
+        "arm", skeleton=skeleton([-1, 0], names=("base", "tip"), offsets=arm().rest_translations)
+    )
+
+
+def test_motions_are_compared_frame_by_frame_and_the_worst_is_named() -> None:
+    first = Actor(bare(), clip=walk([0.0, 0.1, 0.2, 0.3]))
+    second = Actor(bare(), clip=walk([0.0, 0.1, 0.25, 0.3]))
+    found = compare(first, second)
+    assert_allclose(measures(found)["joint orientations"].maximum, 0.05)
+    assert_allclose(measures(found)["joint positions"].maximum, 2 * np.sin(0.025))
+    assert measures(found)["joint positions"].step == "frame 2"
+    only = compare(first, second, frames=(0, 2))
+    assert measures(only)["joint positions"].maximum < 1e-12
+
+
+def test_motions_of_other_length_are_a_mismatch_and_the_common_part_is_compared() -> None:
+    found = compare(Actor(bare(), clip=walk([0.0] * 4)), Actor(bare(), clip=walk([0.0] * 6)))
+    assert found.mismatches == ("one lasts 0.3 s, the other 0.5 s",)
+    assert measures(found)["joint positions"].n_compared == 2 * 4
+
+
+def test_range_without_frames_is_refused() -> None:
+    actors = Actor(bare(), clip=walk([0.0] * 4)), Actor(bare(), clip=walk([0.0] * 4))
+    with pytest.raises(RigError, match=r"^no frame in 9:12; both have frames 0 to 3$"):
+        compare(*actors, frames=(9, 12))
+
+
+def test_rotation_distance_is_exact_for_small_and_half_turns() -> None:
+    angles = np.array([1e-9, 1e-4, 1.0, np.pi])
+    found = rotation_distance(axis_rotations(1, angles), np.eye(3))
+    assert_allclose(found, angles, rtol=1e-6)
+
+
+def test_nan_is_never_within_a_tolerance() -> None:
+    found = compare(Actor(figure()), Actor(figure()), n_poses=0)
+    broken = replace(found.measures[0], maximum=float("nan"))
+    assert replace(found, measures=(broken,)).exceeds(1e9)
+
+
+def test_actors_are_left_in_the_worst_pose_also_if_that_is_their_own() -> None:
+    # The vertex is off by the same at rest and turned, so the first pose is the worst.
+    moved = CORNERS.copy()
+    moved[0] += [0.0, 0.0, 0.2]
+    first, second = Actor(figure()), Actor(figure(moved))
+    found = compare(first, second)
+    assert measures(found)["vertices"].step == "own pose"
+    for actor in (first, second):
+        assert actor.pose is not None
+        assert_allclose(actor.pose.dofs, [0.0])

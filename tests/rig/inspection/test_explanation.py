@@ -1,0 +1,266 @@
+"""Why a vertex is where it is: an arm of two joints, every number worked out by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from rig.hand_made import matrix, mesh, skeleton, turn_z
+
+from viewer.errors import RigError
+from viewer.rig.blendshapes import BlendShapes, Correctives
+from viewer.rig.figure import Figure
+from viewer.rig.inspection.explanation import explain
+from viewer.rig.inspection.explanation_text import explanation_text
+from viewer.rig.pose import rest_pose
+from viewer.rig.skin import skin_from_lists
+from viewer.rig.skinning import Skinning, deform
+
+# The shoulder is at the origin, the elbow at (2, 0, 0); both turn about z and x.
+POINTS = [[3.0, 0, 0], [2.0, 1, 0], [1.0, 0, 0], [5.0, 5, 5]]
+ROWS = [[(1, 1.0)], [(0, 0.25), (1, 0.75)], [(0, 1.0)], []]
+ELBOW = matrix(move=(2.0, 0, 0))
+
+
+def arm(rows=ROWS, **parts) -> Figure:
+    dofs = [(joint, kind, 0.0) for joint in range(2) for kind in ("x", "z")]
+    bones = skeleton([-1, 0], dofs, ("shoulder", "elbow"), np.array([[0.0, 0, 0], [2, 0, 0]]))
+    skin = skin_from_lists(rows, np.stack([np.eye(4), np.linalg.inv(ELBOW)]))
+    return Figure("arm", mesh(POINTS), bones, skin, **parts)
+
+
+def bent(figure, elbow=np.pi / 2, shoulder=0.0, twist=0.0):
+    pose = rest_pose(figure.skeleton)
+    pose.dofs[:] = 0.0, shoulder, twist, elbow
+    return pose
+
+
+def test_every_term_of_linear_blending():
+    figure = arm()
+    one = explain(figure, bent(figure), Skinning(), 1)
+    assert one.names == ("elbow", "shoulder") and one.joints.tolist() == [1, 0]
+    assert one.weights.tolist() == [0.75, 0.25]
+    # The elbow's joint turns (2, 1, 0) about (2, 0, 0) by a right angle, to (1, 0, 0); the
+    # shoulder leaves it where it is.
+    expected = ELBOW @ matrix(turn_z(np.pi / 2)) @ np.linalg.inv(ELBOW)
+    assert_allclose(one.matrices, [expected, np.eye(4)], atol=1e-15)
+    assert_allclose(one.rest, [2, 1, 0])
+    assert_allclose(one.images, [[1, 0, 0], [2, 1, 0]], atol=1e-15)
+    assert_allclose(one.terms, [[0.75, 0, 0], [0.5, 0.25, 0]], atol=1e-15)
+    assert_allclose(one.linear, [1.25, 0.25, 0], atol=1e-15)
+    assert_allclose(one.position, [1.25, 0.25, 0], atol=1e-15)
+    assert one.dual is None and not one.is_free
+
+
+def test_matrices_follow_the_parents():
+    figure = arm()
+    one = explain(figure, bent(figure, 0.0, np.pi / 2), Skinning(), 0)
+    # The whole arm points up: (3, 0, 0) goes to (0, 3, 0).
+    assert_allclose(one.matrices, [matrix(turn_z(np.pi / 2))], atol=1e-15)
+    assert_allclose(one.position, [0, 3, 0], atol=1e-15)
+
+
+def test_every_term_of_dual_quaternions():
+    figure = arm()
+    one = explain(figure, bent(figure), Skinning("dqs"), 1)
+    dual, half = one.dual, np.pi / 4
+    # A turn by 90 degrees about z at (2, 0, 0): real (0, 0, sin 45, cos 45); the translation is
+    # c - R c = (2, -2, 0), the dual part half of it times the real part.
+    s, c = np.sin(half), np.cos(half)
+    assert_allclose(dual.duals, [[0, 0, s, c, 1 * c - 1 * s, -1 * c - 1 * s, 0, 0],
+                                 [0, 0, 0, 1, 0, 0, 0, 0]], atol=1e-15)  # fmt: skip
+    assert_allclose(dual.shares, [0.75, 0.25])
+    assert dual.signs.tolist() == [1, 1]
+    blended = 0.75 * dual.duals[0] + 0.25 * dual.duals[1]
+    assert_allclose(dual.blended, blended, atol=1e-15)
+    assert dual.length == pytest.approx(np.hypot(0.75 * s, 0.75 * c + 0.25))
+    # All joints' motions keep (2, 0, 0), so the blend turns about it, by twice this angle.
+    angle = 2 * np.arctan2(0.75 * s, 0.75 * c + 0.25)
+    assert_allclose(one.position, [2 - np.sin(angle), np.cos(angle), 0], atol=1e-15)
+    assert_allclose(dual.stretched, [2, 1, 0])
+    assert_allclose(dual.position, one.skinned)
+
+
+def test_quaternion_on_the_other_side_is_turned():
+    figure = arm([[(0, 0.6), (1, 0.4)]] * 4)
+    # The shoulder turns by 200 degrees: its quaternion's w is below 0, or the other's sign is.
+    pose = bent(figure, np.deg2rad(-80), np.deg2rad(200))
+    one = explain(figure, pose, Skinning("dqs"), 0)
+    first, second = one.dual.duals[:, :4]
+    assert one.dual.signs[0] == 1 and one.dual.signs[1] == np.sign(first @ second)
+    found = {}
+    for shoulder in np.deg2rad(np.arange(0, 360, 5.0)):
+        for elbow in np.deg2rad([-170.0, 30.0, 170.0]):
+            one = explain(figure, bent(figure, elbow, shoulder), Skinning("dqs"), 0)
+            found[float(one.dual.signs[1])] = True
+            assert one.dual.signs[1] * (one.dual.duals[0, :4] @ one.dual.duals[1, :4]) >= 0
+    assert set(found) == {1.0, -1.0}
+
+
+def test_mixture_lies_between_the_two():
+    figure = arm()
+    pose = bent(figure, 1.0)
+    ends = [explain(figure, pose, Skinning(method), 1).position for method in ("lbs", "dqs")]
+    mixed = explain(figure, pose, Skinning("mix", 0.3), 1)
+    assert_allclose(mixed.position, 0.7 * ends[0] + 0.3 * ends[1])
+    assert_allclose(mixed.linear, ends[0])
+
+
+def test_weights_that_do_not_add_up_to_one_are_as_stored():
+    figure = arm([[(0, 0.5)]] * 4)
+    one = explain(figure, bent(figure, shoulder=np.pi / 2), Skinning(), 0)
+    assert_allclose(one.images, [[0, 3, 0]], atol=1e-15)
+    assert_allclose(one.position, [0, 1.5, 0], atol=1e-15)
+    scaled = explain(figure, bent(figure, shoulder=np.pi / 2), Skinning(normalize=True), 0)
+    assert scaled.weights.tolist() == [1.0]
+    assert_allclose(scaled.position, [0, 3, 0], atol=1e-15)
+
+
+def test_cut_influences_are_not_listed():
+    figure = arm()
+    one = explain(figure, bent(figure), Skinning(max_influences=1), 1)
+    assert one.names == ("elbow",) and one.weights.tolist() == [1.0]
+    assert_allclose(one.position, [1, 0, 0], atol=1e-15)
+
+
+@pytest.mark.parametrize("method", ["lbs", "dqs", "mix"])
+def test_vertex_without_influence_stays(method):
+    figure = arm()
+    one = explain(figure, bent(figure, 1.0, 1.0), Skinning(method), 3)
+    assert one.is_free and one.names == ()
+    assert one.position.tolist() == [5, 5, 5]
+
+
+def test_shape_correctives_and_placement_are_separate_steps():
+    offsets = np.zeros((1, 4, 3))
+    offsets[0, 0] = 0.5, 0, 0
+    push = np.zeros((9, 4, 3))
+    push[0, 0] = 0, 0, 1.0  # driven by cos - 1 of the elbow's turn about z
+    figure = arm(blend_shapes=BlendShapes(("long",), offsets), correctives=Correctives(push))
+    pose = bent(figure)
+    pose.shape_weights = np.array([2.0])
+    pose.figure_scale, pose.figure_translation[:] = 2.0, (10, 0, 0)
+    one = explain(figure, pose, Skinning(), 0)
+    assert_allclose(one.stored, [3, 0, 0])
+    assert_allclose(one.shaped, [4, 0, 0])
+    assert_allclose(one.rest, [4, 0, -1], atol=1e-15)
+    # Two units behind the elbow, turned up; then twice as large and aside.
+    assert_allclose(one.skinned, [2, 2, -1], atol=1e-15)
+    assert_allclose(one.position, [14, 4, -2], atol=1e-15)
+    assert_allclose(one.placement, [[2, 0, 0, 10], [0, 2, 0, 0], [0, 0, 2, 0], [0, 0, 0, 1]])
+    without = explain(figure, pose, Skinning(correctives=False), 0)
+    assert_allclose(without.rest, [4, 0, 0])
+
+
+@pytest.mark.parametrize("method", ["lbs", "dqs", "mix"])
+def test_explanation_ends_where_the_vertex_is_drawn(method):
+    figure = arm()
+    pose = bent(figure, 1.1, -2.0, 0.7)
+    pose.scales[1] = 1.5, 0.8, 1.0
+    how = Skinning(method, 0.4)
+    drawn = deform(figure, pose, how)[0]
+    for vertex in range(4):
+        assert_allclose(explain(figure, pose, how, vertex).position, drawn[vertex], atol=1e-14)
+
+
+def test_stretch_of_a_joint_that_scales_comes_first():
+    figure = arm([[(1, 1.0)]] * 4)
+    pose = bent(figure, np.pi / 2)
+    pose.scales[1] = 3.0, 1.0, 1.0
+    one = explain(figure, pose, Skinning("dqs"), 0)
+    # (3, 0, 0) is one unit behind the elbow: three units, then turned up.
+    assert_allclose(one.dual.stretched, [5, 0, 0], atol=1e-14)
+    assert_allclose(one.position, [2, 3, 0], atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("make", "vertex", "message"),
+    [
+        (arm, 4, "vertex: expected 0 to 3, found 4"),
+        (arm, -1, "vertex: expected 0 to 3, found -1"),
+        (
+            lambda: Figure("bare", mesh(POINTS)),
+            0,
+            "figure bare has no skin that follows a skeleton",
+        ),
+    ],
+)
+def test_what_cannot_be_explained_is_refused(make, vertex, message):
+    figure = make()
+    with pytest.raises(RigError) as caught:
+        explain(figure, bent(arm()), Skinning(), vertex)
+    assert str(caught.value) == message
+
+
+def test_text_of_linear_blending():
+    figure = arm()
+    text = explanation_text(explain(figure, bent(figure), Skinning(), 1), digits=2)
+    assert text == [
+        "vertex 1: Linear blend (LBS)",
+        "stored              (  2.00   1.00   0.00 )",
+        "p                   (  2.00   1.00   0.00 )",
+        "1. elbow: w1 = 0.75",
+        "   M1 = [  0.00  -1.00   0.00   2.00 ]",
+        "        [  1.00   0.00   0.00  -2.00 ]",
+        "        [  0.00   0.00   1.00   0.00 ]",
+        "        [  0.00   0.00   0.00   1.00 ]",
+        "   M1 p             (  1.00   0.00   0.00 )",
+        "   w1 M1 p          (  0.75   0.00   0.00 )",
+        "2. shoulder: w2 = 0.25",
+        "   M2 = [  1.00   0.00   0.00   0.00 ]",
+        "        [  0.00   1.00   0.00   0.00 ]",
+        "        [  0.00   0.00   1.00   0.00 ]",
+        "        [  0.00   0.00   0.00   1.00 ]",
+        "   M2 p             (  2.00   1.00   0.00 )",
+        "   w2 M2 p          (  0.50   0.25   0.00 )",
+        "sum of w = 1.00",
+        "sum of w M p        (  1.25   0.25   0.00 )",
+        "position            (  1.25   0.25   0.00 )",
+    ]
+
+
+def test_text_of_dual_quaternions_and_placement():
+    figure = arm([[(1, 1.0)]] * 4)
+    pose = bent(figure)
+    pose.figure_scale, pose.figure_translation[:] = 2.0, (0, 1, 0)
+    lines = explanation_text(explain(figure, pose, Skinning("dqs"), 0), digits=2)
+    # Real (0, 0, sin 45, cos 45), dual (0, -2 sin 45, 0, 0): see the test of every term.
+    assert lines[lines.index("sum of w = 1.00") :] == [
+        "sum of w = 1.00",
+        "sum of w M p        (  2.00   1.00   0.00 )",
+        "q1: share 1.00",
+        "   real [  0.00   0.00   0.71   0.71 ]",
+        "   dual [  0.00  -1.41   0.00   0.00 ]",
+        "q = sum of share times q, with these signs",
+        "   real [  0.00   0.00   0.71   0.71 ]",
+        "   dual [  0.00  -1.41   0.00   0.00 ]",
+        "length of its real part = 1.00",
+        "moved by q / length (  2.00   1.00   0.00 )",
+        "figure: times 2.00, plus",
+        "                    (  0.00   1.00   0.00 )",
+        "position            (  4.00   3.00   0.00 )",
+    ]
+
+
+def test_text_says_what_is_special():
+    figure = arm()
+    free = explanation_text(explain(figure, bent(figure), Skinning("dqs"), 3))
+    assert free[3:] == [
+        "no influence: the vertex stays where it was bound",
+        "position            (  5.0000   5.0000   5.0000 )",
+    ]
+    both = arm([[(0, 0.5), (1, 0.5)]] * 4)
+    pose = bent(both, np.deg2rad(170), np.deg2rad(170))
+    mixed = explanation_text(explain(both, pose, Skinning("mix", 0.25), 0))
+    assert any(line == "q2: share 0.5000, turned to the side of q1" for line in mixed)
+    assert any(line.startswith("0.2500 of the way   (") for line in mixed)
+
+
+def test_numbers_of_the_text_stand_below_each_other():
+    figure = arm()
+    pose = bent(figure, 1.0, 2.0, 3.0)
+    pose.figure_translation[:] = -12345.678, 0.1, 3
+    lines = explanation_text(explain(figure, pose, Skinning("mix"), 1))
+    for opening in "([":
+        widths = {len(line) - line.index(opening) for line in lines if opening in line}
+        assert len(widths) <= 2  # vectors have three numbers, matrix rows and quaternions four

@@ -1,0 +1,217 @@
+"""The front of a figure: judged by names, feet, faces, ends, soles and travel."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from rig.hand_made import matrix, mesh, turn_y, turn_z
+
+import viewer
+from viewer.loading import bundled_body
+from viewer.rig.captures.points import PointLayout
+from viewer.rig.figure import Figure
+from viewer.rig.inspection.front import front_axes, guess_front, usual_front
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.timing import Timing
+from viewer.rig.scene import Actor, Scene
+from viewer.rig.skeleton import ball_skeleton
+
+# A quarter turn takes each axis to the next: about y, +z to +x; about z, -y to +x.
+CYCLES = {"y": ("+z", "+x", "-z", "-x"), "z": ("-y", "+x", "+y", "-x")}
+TURNS = {"y": turn_y, "z": turn_z}
+
+
+def turned(scene: Scene, quarters: int) -> Scene:
+    place = matrix(TURNS[scene.up](quarters * math.pi / 2), (3.0, -2.0, 5.0))
+    return Scene([_placed(actor, place) for actor in scene.actors], world_up=scene.up)
+
+
+def _placed(actor: Actor, place) -> Actor:
+    moved = actor.copy()
+    moved.placement = place @ actor.placement
+    return moved
+
+
+def fronts(scene: Scene) -> list[str]:
+    """Return the guesses for a scene and three copies that are turned by 90 degrees each."""
+    return [guess_front(turned(scene, quarters)) for quarters in range(4)]
+
+
+def cycle(up: str, front: str) -> list[str]:
+    first = CYCLES[up].index(front)
+    return [CYCLES[up][(first + quarters) % 4] for quarters in range(4)]
+
+
+def figure(joints: dict[str, tuple[int, tuple[float, float, float]]], up: str = "y") -> Figure:
+    """Build a figure from names, each with its parent and its place."""
+    parents = np.array([parent for parent, _ in joints.values()], dtype=np.int32)
+    places = np.array([place for _, place in joints.values()], dtype=float)
+    return Figure("made", skeleton=ball_skeleton(tuple(joints), parents, places), up=up)
+
+
+def scene(*figures: Figure) -> Scene:
+    return Scene([Actor(figure) for figure in figures])
+
+
+BODY = {"hips": (-1, (0, 1, 0)), "LeftUpLeg": (0, (0.1, 1, 0)), "RightUpLeg": (0, (-0.1, 1, 0))}
+"""Faces +z: its left is +x."""
+
+
+@pytest.mark.parametrize(("files", "front"), [((), "+z"), ((bundled_body(),), "+z")])
+def test_bundled_figures_face_the_usual_way_and_turn(files, front):
+    assert fronts(viewer.load(*files)) == cycle("y", front)
+
+
+@pytest.mark.parametrize(
+    ("names", "front"),
+    [
+        (("cse169/wasp.skel", "cse169/wasp.skin"), "-z"),
+        (("cse169/test.skel",), "-z"),
+        (("pig/core_txt_files",), "+x"),
+        (("smpl_synthetic/SMPL_NEUTRAL.npz",), "+z"),
+    ],
+)
+def test_real_figures_show_their_front_and_turn(shared_data, names, front):
+    found = viewer.load(*(shared_data / name for name in names))
+    assert fronts(found) == cycle(found.up, front)
+
+
+def test_people_who_face_each_other_leave_the_usual_front(shared_data):
+    found = viewer.load(shared_data / "smpl_synthetic" / "easymocap")
+    assert guess_front(found) == "-y"
+
+
+def test_tube_has_no_front(shared):
+    tube = viewer.load(shared / "tube.skel", shared / "tube.skin")
+    assert fronts(tube) == ["+z"] * 4
+
+
+def test_left_and_right_show_the_front():
+    assert fronts(scene(figure(BODY))) == cycle("y", "+z")
+    # With z up and the left at +y a figure faces +x.
+    lying = {name: (p, (0.0, place[0], place[1])) for name, (p, place) in BODY.items()}
+    assert fronts(scene(figure(lying, "z"))) == cycle("z", "+x")
+
+
+@pytest.mark.parametrize("degrees", [-40, 40])
+def test_slanted_figure_gets_the_nearest_axis(degrees):
+    actor = Actor(figure(BODY), placement=matrix(turn_y(math.radians(degrees))))
+    assert guess_front(Scene([actor])) == "+z"
+
+
+@pytest.mark.parametrize(
+    "joints",
+    [
+        {"a": (-1, (0, 1, 0)), "foot": (0, (0, 0, 0)), "toe": (1, (-0.2, 0, 0))},
+        {"a": (-1, (0, 1, 0)), "head": (0, (0, 2, 0)), "jaw": (1, (-0.1, 2, 0))},
+        {"a": (-1, (0, 1, 0)), "head": (0, (-1, 1, 0)), "tail_1": (0, (1, 1, 0))},
+        {"a": (-1, (0, 1, 0)), "b": (0, (0.2, 1, 0)), "tail_1": (0, (1, 1, 0))},
+    ],
+    ids=["toe", "jaw", "head", "tail"],
+)
+def test_feet_faces_and_ends_show_the_front(joints):
+    assert fronts(scene(figure(joints))) == cycle("y", "-x")
+
+
+def test_all_other_evidence_together_outvotes_sides_that_are_named_the_wrong_way_round():
+    joints = {
+        **BODY,
+        "toe": (1, (0.1, 0.9, -0.2)),
+        "head": (0, (0, 1, -1)),
+        "eye": (4, (0, 1, -1.1)),
+    }
+    assert fronts(scene(figure(joints))) == cycle("y", "-z")  # 6 to 3
+    del joints["eye"]  # 4 to 3 is not clear
+    assert fronts(scene(figure(joints))) == ["+z"] * 4
+    del joints["head"]  # 2 to 3 either
+    assert fronts(scene(figure(joints))) == ["+z"] * 4
+
+
+def _walk(way, n_frames=11):
+    chain = {"a": (-1, (0, 0, 0)), "b": (0, (0, 1, 0))}
+    turns = np.tile([0.0, 0.0, 0.0, 1.0], (n_frames, 2, 1))
+    places = np.outer(np.linspace(0.0, 1.0, n_frames), way)
+    timing = Timing(30.0, np.arange(n_frames))
+    return Actor(figure(chain), clip=SampledClip("walk", timing, turns, figure_translations=places))
+
+
+def test_travel_shows_the_front_where_nothing_else_does():
+    assert fronts(Scene([_walk((-3.0, 0.0, 0.2))])) == cycle("y", "-x")
+    assert guess_front(Scene([_walk((0.0, 5.0, 0.0))])) == "+z"  # up is no way to go
+    assert guess_front(Scene([_walk((-0.1, 0.0, 0.0))])) == "+z"  # nor is swaying
+
+
+def test_travel_does_not_outvote_names():
+    actor = _walk((-3.0, 0.0, 0.0))
+    sided = {"hips": BODY["hips"], "LeftUpLeg": BODY["LeftUpLeg"], "RightUpLeg": BODY["RightUpLeg"]}
+    turns = np.tile([0.0, 0.0, 0.0, 1.0], (actor.clip.n_rows, 3, 1))
+    clip = SampledClip(
+        "walk", actor.clip.timing, turns, figure_translations=actor.clip.figure_translations
+    )
+    assert guess_front(Scene([Actor(figure(sided), clip=clip)])) == "+z"
+
+
+def test_captured_points_show_it_by_their_sides():
+    layout = PointLayout("two", ("left_hip", "right_hip"), np.zeros((0, 2)), np.array([1, -1]))
+    points = np.array([[0.0, -0.1, 1.0, 0.9], [0.0, 0.1, 1.0, 0.9]])  # the left is -y
+    actor = Actor(Figure("points", points=layout, up="z"), points=points)
+    assert guess_front(Scene([actor], world_up="z")) == "-x"
+    points[0, 3] = 0.0  # not seen
+    assert guess_front(Scene([actor], world_up="z")) == "-y"
+
+
+def _grid(x, y, z):
+    return np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+def _boots():
+    """Two legs up to 1, whose soles reach ahead to z = 0.3, and a trunk."""
+    leg = _grid(np.linspace(0.1, 0.2, 3), np.linspace(0.0, 1.0, 51), np.linspace(-0.05, 0.05, 3))
+    sole = _grid(np.linspace(0.1, 0.2, 3), [0.0, 0.02], np.linspace(0.05, 0.3, 11))
+    trunk = _grid(np.linspace(0.0, 0.3, 7), np.linspace(1.0, 2.0, 11), np.linspace(-0.1, 0.1, 5))
+    half = np.concatenate([leg, sole, trunk])
+    return np.concatenate([half, half * (-1, 1, 1)])
+
+
+def test_mesh_alone_shows_it_by_its_feet():
+    assert fronts(scene(Figure("boots", mesh=mesh(_boots())))) == cycle("y", "+z")
+
+
+@pytest.mark.parametrize(
+    "positions",
+    [
+        _grid([0.0, 1.0], [0.0, 1.0], [0.0, 1.0]),
+        _grid([0.0, 3.0], [0.0, 1.0], [0.0, 1.0]),
+        np.zeros((1, 3)),
+        _boots() * (1, 0, 1),
+    ],
+    ids=["cube", "box", "point", "flat"],
+)
+def test_shapes_without_a_front_get_the_usual_one(positions):
+    assert fronts(scene(Figure("shape", mesh=mesh(positions)))) == ["+z"] * 4
+
+
+def test_actors_that_disagree_leave_the_usual_front_and_those_that_agree_do_not():
+    place = matrix(turn_y(math.pi / 2))
+    one, other = Actor(figure(BODY), placement=place), Actor(figure(BODY), placement=place)
+    assert guess_front(Scene([one, other])) == "+x"
+    other.placement = matrix(turn_y(-math.pi / 2))
+    assert guess_front(Scene([one, other])) == "+z"
+    other.visible = False
+    assert guess_front(Scene([one, other])) == "+x"
+    assert guess_front(Scene([])) == "+z"
+
+
+def test_guessing_changes_nothing():
+    actor = _walk((-3.0, 0.0, 0.0))
+    before = actor.pose.figure_translation.copy()
+    guess_front(Scene([actor]))
+    assert (actor.pose.figure_translation == before).all()
+
+
+def test_fronts_are_the_horizontal_axes():
+    assert front_axes("y") == ("+x", "-x", "+z", "-z")
+    assert front_axes("z") == ("+x", "-x", "+y", "-y")
+    assert usual_front("y") == "+z" and usual_front("z") == "-y"

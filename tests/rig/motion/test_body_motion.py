@@ -1,0 +1,199 @@
+"""Body motions on figures: the vertices are those of the formula, whatever turns about what."""
+
+import numpy as np
+import pytest
+from export.plain_smpl import rotation, smpl_forward
+from family_models import family_figure
+from formats.synthetic_smpl import model
+from numpy.testing import assert_allclose
+from rig.hand_made import skeleton
+
+from viewer.errors import RigError
+from viewer.rig.figure import Figure
+from viewer.rig.motion.body_motion import BodyMotion, body_clip, root_positions
+from viewer.rig.motion.evaluation import frames_of, pose_of
+from viewer.rig.motion.timing import Timing
+from viewer.rig.skinning import deform
+from viewer.rig.smpl_family import FAMILY
+
+ATOL = 1e-12  # metres: some hundred roundings of numbers near 1
+TURN, MOVE = np.array([0.7, -1.9, 0.4]), np.array([0.5, 2.0, -1.0])
+
+
+def waves(*shape, seed=0.0):
+    count = int(np.prod(shape))
+    return 0.5 * np.sin(seed + 1.7 * np.arange(1, count + 1) ** 1.3).reshape(shape)
+
+
+@pytest.fixture(scope="module")
+def family(tmp_path_factory):
+    """Figures of the family by kind, each read once."""
+    folder, figures = tmp_path_factory.mktemp("family"), {}
+
+    def get(kind: str) -> Figure:
+        if kind not in figures:
+            figures[kind] = family_figure(kind, folder)
+        return figures[kind]
+
+    return get
+
+
+def motion(names, vectors, **words):
+    """Return a motion of one frame or several."""
+    vectors = np.reshape(vectors, (-1, len(names), 3))
+    words = {"translations": np.tile(MOVE, (len(vectors), 1)), **words}
+    return BodyMotion("a", Timing(30.0, np.arange(len(vectors))), names, vectors, **words)
+
+
+def posed(figure, given, frame=0):
+    """Return the vertices of a figure that a motion poses, and the notes."""
+    clip, notes = body_clip(given, figure)
+    frames = frames_of(figure, clip, np.array([frame / 30.0]))
+    return deform(figure, pose_of(figure, frames, 0))[0], notes
+
+
+def without_root(kind, vectors, shape=(), columns=None):
+    """Return X: the body posed with the root at rest, as the paper has it."""
+    pose = np.array(vectors)
+    pose[0] = 0.0
+    return smpl_forward(model(kind), shape, pose, columns)[0]
+
+
+@pytest.mark.parametrize(("kind", "count"), [("smpl", 24), ("smplh", 52), ("smplx", 55)])
+def test_root_turns_about_the_origin(family, kind, count):
+    vectors, shape = waves(count, 3), waves(10, seed=1.0)
+    vectors[0] = TURN
+    given = motion(FAMILY[count].names, vectors, about_origin=True, shape=shape[None])
+    found, notes = posed(family(kind), given)
+    expected = without_root(kind, vectors, shape) @ rotation(TURN).T + MOVE
+    assert notes == []
+    assert_allclose(found, expected, rtol=0, atol=ATOL)
+
+
+@pytest.mark.parametrize("kind", ["smpl", "smplx"])
+def test_root_turns_about_the_pelvis(family, kind):
+    names = FAMILY[24 if kind == "smpl" else 55].names
+    vectors, shape = waves(len(names), 3), waves(10, seed=2.0)
+    vectors[0] = TURN
+    found, _ = posed(family(kind), motion(names, vectors, shape=shape[None]))
+    arrays = model(kind)
+    rest = arrays["v_template"] + arrays["shapedirs"][:, :, :10] @ shape
+    pelvis = (arrays["J_regressor"] @ rest)[0]
+    expected = (without_root(kind, vectors, shape) - pelvis) @ rotation(TURN).T + pelvis + MOVE
+    assert_allclose(found, expected, rtol=0, atol=ATOL)
+
+
+def test_world_turns_the_posed_body_about_the_origin(family):
+    vectors, shape, world = waves(24, 3), waves(10, seed=3.0), np.array([[1.5, 0.2, -0.6]])
+    given = motion(FAMILY[24].names, vectors, shape=shape[None], world_turns=world)
+    found, _ = posed(family("smpl"), given)
+    # The root's own rotation is part of X here.
+    body = smpl_forward(model("smpl"), shape, vectors)[0]
+    assert_allclose(found, body @ rotation(world[0]).T + MOVE, rtol=0, atol=ATOL)
+
+
+def test_every_frame_has_its_own_shape(family):
+    vectors = np.stack([waves(24, 3, seed=seed) for seed in (0.0, 1.0)])
+    vectors[:, 0] = TURN
+    shapes = np.stack([waves(10, seed=4.0), waves(10, seed=5.0)])
+    given = motion(FAMILY[24].names, vectors, about_origin=True, shape=shapes)
+    for frame in (0, 1):
+        found, _ = posed(family("smpl"), given, frame)
+        expected = without_root("smpl", vectors[frame], shapes[frame]) @ rotation(TURN).T + MOVE
+        assert_allclose(found, expected, rtol=0, atol=ATOL)
+
+
+def test_expression_moves_face_and_root(family):
+    vectors, expression = waves(55, 3), waves(10, seed=6.0)
+    vectors[0] = TURN
+    given = motion(FAMILY[55].names, vectors, about_origin=True, expression=expression[None])
+    found, _ = posed(family("smplx"), given)
+    body = without_root("smplx", vectors, expression, range(10, 20))
+    assert_allclose(found, body @ rotation(TURN).T + MOVE, rtol=0, atol=ATOL)
+
+
+@pytest.mark.parametrize("flat", [True, False])
+@pytest.mark.parametrize(("kind", "count"), [("smplh", 52), ("smplx", 55)])
+def test_hands_turn_by_their_components(family, kind, count, flat):
+    arrays, names = model(kind), FAMILY[count].names
+    body, left, right = waves(22, 3), waves(6, seed=7.0), waves(12, seed=8.0)
+    given = motion(
+        names[:22], body, about_origin=True, hands={"left": left[None], "right": right[None]},
+        flat_hands=flat,
+    )  # fmt: skip
+    found, notes = posed(family(kind), given)
+    vectors = np.zeros((count, 3))
+    vectors[:22] = body
+    for side, first, numbers in (("l", count - 30, left), ("r", count - 15, right)):
+        turned = numbers @ arrays[f"hands_components{side}"][: len(numbers)]
+        turned = turned + (0.0 if flat else arrays[f"hands_mean{side}"])
+        vectors[first : first + 15] = turned.reshape(15, 3)
+    expected = without_root(kind, vectors) @ rotation(body[0]).T + MOVE
+    assert notes == []
+    assert_allclose(found, expected, rtol=0, atol=ATOL)
+
+
+def test_mano_has_one_hand_for_any_side(family):
+    arrays = model("mano")
+    numbers = waves(6)
+    given = motion(("wrist",), TURN, about_origin=True, hands={"": numbers[None]}, flat_hands=True)
+    found, _ = posed(family("mano"), given)
+    vectors = np.zeros((16, 3))
+    vectors[1:] = (numbers @ arrays["hands_components"][:6]).reshape(15, 3)
+    expected = smpl_forward(arrays, (), vectors)[0] @ rotation(TURN).T + MOVE
+    assert_allclose(found, expected, rtol=0, atol=ATOL)
+
+
+def test_root_positions_follow_the_shape(family):
+    arrays, shapes = model("smpl"), np.stack([np.zeros(10), waves(10)])
+    expected = [
+        (arrays["J_regressor"] @ (arrays["v_template"] + arrays["shapedirs"] @ shape))[0]
+        for shape in shapes
+    ]
+    assert_allclose(root_positions(family("smpl"), shapes), expected, rtol=0, atol=ATOL)
+
+
+def test_what_a_figure_lacks_is_noted(family):
+    vectors = np.zeros((55, 3))
+    vectors[[22, 30]] = 0.1
+    given = motion(
+        FAMILY[55].names, vectors, shape=waves(1, 12), expression=waves(1, 10),
+        hands={"left": np.ones((1, 6)), "right": np.zeros((1, 6))},
+    )  # fmt: skip
+    _, notes = posed(family("smpl"), given)
+    assert notes == [
+        "the left hand: smpl has no hand components",
+        "2 joints that smpl lacks were left out: jaw, left_middle3",
+        "shape coefficients 11 to 12 were left out, as smpl has 10 "
+        f"(largest {np.abs(waves(12)[10:]).max():.3g})",
+        f"expression coefficients 1 to 10 were left out, as smpl has 0 "
+        f"(largest {np.abs(waves(10)).max():.3g})",
+    ]
+
+
+def test_other_skeletons_are_refused():
+    figure = Figure("box", skeleton=skeleton([-1]))
+    with pytest.raises(RigError, match=r"^a moves the joint pelvis, which box does not have$"):
+        body_clip(motion(("pelvis",), TURN), figure)
+
+
+def test_arrays_must_fit():
+    with pytest.raises(RigError, match=r"^world_turns: expected shape 1 x 3, found 2 x 3$"):
+        motion(("pelvis",), TURN, world_turns=np.zeros((2, 3)))
+    with pytest.raises(RigError, match=r"^translations: expected shape 1 x 3, found 1 x 2$"):
+        motion(("pelvis",), TURN, translations=np.zeros((1, 2)))
+
+
+def test_of_many_joints_left_out_six_are_named(family):
+    names = (*FAMILY[55].names,)
+    vectors = np.zeros((1, 55, 3))
+    vectors[:, 22:] = 0.1
+    _, notes = posed(family("smpl"), motion(names, vectors))
+    lost = [name for name in names[22:] if name not in family("smpl").skeleton.names]
+    listed = ", ".join(lost[:6])
+    assert len(lost) == 33
+    assert notes == [f"33 joints that smpl lacks were left out: {listed}, … and 27 more"]
+    vectors[:, 28:] = 0.0
+    assert posed(family("smpl"), motion(names, vectors))[1] == [
+        f"6 joints that smpl lacks were left out: {listed}"
+    ]

@@ -1,0 +1,125 @@
+"""Actors on their own, as exporters take them: what is up, and who hangs head down."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from rig.hand_made import skeleton as course_skeleton
+
+import viewer
+from viewer.loading import bundled_body
+from viewer.rig.figure import Figure
+from viewer.rig.geometry.transform import rotation_transform
+from viewer.rig.motion.evaluation import pose_of
+from viewer.rig.motion.sampled_animation import upright_animation
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.timing import Timing
+from viewer.rig.motion.upright import own_up, upright_actor
+from viewer.rig.scene import Actor, Scene
+from viewer.rig.skeleton import ball_skeleton
+from viewer.rig.skinning import deform
+
+OVER = np.array([1.0, -1.0, -1.0])
+
+
+def standing(up, placement=None, world_up=None, **parts):
+    figure = Figure("a", skeleton=ball_skeleton(("a",), np.array([-1]), np.zeros((1, 3))), up=up)
+    actor = Actor(replace(figure, **parts))
+    if placement is not None:
+        actor.placement = placement
+    return Scene([actor], world_up=world_up), actor
+
+
+@pytest.mark.parametrize(
+    ("figure", "world", "quarters", "expected"),
+    [
+        ("y", "y", 0, ("y", False)),
+        ("z", "z", 0, ("z", False)),
+        ("y", "z", 0, ("z", False)),  # a body in a capture whose world has z up
+        ("y", "z", 1, ("y", False)),  # stood up beside others: (x, y, z) -> (x, -z, y)
+        ("z", "y", -1, ("z", False)),
+        ("y", "y", 2, ("y", True)),
+        ("y", "z", 2, ("z", True)),
+        ("y", "z", -1, ("y", True)),
+    ],
+)
+def test_what_is_up_before_the_placement(figure, world, quarters, expected):
+    scene, actor = standing(figure, rotation_transform(0, quarters * np.pi / 2), world)
+    assert own_up(scene, actor) == expected
+
+
+def test_lying_along_x_counts_as_the_scene_has_it():
+    scene, actor = standing("y", rotation_transform(2, -np.pi / 2), "z")
+    actor.placement = rotation_transform(1, np.pi / 2)
+    assert own_up(scene, actor) == ("z", False)
+
+
+def test_nothing_different_is_the_same_actor():
+    scene, actor = standing("z", rotation_transform(0, -np.pi / 2), "y")
+    assert upright_actor(scene, actor) is actor
+
+
+def test_figure_says_the_axis_of_the_capture():
+    scene, actor = standing("y", None, "z")
+    found = upright_actor(scene, actor)
+    assert (found.figure.up, actor.figure.up) == ("z", "y")
+    assert found.pose is actor.pose and found.figure.skeleton is actor.figure.skeleton
+
+
+def test_body_that_hangs_is_turned_over_with_shape_and_place():
+    (actor,) = viewer.load(bundled_body()).actors
+    rng = np.random.default_rng(5)
+    actor.pose.dofs[:] = rng.uniform(-1, 1, len(actor.pose.dofs))
+    actor.pose.shape_weights[:2] = 2.0, -1.0
+    actor.pose.translations[0] = 0.1, 0.2, 0.3
+    actor.pose.figure_scale, actor.pose.figure_translation[:] = 1.5, [1, 2, 3]
+    before = actor.pose.copy()
+    actor.placement = rotation_transform(0, np.pi)
+    found = upright_actor(Scene([actor], world_up="y"), actor)
+    wanted = deform(actor.figure, actor.pose)[0] * OVER
+    assert_allclose(deform(found.figure, found.pose)[0], wanted, rtol=0, atol=1e-12)
+    for name in ("dofs", "translations", "rotations", "figure_translation"):
+        assert np.array_equal(getattr(actor.pose, name), getattr(before, name))
+    assert found.figure is actor.figure
+
+
+def test_every_root_is_turned_over():
+    figure = Figure(
+        "two",
+        skeleton=ball_skeleton(("a", "b"), np.array([-1, -1]), np.array([[1, 2, 3], [4, 5, 6.0]])),
+    )
+    actor = Actor(figure, placement=rotation_transform(0, np.pi))
+    actor.pose.dofs[:] = 0.3, -0.2, 0.5, 0.1, 0.2, 0.3
+    actor.pose.figure_scale, actor.pose.figure_translation[:] = 2.0, [7, 8, 9]
+
+    found = upright_actor(Scene([actor]), actor)
+    wanted = np.diag([*OVER, 1.0]) @ viewer.joint_matrices(figure, actor.pose)
+    assert_allclose(viewer.joint_matrices(figure, found.pose), wanted, rtol=0, atol=1e-13)
+
+
+def test_limits_and_missing_axes_do_not_matter():
+    dofs = [(0, "tx", 0.5, 0, 1), (0, "x", 0.2, -0.1, 0.3), (0, "z", 0.1), (1, "y", 0.3)]
+    skeleton = course_skeleton([-1, 0], dofs, offsets=np.array([[1.0, 2, 3], [0, 1, 0]]))
+    actor = Actor(Figure("rig", skeleton=skeleton), placement=rotation_transform(0, np.pi))
+    found = upright_actor(Scene([actor]), actor)
+    wanted = np.diag([*OVER, 1.0]) @ viewer.joint_matrices(actor.figure, actor.pose)
+    assert_allclose(viewer.joint_matrices(actor.figure, found.pose), wanted, rtol=0, atol=1e-12)
+
+
+def test_one_pose_is_the_frame_of_the_motion():
+    (actor,) = viewer.load(bundled_body()).actors
+    turns = np.tile([0.0, 0, 0, 1.0], (1, 24, 1))
+    turns[0, 0] = np.sin(0.4), 0, 0, np.cos(0.4)
+    places = np.array([[1.0, 2.0, 3.0]])
+    actor.clip = SampledClip("a", Timing(30.0, np.arange(1)), turns, figure_translations=places)
+    actor.placement = rotation_transform(0, np.pi)
+    scene = Scene([actor], world_up="z")
+    animation, up = upright_animation(scene, actor)
+    viewer.rig.motion.evaluation.pose_actor(actor, 0.0)
+    found = upright_actor(scene, actor)
+    assert (up, found.figure.up) == ("z", "z")
+    framed = pose_of(actor.figure, animation.frames, 0)
+    assert_allclose(
+        deform(found.figure, found.pose)[0], deform(actor.figure, framed)[0], rtol=0, atol=1e-12
+    )

@@ -1,0 +1,390 @@
+"""A pose on its own: DOFs by name, own numbers, parts by smplx's names, shape and place."""
+
+import numpy as np
+import pytest
+from family_models import family_figure
+from formats.synthetic_smpl import model
+from numpy.testing import assert_allclose
+from rig.hand_made import mesh, skeleton
+
+from viewer.errors import RigError
+from viewer.rig.figure import Figure
+from viewer.rig.pose import Pose, joint_rotations, pose_key, rest_pose
+from viewer.rig.posing.pose_record import PoseRecord, apply_record, record_of
+from viewer.rig.posing.pose_vector import own_numbers
+from viewer.rig.scene import figure_pose
+
+
+@pytest.fixture(scope="module")
+def family(tmp_path_factory):
+    """Figures of the family by kind, each read once."""
+    folder, figures = tmp_path_factory.mktemp("family"), {}
+
+    def get(kind: str) -> Figure:
+        if kind not in figures:
+            figures[kind] = family_figure(kind, folder)
+        return figures[kind]
+
+    return get
+
+
+def vectors(figure: Figure, pose: Pose) -> np.ndarray:
+    """Return every joint's rotation vector."""
+    return own_numbers(figure.pose_layout, joint_rotations(figure.skeleton, pose))
+
+
+def applied(figure: Figure, **words) -> tuple[np.ndarray, list[str]]:
+    """Apply a record to the rest pose; return the joints' rotation vectors and the notes."""
+    pose = figure_pose(figure)
+    notes = apply_record(PoseRecord(**words), figure, pose)
+    return vectors(figure, pose), notes
+
+
+def refusal(figure: Figure, **words) -> str:
+    """Return why a record is refused, after a look whether the pose is as it was."""
+    pose = figure_pose(figure)
+    pose.dofs[:] = 0.125
+    before = pose_key(pose)
+    with pytest.raises(RigError) as caught:
+        apply_record(PoseRecord(translation=np.ones(3), **words), figure, pose)
+    assert pose_key(pose) == before
+    return str(caught.value)
+
+
+def hinges() -> Figure:
+    dofs = [(0, "tx", 0.5), (0, "x", 0.0, -1.0, 1.0), (1, "z", 0.0, -1.0, 1.0)]
+    return Figure("hinges", skeleton=skeleton([-1, 0], dofs, names=["hip", "knee"]))
+
+
+def test_dofs_are_taken_by_name_and_the_others_stay():
+    figure = hinges()
+    pose = rest_pose(figure.skeleton)
+    assert apply_record(PoseRecord(dofs={"knee.z": 0.75, "hip.x": -0.5}), figure, pose) == []
+    assert pose.dofs.tolist() == [0.5, -0.5, 0.75]
+
+
+def test_dofs_beyond_their_limits_are_clamped_and_counted():
+    figure = hinges()
+    pose = rest_pose(figure.skeleton)
+    notes = apply_record(PoseRecord(dofs={"knee.z": 3.0, "hip.x": -2.0}), figure, pose)
+    assert pose.dofs.tolist() == [0.5, -1.0, 1.0]
+    assert notes == ["2 DOFs of the pose were beyond their limits and clamped"]
+
+
+def test_unknown_dof_is_refused_and_leaves_the_pose():
+    message = refusal(hinges(), dofs={"knee.z": 0.5, "elbow.x": 1.0})
+    assert message.startswith("expected a DOF of ") and message.endswith(
+        'found "elbow.x": no joint is called "elbow"; there are 2: hip, knee'
+    )
+
+
+def test_malformed_dof_is_named_once():
+    message = refusal(hinges(), dofs={"knee.q": 0.5})
+    assert message.count("knee.q") == 1 and ": expected JOINT.KIND with KIND" in message
+
+
+def test_dofs_win_over_the_vector():
+    figure = hinges()
+    pose = rest_pose(figure.skeleton)
+    apply_record(PoseRecord(dofs={"knee.z": 0.25}, vector=np.ones(3)), figure, pose)
+    assert pose.dofs.tolist() == [0.5, 0.0, 0.25]
+
+
+def test_figure_without_skeleton_is_refused():
+    figure = Figure("bust", mesh([[0, 0, 0]]))
+    with pytest.raises(RigError) as caught:
+        apply_record(PoseRecord(), figure, rest_pose(skeleton([-1])))
+    assert str(caught.value) == "figure bust has no skeleton to pose"
+
+
+@pytest.mark.parametrize("kind", ["smpl", "smplh", "smplx", "mano", "flame"])
+def test_own_vector_turns_every_joint(family, kind):
+    figure = family(kind)
+    wanted = np.random.default_rng(0).uniform(-1, 1, (figure.skeleton.n_joints, 3))
+    found, notes = applied(figure, vector=wanted.ravel())
+    assert_allclose(found, wanted, atol=1e-13)
+    assert notes == []
+
+
+# Joints beyond the 22 of the body that both models have: first in the vector, in the figure, count.
+@pytest.mark.parametrize(
+    ("kind", "count", "shared", "left_out"),
+    [
+        ("smplx", 72, None, 2),
+        ("smplx", 156, (22, 25, 30), 0),
+        ("smplh", 165, (25, 22, 30), 3),
+        ("smpl", 165, None, 33),
+        ("smplh", 66, None, 0),
+        ("smpl", 66, None, 0),
+    ],
+)
+def test_vector_of_another_member_goes_by_joint_names(family, kind, count, shared, left_out):
+    figure = family(kind)
+    wanted = np.random.default_rng(1).uniform(-1, 1, (count // 3, 3))
+    expected = np.zeros((figure.skeleton.n_joints, 3))
+    expected[:22] = wanted[:22]
+    if shared:
+        source, target, joints = shared
+        expected[target : target + joints] = wanted[source : source + joints]
+    found, notes = applied(figure, vector=wanted.ravel())
+    assert_allclose(found, expected, atol=1e-13)
+    said = [f"{left_out} joints of the pose that {figure.name} lacks were left out"]
+    assert notes == (said if left_out else [])
+
+
+def test_joints_that_the_vector_lacks_go_to_rest(family):
+    figure = family("smplx")
+    pose = figure_pose(figure)
+    pose.dofs[:] = 0.1
+    apply_record(PoseRecord(vector=np.zeros(72)), figure, pose)
+    assert not pose.dofs.any()
+
+
+def test_mano_takes_a_hand_of_either_side(family):
+    wanted = np.random.default_rng(7).uniform(-0.5, 0.5, 45)
+    found, notes = applied(family("mano"), parts={"left_hand_pose": wanted})
+    assert_allclose(found[1:].ravel(), wanted, atol=1e-13)
+    assert notes == []
+
+
+@pytest.mark.parametrize("scale", [0.0, -2.0, 1e-300, 1e300])
+def test_scale_that_cannot_be_drawn_is_left_out(family, scale):
+    figure = family("smpl")
+    pose = figure_pose(figure)
+    pose.figure_scale = 1.5
+    notes = apply_record(PoseRecord(scale=scale), figure, pose)
+    assert pose.figure_scale == 1.5
+    assert len(notes) == 1 and notes[0].startswith("scale: expected") and "left at 1.5" in notes[0]
+
+
+def test_place_and_shape_beyond_all_measure_are_left_out_or_refused(family):
+    figure = family("smpl")
+    pose = figure_pose(figure)
+    notes = apply_record(PoseRecord(translation=np.array([1e300, 0, 0])), figure, pose)
+    assert notes == ["translation: expected at most 1e+09, found 1e+300; left as it was"]
+    assert not pose.figure_translation.any()
+    message = refusal(figure, shape=np.array([1e300]))
+    assert message == "shape coefficients: expected at most 1e+06, found 1e+300"
+
+
+def test_hands_at_rest_of_another_member_are_not_worth_a_note(family):
+    wanted = np.zeros(72)
+    wanted[:66] = 0.1
+    assert applied(family("smplx"), vector=wanted)[1] == []
+
+
+@pytest.mark.parametrize(
+    ("kind", "count", "own"),
+    [("smpl", 71, 72), ("smpl", 63, 72), ("mano", 72, 48), ("flame", 165, 15)],
+)
+def test_vector_of_no_member_is_refused(family, kind, count, own):
+    figure = family(kind)
+    message = refusal(figure, vector=np.ones(count))
+    assert message == f"expected {own} pose numbers for {figure.name}, found {count}"
+
+
+def test_body_pose_begins_after_the_root(family):
+    wanted = np.random.default_rng(2).uniform(-1, 1, (21, 3))
+    found, notes = applied(family("smplx"), parts={"body_pose": wanted.ravel()})
+    assert_allclose(found[1:22], wanted, atol=1e-13)
+    assert not found[0].any()
+    assert not found[22:].any()
+    assert notes == []
+    # SMPL's own has the two hands as well.
+    wanted = np.random.default_rng(3).uniform(-1, 1, (23, 3))
+    assert_allclose(applied(family("smpl"), parts={"body_pose": wanted})[0][1:], wanted, atol=1e-13)
+
+
+def test_body_pose_of_another_length_is_refused(family):
+    message = "body_pose: expected 3 numbers a joint, of up to 23 joints, found "
+    for kind, count in (("smpl", 72), ("smpl", 64), ("smpl", 2), ("smplx", 72), ("smplx", 65)):
+        found = refusal(family(kind), parts={"body_pose": np.ones(count)})
+        assert found == f"{message}{count} numbers"
+
+
+@pytest.mark.parametrize(
+    ("part", "kind", "joint"),
+    [
+        ("global_orient", "smplx", 0),
+        ("global_orient", "mano", 0),
+        ("global_orient", "flame", 0),
+        ("jaw_pose", "smplx", 22),
+        ("leye_pose", "smplx", 23),
+        ("reye_pose", "smplx", 24),
+        ("neck_pose", "flame", 1),
+        ("jaw_pose", "flame", 2),
+    ],
+)
+def test_single_joints_by_the_names_of_smplx(family, part, kind, joint):
+    found, notes = applied(family(kind), parts={part: np.array([0.1, -0.2, 0.3])})
+    assert_allclose(found[joint], [0.1, -0.2, 0.3], atol=1e-14)
+    assert not np.delete(found, joint, axis=0).any()
+    assert notes == []
+
+
+def test_part_that_the_figure_lacks_is_noted_if_it_says_something(family):
+    figure = family("smpl")
+    assert applied(figure, parts={"jaw_pose": np.zeros(3)})[1] == []
+    found, notes = applied(figure, parts={"jaw_pose": np.ones(3)})
+    assert notes == [f"jaw_pose: {figure.name} has no such joint, left out"]
+    assert not found.any()
+
+
+def test_single_joint_needs_three_numbers(family):
+    message = refusal(family("smplx"), parts={"jaw_pose": np.ones(6)})
+    assert message == "jaw_pose: expected 3 numbers, found 6"
+
+
+HANDS = [("smplx", "left", 25), ("smplx", "right", 40), ("smplh", "left", 22), ("mano", "", 1)]
+
+
+def hand_arrays(kind, side):
+    arrays = model(kind)
+    return arrays[f"hands_components{side[:1]}"], arrays[f"hands_mean{side[:1]}"]
+
+
+@pytest.mark.parametrize(("kind", "side", "first"), HANDS)
+@pytest.mark.parametrize("flat", [None, True, False])
+def test_few_numbers_are_coefficients(family, kind, side, first, flat):
+    components, mean = hand_arrays(kind, side)
+    part = f"{side}_hand_pose" if side else "hand_pose"
+    weights = np.array([0.5, -0.25, 0.125])
+    expected = 0.5 * components[0] - 0.25 * components[1] + 0.125 * components[2]
+    if not flat:  # said so or not said
+        expected = expected + mean
+    found, _ = applied(family(kind), parts={part: weights}, flat_hands=flat)
+    assert_allclose(found[first : first + 15].ravel(), expected, atol=1e-13)
+    assert not np.delete(found, range(first, first + 15), axis=0).any()
+
+
+@pytest.mark.parametrize(("kind", "side", "first"), HANDS)
+@pytest.mark.parametrize("flat", [None, True, False])
+def test_forty_five_numbers_are_rotation_vectors(family, kind, side, first, flat):
+    _, mean = hand_arrays(kind, side)
+    part = f"{side}_hand_pose" if side else "hand_pose"
+    wanted = np.random.default_rng(4).uniform(-0.5, 0.5, 45)
+    expected = wanted + mean if flat is False else wanted
+    found, _ = applied(family(kind), parts={part: wanted}, flat_hands=flat)
+    assert_allclose(found[first : first + 15].ravel(), expected, atol=1e-13)
+
+
+def test_forty_five_coefficients_where_the_file_says_so(family):
+    components, mean = hand_arrays("smplx", "left")
+    weights = np.zeros(45)
+    weights[44] = 0.5
+    words = {"parts": {"left_hand_pose": weights}, "hand_coefficients": True}
+    found, _ = applied(family("smplx"), **words)
+    assert_allclose(found[25:40].ravel(), 0.5 * components[44] + mean, atol=1e-13)
+
+
+def test_hand_of_another_length_is_refused(family):
+    figure = family("smplx")
+    message = refusal(figure, parts={"left_hand_pose": np.ones(46)})
+    assert message == "expected at most 45 hand coefficients, found 46"
+    words = {"parts": {"left_hand_pose": np.ones(12)}, "hand_coefficients": False}
+    assert refusal(figure, **words) == "left_hand_pose: expected 45 numbers, found 12"
+
+
+def test_fingers_without_components_take_rotation_vectors_only(tmp_path):
+    none = {f"hands_{what}{side}": None for what in ("components", "mean") for side in "lr"}
+    figure = family_figure("smplh", tmp_path, **none)
+    wanted = np.random.default_rng(5).uniform(-0.5, 0.5, 45)
+    found, notes = applied(figure, parts={"right_hand_pose": wanted})
+    assert_allclose(found[37:].ravel(), wanted, atol=1e-13)
+    assert notes == []
+    found, notes = applied(figure, parts={"right_hand_pose": np.ones(6)})
+    assert notes == [f"right_hand_pose: {figure.name} has no hand components, left out"]
+    assert not found.any()
+
+
+def test_shape_and_expression_go_to_their_own_rows(family):
+    figure = family("smplx")
+    pose = figure_pose(figure)
+    pose.shape_weights[:] = 9.0
+    apply_record(PoseRecord(shape=np.array([1.0, 2.0])), figure, pose)
+    assert pose.shape_weights.tolist() == [1, 2, *[0] * 8, *[9] * 10]
+    apply_record(PoseRecord(expression=np.array([3.0])), figure, pose)
+    assert pose.shape_weights.tolist() == [1, 2, *[0] * 8, 3, *[0] * 9]
+
+
+def test_more_coefficients_than_the_figure_has_must_be_zero(family):
+    figure = family("smpl")
+    pose = figure_pose(figure)
+    apply_record(PoseRecord(shape=np.array([1.0] * 10 + [0.0] * 290)), figure, pose)
+    assert pose.shape_weights.tolist() == [1.0] * 10
+    message = refusal(figure, shape=np.ones(16))
+    assert message == f"{figure.name} has 10 shape coefficients, found 16"
+    message = refusal(figure, expression=np.ones(1))
+    assert message == f"{figure.name} has 0 expression coefficients, found 1"
+
+
+def test_more_coefficients_than_the_figure_has_can_be_left_out(family):
+    figure = family("smpl")
+    pose = figure_pose(figure)
+    record = PoseRecord(shape=np.array([0.5] * 14 + [-3.0, 0.0]), expression=np.array([2.0]))
+    assert apply_record(record, figure, pose, cut=True) == [
+        f"shape coefficients 11 to 16 were left out, as {figure.name} has 10 (largest 3)",
+        f"expression coefficient 1 was left out, as {figure.name} has 0 (largest 2)",
+    ]
+    assert pose.shape_weights.tolist() == [0.5] * 10
+
+
+def test_shapes_for_a_figure_without_any_are_refused_all_the_same():
+    rig = Figure("bones", skeleton=skeleton((-1,)))
+    with pytest.raises(RigError) as caught:
+        apply_record(PoseRecord(shape=np.ones(3)), rig, figure_pose(rig), cut=True)
+    assert str(caught.value) == "bones has 0 shape coefficients, found 3"
+
+
+def test_place_is_taken_and_what_is_missing_stays(family):
+    figure = family("smpl")
+    pose = figure_pose(figure)
+    pose.dofs[:] = 0.1
+    apply_record(PoseRecord(translation=np.array([1, 2, 3]), scale=2), figure, pose)
+    assert pose.figure_translation.tolist() == [1, 2, 3]
+    assert pose.figure_scale == 2.0
+    apply_record(PoseRecord(), figure, pose)
+    assert pose.figure_translation.tolist() == [1, 2, 3]
+    assert pose.dofs.tolist() == [0.1] * 72
+
+
+def test_pose_shares_no_array_with_its_record(family):
+    figure = family("smpl")
+    pose, moved = figure_pose(figure), np.zeros(3)
+    apply_record(PoseRecord(translation=moved), figure, pose)
+    pose.figure_translation[0] = 5.0
+    assert moved[0] == 0.0
+
+
+@pytest.mark.parametrize("kind", ["smpl", "smplx", "mano"])
+def test_record_of_a_pose_gives_it_back(family, kind):
+    figure = family(kind)
+    rng = np.random.default_rng(6)
+    pose = figure_pose(figure)
+    pose.dofs[:] = rng.uniform(-1, 1, len(pose.dofs))
+    pose.shape_weights[:] = rng.normal(size=len(pose.shape_weights))
+    pose.figure_scale, pose.figure_translation[:] = 1.5, rng.normal(size=3)
+    again = figure_pose(figure)
+    assert apply_record(record_of(figure, pose), figure, again) == []
+    assert pose_key(again) == pose_key(pose)
+
+
+def test_record_holds_words_and_own_numbers(family):
+    figure = family("smplx")
+    pose = figure_pose(figure)
+    pose.dofs[3 * 4] = 0.5  # left knee about x
+    pose.shape_weights[[0, 10]] = 1.0, 2.0
+    record = record_of(figure, pose)
+    assert record.dofs["left_knee.x"] == 0.5
+    assert len(record.dofs) == 165
+    assert_allclose(record.vector[12:15], [0.5, 0, 0], atol=1e-15)
+    assert record.shape.tolist() == [1.0, *[0.0] * 9]
+    assert record.expression.tolist() == [2.0, *[0.0] * 9]
+
+
+def test_record_of_a_figure_without_shapes_has_none():
+    figure = hinges()
+    record = record_of(figure, rest_pose(figure.skeleton))
+    assert record.shape is None
+    assert record.expression is None
+    assert record.vector.tolist() == [0.5, 0.0, 0.0]

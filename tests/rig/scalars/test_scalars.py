@@ -1,0 +1,314 @@
+"""Scalar views: lengths per vertex, each worked out by hand on a few points."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from rig.hand_made import mesh, skeleton
+
+from viewer.errors import RigError
+from viewer.rig import scalars
+from viewer.rig.annotations import BodyParts, VertexField
+from viewer.rig.blendshapes import Correctives
+from viewer.rig.figure import Figure
+from viewer.rig.pose import rest_pose
+from viewer.rig.scalars import (
+    SCALARS,
+    categories,
+    compute,
+    find_view,
+    joint_of,
+    length_unit,
+    menu_title,
+    missing_part,
+    shown_unit,
+    split_name,
+    strongest,
+    view_title,
+)
+from viewer.rig.skin import skin_from_lists
+from viewer.rig.skinning import Skinning
+
+POINTS = [[0.0, 3, 4], [0.0, 3, 4], [1.0, 1, 1]]
+
+
+def sliding(influences, **parts) -> Figure:
+    """Return three points bound to six joints that slide along x and turn about x."""
+    dofs = [(joint, kind, 0.0) for joint in range(6) for kind in ("tx", "x")]
+    bones = skeleton([-1] * 6, dofs)
+    skin = skin_from_lists(influences, np.tile(np.eye(4), (6, 1, 1)))
+    return Figure("points", mesh(POINTS), bones, skin, **parts)
+
+
+def slid(figure, *moves):
+    pose = rest_pose(figure.skeleton)
+    pose.dofs[::2][: len(moves)] = moves
+    return pose
+
+
+def test_cut_is_the_distance_to_four_influences():
+    # Six equal sixths; the last two joints move by 6: one unit each is lost.
+    sixths = [(joint, 1 / 6) for joint in range(6)]
+    figure = sliding([sixths, [(5, 1.0)], []])
+    found = compute("cut", figure, slid(figure, 0, 0, 0, 0, 6, 6), Skinning())
+    assert_allclose(found, [2.0, 0, 0], atol=1e-14)
+
+
+def test_cut_follows_the_chosen_number_of_influences():
+    figure = sliding([[(0, 0.5), (1, 0.25), (2, 0.25)], [(0, 1.0)], []])
+    pose = slid(figure, 4, 0, 0)
+    # With one influence 4 instead of 2; with two 4 * 2/3; with three nothing is cut.
+    for count, expected in ((1, 2.0), (2, 4 * 2 / 3 - 2), (3, 0.0)):
+        found = compute("cut", figure, pose, Skinning(max_influences=count))
+        assert_allclose(found, [expected, 0, 0], atol=1e-14)
+
+
+def test_normalized_is_what_the_sum_of_the_weights_takes_away():
+    # 0.9 of a vertex 5 from the origin: half a unit. 0.5 of (1, 1, 1) is half its length.
+    figure = sliding([[(0, 0.9)], [(0, 0.5), (1, 0.5)], [(0, 0.5)]])
+    for how in (Skinning(), Skinning(normalize=True), Skinning(max_influences=4)):
+        found = compute("normalized", figure, slid(figure), how)
+        assert_allclose(found, [0.5, 0, np.sqrt(3) / 2], atol=1e-14)
+
+
+def test_methods_is_what_linear_blending_loses_in_a_twist():
+    figure = sliding([[(0, 0.5), (1, 0.5)], [(0, 1.0)], [(1, 1.0)]])
+    pose = rest_pose(figure.skeleton)
+    pose.dofs[3] = np.pi / 2  # joint 1 about x
+    # Radius 5 against 5 cos 45.
+    expected = [5.0 * (1.0 - np.sqrt(0.5)), 0, 0]
+    for method in ("lbs", "dqs", "mix"):
+        found = compute("methods", figure, pose, Skinning(method))
+        assert_allclose(found, expected, atol=1e-14)
+
+
+def test_correctives_is_how_far_they_move_a_vertex():
+    offsets = np.zeros((45, 3, 3))
+    offsets[4, 0] = 3.0, 0.0, 4.0  # joint 1, middle of the second row: cos x - 1
+    ties = [[(0, 1.0)]] * 3
+    figure = sliding(ties, correctives=Correctives(offsets))
+    pose = rest_pose(figure.skeleton)
+    pose.dofs[3] = np.pi
+    for on in (True, False):
+        found = compute("correctives", figure, pose, Skinning(correctives=on))
+        assert_allclose(found, [10.0, 0, 0], atol=1e-14)
+    assert compute("correctives", sliding(ties), pose, Skinning()).tolist() == [0, 0, 0]
+
+
+def test_asymmetry_of_a_posed_figure():
+    points = [[2.0, 0, 0], [-2.0, 0, 0], [0.0, 1, 0]]
+    figure = sliding([[(0, 1.0)], [(1, 1.0)], [(2, 1.0)]], symmetry=np.array([1, 0, 2]))
+    figure = replace(figure, mesh=mesh(points))
+    assert compute("asymmetry", figure, slid(figure), Skinning()).tolist() == [0, 0, 0]
+    # Both sides outwards by one is symmetric, one side alone is not; the middle counts twice.
+    assert compute("asymmetry", figure, slid(figure, 1, -1), Skinning()).tolist() == [0, 0, 0]
+    assert compute("asymmetry", figure, slid(figure, 1, 0, 0.5), Skinning()).tolist() == [1, 1, 1]
+
+
+def test_asymmetry_is_not_that_of_the_place_but_of_the_figure():
+    points = [[2.0, 0, 0], [-1.0, 0, 0], [0.0, 1, 0]]
+    figure = sliding([[(0, 1.0)]] * 3, symmetry=np.array([1, 0, 2]))
+    figure = replace(figure, mesh=mesh(points))
+    pose = slid(figure)
+    pose.figure_scale, pose.figure_translation[:] = 2.0, (7, 8, 9)
+    assert_allclose(compute("asymmetry", figure, pose, Skinning()), [2, 2, 0], atol=1e-14)
+
+
+def test_asymmetry_without_a_map_is_nothing():
+    figure = sliding([[(0, 1.0)]] * 3)
+    assert compute("asymmetry", figure, slid(figure, 1), Skinning()).tolist() == [0, 0, 0]
+
+
+FAR = VertexField("far", "How far", np.array([0.5, 2.0, 0.0]), "length")
+KINDS_OF_MATCH = VertexField("match", "How found", np.array([0, 1, 1]), names=("near", "filled"))
+MOVING = [name for name, view in SCALARS.items() if view.moves]
+
+
+@pytest.mark.parametrize("name", MOVING)
+def test_mesh_in_its_binding_space_shows_nothing(name):
+    figure = sliding([[(0, 0.5), (1, 0.2)]] * 3)
+    assert compute(name, figure, None, Skinning()).tolist() == [0, 0, 0]
+
+
+@pytest.mark.parametrize("name", SCALARS)
+def test_figure_without_what_a_view_shows_has_nothing(name):
+    figure = sliding([[(0, 1.0)]] * 3)
+    bare = Figure("bare", mesh(POINTS), figure.skeleton)
+    nothing = -1 if SCALARS[name].kind == "categorical" else 0
+    assert compute(name, bare, slid(figure, 5), Skinning()).tolist() == [nothing] * 3
+    assert missing_part(name, bare) == SCALARS[name].needs != ""
+
+
+@pytest.mark.parametrize("name", [name for name in SCALARS if name not in MOVING])
+def test_views_of_weights_and_parts_need_no_pose(name):
+    parts = BodyParts(("a", "b"), np.array([0, 1, 1]))
+    figure = replace(
+        sliding([[(0, 0.5), (1, 0.2)]] * 3, body_parts=parts),
+        fields=(FAR, KINDS_OF_MATCH),
+    )
+    view = "weight:j1" if name == "weight" else name
+    still = compute(view, figure, None, Skinning())
+    assert still.tolist() == compute(view, figure, slid(figure, 5), Skinning()).tolist()
+    assert name == "dominant" or still.any()
+
+
+def test_unknown_view_is_refused():
+    with pytest.raises(RigError) as caught:
+        compute("magic", sliding([[]] * 3), None, Skinning())
+    expected = f'no scalar view "magic"; there are {len(SCALARS)}: {", ".join(SCALARS)}'
+    assert str(caught.value) == expected
+
+
+@pytest.mark.parametrize(
+    ("name", "low", "high", "ends"),
+    [
+        ("cut", 0.25, 2.0, (0.0, 2.0)),
+        ("cut", 0.0, 0.0, (0.0, 1.0)),
+        ("weight", 0.0, 0.4, (0.0, 1.0)),
+        ("weight", -0.5, 1.5, (-0.5, 1.5)),
+        ("stretch", -50.0, 20.0, (-50.0, 50.0)),
+        ("stretch", -5.0, 20.0, (-20.0, 20.0)),
+        ("area", 0.0, 0.0, (-1.0, 1.0)),
+        ("influences", 1.0, 4.0, (0.0, 4.0)),
+    ],
+)
+def test_automatic_range_of_a_view(name, low, high, ends):
+    assert SCALARS[name].shown(low, high) == ends
+
+
+def test_parts_are_the_indices_of_the_parts():
+    parts = BodyParts(("foot", "head"), np.array([1, 0, 1]))
+    figure = sliding([[]] * 3, body_parts=parts)
+    assert compute("parts", figure, None, Skinning()).tolist() == [1, 0, 1]
+    assert categories("parts", figure) == ("foot", "head")
+    assert categories("parts", sliding([[]] * 3)) == ()
+    assert categories("dominant", figure) == ("j0", "j1", "j2", "j3", "j4", "j5")
+
+
+def test_name_of_a_view_may_hold_a_joint():
+    assert split_name("weight:left:knee") == ("weight", "left:knee")
+    assert split_name("stretch") == ("stretch", "")
+    assert find_view("weight:#4") is SCALARS["weight"]
+    with pytest.raises(RigError) as caught:
+        split_name("stretch:knee")
+    assert str(caught.value) == 'scalar view "stretch": expected no joint, found "knee"'
+
+
+def named(*names) -> Figure:
+    """Return a point bound to joints of these names."""
+    bones = skeleton([-1] * len(names), names=names)
+    skin = skin_from_lists([[(0, 1.0)]], np.tile(np.eye(4), (len(names), 1, 1)))
+    return Figure("named", mesh([[0.0, 0, 0]]), bones, skin)
+
+
+@pytest.mark.parametrize(
+    ("text", "joint"),
+    [("Left_Knee", 1), ("left_knee", 1), ("#2", 2), ("2", 2), ("", 3), ("#3", 3), ("7", 4)],
+)
+def test_joint_is_found_by_name_or_index(text, joint):
+    assert joint_of(named("hip", "left_knee", "right_knee", "", "7"), text) == joint
+
+
+@pytest.mark.parametrize(
+    ("names", "text", "message"),
+    [
+        (
+            ("hip", "left_knee", "right_knee"),
+            "left_kne",
+            'no joint is called "left_kne"; did you mean left_knee?',
+        ),
+        (("hip", "L_Knee", "R_Knee"), "knee", 'no joint is called "knee"; did you mean '
+         "L_Knee or R_Knee?"),
+        (
+            ("a", "b", "c", "d", "e", "f"),
+            "tail",
+            'no joint is called "tail"; there are 6: a, b, c, d, e, f',
+        ),
+        (("a", "b"), "#2", 'no joint is called "#2"; there are 2: a, b'),
+        (("a", "a"), "a", '"a" names 2 joints: say which one, a#0, a#1'),
+    ],
+)  # fmt: skip
+def test_unknown_joint_is_refused_with_names_that_are_close(names, text, message):
+    with pytest.raises(RigError) as caught:
+        joint_of(named(*names), text)
+    assert str(caught.value) == message
+    with pytest.raises(RigError, match="joint"):
+        compute(f"weight:{text}", named(*names), None, Skinning())
+
+
+def test_joints_without_a_skeleton_have_indices():
+    skin = skin_from_lists([[(1, 0.25)]], np.tile(np.eye(4), (2, 1, 1)))
+    figure = Figure("skin", mesh([[0.0, 0, 0]]), None, skin)
+    assert compute("weight:#1", figure, None, Skinning()).tolist() == [0.25]
+    assert categories("dominant", figure) == ("#0", "#1")
+    assert view_title("weight:1", figure, Skinning()) == "Weight of #1"
+    with pytest.raises(RigError) as caught:
+        joint_of(figure, "knee")
+    assert str(caught.value) == 'no joint "knee"; without a skeleton there are #0 to #1'
+
+
+def test_what_a_figure_lacks_for_the_weight_of_a_joint():
+    figure = named("hip", "knee")
+    assert missing_part("weight:knee", figure) == ""
+    assert missing_part("weight", figure) == "a selected joint"
+    assert missing_part("weight:toe", figure) == 'a joint "toe"'
+    assert view_title("weight:KNEE", figure, Skinning()) == "Weight of knee"
+    for name in ("weight:toe", "weight"):
+        assert view_title(name, figure, Skinning()) == "Weight of a joint"
+
+
+def test_units_of_views():
+    figure = sliding([[]] * 3, unit="m")
+    found = {name: shown_unit(name, figure) for name in ("cut", "stretch", "entropy", "weight")}
+    assert found == {
+        "cut": (1000.0, "mm"), "stretch": (1.0, "%"), "entropy": (1.0, "bits"), "weight": (1.0, "")
+    }  # fmt: skip
+
+
+def test_every_module_of_the_folder_is_in_the_table():
+    folder = Path(scalars.__file__).parent
+    modules = {path.stem for path in folder.glob("*.py") if not path.name.startswith("_")}
+    assert modules == {view.module for view in SCALARS.values()}
+
+
+def test_small_lengths_are_millimetres_or_a_share_of_the_size():
+    figure = sliding([[]] * 3, unit="m")
+    assert length_unit(figure) == (1000.0, "mm")
+    # A centimetre is 10 mm, an inch 25.4.
+    assert length_unit(replace(figure, unit="cm")) == (10.0, "mm")
+    assert length_unit(replace(figure, unit="in"))[0] == pytest.approx(25.4)
+    # Box of 1 x 2 x 3: a diagonal of sqrt 14.
+    factor, word = length_unit(replace(figure, unit=""))
+    assert word == "% of the size"
+    assert factor == pytest.approx(100.0 / np.sqrt(14.0))
+    assert length_unit(Figure("bones", skeleton=figure.skeleton)) == (1.0, "units")
+
+
+def test_strongest_is_the_largest_number_of_influences():
+    assert strongest(sliding([[], [(0, 0.5)] * 3, [(1, 1.0)]])) == 3
+    assert strongest(sliding([[]] * 3)) == 0
+    assert strongest(Figure("bare", mesh(POINTS))) == 0
+
+
+def test_fields_are_shown_by_name_or_the_first_of_their_kind():
+    figure = replace(sliding([[(0, 1.0)]] * 3), fields=(FAR, KINDS_OF_MATCH), unit="m")
+    for name in ("field", "field:far", "field:FAR"):
+        assert compute(name, figure, None, Skinning()).tolist() == [0.5, 2.0, 0.0]
+        assert view_title(name, figure, Skinning()) == "How far"
+        assert shown_unit(name, figure) == (1000.0, "mm")
+    assert compute("class:match", figure, None, Skinning()).tolist() == [0.0, 1.0, 1.0]
+    assert categories("class", figure) == ("near", "filled")
+    assert missing_part("field:near", figure) == 'a field "near"'
+    assert missing_part("class", replace(figure, fields=(FAR,))) == "classes"
+    with pytest.raises(RigError, match=r'^no field is called "match"; there are 1: far$'):
+        compute("field:match", figure, None, Skinning())
+
+
+def test_titles_tell_how_many_influences_are_kept():
+    figure = sliding([[(0, 1.0)]] * 3)
+    assert view_title("cut", figure, Skinning()) == "Distance to 4 influences"
+    assert menu_title("cut", Skinning(max_influences=1)) == "Distance to 1 influence"
+    assert menu_title("cut", Skinning(max_influences=8)) == "Distance to 8 influences"
+    assert menu_title("entropy", Skinning(max_influences=8)) == "Entropy of weights"

@@ -1,0 +1,248 @@
+"""Dual quaternion skinning: its laws, and closed forms of what it blends."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from rig.hand_made import matrix, mesh, skeleton, turn_x, turn_y, turn_z
+
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import Mesh
+from viewer.rig.pose import rest_pose
+from viewer.rig.skin import skin_from_lists
+from viewer.rig.skinning import Skinning, deform, dqs, lbs, mix
+
+ROUNDING = 1e-14
+RIGID = [matrix(turn_x(0.8), (1, 2, 3)), matrix(turn_z(-2.0), (-4, 0, 1)), np.eye(4)]
+
+
+def bound(pairs, n_joints=3, bind=None):
+    """Return a skin of one vertex a list; joints bound at the origin unless told otherwise."""
+    bind = np.tile(np.eye(4), (n_joints, 1, 1)) if bind is None else np.asarray(bind)
+    return skin_from_lists(pairs, np.linalg.inv(bind))
+
+
+def move(point, pairs, palette, method=dqs, normal=(0.6, 0.0, 0.8), bind=None, **changes):
+    skin = bound([pairs], len(palette), bind)
+    points, normals = np.array([point], dtype=float), np.array([normal], dtype=float)
+    moved, turned = method.deform(points, normals, skin, np.array(palette), **changes)
+    return moved[0], turned[0]
+
+
+def random_rigid(rng, count):
+    return [
+        matrix(turn_x(a) @ turn_y(b) @ turn_z(c), rng.normal(size=3))
+        for a, b, c in rng.uniform(-3, 3, (count, 3))
+    ]
+
+
+def random_arm(seed, n_vertices=80, n_joints=7):
+    rng = np.random.default_rng(seed)
+    dofs = [(joint, axis, 0.0) for joint in range(n_joints) for axis in "xyz"]
+    parents = [-1, *(int(rng.integers(0, j)) for j in range(1, n_joints))]
+    bones = skeleton(parents, dofs, offsets=rng.normal(size=(n_joints, 3)))
+    joints = bones.rest_translations.copy()
+    for joint, parent in enumerate(parents):
+        joints[joint] += joints[parent] if parent >= 0 else 0.0
+    influences = [
+        [(int(rng.integers(n_joints)), float(rng.uniform(0.05, 1))) for _ in range(4)]
+        for _ in range(n_vertices)
+    ]
+    bind = np.array([matrix(None, place) for place in joints])
+    shape = Mesh(rng.normal(size=(n_vertices, 3)), rng.normal(size=(n_vertices, 3)), [[0, 1, 2]])
+    return Figure("arm", shape, bones, bound(influences, bind=bind))
+
+
+def test_bind_pose_returns_the_mesh():
+    figure = random_arm(0)
+    positions, normals = deform(figure, method="dqs")
+    assert_allclose(positions, figure.mesh.positions, atol=ROUNDING)
+    lengths = np.linalg.norm(figure.mesh.normals, axis=1, keepdims=True)
+    assert_allclose(normals, figure.mesh.normals / lengths, atol=ROUNDING)
+
+
+@pytest.mark.parametrize("joint", [0, 1, 2])
+def test_one_influence_is_a_rigid_motion(joint):
+    moved, turned = move((1, 2, 3), [(joint, 1.0)], RIGID)
+    assert_allclose(moved, (RIGID[joint] @ [1, 2, 3, 1])[:3], atol=ROUNDING)
+    assert_allclose(turned, RIGID[joint][:3, :3] @ [0.6, 0, 0.8], atol=ROUNDING)
+
+
+def test_all_weight_on_one_joint_equals_linear_blending():
+    figure = random_arm(1)
+    single = [[(vertex % 7, 1.0)] for vertex in range(80)]
+    figure = replace(figure, skin=skin_from_lists(single, figure.skin.inverse_bind))
+    pose = rest_pose(figure.skeleton)
+    pose.dofs[:] = np.random.default_rng(2).uniform(-3, 3, 21)
+    for found, expected in zip(deform(figure, pose, "dqs"), deform(figure, pose), strict=True):
+        assert_allclose(found, expected, atol=1e-13)
+
+
+@pytest.mark.parametrize("degrees", [30, 90, 150, 179])
+def test_twist_keeps_the_radius_where_linear_blending_collapses(degrees):
+    angle = np.radians(degrees)
+    palette = [np.eye(4), matrix(turn_x(angle))]
+    around = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
+    for a in around:
+        point, pairs = (0.3, np.cos(a), np.sin(a)), [(0, 0.5), (1, 0.5)]
+        # Half way between two turns about x: the turn by half the angle.
+        half = turn_x(angle / 2) @ point
+        moved, turned = move(point, pairs, palette, normal=(0, np.cos(a), np.sin(a)))
+        assert_allclose(moved, half, atol=ROUNDING)
+        assert_allclose(turned, half - [0.3, 0, 0], atol=ROUNDING)
+        # The mean of two matrices shortens the radius to cos(angle / 2).
+        linear, _ = move(point, pairs, palette, lbs)
+        assert np.hypot(*linear[1:]) == pytest.approx(np.cos(angle / 2))
+
+
+def test_half_a_turn_keeps_the_radius():
+    palette = [np.eye(4), matrix(np.diag([1.0, -1.0, -1.0]))]
+    for point in ((0.3, 1.0, 0.0), (0.0, 0.6, 0.8)):
+        moved, _ = move(point, [(0, 0.5), (1, 0.5)], palette)
+        assert np.hypot(*moved[1:]) == pytest.approx(1.0)
+        assert moved[0] == pytest.approx(point[0])
+        assert_allclose(move(point, [(0, 0.5), (1, 0.5)], palette, lbs)[0], [point[0], 0, 0])
+
+
+def middle_screw(first, second):
+    """Return the motion half way along the screw from one rigid motion to another.
+
+    Independent of quaternions: the relative motion is the turn by ``angle`` about an axis through
+    a point and the slide along it; half of it is half the turn and half the slide.
+    """
+    relative = second @ np.linalg.inv(first)
+    turn, shift = relative[:3, :3], relative[:3, 3]
+    angle = np.arccos(np.clip((np.trace(turn) - 1.0) / 2.0, -1.0, 1.0))
+    axis = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+    axis /= np.linalg.norm(axis)
+    slide = axis @ shift
+    center = np.linalg.lstsq(np.eye(3) - turn, shift - slide * axis, rcond=None)[0]
+    cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    half = np.eye(3) + np.sin(angle / 2) * cross + (1 - np.cos(angle / 2)) * cross @ cross
+    return matrix(half, center - half @ center + 0.5 * slide * axis) @ first
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_equal_weights_of_two_joints_meet_half_way_along_the_screw(seed):
+    rng = np.random.default_rng(seed)
+    first, second = random_rigid(rng, 2)
+    point = rng.normal(size=3)
+    moved, turned = move(point, [(0, 0.5), (1, 0.5)], [first, second])
+    middle = middle_screw(first, second)
+    assert_allclose(moved, (middle @ [*point, 1])[:3], atol=1e-13)
+    assert_allclose(turned, middle[:3, :3] @ [0.6, 0, 0.8], atol=1e-13)
+
+
+def test_result_does_not_depend_on_the_origin():
+    """Blending is about the screw: moving everything along moves the result along."""
+    rng = np.random.default_rng(3)
+    palette, shift = random_rigid(rng, 3), matrix(turn_y(1.0), (10, -20, 5))
+    pairs, point = [(0, 0.2), (1, 0.5), (2, 0.3)], rng.normal(size=3)
+    moved, _ = move(point, pairs, palette)
+    elsewhere = [shift @ motion @ np.linalg.inv(shift) for motion in palette]
+    again, _ = move((shift @ [*point, 1])[:3], pairs, elsewhere)
+    assert_allclose(again, (shift @ [*moved, 1])[:3], atol=1e-12)
+
+
+@pytest.mark.parametrize("angle", [2.0, 3.0, 3.5, 5.0, 6.2])
+def test_turns_take_the_shorter_way(angle):
+    """Joints at angle and angle + 0.4: the mean turn is angle + 0.2, wherever w changes sign."""
+    palette = [matrix(turn_y(angle)), matrix(turn_y(angle + 0.4))]
+    for pairs in ([(0, 0.5), (1, 0.5)], [(1, 0.5), (0, 0.5)]):
+        moved, _ = move((1, 2, 3), pairs, palette)
+        assert_allclose(moved, turn_y(angle + 0.2) @ [1, 2, 3], atol=ROUNDING)
+
+
+def test_chain_turned_by_more_than_half_a_turn_blends_across_its_last_joint():
+    # Ten joints of 50 degrees each: 450 and 500 degrees meet at 475.
+    bones = skeleton([-1, *range(9)], [(joint, "z", np.radians(50)) for joint in range(10)])
+    skin = bound([[(8, 0.5), (9, 0.5)]], 10)
+    figure = Figure("chain", mesh([[1.0, 0, 0]]), bones, skin)
+    expected = turn_z(np.radians(475)) @ [1, 0, 0]
+    assert_allclose(deform(figure, method="dqs")[0][0], expected, atol=ROUNDING)
+
+
+def test_side_is_that_of_the_strongest_influence():
+    # 0, 100 and 200 degrees about z, most at 100: 0 and 200 are both nearer than half a turn.
+    angles = np.radians([0.0, 100.0, 200.0])
+    palette = [matrix(turn_z(angle)) for angle in angles]
+    weights = [0.25, 0.5, 0.25]
+    half = np.array([np.sin(angles / 2), np.cos(angles / 2)]) @ weights
+    expected = turn_z(2.0 * np.arctan2(*half)) @ [1, 0, 0]
+    for order in ([0, 1, 2], [2, 0, 1], [1, 2, 0]):
+        moved, _ = move((1, 0, 0), [(j, weights[j]) for j in order], palette)
+        assert_allclose(moved, expected, atol=ROUNDING)
+    assert_allclose(expected, turn_z(angles[1]) @ [1, 0, 0], atol=ROUNDING)
+
+
+def test_order_of_influences_does_not_matter():
+    rng = np.random.default_rng(4)
+    palette = random_rigid(rng, 6)
+    weights = rng.dirichlet(np.ones(6))
+    pairs = [(joint, float(weights[joint])) for joint in range(6)]
+    expected, _ = move((1, 2, 3), pairs, palette)
+    for _ in range(10):
+        mixed = [pairs[index] for index in rng.permutation(6)]
+        assert_allclose(move((1, 2, 3), mixed, palette)[0], expected, atol=ROUNDING)
+
+
+def test_weights_count_relative_to_their_sum():
+    expected, _ = move((1, 2, 3), [(0, 0.75), (1, 0.25)], RIGID)
+    for factor in (0.1, 0.998, 4.0, -2.0):
+        pairs = [(0, 0.75 * factor), (1, 0.25 * factor)]
+        assert_allclose(move((1, 2, 3), pairs, RIGID)[0], expected, atol=1e-13)
+
+
+def test_joint_listed_twice_adds_up():
+    once, _ = move((1, 2, 3), [(0, 0.75), (1, 0.25)], RIGID)
+    twice, _ = move((1, 2, 3), [(0, 0.375), (1, 0.25), (0, 0.375)], RIGID)
+    assert_allclose(twice, once, atol=ROUNDING)
+
+
+@pytest.mark.parametrize("pairs", [[], [(0, 0.0)], [(0, 1.0), (1, -1.0)], [(0, 0.5), (0, -0.5)]])
+def test_vertex_that_nothing_moves_or_all_cancels_stays(pairs):
+    moved, turned = move((1, 2, 3), pairs, RIGID)
+    assert moved.tolist() == [1, 2, 3]
+    assert_allclose(turned, [0.6, 0, 0.8], atol=ROUNDING)
+
+
+@pytest.mark.parametrize("chunk", [1, 7, 100])
+def test_chunks_of_any_size_give_the_same(monkeypatch, chunk):
+    rng = np.random.default_rng(5)
+    influences = [
+        [(int(rng.integers(5)), float(rng.uniform(0.1, 1))) for _ in range(rng.integers(0, 4))]
+        for _ in range(50)
+    ]
+    positions, normals = rng.normal(size=(2, 50, 3))
+    skin, palette = bound(influences, 5), np.array(random_rigid(rng, 5))
+    expected = dqs.deform(positions, normals, skin, palette)
+    monkeypatch.setattr(dqs, "_CHUNK", chunk)
+    found = dqs.deform(positions, normals, skin, palette)
+    assert np.array_equal(found[0], expected[0])
+    assert np.array_equal(found[1], expected[1])
+
+
+def test_mesh_without_vertices_is_skinned_to_nothing():
+    none = np.zeros((0, 3))
+    assert dqs.deform(none, none, bound([], 2), np.array(RIGID[:2]))[0].shape == (0, 3)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.25, 0.5, 1.0])
+def test_mix_is_the_straight_line_between_both(share):
+    figure = random_arm(6)
+    pose = rest_pose(figure.skeleton)
+    pose.dofs[:] = np.random.default_rng(7).uniform(-2, 2, 21)
+    linear, dual = deform(figure, pose), deform(figure, pose, "dqs")
+    positions, normals = deform(figure, pose, Skinning("mix", share=share))
+    assert_allclose(positions, linear[0] + share * (dual[0] - linear[0]), atol=ROUNDING)
+    between = linear[1] + share * (dual[1] - linear[1])
+    between /= np.linalg.norm(between, axis=1, keepdims=True)
+    assert_allclose(normals, between, atol=1e-13)
+
+
+def test_mix_takes_half_of_each_unless_told_otherwise():
+    palette = [np.eye(4), matrix(turn_x(np.pi / 2))]
+    moved, _ = move((0, 1, 0), [(0, 0.5), (1, 0.5)], palette, mix)
+    # LBS gives (0, 1/2, 1/2), DQS a point on the circle at 45 degrees.
+    assert_allclose(moved, [0, *[(0.5 + np.sqrt(0.5)) / 2] * 2], atol=ROUNDING)

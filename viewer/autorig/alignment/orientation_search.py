@@ -1,0 +1,201 @@
+"""Which way up and facing a mesh stands, in which unit, and where: all likely answers tried."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import permutations, product
+
+import numpy as np
+
+from viewer.autorig.alignment.icp import Cloud, gaps_between, iterate
+from viewer.autorig.alignment.similarity import Similarity
+from viewer.autorig.surface.samples import SurfaceSamples
+from viewer.errors import RigError
+from viewer.rig.arrays import Floats
+
+__all__ = ["AXES", "Candidate", "axis_direction", "axis_turns", "in_place", "search", "unit_scale"]
+
+AXES = ("x", "y", "z", "-x", "-y", "-z")
+"""What an up axis or a facing may be."""
+
+_UNITS = (1.0, 100.0, 0.01, 1000.0, 0.001, 39.37, 1.0 / 39.37)
+"""Metres to centimetres, millimetres and inches, and back."""
+
+_NEAR_UNIT = 0.15  # how far a ratio of sizes may be from a unit's and be taken for it
+_TRIM = 0.8  # share of distances that counts: hair, skirts and cropped parts do not
+_QUICK, _LONG = 12, 60  # rounds for every candidate, and for the best few
+_FINALISTS = 4
+_NO_BETTER = 0.7  # of an error: turning a mesh that lies in place must gain more than this
+_IN_PLACE = 300  # samples that tell whether a mesh lies in place already
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidate:
+    """An alignment with what speaks for it.
+
+    Attributes
+    ----------
+    placed : Similarity
+        Template to target.
+    error : float
+        Trimmed mean distance over the target's size: both ways in a search; from the target to
+        the template alone where it lies in place, as it may be a part of it.
+    """
+
+    placed: Similarity
+    error: float
+
+
+def axis_direction(name: str) -> Floats:
+    """Return the unit vector of an axis: ``"-z"`` is (0, 0, -1)."""
+    direction = np.zeros(3)
+    direction["xyz".index(name[-1])] = -1.0 if name.startswith("-") else 1.0
+    return direction
+
+
+def axis_turns(template_up: str, up: str | None = None, facing: str | None = None) -> list[Floats]:
+    """Return the rotations that carry axes to axes: 24, 4 or 1, the identity first if it is one.
+
+    Parameters
+    ----------
+    template_up : "y" or "z"
+        The axis that points up in the template. Figures with y up face +z, those with z up +x.
+    up, facing : str, optional
+        One of ``AXES`` each: where the template's up and forward axes lead.
+
+    Returns
+    -------
+    list of (3, 3)
+        Proper rotations.
+
+    Raises
+    ------
+    RigError
+        If up and facing are the same or opposite.
+    """
+    for name in filter(None, (up, facing)):
+        if name not in AXES:
+            raise RigError(f'expected an axis, one of {", ".join(AXES)}, found "{name}"')
+    if up is not None and facing is not None and up[-1] == facing[-1]:
+        raise RigError(f"expected a facing across the up axis {up}, found {facing}")
+    forward = "z" if template_up == "y" else "x"
+    turns = []
+    for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
+        matrix = np.zeros((3, 3))
+        matrix[np.arange(3), order] = signs
+        if np.linalg.det(matrix) < 0.0:
+            continue
+        if up is not None and (matrix @ axis_direction(template_up) != axis_direction(up)).any():
+            continue
+        if facing is None or (matrix @ axis_direction(forward) == axis_direction(facing)).all():
+            turns.append(matrix)
+    return sorted(turns, key=lambda turn: -float(np.trace(turn)))
+
+
+def unit_scale(ratio: float) -> float:
+    """Return the unit's factor that a ratio of sizes is within 15 % of, or the ratio itself.
+
+    >>> unit_scale(93.0), unit_scale(1.4)
+    (100.0, 1.4)
+    """
+    near = [unit for unit in _UNITS if abs(ratio / unit - 1.0) <= _NEAR_UNIT]
+    return near[0] if near else ratio
+
+
+def in_place(template: Cloud, target: Cloud, turns: list[Floats], scaled: bool) -> Candidate:
+    """Return the best of the placements that leave the origin where it is.
+
+    Parameters
+    ----------
+    template, target : Cloud
+        Samples and search.
+    turns : list of (3, 3)
+        From ``axis_turns``.
+    scaled : bool
+        Whether other units are tried too.
+
+    Returns
+    -------
+    Candidate
+        Its error is one-way: a shirt that lies on the body fits, whatever it leaves bare. Of
+        several about equally good ones the first, so that nothing is turned without need: most
+        figures look much the same from behind.
+    """
+    few = target.samples.positions[:: max(1, len(target.samples.positions) // _IN_PLACE)]
+    found = []
+    for unit, turn in product(_UNITS if scaled else (1.0,), turns):
+        placed = Similarity(unit, turn, np.zeros(3), np.ones(3))
+        near = placed.apply(template.find(placed.undo(few)).positions)
+        error = _trimmed_mean(np.linalg.norm(near - few, axis=1)) / target.size
+        found.append(Candidate(placed, error))
+    enough = min(candidate.error for candidate in found) / _NO_BETTER + 1e-9
+    return next(candidate for candidate in found if candidate.error <= enough)
+
+
+def search(
+    template: Cloud,
+    target: Cloud,
+    turns: list[Floats],
+    scale: float | None,
+    report: Callable[[float], None],
+) -> Candidate:
+    """Return the best of the candidates after a few rounds each, and more for the best four.
+
+    Parameters
+    ----------
+    template, target : Cloud
+        Samples and search.
+    turns : list of (3, 3)
+        From ``axis_turns``.
+    scale : float or None
+        Kept if given; else begun with the ratio of the distances from the middle, which does not
+        depend on how a mesh is turned as its box does.
+    report : callable
+        Told the share that is done; may raise to cancel.
+
+    Returns
+    -------
+    Candidate
+        The one with the least two-way error.
+    """
+    ours, theirs = template.samples.positions, target.samples.positions
+    start = unit_scale(_radius(theirs) / _radius(ours)) if scale is None else scale
+    few = [_thinned(side, 300) for side in (template, target)]
+    found = []
+    for index, turn in enumerate(turns):
+        shift = theirs.mean(axis=0) - start * turn @ ours.mean(axis=0)
+        begun = Similarity(start, turn, shift, np.ones(3))
+        placed = iterate(few[0], few[1], begun, _QUICK, scales=scale is None)
+        found.append(judge(few[0], few[1], placed))
+        report(0.6 * (index + 1) / len(turns))
+    best = []
+    finalists = sorted(found, key=lambda candidate: candidate.error)[:_FINALISTS]
+    for index, finalist in enumerate(finalists):
+        placed = iterate(template, target, finalist.placed, _LONG, scales=scale is None)
+        best.append(judge(template, target, placed))
+        report(0.6 + 0.4 * (index + 1) / len(finalists))
+    return min(best, key=lambda candidate: candidate.error)
+
+
+def judge(template: Cloud, target: Cloud, placed: Similarity) -> Candidate:
+    """Return an alignment with its two-way error."""
+    gaps = gaps_between(template, target, placed)
+    both = _trimmed_mean(gaps.towards) + _trimmed_mean(gaps.away)
+    return Candidate(placed, 0.5 * both / target.size)
+
+
+def _thinned(side: Cloud, count: int) -> Cloud:
+    step = max(1, len(side.samples.positions) // count)
+    samples = SurfaceSamples(side.samples.positions[::step], side.samples.normals[::step])
+    return side.with_samples(samples)
+
+
+def _radius(points: Floats) -> float:
+    """Return the root mean square distance of points from their middle."""
+    return float(np.sqrt(points.var(axis=0).sum()))
+
+
+def _trimmed_mean(distances: Floats) -> float:
+    count = max(1, int(np.ceil(_TRIM * len(distances))))
+    return float(np.partition(distances, count - 1)[:count].mean())

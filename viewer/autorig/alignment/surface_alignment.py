@@ -1,0 +1,340 @@
+"""Lay a posed template onto a target mesh: where it is already, by landmarks, or by searching."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.autorig.alignment.axes_fit import fit_axes
+from viewer.autorig.alignment.icp import (
+    Cloud,
+    Side,
+    Triangles,
+    capped_rms,
+    gaps_between,
+    iterate,
+    slide,
+    trimmed_rms,
+)
+from viewer.autorig.alignment.orientation_search import axis_turns, in_place, search
+from viewer.autorig.alignment.similarity import Similarity, fit_similarity
+from viewer.autorig.surface.samples import sample_surface
+from viewer.errors import RigError
+from viewer.rig.arrays import Floats, Ints, frozen
+from viewer.rig.number_text import number_text
+
+__all__ = [
+    "PART",
+    "SCALES",
+    "Alignment",
+    "AlignmentSettings",
+    "Posed",
+    "align",
+    "alignment_lines",
+    "misfit",
+    "similarity_of",
+]
+
+SCALES = ("uniform", "axes", "none")
+"""One scale; one along each axis of the target; or the template's size as it is."""
+
+_DENSE, _SAMPLES = 12_000, 2_000  # points that are searched, and that are asked for
+_ROUNDS, _SLIDES = 60, 25  # of points to points, and to planes
+_AXES_ROUNDS = 20
+_IN_PLACE = 0.03  # misfit over size up to which a mesh may lie in place already
+_SURELY = 0.003  # mean distance over size up to which nothing better is looked for
+_SLIDING = 0.02  # misfit over size up to which surfaces slide along each other
+# Share of that misfit that a search must reach to move the mesh all the same: a part of a figure
+# fits nearly as well in many other places, the whole of it does not.
+_BETTER, _PART_BETTER = 0.8, 0.35
+PART = 0.05
+"""Of the size: a template farther than this from the target says that the target is a part."""
+
+_CAP = 0.05  # of the size: what lies farther away, as hair or a missing hand, counts as much
+_BAD = 0.03  # RMS over size above which the alignment is doubtful
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Posed:
+    """A surface to align: the posed template, or the target.
+
+    Attributes
+    ----------
+    positions : (V, 3)
+        Its own unit.
+    triangles : (T, 3)
+        Vertex indices.
+    """
+
+    positions: Floats
+    triangles: Ints
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AlignmentSettings:
+    """What is known or wanted of an alignment.
+
+    Attributes
+    ----------
+    up, facing : str or None
+        The target's axes, of ``orientation_search.AXES``; None to find them.
+    scale : str
+        One of ``SCALES``.
+    landmarks : (N, 2, 3) or None
+        Three or more pairs of points of the posed template and the target. They take the place
+        of the search.
+    refines : bool
+        Whether closest points improve on landmarks or on what the search found.
+    matrix : (4, 4) or None
+        An alignment that is known, as dragged in the window: nothing is searched.
+    """
+
+    up: str | None = None
+    facing: str | None = None
+    scale: str = "uniform"
+    landmarks: Floats | None = None
+    refines: bool = True
+    matrix: Floats | None = None
+
+    def __post_init__(self) -> None:
+        if self.scale not in SCALES:
+            raise RigError(f'scale: expected {", ".join(SCALES)}, found "{self.scale}"')
+        for name, shape in (("landmarks", (None, 2, 3)), ("matrix", (4, 4))):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, frozen(name, getattr(self, name), shape))
+        if self.landmarks is not None and len(self.landmarks) < 3:
+            raise RigError(f"landmarks: expected 3 or more pairs, found {len(self.landmarks)}")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Alignment:
+    """Where the posed template lies in the target's frame.
+
+    Attributes
+    ----------
+    placed : Similarity
+        Template to target, in the target's unit; never a reflection.
+    error : float
+        Trimmed RMS distance (the best 90 %) of the target from the template, over the target's
+        size.
+    away : float
+        The same of the template from the target: large where the target is only a part.
+    uneven : (float, float)
+        Root mean squares of the same distances over the size, without what the surface stands off
+        everywhere, and with all of them, each counted as 5 % at most: there ends of limbs that
+        stick out count, which the best 90 % leave out.
+    how : str
+        ``"in place"``, ``"search"``, ``"landmarks"``, ``"given"``, or ``"fit"`` where pose and
+        proportions were fitted beyond that, unless landmarks were given.
+    """
+
+    placed: Similarity
+    error: float
+    away: float
+    uneven: tuple[float, ...]
+    how: str
+
+    @classmethod
+    def of(cls, template: Side, target: Side, placed: Similarity, how: str) -> Alignment:
+        """Return an alignment with its errors.
+
+        Parameters
+        ----------
+        template, target : Side
+            Both meshes.
+        placed : Similarity
+            Where the template lies.
+        how : str
+            See above.
+        """
+        size = target.size
+        gaps = gaps_between(template, target, placed)
+        return cls(
+            placed,
+            error=trimmed_rms(gaps.towards) / size,
+            away=trimmed_rms(gaps.away) / size,
+            uneven=tuple(
+                capped_rms(way / size, _CAP) for way in (gaps.uneven_towards, gaps.uneven_away)
+            ),
+            how=how,
+        )
+
+
+def misfit(alignment: Alignment, is_part: bool) -> float:
+    """Return what alignments are compared by: the mean of the uneven errors both ways.
+
+    Parameters
+    ----------
+    alignment : Alignment
+        With its errors.
+    is_part : bool
+        Whether the target is only a part of what the template shows: then what the template has
+        beyond it says nothing.
+    """
+    towards, away = alignment.uneven
+    return towards if is_part else 0.5 * (towards + away)
+
+
+def align(
+    template: Posed,
+    target: Posed,
+    template_up: str,
+    settings: AlignmentSettings,
+    report: Callable[[float, str], None],
+) -> Alignment:
+    """Find the similarity that lays the template onto the target.
+
+    A target that lies in place already, in another unit or turned by quarter turns at most, is
+    left there: a fit of a part (a shirt, an open shell) would only move it away. Otherwise all
+    quarter turns are tried, each with a few rounds of closest points; the best is refined on the
+    surfaces.
+
+    Parameters
+    ----------
+    template, target : Posed
+        In the same pose, roughly.
+    template_up : "y" or "z"
+        The template's up axis.
+    settings : AlignmentSettings
+        What is known or wanted.
+    report : callable
+        Told the share that is done, and what is being done; may raise to cancel.
+
+    Returns
+    -------
+    Alignment
+        With its error.
+
+    Raises
+    ------
+    RigError
+        If a mesh has no area, landmarks lie on a line, or axes contradict each other.
+    """
+    report(0.0, "alignment")
+    ours, theirs = (
+        Triangles(side.positions, side.triangles, _SAMPLES) for side in (template, target)
+    )
+    fine = (ours, theirs)
+    if settings.matrix is not None:
+        return Alignment.of(ours, theirs, similarity_of(settings.matrix), "given")
+    coarse = [
+        Cloud(exact.samples, sample_surface(side.positions, side.triangles, _DENSE))
+        for exact, side in zip(fine, (template, target), strict=True)
+    ]
+    if settings.landmarks is not None:
+        start = _landmark_fit(settings.landmarks, settings.scale)
+        if settings.refines:
+            report(0.2, "alignment")
+            start = iterate(coarse[0], coarse[1], start, _ROUNDS, settings.scale != "none")
+        return Alignment.of(ours, theirs, _refined(fine, start, settings, report), "landmarks")
+    turns = axis_turns(template_up, settings.up, settings.facing)
+    stays = in_place(coarse[0], coarse[1], turns, scaled=settings.scale != "none")
+    report(0.1, "alignment")
+    if stays.error <= _SURELY:
+        return Alignment.of(ours, theirs, stays.placed, "in place")
+    scale = 1.0 if settings.scale == "none" else None
+    best = search(coarse[0], coarse[1], turns, scale, lambda s: report(0.1 + 0.7 * s, "alignment"))
+    left = Alignment.of(ours, theirs, stays.placed, "in place")
+    found = Alignment.of(ours, theirs, best.placed, "search")
+    is_part = found.away > PART
+    # Sliding perfects what nearly fits; in another pose it takes long and leads nowhere.
+    if settings.scale == "axes" or misfit(found, True) <= _SLIDING:
+        placed = _refined(fine, best.placed, settings, report)
+        slid = Alignment.of(ours, theirs, placed, "search")
+        is_part &= slid.away > PART
+        # It looks at what faces each other alone, and may leave ends of limbs behind.
+        if settings.scale == "axes" or misfit(slid, is_part) <= misfit(found, is_part):
+            found = slid
+    share = _PART_BETTER if is_part else _BETTER
+    gap = misfit(left, is_part)
+    return found if gap > _IN_PLACE or misfit(found, is_part) < share * gap else left
+
+
+def _landmark_fit(landmarks: Floats, scale: str) -> Similarity:
+    return fit_similarity(landmarks[:, 0], landmarks[:, 1], 1.0 if scale == "none" else None)
+
+
+def _refined(
+    fine: tuple[Triangles, Triangles],
+    start: Similarity,
+    settings: AlignmentSettings,
+    report: Callable[[float, str], None],
+) -> Similarity:
+    if settings.refines:
+        report(0.85, "alignment")
+        start = slide(fine[0], fine[1], start, _SLIDES, settings.scale != "none")
+    if settings.scale == "axes":
+        return fit_axes(fine[0], fine[1], start, _AXES_ROUNDS, settings.refines)
+    return start
+
+
+def similarity_of(matrix: Floats) -> Similarity:
+    """Return a 4 x 4 matrix as the similarity it is, stretched along one space's axes at most.
+
+    Raises
+    ------
+    RigError
+        If it mirrors, shears, or scales along other directions than the axes of the template or
+        of the target.
+    """
+    linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
+    determinant = float(np.linalg.det(linear))
+    if not determinant > 0.0:
+        raise RigError("alignment: expected a matrix that does not mirror or flatten")
+    scale, shift = float(np.cbrt(determinant)), np.asarray(matrix)[:3, 3]
+    rotation = linear / scale
+    if _is_rotation(rotation):
+        return Similarity(scale, rotation, shift, np.ones(3))
+    for axis in (1, 0):
+        # F R has rows of lengths F, and R H columns of lengths H.
+        factors = np.linalg.norm(rotation, axis=axis)
+        factors = factors / np.cbrt(np.prod(factors))
+        plain = rotation / (factors[:, None] if axis else factors)
+        if _is_rotation(plain):
+            both = (factors, np.ones(3)) if axis else (np.ones(3), factors)
+            return Similarity(scale, plain, shift, *both)
+    raise RigError(
+        "alignment: expected a rotation, a shift, and one scale or one along each axis, found a "
+        "shear"
+    )
+
+
+def _is_rotation(linear: Floats) -> bool:
+    return bool(np.abs(linear @ linear.T - np.eye(3)).max() <= 1e-6)
+
+
+_HOW = {
+    "in place": "the template is scaled and turned about the origin that both share",
+    "search": "found by closest points",
+    "landmarks": "from the landmarks",
+    "given": "as given",
+    "fit": "found by fitting pose and proportions",
+}
+
+
+def alignment_lines(alignment: Alignment) -> list[str]:
+    """Return what a person should know: scale, turn, shift, error, and whether to doubt it."""
+    placed = alignment.placed
+    angle = np.degrees(np.arccos(np.clip((np.trace(placed.rotation) - 1.0) / 2.0, -1.0, 1.0)))
+    how = _HOW[alignment.how]
+    if alignment.how == "in place" and placed.scale == 1.0 and angle == 0.0:
+        how = "the target lies on the template as it is"
+    shift = ", ".join(number_text(value, ".4g") for value in placed.shift.tolist())
+    factors = ""
+    for values, whose in ((placed.factors, ""), (placed.own_factors, "the template's ")):
+        if (values != 1.0).any():
+            factors = f" (along {whose}x, y, z: {', '.join(f'{f:.4g}' for f in values)})"
+    lines = [
+        f"alignment: {how}; scale {placed.scale:.6g}{factors}, turned by "
+        f"{angle:.2f} degrees, shift ({shift})",
+        f"alignment error: {100.0 * alignment.error:.3f} % of the target's size (RMS of the best "
+        f"90 %; template to target {100.0 * alignment.away:.3f} %)",
+    ]
+    if alignment.error > _BAD:
+        lines.append(
+            f"warning: the alignment is doubtful, above {100.0 * _BAD:g} %: give --up, --facing "
+            "or landmarks, or pose the template like the target"
+        )
+    return lines

@@ -1,0 +1,1 @@
+"""Correspondence: which vertices of a target lie on the template's surface."""

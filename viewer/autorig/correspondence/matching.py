@@ -1,0 +1,245 @@
+"""Which vertices of a target lie on the template's surface, and where.
+
+A vertex is matched if the closest point of the template is near enough and faces the same way
+(Abdrashitov et al. 2023). Skin that touches other skin, such as an arm at rest on the torso,
+is near the wrong part but faces the other way: it is left to be filled in.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from viewer.autorig.correspondence.same_vertices import at_vertices, same_vertices
+from viewer.autorig.surface.welding import Welded, weld
+from viewer.errors import RigError
+from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.geometry.closest_point import Surface, SurfacePoints, interpolate
+from viewer.rig.geometry.vectors import unit
+from viewer.rig.mesh import vertex_normals
+
+__all__ = ["MatchSettings", "Matches", "Template", "match", "sheet_normals"]
+
+_INSIDE_OUT = math.radians(120.0)  # an angle that says "turned round" rather than "folded"
+_MOST = 0.75  # of an island's near vertices: so many turned round, and the island is
+_TOGETHER = math.radians(80.0)  # a normal and the middle of its group; see _sides
+_CANCELLED = 1e-3  # of the areas around a vertex: what is left where two sides cancel out
+
+
+@dataclass(frozen=True, slots=True)
+class MatchSettings:
+    """When a vertex counts as lying on the template.
+
+    Attributes
+    ----------
+    max_distance : float
+        Fraction of the target's box diagonal.
+    max_angle : float
+        Radians between the normals of both surfaces.
+    near_distance, near_angle : float
+        Nearer than this fraction, this angle is enough: sharp and thin parts of a coarse mesh
+        have normals of their own. Sheets thinner than this are matched on the side that fits.
+    flipped_normals : bool
+        Let a normal that points the other way count as well. An island that as a whole is
+        inside out is turned round without this.
+    """
+
+    max_distance: float = 0.05
+    max_angle: float = math.radians(30.0)
+    near_distance: float = 0.005
+    near_angle: float = math.radians(60.0)
+    flipped_normals: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("max_distance", "max_angle", "near_distance", "near_angle"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise RigError(f"{name}: expected a number of at least 0, found {value}")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Matches:
+    """Where the vertices of a target meet the template.
+
+    Attributes
+    ----------
+    points : SurfacePoints
+        W points of the template: of each matched vertex the one that fits, else the closest.
+    matched : (W,) bool
+        Which vertices lie on the template.
+    angles : (W,)
+        Radians between the normals there, 0 where the target has no normal.
+    inside_out : (I,) int32
+        Islands of the target that were turned round.
+    """
+
+    points: SurfacePoints
+    matched: Bools
+    angles: Floats
+    inside_out: Ints
+
+
+class Template:
+    """The surface that others are matched to, aligned with them.
+
+    Parameters
+    ----------
+    positions : (V, 3)
+        In the target's space.
+    triangles : (T, 3)
+        Vertex indices.
+
+    Raises
+    ------
+    RigError
+        If there is no triangle, or SciPy is missing.
+    """
+
+    def __init__(self, positions: Floats, triangles: Ints) -> None:
+        self.surface = Surface(positions, triangles)
+        self.positions, self.triangles = positions, triangles
+        self.welded = weld(positions, triangles)
+        normals = vertex_normals(self.welded.positions, self.welded.triangles)
+        self.normals: Floats = normals[self.welded.vertices]
+
+    def normals_at(self, points: SurfacePoints) -> Floats:
+        """Return unit normals at points of the surface, (N, 3), mixed from the corners'."""
+        return unit(interpolate(points, self.triangles, self.normals))
+
+
+def sheet_normals(mesh: Welded) -> Floats:
+    """Return the unit normal of each vertex, 0 where there is none.
+
+    Parameters
+    ----------
+    mesh : Welded
+        W vertices.
+
+    Returns
+    -------
+    (W, 3)
+        0 for vertices without triangles, and where the two sides of a sheet cancel out.
+    """
+    a, b, c = (mesh.positions[mesh.triangles[:, corner]] for corner in range(3))
+    vectors = np.cross(b - a, c - a)
+    corners, count = mesh.triangles.ravel(), len(mesh.positions)
+    areas = np.bincount(corners, np.repeat(np.linalg.norm(vectors, axis=1), 3), minlength=count)
+    columns = [
+        np.bincount(corners, np.repeat(vectors[:, axis], 3), minlength=count) for axis in range(3)
+    ]
+    sums = np.stack(columns, axis=1).astype(float)
+    sums[np.linalg.norm(sums, axis=1) <= _CANCELLED * areas] = 0.0
+    return unit(sums)
+
+
+def match(template: Template, target: Welded, size: float, settings: MatchSettings) -> Matches:
+    """Find the vertices of a target that lie on the template.
+
+    Parameters
+    ----------
+    template : Template
+        In the target's space.
+    target : Welded
+        W vertices.
+    size : float
+        The target's box diagonal, that distances are fractions of.
+    settings : MatchSettings
+        How near, and how alike in direction.
+
+    Returns
+    -------
+    Matches
+        Vertices without a normal are judged by distance alone.
+    """
+    points = _closest(template, target)
+    normals = sheet_normals(target)
+    angles = _angles(template, points, normals)
+    near = points.distances <= settings.max_distance * size
+    inside_out = _inside_out(target, angles, near & normals.any(axis=1))
+    normals[np.isin(target.islands, inside_out)] *= -1.0
+    angles = _judged(_angles(template, points, normals), normals, settings)
+    matched = _accepted(points.distances, angles, size, settings)
+    rest = np.nonzero(~matched & (points.distances <= settings.near_distance * size))[0]
+    sides = _sides(template, target.positions[rest], normals[rest])
+    side_angles = _judged(_angles(template, sides, normals[rest]), normals[rest], settings)
+    fits = (sides.distances <= settings.near_distance * size) & (side_angles <= settings.near_angle)
+    matched[rest[fits]] = True
+    angles[rest[fits]] = side_angles[fits]
+    return Matches(_replaced(points, rest[fits], sides, fits), matched, angles, inside_out)
+
+
+def _closest(template: Template, target: Welded) -> SurfacePoints:
+    """Return the closest points, or the vertices that are the target's own."""
+    points, welded = template.surface.closest(target.positions), template.welded
+    same = same_vertices(welded, target, points.distances)
+    corners = welded.vertices[template.triangles]
+    return at_vertices(points, target.positions, corners, welded.positions, same)
+
+
+def _angles(template: Template, points: SurfacePoints, normals: Floats) -> Floats:
+    """Return the angles between normals (N, 3) and those of the template, 0 without normal."""
+    there = template.normals_at(points)
+    cosines = np.clip(np.einsum("na,na->n", there, normals), -1.0, 1.0)
+    return np.where(normals.any(axis=1), np.arccos(cosines), 0.0)
+
+
+def _judged(angles: Floats, normals: Floats, settings: MatchSettings) -> Floats:
+    if not settings.flipped_normals:
+        return angles
+    return np.where(normals.any(axis=1), np.minimum(angles, math.pi - angles), 0.0)
+
+
+def _accepted(distances: Floats, angles: Floats, size: float, settings: MatchSettings) -> Bools:
+    far = (distances <= settings.max_distance * size) & (angles <= settings.max_angle)
+    near = (distances <= settings.near_distance * size) & (angles <= settings.near_angle)
+    return far | near
+
+
+def _inside_out(target: Welded, angles: Floats, judged: Bools) -> Ints:
+    """Return the islands most of whose judged vertices face the other way."""
+    of = target.islands[judged]
+    total = np.bincount(of, minlength=target.n_islands)
+    turned = np.bincount(of[angles[judged] > _INSIDE_OUT], minlength=target.n_islands)
+    return np.nonzero((turned > _MOST * total) & (total > 0))[0].astype(np.int32)
+
+
+def _sides(template: Template, positions: Floats, normals: Floats) -> SurfacePoints:
+    """Return the closest points on triangles that face roughly the same way.
+
+    Directions come in 26 groups, those of a cube's faces, edges and corners; none is farther
+    than 28 degrees from one of them. Each group has its part of the template's triangles.
+    """
+    count = len(positions)
+    triangles, distances = np.zeros(count, dtype=np.int32), np.full(count, np.inf)
+    barycentric, found = np.tile([1.0, 0.0, 0.0], (count, 1)), positions.copy()
+    grid = np.array([axes for axes in product((-1.0, 0.0, 1.0), repeat=3) if any(axes)])
+    directions = unit(grid)
+    a, b, c = (template.positions[template.triangles[:, corner]] for corner in range(3))
+    faces = unit(np.cross(b - a, c - a))
+    group = (normals @ directions.T).argmax(axis=1) if count else np.zeros(0, dtype=int)
+    for number in np.unique(group):
+        inside = np.nonzero(group == number)[0]
+        facing = np.nonzero(faces @ directions[number] >= math.cos(_TOGETHER))[0]
+        if len(facing) == 0:
+            continue
+        part = Surface(template.positions, template.triangles[facing]).closest(positions[inside])
+        triangles[inside] = facing[part.triangles]
+        barycentric[inside], found[inside] = part.barycentric, part.positions
+        distances[inside] = part.distances
+    # No triangle faces that way: the distance says so, but must be a number.
+    distances[np.isinf(distances)] = np.finfo(float).max
+    return SurfacePoints(triangles, barycentric, found, distances)
+
+
+def _replaced(points: SurfacePoints, rows: Any, others: SurfacePoints, of: Bools) -> SurfacePoints:
+    """Return the points with some rows taken from others."""
+    columns = []
+    for name in ("triangles", "barycentric", "positions", "distances"):
+        column = getattr(points, name).copy()
+        column[rows] = getattr(others, name)[of]
+        columns.append(column)
+    return SurfacePoints(*columns)

@@ -1,0 +1,1 @@
+"""Properties of triangle surfaces: connectivity, winding, samples, Laplace operators."""

@@ -1,0 +1,160 @@
+"""How much each vertex differs from its neighbours: Laplace operators of triangle meshes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from viewer.autorig.surface.welding import Welded, edges, non_manifold_edges
+from viewer.rig._scipy import scipy_part
+from viewer.rig.arrays import Bools, Floats, Ints
+
+__all__ = ["cotangent_laplacian", "graph_laplacian", "laplacian", "voronoi_areas"]
+
+_STEEPEST = 100.0  # cotangent of 0.6 degrees: a thinner triangle's angles say nothing any more
+_FLAT = 1e-12  # twice the area of a triangle over its squared longest edge, at least
+_EVEN = 1.0 / np.sqrt(3.0)  # cotangent of 60 degrees
+_LIGHTEST = 1e-9  # of the mean: the least area of a vertex, as it is divided by
+
+
+def laplacian(mesh: Welded) -> tuple[Any, Floats]:
+    """Return the Laplace operator of a mesh and the area of each vertex, whatever its state.
+
+    Islands with an edge that more than two triangles share have no cotangent operator: theirs
+    is that of the graph of edges, and their vertices all have the mesh's mean area.
+
+    Parameters
+    ----------
+    mesh : Welded
+        W vertices. Make it of size 1 if the areas are to be compared with the operator, which
+        has no unit.
+
+    Returns
+    -------
+    operator : sparse (W, W)
+        Symmetric, positive semidefinite, rows add up to 0.
+    areas : (W,)
+        Squared units, at least 1e-9 of their mean; all 1 if no triangle has an area.
+    """
+    broken = np.unique(mesh.islands[non_manifold_edges(mesh.triangles)])
+    is_broken: Bools = np.isin(mesh.islands, broken)
+    graph_like = is_broken[mesh.triangles[:, 0]]
+    sound = mesh.triangles[~graph_like]
+    operator = cotangent_laplacian(mesh.positions, sound)
+    operator += graph_laplacian(len(mesh.positions), mesh.triangles[graph_like])
+    areas = voronoi_areas(mesh.positions, mesh.triangles)
+    positive = areas[areas > 0.0]
+    mean = float(positive.mean()) if len(positive) else 1.0
+    areas[is_broken] = mean
+    return operator, np.maximum(areas, _LIGHTEST * mean if len(positive) else 1.0)
+
+
+def cotangent_laplacian(positions: Floats, triangles: Ints) -> Any:
+    """Return the cotangent Laplacian: L_ij = -(cot a + cot b) / 2 on edges, L_ii = -sum_j L_ij.
+
+    a and b are the angles opposite to the edge (Pinkall and Polthier 1993). A triangle with an
+    angle below 0.6 degrees, or without area, counts as equilateral: it still connects, and the
+    operator stays positive semidefinite triangle by triangle, which it would not if large
+    cotangents were cut.
+
+    Parameters
+    ----------
+    positions : (V, 3)
+        Any unit.
+    triangles : (T, 3)
+        Vertex indices.
+
+    Returns
+    -------
+    sparse (V, V)
+        Without unit. The opposite sign of the Laplacian of calculus.
+
+    >>> square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    >>> L = cotangent_laplacian(square, np.array([[0, 1, 2], [0, 2, 3]]))
+    >>> L.toarray().round(12)[0].tolist()
+    [1.0, -0.5, 0.0, -0.5]
+    """
+    halves = 0.5 * _steady(_cotangents(positions, triangles))
+    # The angle at corner k lies opposite to the edge of the other two.
+    links = triangles[:, [1, 2, 2, 0, 0, 1]].reshape(-1, 2)
+    return _from_edges(len(positions), links, halves.ravel())
+
+
+def graph_laplacian(n_vertices: int, triangles: Ints) -> Any:
+    """Return the Laplacian of the graph of edges: L_ij = -1, L_ii = number of neighbours.
+
+    Parameters
+    ----------
+    n_vertices : int
+        V.
+    triangles : (T, 3)
+        Vertex indices.
+
+    Returns
+    -------
+    sparse (V, V)
+        Without unit.
+    """
+    links = edges(triangles)
+    return _from_edges(n_vertices, links, np.ones(len(links)))
+
+
+def voronoi_areas(positions: Floats, triangles: Ints) -> Floats:
+    """Return the part of the surface that is nearest to each vertex, "mixed" at obtuse angles.
+
+    In a triangle without an obtuse angle vertex a owns (|ab|^2 cot c + |ac|^2 cot b) / 8; in
+    one with, the obtuse corner owns half and the others a quarter (Meyer et al. 2003, fig. 4).
+
+    Parameters
+    ----------
+    positions : (V, 3)
+        Any unit.
+    triangles : (T, 3)
+        Vertex indices.
+
+    Returns
+    -------
+    (V,)
+        Squared units; they add up to the area of the mesh.
+    """
+    cotangents = _cotangents(positions, triangles)
+    corners = positions[triangles]
+    offsets = np.roll(corners, -1, axis=1) - np.roll(corners, 1, axis=1)  # opposite each corner
+    squares = np.einsum("tka,tka->tk", offsets, offsets)
+    shares = squares * cotangents / 8.0
+    parts = np.roll(shares, 1, axis=1) + np.roll(shares, -1, axis=1)
+    area = 0.5 * np.linalg.norm(np.cross(offsets[:, 1], offsets[:, 2]), axis=1)
+    obtuse: Bools = cotangents < 0.0
+    is_obtuse: Bools = np.logical_or.reduce(obtuse, axis=1)
+    parts = np.where(is_obtuse[:, None], np.where(obtuse, 0.5, 0.25) * area[:, None], parts)
+    return np.bincount(triangles.ravel(), parts.ravel(), minlength=len(positions)).astype(float)
+
+
+def _cotangents(positions: Floats, triangles: Ints) -> Floats:
+    """Return the cotangent of the angle at each corner, (T, 3): u . v / |u x v|."""
+    corners = positions[triangles]
+    u = np.roll(corners, -1, axis=1) - corners
+    v = np.roll(corners, 1, axis=1) - corners
+    double = np.linalg.norm(np.cross(u[:, 0], v[:, 0]), axis=1)
+    # Without area the cotangents become very large, but not infinite.
+    longest = np.einsum("tka,tka->tk", u, u).max(axis=1, initial=np.finfo(float).tiny)
+    return np.einsum("tka,tka->tk", u, v) / np.maximum(double, _FLAT * longest)[:, None]
+
+
+def _steady(cotangents: Floats) -> Floats:
+    thin: Bools = np.abs(cotangents).max(axis=1, initial=0.0) > _STEEPEST
+    return np.where(thin[:, None], _EVEN, cotangents)
+
+
+def _from_edges(n_vertices: int, links: Ints, weights: Floats) -> Any:
+    """Return the Laplacian of weighted edges (E, 2); weights of the same edge add up."""
+    sparse = scipy_part("sparse")
+    a, b = links[:, 0], links[:, 1]
+    shape = (n_vertices, n_vertices)
+    matrix = sparse.csr_array(
+        (np.concatenate([-weights, -weights]), (np.concatenate([a, b]), np.concatenate([b, a]))),
+        shape=shape,
+    )
+    diagonal = np.asarray(-matrix.sum(axis=1)).ravel()
+    return sparse.csr_array(matrix + sparse.diags_array(diagonal, shape=shape))

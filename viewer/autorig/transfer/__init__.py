@@ -1,0 +1,1 @@
+"""Transfer of a template's joints, pose, motions and correctives to a target mesh."""

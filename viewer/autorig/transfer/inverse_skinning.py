@@ -1,0 +1,172 @@
+"""Take a mesh out of its pose: each vertex by the inverse of its blended matrix."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from viewer.autorig.surface.welding import edges, weld
+from viewer.rig._scipy import scipy_part
+from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.geometry.rotation import nearest_rotations
+from viewer.rig.skin import Skin
+from viewer.rig.skinning.lbs import blended_matrices
+
+__all__ = ["SMALLEST_STRETCH", "Unposed", "mend", "unpose"]
+
+SMALLEST_STRETCH = 0.2
+"""Singular value below which a blended matrix counts as singular: two joints bent apart by an
+angle a with equal weights give cos(a / 2), and here a = 157 degrees."""
+
+_RINGS = 2  # neighbours of guarded vertices that may move to mend a tear
+_SMOOTH = 0.01  # weight of the shape against the pose when a tear is mended
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Unposed:
+    """A mesh at rest.
+
+    Attributes
+    ----------
+    positions : (V, 3)
+        Binding space; pose correctives are still part of them.
+    matrices : (V, 3, 4)
+        What poses each vertex again.
+    guarded : (V,) bool
+        Vertices whose matrix is nearly singular: undone by the rotation nearest to it, so they
+        do not come back exactly.
+    """
+
+    positions: Floats
+    matrices: Floats
+    guarded: Bools
+
+
+def unpose(positions: Floats, skin: Skin, palette: Floats) -> Unposed:
+    """Undo linear blend skinning: rest = B^-1 (t - d), with sum_j w_j A_j = [B | d].
+
+    Only the 3 x 3 part is inverted. Where its smallest singular value is below
+    ``SMALLEST_STRETCH`` the nearest rotation (polar factor) takes its place, as dividing by
+    almost nothing would tear the mesh; a vertex without influence stays where it is.
+
+    Parameters
+    ----------
+    positions : (V, 3)
+        Posed vertices.
+    skin : Skin
+        Of V vertices.
+    palette : (J, 4, 4)
+        Skinning matrices of the pose, bind to posed.
+
+    Returns
+    -------
+    Unposed
+        In the binding space of the skin.
+    """
+    matrices = blended_matrices(skin, palette)
+    linear = matrices[:, :, :3]
+    guarded = _is_singular(linear)
+    inverted = linear.copy()
+    if guarded.any():
+        inverted[guarded] = nearest_rotations(linear[guarded])[0]
+    steps = positions - matrices[:, :, 3]
+    rest = np.asarray(np.linalg.solve(inverted, steps[..., None])[..., 0], dtype=np.float64)
+    return Unposed(rest, matrices, guarded)
+
+
+def _is_singular(linear: Floats) -> Bools:
+    """Return whose smallest singular value is too small: (V,) bool.
+
+    As |det| = s1 s2 s3 and s1 s2 <= (s1^2 + s2^2) / 2 <= |B|^2 / 2, s3 >= 2 |det| / |B|^2; only
+    where that bound says nothing the singular values are found.
+    """
+    squares = np.einsum("vab,vab->v", linear, linear)
+    bound = 2.0 * np.abs(np.linalg.det(linear)) / np.where(squares > 0.0, squares, 1.0)
+    doubtful = np.flatnonzero(bound < SMALLEST_STRETCH)
+    singular = np.zeros(len(linear), dtype=np.bool_)
+    if len(doubtful):
+        values = np.linalg.svd(linear[doubtful], compute_uv=False)
+        singular[doubtful] = values[:, 2] < SMALLEST_STRETCH
+    return singular
+
+
+def mend(unposed: Unposed, posed: Floats, triangles: Ints) -> Floats:
+    """Smooth what surrounds guarded vertices, in the least-squares sense.
+
+    Minimises sum_v |B_v x_v + d_v - t_v|^2 + lambda |L x|^2 over the guarded vertices and two
+    rings around them, all others fixed, with L the Laplacian of the graph of edges and lambda =
+    0.01. The problem is linear in x: one Gauss-Newton step solves it.
+
+    Parameters
+    ----------
+    unposed : Unposed
+        What ``unpose`` gave.
+    posed : (V, 3)
+        The vertices t that posing should give back.
+    triangles : (T, 3)
+        Vertex indices; coincident vertices move together.
+
+    Returns
+    -------
+    (V, 3)
+        Rest positions; those of ``unposed`` where nothing was guarded.
+    """
+    if not unposed.guarded.any():
+        return unposed.positions
+    sparse = scipy_part("sparse")
+    welded = weld(unposed.positions, triangles)
+    count = len(welded.positions)
+    links = edges(welded.triangles)
+    free = np.zeros(count, dtype=np.bool_)
+    free[welded.vertices[unposed.guarded]] = True
+    for _ in range(_RINGS):
+        touched = links[free[links].any(axis=1)]
+        free[touched.ravel()] = True
+    own = np.flatnonzero(free)
+    laplacian = _laplacian(count, links)
+    normal, right = _normal_equations(unposed, posed, welded.vertices, free)
+    smooth = sparse.kron(laplacian.T @ laplacian, sparse.diags_array(np.ones(3)))
+    dof = (3 * own[:, None] + np.arange(3)).ravel()
+    fixed = np.setdiff1d(np.arange(3 * count), dof)
+    smooth = sparse.csr_array(smooth)[dof]
+    places = welded.positions.ravel()
+    system = sparse.csc_array(normal + _SMOOTH * smooth[:, dof])
+    solved = scipy_part("sparse.linalg").spsolve(
+        system, right - _SMOOTH * (smooth[:, fixed] @ places[fixed])
+    )
+    moved = unposed.positions.copy()
+    result = welded.positions.copy()
+    result[own] = solved.reshape(-1, 3)
+    inside = free[welded.vertices]
+    moved[inside] = result[welded.vertices[inside]]
+    return moved
+
+
+def _laplacian(count: int, links: Ints) -> Any:
+    """Return the mean of the neighbours minus the vertex itself, with the sign turned."""
+    sparse = scipy_part("sparse")
+    a, b = links[:, 0], links[:, 1]
+    degree = np.maximum(np.bincount(links.ravel(), minlength=count), 1)
+    rows, columns = np.concatenate([a, b]), np.concatenate([b, a])
+    matrix = sparse.csr_array((-1.0 / degree[rows], (rows, columns)), shape=(count, count))
+    return matrix + sparse.diags_array((np.bincount(links.ravel(), minlength=count) > 0) * 1.0)
+
+
+def _normal_equations(
+    unposed: Unposed, posed: Floats, welded: Ints, free: Bools
+) -> tuple[Any, Floats]:
+    """Return B^T B as blocks, and B^T (t - d), summed over coincident vertices."""
+    number = np.cumsum(free) - 1
+    inside = np.flatnonzero(free[welded])
+    rows = number[welded[inside]]
+    linear = unposed.matrices[inside, :, :3]
+    steps = posed[inside] - unposed.matrices[inside, :, 3]
+    blocks = np.zeros((int(free.sum()), 3, 3))
+    right = np.zeros((len(blocks), 3))
+    np.add.at(blocks, rows, np.swapaxes(linear, 1, 2) @ linear)
+    np.add.at(right, rows, np.einsum("vab,va->vb", linear, steps))
+    starts = np.arange(len(blocks) + 1)
+    matrix = scipy_part("sparse").bsr_array((blocks, starts[:-1], starts))
+    return matrix, right.ravel()

@@ -1,0 +1,172 @@
+"""Where a template's joints belong in another mesh: moved as the surface around them moved."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.autorig.surface.samples import triangle_normals
+from viewer.autorig.surface.winding import winding_numbers
+from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.blendshapes import JointRegressor
+from viewer.rig.geometry.closest_point import Surface
+from viewer.rig.skin import Skin, influence_counts
+
+__all__ = ["CarriedJoints", "boundary_weights", "carry_joints", "outside", "surface_shifts"]
+
+_ENOUGH = 0.5  # share of a joint's weights that must have found the target
+_SAME_WAY = 0.5  # cosine of 60 degrees between the surfaces
+_INSIDE = 0.5  # winding number between outside and inside
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CarriedJoints:
+    """Joints in the target's frame.
+
+    Attributes
+    ----------
+    positions : (J, 3)
+        In the pose of the target.
+    carried : (J,) bool
+        Which were moved by the surface around them; the others moved along with their parents.
+    measurable : (J,) bool
+        Which have vertices to be moved by at all.
+    """
+
+    positions: Floats
+    carried: Bools
+    measurable: Bools
+
+
+def surface_shifts(
+    positions: Floats,
+    normals: Floats,
+    target_positions: Floats,
+    target_triangles: Ints,
+    max_distance: float,
+) -> tuple[Floats, Bools]:
+    """Return the way from points to the closest points of a target, and where it can be trusted.
+
+    Parameters
+    ----------
+    positions, normals : (V, 3)
+        The template's vertices, aligned with the target.
+    target_positions : (W, 3)
+        The target's vertices.
+    target_triangles : (T, 3)
+        Its triangles.
+    max_distance : float
+        In the target's unit; farther pairs are no pairs.
+
+    Returns
+    -------
+    shifts : (V, 3)
+        Target minus template.
+    matched : (V,) bool
+        Near enough, and the surfaces are at most 60 degrees apart, whichever way they face.
+    """
+    found = Surface(target_positions, target_triangles).closest(positions)
+    facing = triangle_normals(target_positions, target_triangles)[found.triangles]
+    cosines = np.abs(np.einsum("va,va->v", facing, normals))
+    matched = (found.distances <= max_distance) & (cosines >= _SAME_WAY)
+    return found.positions - positions, matched
+
+
+def boundary_weights(skin: Skin, parents: Ints) -> JointRegressor:
+    """Return what tells where a joint is: b_v = w_vj w_v,parent, vertices that both hold.
+
+    A root takes the boundary with its children. Rows are not scaled: a joint without a boundary
+    has none.
+
+    Parameters
+    ----------
+    skin : Skin
+        Of the template.
+    parents : (J,)
+        -1 for roots.
+
+    Returns
+    -------
+    JointRegressor
+        Weights of vertices for each joint.
+    """
+    owners = np.repeat(np.arange(skin.n_vertices), influence_counts(skin))
+    count = skin.n_joints
+    keys = owners * count + skin.joints
+    unique, inverse = np.unique(keys, return_inverse=True)
+    weights = np.bincount(inverse.reshape(-1), skin.weights, minlength=len(unique))
+    vertices, joints = unique // count, unique % count
+    above = parents[joints]
+    wanted = vertices * count + np.maximum(above, 0)
+    place = np.minimum(np.searchsorted(unique, wanted), max(len(unique) - 1, 0))
+    shared = (above >= 0) & (unique[place] == wanted) if len(unique) else np.zeros(0, np.bool_)
+    product = weights[shared] * weights[place[shared]]
+    rows, columns = joints[shared], vertices[shared]
+    # What a root shares with a child says where the root's own region ends, too.
+    at_root = parents[above[shared]] < 0
+    return JointRegressor(
+        count,
+        np.concatenate([rows, above[shared][at_root]]).astype(np.int32),
+        np.concatenate([columns, columns[at_root]]).astype(np.int32),
+        np.concatenate([product, product[at_root]]),
+    )
+
+
+def carry_joints(
+    joints: Floats, parents: Ints, regressor: JointRegressor, shifts: Floats, matched: Bools
+) -> CarriedJoints:
+    """Move joints by what the surface around them was moved by.
+
+    J'_j = J_j + sum_v k_jv d_v / sum_v k_jv over matched vertices v, with the way d_v to the
+    target and the rows k_j of a regressor: so the estimator's own error, which posed regressors
+    have, cancels out. Where less than half of a row is matched the joint goes with its parent.
+
+    Parameters
+    ----------
+    joints : (J, 3)
+        Posed and aligned with the target.
+    parents : (J,)
+        -1 for roots; parents come first.
+    regressor : JointRegressor
+        The model's own, or ``boundary_weights``.
+    shifts : (V, 3)
+        From ``surface_shifts``.
+    matched : (V,) bool
+        Where they can be trusted.
+
+    Returns
+    -------
+    CarriedJoints
+        In the unit of ``joints``.
+    """
+    rows, columns, weights = regressor.joints, regressor.vertices, regressor.weights
+    count = len(joints)
+    used = np.where(matched[columns], weights, 0.0)
+    whole = np.bincount(rows, np.abs(weights), minlength=count)
+    present = np.bincount(rows, np.abs(used), minlength=count)
+    total = np.bincount(rows, used, minlength=count)
+    # Rows of both signs may nearly cancel, and then say nothing.
+    carried = (present >= _ENOUGH * whole) & (total >= _ENOUGH * present) & (whole > 0.0)
+    sums = [np.bincount(rows, used * shifts[columns, axis], minlength=count) for axis in range(3)]
+    moves = np.stack(sums, axis=1) / np.where(carried, total, 1.0)[:, None]
+    for joint in np.flatnonzero(~carried).tolist():
+        # Parents come first, so the parent's way is final.
+        moves[joint] = moves[parents[joint]] if parents[joint] >= 0 else 0.0
+    return CarriedJoints(joints + moves, carried, whole > 0.0)
+
+
+def outside(positions: Floats, triangles: Ints, joints: Floats) -> Bools:
+    """Return which joints lie outside a mesh: (J,) bool; one that is inside out has an inside.
+
+    Parameters
+    ----------
+    positions : (V, 3)
+        Any unit.
+    triangles : (T, 3)
+        Vertex indices.
+    joints : (J, 3)
+        In the same space.
+    """
+    outer: Bools = np.abs(winding_numbers(positions, triangles, joints)) < _INSIDE
+    return outer

@@ -1,0 +1,274 @@
+"""A skeleton with other proportions: same joints, same DOFs, other distances between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from viewer.autorig.alignment.similarity import Similarity
+from viewer.autorig.transfer.leg_scale import leg_scale
+from viewer.errors import RigError
+from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.figure import Figure
+from viewer.rig.geometry.rotation import matrix_to_euler, matrix_to_quaternion, quaternion_to_matrix
+from viewer.rig.kinematics import world_matrices
+from viewer.rig.pose import Pose, dof_rotations, joint_rotations
+from viewer.rig.posing.pose_vector import rotation_rows
+from viewer.rig.retargeting.mirror import joint_partners, mirror_axis
+from viewer.rig.skeleton import Skeleton, joint_label
+
+__all__ = ["RestSkeleton", "fit_rest_skeleton"]
+
+_FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RestSkeleton:
+    """The target's skeleton, how it is bound, and the pose in which the target was found.
+
+    Attributes
+    ----------
+    skeleton : Skeleton
+        At rest it stands as the template does at rest, in the template's axes and the target's
+        unit: so clips and poses of the template mean the same to it.
+    inverse_bind : (J, 4, 4)
+        Of the pose in which the template is bound.
+    pose : Pose
+        Puts the joints where they are in the target.
+    root_scale : float
+        What lengths of the root are scaled by, see ``leg_scale``.
+    lines : tuple of str
+        What was changed beside the lengths.
+    """
+
+    skeleton: Skeleton
+    inverse_bind: Floats
+    pose: Pose
+    root_scale: float
+    lines: tuple[str, ...]
+
+
+def fit_rest_skeleton(
+    template: Figure,
+    pose: Pose,
+    placed: Similarity,
+    joints: Floats,
+    carried: Bools | None,
+    original: Skeleton | None = None,
+) -> RestSkeleton:
+    """Find rest offsets that put a posed skeleton's joints at given places.
+
+    The target's joint j stands in the world with the linear part R P_j, P_j being that of the
+    template's pose and R the alignment's rotation. So the offset from its parent i is
+    (R P_i)^-1 (p_j - p_i), of which the DOFs' translations, scaled, are part. The rest root is
+    the template's, scaled as the legs are; the figure's translation carries it to the target, and
+    R goes into the root's rotation.
+
+    Parameters
+    ----------
+    template : Figure
+        Shaped as posed, with skeleton and skin.
+    pose : Pose
+        Of the template.
+    placed : Similarity
+        The posed template, with the pose's own scale and translation, to the target.
+    joints : (J, 3)
+        In the target's frame.
+    carried : (J,) bool or None
+        Which of them were measured on the target. A symmetric template then gives a symmetric
+        skeleton: left and right offsets are averaged, or taken from the side that was measured.
+        None leaves the joints as they are.
+    original : Skeleton or None
+        The template's before its limbs were resized; None if they were not.
+
+    Returns
+    -------
+    RestSkeleton
+        Lengths in the target's unit.
+    """
+    skeleton, skin = template.skeleton, template.skin
+    assert skeleton is not None and skin is not None  # the pipeline looked
+    scale = placed.scale * pose.figure_scale
+    turned = world_matrices(skeleton, pose)[:, :3, :3]
+    moves = scale * _moves(skeleton, pose)
+    world = placed.rotation @ turned
+    offsets = _offsets(skeleton.parents, world, joints) - moves
+    roots = skeleton.parents < 0
+    # Roots stand in figure space: what turns them there is taken out of the ways between them.
+    spread = (joints - joints[0]) @ placed.rotation
+    offsets[roots] = (scale * skeleton.rest_translations[0] + spread - moves + moves[0])[roots]
+    offsets[0] = scale * skeleton.rest_translations[0]
+    if carried is not None:
+        offsets = _symmetric(template, offsets, scale, carried)
+    provisional = _with_offsets(skeleton, offsets, np.full(len(roots), scale))
+    root_scale = leg_scale(original or skeleton, provisional, template.up, scale)
+    offsets[roots] += (root_scale - scale) * skeleton.rest_translations[0]
+    longer = offsets - scale * skeleton.rest_translations
+    joint_scales = np.where(roots, root_scale, scale)
+    fitted = _with_offsets(skeleton, offsets, joint_scales)
+    if skeleton.boxes is not None:
+        fitted = replace(fitted, boxes=scale * skeleton.boxes)
+    posed = _scaled_pose(skeleton, pose, joint_scales)
+    fitted, lines = _turn_roots(fitted, posed, placed.rotation)
+    _move_roots(fitted, posed, joints)
+    bind = _bind_matrices(skeleton.parents, skin.inverse_bind, longer, scale)
+    inverse_bind = np.asarray(np.linalg.inv(bind), dtype=np.float64)
+    return RestSkeleton(fitted, inverse_bind, posed, root_scale, tuple(lines))
+
+
+def _moves(skeleton: Skeleton, pose: Pose) -> Floats:
+    """Return what a pose adds to the rest translations: (J, 3)."""
+    moves = pose.translations.copy()
+    rows = skeleton.dof_kinds < _FIRST_ROTATION
+    np.add.at(moves, (skeleton.dof_joints[rows], skeleton.dof_kinds[rows]), pose.dofs[rows])
+    return moves
+
+
+def _offsets(parents: Ints, world: Floats, joints: Floats) -> Floats:
+    """Return each joint's place within its parent's axes: (J, 3); roots as they are."""
+    offsets = joints.copy()
+    below = np.flatnonzero(parents >= 0)
+    above = parents[below]
+    ways = joints[below] - joints[above]
+    # Solved, not transposed: poses may scale joints.
+    offsets[below] = np.linalg.solve(world[above], ways[..., None])[..., 0]
+    return offsets
+
+
+def _symmetric(template: Figure, offsets: Floats, scale: float, carried: Bools) -> Floats:
+    """Let left and right change alike, if the template's joints mirror each other.
+
+    What is averaged are changes against the scaled template, in its rest axes.
+    """
+    skeleton = template.skeleton
+    assert skeleton is not None  # the caller looked
+    try:
+        partners = joint_partners(template)
+    except RigError:
+        return offsets  # not symmetric: nothing to keep
+    flip = np.ones(3)
+    flip[mirror_axis(template)] = -1.0
+    zero = _zero_pose(skeleton)
+    rest = world_matrices(skeleton, zero)[:, :3, :3]
+    has_parent = skeleton.parents >= 0
+    frames = np.where(has_parent[:, None, None], rest[skeleton.parents], np.eye(3))
+    changes = offsets - scale * skeleton.rest_translations
+    straight = np.einsum("jab,jb->ja", frames, changes)
+    mirrored = straight[partners] * flip
+    own, other = carried.astype(float), carried[partners].astype(float)
+    neither = own + other == 0.0
+    own, other = np.where(neither, 1.0, own), np.where(neither, 1.0, other)
+    mixed = (own[:, None] * straight + other[:, None] * mirrored) / (own + other)[:, None]
+    mixed[~has_parent] = straight[~has_parent]
+    back = np.linalg.solve(frames, mixed[..., None])[..., 0]
+    symmetric: Floats = scale * skeleton.rest_translations + back
+    return symmetric
+
+
+def _zero_pose(skeleton: Skeleton) -> Pose:
+    return Pose(
+        dofs=np.zeros(skeleton.n_dofs),
+        translations=np.zeros((skeleton.n_joints, 3)),
+        rotations=skeleton.rest_rotations.copy(),
+        scales=skeleton.rest_scales.copy(),
+    )
+
+
+def _with_offsets(skeleton: Skeleton, offsets: Floats, joint_scales: Floats) -> Skeleton:
+    """Return a skeleton with other rest offsets, its lengths scaled: (J, 3), (J,)."""
+    scales = _dof_scales(skeleton, joint_scales)
+    return replace(
+        skeleton,
+        rest_translations=offsets,
+        dof_limits=scales[:, None] * skeleton.dof_limits,
+        rest_dofs=scales * skeleton.rest_dofs,
+    )
+
+
+def _dof_scales(skeleton: Skeleton, joint_scales: Floats) -> Floats:
+    is_move = skeleton.dof_kinds < _FIRST_ROTATION
+    return np.where(is_move, joint_scales[skeleton.dof_joints], 1.0)
+
+
+def _scaled_pose(skeleton: Skeleton, pose: Pose, joint_scales: Floats) -> Pose:
+    """Return a pose in the target's unit, without shape, scale and place of its own."""
+    posed = pose.copy()
+    posed.dofs *= _dof_scales(skeleton, joint_scales)
+    posed.translations *= joint_scales[:, None]
+    posed.shape_weights = np.zeros(0)
+    posed.figure_scale = 1.0
+    posed.figure_translation[:] = 0.0
+    return posed
+
+
+def _turn_roots(skeleton: Skeleton, pose: Pose, rotation: Floats) -> tuple[Skeleton, list[str]]:
+    """Turn the roots by the alignment, in place: by their DOFs where they are ball joints.
+
+    Limits of a root say how it may stand in the template's world, not in the target's: they are
+    widened to hold the pose.
+    """
+    roots = np.flatnonzero(skeleton.parents < 0)
+    wanted = rotation @ joint_rotations(skeleton, pose)[roots]
+    rows = rotation_rows(skeleton)[roots]
+    ball = rows[:, 0] >= 0
+    beneath = quaternion_to_matrix(pose.rotations[roots])
+    if np.abs(rotation - np.eye(3)).max() < 1e-12:
+        return skeleton, []
+    limits = skeleton.dof_limits.copy()
+    low, high = limits[rows[ball], 0], limits[rows[ball], 1]
+    angles = _angles_within((np.swapaxes(beneath, 1, 2) @ wanted)[ball], low, high)
+    pose.dofs[rows[ball]] = angles
+    beyond = ((angles < low) | (angles > high)).any(axis=1)
+    limits[rows[ball], 0] = np.minimum(low, angles)
+    limits[rows[ball], 1] = np.maximum(high, angles)
+    others = roots[~ball]
+    held = dof_rotations(skeleton, pose.dofs)[others]
+    left = wanted[~ball] @ np.swapaxes(held, 1, 2)
+    pose.rotations[others] = matrix_to_quaternion(left)
+    lines = [
+        f"limits of {joint_label(skeleton, int(joint))} widened to hold the target's pose"
+        for joint in roots[ball][beyond]
+    ]
+    return replace(skeleton, dof_limits=limits), lines
+
+
+def _angles_within(rotations: Floats, low: Floats, high: Floats) -> Floats:
+    """Return angles about x, y, z, of the two triples that make a rotation the one within limits.
+
+    (x, y, z) and (x + pi, pi - y, z + pi) are the same rotation.
+    """
+    first = matrix_to_euler(rotations)
+    other = np.stack([first[:, 0] + np.pi, np.pi - first[:, 1], first[:, 2] + np.pi], axis=1)
+    other -= 2.0 * np.pi * np.round(other / (2.0 * np.pi))
+    excess = [
+        (np.maximum(low - angles, 0.0) + np.maximum(angles - high, 0.0)).sum(axis=1)
+        for angles in (first, other)
+    ]
+    return np.where((excess[0] <= excess[1])[:, None], first, other)
+
+
+def _move_roots(skeleton: Skeleton, pose: Pose, joints: Floats) -> None:
+    """Move the figure until the first root is in its place, and other roots by themselves."""
+    found = world_matrices(skeleton, pose)[:, :3, 3]
+    pose.figure_translation[:] = joints[0] - found[0]
+    others = np.flatnonzero(skeleton.parents < 0)[1:]
+    pose.translations[others] += joints[others] - found[others] - pose.figure_translation
+
+
+def _bind_matrices(parents: Ints, inverse_bind: Floats, longer: Floats, scale: float) -> Floats:
+    """Return where the joints are bound: the template's bind pose with the new lengths.
+
+    Each local bind matrix B_parent^-1 B keeps its linear part; its translation is scaled, and
+    changed by as much as the rest offset was.
+    """
+    bind = np.asarray(np.linalg.inv(inverse_bind), dtype=np.float64)
+    local = bind.copy()
+    below = np.flatnonzero(parents >= 0)
+    local[below] = inverse_bind[parents[below]] @ bind[below]
+    local[:, :3, 3] = scale * local[:, :3, 3] + longer
+    result = local.copy()
+    for joint in below.tolist():
+        # Parents come first, so result[parent] is already final.
+        result[joint] = result[parents[joint]] @ local[joint]
+    return result

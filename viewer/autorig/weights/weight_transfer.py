@@ -1,0 +1,249 @@
+"""A template's skin weights on another mesh: matched where they meet, filled in elsewhere."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from viewer.autorig.correspondence.inside_out import wound_backwards
+from viewer.autorig.correspondence.matching import Matches, MatchSettings, Template, match
+from viewer.autorig.correspondence.nearest import nearest_vertices
+from viewer.autorig.surface.laplacian import laplacian
+from viewer.autorig.surface.welding import Welded, weld
+from viewer.autorig.weights.inpainting import NEGLIGIBLE, Report, fill
+from viewer.autorig.weights.result import (
+    RigidIslands,
+    WeightTransfer,
+    match_lines,
+    nothing_matched,
+    rigid_lines,
+    template_lines,
+)
+from viewer.autorig.weights.smoothing import smooth, within
+from viewer.autorig.weights.sparse_weights import put_rows, skin_of, weight_matrix
+from viewer.errors import RigError
+from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.geometry.closest_point import SurfacePoints, interpolate
+from viewer.rig.mesh import bounding_box, box_size
+from viewer.rig.skin import Skin, skin_rows
+
+__all__ = ["WeightSettings", "nearest_weights", "transferred_weights"]
+
+
+@dataclass(frozen=True, slots=True)
+class WeightSettings:
+    """How weights are carried over.
+
+    Attributes
+    ----------
+    match : MatchSettings
+        When a vertex counts as lying on the template.
+    smoothing_rounds : int
+        Rounds of evening out the filled-in weights and their surroundings; 0 for none.
+    max_influences : int or None
+        The strongest that are kept of each vertex; None for all.
+    """
+
+    match: MatchSettings = field(default_factory=MatchSettings)
+    smoothing_rounds: int = 0
+    max_influences: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.smoothing_rounds < 0:
+            raise RigError(f"smoothing: expected at least 0 rounds, found {self.smoothing_rounds}")
+        if self.max_influences is not None and self.max_influences < 1:
+            raise RigError(f"influences: expected at least 1, found {self.max_influences}")
+
+
+def transferred_weights(
+    template: Template,
+    weights: Skin,
+    positions: Floats,
+    triangles: Ints,
+    settings: WeightSettings,
+    report: Report,
+) -> WeightTransfer:
+    """Carry weights over by closest points, and fill in what does not meet the template.
+
+    Parameters
+    ----------
+    template : Template
+        Its surface, aligned with the target.
+    weights : Skin
+        Of the template's vertices.
+    positions : (V, 3)
+        The target's vertices.
+    triangles : (T, 3)
+        Its triangles.
+    settings : WeightSettings
+        Limits of matching, smoothing, how many influences.
+    report : callable
+        Called with a fraction from 0 to 1 and what is being done; may raise to cancel.
+
+    Returns
+    -------
+    WeightTransfer
+        Rows add up to 1. No weight of the template is dropped, only solved ones below 1e-6, and
+        those of corners that have less than 1e-6 of a closest point.
+
+    Raises
+    ------
+    RigError
+        If no vertex of the target meets the template, the target is a point, weights of the
+        template are missing, or SciPy is.
+    """
+    source = weight_matrix(weights, template.triangles)
+    size = box_size(bounding_box(positions))
+    if size <= 0.0:
+        raise RigError(
+            f"target: expected a mesh with a size, found {len(positions)} vertices at one place"
+        )
+    report(0.0, "joining seams")
+    target = weld(positions, triangles)
+    report(0.1, "looking for closest points")
+    found = match(template, target, size, settings.match)
+    if not found.matched.any():
+        raise RigError(nothing_matched(found.points.distances, size))
+    report(0.4, "weighing")
+    rows = interpolate(_without_residue(found.points), template.triangles, source)
+    has_match = np.bincount(target.islands, found.matched, target.n_islands) > 0
+    rows, rigid = _with_rigid(template, source, target, rows, np.nonzero(~has_match)[0])
+    filled = ~found.matched & has_match[target.islands]
+    rows, method = _filled(target, size, rows, found.matched, filled, report)
+    if settings.smoothing_rounds and filled.any():
+        report(0.95, "smoothing")
+        reach = settings.match.max_distance * size
+        active = within(target.positions, target.triangles, filled, reach)
+        rows = smooth(rows, target.triangles, active, settings.smoothing_rounds)
+    report(1.0, "weights found")
+    lines = (
+        *template_lines(weights),
+        *match_lines(found, filled, method),
+        *rigid_lines(rigid),
+    )
+    skin = skin_of(rows, weights.inverse_bind, settings.max_influences)
+    backwards = wound_backwards(target, found.inside_out)
+    return _in_vertices(target.vertices, skin, found, filled, backwards, rigid, lines)
+
+
+def _without_residue(points: SurfacePoints) -> SurfacePoints:
+    """Return points on edges and corners as these: rounding leaves them a little of the rest."""
+    kept = np.where(points.barycentric < NEGLIGIBLE, 0.0, points.barycentric)
+    return replace(points, barycentric=kept / kept.sum(axis=1, keepdims=True))
+
+
+def nearest_weights(
+    template: Floats, weights: Skin, positions: Floats, max_distance: float = 0.05
+) -> WeightTransfer:
+    """Copy the weights of the nearest vertex.
+
+    Parameters
+    ----------
+    template : (V_S, 3)
+        The template's vertices, aligned with the target.
+    weights : Skin
+        Theirs; copied as they are.
+    positions : (V, 3)
+        The target's vertices.
+    max_distance : float
+        Fraction of the target's box diagonal up to which a vertex is reported as matched. It
+        changes no weight.
+
+    Returns
+    -------
+    WeightTransfer
+        ``angles`` are all 0: this method does not look at them.
+    """
+    vertices, distances = nearest_vertices(template, positions)
+    skin = skin_rows(weights, vertices)
+    near = distances <= max_distance * box_size(bounding_box(positions))
+    empty = np.zeros(0, dtype=np.int32)
+    return WeightTransfer(
+        starts=skin.starts,
+        joints=skin.joints,
+        weights=skin.weights,
+        matched=near,
+        filled=np.zeros(len(near), dtype=bool),
+        distances=distances,
+        angles=np.zeros(len(near)),
+        points=None,
+        backwards=np.zeros(len(near), dtype=bool),
+        rigid=RigidIslands(empty, empty, empty, np.zeros(0)),
+        lines=(f"nearest vertex within the limit for {int(near.sum())} of {len(near)} vertices",),
+    )
+
+
+def _with_rigid(
+    template: Template, source: Any, target: Welded, rows: Any, islands: Any
+) -> tuple[Any, RigidIslands]:
+    """Give islands without a match the weights closest to the mean of their vertices."""
+    if len(islands) == 0:
+        empty = np.zeros(0, dtype=np.int32)
+        return rows, RigidIslands(empty, empty, empty, np.zeros(0))
+    counts = np.bincount(target.islands, minlength=target.n_islands)
+    sums = [
+        np.bincount(target.islands, target.positions[:, axis], target.n_islands)
+        for axis in range(3)
+    ]
+    centers = (np.stack(sums, axis=1) / counts[:, None])[islands]
+    points = template.surface.closest(centers)
+    island_rows = interpolate(points, template.triangles, source)
+    number = np.full(target.n_islands, -1)
+    number[islands] = np.arange(len(islands))
+    members = np.nonzero(number[target.islands] >= 0)[0]
+    rows = put_rows(rows, members, island_rows[number[target.islands[members]]])
+    strongest = np.asarray(island_rows.argmax(axis=1)).ravel().astype(np.int32)
+    welded = np.unique(target.islands, return_index=True)[1][islands]
+    first = np.unique(target.vertices, return_index=True)[1][welded].astype(np.int32)
+    sizes = counts[islands].astype(np.int32)
+    return rows, RigidIslands(first, sizes, strongest, points.distances)
+
+
+def _filled(
+    target: Welded, size: float, rows: Any, matched: Bools, unknown: Bools, report: Report
+) -> tuple[Any, str]:
+    """Solve for the unknown rows on the mesh made of size 1, as the operator has no unit."""
+    if not unknown.any():
+        return rows, "direct"
+    report(0.5, "measuring the surface")
+    operator, areas = laplacian(replace(target, positions=target.positions / size))
+
+    def part(fraction: float, what: str) -> None:
+        report(0.55 + 0.4 * fraction, what)
+
+    values, method = fill(operator, areas, rows, matched, unknown, part)
+    return put_rows(rows, np.nonzero(unknown)[0], values), method
+
+
+def _in_vertices(
+    welded: Ints,
+    skin: Skin,
+    found: Matches,
+    filled: Bools,
+    backwards: Bools,
+    rigid: RigidIslands,
+    lines: tuple[str, ...],
+) -> WeightTransfer:
+    """Return what belongs to welded vertices for each of the vertices that they stand for."""
+    rows = skin_rows(skin, welded)
+    points = found.points
+    return WeightTransfer(
+        starts=rows.starts,
+        joints=rows.joints,
+        weights=rows.weights,
+        matched=found.matched[welded],
+        filled=filled[welded],
+        distances=points.distances[welded],
+        angles=found.angles[welded],
+        points=SurfacePoints(
+            points.triangles[welded],
+            points.barycentric[welded],
+            points.positions[welded],
+            points.distances[welded],
+        ),
+        backwards=backwards,
+        rigid=rigid,
+        lines=lines,
+    )

@@ -1,0 +1,59 @@
+"""Tables and coloured lines of commands; colours appear at a terminal alone."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Collection, Sequence
+from io import StringIO
+from typing import TextIO
+
+__all__ = ["print_line", "table_lines"]
+
+
+def print_line(*parts: str | tuple[str, str], file: TextIO | None = None) -> None:
+    """Print one line.
+
+    Parameters
+    ----------
+    *parts : str or (str, str)
+        Texts one behind the other, some with a style as rich has it, such as ``"red"``.
+    file : TextIO, optional
+        Standard output if omitted. Where it is no terminal, it gets the plain text.
+    """
+    stream = sys.stdout if file is None else file
+    if stream is None or not stream.isatty():
+        print("".join(part if isinstance(part, str) else part[0] for part in parts), file=stream)
+        return
+    from rich.console import Console
+    from rich.text import Text
+
+    Console(file=stream).print(Text.assemble(*parts), soft_wrap=True)
+
+
+def table_lines(rows: Sequence[Sequence[str]], right: Collection[int] = ()) -> list[str]:
+    """Lay out cells in columns as wide as they need.
+
+    Parameters
+    ----------
+    rows : sequence of rows
+        All of one length.
+    right : collection of int
+        Columns whose cells stand at their right.
+
+    >>> table_lines([["", "joints"], ["walk", "0.5"]], right=[1])
+    ['      joints', 'walk     0.5']
+    """
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=None, show_header=False, pad_edge=False, padding=(0, 1))
+    for column in range(len(rows[0]) if rows else 0):
+        table.add_column(justify="right" if column in right else "left", no_wrap=True)
+    for row in rows:
+        table.add_row(*map(Text, row))
+    # Wide enough for any row, so that nothing is cut.
+    width = sum(max(len(cell) for cell in column) * 2 + 2 for column in zip(*rows, strict=True))
+    text = StringIO()
+    Console(file=text, width=width + 1, color_system=None, legacy_windows=False).print(table)
+    return [line.rstrip() for line in text.getvalue().splitlines()]

@@ -1,0 +1,57 @@
+"""Print a script that completes commands, options and file names in a shell."""
+
+from __future__ import annotations
+
+import argparse
+from importlib import import_module
+from typing import Any
+
+from viewer.commands import COMMANDS
+from viewer.commands._usage import Parser
+
+__all__ = ["add_arguments", "command_line", "run"]
+
+_SHELLS = ("bash", "zsh", "tcsh")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    parser.add_argument("shell", choices=_SHELLS, help="whose script to print, see below")
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = (
+        "bash: viewer completion bash > ~/.local/share/bash-completion/completions/viewer\n"
+        "zsh:  viewer completion zsh > a file _viewer in a folder of $fpath\n"
+        "tcsh: viewer completion tcsh > a file that ~/.tcshrc sources"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print the script."""
+    import shtab
+
+    print(shtab.complete(command_line(), arguments.shell))
+    return 0
+
+
+def command_line() -> argparse.ArgumentParser:
+    """Return the whole command line as one parser, with what is completed by names of files."""
+    import shtab
+
+    whole = Parser(prog="viewer", description="See, check and produce skinned characters.")
+    whole.add_argument("--version", action="store_true", help="print the version")
+    commands: Any = whole.add_subparsers(dest="command", parser_class=Parser)
+    for name, text in COMMANDS.items():
+        parser = commands.add_parser(name, help=text, description=text)
+        import_module(f"viewer.commands.{name}").add_arguments(parser)
+        for action in parser._actions:  # it has no public name
+            if _names_a_file(action):
+                action.complete = shtab.FILE
+    return whole
+
+
+def _names_a_file(action: argparse.Action) -> bool:
+    """Return whether the value of an argument is a file or folder."""
+    if action.choices is not None or action.nargs == 0:
+        return False
+    metavar = str(action.metavar or "")
+    return not action.option_strings or metavar.startswith(("FILE", "FOLDER", "FIGURE", "OTHER"))

@@ -1,0 +1,105 @@
+"""Instances of a cube: the corners, colour and matrix of each box."""
+
+from __future__ import annotations
+
+import colorsys
+from typing import Any
+
+import moderngl
+import numpy as np
+
+from viewer.rendering.gpu.ownership import Owner
+from viewer.rendering.gpu.upload import buffer, matrix_texture, write_matrices
+from viewer.rendering.gpu.vertex_arrays import VertexArrays
+from viewer.rig.arrays import Bools, Floats
+from viewer.rig.mesh import bounding_box
+
+__all__ = ["BoxBuffers", "joint_colors"]
+
+_GOLDEN = 0.618033988749895
+_MANY = 1000  # boxes from which on it pays to look for coincident ones
+
+
+def joint_colors(n_joints: int) -> Floats:
+    """Return a colour for each joint: hues a golden ratio apart, so neighbours differ.
+
+    Returns
+    -------
+    (J, 3)
+        Linear.
+    """
+    hues = 0.58 + _GOLDEN * np.arange(n_joints)
+    return np.array([colorsys.hsv_to_rgb(hue % 1.0, 0.42, 0.72) for hue in hues])
+
+
+class BoxBuffers:
+    """Boxes on the GPU, each moved by a matrix of its own.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        The context in use.
+    cube : moderngl.Buffer
+        Corners and normals of a cube from 0 to 1, shared by all boxes.
+    boxes : (N, 2, 3)
+        Lower and upper corner of each.
+
+    Attributes
+    ----------
+    count : int
+        Number of boxes, N.
+    world : moderngl.Texture
+        The matrices, relative to ``center``.
+    center : (3,)
+        Figure space; it is part of the model matrix.
+    """
+
+    def __init__(self, context: moderngl.Context, cube: moderngl.Buffer, boxes: Floats) -> None:
+        self.count, self._boxes = len(boxes), boxes
+        self.center: Floats = np.zeros(3)
+        self._cube = cube
+        self._owner = Owner()
+        with self._owner.guard():
+            keep = self._owner.keep
+            self._low = keep(buffer(context, boxes[:, 0], "f4"))
+            self._high = keep(buffer(context, boxes[:, 1], "f4"))
+            self._colors = keep(buffer(context, joint_colors(self.count), "f4"))
+            self.world = keep(matrix_texture(context, self.count))
+        self._arrays = self._owner.keep(VertexArrays(context))
+
+    def move(self, matrices: Floats) -> None:
+        """Upload the boxes' matrices, (N, 4, 4) box to figure space; they are changed."""
+        self.center = bounding_box(matrices[:, :3, 3]).mean(axis=0)
+        matrices[:, :3, 3] -= self.center
+        if self.count > _MANY:
+            matrices[self._hidden(matrices)] = 0.0
+        write_matrices(self.world, matrices)
+
+    def _hidden(self, matrices: Floats) -> Bools:
+        """Return which boxes coincide with another; shrunk to a point, they cost nothing.
+
+        A hundred thousand boxes over one another would take minutes to draw in software.
+        """
+        rows = np.concatenate([matrices[:, :3].reshape(-1, 12), self._boxes.reshape(-1, 6)], axis=1)
+        _, first = np.unique(rows.astype(np.float32), axis=0, return_index=True)
+        hidden = np.ones(len(rows), dtype=bool)
+        hidden[first] = False
+        return hidden
+
+    def array(self, program: moderngl.Program) -> moderngl.VertexArray:
+        """Return the instanced boxes for a program, with what its compiler kept."""
+
+        def content() -> list[Any]:
+            found: list[Any] = [(self._cube, "3f4 12x", "in_corner")]
+            if "in_normal" in program:
+                found = [(self._cube, "3f4 3f4", "in_corner", "in_normal")]
+            found += [(self._low, "3f4/i", "in_low"), (self._high, "3f4/i", "in_high")]
+            if "in_color" in program:
+                found.append((self._colors, "3f4/i", "in_color"))
+            return found
+
+        return self._arrays.get(program, content)
+
+    def release(self) -> None:
+        """Free every buffer."""
+        self._owner.release()

@@ -1,0 +1,37 @@
+"""Conversion between linear light and sRGB (IEC 61966-2-1)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.rendering.options import Color
+from viewer.rig.arrays import Floats
+
+__all__ = ["decode_color", "decode_srgb", "encode_color", "encode_srgb"]
+
+
+def encode_srgb(linear: Floats) -> Floats:
+    """Return linear light as sRGB, 0 to 1, cut to what screens show."""
+    linear = np.clip(linear, 0.0, 1.0)
+    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+
+
+def decode_srgb(colors: Floats) -> Floats:
+    """Return sRGB, 0 to 1, as linear light."""
+    return np.where(colors <= 0.04045, colors / 12.92, ((colors + 0.055) / 1.055) ** 2.4)
+
+
+def encode_color(color: Color) -> Color:
+    """Return a scene's colour as screens and colour pickers show it.
+
+    >>> [round(part, 3) for part in encode_color((0.0, 0.001, 0.214))]
+    [0.0, 0.013, 0.5]
+    """
+    r, g, b = encode_srgb(np.array(color)).tolist()
+    return r, g, b
+
+
+def decode_color(color: Color) -> Color:
+    """Return the colour of a colour picker as scenes hold it."""
+    r, g, b = decode_srgb(np.array(color)).tolist()
+    return r, g, b

@@ -1,0 +1,101 @@
+"""Captured points at a fixed rate: one person's frames, ready for an exporter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.rig.arrays import Bools, Floats
+from viewer.rig.captures.points import PointClip, PointLayout, sample_points
+from viewer.rig.motion.sampled_animation import frame_range
+from viewer.rig.motion.upright import own_up
+from viewer.rig.scene import Actor, Scene
+
+__all__ = ["SampledPoints", "sample_upright_points"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SampledPoints:
+    """Captured points at a fixed rate.
+
+    Attributes
+    ----------
+    name : str
+        What the actor is called.
+    layout : PointLayout
+        Names and limbs of the K points.
+    frame_rate : float
+        Frames a second.
+    first_frame : int
+        What the first frame is called.
+    times : (F,)
+        Seconds.
+    present : (F,) bool
+        Whether the person is there at all.
+    points : (F, K, 3)
+        The unit of the capture; NaN where a point is not seen.
+    confidences : (F, K)
+        0 where a point is not seen.
+    """
+
+    name: str
+    layout: PointLayout
+    frame_rate: float
+    first_frame: int
+    times: Floats
+    present: Bools
+    points: Floats
+    confidences: Floats
+
+
+def sample_upright_points(
+    scene: Scene,
+    actor: Actor,
+    rate: float | None = None,
+    frames: tuple[int, int | None] | None = None,
+    fill: bool = False,
+) -> tuple[SampledPoints, Literal["y", "z"]]:
+    """Sample an actor's points, rotated upright where their own world is upside down.
+
+    Parameters
+    ----------
+    scene : Scene
+        Says what is up.
+    actor : Actor
+        Captured points; where it stands in the scene is left out.
+    rate, frames, fill
+        As for ``viewer.rig.motion.sampled_animation.sample_animation``.
+
+    Returns
+    -------
+    animation : SampledPoints
+        Its frames.
+    up : "y" or "z"
+        The axis that points up in them.
+
+    Raises
+    ------
+    RigError
+        If the actor has no motion of points, or no frame in that range.
+    """
+    motion, layout = actor.clip, actor.figure.points
+    if not isinstance(motion, PointClip) or layout is None:
+        raise RigError(f"{actor.name} has no motion of points")
+    own = motion.timing.frame_rate
+    rate = own if rate is None else rate
+    first, stop = frame_range(motion, rate, frames)
+    times: Floats = motion.start + np.arange(first, stop) / rate
+    sampled = [sample_points(motion, float(time), fill) for time in times]
+    nothing = np.zeros((len(layout.names), 4))
+    rows = np.stack([nothing if row is None else row for row in sampled])
+    up, hangs = own_up(scene, actor)
+    places, confidences = rows[..., :3], rows[..., 3]
+    if hangs:
+        places = places * np.array([1.0, -1.0, -1.0])
+    places = np.where(confidences[..., None] > 0.0, places, np.nan)
+    present = np.array([row is not None for row in sampled], dtype=np.bool_)
+    start = first + (motion.timing.first_frame if rate == own else 0)
+    return SampledPoints(actor.name, layout, rate, start, times, present, places, confidences), up

@@ -1,0 +1,179 @@
+"""Sampled animations: an actor's poses at a fixed rate, ready for an exporter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.rig.arrays import Floats
+from viewer.rig.captures.points import PointClip
+from viewer.rig.figure import Figure
+from viewer.rig.geometry.quaternion import multiply
+from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.evaluation import (
+    DEFAULT_RATE,
+    Frames,
+    frame_rate,
+    frames_of,
+    rest_translations_of,
+)
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.upright import own_up
+from viewer.rig.pose import Pose
+from viewer.rig.scene import Actor, Motion, Scene
+
+__all__ = ["SampledAnimation", "frame_range", "frames_at", "sample_animation", "upright_animation"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SampledAnimation:
+    """A figure in many poses.
+
+    Attributes
+    ----------
+    name : str
+        What the actor is called.
+    figure : Figure
+        Unshaped; ``frames`` holds the shape.
+    frame_rate : float
+        Frames a second.
+    first_frame : int
+        What the first frame is called.
+    frames : Frames
+        Poses, in time order; gaps are in ``frames.present``.
+    motion : Clip or SampledClip
+        What the frames were sampled from.
+    base : Pose or None
+        Gives what the motion leaves alone.
+    is_rotated : bool
+        Whether the frames are rotated upright, see ``upright_animation``; the motion never is.
+    """
+
+    name: str
+    figure: Figure
+    frame_rate: float
+    first_frame: int
+    frames: Frames
+    motion: Clip | SampledClip
+    base: Pose | None = None
+    is_rotated: bool = False
+
+
+def sample_animation(
+    actor: Actor,
+    rate: float | None = None,
+    frames: tuple[int, int | None] | None = None,
+    fill: bool = False,
+) -> SampledAnimation:
+    """Sample an actor's clip at a fixed rate.
+
+    Parameters
+    ----------
+    actor : Actor
+        With a clip.
+    rate : float, optional
+        Frames a second; the clip's own if omitted, so that captured frames come back exactly.
+    frames : (int, int), optional
+        First frame and the one behind the last (None: the clip's end), counted from the clip's
+        start at that rate; all if omitted.
+    fill : bool
+        Bridge gaps: rotations on the shorter arc.
+
+    Raises
+    ------
+    RigError
+        If there is no clip, or no frame in that range.
+    """
+    motion, figure = actor.clip, actor.figure
+    if not isinstance(motion, Clip | SampledClip) or figure.skeleton is None:
+        raise RigError(f"{actor.name} has no motion of joints")
+    own = frame_rate(motion) if isinstance(motion, SampledClip) else DEFAULT_RATE
+    rate = own if rate is None else rate
+    first, stop = frame_range(motion, rate, frames)
+    times: Floats = motion.start + np.arange(first, stop) / rate
+    shift = motion.timing.first_frame if isinstance(motion, SampledClip) and rate == own else 0
+    sampled = frames_of(figure, motion, times, actor.pose, fill)
+    base = None if actor.pose is None else actor.pose.copy()
+    return SampledAnimation(actor.name, figure, rate, first + shift, sampled, motion, base)
+
+
+def frames_at(animation: SampledAnimation, times: Floats) -> Frames:
+    """Sample an animation's motion at any times, rotated upright if its frames are: (T,) s."""
+    found = frames_of(animation.figure, animation.motion, times, animation.base)
+    return _rotated_upright(animation.figure, found) if animation.is_rotated else found
+
+
+def frame_range(
+    motion: Motion, rate: float, frames: tuple[int, int | None] | None
+) -> tuple[int, int]:
+    """Return the first frame and the one behind the last; arguments as for ``sample_animation``.
+
+    Raises
+    ------
+    RigError
+        If no frame is in that range.
+    """
+    count = int(np.floor((motion.end - motion.start) * rate + 1e-6)) + 1
+    first, asked = (0, None) if frames is None else frames
+    stop = count if asked is None else asked
+    if isinstance(motion, SampledClip | PointClip):
+        stop = min(stop, count)  # curves go on behind their keys, captures do not
+    if not 0 <= first < stop:
+        found = f"{first} to {'the end' if asked is None else asked}"
+        raise RigError(f"frames: expected a range within 0 to {count}, found {found}")
+    return first, stop
+
+
+def upright_animation(
+    scene: Scene,
+    actor: Actor,
+    rate: float | None = None,
+    frames: tuple[int, int | None] | None = None,
+    fill: bool = False,
+    keeps_world: bool = False,
+) -> tuple[SampledAnimation, str]:
+    """Sample an actor's clip, rotated upright where its own world is upside down.
+
+    Parameters
+    ----------
+    scene : Scene
+        Says what is up.
+    actor, rate, frames, fill
+        As for ``sample_animation``. Where the actor stands in the scene is left out.
+    keeps_world : bool
+        Leave it as its own world has it, for formats that keep a capture's numbers.
+
+    Returns
+    -------
+    animation : SampledAnimation
+        Its frames.
+    up : "y", "z", "-y" or "-z"
+        The axis that points up in them; the last two only in a world that is kept.
+    """
+    animation = sample_animation(actor, rate, frames, fill)
+    up, hangs = own_up(scene, actor)
+    if not hangs:
+        return animation, up
+    if keeps_world:
+        return animation, f"-{up}"
+    return replace(
+        animation, frames=_rotated_upright(animation.figure, animation.frames), is_rotated=True
+    ), up
+
+
+def _rotated_upright(figure: Figure, frames: Frames) -> Frames:
+    """Return the frames rotated by 180 degrees about x: the root, and the way to it.
+
+    With the root joint at p = s (rest + t) + T in the figure, R' = Q R and T' = Q p - s (rest + t).
+    """
+    half = np.array([1.0, 0.0, 0.0, 0.0])
+    rotations = frames.rotations.copy()
+    assert figure.skeleton is not None  # whoever has an animation has a skeleton
+    roots = np.flatnonzero(figure.skeleton.parents < 0)
+    rotations[:, roots] = multiply(half, rotations[:, roots])
+    rest = rest_translations_of(figure, frames.shape_weights)[:, 0]
+    inner = frames.figure_scales[:, None] * (rest + frames.translations[:, 0])
+    place = (inner + frames.figure_translations) * np.array([1.0, -1.0, -1.0]) - inner
+    return replace(frames, rotations=rotations, figure_translations=place)

@@ -1,0 +1,135 @@
+"""Sampled animations of one frame: an actor's current pose, for formats that hold motions."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.rig.figure import Figure
+from viewer.rig.geometry.rotation import matrix_to_quaternion
+from viewer.rig.motion.clip import Clip, is_course_rig
+from viewer.rig.motion.clip_edit import clip_from_pose
+from viewer.rig.motion.evaluation import DEFAULT_RATE, Frames
+from viewer.rig.motion.sampled_animation import SampledAnimation
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.timing import Timing
+from viewer.rig.motion.upright import own_up, upright_actor
+from viewer.rig.pose import Pose, joint_rotations, local_matrices
+from viewer.rig.scene import Actor, Scene
+
+__all__ = ["pose_frames", "single_frame", "upright_single_frame"]
+
+
+def single_frame(
+    actor: Actor, rate: float = DEFAULT_RATE, number: int = 0, time: float = 0.0
+) -> SampledAnimation:
+    """Return an actor's current pose as an animation of one frame.
+
+    Parameters
+    ----------
+    actor : Actor
+        With joints; whoever is not present has a frame that is missing.
+    rate : float
+        Frames a second that the animation says.
+    number : int
+        What the frame is called.
+    time : float
+        Seconds of the frame.
+
+    Returns
+    -------
+    SampledAnimation
+        Its ``motion`` holds the frame too: of rigs that move by keys a key for each DOF.
+
+    Raises
+    ------
+    RigError
+        If there are no joints.
+    """
+    figure, pose = actor.figure, actor.pose
+    if figure.skeleton is None or pose is None:
+        raise RigError(f"figure {figure.name} has no joints to pose")
+    figure, frames = pose_frames(figure, pose, actor.is_present, time)
+    skeleton = figure.skeleton
+    assert skeleton is not None  # as above
+    if is_course_rig(skeleton) and not isinstance(actor.clip, SampledClip):
+        motion: Clip | SampledClip = clip_from_pose(skeleton, pose, actor.name, time, time)
+    else:
+        motion = SampledClip(
+            actor.name,
+            Timing(rate, np.zeros(1, dtype=np.int32), first_frame=number, start=time),
+            frames.rotations,
+            frames.translations,
+            frames.figure_translations,
+            frames.figure_scales,
+            frames.shape_weights,
+        )
+    return SampledAnimation(actor.name, figure, rate, number, frames, motion)
+
+
+def upright_single_frame(
+    scene: Scene,
+    actor: Actor,
+    rate: float = DEFAULT_RATE,
+    number: int = 0,
+    time: float = 0.0,
+    keeps_world: bool = False,
+) -> tuple[SampledAnimation, str]:
+    """Return an actor's current pose, rotated upright where its own world is upside down.
+
+    Parameters
+    ----------
+    scene : Scene
+        Says what is up.
+    actor, rate, number, time
+        As for ``single_frame``. Where the actor stands in the scene is left out.
+    keeps_world : bool
+        Leave it as its own world has it, as ``upright_animation`` does.
+
+    Returns
+    -------
+    animation : SampledAnimation
+        One frame.
+    up : "y", "z", "-y" or "-z"
+        The axis that points up in it; below only in worlds that are kept.
+    """
+    up, hangs = own_up(scene, actor)
+    if keeps_world or not hangs:
+        return single_frame(actor, rate, number, time), f"-{up}" if hangs else up
+    standing = replace(upright_actor(scene, actor), figure=actor.figure)
+    return single_frame(standing, rate, number, time), up
+
+
+def pose_frames(
+    figure: Figure, pose: Pose | None, is_present: bool = True, time: float = 0.0
+) -> tuple[Figure, Frames]:
+    """Return one pose as frames, and the figure that these move.
+
+    Parameters
+    ----------
+    figure : Figure
+        With a skeleton or, as a whole, without.
+    pose : Pose or None
+        Its pose; None leaves a figure without a skeleton where it is.
+    is_present : bool
+        Whether the frame is there.
+    time : float
+        Seconds of the frame.
+    """
+    skeleton, weights = figure.skeleton, np.zeros((1, figure.n_shapes))
+    place, scale = np.zeros((1, 3)), np.ones(1)
+    turned, moved = np.zeros((1, 0, 4)), np.zeros((1, 0, 3))
+    if pose is not None:
+        weights[0, : len(pose.shape_weights)] = pose.shape_weights  # missing ones count as 0
+        place, scale = pose.figure_translation[None].copy(), np.array([pose.figure_scale])
+    if pose is not None and skeleton is not None:
+        if (pose.scales != skeleton.rest_scales).any():
+            # Frames know no scales of joints: the skeleton says them.
+            skeleton = replace(skeleton, rest_scales=pose.scales)
+            figure = replace(figure, skeleton=skeleton)
+        moved = (local_matrices(skeleton, pose)[:, :3, 3] - skeleton.rest_translations)[None]
+        turned = matrix_to_quaternion(joint_rotations(skeleton, pose))[None]
+    present, times = np.array([is_present]), np.array([time])
+    return figure, Frames(times, present, turned, moved, weights, place, scale)
