@@ -1,7 +1,8 @@
 # Two commands for a fresh machine with python3 and make:
 #   make run    open the bundled figure (without a display: write its picture here)
 #   make test   run all tests
-# Others: make lint, make bench, make golden, make manual, make figure, make clean.
+#   make quick  run those that neither draw nor start programs, in less than a minute
+# Others: make lint, make bench, make golden [NAME...], make manual, make figure, make clean.
 
 PYTHON ?= python3
 VENV ?= .venv
@@ -9,20 +10,34 @@ WORKERS ?= auto
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: run test lint bench golden manual figure system clean
+# One process of tests per core (WORKERS=0 for none), each computing and drawing with one thread: no
+# test waits for the threads of another one. Compiled files spare the next start much time.
+TESTING := PYTHONDONTWRITEBYTECODE= LP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest
+
+# The words after golden are names of pictures, not targets.
+ifeq ($(firstword $(MAKECMDGOALS)),golden)
+PICTURES := $(wordlist 2,$(words $(MAKECMDGOALS)),$(MAKECMDGOALS))
+.PHONY: $(PICTURES)
+$(PICTURES): ; @:
+endif
+
+.PHONY: run test quick lint bench golden manual figure system clean
 
 # A window may open even where pictures cannot be drawn without one: go on either way.
 run: $(READY)
 	@sh .ci/system "$(BIN)/python" || true
 	@$(BIN)/viewer $(FILES)
 
-# One process of tests per core (WORKERS=0 for none), each drawing with one thread: no test waits for
-# the threads of another one's pictures.
 test: $(READY) system
 	@$(BIN)/ruff check viewer tests assets
 	@$(BIN)/ruff format --check viewer tests assets
 	@$(BIN)/mypy
-	@LP_NUM_THREADS=1 $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile $(TESTS)
+	@VIEWER_TEST_BUDGET=300 $(TESTING) -n $(WORKERS) --dist worksteal $(TESTS)
+
+# A test that draws all the same fails: it finds no OpenGL.
+quick: $(READY)
+	@__EGL_VENDOR_LIBRARY_DIRS=/nonexistent DISPLAY= VIEWER_TEST_BUDGET=60 \
+		$(TESTING) -n $(WORKERS) --dist worksteal -m "not slow" $(TESTS)
 
 lint: $(READY)
 	@$(BIN)/ruff check --fix viewer tests assets
@@ -33,7 +48,7 @@ bench: $(READY) system
 	@$(BIN)/python tests/bench/run.py
 
 golden: $(READY) system
-	@VIEWER_UPDATE_GOLDEN=1 $(BIN)/python -m pytest -q tests/rendering tests/app
+	@VIEWER_UPDATE_GOLDEN="$(or $(PICTURES),all)" $(TESTING) -q tests/rendering tests/app
 
 # Writes the reference tables of the manual anew, from the registries.
 manual: $(READY)

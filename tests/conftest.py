@@ -9,13 +9,29 @@ from pathlib import Path
 import moderngl
 import pytest
 from hypothesis import settings
+from run_time import RunTime
 
+pytest_plugins = ["stored_pictures"]
+
+TESTS = Path(__file__).resolve().parent
+DRAWING = ("app", "rendering")  # folders of tests that draw
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 SHARED = SHARED_DATA / "cse169"
 
 # Every run tries the same examples, and takes as long as it takes.
 settings.register_profile("fixed", derandomize=True, deadline=None, database=None)
 settings.load_profile("fixed")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    if not hasattr(config, "workerinput"):  # else a process of its own counts for all
+        config.pluginmanager.register(RunTime())
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if item.path.is_relative_to(TESTS) and item.path.relative_to(TESTS).parts[0] in DRAWING:
+            item.add_marker("slow")
 
 
 @pytest.fixture(scope="session")

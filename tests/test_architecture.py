@@ -12,49 +12,35 @@ ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "viewer"
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 
-# Which parts of the package each part may import.
-ALLOWED = {
-    "rig": {"rig", "errors", "near_names"},
-    "autorig": {"autorig", "rig", "errors", "near_names"},
-    "media": {"media", "rig", "errors", "interrupts", "streams"},
-    "formats": {"formats", "media", "rig", "errors", "interrupts", "near_names", "streams"},
-    "rendering": {"rendering", "rig", "errors", "interrupts", "near_names", "resources"},
-    "export": {
-        "autorig",
-        "export",
-        "formats",
-        "media",
-        "rig",
-        "errors",
-        "interrupts",
-        "near_names",
-    },
-    "loading": {"loading", "formats", "rig", "errors", "near_names", "resources"},
+# Which parts of the package each part may import, beside itself and what every part may.
+EVERYWHERE = {"diagnostics", "errors", "near_names", "phrases"}
+PARTS = {
+    "rig": set(),
+    "autorig": {"rig"},
+    "media": {"rig", "interrupts", "streams"},
+    "formats": {"media", "rig", "interrupts", "streams"},
+    "rendering": {"rig", "interrupts", "resources"},
+    "export": {"autorig", "formats", "media", "rig", "interrupts"},
+    "loading": {"formats", "rig", "resources"},
     "app": {
-        "app",
-        "autorig",
-        "export",
-        "formats",
-        "lint",
-        "loading",
-        "manual",
-        "media",
-        "models",
-        "rendering",
-        "rig",
-        "errors",
-        "interrupts",
-        "near_names",
-        "resources",
+        *("autorig", "export", "formats", "lint", "loading", "manual", "media", "models"),
+        *("rendering", "rig", "interrupts", "resources"),
     },
-    "lint": {"lint", "loading", "formats", "rig", "errors", "near_names"},
-    "manual": {"errors", "near_names", "resources"},
-    "models": {"formats", "errors", "interrupts", "near_names"},
-    "errors": set(),
+    "lint": {"loading", "formats", "rig"},
+    "manual": {"resources"},
+    "models": {"formats", "interrupts"},
     "interrupts": set(),
-    "near_names": {"errors"},
-    "resources": {"errors"},
-    "streams": {"errors"},
+    "resources": set(),
+    "streams": set(),
+}
+LEAVES = {
+    "phrases": set(),
+    "diagnostics": {"phrases"},
+    "errors": {"diagnostics", "phrases"},
+    "near_names": {"phrases"},
+}
+ALLOWED = {name: parts | {name} for name, parts in LEAVES.items()} | {
+    name: parts | EVERYWHERE | {name} for name, parts in PARTS.items()
 }
 # Which folders of the window each of them may import: no feature knows all the others, and the core
 # knows none. Modules that lie in no folder put the window together and may import everything.

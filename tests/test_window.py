@@ -30,7 +30,7 @@ from viewer.rig.scene import scene_points
 ROOT = Path(__file__).resolve().parents[1]
 SHARED = ROOT.parent / "shared" / "data" / "cse169"
 SIZE = (1280, 800)
-PATIENCE = 20.0  # seconds until something that should happen counts as missing
+PATIENCE = 60.0  # seconds until something that should happen counts as missing
 
 
 def _wait_for(condition, what):
@@ -165,7 +165,7 @@ class Window:
     def tell(self, *words, check=True):
         done = subprocess.run(
             ["xdotool", *map(str, words)],
-            env=self.environment, capture_output=True, text=True, timeout=20, check=check,
+            env=self.environment, capture_output=True, text=True, timeout=PATIENCE, check=check,
         )  # fmt: skip
         return done.stdout.strip()
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from viewer.errors import printable
+from viewer.phrases import printable
 
 __all__ = ["did_you_mean", "name_hint", "near_names", "question"]
 

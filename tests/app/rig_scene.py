@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 from autorig.rigged_shapes import arm, mesh_of, turn
 
@@ -52,11 +50,9 @@ def scene(with_template=True, with_clip=False) -> Scene:
     return Scene(actors)
 
 
-def finish(hand, seconds=120.0):
+def finish(hand):
     """Run frames until the thread's work is done and taken over."""
-    end = time.monotonic() + seconds
     while hand.state.job is not None:
-        assert time.monotonic() < end
+        hand.state.job.wait()
         hand.step()
-        time.sleep(0.1)
     hand.step(3)

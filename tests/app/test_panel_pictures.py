@@ -1,16 +1,16 @@
 """Golden pictures of the interface, compared coarsely: letters differ between machines.
 
-VIEWER_UPDATE_GOLDEN=1 draws them anew; look at them before they are committed.
+``make golden NAME…`` draws them anew; look at them before they are committed.
 """
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image, ImageFilter
+from stored_pictures import GOLDEN, is_redrawn
 
 from viewer.app.files.state import Files
 from viewer.app.linting.actions import check_rig
@@ -19,7 +19,6 @@ from viewer.app.posing.state import Posing
 from viewer.app.shown_panels import ShownPanels
 from viewer.app.weights.actions import pin_vertex
 
-GOLDEN = Path(__file__).resolve().parents[1] / "golden"
 SIZE = (560, 420)
 BODY_SIZE = (760, 680)
 MOST_MEAN, MOST_LOCAL = 3.0, 40.0  # of 255, after blurring away letters and hinting
@@ -143,11 +142,13 @@ def _shown(hand, prepare):
     return hand.screen()
 
 
+@pytest.mark.golden("app_{name}")
 @pytest.mark.parametrize("name", STATES)
 def test_interface_looks_as_it_did(drive, rig, name):
-    _compare(_shown(drive(*rig, size=SIZE), STATES[name]), name)
+    _compare(_shown(drive(*rig, size=SIZE, samples=4), STATES[name]), name)
 
 
+@pytest.mark.golden("app_{name}")
 @pytest.mark.parametrize("name", BODIES)
 def test_panels_of_bodies_look_as_they_did(drive_body, name):
     kind, prepare = BODIES[name]
@@ -159,16 +160,16 @@ def test_panels_of_bodies_look_as_they_did(drive_body, name):
 
 def _compare(pixels, name):
     path = GOLDEN / f"app_{name}.png"
-    if os.environ.get("VIEWER_UPDATE_GOLDEN") == "1":
+    if is_redrawn(path.stem):
         Image.fromarray(pixels).save(path)
-    assert path.is_file(), f"{path} is missing: VIEWER_UPDATE_GOLDEN=1 draws it"
+    assert path.is_file(), f"{path} is missing: make golden {path.stem} draws it"
     with Image.open(path) as golden:
         wanted = np.array(golden.convert("RGB"))
     assert _is_like(pixels, wanted), _difference(pixels, wanted)
 
 
 def test_comparison_tells_states_apart(drive, rig):
-    hand = drive(*rig, size=SIZE)
+    hand = drive(*rig, size=SIZE, samples=4)
     start = _shown(hand, _nothing)
     hand.state.of(ShownPanels).closed.add("stats")
     without_panel = hand.screen()

@@ -7,9 +7,14 @@ from __future__ import annotations
 
 import copy
 
+import numpy as np
 import pytest
 from app.curves.test_curves_panel import clip_text
+from app.posing_rigs import around, joint_seen
 
+from viewer.app.core.view_frame import view_frame
+from viewer.app.posing.gizmo import handle_at
+from viewer.app.posing.rotate_tool import RADIUS
 from viewer.app.posing.state import Posing
 
 
@@ -113,14 +118,7 @@ def test_handle_of_a_joint_turns_from_the_press(hand, spread):
 
 def _ring(hand):
     """Return a place on a ring of the tool Rotate."""
-    from viewer.app.core.view_frame import view_frame
-    from viewer.app.posing.gizmo import handle_at
-
-    x, y, width, height = map(round, hand.state.view_rect)
     frame = view_frame(hand.state)
-    return next(
-        (float(across), float(down))
-        for down in range(y + 60, y + height - 60, 3)
-        for across in range(x, x + width, 3)
-        if handle_at(hand.state, frame, (across, down)) is not None
-    )
+    center = joint_seen(hand, hand.state.selected_joint)
+    places = around(center, RADIUS, 0.0, 2.0 * np.pi, 36)
+    return next(place for place in places if handle_at(hand.state, frame, place) is not None)

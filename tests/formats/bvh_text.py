@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from faults import Fault, warnings_of
+
 from viewer.formats import Source, bvh
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 
@@ -42,14 +44,13 @@ Frame Time: 0.0333333
 """
 
 
-def read(text: str | bytes) -> tuple[SkeletonMotion, list[str]]:
-    """Read a text; return also what was noticed and guessed, without the path."""
+def read(text: str | bytes) -> tuple[SkeletonMotion, list[Fault | str]]:
+    """Read a text; return also its warnings as (key, line, values), and what was guessed."""
     data = text if isinstance(text, bytes) else text.encode()
     source = Source("a.bvh", data)
     motion = bvh.read(source)
-    warnings = [line.removeprefix("a.bvh:").strip() for line in source.warnings]
     guesses = [motion.unit_note] * bool(motion.unit_note)
-    return motion, [*warnings, *guesses, *motion.up_notes]
+    return motion, [*warnings_of(source.diagnostics), *guesses, *motion.up_notes]
 
 
 def one_joint(channels: str, frames: str, extra: str = "") -> str:

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+from faults import Fault, fault_of, warnings_of
 
 from viewer.formats import Source
 from viewer.formats.easymocap import open_capture
@@ -55,7 +56,15 @@ def opened(path: Path, **options):
     """Return a capture, its parts, and the warnings of the source."""
     source = Source.open(path)
     capture = open_capture(source, **options)
-    return capture, list(capture.parts()), source.warnings
+    return capture, list(capture.parts()), warnings_of(source.diagnostics)
+
+
+def noticed(parts: list, path: Path | None = None) -> list[Fault]:
+    """Return what was noticed in parts, all of it in one file if a path is given."""
+    found = [one for part in parts for one in part.warnings]
+    assert all(str(one).isprintable() for one in found)
+    assert path is None or all(one.path == path for one in found)
+    return [fault_of(one) for one in found]
 
 
 def rows_of(parts: list, person: int) -> list[int]:

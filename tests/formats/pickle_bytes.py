@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from faults import Fault, fault_of
 from numpy.typing import NDArray
 
 from viewer.errors import FormatError
@@ -26,18 +27,17 @@ def opened(data: bytes) -> Archive:
     return open_archive(Source(PATH, data))
 
 
-def refusal(data: bytes) -> str:
-    """The one line that bytes are refused with, less the name of the file."""
+def refusal(data: bytes) -> Fault:
+    """What bytes are refused with, of the file that it names."""
     with pytest.raises(FormatError) as caught:
         archive = opened(data)
         for key in archive.keys:
             value = archive.get(key)
             if isinstance(value, Deferred):
                 value.values()
-    line = str(caught.value)
-    assert "\n" not in line
-    assert line.startswith("model.pkl: ")
-    return line.removeprefix("model.pkl: ")
+    assert "\n" not in str(caught.value)
+    assert str(caught.value).startswith("model.pkl: ")
+    return fault_of(caught.value.diagnostic)
 
 
 def text(words: str) -> bytes:

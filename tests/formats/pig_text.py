@@ -12,6 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from faults import fault_of, warnings_of
 from numpy.testing import assert_array_equal
 
 import viewer
@@ -49,9 +50,9 @@ def write(folder, files=GOOD, **changes):
 
 
 def read(path):
-    """Return the figure and the warnings of a folder or archive."""
+    """Return the figure and the warnings of a folder or archive, these as data."""
     source = Source.open(path)
-    return pig.read(source), source.warnings
+    return pig.read(source), warnings_of(source.diagnostics)
 
 
 def silent(path):
@@ -61,13 +62,13 @@ def silent(path):
 
 
 def refusal(path):
-    """Return the one line that a model is refused with, less the name of its folder."""
+    """Return the file of a model that is refused, and why: its name, key, line and values."""
     with pytest.raises((FormatError, RigError)) as caught:
         viewer.load(path)
     assert caught.value.exit_code == 2
-    line = str(caught.value)
-    assert line.isprintable()
-    return line.replace(f"{path.parent}/", "")
+    assert str(caught.value).isprintable()
+    found = caught.value.diagnostic
+    return (found.path.relative_to(path.parent).as_posix(), *fault_of(found))
 
 
 def arrays(*, dense=True):

@@ -1,8 +1,10 @@
 """A good ``.skel`` text to bend and break, and how the tests read it."""
 
 import math
+from pathlib import Path
 
 import pytest
+from faults import fault_of, warnings_of
 
 from viewer.errors import FormatError
 from viewer.formats import Source, skel
@@ -25,9 +27,9 @@ GOOD = """balljoint root {
 
 
 def read(text):
-    """Return the skeleton and the warnings of a text."""
+    """Return the skeleton of a text, and its warnings as (key, line, values)."""
     source = Source("a.skel", text if isinstance(text, bytes) else text.encode())
-    return skel.read(source).skeleton, source.warnings
+    return skel.read(source).skeleton, warnings_of(source.diagnostics)
 
 
 def silent(text):
@@ -40,7 +42,8 @@ def refusal(text):
     with pytest.raises(FormatError) as caught:
         read(text)
     assert caught.value.exit_code == 2
-    return str(caught.value)
+    assert caught.value.path == Path("a.skel")
+    return fault_of(caught.value.diagnostic)
 
 
 def assert_good(skeleton):

@@ -5,8 +5,10 @@ import pickle
 import numpy as np
 import pytest
 from capture_files import waves
+from faults import NAN, fault_of, warnings_of
 from numpy.testing import assert_allclose, assert_array_equal
 
+from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
 from viewer.formats import Source, amass, detect, read
 from viewer.rig.motion.body_motion import BodyMotion
@@ -14,7 +16,7 @@ from viewer.rig.posing.pose_record import PoseRecord
 from viewer.rig.smpl_family import FAMILY
 
 SMPLH, SMPLX, SMPL = FAMILY[52].names, FAMILY[55].names, FAMILY[24].names
-NO_RATE = "no frame rate in it: 30 frames a second, as is usual"
+NO_RATE = ("F007.motion-no-rate", None, {"rate": 30.0})
 
 
 def saved(path, **arrays):
@@ -40,13 +42,15 @@ def motion_of(path):
     source = Source.open(path)
     motion = read(source)
     assert isinstance(motion, BodyMotion)
-    return motion, [text.removeprefix(f"{path}: ") for text in source.warnings]
+    assert all(found.path == path for found in source.diagnostics)
+    return motion, warnings_of(source.diagnostics)
 
 
 def refusal(path):
     with pytest.raises(FormatError) as caught:
         amass.read(Source.open(path))
-    return str(caught.value).removeprefix(f"{path}: ")
+    assert caught.value.path == path
+    return fault_of(caught.value.diagnostic)
 
 
 def test_first_release(tmp_path):
@@ -91,7 +95,7 @@ def test_differing_frame_rates_are_noticed(tmp_path):
     motion, warnings = motion_of(path)
     assert motion.timing.frame_rate == 120.0
     assert warnings == [
-        "frame rates that differ (mocap_framerate 120, mocap_frame_rate 60): the first is taken"
+        ("F007.motion-rates", None, {"rates": ["mocap_framerate 120", "mocap_frame_rate 60"]})
     ]
 
 
@@ -99,7 +103,7 @@ def test_soft_tissue_is_counted(tmp_path):
     dmpls = np.zeros((4, 8))
     dmpls[1:3, 2] = 0.5
     path = saved(tmp_path / "a.npz", **first_release(dmpls=dmpls))
-    assert motion_of(path)[1] == ["dmpls, the soft tissue of 2 frames, are left out"]
+    assert motion_of(path)[1] == [("F007.motion-tissue", None, {"n": 2})]
 
 
 def test_second_release(tmp_path):
@@ -163,9 +167,7 @@ def test_hand_angles_are_joints_and_never_get_the_mean(tmp_path):
     path = saved(tmp_path / "a.npz", **parts, transl=waves(2, 3), fps=np.array(25))
     motion, warnings = motion_of(path)
     assert motion.joint_names == (*SMPL[:22], *SMPLX[40:])
-    assert warnings == [
-        "right_hand_pose: angles are taken as they are; the mean hand is not added to them"
-    ]
+    assert warnings == [("F007.motion-angles", None, {"item": "right_hand_pose"})]
 
 
 def test_expressions_of_speech(tmp_path):
@@ -192,7 +194,7 @@ def test_dance_in_a_pickle(tmp_path):
     motion, warnings = motion_of(path)
     assert (motion.joint_names, motion.up, motion.timing.frame_rate) == (SMPL, "y", 60.0)
     assert_allclose(motion.translations, waves(3, 3), rtol=0, atol=1e-15)  # one rounding of 93 x
-    assert warnings == ["no frame rate in it: 60 frames a second, as AIST++ has"]
+    assert warnings == [("F007.motion-aist-rate", None, {"rate": 60.0})]
 
 
 @pytest.mark.parametrize(
@@ -203,7 +205,7 @@ def test_poses_alone_are_a_motion_if_there_are_several(tmp_path, shape, names):
     path = saved(tmp_path / "a.npz", poses=waves(*shape))
     motion, warnings = motion_of(path)
     assert (motion.joint_names, motion.n_rows, motion.up) == (names, 2, "")
-    assert warnings == [NO_RATE, "no trans in it: the body stays in its place"]
+    assert warnings == [NO_RATE, ("F007.motion-place", None, {})]
 
 
 @pytest.mark.parametrize(
@@ -250,7 +252,9 @@ def test_no_frames_are_refused(tmp_path, arrays, key):
     path = saved(tmp_path / "a.npz", **arrays)
     with pytest.raises(FormatError) as caught:
         read(Source.open(path))
-    assert str(caught.value) == f"{path}: {key}: expected frames, found none"
+    assert caught.value.path == path
+    fault = ("F002.motion-no-frames", None, {"item": key})
+    assert fault_of(caught.value.diagnostic) == fault
 
 
 # The same thing twice
@@ -259,14 +263,20 @@ def test_no_frames_are_refused(tmp_path, arrays, key):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"root_orient": waves(4, 3, seed=9)}, "poses and root_orient differ: poses is taken"),
+        ({"root_orient": waves(4, 3, seed=9)}, ("F007.motion-differ", None, {"first": "poses",
+         "others": ["root_orient"]})),
         ({"pose_body": waves(4, 63, seed=9), "pose_hand": waves(4, 90, seed=9)},
-         "poses and pose_body, pose_hand differ: poses is taken"),
-        ({"root_orient": waves(4, 156)[:3, :3]}, "poses and root_orient differ: poses is taken"),
-        ({"root_orient": np.array("none")}, "poses and root_orient differ: poses is taken"),
-        ({"fullpose": waves(4, 156, seed=9)}, "poses and fullpose differ: poses is taken"),
-        ({"transl": waves(4, 3)}, "trans and transl differ: trans is taken"),
-        ({"shape": waves(10)}, "betas and shape differ: betas is taken"),
+         ("F007.motion-differ", None, {"first": "poses", "others": ["pose_body", "pose_hand"]})),
+        ({"root_orient": waves(4, 156)[:3, :3]}, ("F007.motion-differ", None, {"first": "poses",
+         "others": ["root_orient"]})),
+        ({"root_orient": np.array("none")}, ("F007.motion-differ", None, {"first": "poses",
+         "others": ["root_orient"]})),
+        ({"fullpose": waves(4, 156, seed=9)}, ("F007.motion-differ", None, {"first": "poses",
+         "others": ["fullpose"]})),
+        ({"transl": waves(4, 3)}, ("F007.motion-differ", None, {"first": "trans",
+         "others": ["transl"]})),
+        ({"shape": waves(10)}, ("F007.motion-differ", None, {"first": "betas",
+         "others": ["shape"]})),
     ],
 )  # fmt: skip
 def test_what_is_there_twice_and_differs_is_said(tmp_path, changes, message):
@@ -296,9 +306,7 @@ def test_parts_of_the_same_joints_are_taken_once(tmp_path):
     motion, warnings = motion_of(path)
     assert motion.joint_names == (*SMPL[:22], "left_eye", "right_eye")
     assert_array_equal(motion.vectors[:, 22:].reshape(3, 6), waves(3, 6))
-    assert warnings == [
-        "leye_pose and the part before it with the same joints differ: leye_pose is left out"
-    ]
+    assert warnings == [("F007.motion-again", None, {"item": "leye_pose"})]
 
 
 def test_marks_of_our_own_files_are_read(tmp_path):
@@ -310,7 +318,7 @@ def test_marks_of_our_own_files_are_read(tmp_path):
 
 def test_unknown_keys_are_named(tmp_path):
     path = saved(tmp_path / "a.npz", **first_release(contact=np.zeros(4)))
-    assert motion_of(path)[1] == ["keys that mean nothing in a motion: contact"]
+    assert motion_of(path)[1] == [("F007.motion-keys", None, {"keys": ["contact"]})]
 
 
 # Broken
@@ -319,31 +327,38 @@ def test_unknown_keys_are_named(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"trans": waves(3, 3)}, "trans: expected 4 frames as in poses, found 3"),
-        ({"trans": waves(4, 2)}, "trans: expected 3 numbers a frame, found 2"),
-        ({"trans": np.full((4, 3), np.nan)},
-         "trans: expected finite numbers, found 12 that are not"),
-        ({"betas": waves(3, 16)}, "betas: expected 4 frames as in poses, found 3"),
-        ({"poses": waves(4, 155)},
-         "poses: expected 66, 72, 156 or 165 numbers a frame, found 155"),
-        ({"poses": np.zeros((0, 156))}, "poses: expected frames, found none"),
-        ({"poses": np.array(["a"])}, "poses: expected an array of numbers, found 1 texts"),
-        ({"mocap_framerate": np.array(0.0)},
-         "mocap_framerate: expected 1e-06 to 1,000,000 frames a second, found 0"),
-        ({"mocap_framerate": np.array(1e-320)},
-         "mocap_framerate: expected 1e-06 to 1,000,000 frames a second, found 9.99989e-321"),
-        ({"mocap_framerate": None, "fps": np.array(1.5e6)},
-         "fps: expected 1e-06 to 1,000,000 frames a second, found 1.5e+06"),
-        ({"smpl_scaling": np.array([1e-320])},
-         "smpl_scaling: expected 1e-06 to 1e+06, found 9.99989e-321"),
-        ({"smpl_scaling": np.array([1e-6]), "trans": np.full((4, 3), 1e38)},
-         "trans: expected numbers up to 3.4e+38, found 1e+44"),
-        ({"mocap_framerate": np.array([30.0, 60.0])},
-         "mocap_framerate: expected one number, found 2"),
-        ({"mocap_framerate": np.array(np.nan)},
-         "mocap_framerate: expected finite numbers, found 1 that are not"),
-        ({"present": np.ones(3)}, "present: expected 4 as in poses, found 3"),
-        ({"smpl_scaling": np.zeros(1)}, "smpl_scaling: expected 1e-06 to 1e+06, found 0"),
+        ({"trans": waves(3, 3)}, ("F002.motion-frames", None, {"item": "trans", "expected": 4,
+         "other": "poses", "found": 3})),
+        ({"trans": waves(4, 2)}, ("F002.motion-width", None, {"item": "trans", "expected": [3],
+         "found": 2})),
+        ({"trans": np.full((4, 3), np.nan)}, ("F003.finite", None, {"item": "trans", "found": NAN,
+         "at": Phrase("row-frame", index=0)})),
+        ({"betas": waves(3, 16)}, ("F002.motion-frames", None, {"item": "betas", "expected": 4,
+         "other": "poses", "found": 3})),
+        ({"poses": waves(4, 155)}, ("F002.motion-width", None, {"item": "poses", "expected": [66,
+         72, 156, 165], "found": 155})),
+        ({"poses": np.zeros((0, 156))}, ("F002.motion-no-frames", None, {"item": "poses"})),
+        ({"poses": np.array(["a"])}, ("F002.value", None, {"item": "poses",
+         "expected": Phrase("wanted-numbers-any"), "found": Phrase("found-texts", shape=(1,))})),
+        ({"mocap_framerate": np.array(0.0)}, ("F002.motion-rate", None,
+         {"item": "mocap_framerate", "low": 1e-06, "high": 1000000.0, "found": 0.0})),
+        ({"mocap_framerate": np.array(1e-320)}, ("F002.motion-rate", None,
+         {"item": "mocap_framerate", "low": 1e-06, "high": 1000000.0, "found": 1e-320})),
+        ({"mocap_framerate": None, "fps": np.array(1.5e6)}, ("F002.motion-rate", None,
+         {"item": "fps", "low": 1e-06, "high": 1000000.0, "found": 1500000.0})),
+        ({"smpl_scaling": np.array([1e-320])}, ("F002.motion-scale", None,
+         {"item": "smpl_scaling", "low": 1e-06, "high": 1000000.0, "found": 1e-320})),
+        ({"smpl_scaling": np.array([1e-6]), "trans": np.full((4, 3), 1e38)}, ("F003.limit", None,
+         {"item": "trans", "found": 1e44, "at": Phrase("element", indices=[0, 0]),
+         "limit": 3.4028234663852886e38})),
+        ({"mocap_framerate": np.array([30.0, 60.0])}, ("F002.motion-single", None,
+         {"item": "mocap_framerate", "found": 2})),
+        ({"mocap_framerate": np.array(np.nan)}, ("F003.finite", None, {"item": "mocap_framerate",
+         "found": NAN, "at": Phrase("element", indices=[0])})),
+        ({"present": np.ones(3)}, ("F002.motion-present", None, {"item": "present", "expected": 4,
+         "other": "poses", "found": 3})),
+        ({"smpl_scaling": np.zeros(1)}, ("F002.motion-scale", None, {"item": "smpl_scaling",
+         "low": 1e-06, "high": 1000000.0, "found": 0.0})),
     ],
 )  # fmt: skip
 def test_mismatched_arrays_are_refused(tmp_path, changes, message):
@@ -353,35 +368,30 @@ def test_mismatched_arrays_are_refused(tmp_path, changes, message):
 @pytest.mark.parametrize(
     ("part", "message"),
     [
-        ({"pose_body": waves(2, 63)}, "pose_body: expected 3 frames as in root_orient, found 2"),
-        ({"pose_body": waves(3, 62)}, "pose_body: expected 63 or 69 numbers a frame, found 62"),
-        ({"pose_hand": waves(3, 12)}, "pose_hand: expected 90 numbers a frame, found 12"),
+        ({"pose_body": waves(2, 63)}, ("F002.motion-frames", None, {"item": "pose_body",
+         "expected": 3, "other": "root_orient", "found": 2})),
+        ({"pose_body": waves(3, 62)}, ("F002.motion-width", None, {"item": "pose_body",
+         "expected": [63, 69], "found": 62})),
+        ({"pose_hand": waves(3, 12)}, ("F002.motion-width", None, {"item": "pose_hand",
+         "expected": [90], "found": 12})),
     ],
-)
+)  # fmt: skip
 def test_mismatched_parts_are_refused(tmp_path, part, message):
     assert refusal(saved(tmp_path / "a.npz", root_orient=waves(3, 3), **part)) == message
 
 
 def test_shape_of_a_subject_is_no_motion(tmp_path):
     path = saved(tmp_path / "shape.npz", betas=waves(16), gender=np.array("male"))
-    assert refusal(path) == (
-        "expected a motion, found a subject's shape (keys betas, gender): open the *_poses.npz "
-        "files beside it"
-    )
+    assert refusal(path) == (("F002.motion-shape", None, {"keys": ["betas", "gender"]}))
 
 
 def test_first_stage_is_no_motion(tmp_path):
     arrays = {"betas": waves(16), "markers_latent": np.zeros((4, 3)), "gender": np.array("male")}
     path = saved(tmp_path / "female_stagei.npz", **arrays)
     assert detect(Source.open(path)) == "amass"
-    assert refusal(path) == (
-        "expected a motion, found the first stage of a marker fit, which has no poses: open the "
-        "*_stageii.npz files beside it"
-    )
+    assert refusal(path) == (("F002.motion-stage", None, {}))
 
 
 def test_other_archives_are_named_by_their_keys(tmp_path):
     path = saved(tmp_path / "a.npz", pose_body=waves(3, 63))
-    assert refusal(path) == (
-        "expected a motion (poses, or root_orient and pose_body), found the keys pose_body"
-    )
+    assert refusal(path) == (("F002.motion", None, {"keys": ["pose_body"]}))

@@ -9,8 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from faults import Fault, fault_of
 from numpy.testing import assert_array_equal
 
+from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
 from viewer.formats._archive import Archive, Opaque, Sparse
 from viewer.formats._archive_opening import is_archive, open_archive
@@ -37,12 +39,12 @@ def opened(data: bytes, name: str = "x.npz") -> Archive:
     return open_archive(Source(name, data))
 
 
-def refused(action: Any, *arguments: Any) -> str:
+def refused(action: Any, *arguments: Any) -> Fault:
+    """What a call is refused with; of the file that it names."""
     with pytest.raises(FormatError) as caught:
         action(*arguments)
-    line = str(caught.value)
-    assert "\n" not in line
-    return line
+    assert str(caught.value).isprintable() and caught.value.path is not None
+    return fault_of(caught.value.diagnostic)
 
 
 @pytest.mark.parametrize(
@@ -61,7 +63,7 @@ def test_content_decides_not_the_name(data: bytes, kind: str, keys: tuple[str, .
     assert is_archive(data[:64])
     for name in ("x.pkl", "x.npz", "x.txt"):
         archive = opened(data, name)
-        assert (archive.kind, archive.keys, archive.path) == (kind, keys, Path(name))
+        assert (archive.kind, archive.keys, archive.source.path) == (kind, keys, Path(name))
 
 
 @pytest.mark.parametrize("protocol", range(6))
@@ -102,35 +104,30 @@ def test_other_files_are_no_archives(head: bytes) -> None:
 @pytest.mark.parametrize(
     ("data", "found"),
     [
-        (b"", "an empty file"),
-        (b" \n", "only white space"),
-        (
-            b"version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 39\n",
-            "a Git LFS pointer, not the file itself (`git lfs pull` fetches it)",
-        ),
-        (b"<!DOCTYPE html><html>Sign in</html>", "HTML or XML (a failed download?)"),
-        (b"\x1f\x8b\x08\0\0\0", "gzip data"),
-        (b"%PDF-1.7", "a PDF document"),
-        (bytes(1000), "zeros"),
+        (b"", ("F002.archive", None, {"found": "an empty file"})),
+        (b" \n", ("F002.archive", None, {"found": "only white space"})),
+        (b"version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 39\n",
+         ("F002.archive-pointer", None, {})),
+        (b"<!DOCTYPE html><html>Sign in</html>", ("F002.archive", None,
+         {"found": "HTML or XML (a failed download?)"})),
+        (b"\x1f\x8b\x08\0\0\0", ("F002.archive", None, {"found": "gzip data"})),
+        (b"%PDF-1.7", ("F002.archive", None, {"found": "a PDF document"})),
+        (bytes(1000), ("F002.archive", None, {"found": "zeros"})),
     ],
-)
-def test_what_a_file_is_instead(data: bytes, found: str) -> None:
-    line = refused(opened, data, "SMPL_MALE.pkl")
-    assert line == f"SMPL_MALE.pkl: expected a pickle, .npz or .npy file, found {found}"
+)  # fmt: skip
+def test_what_a_file_is_instead(data: bytes, found: Fault) -> None:
+    assert refused(opened, data, "SMPL_MALE.pkl") == found
 
 
 @pytest.mark.parametrize("protocol", [0, 1, 2])
 def test_transfer_in_text_mode_is_named(protocol: int) -> None:
     data = pickle.dumps({"v": np.arange(13.0)}, protocol).replace(b"\n", b"\r\n")
-    assert refused(opened, data, "x.pkl") == (
-        "x.pkl: expected a pickle, found Windows line ends: damaged in transfer, "
-        "download it again in binary mode"
-    )
+    assert refused(opened, data, "x.pkl") == (("F002.pickle-line-ends", None, {}))
 
 
 def test_text_that_is_no_pickle() -> None:
     line = refused(opened, b"positions 4 {\n", "x.pkl")
-    assert line == "x.pkl: expected a pickle, .npz or .npy file, found something else"
+    assert line == ("F002.archive", None, {"found": "something else"})
 
 
 def test_single_array(tmp_path: Path) -> None:
@@ -164,7 +161,11 @@ def test_file_that_is_gone(tmp_path: Path) -> None:
     np.savez(path, v=ROWS)
     source = Source.open(path)
     path.unlink()
-    assert refused(open_archive, source) == f"{path}: cannot be read: No such file or directory"
+    assert refused(open_archive, source) == (
+        "F001.unreadable",
+        None,
+        {"reason": "No such file or directory", "near": ""},
+    )
 
 
 @pytest.mark.parametrize(
@@ -174,43 +175,59 @@ def test_file_that_is_gone(tmp_path: Path) -> None:
         ((4, 3), "biuf", None),
         ((None, 3), "f", None),
         (("V", "C"), "biuf", None),
-        ((4,), "biuf", "expected 4 numbers, found 4 x 3 float64"),
-        ((), "biuf", "expected a single number, found 4 x 3 float64"),
-        (("V", 4), "biuf", "expected V x 4 numbers, found 4 x 3 float64"),
-        (("J", "J"), "biuf", "expected J x J numbers, found 4 x 3 float64"),
-        ((None, 3, None), "biuf", "expected any x 3 x any numbers, found 4 x 3 float64"),
-        (("T", 3), "iu", "expected T x 3 whole numbers, found 4 x 3 float64"),
-        (None, "SU", "expected an array of texts, found 4 x 3 float64"),
-        ((4, 3), "b", "expected 4 x 3 values of kind b, found 4 x 3 float64"),
+        ((4,), "biuf", ("F002.value", None, {"item": "v", "expected": Phrase("wanted-numbers",
+         shape=(4,)), "found": Phrase("found-array", shape=(4, 3), dtype="float64")})),
+        ((), "biuf", ("F002.value", None, {"item": "v",
+         "expected": Phrase("wanted-numbers-single"), "found": Phrase("found-array", shape=(4, 3),
+         dtype="float64")})),
+        (("V", 4), "biuf", ("F002.value", None, {"item": "v", "expected": Phrase("wanted-numbers",
+         shape=("V", 4)), "found": Phrase("found-array", shape=(4, 3), dtype="float64")})),
+        (("J", "J"), "biuf", ("F002.value", None, {"item": "v",
+         "expected": Phrase("wanted-numbers", shape=("J", "J")), "found": Phrase("found-array",
+         shape=(4, 3), dtype="float64")})),
+        ((None, 3, None), "biuf", ("F002.value", None, {"item": "v",
+         "expected": Phrase("wanted-numbers", shape=(None, 3, None)),
+         "found": Phrase("found-array", shape=(4, 3), dtype="float64")})),
+        (("T", 3), "iu", ("F002.value", None, {"item": "v", "expected": Phrase("wanted-whole",
+         shape=("T", 3)), "found": Phrase("found-array", shape=(4, 3), dtype="float64")})),
+        (None, "SU", ("F002.value", None, {"item": "v", "expected": Phrase("wanted-texts-any"),
+         "found": Phrase("found-array", shape=(4, 3), dtype="float64")})),
+        ((4, 3), "b", ("F002.value", None, {"item": "v", "expected": Phrase("wanted-kind",
+         shape=(4, 3), kinds="b"), "found": Phrase("found-array", shape=(4, 3),
+         dtype="float64")})),
     ],
-)
-def test_shape_and_kind_are_checked(shape: Any, kinds: str, message: str | None) -> None:
+)  # fmt: skip
+def test_shape_and_kind_are_checked(shape: Any, kinds: str, message: Fault | None) -> None:
     for archive in (opened(npz(v=ROWS)), opened(pickle.dumps({"v": ROWS}))):
         if message is None:
             assert_array_equal(archive.array("v", shape, kinds).values(), ROWS)
         else:
-            assert refused(archive.array, "v", shape, kinds) == f"x.npz: v: {message}"
+            assert refused(archive.array, "v", shape, kinds) == message
 
 
 @pytest.mark.parametrize(
     ("value", "found"),
     [
-        ("lbs", "'lbs'"),
-        (b"lbs", "3 bytes"),
-        (None, "nothing"),
-        ({"a": 1}, "1 named value"),
-        ([[1, 2], [3]], "a list of 2"),
-        (["a", 1], "a list of 2"),
-        ([ROWS, ROWS], "a list of 2"),
-        ([1 << 70], "a list of 1"),
-        (np.array(["a", "b"]), "2 texts"),
-        (np.array([{}], object), "an unread value (object array)"),
+        ("lbs", Phrase("found-value", value="'lbs'")),
+        (b"lbs", Phrase("found-bytes", n=3)),
+        (None, Phrase("found-nothing")),
+        ({"a": 1}, Phrase("found-named", n=1)),
+        ([[1, 2], [3]], Phrase("found-list", n=2)),
+        (["a", 1], Phrase("found-list", n=2)),
+        ([ROWS, ROWS], Phrase("found-list", n=2)),
+        ([1 << 70], Phrase("found-list", n=1)),
+        (np.array(["a", "b"]), Phrase("found-texts", shape=(2,))),
+        (np.array([{}], object), Phrase("found-unread", what=Phrase("unread-objects"))),
     ],
 )
-def test_what_is_no_array(value: Any, found: str) -> None:
+def test_what_is_no_array(value: Any, found: Phrase) -> None:
     archive = opened(pickle.dumps({"v": value}))
-    assert refused(archive.array, "v") == f"x.npz: v: expected an array of numbers, found {found}"
-    assert refused(archive.sparse, "v") == f"x.npz: v: expected any x any numbers, found {found}"
+    for ask, expected in (
+        (archive.array, Phrase("wanted-numbers-any")),
+        (archive.sparse, Phrase("wanted-numbers", shape=(None, None))),
+    ):
+        values = {"item": "v", "expected": expected, "found": found}
+        assert refused(ask, "v") == ("F002.value", None, values)
 
 
 @pytest.mark.parametrize(
@@ -235,8 +252,8 @@ def test_missing_keys() -> None:
     archive = opened(npz(v=ROWS))
     assert archive.has("v") and not archive.has("w")
     for ask in (archive.get, archive.array, archive.sparse, archive.text):
-        assert refused(ask, "w") == "x.npz: w: expected a value, found no such key"
-    assert refused(archive.get, "a\nb") == r"x.npz: a\nb: expected a value, found no such key"
+        assert refused(ask, "w") == ("F002.no-key", None, {"item": "w"})
+    assert refused(archive.get, "a\nb") == ("F002.no-key", None, {"item": "a\\nb"})
 
 
 def test_matrix_may_be_dense() -> None:
@@ -247,7 +264,15 @@ def test_matrix_may_be_dense() -> None:
     assert (rows.tolist(), columns.tolist()) == ([0, 1, 1], [1, 0, 2])
     assert_array_equal(values, [2.5, 1, np.nan])
     line = refused(opened(npz(v=dense)).sparse, "v", (3, 3))
-    assert line == "x.npz: v: expected 3 x 3 numbers, found 2 x 3 float64"
+    assert line == (
+        "F002.value",
+        None,
+        {
+            "item": "v",
+            "expected": Phrase("wanted-numbers", shape=(3, 3)),
+            "found": Phrase("found-array", shape=(2, 3), dtype="float64"),
+        },
+    )
 
 
 def test_entries_of_rows_and_columns() -> None:
@@ -269,11 +294,18 @@ def test_texts_however_they_are_written(value: Any) -> None:
 
 @pytest.mark.parametrize(
     ("value", "found"),
-    [(1, "1"), (["a"], "a list of 1"), (np.array(["a", "b"]), "2 texts"), (ROWS, "4 x 3 float64")],
-)
-def test_what_is_no_text(value: Any, found: str) -> None:
+    [
+        (1, ("F002.text", None, {"item": "v", "found": Phrase("found-value", value="1")})),
+        (["a"], ("F002.text", None, {"item": "v", "found": Phrase("found-list", n=1)})),
+        (np.array(["a", "b"]), ("F002.text", None, {"item": "v", "found": Phrase("found-texts",
+         shape=(2,))})),
+        (ROWS, ("F002.text", None, {"item": "v", "found": Phrase("found-array", shape=(4, 3),
+         dtype="float64")})),
+    ],
+)  # fmt: skip
+def test_what_is_no_text(value: Any, found: Fault) -> None:
     archive = opened(pickle.dumps({"v": value}))
-    assert refused(archive.text, "v") == f"x.npz: v: expected a text, found {found}"
+    assert refused(archive.text, "v") == found
 
 
 def test_values_are_kept() -> None:
@@ -281,7 +313,7 @@ def test_values_are_kept() -> None:
     first = archive.get("v")
     assert isinstance(first, Deferred)
     assert archive.get("v") is first
-    assert archive.get("o") == Opaque("object array")
+    assert archive.get("o") == Opaque(Phrase("unread-objects"))
 
 
 def test_halves_are_widened(tmp_path: Path) -> None:

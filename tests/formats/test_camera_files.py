@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from capture_files import body, opened, write_frames
+from faults import fault_of
 from numpy.testing import assert_allclose, assert_array_equal
 
 from viewer.errors import FormatError
@@ -95,39 +96,40 @@ def test_broken_cameras_leave_the_bodies(tmp_path):
     cameras(tmp_path, intrinsic="nonsense")
     capture, parts, _ = opened(tmp_path)
     assert (capture.views, list(parts[0].bodies)) == ((), [0])
-    assert capture.warnings == (
-        f'{tmp_path}/intri.yml:1: expected name: value, found "nonsense"; the cameras are left out',
+    assert tuple(map(fault_of, capture.warnings)) == (
+        ("F007.cameras", 1, {"problem": ("F002.camera-value", None, {"found": b"nonsense"})}),
     )
 
 
 def test_one_file_is_not_enough(tmp_path):
     (tmp_path / "extri.yml").write_text(EXTRINSIC)
-    assert find_cameras([tmp_path], 1 << 20) == (
-        (),
-        [f"{tmp_path}/extri.yml: no intri.yml beside it; the cameras are left out"],
-    )
+    views, (note,) = find_cameras([tmp_path], 1 << 20)
+    assert (views, note.path) == ((), tmp_path / "extri.yml")
+    assert fault_of(note) == ("F007.cameras-beside", None, {"name": "intri.yml"})
     assert find_cameras([tmp_path / "none"], 1 << 20) == ((), [])
 
 
 @pytest.mark.parametrize(
     ("file", "old", "new", "message"),
     [
-        ("intri", "K_01", "K_02", "3: K_01: expected 3 x 3 numbers, found no such key"),
-        ("intri", "1.2e+03", "-1",
-         "6: K_01: expected focal lengths above 0 and the last row 0 0 1"),
-        ("intri", "1.2e+03", "1e30", "6: K_01: expected focal lengths of 0.001 to 1e+09 pixels, "
-         "found 1e+30 and 1100.5"),
-        ("intri", "1100.5", "1e-320", "6: K_01: expected focal lengths of 0.001 to 1e+09 pixels, "
-         "found 1200 and 9.99989e-321"),
-        ("intri", "512.", "-1e10", "6: K_01: expected numbers up to 1e+09, found -1e+10"),
-        ("intri", "-0.1,", "-2e6,", "12: dist_01: expected numbers up to 1e+06, found -2e+06"),
-        ("extri", "-1.0, 3.0", "1e38, 3.0", "14: T_01: expected numbers up to 1e+09, found 1e+38"),
-        ("extri", "T_01", "T_1", "3: T_01: expected 3 numbers, found no such key"),
+        ("intri", "K_01", "K_02", ("F002.camera-no-key", 3, {"item": "K_01", "shape": (3, 3)})),
+        ("intri", "1.2e+03", "-1", ("F002.camera-focal", 6, {"item": "K_01"})),
+        ("intri", "1.2e+03", "1e30", ("F002.camera-focal-range", 6, {"item": "K_01", "low": 0.001,
+         "high": 1000000000.0, "first": 1e30, "second": 1100.5})),
+        ("intri", "1100.5", "1e-320", ("F002.camera-focal-range", 6, {"item": "K_01",
+         "low": 0.001, "high": 1000000000.0, "first": 1200.0, "second": 1e-320})),
+        ("intri", "512.", "-1e10", ("F003.camera-limit", 6, {"item": "K_01",
+         "limit": 1000000000.0, "found": -10000000000.0})),
+        ("intri", "-0.1,", "-2e6,", ("F003.camera-limit", 12, {"item": "dist_01",
+         "limit": 1000000.0, "found": -2000000.0})),
+        ("extri", "-1.0, 3.0", "1e38, 3.0", ("F003.camera-limit", 14, {"item": "T_01",
+         "limit": 1000000000.0, "found": 1e38})),
+        ("extri", "T_01", "T_1", ("F002.camera-no-key", 3, {"item": "T_01", "shape": (3,)})),
         ("extri", "Rot_01: !!opencv-matrix\n  rows: 3\n  cols: 3",
-         "Rot_01: !!opencv-matrix\n  rows: 9\n  cols: 1",
-         "9: Rot_01: expected 3 x 3 numbers, found 9 x 1"),
-        ("extri", "-1.0, 0.0, 1.0, 0.0]", "-1.0, 0.0, -1.0, 0.0]",
-         "9: Rot_01: expected a rotation, found a matrix that is none"),
+         "Rot_01: !!opencv-matrix\n  rows: 9\n  cols: 1", ("F002.camera-shape", 9,
+         {"item": "Rot_01", "shape": (3, 3), "found": (9, 1)})),
+        ("extri", "-1.0, 0.0, 1.0, 0.0]", "-1.0, 0.0, -1.0, 0.0]", ("F002.camera-rotation", 9,
+         {"item": "Rot_01"})),
     ],
 )  # fmt: skip
 def test_one_broken_camera_is_left_out(tmp_path, file, old, new, message):
@@ -136,34 +138,38 @@ def test_one_broken_camera_is_left_out(tmp_path, file, old, new, message):
     texts[file] = texts[file].replace(old, new, 1)
     views, notes = cameras(tmp_path, *texts.values())
     assert [view.name for view in views] == ["b c"]
-    assert notes == [f"{tmp_path}/{file}.yml:{message}; this camera is left out"]
+    (note,) = notes
+    key, line, values = message
+    assert note.path == tmp_path / f"{file}.yml"
+    assert fault_of(note) == ("F007.camera", line, {"problem": (key, None, values)})
 
 
 @pytest.mark.parametrize(
     ("text", "line", "message"),
     [
-        ("a: 1\na: 2\n", 4, 'expected every key once, found "a"'),
-        ("  indented\n", 3, 'expected name: value, found "indented"'),
-        ("K: !!opencv-matrix\n  size: 3\n", 4,
-         'expected rows, cols, dt or data, found "size: 3"'),
-        ("K: !!opencv-matrix\n  rows: three\n", 4, 'expected a size, found "three"'),
-        ("K: !!opencv-matrix\n  rows: 1e99\n", 4, 'expected a size, found "1e99"'),
-        ("K: !!opencv-matrix\n  rows: 1\n  cols: 2\n  data: 1, 2\n", 6,
-         'expected [ numbers ], found "1, 2"'),
-        ("K: !!opencv-matrix\n  rows: 1\n  cols: 2\n  data: [ 1, .Nan ]\n", 6,
-         'K: expected a number, found ".Nan"'),
+        ("a: 1\na: 2\n", 4, ("F002.camera-twice", 4, {"found": "a"})),
+        ("  indented\n", 3, ("F002.camera-value", 3, {"found": b"indented"})),
+        ("K: !!opencv-matrix\n  size: 3\n", 4, ("F002.camera-part", 4, {"found": b"size: 3"})),
+        ("K: !!opencv-matrix\n  rows: three\n", 4, ("F002.camera-size", 4, {"found": b"three"})),
+        ("K: !!opencv-matrix\n  rows: 1e99\n", 4, ("F002.camera-size", 4, {"found": b"1e99"})),
+        ("K: !!opencv-matrix\n  rows: 1\n  cols: 2\n  data: 1, 2\n", 6, ("F002.camera-data", 6,
+         {"found": b"1, 2"})),
+        ("K: !!opencv-matrix\n  rows: 1\n  cols: 2\n  data: [ 1, .Nan ]\n", 6, ("F002.number", 6,
+         {"item": "K", "found": b".Nan"})),
         ("K: !!opencv-matrix\n  rows: 1\n  cols: 2\n  data: [ 1, 1e+308 ]\n", 6,
-         'K: expected a number below 3.4e+38, found "1e+308"'),
-        ("K: !!opencv-matrix\n  rows: 1\n  cols: 2\n  data: [ 1 ]\n", 3,
-         "K: expected 1 x 2 numbers, found 1"),
-        ("K: !!opencv-matrix\n  rows: 1\n  cols: 2\n  data: [ 1, 2\n", 3,
-         "K: expected 1 x 2 numbers, found 2"),
-        ("K: !!opencv-matrix\n  data: [ 1, 2 ]\n", 3,
-         "K: expected rows, cols and data, found no rows"),
-        ("K: !!opencv-matrix\n  rows: 2\n", 3, "K: expected rows, cols and data, found no cols"),
+         ("F003.too-large", 6, {"item": "K", "found": b"1e+308"})),
+        ("K: !!opencv-matrix\n  rows: 1\n  cols: 2\n  data: [ 1 ]\n", 3, ("F002.camera-count", 3,
+         {"found": 1, "item": "K", "shape": (1, 2)})),
+        ("K: !!opencv-matrix\n  rows: 1\n  cols: 2\n  data: [ 1, 2\n", 3, ("F002.camera-count", 3,
+         {"found": 2, "item": "K", "shape": (1, 2)})),
+        ("K: !!opencv-matrix\n  data: [ 1, 2 ]\n", 3, ("F002.camera-lacks", 3, {"item": "K",
+         "name": "rows"})),
+        ("K: !!opencv-matrix\n  rows: 2\n", 3, ("F002.camera-lacks", 3, {"item": "K",
+         "name": "cols"})),
     ],
 )  # fmt: skip
 def test_broken_storage_is_refused_with_its_line(text, line, message):
     with pytest.raises(FormatError) as caught:
         storage(HEAD + text)
-    assert str(caught.value) == f"a.yml:{line}: {message}"
+    assert str(caught.value).startswith(f"a.yml:{line}: ")
+    assert fault_of(caught.value.diagnostic) == message

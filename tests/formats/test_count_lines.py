@@ -1,12 +1,10 @@
 """A count that is wrong is refused at the line that states it, with both numbers."""
 
-import re
-
 import pytest
 from bvh_text import GOOD as BVH
+from faults import refusal_of
 from skin_text import GOOD as SKIN
 
-from viewer.errors import FormatError
 from viewer.formats import Source, read
 
 ANIM = """animation {
@@ -43,9 +41,7 @@ FILES = {
 
 
 def refusal(name, text):
-    with pytest.raises(FormatError) as caught:
-        read(Source(name, text.encode()))
-    return caught.value
+    return refusal_of(lambda: read(Source(name, text.encode())))
 
 
 # File, what stands before a count, the count, and what the file has instead of each wrong one.
@@ -70,27 +66,28 @@ def test_a_wrong_count_is_refused_where_it_stands(name, head, count, step):
     text = FILES[name]
     assert f"{head}{count}" in text
     before, _, after = text.partition(f"{head}{count}")
-    problem = refusal(name, f"{before}{head}{count + step}{after}")
-    assert problem.line == 1 + f"{before}{head}".count("\n")
-    wanted, found = re.search(r"expected (\d+) .*found (\d+)", str(problem)).groups()
-    assert (int(wanted), int(found)) == (count + step, count)
+    _, line, values = refusal(name, f"{before}{head}{count + step}{after}")
+    assert line == 1 + f"{before}{head}".count("\n")
+    assert (values["expected"], values["found"]) == (count + step, count)
 
 
 @pytest.mark.parametrize(("element", "count", "line"), [("vertex", 3, 3), ("face", 1, 7)])
 def test_too_many_rows_of_a_table_are_refused_at_its_element(element, count, line):
-    problem = refusal("a.ply", PLY.replace(f"{element} {count}", f"{element} {count + 9}"))
-    assert problem.line == line and f"expected {count + 9} lines" in str(problem)
+    fault = refusal("a.ply", PLY.replace(f"{element} {count}", f"{element} {count + 9}"))
+    found = {"element": element, "expected": count + 9, "found": 1 if element == "face" else 4}
+    assert fault == ("F002.ply-lines", line, found)
 
 
 @pytest.mark.parametrize(("stated", "line"), [("1 0 0.25 1 0.75", 13), ("3 0 0.25 1 0.75", 13)])
 def test_a_vertex_that_misstates_its_influences_is_refused_at_its_line(stated, line):
     """Behind it, the counts of all others seem to shift."""
-    problem = refusal("a.skin", SKIN.replace("2 0 0.25 1 0.75", stated))
-    assert problem.line == line
-    assert f"vertex 1: expected {stated[0]} pairs" in str(problem)
-    assert "found 4 numbers" in str(problem)
+    fault = refusal("a.skin", SKIN.replace("2 0 0.25 1 0.75", stated))
+    values = {"vertex": 1, "pairs": stated[:1].encode(), "found": 4}
+    assert fault == ("F002.skin-influences", line, values)
 
 
 def test_counts_of_a_file_in_one_line_are_followed_as_they_are():
     text = " ".join(SKIN.replace("1 1 1\n}", "2 1 1\n}").split())
-    assert "vertex 2, the last: expected 2 pairs" in str(refusal("a.skin", text))
+    key, _, values = refusal("a.skin", text)
+    assert key == "F002.skin-influences-end"
+    assert (values["vertex"], values["pairs"]) == (2, b"2")

@@ -1,6 +1,8 @@
 import gzip
+from pathlib import Path
 
 import pytest
+from faults import fault_of, refusal_of, warnings_of
 
 from viewer.errors import FormatError
 from viewer.formats import KNOWN, Source, detect
@@ -12,7 +14,7 @@ SKIN = b"positions 1 { 0 0 0 } triangles 1 { 0 0 0 }"
 
 def found(name, data):
     source = Source(name, data)
-    return detect(source), source.warnings
+    return detect(source), warnings_of(source.diagnostics)
 
 
 @pytest.mark.parametrize(("data", "key"), [(SKEL, "skel"), (SKIN, "skin")])
@@ -23,15 +25,15 @@ def test_content_decides(data, key, suffix):
 
 
 @pytest.mark.parametrize(
-    ("name", "data", "key", "warning"),
+    ("name", "data", "key", "values"),
     [
-        ("a.skin", SKEL, "skel", "a.skin: is a .skel, named .skin"),
-        ("a.skel", SKIN, "skin", "a.skel: is a .skin, named .skel"),
-        ("A.SKEL", SKIN, "skin", "A.SKEL: is a .skin, named .skel"),
+        ("a.skin", SKEL, "skel", {"found": ".skel", "suffix": ".skin"}),
+        ("a.skel", SKIN, "skin", {"found": ".skin", "suffix": ".skel"}),
+        ("A.SKEL", SKIN, "skin", {"found": ".skin", "suffix": ".skel"}),
     ],
 )
-def test_wrong_suffix_is_a_warning(name, data, key, warning):
-    assert found(name, data) == (key, [warning])
+def test_wrong_suffix_is_a_warning(name, data, key, values):
+    assert found(name, data) == (key, [("F007.suffix", None, values)])
 
 
 @pytest.mark.parametrize(
@@ -87,13 +89,14 @@ def test_skin_is_recognised(data):
 def test_other_content_is_named(data, kind, name, wanted):
     with pytest.raises(FormatError) as caught:
         found(name, data)
-    assert str(caught.value) == f"{name}: expected a {wanted or ANY} file, found {kind}"
+    assert caught.value.path == Path(name)
+    values = {"wanted": wanted or ANY, "looks": kind}
+    assert fault_of(caught.value.diagnostic) == ("F002.kind", None, values)
 
 
 def test_text_of_another_kind_is_refused():
-    with pytest.raises(FormatError) as caught:
-        found("a.txt", b"hello world")
-    assert str(caught.value) == f"a.txt: expected a {ANY} file, found something else"
+    fault = refusal_of(lambda: found("a.txt", b"hello world"))
+    assert fault == ("F002.unknown-kind", None, {"wanted": ANY})
 
 
 @pytest.mark.parametrize(("name", "key"), [("a.skel", "skel"), ("a.skin", "skin")])
@@ -105,6 +108,5 @@ def test_text_with_a_known_suffix_goes_to_its_reader(name, key):
     ("data", "kind"), [(b"PK\x03\x04\x14", "a ZIP archive"), (b"\x93NUMPY\1\0", "a numpy array")]
 )
 def test_broken_archive_under_a_text_suffix_is_named(data, kind):
-    with pytest.raises(FormatError) as caught:
-        detect(Source("a.skel", data))
-    assert str(caught.value) == f"a.skel: expected a .skel file, found {kind}"
+    fault = refusal_of(lambda: detect(Source("a.skel", data)))
+    assert fault == ("F002.kind", None, {"wanted": ".skel", "looks": kind})

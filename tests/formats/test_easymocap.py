@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from capture_files import body, opened, points, rows_of, waves, write_frames
+from capture_files import body, noticed, opened, points, rows_of, waves, write_frames
 from numpy.testing import assert_array_equal
 
 from viewer.formats import Source, detect, read
@@ -67,7 +67,7 @@ def test_fullest_folder_is_read(tmp_path):
     write_frames(tmp_path / "smpl_full", {0: [body(0, 156)]})
     capture, _, warnings = opened(tmp_path)
     assert capture.model == "SMPL+H"
-    assert warnings == [f"{tmp_path}: smpl_full/ is read, smpl/ beside it is not"]
+    assert warnings == [("F007.capture-beside", None, {"name": "smpl_full", "others": "smpl"})]
 
 
 def test_first_view_of_several_is_read(tmp_path):
@@ -76,7 +76,9 @@ def test_first_view_of_several_is_read(tmp_path):
     for path in (tmp_path, tmp_path / "smpl"):
         _, parts, warnings = opened(path)
         assert list(parts[0].bodies) == [1]
-        assert warnings == [f"{path}: smpl/01 is read, others are not: 02, 03"]
+        assert warnings == [
+            ("F007.capture-camera", None, {"folder": "smpl", "name": "01", "others": ["02", "03"]})
+        ]
 
 
 def test_pictures_and_hidden_files_do_not_count(tmp_path):
@@ -115,9 +117,7 @@ def test_absurd_holes_are_closed(tmp_path):
     write_frames(tmp_path / "smpl", {"7": [body(0)], "99999999999": [body(0)]})
     capture, parts, warnings = opened(tmp_path)
     assert (capture.n_frames, capture.first_frame, rows_of(parts, 0)) == (2, 0, [0, 1])
-    assert warnings == [
-        f"{tmp_path}: 2 frames numbered from 7 to 99999999999: taken one after the other"
-    ]
+    assert warnings == [("F007.capture-numbers", None, {"n": 2, "first": 7, "last": 99999999999})]
 
 
 def test_hole_of_a_thousand_frames_is_none_to_close(tmp_path):
@@ -153,13 +153,11 @@ def test_parts_grow_and_the_first_ends_with_somebody(tmp_path):
 
 
 def test_people_without_a_track_are_told_apart_within_a_frame(tmp_path):
-    write_frames(tmp_path / "smpl", {0: [body(-1), body(0), body(-1, seed=1.0), body(-1)]})
+    people = [body(-1), body(0), body(-1, seed=1.0), body(-1)]
+    folder = write_frames(tmp_path / "smpl", {0: people})
     _, parts, _ = opened(tmp_path)
     assert list(parts[0].bodies) == [-1, 0, -2, -3]
-    assert parts[0].warnings == (
-        f"{tmp_path}/smpl/000000.json: people without a track (id -1) are called "
-        '"untracked" and numbered within each frame: nobody says who of them is who in the next',
-    )
+    assert noticed(parts[:1], folder / "000000.json") == [("F007.record-untracked", None, {})]
     assert_array_equal(parts[0].bodies[-2].translations[0], waves(3, seed=3.0))
 
 
@@ -174,9 +172,7 @@ def test_people_without_id_are_counted(tmp_path):
     folder = write_frames(tmp_path / "smpl", {0: [body(0, id=None), body(0, id=None)]})
     _, parts, _ = opened(tmp_path)
     assert list(parts[0].bodies) == [0, 1]
-    assert parts[0].warnings == (
-        f"{folder}/000000.json: people without id: numbered in the order of their lists",
-    )
+    assert noticed(parts[:1], folder / "000000.json") == [("F007.record-no-id", None, {})]
 
 
 # Layouts of poses
@@ -194,13 +190,19 @@ def turned(record, start, stop):
         (69, "SMPL", FAMILY[24].names, [(0, 69)], {}, True),
         (78, "SMPL+H", BODY, [(3, 66)], {"left": (66, 72), "right": (72, 78)}, False),
         (156, "SMPL+H", FAMILY[52].names, [(3, 156)], {}, True),
-        (87, "SMPL-X", (*BODY, *FACE), [(3, 66), (78, 87)],
-         {"left": (66, 72), "right": (72, 78)}, True),
+        (
+            87,
+            "SMPL-X",
+            (*BODY, *FACE),
+            [(3, 66), (78, 87)],
+            {"left": (66, 72), "right": (72, 78)},
+            True,
+        ),
         (165, "SMPL-X", FAMILY[55].names, [(3, 165)], {}, True),
         (9, "MANO", ("wrist",), [], {"": (3, 9)}, True),
         (48, "MANO", FAMILY[16].names, [(3, 48)], {}, True),
     ],
-)  # fmt: skip
+)
 def test_length_tells_the_layout(tmp_path, count, model, names, parts, hands, is_flat, flat):
     record = body(0, count, flat=flat)
     write_frames(tmp_path / "smpl", {0: [record], 1: [record]})
@@ -264,10 +266,8 @@ def test_vertices_are_left_out_and_that_is_said_once(tmp_path):
     record = body(0, vertices=[[0, 0, 0]] * 4)
     folder = write_frames(tmp_path / "smpl", {0: [record], 1: [record]})
     _, parts, _ = opened(tmp_path)
-    assert [part.warnings for part in parts] == [
-        (f"{folder}/000000.json: vertices are not needed, and left out everywhere",),
-        (),
-    ]
+    said = [("F007.record-vertices", None, {})]
+    assert noticed(parts[:1], folder / "000000.json") == said and noticed(parts[1:]) == []
 
 
 def test_up_axis_is_passed_on(tmp_path):
@@ -332,10 +332,7 @@ def test_keypoints_twice_are_said_to_be_left_out(tmp_path):
     write_frames(tmp_path / "keypoints3d", {0: [points(0)]})
     _, parts, _ = opened(tmp_path)
     assert_array_equal(parts[0].points[0][1].points, [points(0)["keypoints3d"]])
-    assert parts[0].warnings == (
-        f"{folder}/000000.json: keypoints3d in it and beside it: those in the folder keypoints3d "
-        "count",
-    )
+    assert noticed(parts[:1], folder / "000000.json") == [("F007.record-points", None, {})]
 
 
 def test_keypoints_in_body_records_are_read(tmp_path):
@@ -354,7 +351,7 @@ def test_synthetic_recording(shared_data):
         pytest.skip("no synthetic recording")
     capture, parts, warnings = opened(folder)
     assert (capture.n_frames, capture.model, warnings) == (30, "SMPL", [])
-    assert [part.warnings for part in parts] == [(), ()]
+    assert noticed(parts) == []
     assert (rows_of(parts, 0), rows_of(parts, 1)) == (list(range(30)), list(range(20)))
     record = json.loads((folder / "smpl" / "000007.json").read_text())[1]
     motion = parts[1].bodies[1]

@@ -3,30 +3,46 @@
 import json
 
 import pytest
-from capture_files import body, opened, points, rows_of, write_frames
+from capture_files import body, noticed, opened, points, rows_of, write_frames
+from faults import INF
+
+from viewer.diagnostics import Phrase
 
 INFINITE = json.loads("1e400")
 
 
-def warnings_of(parts):
-    return [text for part in parts for text in part.warnings]
+def fault_in(parts, path):
+    """Return the line of the only fault, and what it is."""
+    ((key, line, values),) = noticed(parts, path)
+    assert key == "F007.record"
+    return line, values["problem"]
 
 
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"shapes": [[], []]}, "shapes: expected 2 numbers, found an empty list among them"),
-        ({"shapes": [[None]]}, "shapes: expected 1 number, found"),
-        ({"shapes": [[INFINITE]]}, "shapes: expected finite numbers, found inf"),
-        ({"shapes": "x"}, "shapes: expected numbers, found 'x'"),
-        ({"shapes": {}}, "shapes: expected numbers, found"),
-        ({"expression": [["a"]]}, "expression: expected 1 number, found 'a' among them"),
-        ({"expression": [[INFINITE] * 3]}, "expression: expected finite numbers, found inf"),
-        ({"poses": [[None] * 69]}, "poses: expected 69 numbers, found"),
-        ({"poses": [[INFINITE] * 165]}, "poses: expected finite numbers, found inf"),
-        ({"Th": [[1.0]], "shapes": [[1.0]]}, "Th: expected 3 numbers, found 1"),
+        ({"shapes": [[], []]}, ("F002.record", None, {"item": "person 0: shapes",
+         "problem": Phrase("record-odd", expected=2, found=Phrase("found-empty-list"))})),
+        ({"shapes": [[None]]}, ("F002.record", None, {"item": "person 0: shapes",
+         "problem": Phrase("record-odd", expected=1, found=Phrase("found-nothing"))})),
+        ({"shapes": [[INFINITE]]}, ("F003.record", None, {"item": "person 0: shapes",
+         "problem": Phrase("not-finite", found=INF)})),
+        ({"shapes": "x"}, ("F002.record", None, {"item": "person 0: shapes",
+         "problem": Phrase("record-numbers", found=Phrase("found-value", value="'x'"))})),
+        ({"shapes": {}}, ("F002.record", None, {"item": "person 0: shapes",
+         "problem": Phrase("record-numbers", found=Phrase("found-no-named"))})),
+        ({"expression": [["a"]]}, ("F002.record", None, {"item": "person 0: expression",
+         "problem": Phrase("record-odd", expected=1, found=Phrase("found-value", value="'a'"))})),
+        ({"expression": [[INFINITE] * 3]}, ("F003.record", None, {"item": "person 0: expression",
+         "problem": Phrase("not-finite", found=INF)})),
+        ({"poses": [[None] * 69]}, ("F002.record", None, {"item": "person 0: poses",
+         "problem": Phrase("record-odd", expected=69, found=Phrase("found-nothing"))})),
+        ({"poses": [[INFINITE] * 165]}, ("F003.record", None, {"item": "person 0: poses",
+         "problem": Phrase("not-finite", found=INF)})),
+        ({"Th": [[1.0]], "shapes": [[1.0]]}, ("F002.record", None, {"item": "person 0: Th",
+         "problem": Phrase("record-count", expected=3, found=1)})),
     ],
-)
+)  # fmt: skip
 def test_width_comes_from_records_that_can_be_used(tmp_path, changes, message):
     others = {"expression": [[0.5] * 10]} if "expression" in changes else {}
     good = [body(0, **others), body(1, **others)]
@@ -36,8 +52,7 @@ def test_width_comes_from_records_that_can_be_used(tmp_path, changes, message):
     folder = write_frames(tmp_path / "smpl", {0: first, 1: good, 2: good})
     _, parts, _ = opened(tmp_path)
     assert (rows_of(parts, 0), rows_of(parts, 1)) == ([1, 2], [0, 1, 2])
-    (warning,) = warnings_of(parts)
-    assert warning.startswith(f"{folder}/000000.json:{rows[0]}: person 0: {message}")
+    assert fault_in(parts, folder / "000000.json") == (rows[0], message)
 
 
 @pytest.mark.parametrize("key", ["handl", "handr"])
@@ -46,8 +61,9 @@ def test_width_of_hands_comes_from_records_that_can_be_used(tmp_path, key):
     folder = write_frames(tmp_path / "smpl", {0: [{**good, key: [[None]]}], 1: [good]})
     _, parts, _ = opened(tmp_path)
     assert rows_of(parts, 0) == [1]
-    (warning,) = warnings_of(parts)
-    assert warning.startswith(f"{folder}/000000.json:1: person 0: {key}: expected 1 number, found")
+    line, (_, _, values) = fault_in(parts, folder / "000000.json")
+    problem = Phrase("record-odd", expected=1, found=Phrase("found-nothing"))
+    assert (line, values) == (1, {"item": f"person 0: {key}", "problem": problem})
 
 
 def test_faulty_coefficients_that_come_late_are_no_measure_either(tmp_path):
@@ -55,7 +71,9 @@ def test_faulty_coefficients_that_come_late_are_no_measure_either(tmp_path):
     folder = write_frames(tmp_path / "smpl", {0: [bare], 1: [bad], 2: [good], 3: [good]})
     _, parts, _ = opened(tmp_path)
     assert rows_of(parts, 0) == [0, 2, 3]
-    assert warnings_of(parts)[0].startswith(f"{folder}/000001.json:1: person 0: shapes: ")
+    first = next(found for part in parts for found in part.warnings)
+    assert (first.path, first.line) == (folder / "000001.json", 1)
+    assert first.values["problem"].values["item"] == "person 0: shapes"
 
 
 @pytest.mark.parametrize(
@@ -69,9 +87,9 @@ def test_number_of_keypoints_comes_from_records_that_can_be_used(tmp_path, rows)
     assert seen == [[0] * len(seen[0]), [1] * len(parts)]
     counts = [part.points[0][1].points.shape[:2] for part in parts if 0 in part.points]
     assert sum(rows for rows, _ in counts) == 1 and {count for _, count in counts} == {25}
-    (warning,) = warnings_of(parts)
-    where = f"{folder}/000000.json:1: person 0: keypoints3d: "
-    assert warning.startswith(f"{where}expected rows of 3 or 4 ")
+    line, (_, _, values) = fault_in(parts, folder / "000000.json")
+    assert (line, values["item"]) == (1, "person 0: keypoints3d")
+    assert values["problem"].key in ("record-rows", "record-other-rows", "record-no-rows")
 
 
 def test_keypoints_that_are_not_seen_are_a_measure(tmp_path):
@@ -82,14 +100,17 @@ def test_keypoints_that_are_not_seen_are_a_measure(tmp_path):
 
 
 def test_lengths_of_poses_are_listed_as_a_choice(tmp_path):
-    write_frames(tmp_path / "smpl", {0: [body(0, poses=[[0.0] * 7])], 1: [body(0)]})
+    folder = write_frames(tmp_path / "smpl", {0: [body(0, poses=[[0.0] * 7])], 1: [body(0)]})
     _, parts, _ = opened(tmp_path)
-    (warning,) = warnings_of(parts)
-    wanted = "9, 48, 63, 69, 72, 78, 87, 156 or 165"
-    assert warning.endswith(f"poses: expected {wanted} numbers, found 7")
+    _, (_, _, values) = fault_in(parts, folder / "000000.json")
+    lengths = [9, 48, 63, 69, 72, 78, 87, 156, 165]
+    problem = Phrase("record-lengths", expected=lengths, found=7)
+    assert values == {"item": "person 0: poses", "problem": problem}
 
 
 def test_record_without_keys_has_no_keys(tmp_path):
     write_frames(tmp_path / "smpl", {0: [{}], 1: [body(0)]})
     _, parts, _ = opened(tmp_path)
-    assert [text for text in warnings_of(parts) if text.endswith("found no keys")]
+    problem = Phrase("record-no-keys", expected=("poses", "keypoints3d"))
+    faults = [values.get("problem") for _, _, values in noticed(parts)]
+    assert ("F002.record", None, {"item": "person 0", "problem": problem}) in faults

@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
-from capture_files import body, opened, rows_of, waves, write_frames
+from capture_files import body, noticed, opened, rows_of, waves, write_frames
+from faults import NAN
 from numpy.testing import assert_array_equal
 
+from viewer.diagnostics import Phrase
 from viewer.formats._easymocap.shapes import carry, last_given
 
 ROWS = np.array([[9.0, 9.0], [1.0, 2.0], [9.0, 9.0], [np.nan, 3.0], [9.0, 9.0]])
@@ -48,9 +50,8 @@ def test_shapes_of_the_first_record_count_for_all(tmp_path):
     assert len(parts) == 3 and rows_of(parts, 1) == list(range(100))
     assert shapes_of(parts, 0) == [2.0] * 100 and shapes_of(parts, 1) == [3.0] * 100
     assert all(part.bodies[0].shape.shape == (1, 10) for part in parts)
-    assert [text for part in parts for text in part.warnings] == [
-        f"{folder}/000001.json: no shapes in this record: the person's last ones are kept, "
-        "wherever there are none"
+    assert noticed(parts, folder / "000001.json") == [
+        ("F007.record-last", None, {"item": "shapes"})
     ]
 
 
@@ -67,12 +68,22 @@ def test_last_good_shapes_are_kept(tmp_path):
     rows = [part.bodies[0] for part in parts]
     assert rows[0].shape is None  # nobody had said a word of shapes
     assert shapes_of(parts[1:], 0) == found[1:]
-    texts = [text.removeprefix(f"{tmp_path}/smpl/") for part in parts for text in part.warnings]
-    assert texts == [
-        "000001.json: no earlier record has shapes: 0 is taken there",
-        "000004.json:1: person 0: shapes: expected finite numbers, found nan",
-        "000002.json: no shapes in this record: the person's last ones are kept, wherever there "
-        "are none",
+    names = [found.path.name for part in parts for found in part.warnings]
+    assert names == ["000001.json", "000004.json", "000002.json"]
+    assert noticed(parts) == [
+        ("F007.record-first", None, {"keys": ("shapes",)}),
+        (
+            "F007.record",
+            1,
+            {
+                "problem": (
+                    "F003.record",
+                    None,
+                    {"item": "person 0: shapes", "problem": Phrase("not-finite", found=NAN)},
+                )
+            },
+        ),
+        ("F007.record-last", None, {"item": "shapes"}),
     ]
 
 
@@ -81,9 +92,8 @@ def test_who_never_had_shapes_has_those_of_the_mean_body(tmp_path):
     _, parts, _ = opened(tmp_path)
     assert_array_equal(parts[0].bodies[1].shape, np.zeros((1, 10)))
     assert_array_equal(parts[0].bodies[0].shape, [waves(10, seed=3)])
-    assert parts[0].warnings == (
-        f"{folder}/000000.json: no shapes in this record, nor in earlier ones of the same person: "
-        "0 is taken",
+    assert tuple(noticed(parts[:1], folder / "000000.json")) == (
+        ("F007.record-no-last", None, {"item": "shapes"}),
     )
 
 
@@ -135,9 +145,7 @@ def test_empty_coefficients_are_none(tmp_path, key, empty):
     expected, found = (opened(folder)[1] for folder in (missing, written))
     assert rows_of(found, 0) == [0, 1]
     for part, other in zip(found, expected, strict=True):
-        assert [text.partition(": ")[2] for text in part.warnings] == [
-            text.partition(": ")[2] for text in other.warnings
-        ]
+        assert noticed([part]) == noticed([other])
         motion, wanted = part.bodies[0], other.bodies[0]
         assert (motion.expression is None) == (wanted.expression is None)
         if key == "shapes":

@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 import pytest
 
+from viewer.diagnostics import Collector
 from viewer.errors import ViewerError
 from viewer.formats import Source, read
 from viewer.rig.comparison.pairs import pair_names
@@ -77,8 +78,7 @@ def calls(work):
 
 
 def read_it(name, text, takes_faults):
-    source = Source(name, text.encode())
-    source.faults = [] if takes_faults else None
+    source = Source(name, text.encode(), diagnostics=Collector(keeps_errors=takes_faults))
     try:
         return read(source)
     except ViewerError as problem:

@@ -1,7 +1,9 @@
 """The .morph reader: grammar, quirks, exact messages."""
 
 import pytest
+from faults import refusal_of, warnings_of
 
+from viewer.diagnostics import Phrase
 from viewer.errors import FormatError, UnsupportedFormatError
 from viewer.formats import Source, detect, read, write
 from viewer.rig.morph_target import MorphTarget
@@ -15,7 +17,7 @@ def parse(text, path="smile.morph"):
     source = Source(path, text.encode())
     target = read(source)
     assert isinstance(target, MorphTarget)
-    return target, source.warnings
+    return target, warnings_of(source.diagnostics)
 
 
 def assert_good(target):
@@ -48,92 +50,99 @@ def test_reads_every_part_without_a_word(text):
 def test_missing_last_brace_warns():
     target, warnings = parse(GOOD.rstrip("}\n"))
     assert_good(target)
-    assert warnings == ['smile.morph: the last "}" is missing: normals ends with the file']
+    assert warnings == [("F006.last-brace", None, {"section": "normals"})]
 
 
 def test_missing_normals_warn():
     target, warnings = parse(POSITIONS)
     assert target.normals is None
-    assert warnings == ["smile.morph: no normals section: normals stay as they are"]
+    assert warnings == [("F007.morph-normals", None, {})]
 
 
 def test_empty_target_warns():
     target, warnings = parse("positions 0 { } normals 0 { }")
-    assert len(target.vertices) == 0 and warnings == ["smile.morph: moves no vertex"]
+    assert len(target.vertices) == 0 and warnings == [("F007.morph-empty", None, {})]
 
 
 @pytest.mark.parametrize(
-    ("text", "message"),
+    ("text", "fault"),
     [
-        (NORMALS, "smile.morph:4: no positions section"),
-        ("", "smile.morph: expected a .morph file, found an empty file"),
+        (NORMALS, ("F002.morph-positions", 4, {"looks": None})),
+        ("", ("F002.kind", None, {"wanted": ".morph", "looks": "an empty file"})),
         (
             GOOD.replace("-1", "up"),
-            'smile.morph:3: positions: expected a number, found "up"',
+            (
+                "F002.number",
+                3,
+                {"item": Phrase("entry", section="positions", index=1), "found": b"up"},
+            ),
         ),
         (
             GOOD.replace("-1", "nan"),
-            'smile.morph:3: positions: expected a number, found "nan"',
+            (
+                "F003.number",
+                3,
+                {"item": Phrase("entry", section="positions", index=1), "found": b"nan"},
+            ),
         ),
         (
             GOOD.replace("7 .5", "7.5 .5"),
-            'smile.morph:3: positions: expected a vertex index, found "7.5"',
+            ("F002.morph-index", 3, {"section": "positions", "found": 7.5}),
         ),
         (
             GOOD.replace("7 .5", "-7 .5"),
-            'smile.morph:3: positions: expected a vertex index, found "-7"',
+            ("F002.morph-index", 3, {"section": "positions", "found": -7.0}),
         ),
         (
             GOOD.replace("7 .5", "3 .5"),
-            'smile.morph:3: positions: vertex "3" is listed twice',
+            ("F002.morph-twice", 3, {"section": "positions", "vertex": 3}),
         ),
         (
             GOOD.replace("7 0 1 0", "8 0 1 0"),
-            "smile.morph:5: normals: expected the vertices that positions has, "
-            "found 8 instead of 7",
+            ("F002.morph-vertices", 5, {"found": 8, "expected": 7}),
         ),
         (
             POSITIONS + "normals 1 { 3 0 0 1 }",
-            "smile.morph:5: positions (line 1) has 2 vertices, normals (line 5) has 1",
+            ("F002.morph-counts", 5, {"line": 1, "first": 2, "other": 5, "second": 1}),
         ),
         (
             GOOD.replace("positions 2", "positions 3"),
-            "smile.morph:1: positions: expected 3 rows of 4 numbers, found 2 (to line 4)",
+            ("F002.skin-declared", 1, {"section": "positions", "expected": 3, "found": 2}),
         ),
         (
             GOOD.replace("positions 2", "positions 2000000000"),
-            "smile.morph:1: positions: expected a count that the file can hold, found 2000000000 "
-            f"entries in {len(GOOD) - len('positions 2')} bytes",
+            ("F002.skin-too-many", 1, {"section": "positions", "found": 2000000000, "size": 63}),
         ),
         (
             GOOD.replace("positions 2", "positions -2"),
-            'smile.morph:1: positions: expected a count, found "-2"',
+            ("F002.skin-count", 1, {"section": "positions", "found": b"-2"}),
         ),
         (
             GOOD.replace("  3 0 1 2\n", "  3 0 1\n"),
-            "smile.morph:2: expected 4 numbers, found 3 (positions)",
+            (
+                "F002.width",
+                2,
+                {"item": Phrase("entry", section="positions", index=0), "expected": 4, "found": 3},
+            ),
         ),
         (
             GOOD + "triangles 1 { 0 1 2 }",
-            'smile.morph:9: expected positions or normals, found "triangles"',
+            ("F002.morph-section", 9, {"found": b"triangles"}),
         ),
-        (GOOD + POSITIONS, "smile.morph:9: expected one section of positions, found another"),
+        (GOOD + POSITIONS, ("F002.morph-repeated", 9, {"section": "positions"})),
         (
             GOOD.replace("normals 2 {", "normals 2"),
-            'smile.morph:6: normals: expected "{", found "3"',
+            ("F002.skin-brace", 6, {"section": "normals", "found": b"3"}),
         ),
         (
             POSITIONS + "normals 2 { 3 0 0 1",
-            'smile.morph:5: expected "}" to close normals (line 5), found the end of the file '
-            "after 1 of 2 rows",
+            ("F002.skin-rows-end", 5, {"section": "normals", "line": 5, "found": 1, "expected": 2}),
         ),
-        ("positions", "smile.morph:1: positions: expected a count, found the end of the file"),
+        ("positions", ("F002.skin-count", 1, {"section": "positions", "found": None})),
     ],
 )
-def test_malformed_files_are_refused_with_their_line(text, message):
-    with pytest.raises(FormatError) as caught:
-        parse(text)
-    assert str(caught.value) == message
+def test_malformed_files_are_refused_with_their_line(text, fault):
+    assert refusal_of(lambda: parse(text)) == fault
 
 
 def test_truncation_anywhere_is_an_error_or_a_warning():
@@ -153,5 +162,6 @@ def test_morph_is_told_from_a_skin_by_its_suffix():
 
 def test_morphs_are_not_written(tmp_path):
     target, _ = parse(GOOD)
-    with pytest.raises(UnsupportedFormatError, match=r'no writer for "\.morph"'):
+    with pytest.raises(UnsupportedFormatError, match=r'no writer for "\.morph"') as caught:
         write(target, tmp_path / "copy.morph")
+    assert caught.value.diagnostic.key == "F002.no-writer"

@@ -14,8 +14,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from faults import Fault, fault_of
 from numpy.testing import assert_array_equal
 
+from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
 from viewer.formats._archive import Archive, Opaque
 from viewer.formats._archive_opening import open_archive
@@ -76,13 +78,12 @@ def look(data: bytes, max_size: int = 2 << 30) -> None:
             assert value.values().shape == value.shape
 
 
-def refusal(data: bytes, max_size: int = 2 << 30) -> str:
+def refusal(data: bytes, max_size: int = 2 << 30) -> Fault:
     with pytest.raises(FormatError) as caught:
         look(data, max_size)
-    line = str(caught.value)
-    assert "\n" not in line
-    assert line.startswith("x.npz: ")
-    return line.removeprefix("x.npz: ")
+    assert "\n" not in str(caught.value)
+    assert str(caught.value).startswith("x.npz: ")
+    return fault_of(caught.value.diagnostic)
 
 
 def cost(action: Callable[[], Any]) -> int:
@@ -140,11 +141,15 @@ def test_file_that_changed_is_not_read(tmp_path: Path) -> None:
     np.savez(path, v=ROWS + 1, w=ROWS)
     with pytest.raises(FormatError) as caught:
         archive.array("v").values()
-    assert str(caught.value) == f"{path}: changed since it was opened; open it again"
+    assert fault_of(caught.value.diagnostic) == ("F002.changed", None, {})
     path.unlink()
     with pytest.raises(FormatError) as caught:
         archive.array("v").values()
-    assert str(caught.value) == f"{path}: cannot be read: No such file or directory"
+    assert fault_of(caught.value.diagnostic) == (
+        "F001.unreadable",
+        None,
+        {"reason": "No such file or directory", "near": ""},
+    )
 
 
 def test_headers_of_other_writers() -> None:
@@ -168,24 +173,24 @@ def test_headers_of_other_writers() -> None:
 @pytest.mark.parametrize(
     ("given", "what"),
     [
-        (np.array({"L_Hip": 1}, dtype=object), "object array"),
-        (np.array([None, 1], dtype=object), "object array"),
-        (np.zeros(2, "f4,i4"), "array of records"),
-        (np.zeros(2, [("a", "f4", 3)]), "array of records"),
-        (np.zeros(2, "V8"), "array of type |V8"),
-        (np.zeros(2, complex), "array of type <c16"),
-        (np.zeros(2, "M8[s]"), "array of type <M8[s]"),
+        (np.array({"L_Hip": 1}, dtype=object), Phrase("unread-objects")),
+        (np.array([None, 1], dtype=object), Phrase("unread-objects")),
+        (np.zeros(2, "f4,i4"), Phrase("unread-records")),
+        (np.zeros(2, [("a", "f4", 3)]), Phrase("unread-records")),
+        (np.zeros(2, "V8"), Phrase("unread-dtype", dtype="|V8")),
+        (np.zeros(2, complex), Phrase("unread-dtype", dtype="<c16")),
+        (np.zeros(2, "M8[s]"), Phrase("unread-dtype", dtype="<M8[s]")),
     ],
     ids=["object", "objects", "record", "sub-array", "void", "complex", "date"],
 )
-def test_arrays_that_are_not_evaluated(given: Any, what: str) -> None:
+def test_arrays_that_are_not_evaluated(given: Any, what: Phrase) -> None:
     archive = opened(npz(v=given, good=ROWS))
     assert archive.get("v") == Opaque(what)
     assert_array_equal(archive.array("good").values(), ROWS)
     with pytest.raises(FormatError) as caught:
         archive.array("v")
-    line = f"x.npz: v: expected an array of numbers, found an unread value ({what})"
-    assert str(caught.value) == line
+    key, _, values = fault_of(caught.value.diagnostic)
+    assert (key, values["found"]) == ("F002.value", Phrase("found-unread", what=what))
 
 
 def test_pickles_inside_are_never_opened(tmp_path: Path) -> None:
@@ -193,39 +198,55 @@ def test_pickles_inside_are_never_opened(tmp_path: Path) -> None:
     attack = b"cos\nsystem\n(S'touch " + str(marker).encode() + b"'\ntR."
     data = zipped({"v.npy": npy(header("'|O'", shape="()"), attack), "w.pkl": attack})
     archive = opened(data)
-    assert archive.get("v") == Opaque("object array")
-    assert archive.get("w.pkl") == Opaque("no array")
+    assert archive.get("v") == Opaque(Phrase("unread-objects"))
+    assert archive.get("w.pkl") == Opaque(Phrase("unread-member"))
     assert not marker.exists()
 
 
 def test_names_outside_the_folder_are_only_names() -> None:
     data = zipped({"../../etc/x.npy": npy(header(), bytes(8)), "a\nb.npy": npy(header(), b"")})
-    line = r"a\nb: expected 1 float64, found 0 bytes"
-    assert refusal(data) == line
+    problem = Phrase("array-bytes", shape=(1,), dtype="float64", found=0)
+    assert refusal(data) == ("F002.archive-value", None, {"item": r"a\nb", "problem": problem})
 
 
 @pytest.mark.parametrize(
     ("data", "line"),
     [
-        (npy(header(shape="(1099511627776,)"), bytes(8)), "1099511627776 float64, found 8 bytes"),
-        (npy(header(shape="(0, 4611686018427387904)")), f"0 x {1 << 62} float64, found 0 bytes"),
-        (npy(header(shape="(2,)"), bytes(8)), "2 float64, found 8 bytes"),
-        (npy(header(shape="(1,)"), bytes(9)), "1 float64, found 9 bytes"),
-        (npy(header(shape="()")), "one float64, found 0 bytes"),
-        (npy(header("'|S4'", shape="(9,)"), bytes(8)), "9 bytes32, found 8 bytes"),
-        (npy("")[:10], "a header with descr, fortran_order and shape, found b''"),
-        (npy("{}"), "a header with descr, fortran_order and shape, found b'{}'"),
-        (npy(header(), version=b"\4\0"), "an .npy header, found b'\\x93NUMPY\\x04\\x00'"),
-        (b"cos\nsystem\n", "an .npy header, found b'cos\\nsyst'"),
-        (b"", "an .npy header, found b''"),
-        (npy(b"x" * 10)[:15], "a header of 10 bytes, found 5"),
-        (npy("")[:6] + b"\2\0\0\0\1\0", "a header below 64 KiB, found 65536 bytes"),
-        (npy("", version=b"\2\0")[:8], "a header with descr, fortran_order and shape, found b''"),
+        (npy(header(shape="(1099511627776,)"), bytes(8)), ("F002.archive-value", None,
+         {"item": "v", "problem": Phrase("array-bytes", shape=(1099511627776,), dtype="float64",
+         found=8)})),
+        (npy(header(shape="(0, 4611686018427387904)")), ("F002.archive-value", None, {"item": "v",
+         "problem": Phrase("array-bytes", shape=(0, 4611686018427387904), dtype="float64",
+         found=0)})),
+        (npy(header(shape="(2,)"), bytes(8)), ("F002.archive-value", None, {"item": "v",
+         "problem": Phrase("array-bytes", shape=(2,), dtype="float64", found=8)})),
+        (npy(header(shape="(1,)"), bytes(9)), ("F002.archive-value", None, {"item": "v",
+         "problem": Phrase("array-bytes", shape=(1,), dtype="float64", found=9)})),
+        (npy(header(shape="()")), ("F002.archive-value", None, {"item": "v",
+         "problem": Phrase("array-bytes", shape=(), dtype="float64", found=0)})),
+        (npy(header("'|S4'", shape="(9,)"), bytes(8)), ("F002.archive-value", None, {"item": "v",
+         "problem": Phrase("array-bytes", shape=(9,), dtype="bytes32", found=8)})),
+        (npy("")[:10], ("F002.archive-value", None, {"item": "v", "problem": Phrase("npy-header",
+         found=b"")})),
+        (npy("{}"), ("F002.archive-value", None, {"item": "v", "problem": Phrase("npy-header",
+         found=b"{}")})),
+        (npy(header(), version=b"\4\0"), ("F002.archive-value", None, {"item": "v",
+         "problem": Phrase("npy-lead", found=b"\x93NUMPY\x04\x00")})),
+        (b"cos\nsystem\n", ("F002.archive-value", None, {"item": "v",
+         "problem": Phrase("npy-lead", found=b"cos\nsyst")})),
+        (b"", ("F002.archive-value", None, {"item": "v", "problem": Phrase("npy-lead",
+         found=b"")})),
+        (npy(b"x" * 10)[:15], ("F002.archive-value", None, {"item": "v",
+         "problem": Phrase("npy-header-cut", expected=10, found=5)})),
+        (npy("")[:6] + b"\2\0\0\0\1\0", ("F002.archive-value", None, {"item": "v",
+         "problem": Phrase("npy-header-length", found=65536)})),
+        (npy("", version=b"\2\0")[:8], ("F002.archive-value", None, {"item": "v",
+         "problem": Phrase("npy-header", found=b"")})),
     ],
 )  # fmt: skip
-def test_headers_that_lie(data: bytes, line: str) -> None:
+def test_headers_that_lie(data: bytes, line: Fault) -> None:
     whole = zipped({"v.npy": data})
-    assert refusal(whole) == f"v: expected {line}"
+    assert refusal(whole) == line
     assert cost(lambda: refusal(whole)) < BOUND
 
 
@@ -257,9 +278,9 @@ def test_headers_that_lie(data: bytes, line: str) -> None:
     ids=lambda text: text[:40],
 )
 def test_headers_that_break_the_grammar(text: str) -> None:
-    line = refusal(zipped({"v.npy": npy(text, bytes(8))}))
-    assert line.startswith("v: expected a header with descr, fortran_order and shape, found b")
-    assert len(line) < 400
+    key, _, values = refusal(zipped({"v.npy": npy(text, bytes(8))}))
+    assert (key, values["item"], values["problem"].key) == ("F002.archive-value", "v", "npy-header")
+    assert len(str(values["problem"])) < 400
 
 
 def test_bomb_is_refused_before_it_is_unpacked() -> None:
@@ -275,18 +296,20 @@ def test_bomb_is_refused_before_it_is_unpacked() -> None:
             member.write(bytes(1 << 20))
     data = stream.getvalue()
     assert len(data) < 1 << 19
-    line = f"expected at most 100 times its size when unpacked, found {size} bytes in {len(data)}"
+    line = ("F002.npz-ratio", None, {"most": 100, "found": size, "size": len(data)})
     assert refusal(data) == line
     assert cost(lambda: refusal(data)) < 4 << 20
 
 
 def test_max_size_is_for_all_members_together() -> None:
     data = npz(packed=True, a=np.zeros(1000), b=np.zeros(1000))
-    assert refusal(data, 10_000) == "expected at most 10000 bytes, found 16256 (--max-size)"
-    with pytest.raises(FormatError, match="expected at most 100 bytes, found 128"):
-        stream = io.BytesIO()
-        np.save(stream, np.zeros(0))
+    assert refusal(data, 10_000) == ("F001.too-large", None, {"most": 10000, "size": 16256})
+    stream = io.BytesIO()
+    np.save(stream, np.zeros(0))
+    with pytest.raises(FormatError) as caught:
         open_archive(Source("x.npy", stream.getvalue()), 100)
+    found = fault_of(caught.value.diagnostic)
+    assert found == ("F001.too-large", None, {"most": 100, "size": 128})
 
 
 def test_many_directory_entries_on_one_member() -> None:
@@ -297,16 +320,15 @@ def test_many_directory_entries_on_one_member() -> None:
     entry = data[start:end]
     entries = b"".join(entry.replace(b"v.npy", b"%c.npy" % (65 + n)) for n in range(26))
     tail = struct.pack("<4s4H2LH", b"PK\5\6", 0, 0, 26, 26, len(entries), start, 0)
-    line = refusal(data[:start] + entries + tail)
-    assert line.startswith("expected at most 100 times its size when unpacked, found 218107")
+    key, _, values = refusal(data[:start] + entries + tail)
+    assert (key, values["most"]) == ("F002.npz-ratio", 100)
+    assert str(values["found"]).startswith("218107")
 
 
 def test_directory_that_is_too_long() -> None:
     data = zipped({f"{number:0>50}": b"" for number in range(25_000)})
     line = refusal(data)
-    assert line == (
-        "expected a whole .npz file, found a damaged one (a directory of 2400000 bytes)"
-    )
+    assert line == (("F002.npz", None, {"reason": "a directory of 2400000 bytes"}))
     assert cost(lambda: refusal(data)) < BOUND
 
 
@@ -319,18 +341,22 @@ def changed(data: bytes, local: int, central: int, value: int) -> bytes:
 
 
 def test_encrypted_member() -> None:
-    line = "v: expected stored or deflated data, found encrypted data"
+    line = ("F002.npz-encrypted", None, {"item": "v"})
     assert refusal(changed(npz(v=ROWS), 6, 8, 1)) == line
     assert refusal(changed(npz(v=ROWS), 6, 8, 0x41)) == line
 
 
 @pytest.mark.parametrize(
     ("method", "found"),
-    [(12, "bzip2"), (14, "LZMA"), (93, "Zstandard"), (99, "compression method 99")],
+    [
+        (12, ("F002.npz-method-name", None, {"item": "v", "method": "bzip2"})),
+        (14, ("F002.npz-method-name", None, {"item": "v", "method": "LZMA"})),
+        (93, ("F002.npz-method-name", None, {"item": "v", "method": "Zstandard"})),
+        (99, ("F002.npz-method", None, {"item": "v", "method": 99})),
+    ],
 )
-def test_other_compression(method: int, found: str) -> None:
-    line = refusal(changed(npz(v=ROWS), 8, 10, method))
-    assert line == f"v: expected stored or deflated data, found {found}"
+def test_other_compression(method: int, found: Fault) -> None:
+    assert refusal(changed(npz(v=ROWS), 8, 10, method)) == found
 
 
 @pytest.mark.filterwarnings("ignore:Duplicate name")
@@ -339,17 +365,21 @@ def test_same_name_twice() -> None:
     with zipfile.ZipFile(stream, "w") as archive:
         for _ in "ab":
             archive.writestr("v.npy", npy(header(), bytes(8)))
-    assert refusal(stream.getvalue()) == "v: expected one of this name, found 2"
+    assert refusal(stream.getvalue()) == ("F002.npz-twice", None, {"item": "v", "found": 2})
     one = npy(header(), bytes(8))
-    assert refusal(zipped({"v.npy": one, "v": one})) == "v: expected one of this name, found 2"
+    assert refusal(zipped({"v.npy": one, "v": one})) == (
+        "F002.npz-twice",
+        None,
+        {"item": "v", "found": 2},
+    )
 
 
 @pytest.mark.parametrize("packed", [False, True])
 def test_damaged_values(packed: bool) -> None:
     data = bytearray(npz(packed=packed, v=np.arange(1000.0), w=ROWS))
     data[600] ^= 0xFF
-    line = refusal(bytes(data))
-    assert line.startswith("v: expected ")
+    key, _, values = refusal(bytes(data))
+    assert (key, values["item"]) == ("F002.archive-value", "v")
     archive = opened(bytes(data))
     assert_array_equal(archive.array("w").values(), ROWS)
 

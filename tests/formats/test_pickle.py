@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from faults import fault_of, warnings_of
 from numpy.testing import assert_array_equal
 from pickle_bytes import (
     array,
@@ -32,6 +33,7 @@ from pickle_bytes import (
     whole,
 )
 
+from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
 from viewer.formats._archive import Opaque, Sparse
 from viewer.formats._archive_opening import open_archive
@@ -290,33 +292,33 @@ def test_chumpy_handle() -> None:
 def test_other_chumpy_expressions_are_not_computed(module: str, name: str) -> None:
     built = created(module, name, mapping(a=ch(array(ROWS)), b=ch(array(ROWS))))
     archive = opened(saved(v=built, w=ch(built), x=select(built, [0], 1), good=array(ROWS)))
-    what = Opaque(f"{module}.{name} expression")
-    assert [archive.get(key) for key in "vwx"] == [what] * 3
+    what = Phrase("unread-expression", name=f"{module}.{name}")
+    assert [archive.get(key) for key in "vwx"] == [Opaque(what)] * 3
     assert_array_equal(archive.array("good").values(), ROWS)
     with pytest.raises(FormatError) as caught:
         archive.array("v", ("V", 3))
-    expected = f"v: expected V x 3 numbers, found an unread value ({what.what})"
-    assert str(caught.value) == f"model.pkl: {expected}"
+    key, _, values = fault_of(caught.value.diagnostic)
+    assert (key, values["found"]) == ("F002.value", Phrase("found-unread", what=what))
 
 
 def test_object_arrays_are_opaque() -> None:
     given = {"v": np.array({"L_Hip": 1}, dtype=object), "w": np.array([[1], None], dtype=object)}
     for protocol in (2, 5):
         archive = opened(pickle.dumps(given, protocol))
-        assert [archive.get(key) for key in "vw"] == [Opaque("object array")] * 2
+        assert [archive.get(key) for key in "vw"] == [Opaque(Phrase("unread-objects"))] * 2
 
 
 @pytest.mark.parametrize(
     ("given", "what"),
     [
-        (np.zeros(2, "f4,i4"), "array of records"),
-        (np.zeros(2, "V8"), "array of records"),
-        (np.zeros(2, complex), "array of type c16"),
-        (np.zeros(2, "M8[s]"), "array of type M8"),
+        (np.zeros(2, "f4,i4"), Phrase("unread-records")),
+        (np.zeros(2, "V8"), Phrase("unread-records")),
+        (np.zeros(2, complex), Phrase("unread-dtype", dtype="c16")),
+        (np.zeros(2, "M8[s]"), Phrase("unread-dtype", dtype="M8")),
     ],
     ids=["record", "void", "complex", "date"],
 )
-def test_arrays_of_other_types_are_opaque(given: Any, what: str) -> None:
+def test_arrays_of_other_types_are_opaque(given: Any, what: Phrase) -> None:
     assert opened(pickle.dumps({"v": given}, 2)).get("v") == Opaque(what)
 
 
@@ -332,7 +334,11 @@ def test_truth_values_other_than_0_and_1_are_true() -> None:
 
 def test_letters_beyond_unicode_are_refused() -> None:
     line = refusal(saved(v=array_of((1,), b"\xff\xff\xff\x7f", "U1")))
-    assert line == "v: expected letters in a text, found number 2147483647"
+    assert line == (
+        "F002.archive-value",
+        None,
+        {"item": "v", "problem": Phrase("array-letter", found=2147483647)},
+    )
 
 
 def test_old_byte_order_without_state() -> None:
@@ -350,7 +356,7 @@ def test_unicode_bytes_of_an_array() -> None:
 def test_bytes_after_the_end_are_a_warning() -> None:
     source = Source("model.pkl", saved(v=whole(1)) + b"more")
     assert open_archive(source).get("v") == 1
-    assert source.warnings == ["model.pkl: 4 bytes after the end of the pickle were ignored"]
+    assert warnings_of(source.diagnostics) == [("F006.pickle-rest", None, {"n": 4})]
 
 
 def test_synthetic_model_equals_its_npz() -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from faults import Fault
 from pickle_bytes import (
     array,
     created,
@@ -26,7 +27,9 @@ from pickle_bytes import (
     whole,
 )
 
+from viewer.diagnostics import Phrase
 from viewer.formats._archive import Opaque
+from viewer.phrases import printable
 
 DAMAGED = (
     "expected a pickle, found Windows line ends: damaged in transfer, "
@@ -107,11 +110,9 @@ def test_attacks_of_this_file_work_where_they_are_not_refused(tmp_path: Path) ->
     ],
 )
 def test_names_outside_the_table(module: str, name: str, marker: Path) -> None:
-    from viewer.errors import printable
-
     argument = text(written(marker))
-    shown = printable(f"{module}.{name}")
-    line = f'expected arrays and plain data, found the global "{shown}", {FORBIDDEN}'
+    problem = Phrase("pickle-global", name=printable(f"{module}.{name}"))
+    fault = ("F002.pickle", None, {"problem": problem})
     stack_name = unicode(module) + unicode(name) + b"\x93"
     bodies = {
         "reduce": reduced(module, name, argument),
@@ -124,8 +125,8 @@ def test_names_outside_the_table(module: str, name: str, marker: Path) -> None:
         "nested": array(np.ones(2)).replace(whole(1), reduced(module, name, argument), 1),
     }
     for kind, body in bodies.items():
-        assert refusal(saved(good=array(np.ones(2)), v=body)) == line, kind
-    assert refusal(b"(dp0\nS'v'\n" + bodies["reduce"] + b"s.") == line
+        assert refusal(saved(good=array(np.ones(2)), v=body)) == fault, kind
+    assert refusal(b"(dp0\nS'v'\n" + bodies["reduce"] + b"s.") == fault
 
 
 NDARRAY = named("numpy", "ndarray")
@@ -135,16 +136,22 @@ CODE = text("f8")
 @pytest.mark.parametrize(
     ("body", "line"),
     [
-        (NDARRAY + several(shape(1 << 40)) + b"R", "a call of numpy.ndarray"),
-        (named("__builtin__", "object") + b")R", "a call of __builtin__.object"),
-        (text("x") + several() + b"R", "a call of a text"),
-        (array(np.ones(1)) + several() + b"R", "a call of an array"),
-        (reduced("__builtin__", "set") + b")R", "a call of a list"),
-        (named("chumpy.ch", "Ch") + b")R", "a call of chumpy.ch.Ch"),
+        (NDARRAY + several(shape(1 << 40)) + b"R", ("F002.pickle", None,
+         {"problem": Phrase("pickle-call", found=Phrase("noun", name="numpy.ndarray"))})),
+        (named("__builtin__", "object") + b")R", ("F002.pickle", None,
+         {"problem": Phrase("pickle-call", found=Phrase("noun", name="__builtin__.object"))})),
+        (text("x") + several() + b"R", ("F002.pickle", None, {"problem": Phrase("pickle-call",
+         found=Phrase("noun-text"))})),
+        (array(np.ones(1)) + several() + b"R", ("F002.pickle", None,
+         {"problem": Phrase("pickle-call", found=Phrase("noun-array"))})),
+        (reduced("__builtin__", "set") + b")R", ("F002.pickle", None,
+         {"problem": Phrase("pickle-call", found=Phrase("noun-other", kind="list"))})),
+        (named("chumpy.ch", "Ch") + b")R", ("F002.pickle", None, {"problem": Phrase("pickle-call",
+         found=Phrase("noun", name="chumpy.ch.Ch"))})),
     ],
-)
-def test_calls_of_what_is_no_function(body: bytes, line: str) -> None:
-    assert refusal(saved(v=body)) == f"expected a call of a known function, found {line}"
+)  # fmt: skip
+def test_calls_of_what_is_no_function(body: bytes, line: Fault) -> None:
+    assert refusal(saved(v=body)) == line
 
 
 RECONSTRUCT = ("numpy.core.multiarray", "_reconstruct")
@@ -155,11 +162,8 @@ RECONSTRUCT = ("numpy.core.multiarray", "_reconstruct")
     [
         (*RECONSTRUCT, [NDARRAY, shape(1 << 40), text("b")], "numpy.ndarray, a tuple, a text"),
         (*RECONSTRUCT, [NDARRAY, shape(0), text("c")], "numpy.ndarray, a tuple, a text"),
-        (
-            *RECONSTRUCT,
-            [named("numpy", "dtype"), shape(0), text("b")],
-            "numpy.dtype, a tuple, a text",
-        ),
+        (*RECONSTRUCT, [named("numpy", "dtype"), shape(0), text("b")],
+         "numpy.dtype, a tuple, a text"),
         (*RECONSTRUCT, [NDARRAY], "numpy.ndarray"),
         ("numpy", "dtype", [b"]", whole(0), whole(1)], "a list, a number, a number"),
         ("numpy", "dtype", [CODE, whole(0), whole(2)], "a text, a number, a number"),
@@ -170,59 +174,50 @@ RECONSTRUCT = ("numpy.core.multiarray", "_reconstruct")
         ("__builtin__", "bytes", [whole(1 << 30)], "a number"),
         ("__builtin__", "set", [whole(1)], "a number"),
         ("collections", "OrderedDict", [b"](" + whole(1) + b"e"], "a list"),
-        (
-            "copy_reg",
-            "_reconstructor",
-            [NDARRAY, NDARRAY, b"N"],
-            "numpy.ndarray, numpy.ndarray, nothing",
-        ),
-        (
-            "copy_reg",
-            "_reconstructor",
-            [named("chumpy.ch", "Ch"), named("__builtin__", "object"), whole(1)],
-            "chumpy.ch.Ch, __builtin__.object, a number",
-        ),
-        (
-            "copy_reg",
-            "_reconstructor",
-            [named("__builtin__", "set"), named("__builtin__", "object"), b"N"],
-            "__builtin__.set, __builtin__.object, nothing",
-        ),
-        (
-            "numpy.core.numeric",
-            "_frombuffer",
-            [text("x" * 8), element_type(), shape(1), text("A")],
-            "a text, a dtype, a tuple, a text",
-        ),
-        (
-            "numpy.core.numeric",
-            "_frombuffer",
-            [text("x" * 8), element_type(), shape(1), text("K"), shape(1)],
-            "a text, a dtype, a tuple, a text, a tuple",
-        ),
+        ("copy_reg", "_reconstructor", [NDARRAY, NDARRAY, b"N"],
+         "numpy.ndarray, numpy.ndarray, nothing"),
+        ("copy_reg", "_reconstructor", [named("chumpy.ch", "Ch"), named("__builtin__", "object"),
+         whole(1)], "chumpy.ch.Ch, __builtin__.object, a number"),
+        ("copy_reg", "_reconstructor", [named("__builtin__", "set"), named("__builtin__",
+         "object"), b"N"], "__builtin__.set, __builtin__.object, nothing"),
+        ("numpy.core.numeric", "_frombuffer", [text("x" * 8), element_type(), shape(1),
+         text("A")], "a text, a dtype, a tuple, a text"),
+        ("numpy.core.numeric", "_frombuffer", [text("x" * 8), element_type(), shape(1), text("K"),
+         shape(1)], "a text, a dtype, a tuple, a text, a tuple"),
         ("numpy.core.multiarray", "scalar", [element_type(), whole(1)], "a dtype, a number"),
         ("numpy.core.multiarray", "scalar", [text("f8"), text("x" * 8)], "a text, a text"),
     ],
-)
+)  # fmt: skip
 def test_unusual_arguments(module: str, name: str, arguments: list[bytes], found: str) -> None:
-    line = refusal(saved(v=reduced(module, name, *arguments)))
-    assert line == f"expected the usual arguments of {module}.{name}, found ({found})"
+    key, _, values = refusal(saved(v=reduced(module, name, *arguments)))
+    problem = values["problem"]
+    assert (key, problem.key) == ("F002.pickle", "pickle-arguments")
+    assert problem.values["name"] == f"{module}.{name}"
+    assert ", ".join(map(str, problem.values["found"])) == found
 
 
 @pytest.mark.parametrize(
     ("body", "found"),
     [
-        (named("chumpy.ch", "Ch") + several(whole(1)) + b"\x81", "chumpy.ch.Ch"),
-        (NDARRAY + b")\x81", "numpy.ndarray"),
-        (NDARRAY + b")}\x92", "numpy.ndarray"),
-        (b"(" + named("numpy", "dtype") + CODE + b"o", "numpy.dtype"),
-        (b"(o", "nothing"),
-        (b"(icollections\nOrderedDict\n", "collections.OrderedDict"),
-        (b"])\x81", "a list"),
+        (named("chumpy.ch", "Ch") + several(whole(1)) + b"\x81", ("F002.pickle", None,
+         {"problem": Phrase("pickle-create", found=Phrase("noun", name="chumpy.ch.Ch"))})),
+        (NDARRAY + b")\x81", ("F002.pickle", None, {"problem": Phrase("pickle-create",
+         found=Phrase("noun", name="numpy.ndarray"))})),
+        (NDARRAY + b")}\x92", ("F002.pickle", None, {"problem": Phrase("pickle-create",
+         found=Phrase("noun", name="numpy.ndarray"))})),
+        (b"(" + named("numpy", "dtype") + CODE + b"o", ("F002.pickle", None,
+         {"problem": Phrase("pickle-create", found=Phrase("noun", name="numpy.dtype"))})),
+        (b"(o", ("F002.pickle", None, {"problem": Phrase("pickle-create",
+         found=Phrase("noun-nothing"))})),
+        (b"(icollections\nOrderedDict\n", ("F002.pickle", None,
+         {"problem": Phrase("pickle-create", found=Phrase("noun",
+         name="collections.OrderedDict"))})),
+        (b"])\x81", ("F002.pickle", None, {"problem": Phrase("pickle-create",
+         found=Phrase("noun-other", kind="list"))})),
     ],
-)
-def test_new_objects_of_other_classes(body: bytes, found: str) -> None:
-    assert refusal(saved(v=body)) == f"expected a new object of a known class, found {found}"
+)  # fmt: skip
+def test_new_objects_of_other_classes(body: bytes, found: Fault) -> None:
+    assert refusal(saved(v=body)) == found
 
 
 MATRIX = "scipy.sparse.csc", "csc_matrix"
@@ -232,35 +227,40 @@ SLOTS = several(b"N", mapping(toarray=whole(1)))
 @pytest.mark.parametrize(
     ("body", "line"),
     [
-        (
-            named(*MATRIX) + SLOTS + b"b",
-            "an object that takes a state, found scipy.sparse.csc.csc_matrix",
-        ),
-        (NDARRAY + SLOTS + b"b", "an object that takes a state, found numpy.ndarray"),
-        (b"]" + mapping(append=whole(1)) + b"b", "an object that takes a state, found a list"),
-        (b"}" + mapping(a=whole(1)) + b"b", "an object that takes a state, found a dict"),
-        (
-            named(*MATRIX) + b")\x81" + SLOTS + b"b",
-            "a dict as state of scipy.sparse.csc.csc_matrix, found a tuple",
-        ),
-        (named("chumpy.ch", "Ch") + b")\x81]b", "a dict as state of chumpy.ch.Ch, found a list"),
-        (empty_array() + b"}b", "the state of an array, found a dict"),
-        (empty_array() + several(whole(1)) + b"b", "the state of an array, found a tuple"),
-        (
-            empty_array() + several(whole(1), shape(1), element_type(), whole(0), b"]") + b"b",
-            "the state of an array, found a tuple",
-        ),
-        (
-            empty_array() + several(whole(1), shape(-1), element_type(), whole(0), CODE) + b"b",
-            "the state of an array, found a tuple",
-        ),
-        (element_type() + b"}b", "the state of an element type, found a dict"),
-        (element_type(order="?"), "the byte order of an array, found a text"),
-        (element_type("S4", "|", size=1 << 30), "the state of an element type, found a tuple"),
+        (named(*MATRIX) + SLOTS + b"b", ("F002.pickle", None, {"problem": Phrase("pickle-build",
+         found=Phrase("noun", name="scipy.sparse.csc.csc_matrix"))})),
+        (NDARRAY + SLOTS + b"b", ("F002.pickle", None, {"problem": Phrase("pickle-build",
+         found=Phrase("noun", name="numpy.ndarray"))})),
+        (b"]" + mapping(append=whole(1)) + b"b", ("F002.pickle", None,
+         {"problem": Phrase("pickle-build", found=Phrase("noun-other", kind="list"))})),
+        (b"}" + mapping(a=whole(1)) + b"b", ("F002.pickle", None,
+         {"problem": Phrase("pickle-build", found=Phrase("noun-other", kind="dict"))})),
+        (named(*MATRIX) + b")\x81" + SLOTS + b"b", ("F002.pickle", None,
+         {"problem": Phrase("pickle-state", name="scipy.sparse.csc.csc_matrix",
+         found=Phrase("noun-other", kind="tuple"))})),
+        (named("chumpy.ch", "Ch") + b")\x81]b", ("F002.pickle", None,
+         {"problem": Phrase("pickle-state", name="chumpy.ch.Ch", found=Phrase("noun-other",
+         kind="list"))})),
+        (empty_array() + b"}b", ("F002.pickle", None, {"problem": Phrase("pickle-array-state",
+         found=Phrase("noun-other", kind="dict"))})),
+        (empty_array() + several(whole(1)) + b"b", ("F002.pickle", None,
+         {"problem": Phrase("pickle-array-state", found=Phrase("noun-other", kind="tuple"))})),
+        (empty_array() + several(whole(1), shape(1), element_type(), whole(0), b"]") + b"b",
+         ("F002.pickle", None, {"problem": Phrase("pickle-array-state", found=Phrase("noun-other",
+         kind="tuple"))})),
+        (empty_array() + several(whole(1), shape(-1), element_type(), whole(0), CODE) + b"b",
+         ("F002.pickle", None, {"problem": Phrase("pickle-array-state", found=Phrase("noun-other",
+         kind="tuple"))})),
+        (element_type() + b"}b", ("F002.pickle", None, {"problem": Phrase("pickle-dtype-state",
+         found=Phrase("noun-other", kind="dict"))})),
+        (element_type(order="?"), ("F002.pickle", None, {"problem": Phrase("pickle-byte-order",
+         found=Phrase("noun-text"))})),
+        (element_type("S4", "|", size=1 << 30), ("F002.pickle", None,
+         {"problem": Phrase("pickle-dtype-state", found=Phrase("noun-other", kind="tuple"))})),
     ],
-)
-def test_states_that_nobody_writes(body: bytes, line: str) -> None:
-    assert refusal(saved(v=body)) == f"expected {line}"
+)  # fmt: skip
+def test_states_that_nobody_writes(body: bytes, line: Fault) -> None:
+    assert refusal(saved(v=body)) == line
 
 
 def test_states_set_no_attribute(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -276,7 +276,7 @@ def test_states_set_no_attribute(monkeypatch: pytest.MonkeyPatch) -> None:
     data = saved(a=created("chumpy.ch", "Ch", state), b=created("chumpy.ch", "Ch", b"}"))
     archive = opened(data)
     assert archive.array("a").values().tolist() == [1, 1]
-    assert archive.get("b") == Opaque("chumpy.ch.Ch without values")
+    assert archive.get("b") == Opaque(Phrase("unread-chumpy", name="chumpy.ch.Ch"))
 
 
 def test_one_load_leaves_nothing_for_the_next() -> None:
@@ -287,99 +287,93 @@ def test_one_load_leaves_nothing_for_the_next() -> None:
 @pytest.mark.parametrize(
     ("body", "found"),
     [
-        (b"Pos.system\n", "a persistent id"),
-        (text("x") + b"Q", "a persistent id"),
-        (b"\x82\x01", "an extension code"),
-        (b"\x83\x01\x01", "an extension code"),
-        (b"\x84\x01\x01\x01\x01", "an extension code"),
-        (b"\x97", "an out-of-band buffer"),
-        (b"\x98", "an out-of-band buffer"),
+        (b"Pos.system\n", ("F002.pickle", None, {"problem": Phrase("pickle-refused",
+         found=Phrase("noun-persistent"))})),
+        (text("x") + b"Q", ("F002.pickle", None, {"problem": Phrase("pickle-refused",
+         found=Phrase("noun-persistent"))})),
+        (b"\x82\x01", ("F002.pickle", None, {"problem": Phrase("pickle-refused",
+         found=Phrase("noun-extension"))})),
+        (b"\x83\x01\x01", ("F002.pickle", None, {"problem": Phrase("pickle-refused",
+         found=Phrase("noun-extension"))})),
+        (b"\x84\x01\x01\x01\x01", ("F002.pickle", None, {"problem": Phrase("pickle-refused",
+         found=Phrase("noun-extension"))})),
+        (b"\x97", ("F002.pickle", None, {"problem": Phrase("pickle-refused",
+         found=Phrase("noun-buffer"))})),
+        (b"\x98", ("F002.pickle", None, {"problem": Phrase("pickle-refused",
+         found=Phrase("noun-buffer"))})),
     ],
-)
-def test_steps_that_reach_outside(body: bytes, found: str) -> None:
-    assert refusal(saved(v=body)) == f"expected arrays and plain data, found {found}, {FORBIDDEN}"
+)  # fmt: skip
+def test_steps_that_reach_outside(body: bytes, found: Fault) -> None:
+    assert refusal(saved(v=body)) == found
 
 
 @pytest.mark.parametrize(
     ("body", "line"),
     [
-        (
-            b"B\xff\xff\xff\x7f",
-            "expected 2147483647 more bytes, found 2 (a file cut short?) at byte 7",
-        ),
-        (b"T\xff\xff\xff\xff", "expected -1 more bytes, found 2 (a file cut short?) at byte 7"),
-        (
-            b"X\xff\xff\xff\xff",
-            "expected 4294967295 more bytes, found 2 (a file cut short?) at byte 7",
-        ),
-        (
-            b"\x8e" + b"\xff" * 8,
-            "expected 18446744073709551615 more bytes, found 2 (a file cut short?) at byte 7",
-        ),
-        (
-            b"\x96" + b"\0" * 7 + b"\x7f",
-            "expected 9151314442816847872 more bytes, found 2 (a file cut short?) at byte 7",
-        ),
-        (
-            b"\x95" + b"\xff" * 8,
-            "expected 18446744073709551615 more bytes, found 2 (a file cut short?) at byte 7",
-        ),
-        (b"\x80\x06", "expected a pickle of protocol 0 to 5, found 6 at byte 7"),
-        (
-            b"\x8b\xff\xff\xff\x00",
-            "expected a number of at most 1024 bytes, found 16777215 at byte 7",
-        ),
-        (b"\x8b\xff\xff\xff\xff", "expected a number of at most 1024 bytes, found -1 at byte 7"),
-        (b"I1_0\n", 'expected a whole number, found "1_0" at byte 7'),
-        (b"I0x10\n", 'expected a whole number, found "0x10" at byte 7'),
-        (b"L12LL\n", 'expected a whole number, found "12L" at byte 7'),
-        (
-            b"I" + b"9" * 1_000_000 + b"\n",
-            "expected at most 256 letters in a line, found 1000000 at byte 7",
-        ),
-        (
-            b"L" + b"9" * 1_000_000 + b"L\n",
-            "expected at most 256 letters in a line, found 1000001 at byte 7",
-        ),
-        (b"F1e5_0\n", 'expected a number, found "1e5_0" at byte 7'),
-        (b"S'a\n", 'expected a text in quotes, found "\'a" at byte 7'),
-        (
-            b"S'\\N{BELL}'\n",
-            "expected a text as Python 2 writes it, found another escape at byte 7",
-        ),
-        (b"S'\\777'\n", "expected a text as Python 2 writes it, found another escape at byte 7"),
-        (
-            b"S'\\x4\\\\1'\n",
-            "expected a text as Python 2 writes it, found another escape at byte 7",
-        ),
-        (b"S'\\'\n", "expected a text as Python 2 writes it, found another escape at byte 7"),
-        (b"Iwhere", "expected the end of a line, found the end of the file (cut short?) at byte 7"),
-        (b"h\x07", "expected a value remembered before, found number 7 at byte 7"),
-        (b"g99\n", "expected a value remembered before, found number 99 at byte 7"),
-        (b"Np-1\n", "expected a number from 0 on, found -1 at byte 8"),
-        (b"0" * 9, "expected a value on the stack, found none at byte 9"),
-        (b"(R", "expected a value on the stack, found none at byte 8"),
-        (b"t1", "expected a mark on the stack, found none at byte 7"),
-        (b"Na", "expected a list to add to, found a text at byte 8"),
-        (b"(NNu", "expected a dict to add to, found a text at byte 10"),
-        (b"(NNNd", "expected keys with values, found a key without at byte 11"),
-        (b"\xffx", 'expected a step of a pickle, found "\ufffd" at byte 7'),
-        (b"NN\x93", "expected short names, found nothing and nothing at byte 9"),
-        (b")}N\x92", "expected no arguments with names, found nothing at byte 10"),
-        (
-            b"cnumpy\r\nndarray\r\n",
-            DAMAGED,
-        ),
-        (
-            b"I1\r\n",
-            DAMAGED,
-        ),
-        (
-            b"S'a'\r\n",
-            DAMAGED,
-        ),
+        (b"B\xff\xff\xff\x7f", ("F002.pickle-step", None, {"problem": Phrase("pickle-cut",
+         expected=2147483647, found=2), "at": 7})),
+        (b"T\xff\xff\xff\xff", ("F002.pickle-step", None, {"problem": Phrase("pickle-cut",
+         expected=-1, found=2), "at": 7})),
+        (b"X\xff\xff\xff\xff", ("F002.pickle-step", None, {"problem": Phrase("pickle-cut",
+         expected=4294967295, found=2), "at": 7})),
+        (b"\x8e" + b"\xff" * 8, ("F002.pickle-step", None, {"problem": Phrase("pickle-cut",
+         expected=18446744073709551615, found=2), "at": 7})),
+        (b"\x96" + b"\0" * 7 + b"\x7f", ("F002.pickle-step", None,
+         {"problem": Phrase("pickle-cut", expected=9151314442816847872, found=2), "at": 7})),
+        (b"\x95" + b"\xff" * 8, ("F002.pickle-step", None, {"problem": Phrase("pickle-cut",
+         expected=18446744073709551615, found=2), "at": 7})),
+        (b"\x80\x06", ("F002.pickle-step", None, {"problem": Phrase("pickle-protocol", found=6),
+         "at": 7})),
+        (b"\x8b\xff\xff\xff\x00", ("F002.pickle-step", None, {"problem": Phrase("pickle-long",
+         most=1024, found=16777215), "at": 7})),
+        (b"\x8b\xff\xff\xff\xff", ("F002.pickle-step", None, {"problem": Phrase("pickle-long",
+         most=1024, found=-1), "at": 7})),
+        (b"I1_0\n", ("F002.pickle-step", None, {"problem": Phrase("pickle-decimal", found=b"1_0"),
+         "at": 7})),
+        (b"I0x10\n", ("F002.pickle-step", None, {"problem": Phrase("pickle-decimal",
+         found=b"0x10"), "at": 7})),
+        (b"L12LL\n", ("F002.pickle-step", None, {"problem": Phrase("pickle-decimal",
+         found=b"12L"), "at": 7})),
+        (b"I" + b"9" * 1_000_000 + b"\n", ("F002.pickle-step", None,
+         {"problem": Phrase("pickle-line", most=256, found=1000000), "at": 7})),
+        (b"L" + b"9" * 1_000_000 + b"L\n", ("F002.pickle-step", None,
+         {"problem": Phrase("pickle-line", most=256, found=1000001), "at": 7})),
+        (b"F1e5_0\n", ("F002.pickle-step", None, {"problem": Phrase("pickle-number",
+         found=b"1e5_0"), "at": 7})),
+        (b"S'a\n", ("F002.pickle-step", None, {"problem": Phrase("pickle-quotes", found=b"'a"),
+         "at": 7})),
+        (b"S'\\N{BELL}'\n", ("F002.pickle-step", None, {"problem": Phrase("pickle-escape"),
+         "at": 7})),
+        (b"S'\\777'\n", ("F002.pickle-step", None, {"problem": Phrase("pickle-escape"), "at": 7})),
+        (b"S'\\x4\\\\1'\n", ("F002.pickle-step", None, {"problem": Phrase("pickle-escape"),
+         "at": 7})),
+        (b"S'\\'\n", ("F002.pickle-step", None, {"problem": Phrase("pickle-escape"), "at": 7})),
+        (b"Iwhere", ("F002.pickle-step", None, {"problem": Phrase("pickle-line-end"), "at": 7})),
+        (b"h\x07", ("F002.pickle-step", None, {"problem": Phrase("pickle-recall", found=7),
+         "at": 7})),
+        (b"g99\n", ("F002.pickle-step", None, {"problem": Phrase("pickle-recall", found=99),
+         "at": 7})),
+        (b"Np-1\n", ("F002.pickle-step", None, {"problem": Phrase("pickle-memo", found=-1),
+         "at": 8})),
+        (b"0" * 9, ("F002.pickle-step", None, {"problem": Phrase("pickle-stack"), "at": 9})),
+        (b"(R", ("F002.pickle-step", None, {"problem": Phrase("pickle-stack"), "at": 8})),
+        (b"t1", ("F002.pickle-step", None, {"problem": Phrase("pickle-mark"), "at": 7})),
+        (b"Na", ("F002.pickle-step", None, {"problem": Phrase("pickle-list",
+         found=Phrase("noun-text")), "at": 8})),
+        (b"(NNu", ("F002.pickle-step", None, {"problem": Phrase("pickle-dict",
+         found=Phrase("noun-text")), "at": 10})),
+        (b"(NNNd", ("F002.pickle-step", None, {"problem": Phrase("pickle-pairs"), "at": 11})),
+        (b"\xffx", ("F002.pickle-step", None, {"problem": Phrase("pickle-step", found=b"\xff"),
+         "at": 7})),
+        (b"NN\x93", ("F002.pickle-step", None, {"problem": Phrase("pickle-names",
+         module=Phrase("noun-nothing"), name=Phrase("noun-nothing")), "at": 9})),
+        (b")}N\x92", ("F002.pickle-step", None, {"problem": Phrase("pickle-keywords",
+         found=Phrase("noun-nothing")), "at": 10})),
+        (b"cnumpy\r\nndarray\r\n", ("F002.pickle-line-ends", None, {})),
+        (b"I1\r\n", ("F002.pickle-line-ends", None, {})),
+        (b"S'a'\r\n", ("F002.pickle-line-ends", None, {})),
     ],
     ids=lambda value: repr(value[:12]),
-)
-def test_damage(body: bytes, line: str) -> None:
+)  # fmt: skip
+def test_damage(body: bytes, line: Fault) -> None:
     assert refusal(b"\x80\x02}" + text("vv") + body + b"s.") == line

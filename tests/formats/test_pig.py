@@ -189,7 +189,7 @@ def test_without_texture_coordinates_the_figure_is_untextured(folder, gone):
     figure, warnings = read(write(folder, **{gone: None}))
     assert_core(figure)
     assert (figure.mesh.uvs, figure.mesh.uv_triangles) == (None, None)
-    assert warnings == [f"{folder}: no textures or faces_tex: shown without texture"]
+    assert warnings == [("F007.pig-texture", None, {})]
 
 
 # Pictures in the folder

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from faults import fault_of
 from pig_text import CORE
 from pig_text import write as write_pig
 from synthetic_smpl import model
@@ -108,19 +109,18 @@ def test_pose_alone_is_refused(files):
 @pytest.mark.parametrize(
     ("figure", "pose", "message"),
     [
-        ("legs", "short", ":1: expected 9 pose numbers for legs, found 3"),
-        ("pig", "short", ":1: expected 13 pose numbers for pig, found 3"),
-        ("smpl", "bend", ":1: expected 72 pose numbers for smpl, found 13"),
-        (
-            "legs",
-            "tail",
-            ':1: expected a DOF of legs, found "tail.x": no joint is called "tail"; there are 2: '
-            "hip, knee",
-        ),
+        ("legs", "short", ("F002.pose-vector", 1, {"expected": 9, "figure": "legs", "found": 3})),
+        ("pig", "short", ("F002.pose-vector", 1, {"expected": 13, "figure": "pig", "found": 3})),
+        ("smpl", "bend", ("F002.pose-vector", 1, {"expected": 72, "figure": "smpl", "found": 13})),
+        ("legs", "tail", ("F002.pose-unknown-dof", 1, {"figure": "legs", "found": "tail.x",
+         "reason": 'no joint is called "tail"; there are 2: hip, knee'})),
     ],
-)
+)  # fmt: skip
 def test_pose_of_another_figure_is_refused_with_both(files, figure, pose, message):
-    assert refusal(files[figure], files[pose]) == f"{files[pose]}{message}"
+    with pytest.raises(FormatError) as caught:
+        viewer.load(files[figure], files[pose])
+    assert caught.value.path == files[pose]
+    assert fault_of(caught.value.diagnostic) == message
 
 
 # Pictures
@@ -153,7 +153,9 @@ def test_picture_alone_is_refused(files):
 
 def test_broken_picture_is_refused(files):
     files["red"].write_bytes(b"\x89PNG\r\n\x1a\nnothing")
-    assert refusal(files["pig"], files["red"]).startswith(f"{files['red']}: a picture that cannot")
+    with pytest.raises(FormatError) as caught:
+        viewer.load(files["pig"], files["red"])
+    assert (caught.value.path, caught.value.diagnostic.key) == (files["red"], "F001.picture")
 
 
 # A figure that is open already

@@ -7,9 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from faults import fault_of, warnings_of
 from numpy.testing import assert_array_equal
 
 import viewer
+from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
 from viewer.formats import pose
 from viewer.formats._source import Source
@@ -97,36 +99,52 @@ def test_a_file_needs_no_more_than_names_and_turns():
 def test_without_turns_the_other_words_mean_nothing():
     source = Source("a.json", b'{"dofs": {"a.x": 1}, "joint_names": 3, "up": "y"}')
     assert pose.read(source).turns is None
-    assert source.warnings == ["a.json:1: keys that mean nothing in a pose: joint_names, up"]
+    assert warnings_of(source.diagnostics) == [
+        ("F007.pose-keys", 1, {"keys": ["joint_names", "up"]})
+    ]
 
 
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"joint_names": None}, "joint_names: expected names, found nothing"),
-        ({"joint_names": [1]}, "joint_names: expected names, found 1"),
-        ({"joint_names": "a"}, "joint_names: expected a list of names, found 0 dimensions"),
-        ({"joint_names": ["a", "b"]}, "joint_turns: expected 2 x 4 numbers, found 1 x 4"),
-        ({"joint_turns": [[0, 0, 1]]}, "joint_turns: expected 1 x 4 numbers, found 1 x 3"),
-        ({"joint_turns": 1}, "joint_turns: expected 1 x 4 numbers, found one number"),
-        ({"joint_turns": "a"}, "joint_turns: expected numbers, found 'a'"),
-        ({"joint_turns": [[0, 0], [1]]},
-         "joint_turns: expected numbers, found lists of different lengths or depths"),
-        ({"joint_turns": [[0, 0, 0, 0]]},
-         "joint_turns: a: expected a quaternion, found four zeros"),
-        ({"joint_turns": [[0, 0, 0, 1e300]]},
-         "joint_turns: expected finite numbers, found 1e+300"),
-        ({"joint_shifts": [[0, 0]]}, "joint_shifts: expected 1 x 3 numbers, found 1 x 2"),
-        ({"joint_rotations": [[0, 0, 1]]},
-         "joint_rotations: expected 1 x 4 numbers, found 1 x 3"),
-        ({"joint_rotations": [[0, 0, 0, 0]]},
-         "joint_rotations: a: expected a quaternion, found four zeros"),
-        ({"up": "x"}, 'up: expected "y" or "z", found "x"'),
-        ({"up": 3}, "up: expected a word, found 3"),
-        ({"dof_layout": [1]}, "dof_layout: expected a word, found a list of 1"),
+        ({"joint_names": None}, ("F002.pose-array", 1, {"item": "joint_names",
+         "expected": Phrase("pose-names"), "found": Phrase("found-nothing")})),
+        ({"joint_names": [1]}, ("F002.pose-array", 1, {"item": "joint_names",
+         "expected": Phrase("pose-names"), "found": Phrase("found-value", value="1")})),
+        ({"joint_names": "a"}, ("F002.pose-list", 1, {"item": "joint_names", "found": 0})),
+        ({"joint_names": ["a", "b"]}, ("F002.pose-array", 1, {"item": "joint_turns",
+         "expected": Phrase("wanted-numbers", shape=(2, 4)), "found": Phrase("pose-shape",
+         shape=(1, 4))})),
+        ({"joint_turns": [[0, 0, 1]]}, ("F002.pose-array", 1, {"item": "joint_turns",
+         "expected": Phrase("wanted-numbers", shape=(1, 4)), "found": Phrase("pose-shape",
+         shape=(1, 3))})),
+        ({"joint_turns": 1}, ("F002.pose-array", 1, {"item": "joint_turns",
+         "expected": Phrase("wanted-numbers", shape=(1, 4)), "found": Phrase("pose-one-number")})),
+        ({"joint_turns": "a"}, ("F002.pose-array", 1, {"item": "joint_turns",
+         "expected": Phrase("pose-numbers"), "found": Phrase("found-value", value="'a'")})),
+        ({"joint_turns": [[0, 0], [1]]}, ("F002.pose-array", 1, {"item": "joint_turns",
+         "expected": Phrase("pose-numbers"), "found": Phrase("pose-ragged")})),
+        ({"joint_turns": [[0, 0, 0, 0]]}, ("F002.pose-quaternion", 1, {"item": "joint_turns",
+         "joint": "a"})),
+        ({"joint_turns": [[0, 0, 0, 1e300]]}, ("F003.pose-number", 1, {"item": "joint_turns",
+         "found": 1e300})),
+        ({"joint_shifts": [[0, 0]]}, ("F002.pose-array", 1, {"item": "joint_shifts",
+         "expected": Phrase("wanted-numbers", shape=(1, 3)), "found": Phrase("pose-shape",
+         shape=(1, 2))})),
+        ({"joint_rotations": [[0, 0, 1]]}, ("F002.pose-array", 1, {"item": "joint_rotations",
+         "expected": Phrase("wanted-numbers", shape=(1, 4)), "found": Phrase("pose-shape",
+         shape=(1, 3))})),
+        ({"joint_rotations": [[0, 0, 0, 0]]}, ("F002.pose-quaternion", 1,
+         {"item": "joint_rotations", "joint": "a"})),
+        ({"up": "x"}, ("F002.pose-up", 1, {"found": "x"})),
+        ({"up": 3}, ("F002.pose-word", 1, {"item": "up", "found": Phrase("found-value",
+         value="3")})),
+        ({"dof_layout": [1]}, ("F002.pose-word", 1, {"item": "dof_layout",
+         "found": Phrase("found-list", n=1)})),
     ],
 )  # fmt: skip
 def test_broken_turns_are_refused(values, message):
     with pytest.raises(FormatError) as caught:
         read(**values)
-    assert str(caught.value) == f"a.json:1: {message}"
+    assert str(caught.value).startswith("a.json:1: ")
+    assert fault_of(caught.value.diagnostic) == message

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 from capture_files import body, opened, rows_of, write_frames
+from faults import fault_of
 
+from viewer.diagnostics import Collector, Phrase
 from viewer.errors import FormatError
 from viewer.formats import Source, amass, anim
 from viewer.formats import bvh as bvh_reader
@@ -19,9 +21,8 @@ def refusal(read, path):
 
 
 def tolerant(read, path):
-    source = Source.open(path)
-    source.faults = []
-    return read(source), source.faults
+    source = Source.open(path, diagnostics=Collector(keeps_errors=True))
+    return read(source), source.diagnostics.errors
 
 
 def test_beyond_is_told_row_by_row():
@@ -40,9 +41,9 @@ def motion_file(path, far, key="trans", **more):
 @pytest.mark.parametrize("key", ["trans", "transl"])
 def test_far_translation_is_refused_with_its_key(tmp_path, far, key):
     path = motion_file(tmp_path / "a.npz", far, key)
-    assert str(refusal(amass.read, path)) == (
-        f"{path}: {key}: expected numbers up to 1e+09, found {far:g} in frame 1"
-    )
+    values = {"item": key, "limit": 1e9, "found": far, "frame": 1}
+    error = refusal(amass.read, path)
+    assert (error.path, fault_of(error.diagnostic)) == (path, ("F003.motion-reach", None, values))
 
 
 def test_translation_is_measured_as_scaled(tmp_path):
@@ -61,10 +62,12 @@ def test_far_person_is_a_gap(tmp_path, far):
     folder = write_frames(tmp_path / "smpl", {0: bad, 1: good, 2: bad, 3: good})
     _, parts, _ = opened(tmp_path)
     assert rows_of(parts, 0) == [1, 3]
-    text = f"json:1: person 0: Th: expected numbers up to 1e+09, found {far:g}"
-    assert [text for part in parts for text in part.warnings] == [
-        f"{folder}/000000.{text}",
-        f"{folder}/000002.{text}",
+    problem = Phrase("beyond-limit", limit=1e9, found=far)
+    fault = ("F003.record", None, {"item": "person 0: Th", "problem": problem})
+    warnings = [found for part in parts for found in part.warnings]
+    assert [(found.path, *fault_of(found)) for found in warnings] == [
+        (folder / "000000.json", "F007.record", 1, {"problem": fault}),
+        (folder / "000002.json", "F007.record", 1, {"problem": fault}),
     ]
 
 
@@ -91,9 +94,11 @@ Frame Time: 0.1
 def test_far_position_is_refused_with_its_line(tmp_path, far):
     path = tmp_path / "a.bvh"
     path.write_text(BVH.format(offset=0, far=far))
-    assert str(refusal(bvh_reader.read, path)) == (
-        f"{path}:15: frame 1: Zposition of joint hip: expected numbers up to 1e+09, found {far:g}"
-    )
+    item = Phrase("bvh-position", frame=1, axis="Z", joint="hip")
+    values = {"item": item, "most": 1e9, "found": pytest.approx(far)}
+    error = refusal(bvh_reader.read, path)
+    assert fault_of(error.diagnostic) == ("F003.beyond", 15, values)
+    assert error.path == path
     motion, faults = tolerant(bvh_reader.read, path)
     assert [(fault.part, fault.places.tolist()) for fault in faults] == [("frames", [1])]
     assert motion.clip.translations[:, 0].tolist() == [[0, 0, 0], [0, 0, 0], [0, 1, 0]]
@@ -112,7 +117,10 @@ def test_far_key_is_refused_with_its_line(tmp_path, far):
     head = "animation {\nrange 0 1\nnumchannels 1\nchannel {\nextrapolate constant constant\n"
     path.write_text(f"{head}{keys}\n}}\n}}\n")
     error = refusal(anim.read, path)
-    assert error.line == 8
-    assert str(error).endswith(f"value: expected numbers up to 1e+09, found {far:g}")
+    key, line, values = fault_of(error.diagnostic)
+    assert (key, line, values["most"], values["item"].values["item"]) == (
+        "F003.beyond", 8, 1e9, "value"
+    )  # fmt: skip
+    assert values["found"] == pytest.approx(far)
     clip, faults = tolerant(anim.read, path)
     assert len(faults) == 1 and clip.channels[0].values.tolist() == [1.0]

@@ -1,11 +1,13 @@
-"""The .anim reader and writer: grammar, quirks, exact messages."""
+"""The .anim reader and writer: grammar, quirks, and what is said of broken files."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
+from faults import Fault, fault_of, refusal_of, warnings_of
 from formats.synthetic_smpl import model
 
+from viewer.diagnostics import Phrase
 from viewer.errors import FormatError, RigError, UnsupportedFormatError
 from viewer.formats import Source, detect, read, write
 from viewer.loading import load
@@ -16,11 +18,11 @@ GOOD = f"animation {{ range -1 4 numchannels 1 {ONE} }}"
 SKEL = "balljoint root { offset 0 0 0 }"
 
 
-def parse(text: str) -> tuple[Clip, list[str]]:
+def parse(text: str) -> tuple[Clip, list[Fault]]:
     source = Source("walk.anim", text.encode())
     clip = read(source)
     assert isinstance(clip, Clip)
-    return clip, source.warnings
+    return clip, warnings_of(source.diagnostics)
 
 
 def test_reads_every_part() -> None:
@@ -53,85 +55,206 @@ def test_quirks_load_without_a_word(text: str) -> None:
 def test_unsorted_keys_are_sorted_with_a_warning() -> None:
     clip, warnings = parse(GOOD.replace("0 1 flat smooth 2", "3 1 flat smooth 2"))
     np.testing.assert_array_equal(clip.channels[0].times, [2, 3])
-    assert warnings == ["walk.anim:1: channel 0: key 1 is before key 0; keys sorted"]
+    assert warnings == [("C001.anim-sorted", 1, {"channel": 0, "late": 1, "before": 0})]
 
 
 def test_channel_without_keys_warns() -> None:
     _, warnings = parse("animation { range 0 1 numchannels 1 channel { keys 0 { } } }")
-    assert warnings == ["walk.anim: channel 0 has no keys: its value is 0"]
+    assert warnings == [("C010.anim-no-keys", None, {"channel": 0})]
 
 
 @pytest.mark.parametrize(
-    ("text", "message"),
+    ("text", "fault"),
     [
-        ("balloon {", 'walk.anim:1: animation: expected "animation", found "balloon"'),
+        (
+            "balloon {",
+            (
+                "F002.anim-word",
+                1,
+                {
+                    "where": Phrase("animation"),
+                    "found": b"balloon",
+                    "begins": None,
+                    "expected": "animation",
+                    "looks": None,
+                },
+            ),
+        ),
         (
             GOOD.replace("\n", "").replace("keys", "\nkeys").replace("flat", "steep"),
-            "walk.anim:2: channel 0, key 0: tangent: expected flat, linear, smooth or a number, "
-            'found "steep"',
+            (
+                "F002.anim-tangent",
+                2,
+                {
+                    "where": Phrase("anim-key", channel=0, index=0),
+                    "found": b"steep",
+                    "begins": None,
+                    "rules": ("flat", "linear", "smooth"),
+                },
+            ),
         ),
         (
             GOOD.replace("bounce", "jump"),
-            "walk.anim:1: channel 0: extrapolate: expected one of constant, linear, cycle, "
-            'cycle_offset, bounce, found "jump"',
+            (
+                "F002.anim-mode",
+                1,
+                {
+                    "where": Phrase("anim-channel", channel=0),
+                    "found": b"jump",
+                    "begins": None,
+                    "modes": ("constant", "linear", "cycle", "cycle_offset", "bounce"),
+                },
+            ),
         ),
         (
             GOOD.replace("{ 0 1", "{ 0 nan"),
-            'walk.anim:1: channel 0, key 0: value: expected a number, found "nan"',
+            (
+                "F003.number",
+                1,
+                {
+                    "where": Phrase("anim-key", channel=0, index=0),
+                    "found": b"nan",
+                    "begins": None,
+                    "item": Phrase(
+                        "anim-item", where=Phrase("anim-key", channel=0, index=0), item="value"
+                    ),
+                },
+            ),
         ),
-        (GOOD.replace("keys 2", "keys 3"), "walk.anim:1: channel 0: expected 3 keys, found 2"),
+        (
+            GOOD.replace("keys 2", "keys 3"),
+            (
+                "F002.anim-keys",
+                1,
+                {
+                    "where": Phrase("anim-channel", channel=0),
+                    "found": 2,
+                    "begins": None,
+                    "expected": 3,
+                },
+            ),
+        ),
         (
             GOOD.replace("keys 2", "keys 2000000000"),
-            "walk.anim:1: channel 0: keys: expected a count that the file can hold, "
-            f'found "2000000000" with {len(GOOD.split("keys 2")[1])} bytes left',
+            (
+                "F002.anim-count",
+                1,
+                {
+                    "where": Phrase("anim-channel", channel=0),
+                    "found": b"2000000000",
+                    "begins": None,
+                    "item": Phrase(
+                        "anim-item", where=Phrase("anim-channel", channel=0), item="keys"
+                    ),
+                    "left": len(GOOD.split("keys 2")[1]),
+                },
+            ),
         ),
         (
             GOOD.replace("numchannels 1", "numchannels 2"),
-            "walk.anim:1: animation: expected 2 channels as numchannels says, found 1",
+            (
+                "F002.anim-channels",
+                1,
+                {"where": Phrase("animation"), "found": 1, "begins": None, "expected": 2},
+            ),
         ),
         (
             GOOD.split("keys")[0],
-            'walk.anim:1: channel 0: expected "}", found the end of the file '
-            "(channel 0 begins in line 1)",
+            (
+                "F002.anim-word",
+                1,
+                {
+                    "where": Phrase("anim-channel", channel=0),
+                    "found": None,
+                    "begins": Phrase(
+                        "anim-begins", where=Phrase("anim-channel", channel=0), line=1
+                    ),
+                    "expected": "}",
+                    "looks": None,
+                },
+            ),
         ),
         (
             GOOD.replace("channel {", "\nchannel {").replace(" linear", "").split("-0.5")[0],
-            "walk.anim:2: channel 0, key 1: tangent: expected flat, linear, smooth or a number, "
-            "found the end of the file (channel 0 begins in line 2)",
+            (
+                "F002.anim-tangent",
+                2,
+                {
+                    "where": Phrase("anim-key", channel=0, index=1),
+                    "found": None,
+                    "begins": Phrase(
+                        "anim-begins", where=Phrase("anim-channel", channel=0), line=2
+                    ),
+                    "rules": ("flat", "linear", "smooth"),
+                },
+            ),
         ),
         (
             GOOD.replace("} }", "} keys 0 { } }", 1),
-            "walk.anim:1: channel 0: expected one list of keys, found another",
+            (
+                "F002.anim-keys-again",
+                1,
+                {"where": Phrase("anim-channel", channel=0), "found": b"keys", "begins": None},
+            ),
         ),
         (
             GOOD.replace("numchannels 1 channel", "numchannels 1 chanel"),
-            'walk.anim:1: animation: expected a channel, found "chanel"',
+            (
+                "F002.anim-item",
+                1,
+                {"where": Phrase("animation"), "found": b"chanel", "begins": None},
+            ),
         ),
         (
             GOOD.replace("numchannels 1", "numchannels -1"),
-            "walk.anim:1: animation: numchannels: expected a count that the file can hold, "
-            f'found "-1" with {len(GOOD.split("numchannels 1")[1])} bytes left',
+            (
+                "F002.anim-count",
+                1,
+                {
+                    "where": Phrase("animation"),
+                    "found": b"-1",
+                    "begins": None,
+                    "item": Phrase("anim-item", where=Phrase("animation"), item="numchannels"),
+                    "left": len(GOOD.split("numchannels 1")[1]),
+                },
+            ),
         ),
         (
             GOOD.replace("numchannels 1", "numchannels 1.5"),
-            "walk.anim:1: animation: numchannels: expected a count that the file can hold, "
-            f'found "1.5" with {len(GOOD.split("numchannels 1")[1])} bytes left',
+            (
+                "F002.anim-count",
+                1,
+                {
+                    "where": Phrase("animation"),
+                    "found": b"1.5",
+                    "begins": None,
+                    "item": Phrase("anim-item", where=Phrase("animation"), item="numchannels"),
+                    "left": len(GOOD.split("numchannels 1")[1]),
+                },
+            ),
         ),
         (
             GOOD.replace("range -1 4", "range -1 up"),
-            'walk.anim:1: animation: range: expected a number, found "up"',
+            (
+                "F002.number",
+                1,
+                {
+                    "where": Phrase("animation"),
+                    "found": b"up",
+                    "begins": None,
+                    "item": Phrase("anim-item", where=Phrase("animation"), item="range"),
+                },
+            ),
         ),
-        ("", "walk.anim: expected a .anim file, found an empty file"),
+        ("", ("F002.kind", None, {"wanted": ".anim", "looks": "an empty file"})),
         (
             GOOD.replace("numchannels 1 ", ""),
-            "walk.anim:1: animation: expected numchannels, found 1",
+            ("F002.anim-no-count", 1, {"where": Phrase("animation"), "found": 1, "begins": None}),
         ),
     ],
 )
-def test_malformed_files_are_refused_with_their_line(text: str, message: str) -> None:
-    with pytest.raises(FormatError) as caught:
-        parse(text)
-    assert str(caught.value) == message
+def test_malformed_files_are_refused_with_their_line(text: str, fault: Fault) -> None:
+    assert refusal_of(lambda: parse(text)) == fault
 
 
 def test_truncation_anywhere_is_an_error_or_a_warning() -> None:
@@ -188,13 +311,13 @@ def test_keys_at_one_time_are_both_kept() -> None:
 def test_reversed_range_is_put_in_order_with_a_warning() -> None:
     clip, warnings = parse(GOOD.replace("range -1 4", "range 4 -1"))
     assert (clip.start, clip.end) == (-1.0, 4.0)
-    assert warnings == ["walk.anim:1: range ends before it begins: read as -1 to 4"]
+    assert warnings == [("F007.anim-reversed", 1, {"start": "-1", "end": "4"})]
 
 
 def test_missing_range_is_that_of_the_keys() -> None:
     clip, warnings = parse(GOOD.replace("range -1 4 ", ""))
     assert (clip.start, clip.end) == (0.0, 2.0)
-    assert warnings == ["walk.anim: no range: that of the keys is played, 0 to 2"]
+    assert warnings == [("F007.anim-no-range", None, {"start": "0", "end": "2"})]
 
 
 def test_numbers_of_numpy_are_written_as_numbers(tmp_path: Path) -> None:
@@ -209,8 +332,10 @@ def test_numbers_of_numpy_are_written_as_numbers(tmp_path: Path) -> None:
 
 def test_write_refuses_channels_out_of_order(tmp_path: Path) -> None:
     channel = Channel(3, np.zeros(1), np.zeros(1), (("flat", "flat"),))
-    with pytest.raises(UnsupportedFormatError, match="a channel for every DOF"):
-        write(Clip("odd", (channel,), 0, 1), tmp_path / "odd.anim")
+    clip = Clip("odd", (channel,), 0, 1)
+    with pytest.raises(UnsupportedFormatError) as caught:
+        write(clip, tmp_path / "odd.anim")
+    assert fault_of(caught.value.diagnostic) == ("F002.anim-order", None, {})
 
 
 def test_clip_is_recognised_by_content() -> None:

@@ -4,8 +4,10 @@ import struct
 
 import numpy as np
 import pytest
+from faults import Fault, refusal_of, warnings_of
 
 import viewer
+from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
 from viewer.formats import Source, detect, ply
 from viewer.media.png import encode_png
@@ -21,9 +23,9 @@ CODES = {"char": "b", "uchar": "B", "short": "h", "ushort": "H", "int": "i", "ui
 
 
 def read(data, path="a.ply"):
-    """Return the figure and the warnings of a text."""
+    """Return the figure of a text, and its warnings as (key, line, values)."""
     source = Source(path, data if isinstance(data, bytes) else data.encode())
-    return ply.read(source), source.warnings
+    return ply.read(source), warnings_of(source.diagnostics)
 
 
 def silent(data):
@@ -32,10 +34,16 @@ def silent(data):
     return figure
 
 
+def vertex(row: int) -> Phrase:
+    return Phrase("ply-row", element="vertex", row=row)
+
+
+def unused(*names: str) -> Fault:
+    return "F007.ply-unused", None, {"names": list(names)}
+
+
 def refusal(data):
-    with pytest.raises(FormatError) as caught:
-        read(data)
-    return str(caught.value)
+    return refusal_of(lambda: read(data))
 
 
 def binary(order, elements, comments=()) -> bytes:
@@ -109,7 +117,7 @@ def test_properties_in_any_order_and_elements_that_are_not_known(order: str) -> 
     assert figure.mesh.uvs.tolist() == [[0.5, 0.25]] * 3
     assert figure.mesh.n_triangles == 4
     assert figure.mesh.triangles[[0, 3]].tolist() == [[0, 1, 2], [2, 1, 0]]
-    assert warnings == ["a.ply: not used: element camera, vertex red, face flags, face quality"]
+    assert warnings == [unused("element camera", "vertex red", "face flags", "face quality")]
 
 
 def test_a_last_byte_that_ends_texts_is_a_number_here() -> None:
@@ -143,11 +151,8 @@ def test_texture_coordinates_that_are_not_two_a_corner_are_left_out() -> None:
     text = text.replace("3 0 1 2\n", "3 0 1 2 0\n").replace("0 1 2 3\n", "0 1 2 3 2 .5 .5\n")
     figure, warnings = read(text)
     assert figure.mesh.uvs is None
-    assert warnings == [
-        "a.ply: texcoord of 2 faces is not two numbers a corner, first face 0: "
-        "texture coordinates are left out",
-        "a.ply: not used: face texcoord",
-    ]
+    texcoord = ("F007.ply-texcoord", None, {"n": 2, "face": 0})
+    assert warnings == [texcoord, unused("face texcoord")]
 
 
 def test_a_comment_names_the_texture(tmp_path) -> None:
@@ -181,19 +186,19 @@ def test_line_ends_of_the_header() -> None:
 def test_points_alone_are_a_warning() -> None:
     figure, warnings = read(f"{HEAD}{VERTEX}end_header\n{POINTS}")
     assert figure.mesh.n_vertices == 4 and figure.mesh.n_triangles == 0
-    assert warnings == ["a.ply: no faces: 4 points, of which nothing is drawn"]
+    assert warnings == [("F007.ply-no-faces", None, {"n": 4})]
 
 
 def test_what_is_left_over_is_said() -> None:
-    assert read(GOOD + "1 2 3\n")[1] == ["a.ply: ignored 1 line after the last element"]
+    assert read(GOOD + "1 2 3\n")[1] == [("F006.ply-lines", None, {"n": 1})]
     data = binary("<", [("vertex", ["float x", "float y", "float z"], SQUARE)])
-    assert read(data + b"abc")[1][0] == "a.ply: ignored 3 bytes after the last element"
+    assert read(data + b"abc")[1][0] == ("F006.ply-bytes", None, {"n": 3})
 
 
 def test_faces_with_fewer_than_three_corners_are_left_out() -> None:
     figure, warnings = read(GOOD.replace("3 0 1 2\n", "2 0 1\n"))
     assert figure.mesh.triangles.tolist() == [[0, 1, 2], [0, 2, 3]]
-    assert warnings == ["a.ply: left out 1 face with fewer than 3 corners, first face 0"]
+    assert warnings == [("F007.ply-small-faces", None, {"n": 1, "face": 0})]
 
 
 def changed(old: str, new: str) -> str:
@@ -202,67 +207,92 @@ def changed(old: str, new: str) -> str:
 
 
 @pytest.mark.parametrize(
-    ("text", "message"),
+    ("text", "fault"),
     [
-        ("", "a.ply:1: expected end_header, found the end of the header"),
-        ("plx\n", 'a.ply:1: expected "ply" in the first line, found "plx"'),
-        ("ply\n\n", "a.ply:3: expected end_header, found the end of the header"),
-        (changed("format ascii 1.0\n", ""),
-         "a.ply:8: expected a line `format`, found none before end_header"),
-        (changed("ascii 1.0", "ascii 2.0"),
-         "a.ply:2: format: expected one of ascii, binary_little_endian, binary_big_endian "
-         'and 1.0, found "ascii 2.0"'),
-        (changed("ascii 1.0", "text 1.0"),
-         "a.ply:2: format: expected one of ascii, binary_little_endian, binary_big_endian "
-         'and 1.0, found "text 1.0"'),
-        (changed("vertex 4", "vertex four"),
-         'a.ply:3: element: expected a name and a count, found "vertex four"'),
-        (changed("vertex 4", "vertex -4"),
-         'a.ply:3: element: expected a name and a count, found "vertex -4"'),
-        (changed("float y", "real y"),
-         "a.ply:5: property: expected a type and a name, or list, two types and a name, "
-         'found "real y"'),
-        (changed("float y", "float x"), 'a.ply:5: property: expected a new name, found "x" again'),
-        (changed("list uchar int vertex_indices", "list uchar vertex_indices"),
-         "a.ply:8: property: expected a type and a name, or list, two types and a name, "
-         'found "list uchar vertex_indices"'),
-        (changed("list uchar", "list float"),
-         'a.ply:8: property: expected a list counted in whole numbers, found "float"'),
-        (HEAD + "property float x\n",
-         "a.ply:3: property: expected an element before it, found none"),
-        (changed("float y", "float y\nhello"),
-         'a.ply:6: expected element, property, comment or end_header, found "hello"'),
-        (HEAD + "element face 0\nend_header\n", "a.ply:4: expected an element vertex, found face"),
-        (HEAD + "end_header\n", "a.ply:3: expected an element vertex, found none"),
-        (changed("float z", "float w"),
-         "a.ply:3: expected vertices with x, y and z, found one without x, y and z"),
-        (HEAD + VERTEX.replace("4", "0") + "end_header\n",
-         "a.ply:3: expected vertices with x, y and z, found none"),
-        (changed("vertex_indices", "corners"),
-         "a.ply:7: face: expected a list vertex_indices, found none"),
-        (changed("face 2", "tristrips 2"),
-         "a.ply:7: expected an element face, found tristrips"),
-        (changed("2 0 0\n", "2 0\n"), "a.ply:11: expected 3 or more numbers in the line, found 2"),
-        (changed("2 0 0\n", "2 0 0 1\n"), "a.ply:11: expected 3 numbers in the line, found 4"),
-        (changed("2 0 0\n", "2 up 0\n"), 'a.ply:11: expected a number, found "up"'),
-        (changed("2 0 0\n", "2 nan 0\n"), 'a.ply:11: expected a number, found "nan"'),
-        (changed("3 0 1 2\n", "3 0 1\n"),
-         "a.ply:14: expected 4 or more numbers in the line, found 3"),
-        (changed("3 0 1 2\n", "3 0 1 2 3\n"), "a.ply:14: expected 4 numbers in the line, found 5"),
-        (changed("3 0 1 2\n", "1.5 0 1 2\n"),
-         "a.ply:14: face: expected how many follow, found 1.5"),
-        (changed("3 0 1 2\n", "-1 0 1 2\n"), "a.ply:14: face: expected how many follow, found -1"),
-        (changed("3 0 1 2\n", "3 0 1 4\n"),
-         "a.ply:14: face 0: expected a vertex from 0 to 3, found 4"),
-        (changed("0 1 2 3\n", "0 1 -1 3\n"),
-         "a.ply:15: face 1: expected a vertex from 0 to 3, found -1"),
-        (changed("face 2", "face 3"), "a.ply:7: face: expected 3 lines, found 2"),
-        (changed("vertex 4", "vertex 99999999999"),
-         "a.ply:3: vertex: expected 99999999999 lines, found 6"),
+        ("", ("F002.ply-no-end", 1, {})),
+        ("plx\n", ("F002.ply-start", 1, {"found": b"plx"})),
+        ("ply\n\n", ("F002.ply-no-end", 3, {})),
+        (changed("format ascii 1.0\n", ""), ("F002.ply-no-format", 8, {})),
+        (
+            changed("ascii 1.0", "ascii 2.0"),
+            (
+                "F002.ply-format",
+                2,
+                {
+                    "orders": ["ascii", "binary_little_endian", "binary_big_endian"],
+                    "found": "ascii 2.0",
+                },
+            ),
+        ),
+        (
+            changed("ascii 1.0", "text 1.0"),
+            (
+                "F002.ply-format",
+                2,
+                {
+                    "orders": ["ascii", "binary_little_endian", "binary_big_endian"],
+                    "found": "text 1.0",
+                },
+            ),
+        ),
+        (changed("vertex 4", "vertex four"), ("F002.ply-element", 3, {"found": "vertex four"})),
+        (changed("vertex 4", "vertex -4"), ("F002.ply-element", 3, {"found": "vertex -4"})),
+        (changed("float y", "real y"), ("F002.ply-property", 5, {"found": "real y"})),
+        (changed("float y", "float x"), ("F002.ply-property-again", 5, {"found": "x"})),
+        (
+            changed("list uchar int vertex_indices", "list uchar vertex_indices"),
+            ("F002.ply-property", 8, {"found": "list uchar vertex_indices"}),
+        ),
+        (changed("list uchar", "list float"), ("F002.ply-list-count", 8, {"found": "float"})),
+        (HEAD + "property float x\n", ("F002.ply-no-element", 3, {})),
+        (changed("float y", "float y\nhello"), ("F002.ply-line", 6, {"found": "hello"})),
+        (HEAD + "element face 0\nend_header\n", ("F002.ply-no-vertex", 4, {"names": ["face"]})),
+        (HEAD + "end_header\n", ("F002.ply-nothing", 3, {})),
+        (changed("float z", "float w"), ("F002.ply-coordinates", 3, {})),
+        (HEAD + VERTEX.replace("4", "0") + "end_header\n", ("F002.ply-vertices", 3, {})),
+        (changed("vertex_indices", "corners"), ("F002.ply-no-corners", 7, {})),
+        (changed("face 2", "tristrips 2"), ("F002.ply-strips", 7, {})),
+        (changed("2 0 0\n", "2 0\n"), ("F002.ply-fewer", 11, {"expected": 3, "found": 2})),
+        (changed("2 0 0\n", "2 0 0 1\n"), ("F002.ply-more", 11, {"expected": 3, "found": 4})),
+        (changed("2 0 0\n", "2 up 0\n"), ("F002.number", 11, {"item": vertex(1), "found": b"up"})),
+        (
+            changed("2 0 0\n", "2 nan 0\n"),
+            ("F003.number", 11, {"item": vertex(1), "found": b"nan"}),
+        ),
+        (changed("3 0 1 2\n", "3 0 1\n"), ("F002.ply-fewer", 14, {"expected": 4, "found": 3})),
+        (changed("3 0 1 2\n", "3 0 1 2 3\n"), ("F002.ply-more", 14, {"expected": 4, "found": 5})),
+        (
+            changed("3 0 1 2\n", "1.5 0 1 2\n"),
+            ("F002.ply-list", 14, {"item": Phrase("ply-row", element="face", row=0), "found": 1.5}),
+        ),
+        (
+            changed("3 0 1 2\n", "-1 0 1 2\n"),
+            (
+                "F002.ply-list",
+                14,
+                {"item": Phrase("ply-row", element="face", row=0), "found": -1.0},
+            ),
+        ),
+        (
+            changed("3 0 1 2\n", "3 0 1 4\n"),
+            ("F002.ply-corner", 14, {"face": 0, "last": 3, "found": 4.0}),
+        ),
+        (
+            changed("0 1 2 3\n", "0 1 -1 3\n"),
+            ("F002.ply-corner", 15, {"face": 1, "last": 3, "found": -1.0}),
+        ),
+        (
+            changed("face 2", "face 3"),
+            ("F002.ply-lines", 7, {"element": "face", "expected": 3, "found": 2}),
+        ),
+        (
+            changed("vertex 4", "vertex 99999999999"),
+            ("F002.ply-lines", 3, {"element": "vertex", "expected": 99999999999, "found": 6}),
+        ),
     ],
-)  # fmt: skip
-def test_broken_texts_say_where_and_what(text: str, message: str) -> None:
-    assert refusal(text) == message
+)
+def test_broken_texts_say_where_and_what(text: str, fault: Fault) -> None:
+    assert refusal(text) == fault
 
 
 def test_broken_bytes_say_where_and_what() -> None:
@@ -271,19 +301,19 @@ def test_broken_bytes_say_where_and_what() -> None:
         ("face", ["list char int vertex_indices"], [[[0, 1, 2]], [[0, 1, 2, 3]]]),
     ]
     data = binary("<", elements)
-    assert refusal(data[:-1]) == (
-        "a.ply:7: face: expected 2 rows, found the end of the file after 29 bytes of them"
-    )
+    short = {"element": "face", "expected": 2, "size": 29}
+    assert refusal(data[:-1]) == ("F002.ply-short", 7, short)
     many = data.replace(b"vertex 4", b"vertex 999999999999")
-    assert refusal(many) == (
-        "a.ply:3: vertex: expected 999999999999 rows, found the end of the file "
-        "after 78 bytes of them"
-    )
+    short = {"element": "vertex", "expected": 999999999999, "size": 78}
+    assert refusal(many) == ("F002.ply-short", 3, short)
     start = data.index(b"end_header\n") + 11
     nan = data[: start + 16] + struct.pack("<f", float("nan")) + data[start + 20 :]
-    assert refusal(nan) == "a.ply: vertex 1: expected finite x y z, found nan"
+    key, line, values = refusal(nan)
+    assert (key, line, values["names"]) == ("F003.ply-finite", None, "x y z")
+    assert values["item"] == vertex(1) and np.isnan(values["found"])
     negative = data[: start + 48] + b"\xff" + data[start + 49 :]
-    assert refusal(negative).startswith("a.ply")
+    face = Phrase("ply-row", element="face", row=0)
+    assert refusal(negative) == ("F002.ply-list", None, {"item": face, "found": -1})
 
 
 def test_it_is_found_by_content() -> None:

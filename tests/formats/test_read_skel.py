@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 from skel_text import GOOD, INF, assert_good, read, silent
 
+from viewer.diagnostics import Phrase
 from viewer.rig.pose import rest_pose
+
+
+def unknown(line, word):
+    return "F006.unknown", line, {"found": word.encode()}
 
 
 def test_good_file_gives_every_value():
@@ -161,10 +166,9 @@ def test_minimum_above_maximum_is_ignored_with_a_warning():
     )
     assert skeleton.dof_limits[6:].tolist() == [[-INF, INF]] * 3
     assert skeleton.rest_dofs[6:].tolist() == [9, 9, 9]
-    assert warnings == [
-        "a.skel:4: ignored 2 limits whose minimum is above the maximum, "
-        "first rotxlimit 5 4 of joint b"
-    ]
+    joint = Phrase("joint", name="b")
+    values = {"n": 2, "axis": "x", "low": 5.0, "high": 4.0, "joint": joint}
+    assert warnings == [("S003.ignored", 4, values)]
 
 
 # What is not known
@@ -196,50 +200,49 @@ def test_unknown_item_is_skipped_whole(item, words, place):
     assert skeleton.names == ("root", "arm")
     assert skeleton.parents.tolist() == [-1, 0]
     assert skeleton.rest_translations.tolist() == [[1, 2, 3], [0, 1, 0]]
-    lines = [f'a.skel:{line}: skipped unknown "{word}"' for line, word in enumerate(words, 2)]
-    assert warnings == lines
+    assert warnings == [unknown(line, word) for line, word in enumerate(words, 2)]
 
 
 def test_numbers_that_belong_to_nothing_are_skipped():
     skeleton, warnings = read("balljoint a {\n5 6 7\noffset 1 2 3 balljoint b { }\n8 9 }")
     assert skeleton.rest_translations.tolist() == [[1, 2, 3], [0, 0, 0]]
-    assert warnings == ['a.skel:2: skipped unknown "5"', 'a.skel:4: skipped unknown "8"']
+    assert warnings == [unknown(2, "5"), unknown(4, "8")]
 
 
 @pytest.mark.parametrize("text", ["version 1.0 {} ", "header { name { balljoint x { } } } ", "v "])
 def test_unknown_words_outside_of_all_joints_are_skipped(text):
     skeleton, warnings = read(f"{text} balljoint a {{ }} {text}")
     assert skeleton.names == ("a",)
-    assert warnings == [f'a.skel:1: skipped unknown "{text.split()[0]}"']
+    assert warnings == [unknown(1, text.split()[0])]
 
 
 def test_unknown_keyword_is_named_once_and_with_its_first_line():
     _, warnings = read("balljoint a {\npos 1\nfoo 2\npos 3\nballjoint b { pos 4 }\nfoo { }\n}")
-    assert warnings == ['a.skel:2: skipped unknown "pos"', 'a.skel:3: skipped unknown "foo"']
+    assert warnings == [unknown(2, "pos"), unknown(3, "foo")]
 
 
 def test_warnings_of_a_hopeless_file_end_after_100():
     _, warnings = read(f"balljoint a {{ {chr(10).join(f'w{number}' for number in range(500))} }}")
     assert len(warnings) == 101
-    assert warnings[99] == 'a.skel:100: skipped unknown "w99"'
-    assert warnings[100] == "a.skel: further warnings are left out"
+    assert warnings[99] == unknown(100, "w99")
+    assert warnings[100] == ("F007.further-warnings", None, {})
 
 
 def test_keywords_are_lower_case():
     _, warnings = read("balljoint a { Offset 1 2 3 }")
-    assert warnings == ['a.skel:1: skipped unknown "Offset"']
+    assert warnings == [unknown(1, "Offset")]
 
 
 def test_missing_brace_at_the_very_end_is_a_warning():
     skeleton, warnings = read(GOOD.rstrip().removesuffix("}"))
     assert_good(skeleton)
-    assert warnings == ['a.skel: the last "}" is missing']
+    assert warnings == [("F006.closing", None, {})]
 
 
 def test_extra_braces_after_the_root_are_a_warning():
     skeleton, warnings = read(GOOD + "}\n}")
     assert_good(skeleton)
-    assert warnings == ['a.skel: ignored 2 "}" after the root']
+    assert warnings == [("F006.extra-braces", None, {"n": 2})]
 
 
 def test_arrays_of_a_skeleton_read_are_locked():

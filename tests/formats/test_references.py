@@ -4,11 +4,13 @@ import json
 
 import numpy as np
 import pytest
+from faults import fault_of
 from pig_text import write as write_pig
 from PIL import Image
 from skin_text import BINDINGS, NORMALS, POSITIONS, TRIANGLES, WEIGHTS
 
 import viewer
+from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
 from viewer.formats import Source, read, referenced_path
 from viewer.formats.rig import NamedFiles
@@ -85,45 +87,46 @@ def skin_text(name):
 
 
 def write_model(folder, kind, name):
-    """Write a model that names a picture; return its path, and file and line of the name."""
+    """Write a model that names a picture; return its path, and the file and line of the name."""
     path = folder / f"a.{kind}"
     if kind == "obj":
         (folder / "m.mtl").write_text(f"newmtl a\nmap_Kd {name}\n")
         path.write_text(OBJ)
-        return path, f"{folder}/m.mtl:2"
+        return path, folder / "m.mtl", 2
     text = skin_text(name) if kind == "skin" else PLY.format(name)
     path.write_text(text)
     line = next(number for number, row in enumerate(text.splitlines(), 1) if name in row)
-    return path, f"{path}:{line}"
+    return path, path, line
 
 
 @pytest.mark.parametrize("kind", ["skin", "obj", "ply"])
 @pytest.mark.parametrize("name", ["../secret/x.png", "{top}/secret/x.png", "link.png", "way/x.png"])
 def test_a_texture_from_outside_is_not_read(folder, kind, name):
     name = name.format(top=folder.parent)
-    path, place = write_model(folder, kind, name)
+    path, named, line = write_model(folder, kind, name)
     source = Source.open(path)
     (material,) = read(source).mesh.materials
     assert (material.texture, material.image) == (name, None)
-    is_absolute = name.startswith("/")
-    why = "is an absolute path: not followed," if is_absolute else "lies outside the folder:"
-    assert source.warnings == [f"{place}: texture {name} {why} not read"]
+    reason = Phrase("absolute-path") if name.startswith("/") else Phrase("outside-folder")
+    (warning,) = source.diagnostics
+    fault = ("F005.texture-refused", line, {"name": name, "reason": reason})
+    assert (warning.path, fault_of(warning)) == (named, fault)
 
 
 @pytest.mark.parametrize("kind", ["skin", "obj", "ply"])
 def test_an_absolute_path_is_called_so_even_within_the_folder(folder, kind):
-    path, place = write_model(folder, kind, f"{folder}/in.png")
+    path, named, line = write_model(folder, kind, f"{folder}/in.png")
     source = Source.open(path)
     assert read(source).mesh.materials[0].image is None
-    (warning,) = source.warnings
-    assert warning.startswith(f"{place}: texture {folder}/in.png is an absolute path")
-    assert "outside" not in warning
+    (warning,) = source.diagnostics
+    values = {"name": f"{folder}/in.png", "reason": Phrase("absolute-path")}
+    assert (warning.path, fault_of(warning)) == (named, ("F005.texture-refused", line, values))
 
 
 @pytest.mark.parametrize("kind", ["skin", "obj", "ply"])
 @pytest.mark.parametrize("name", ["in.png", "sub/in.png", "same.png"])
 def test_a_texture_below_the_folder_is_read(folder, kind, name):
-    path, _ = write_model(folder, kind, name)
+    path, _, _ = write_model(folder, kind, name)
     source = Source.open(path)
     (material,) = read(source).mesh.materials
     assert material.image.tolist() == [[[9, 8, 7, 255]]]
@@ -131,7 +134,7 @@ def test_a_texture_below_the_folder_is_read(folder, kind, name):
 
 
 def test_a_library_behind_a_link_is_not_read(folder):
-    path, _ = write_model(folder, "obj", "in.png")
+    path, _, _ = write_model(folder, "obj", "in.png")
     (folder / "m.mtl").rename(folder.parent / "secret" / "m.mtl")
     (folder / "m.mtl").symlink_to(folder.parent / "secret" / "m.mtl")
     source = Source.open(path)
@@ -166,7 +169,7 @@ def test_the_picture_of_a_pig_folder_may_not_be_a_link_out_of_it(folder):
 
 
 def test_a_link_is_opened_beside_its_neighbours(folder):
-    path, _ = write_model(folder, "skin", "in.png")
+    path, _, _ = write_model(folder, "skin", "in.png")
     elsewhere = folder.parent / "elsewhere"
     elsewhere.mkdir()
     (elsewhere / "b.skin").symlink_to(path)
@@ -179,7 +182,7 @@ def test_a_link_is_opened_beside_its_neighbours(folder):
 
 
 def test_a_picture_that_the_user_names_may_lie_anywhere(folder):
-    path, _ = write_model(folder, "skin", "gone.png")
+    path, _, _ = write_model(folder, "skin", "gone.png")
     scene = viewer.load(path, folder / "link.png")
     (material,) = scene.actors[0].figure.mesh.materials
     assert np.asarray(material.image).tolist() == [[[9, 8, 7, 255]]]
@@ -188,12 +191,12 @@ def test_a_picture_that_the_user_names_may_lie_anywhere(folder):
 def test_a_secret_picture_is_not_written_again(folder, tmp_path, capsys):
     from viewer.cli import run
 
-    path, place = write_model(folder, "skin", "../secret/x.png")
+    path, named, line = write_model(folder, "skin", "../secret/x.png")
     out = tmp_path / "out"
     out.mkdir()
     assert run(["convert", str(path), "-o", str(out / "a.gltf")]) == 0
     assert sorted(file.name for file in out.iterdir()) == ["a.bin", "a.gltf"]
     assert "images" not in json.loads((out / "a.gltf").read_text())
-    assert f"{place}: texture ../secret/x.png lies outside the folder: not read" in (
+    assert f"{named}:{line}: texture ../secret/x.png lies outside the folder: not read" in (
         capsys.readouterr().err
     )

@@ -6,9 +6,11 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from faults import NAN, fault_of
 from numpy.testing import assert_allclose, assert_array_equal
 
 import viewer
+from viewer.diagnostics import Phrase
 from viewer.errors import FormatError, RigError
 from viewer.formats import Source, detect, read
 from viewer.formats.rigged import figure_arrays, save
@@ -127,61 +129,99 @@ def test_figure_without_a_rig_is_not_written(tmp_path, part):
 
 
 BROKEN = {
-    "version": ({"viewer_rig": np.array(2)}, "viewer_rig: expected version 1, found 2"),
+    "version": (
+        {"viewer_rig": np.array(2)},
+        ("F002.rig-version", None, {"item": "viewer_rig", "expected": 1, "found": 2}),
+    ),
     "no version": (
         {"viewer_rig": np.array("one")},
-        "viewer_rig: expected a single number, found a text",
+        (
+            "F002.value",
+            None,
+            {
+                "item": "viewer_rig",
+                "expected": Phrase("wanted-numbers-single"),
+                "found": Phrase("found-text"),
+            },
+        ),
     ),
-    "up": ({"up": np.array("x")}, 'up: expected y or z, found "x"'),
-    "no positions": ({"positions": None}, "positions: expected a value, found no such key"),
+    "up": ({"up": np.array("x")}, ("F002.rig-up", None, {"item": "up", "found": "x"})),
+    "no positions": ({"positions": None}, ("F002.no-key", None, {"item": "positions"})),
     "nan": (
         {"positions": np.full((4, 3), np.nan)},
-        "positions: expected finite numbers, found 12 that are not",
+        (
+            "F003.finite",
+            None,
+            {"item": "positions", "found": NAN, "at": Phrase("row-vertex", index=0)},
+        ),
     ),
     "triangles": (
         {"triangles": np.array([[0, 1, 4], [0, 1, 2]])},
-        "triangles: expected a vertex from 0 to 3, found 4",
+        ("F002.vertex-range", None, {"item": "triangles", "last": 3, "found": 4}),
     ),
     "joints": (
         {"parents": np.array([-1, 0, 0])},
-        "parents: expected 2 numbers, found 3 int64",
+        (
+            "F002.value",
+            None,
+            {
+                "item": "parents",
+                "expected": Phrase("wanted-numbers", shape=(2,)),
+                "found": Phrase("found-array", shape=(3,), dtype="int64"),
+            },
+        ),
     ),
     "cycle": (
         {"parents": np.array([1, 0])},
-        "joint root: expected a parent before it, found 1",
+        ("S002.parent", None, {"item": "parents", "joint": 0, "found": 1}),
     ),
     "skin": (
         {"skin_joints": np.array([0, 1, 0, 2])},
-        "joints: expected indices 0 to 1, found 0 to 2",
+        ("W010.vertex", None, {"item": "skin_joints", "last": 1, "found": 2, "vertex": 2}),
     ),
-    "weights": ({"skin_weights": np.ones(3)}, "weights: expected shape 4, found 3"),
+    "weights": (
+        {"skin_weights": np.ones(3)},
+        ("F002.rig-parts", None, {"problem": "weights: expected shape 4, found 3"}),
+    ),
     "vertices": (
         {"skin_starts": np.array([0, 1, 4])},
-        "figure scan: the skin binds 2 vertices, the mesh has 4",
+        (
+            "F002.rig-parts",
+            None,
+            {"problem": "figure scan: the skin binds 2 vertices, the mesh has 4"},
+        ),
     ),
     "bindings": (
         {"inverse_bind": np.tile(np.eye(4), (3, 1, 1))},
-        "figure scan: the skin has 3 binding matrices, the skeleton has 2 joints",
+        ("B001.rig-matrices", None, {"item": "inverse_bind", "expected": 2, "found": 3}),
     ),
     "correctives": (
         {"correctives": np.zeros((18, 4, 3))},
-        "correctives: expected 9 x any x 3 numbers, found 18 x 4 x 3 float64",
+        (
+            "F002.value",
+            None,
+            {
+                "item": "correctives",
+                "expected": Phrase("wanted-numbers", shape=(9, None, 3)),
+                "found": Phrase("found-array", shape=(18, 4, 3), dtype="float64"),
+            },
+        ),
     ),
     "limits": (
         {"dof_limits": np.full((6, 2), np.nan)},
-        "dof_limits: expected shape 6 x 2 without NaN",
+        ("S003.rig-limits", None, {"item": "dof_limits", "dof": 0, "low": NAN, "high": NAN}),
     ),
     "textures": (
         {"material_textures": np.array(["a"])},
-        "material_textures: expected 2, found 1",
+        ("F002.value", None, {"item": "material_textures", "expected": 2, "found": 1}),
     ),
     "layout": (
         {"layout_starts": np.array([3, 8])},
-        "layout_counts: expected at least 11, found 10",
+        ("F002.rig-layout", None, {"item": "layout_counts", "expected": 11, "found": 10}),
     ),
     "hand": (
         {"hand_0_joints": np.array([2])},
-        "hand_0_joints: expected joints 0 to 1, found others",
+        ("F002.rig-hand", None, {"item": "hand_0_joints", "last": 1}),
     ),
 }
 
@@ -192,7 +232,8 @@ def test_broken_files_are_refused_by_key(tmp_path, changes, message):
     np.savez(path, **arrays_of(**changes))
     with pytest.raises(FormatError) as problem:
         read(Source.open(path))
-    assert str(problem.value) == f"{path}: {message}"
+    assert problem.value.path == path
+    assert fault_of(problem.value.diagnostic) == message
 
 
 def test_correctives_of_another_mesh_are_refused(tmp_path):
@@ -200,6 +241,10 @@ def test_correctives_of_another_mesh_are_refused(tmp_path):
     np.savez(path, **arrays_of(correctives=np.zeros((9, 5, 3))))
     with pytest.raises(FormatError) as problem:
         read(Source.open(path))
-    assert str(problem.value) == (
-        f"{path}: figure scan: the correctives have 5 vertices, the mesh has 4"
+    assert fault_of(problem.value.diagnostic) == (
+        (
+            "F002.rig-parts",
+            None,
+            {"problem": "figure scan: the correctives have 5 vertices, the mesh has 4"},
+        )
     )

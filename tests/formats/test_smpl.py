@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from faults import NAN, fault_of, warnings_of
 from numpy.testing import assert_allclose, assert_array_equal
 from synthetic_smpl import KINDS, model
 
@@ -20,7 +21,7 @@ VERTICES, JOINTS = 32, 24
 
 def read(path):
     source = Source.open(path)
-    return smpl.read(source), source.warnings
+    return smpl.read(source), warnings_of(source.diagnostics)
 
 
 @pytest.fixture
@@ -189,8 +190,8 @@ def test_weight_sums_off_by_rounding_are_scaled_to_1(load):
 def test_model_without_shapes_or_correctives_warns(load):
     figure = load(SMPL, shapedirs=None, posedirs=None)
     assert load.warnings == [
-        f"{load.path}: no `shapedirs`: one fixed shape",
-        f"{load.path}: no `posedirs`: plain linear blend skinning",
+        ("F007.smpl-shapedirs", None, {}),
+        ("F007.smpl-posedirs", None, {}),
     ]
     assert (figure.blend_shapes, figure.correctives) == (None, None)
 
@@ -294,14 +295,12 @@ def test_odd_extras_are_left_out_with_a_warning(load):
     )
     assert (figure.mesh.uvs, figure.keypoints, figure.symmetry) == (None, None, None)
     assert load.warnings == [
-        f"{load.path}: `vt` and `ft` do not fit each other: left out",
-        f"{load.path}: `lmk_faces_idx` refers to triangles that do not exist: left out",
-        f"{load.path}: `vert_sym_idxs` does not pair vertices: left out",
+        ("F007.smpl-uvs", None, {}),
+        ("F007.smpl-landmarks", None, {}),
+        ("F007.smpl-symmetry", None, {}),
     ]
     load(SMPL, vert_sym_idxs=np.full(VERTICES, np.nan))
-    assert load.warnings == [
-        f"{load.path}: `vert_sym_idxs` refers to vertices that do not exist: left out"
-    ]
+    assert load.warnings == [("F007.smpl-symmetry-range", None, {})]
 
 
 def test_facts_list_keys_used_ignored_and_unknown(load):
@@ -368,9 +367,9 @@ def test_odd_numbers_in_late_arrays_are_refused_when_they_are_read(load):
         late = figure.blend_shapes.offsets if key == "shapedirs" else figure.correctives
         with pytest.raises(FormatError) as caught:
             late.values()
-        assert str(caught.value) == (
-            f"{load.path}: {key}: expected finite numbers, found 1 that are not"
-        )
+        assert caught.value.path == load.path
+        key_, _, values = fault_of(caught.value.diagnostic)
+        assert (key_, values["item"], values["found"]) == ("F003.finite", key, NAN)
 
 
 @pytest.mark.parametrize("dtype", ["f2", ">f2", "f4", ">f8"])

@@ -14,8 +14,8 @@ from lint.sound import column, scene_of
 from lint.test_planted_files import LATE_KEYS
 
 import viewer
+from viewer.diagnostics import Diagnostic
 from viewer.lint import Finding, finding_text, lint_again, lint_files
-from viewer.lint._messages import of_warning
 from viewer.lint._named import aimed_at
 from viewer.loading import bundled_files
 from viewer.rig.scene import Scene
@@ -165,7 +165,11 @@ def test_progress_may_stop_while_frames_are_read(shared_data: Path) -> None:
     ],
 )
 def test_words_of_readers_name_places(text, part, vertices, joints) -> None:
-    found = aimed_at(of_warning(text, Path(text.split(":")[0])), scene_of(column()).actors[0], part)
+    found = aimed_at(
+        Finding(Diagnostic("F007.plain", values={"message": text.split(": ", 1)[1]})),
+        scene_of(column()).actors[0],
+        part,
+    )
     if vertices is None:
         assert found is None
     else:

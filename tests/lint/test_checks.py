@@ -12,6 +12,7 @@ from lint.sound import column, keypoints, scene_of, standing
 from lint.test_planted_faults import FAULTS, made, weighted
 
 import viewer.lint
+from viewer.diagnostics import Diagnostic
 from viewer.lint import CHECKS, CODES, SEVERITIES, Finding, lint_scene, points_of
 from viewer.rig.scene import Actor, Scene
 
@@ -71,11 +72,11 @@ def test_a_scene_is_not_changed() -> None:
 def test_points_of_vertices_triangles_and_joints() -> None:
     scene = scene_of(column())
     scene.actors[0].placement[:3, 3] = 10.0, 0.0, 0.0
-    vertex = Finding("W001", "", actor=0, vertices=np.array([5]))
+    vertex = Finding(Diagnostic("W001."), actor=0, vertices=np.array([5]))
     assert points_of(vertex, scene).tolist() == [[9, 1, 1]]
-    triangle = Finding("M001", "", actor=0, triangles=np.array([0]))
+    triangle = Finding(Diagnostic("M001."), actor=0, triangles=np.array([0]))
     assert points_of(triangle, scene).tolist() == [[11, 0, 1], [11, 1, 1], [9, 0, 1]]
-    joint = Finding("S006", "", actor=0, joints=np.array([1]))
+    joint = Finding(Diagnostic("S006."), actor=0, joints=np.array([1]))
     assert points_of(joint, scene).tolist() == [[10, 2, 0]]
 
 
@@ -83,10 +84,10 @@ def test_points_of_captures_and_of_nothing() -> None:
     figure, clip = keypoints()
     scene = scene_of(figure, clip)
     scene.actors[0].points = clip.points[0]
-    ankle = Finding("C011", "", actor=0, joints=np.array([2]))
+    ankle = Finding(Diagnostic("C011."), actor=0, joints=np.array([2]))
     assert points_of(ankle, scene).tolist() == [[0, 0, 0]]
-    assert points_of(Finding("F001", ""), scene).shape == (0, 3)
-    assert len(points_of(Finding("C010", "", actor=0), scene)) == 3
+    assert points_of(Finding(Diagnostic("F001.")), scene).shape == (0, 3)
+    assert len(points_of(Finding(Diagnostic("C010."), actor=0), scene)) == 3
 
 
 @pytest.mark.parametrize("name", FAULTS)

@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 from lint.sound import column, keypoints, scene_of
 
+from viewer.diagnostics import Diagnostic
 from viewer.lint import Finding, places_of, points_of
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 
 
 def about(**places: list[int]) -> Finding:
-    return Finding("W001", "", actor=0, **{name: np.array(at) for name, at in places.items()})
+    return Finding(
+        Diagnostic("W001."), actor=0, **{name: np.array(at) for name, at in places.items()}
+    )
 
 
 def test_all_kinds_of_places_are_there_together() -> None:
@@ -65,6 +68,6 @@ def test_captured_points_that_are_not_seen_have_no_place() -> None:
 
 
 def test_other_actors_than_there_are_have_no_place() -> None:
-    nowhere = Finding("W001", "", actor=3, vertices=np.array([0]))
+    nowhere = Finding(Diagnostic("W001."), actor=3, vertices=np.array([0]))
     assert points_of(nowhere, scene_of(column())).shape == (0, 3)
     assert len(places_of(nowhere, scene_of(column())).vertices) == 0

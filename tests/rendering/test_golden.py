@@ -15,6 +15,7 @@ from rendering.golden_scalars import SHOTS as SCALAR_SHOTS
 from rendering.golden_scenes import BEND, SIZE, Shot, options
 from rendering.golden_scenes import SHOTS as STILL_SHOTS
 from rendering.picture_metrics import complaints, silhouette_share, ssim_error
+from stored_pictures import GOLDEN, is_redrawn
 
 import viewer
 from viewer.rendering.camera import camera_axes
@@ -25,8 +26,6 @@ from viewer.rig.mesh import Mesh
 from viewer.rig.scene import Scene, scene_box
 
 SHOTS = {**STILL_SHOTS, **MOTION_SHOTS, **SCALAR_SHOTS}
-GOLDEN = Path(__file__).resolve().parents[1] / "golden"
-REGENERATE = os.environ.get("VIEWER_UPDATE_GOLDEN") == "1"
 KEEP = os.environ.get("VIEWER_GOLDEN_FAILED")  # a folder for pictures that differ
 
 
@@ -52,12 +51,13 @@ def golden_renderer() -> str:
     return (GOLDEN / "renderer.txt").read_text().strip()
 
 
+@pytest.mark.golden("{name}")
 @pytest.mark.parametrize("name", SHOTS)
 def test_picture_is_as_stored(offscreen, name):
     shot = SHOTS[name]()
     pixels = draw(offscreen, shot)
     path = GOLDEN / f"{name}.png"
-    if REGENERATE:
+    if is_redrawn(name):
         write(path, pixels)
         (GOLDEN / "renderer.txt").write_text(offscreen.context.info["GL_RENDERER"] + "\n")
     assert path.is_file(), f"{path} is missing; see tests/golden/README.md"

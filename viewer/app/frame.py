@@ -82,7 +82,7 @@ class Frame:
         state.stats.version = context.info["GL_VERSION"]
 
     def draw(self, framebuffer: moderngl.Framebuffer, size: tuple[int, int], scale: float) -> None:
-        """Draw one frame between ``imgui.new_frame`` and the swap of buffers.
+        """Run one frame between ``imgui.new_frame`` and the swap of buffers, and paint it.
 
         Parameters
         ----------
@@ -94,6 +94,12 @@ class Frame:
             Pixels per window coordinate.
         """
         started = time.perf_counter()
+        self.run(scale)
+        self.paint(framebuffer, size)
+        self.state.stats.frame_ms = 1e3 * (time.perf_counter() - started)
+
+    def run(self, scale: float) -> None:
+        """Do all of a frame but the painting of its panels, which only a screen needs."""
         state = self.state
         drop_motion_before_press()
         self.clock.advance()
@@ -119,11 +125,13 @@ class Frame:
         if self.target is not None:
             answer_picks(state, self.renderer, self.target.size, scale, self._drawn)
         imgui.render()
+
+    def paint(self, framebuffer: moderngl.Framebuffer, size: tuple[int, int]) -> None:
+        """Paint the panels of the frame that was run last, and the scene behind them."""
         framebuffer.use()
         self.context.viewport = (0, 0, *size)
         framebuffer.clear(0.10, 0.11, 0.12, 1.0)
         imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
-        state.stats.frame_ms = 1e3 * (time.perf_counter() - started)
 
     def _work(self) -> None:
         """Go on with what takes longer than a frame, and say how it ended."""

@@ -60,17 +60,29 @@ class HeadlessApp:
         self.frame = Frame(state, self.context)
 
     def step(self, frames: int = 1) -> None:
-        """Run frames, a sixtieth of a second each; input is what was queued in ImGui's io."""
+        """Run frames, a sixtieth of a second each; input is what was queued in ImGui's io.
+
+        Panels are painted when ``pixels`` asks for them: in software that takes longer than all
+        else of a frame.
+        """
         self._make_current()
         for _ in range(frames):
             imgui.get_io().delta_time = 1.0 / 60.0
             imgui.backends.opengl3_new_frame()
             imgui.new_frame()
-            self.frame.draw(self.screen.framebuffer, self.screen.size, self.pixels_per_point)
+            self.screen.framebuffer.use()  # without one, drawing and picking are errors
+            self.frame.run(self.pixels_per_point)
+            _upload_textures()
 
     def _make_current(self) -> None:
         """Take this thread's OpenGL: another context may have been used since."""
         self.context.__enter__()  # type: ignore[no-untyped-call]
+
+    def pixels(self) -> Bytes:
+        """Return the interface as the last frame left it, (H, W, 4) uint8."""
+        self._make_current()
+        self.frame.paint(self.screen.framebuffer, self.screen.size)
+        return self.screen.read()
 
     def picture(self, fits: bool = True) -> Bytes:
         """Return the whole interface as pixels, (H, W, 4) uint8, the view fitted to its room.
@@ -83,9 +95,8 @@ class HeadlessApp:
         self.step(_SETTLE_FRAMES)
         while self.state.of(Files).stream is None and not self.state.framing.is_settled:
             self.step(1)
-        self.state.stats.frame_ms = 0.0  # the same picture every time
         self.step(1)
-        pixels = self.screen.read()
+        pixels = self.pixels()
         pixels[..., 3] = 255
         return pixels
 
@@ -104,3 +115,11 @@ class HeadlessApp:
 
     def __exit__(self, *_: object) -> None:
         self.release()
+
+
+def _upload_textures() -> None:
+    """Do what painting does first: give ImGui the textures of letters that it has asked for."""
+    for texture in imgui.get_platform_io().textures:
+        if texture.status != imgui.ImTextureStatus.ok:
+            # Not in the stubs of imgui-bundle.
+            imgui.backends.opengl3_update_texture(texture)  # type: ignore[attr-defined,unused-ignore]

@@ -11,10 +11,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.errors import FormatError, printable
+from viewer.diagnostics import Diagnostic
+from viewer.errors import FormatError
 from viewer.formats import Source
 from viewer.formats._numbers import to_number
 from viewer.near_names import name_hint
+from viewer.phrases import printable
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.pose import Pose
@@ -59,28 +61,26 @@ def read_landmarks(source: Source, template: Figure, pose: Pose) -> Floats:
             continue
         values = _floats(words if len(words) == 6 else words[-3:])
         if values is None or len(words) < 4 or (len(words) != 6 and _floats(words) is not None):
-            raise FormatError(
-                source.path,
-                "expected six numbers, or a joint and three numbers, "
-                f'found "{printable(line.strip(), 60)}"',
-                number,
-            )
+            found = {"found": printable(line.strip(), 60)}
+            raise FormatError(Diagnostic("F002.landmark", source.path, number, values=found))
         if len(values) == 6:
             pairs.append([values[:3], values[3:]])
             continue
         name = " ".join(words[:-3])
         if name not in skeleton.names:
-            raise FormatError(
-                source.path,
-                f'expected a joint of {printable(template.name, 60)}, found "{printable(name)}"; '
-                f"{name_hint(name, skeleton.names)}",
-                number,
-            )
+            raise _unknown_joint(source, number, name, template)
         pairs.append([joints[skeleton.names.index(name)].tolist(), values])
     if len(pairs) < 3:
-        found = f"expected 3 or more pairs of points, found {len(pairs)}"
-        raise FormatError(source.path, found, max(len(source.data.splitlines()), 1))
+        last = max(len(source.data.splitlines()), 1)
+        count = {"found": len(pairs)}
+        raise FormatError(Diagnostic("F002.landmarks", source.path, last, values=count))
     return np.array(pairs, dtype=np.float64)
+
+
+def _unknown_joint(source: Source, line: int, name: str, template: Figure) -> FormatError:
+    names = () if template.skeleton is None else template.skeleton.names
+    values = {"figure": printable(template.name, 60), "found": name, "near": name_hint(name, names)}
+    return FormatError(Diagnostic("F002.landmark-joint", source.path, line, values=values))
 
 
 def _floats(words: list[str]) -> list[float] | None:

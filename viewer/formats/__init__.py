@@ -9,8 +9,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, UnsupportedFormatError, printable
-from viewer.formats._faults import Fault
+from viewer.formats._file_bytes import unreadable
 from viewer.formats._references import referenced_path
 from viewer.formats._source import MAX_SIZE, Source
 from viewer.formats._texture import read_picture
@@ -54,7 +55,6 @@ __all__ = [
     "MAX_SIZE",
     "MESHES",
     "SUFFIXES",
-    "Fault",
     "Format",
     "Source",
     "all_or_none",
@@ -209,7 +209,7 @@ def detect(source: Source) -> str:
         # Numbers alone are a pose only where no other suffix says otherwise.
         if re.search(kind.signature, head) and not (by_suffix and key == "pose"):
             if by_suffix:
-                source.warn(f"is a {kind.suffixes[0]}, named {suffix}")
+                source.warn("F007.suffix", found=kind.suffixes[0], suffix=suffix)
             return key
     if suffix in _ARCHIVES:
         return _detect_archive(source)  # says what it is instead
@@ -217,7 +217,9 @@ def detect(source: Source) -> str:
     if by_suffix and looks is None:
         return by_suffix  # its reader knows best what is missing
     wanted = FORMATS[by_suffix].suffixes[0] if by_suffix else KNOWN
-    raise FormatError(source.path, f"expected a {wanted} file, found {looks or 'something else'}")
+    if looks is None:
+        raise source.fault("F002.unknown-kind", wanted=wanted)
+    raise source.fault("F002.kind", wanted=wanted, looks=looks)
 
 
 SUFFIXES = tuple(dict.fromkeys(suffix for kind in FORMATS.values() for suffix in kind.suffixes))
@@ -240,17 +242,14 @@ def _detect_folder(source: Source) -> str:
     try:
         names = {path.name for path in source.path.iterdir()}
     except OSError as problem:
-        raise source.error(f"cannot be read: {problem.strerror or problem}") from None
+        raise unreadable(source.path, problem.strerror or problem) from None
     for key, kind in FORMATS.items():
         if names.intersection(kind.files):
             return key
     is_frames = any(name.lower().endswith(".json") for name in names)
     if is_frames or source.path.name in FORMATS["easymocap"].files:
         return "easymocap"
-    raise source.error(
-        "expected a file, or a folder with a PIG model's tables or EasyMocap's frames, found a "
-        "folder"
-    )
+    raise source.fault("F002.unknown-folder")
 
 
 def _is_archive(source: Source) -> bool:
@@ -270,11 +269,13 @@ def _detect_archive(source: Source) -> str:
     for kind, form in FORMATS.items():
         if set(keys).intersection(form.keys):
             return kind if kind not in ("amass", "pose") else _pose_or_motion(archive)
-    found = ", ".join(printable(key, 40) for key in keys[:12]) or "none"
     wanted = "; ".join(
         f"{form.title}: {', '.join(form.keys)}" for form in FORMATS.values() if form.keys
     )
-    raise source.error(f"expected a model or pose ({wanted}), found the keys {found}")
+    if not keys:
+        raise source.fault("F002.empty-archive", wanted=wanted)
+    found = [printable(key, 40) for key in keys]
+    raise source.fault("F002.unknown-archive", wanted=wanted, found=found)
 
 
 def _pose_or_motion(archive: Archive) -> str:
@@ -316,5 +317,6 @@ def write(content: Figure | Clip | PoseRecord, path: str | Path) -> None:
         if suffix in kind.suffixes:
             import_module(f"{__name__}.{key}").write(content, path)
             return
-    known = ", ".join(dict.fromkeys(s for kind in writers.values() for s in kind.suffixes))
-    raise UnsupportedFormatError(f'no writer for "{suffix}"; there are: {known}')
+    known = list(dict.fromkeys(s for kind in writers.values() for s in kind.suffixes))
+    values = {"suffix": suffix, "known": known}
+    raise UnsupportedFormatError(Diagnostic("F002.no-writer", values=values))

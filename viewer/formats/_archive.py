@@ -9,16 +9,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from viewer.errors import FormatError, counted, printable
-from viewer.formats._faults import Part
+from viewer.diagnostics import Part, Phrase
+from viewer.errors import FormatError
 from viewer.formats._floats import in_double, widened
+from viewer.formats._misfit import MisfitError
 from viewer.formats._source import Source
+from viewer.phrases import printable
 from viewer.rig.arrays import Deferred
 
 __all__ = [
@@ -32,7 +33,8 @@ __all__ = [
 ]
 
 _MAX_SIDE = 1 << 27  # rows or columns of a sparse matrix; a mesh has far fewer vertices
-_KIND_NAMES = {"biuf": "numbers", "iuf": "numbers", "iu": "whole numbers", "SU": "texts"}
+_WANTED = {"biuf": "numbers", "iuf": "numbers", "iu": "whole", "SU": "texts"}
+"""What phrases about arrays of these kinds are called."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,11 +43,11 @@ class Opaque:
 
     Attributes
     ----------
-    what : str
-        For a message: ``"chumpy.ch_ops.add expression"``, ``"object array"``.
+    what : Phrase
+        For a message: ``chumpy.ch_ops.add expression``, ``object array``.
     """
 
-    what: str
+    what: Phrase
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,8 +67,8 @@ class Sparse:
 
     Raises
     ------
-    ValueError
-        If the parts do not fit each other; the text says ``expected …, found …``.
+    MisfitError
+        If the parts do not fit each other.
     """
 
     shape: tuple[int, int]
@@ -78,39 +80,36 @@ class Sparse:
     def __post_init__(self) -> None:
         parts = (self.data, self.indices, self.indptr)
         if any(part.ndim != 1 for part in parts) or self.data.dtype.kind not in "biuf":
-            raise ValueError("expected a sparse matrix of three plain lists, found other shapes")
+            raise MisfitError(Phrase("sparse-shapes"))
         if self.indices.dtype.kind not in "iu" or self.indptr.dtype.kind not in "iu":
-            raise ValueError("expected whole indices in a sparse matrix, found other numbers")
+            raise MisfitError(Phrase("sparse-indices"))
         if not all(0 <= side <= _MAX_SIDE for side in self.shape):
-            raise ValueError(f"expected at most {_MAX_SIDE} rows and columns, found {self.size}")
+            raise MisfitError(Phrase("sparse-size", most=_MAX_SIDE, shape=self.shape))
         self._check_counts()
 
     def _check_counts(self) -> None:
         across, along = self.shape if self.layout == "csc" else self.shape[::-1]
         if len(self.indptr) != along + 1:
-            raise ValueError(
-                f"expected {along + 1} starts in a sparse matrix {self.size}, "
-                f"found {len(self.indptr)}"
+            raise MisfitError(
+                Phrase(
+                    "sparse-starts",
+                    expected=along + 1,
+                    shape=self.shape,
+                    found=len(self.indptr),
+                )
             )
         count = len(self.data)
         # Unsigned differences wrap around, so compare instead of subtracting.
         ordered = bool((self.indptr[1:] >= self.indptr[:-1]).all())
         if not ordered or int(self.indptr[0]) != 0 or int(self.indptr[-1]) != count:
-            raise ValueError(f"expected starts that rise from 0 to {count} in a sparse matrix")
+            raise MisfitError(Phrase("sparse-order", count=count))
         if len(self.indices) != count:
-            raise ValueError(
-                f"expected {count} indices in a sparse matrix, found {len(self.indices)}"
-            )
-        if count and (int(self.indices.min()) < 0 or int(self.indices.max()) >= across):
-            raise ValueError(
-                f"expected indices 0 to {across - 1} in a sparse matrix, "
-                f"found {int(self.indices.min())} to {int(self.indices.max())}"
-            )
-
-    @property
-    def size(self) -> str:
-        """Rows and columns, for a message."""
-        return f"{self.shape[0]} x {self.shape[1]}"
+            raise MisfitError(Phrase("sparse-count", expected=count, found=len(self.indices)))
+        if count == 0:
+            return
+        low, high = int(self.indices.min()), int(self.indices.max())
+        if low < 0 or high >= across:
+            raise MisfitError(Phrase("sparse-range", last=across - 1, low=low, high=high))
 
     def entries(self) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[Any]]:
         """Return row, column and value of every stored entry.
@@ -149,8 +148,8 @@ class Archive:
 
     Parameters
     ----------
-    path : Path
-        The file, for messages.
+    source : Source
+        The file.
     kind : str
         ``"pickle"``, ``"npz"`` or ``"npy"``.
     keys : tuple of str
@@ -160,10 +159,9 @@ class Archive:
     """
 
     def __init__(
-        self, path: Path, kind: str, keys: tuple[str, ...], load: Callable[[str], Value]
+        self, source: Source, kind: str, keys: tuple[str, ...], load: Callable[[str], Value]
     ) -> None:
-        self.path, self.kind, self.keys = path, kind, keys
-        self.source: Source | None = None  # takes faults, if it is known
+        self.source, self.kind, self.keys = source, kind, keys
         self._load = load
         self._values: dict[str, Value] = {}
 
@@ -184,7 +182,7 @@ class Archive:
         """
         if key not in self._values:
             if key not in self.keys:
-                raise self.error(key, "expected a value, found no such key")
+                raise self.fault("F002.no-key", item=key)
             self._values[key] = self._load(key)
         return self._values[key]
 
@@ -210,7 +208,7 @@ class Archive:
             value = _from_lists(value)
         if value is None or value.dtype.kind not in kinds or not _fits(shape, value.shape):
             found = describe(self.get(key))
-            raise self.error(key, f"expected {_wanted(shape, kinds)}, found {found}")
+            raise self.fault("F002.value", item=key, expected=_wanted(shape, kinds), found=found)
         return widened(value)
 
     def sparse(self, key: str, shape: Axes | None = None) -> Sparse:
@@ -232,8 +230,9 @@ class Archive:
         if isinstance(value, Sparse):
             if _fits(shape, value.shape):
                 return replace(value, data=in_double(value.data))
-            found = describe(value)
-            raise self.error(key, f"expected {_wanted(shape, 'biuf')}, found {found}")
+            raise self.fault(
+                "F002.value", item=key, expected=_wanted(shape, "biuf"), found=describe(value)
+            )
         dense = self.array(key, (None, None) if shape is None else shape).values()
         rows, columns = np.nonzero(dense)
         starts = np.searchsorted(rows, np.arange(len(dense) + 1))
@@ -254,60 +253,62 @@ class Archive:
             return value.decode("utf-8", "replace")
         if isinstance(value, str):
             return value
-        raise self.error(key, f"expected a text, found {describe(value)}")
-
-    @property
-    def is_tolerant(self) -> bool:
-        """Whether faults are noted rather than raised."""
-        return self.source is not None and self.source.faults is not None
+        raise self.fault("F002.text", item=key, found=describe(value))
 
     def refuse(
-        self, error: FormatError, count: int = 1, part: Part = "", places: ArrayLike = ()
+        self,
+        key: str,
+        *,
+        item: str,
+        count: int = 1,
+        part: Part = "",
+        places: ArrayLike | None = None,
+        **values: Any,
     ) -> None:
-        """Raise an error, or note it, as ``Source.refuse`` does."""
-        if self.source is None:
-            raise error
-        self.source.refuse(error, count, part, places)
+        """Record a fault of the value called ``item``, see ``Source.refuse``."""
+        self.source.refuse(key, None, count, part, places, item=printable(item, 60), **values)
 
-    def error(self, key: str, message: str) -> FormatError:
-        """Return an error that names the file and the key."""
-        return FormatError(self.path, f"{printable(key, 60)}: {message}")
+    def fault(self, key: str, *, item: str, **values: Any) -> FormatError:
+        """Return the error of a fault of the value called ``item``, see ``Source.fault``."""
+        return self.source.fault(key, item=printable(item, 60), **values)
 
 
-def describe(value: Value) -> str:
+def describe(value: Value) -> Phrase:
     """Return what a value is, for a message.
 
-    >>> describe(Deferred((800, 3), "f4", lambda: np.zeros((800, 3)))), describe({})
-    ('800 x 3 float32', 'no named values')
+    >>> str(describe(Deferred((800, 3), "f4", lambda: np.zeros((800, 3)))))
+    '800 x 3 float32'
     """
     if isinstance(value, Deferred):
-        if value.dtype.kind in "SU" and not value.shape:
-            return "a text"
-        return f"{_axes(value.shape)} {'texts' if value.dtype.kind in 'SU' else value.dtype.name}"
+        return _described_array(value)
     if isinstance(value, Sparse):
-        return f"a sparse matrix {value.size}"
+        return Phrase("found-sparse", shape=value.shape)
     if isinstance(value, Opaque):
-        return f"an unread value ({value.what})"
+        return Phrase("found-unread", what=value.what)
     if isinstance(value, list | tuple):
-        return f"a list of {len(value)}" if value else "an empty list"
+        return Phrase("found-list", n=len(value)) if value else Phrase("found-empty-list")
     if isinstance(value, dict):
-        return counted(len(value), "named value") if value else "no named values"
+        return Phrase("found-named", n=len(value)) if value else Phrase("found-no-named")
     if isinstance(value, bytes):
-        return f"{len(value)} bytes"
-    return "nothing" if value is None else printable(repr(value), 40)
+        return Phrase("found-bytes", n=len(value))
+    if value is None:
+        return Phrase("found-nothing")
+    return Phrase("found-value", value=printable(repr(value), 40))
 
 
-def _wanted(shape: Axes | None, kinds: str) -> str:
-    noun = _KIND_NAMES.get(kinds, f"values of kind {kinds}")
+def _described_array(array: Deferred) -> Phrase:
+    if array.dtype.kind not in "SU":
+        return Phrase("found-array", shape=array.shape, dtype=array.dtype.name)
+    return Phrase("found-texts", shape=array.shape) if array.shape else Phrase("found-text")
+
+
+def _wanted(shape: Axes | None, kinds: str) -> Phrase:
+    if kinds not in _WANTED:
+        return Phrase("wanted-kind", shape=tuple(shape or ()), kinds=kinds)
+    noun = f"wanted-{_WANTED[kinds]}"
     if shape is None:
-        return f"an array of {noun}"
-    return f"{_axes(shape)} {noun}" if shape else f"{_axes(shape)} {noun.removesuffix('s')}"
-
-
-def _axes(shape: Axes) -> str:
-    if not shape:
-        return "a single"
-    return " x ".join("any" if axis is None else str(axis) for axis in shape)
+        return Phrase(f"{noun}-any")
+    return Phrase(noun, shape=tuple(shape)) if shape else Phrase(f"{noun}-single")
 
 
 def _fits(wanted: Axes | None, found: tuple[int, ...]) -> bool:

@@ -53,9 +53,8 @@ def open_archive(source: Source, max_size: int = MAX_SIZE) -> Archive:
     if head.startswith(_NPY):
         return open_npy(source, max_size)
     if head.startswith(_LFS):
-        found = "a Git LFS pointer, not the file itself (`git lfs pull` fetches it)"
-        raise source.error(f"expected a pickle, .npz or .npy file, found {found}")
+        raise source.fault("F002.archive-pointer")
     if not is_archive(head):
         looks = source.looks_like() or "something else"
-        raise source.error(f"expected a pickle, .npz or .npy file, found {looks}")
+        raise source.fault("F002.archive", found=looks)
     return open_pickle(source)

@@ -7,24 +7,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.diagnostics import Part, Phrase
 from viewer.formats._archive import Archive
 from viewer.formats._archive_opening import open_archive
-from viewer.formats._faults import Part
 from viewer.formats._numbers import LARGEST
 from viewer.formats._source import Source
-from viewer.formats._tolerant import mended_corners
+from viewer.formats._tolerant import held_rows, mended_corners
 from viewer.rig.arrays import Bools, Floats, Ints
 
 __all__ = ["archive_of", "are_indices", "corners_of", "finite"]
 
 
-_NOUNS = {
-    "positions": "vertex",
-    "weights": "vertex",
-    "triangles": "triangle",
-    "bindings": "joint",
-    "joints": "joint",
-    "frames": "row",
+_ROWS = {
+    "positions": "row-vertex",
+    "weights": "row-vertex",
+    "triangles": "row-triangle",
+    "bindings": "row-joint",
+    "joints": "row-joint",
+    "frames": "row-frame",
 }
 """What a row is, by what of a figure or motion it is."""
 
@@ -33,7 +33,6 @@ def archive_of(source: Source) -> Archive:
     """Return the archive that a source is; see ``open_archive`` for what it raises."""
     if source.archive is None:
         source.archive = open_archive(source, source.max_size)
-        source.archive.source = source
     return source.archive
 
 
@@ -55,19 +54,20 @@ def finite(
     values : (N, ...)
         Any numbers.
     part : str
-        What of a figure or motion they are, where faults are noted, see ``Fault``.
+        What of a figure or motion they are, see ``Diagnostic``.
     places : (N,), optional
         Which vertex, joint or frame each row is of; its index if omitted.
 
     Returns
     -------
     (N, ...)
-        Where faults are noted, 0 in place of what is not finite; NaN in place of positions.
+        Neutral values in place of what is not finite, where the file is not refused for it: NaN
+        for positions, the identity for matrices of bindings, the row before for frames, else 0.
 
     Raises
     ------
     FormatError
-        With the key, and how many are not.
+        With the key, and the first that is not.
     """
     # Views of a pickle may begin at any address: whoever computes with one should copy it.
     is_ready = values.dtype == np.float64 and values.flags.aligned
@@ -76,29 +76,46 @@ def finite(
     low, high = numbers.min(initial=0.0), numbers.max(initial=0.0)
     if low >= -LARGEST and high <= LARGEST:
         return numbers
-    if archive.is_tolerant:
-        return _mended(archive, key, numbers, part, places)
-    if np.isfinite([low, high]).all():
-        worst = high if high > LARGEST else low
-        raise archive.error(key, f"expected numbers up to {LARGEST:.2g}, found {worst:g}")
-    count = int((~np.isfinite(numbers)).sum())
-    raise archive.error(key, f"expected finite numbers, found {count} that are not")
-
-
-def _mended(
-    archive: Archive, key: str, numbers: Floats, part: Part, places: NDArray[np.integer] | None
-) -> Floats:
-    """Note all numbers that are not finite, and return the others."""
     with np.errstate(invalid="ignore"):
         bad: Bools = ~(np.abs(numbers) <= LARGEST)
+    _refuse_numbers(archive, key, numbers, bad, part, places)
+    return _with_neutral(numbers, bad, part)
+
+
+def _refuse_numbers(
+    archive: Archive,
+    key: str,
+    numbers: Floats,
+    bad: Bools,
+    part: Part,
+    places: NDArray[np.integer] | None,
+) -> None:
+    """Record the numbers that are not finite, or beyond single precision."""
     first = np.argwhere(bad)[0].tolist()
+    found = float(numbers[tuple(first)])
     rows = np.flatnonzero(bad.reshape(len(bad), -1).any(axis=1)) if first else np.zeros(1, np.int64)
-    at = rows if places is None else places[rows]
-    place = f" at {', '.join(map(str, first))}" if first else ""
-    place = f" at {_NOUNS[part]} {at[0]}" if part else place
-    error = archive.error(key, f"expected finite numbers, found {numbers[tuple(first)]:g}{place}")
-    error.code = "W003" if part == "weights" else "F003"
-    archive.refuse(error, int(bad.sum()), part, at if part else ())
+    of = rows if places is None else places[rows]
+    at: Phrase | str = Phrase("element", indices=first) if first else ""
+    values: dict[str, Any] = {"limit": LARGEST} if np.isfinite(found) else {}
+    archive.refuse(
+        f"{'W003' if part == 'weights' else 'F003'}.{'limit' if values else 'finite'}",
+        item=key,
+        count=int(bad.sum()),
+        part=part,
+        places=of if part else None,
+        found=found,
+        at=Phrase(_ROWS[part], index=int(of[0])) if part else at,
+        **values,
+    )
+
+
+def _with_neutral(numbers: Floats, bad: Bools, part: Part) -> Floats:
+    if part in ("frames", "bindings"):
+        lost: Bools = np.asarray(bad.reshape(len(bad), -1).any(axis=1))
+        if part == "frames":
+            return held_rows(numbers, lost)
+        # Of a matrix with such a number nothing can be used: a 0 would make it another one.
+        return np.where(lost[:, None, None], np.eye(4), numbers)
     return np.where(bad, np.nan if part == "positions" else 0.0, numbers)
 
 
@@ -119,15 +136,21 @@ def corners_of(archive: Archive, key: str, values: NDArray[Any], n_vertices: int
     Raises
     ------
     FormatError
-        If an index is not from 0 to V - 1; where faults are noted, it becomes another corner.
+        If an index is not from 0 to V - 1; if the file is not refused for it, it becomes another
+        corner.
     """
     if are_indices(values, n_vertices):
         return values.astype(np.int32)
     fits = (values >= 0) & (values < n_vertices) & (values == np.floor(values))
-    error = archive.error(
-        key, f"expected a vertex from 0 to {n_vertices - 1}, found {values[~fits][0]:.16g}"
+    archive.refuse(
+        "F002.vertex-range",
+        item=key,
+        count=int((~fits).sum()),
+        part="triangles",
+        places=np.flatnonzero(~fits.all(axis=1)),
+        last=n_vertices - 1,
+        found=values[~fits][0],
     )
-    archive.refuse(error, int((~fits).sum()), "triangles", np.flatnonzero(~fits.all(axis=1)))
     return mended_corners(np.where(fits, values, 0).astype(np.int64), fits)
 
 

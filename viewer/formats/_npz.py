@@ -30,9 +30,13 @@ from typing import IO, Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.errors import FormatError, printable
+from viewer.diagnostics import Diagnostic, Phrase
+from viewer.errors import FormatError
 from viewer.formats._archive import Archive, Opaque, Value
+from viewer.formats._file_bytes import unreadable
+from viewer.formats._misfit import MisfitError
 from viewer.formats._source import Source
+from viewer.phrases import printable
 from viewer.rig.arrays import Deferred
 
 __all__ = ["array_dtype", "item_count", "open_npy", "open_npz", "shaped"]
@@ -106,7 +110,7 @@ def shaped(flat: NDArray[Any], shape: tuple[int, ...], is_fortran: bool) -> NDAr
 
     Raises
     ------
-    ValueError
+    MisfitError
         If an element of a text is no letter.
     """
     if flat.dtype.kind == "b" and flat.size and int(flat.view(np.uint8).max()) > 1:
@@ -116,7 +120,7 @@ def shaped(flat: NDArray[Any], shape: tuple[int, ...], is_fortran: bool) -> NDAr
     if array.dtype.kind == "U" and array.size:
         last = int(array.reshape(-1).view(np.uint32).max())
         if last > _LAST_LETTER:
-            raise ValueError(f"expected letters in a text, found number {last}")
+            raise MisfitError(Phrase("array-letter", found=last))
     return array
 
 
@@ -158,7 +162,7 @@ class _Storage:
                 self._stamp = status.st_size, status.st_mtime_ns
         except (OSError, ValueError) as problem:
             if self._data is None:
-                raise self._unreadable(problem) from None
+                raise unreadable(self.path, _reason(problem)) from None
         if self._stamp is None:
             self.size = len(self._data or b"")
         else:
@@ -174,10 +178,6 @@ class _Storage:
             rest = file.read(_CHUNK)
         return self._data[:_CHUNK] == head[: len(self._data)] and not rest.strip(b"\x1a")
 
-    def _unreadable(self, problem: Exception) -> FormatError:
-        reason = getattr(problem, "strerror", None) or problem
-        return FormatError(self.path, f"cannot be read: {reason}")
-
     def open(self) -> IO[bytes]:
         """Return the file as it was at the first look."""
         if self._data is not None:
@@ -185,16 +185,21 @@ class _Storage:
         try:
             file = _Reader(self.path.open("rb", buffering=0))
         except OSError as problem:
-            raise self._unreadable(problem) from None
+            raise unreadable(self.path, _reason(problem)) from None
         status = os.fstat(file.fileno())
         if (status.st_size, status.st_mtime_ns) != self._stamp:
             file.close()
-            raise FormatError(self.path, "changed since it was opened; open it again")
+            raise FormatError(Diagnostic("F002.changed", self.path))
         return file
 
-    def error(self, key: str, message: str) -> FormatError:
+    def fault(self, key: str, problem: Phrase) -> FormatError:
         """Return an error that names the file and the key."""
-        return FormatError(self.path, f"{printable(key, 60)}: {message}")
+        values = {"item": printable(key, 60), "problem": problem}
+        return FormatError(Diagnostic("F002.archive-value", self.path, values=values))
+
+
+def _reason(problem: Exception) -> object:
+    return getattr(problem, "strerror", None) or problem
 
 
 def open_npz(source: Source, max_size: int) -> Archive:
@@ -214,8 +219,8 @@ def open_npz(source: Source, max_size: int) -> Archive:
             _check_members(source, members, storage.size, max_size)
             values = {_key(member): _open_member(storage, archive, member) for member in members}
     except _DAMAGE as problem:
-        raise source.error(f"expected a whole .npz file, found {_damage(problem)}") from None
-    return Archive(source.path, "npz", tuple(values), values.__getitem__)
+        raise source.fault("F002.npz", reason=printable(problem, 100)) from None
+    return Archive(source, "npz", tuple(values), values.__getitem__)
 
 
 def open_npy(source: Source, max_size: int) -> Archive:
@@ -228,13 +233,9 @@ def open_npy(source: Source, max_size: int) -> Archive:
         value: Value = header
     else:
         if storage.size > max_size:
-            raise source.error(f"expected at most {max_size} bytes, found {storage.size}")
+            raise source.fault("F001.too-large", most=max_size, size=storage.size)
         value = header.deferred(partial(_load_file, storage, key, header))
-    return Archive(source.path, "npy", (key,), {key: value}.__getitem__)
-
-
-def _damage(problem: Exception) -> str:
-    return f"a damaged one ({printable(problem, 100)})"
+    return Archive(source, "npy", (key,), {key: value}.__getitem__)
 
 
 def _key(member: zipfile.ZipInfo) -> str:
@@ -247,31 +248,26 @@ def _check_members(
     """Refuse what could not be read, or would become too large, before anything is unpacked."""
     for name, count in Counter(map(_key, members)).items():
         if count > 1:
-            raise source.error(f"{printable(name, 60)}: expected one of this name, found {count}")
+            raise source.fault("F002.npz-twice", item=printable(name, 60), found=count)
     for member in members:
-        found = None
+        name, method = printable(_key(member), 60), member.compress_type
         if member.flag_bits & _ENCRYPTED:
-            found = "encrypted data"
-        elif member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-            method = member.compress_type
-            found = _METHODS.get(method, f"compression method {method}")
-        if found is not None:
-            name = printable(_key(member), 60)
-            raise source.error(f"{name}: expected stored or deflated data, found {found}")
+            raise source.fault("F002.npz-encrypted", item=name)
+        if method in _METHODS:
+            raise source.fault("F002.npz-method-name", item=name, method=_METHODS[method])
+        if method not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise source.fault("F002.npz-method", item=name, method=method)
     total = sum(member.file_size for member in members)
     if total > max_size:
-        raise source.error(f"expected at most {max_size} bytes, found {total} (--max-size)")
+        raise source.fault("F001.too-large", most=max_size, size=total)
     if total > max(_SMALL, _MAX_RATIO * size):
-        raise source.error(
-            f"expected at most {_MAX_RATIO} times its size when unpacked, found {total} bytes "
-            f"in {size}"
-        )
+        raise source.fault("F002.npz-ratio", most=_MAX_RATIO, found=total, size=size)
 
 
 def _open_member(storage: _Storage, archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> Value:
     key = _key(member)
     if not member.filename.endswith(".npy"):
-        return Opaque("no array")
+        return Opaque(Phrase("unread-member"))
     with archive.open(member) as stream:
         header = _read_header(storage, key, stream, member.file_size)
     if isinstance(header, Opaque):
@@ -284,16 +280,16 @@ def _read_header(storage: _Storage, key: str, stream: IO[bytes], size: int) -> _
     lead = stream.read(8)
     layout = _LEAD.get(lead[6:8])
     if not lead.startswith(b"\x93NUMPY") or layout is None:
-        raise storage.error(key, f"expected an .npy header, found {lead!r}")
+        raise storage.fault(key, Phrase("npy-lead", found=lead))
     width = struct.calcsize(layout)
     length = int.from_bytes(stream.read(width), "little")
     if length >= _LONGEST_HEADER:
-        raise storage.error(key, f"expected a header below 64 KiB, found {length} bytes")
+        raise storage.fault(key, Phrase("npy-header-length", found=length))
     text = stream.read(length)
     if len(text) < length:
-        raise storage.error(key, f"expected a header of {length} bytes, found {len(text)}")
+        raise storage.fault(key, Phrase("npy-header-cut", expected=length, found=len(text)))
     if _RECORD.search(text):
-        return Opaque("array of records")
+        return Opaque(Phrase("unread-records"))
     return _parse_header(storage, key, text, 8 + width + length, size)
 
 
@@ -305,19 +301,16 @@ def _parse_header(
     shape = _parse_shape(found.get(b"shape"))
     descr, order = found.get(b"descr"), found.get(b"fortran_order")
     if rest != b"{}" or shape is None or descr is None or order is None:
-        raise storage.error(
-            key, f"expected a header with descr, fortran_order and shape, found {text[:80]!r}"
-        )
+        raise storage.fault(key, Phrase("npy-header", found=text[:80]))
     code = descr.decode("latin-1")
     dtype = array_dtype(code)
     if dtype is None:
-        return Opaque("object array" if code.endswith("O") else f"array of type {printable(code)}")
+        is_object = code.endswith("O")
+        return Opaque(Phrase("unread-objects") if is_object else Phrase("unread-dtype", dtype=code))
     n_items = item_count(shape, dtype.itemsize)
     if n_items is None or n_items * dtype.itemsize != size - offset:
-        sides = printable(" x ".join(map(str, shape)), 80) or "one"
-        raise storage.error(
-            key, f"expected {sides} {dtype.name}, found {max(size - offset, 0)} bytes"
-        )
+        left = max(size - offset, 0)
+        raise storage.fault(key, Phrase("array-bytes", shape=shape, dtype=dtype.name, found=left))
     return _Header(dtype, shape, order == b"True", n_items, offset)
 
 
@@ -343,7 +336,7 @@ def _load_member(storage: _Storage, member: zipfile.ZipInfo, header: _Header) ->
         ):
             return _load(storage, key, header, stream)
     except _DAMAGE as problem:
-        raise storage.error(key, f"expected a whole array, found {_damage(problem)}") from None
+        raise _damaged(storage, key, problem) from None
 
 
 def _load_file(storage: _Storage, key: str, header: _Header) -> NDArray[Any]:
@@ -351,7 +344,11 @@ def _load_file(storage: _Storage, key: str, header: _Header) -> NDArray[Any]:
         with storage.open() as stream:
             return _load(storage, key, header, stream)
     except _DAMAGE as problem:
-        raise storage.error(key, f"expected a whole array, found {_damage(problem)}") from None
+        raise _damaged(storage, key, problem) from None
+
+
+def _damaged(storage: _Storage, key: str, problem: Exception) -> FormatError:
+    return storage.fault(key, Phrase("npy-damaged", reason=printable(problem, 100)))
 
 
 def _load(storage: _Storage, key: str, header: _Header, stream: IO[bytes]) -> NDArray[Any]:
@@ -360,14 +357,17 @@ def _load(storage: _Storage, key: str, header: _Header, stream: IO[bytes]) -> ND
     try:
         flat = np.empty(header.n_items, header.dtype)
     except MemoryError:
-        raise storage.error(key, f"needs {size} bytes of memory, found fewer") from None
+        raise storage.fault(key, Phrase("npy-memory", size=size)) from None
     # Chunk by chunk, as reading at once would hold everything twice.
     room = flat.view(np.uint8) if size else np.empty(0, np.uint8)
     done = 0
     while done < size:
         chunk = stream.read(min(_CHUNK, size - done))
         if not chunk:
-            raise storage.error(key, f"expected {size} bytes of values, found {done}")
+            raise storage.fault(key, Phrase("npy-cut", expected=size, found=done))
         room[done : done + len(chunk)] = np.frombuffer(chunk, np.uint8)
         done += len(chunk)
-    return shaped(flat, header.shape, header.is_fortran)
+    try:
+        return shaped(flat, header.shape, header.is_fortran)
+    except MisfitError as problem:
+        raise storage.fault(key, problem.problem) from None

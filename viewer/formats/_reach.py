@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.diagnostics import Phrase
 from viewer.rig.arrays import Bools
 
 __all__ = ["FARTHEST", "is_beyond", "within_text"]
@@ -32,12 +33,12 @@ def is_beyond(translations: NDArray[np.floating]) -> Bools:
     return np.asarray((np.abs(rows) > FARTHEST).any(axis=1))
 
 
-def within_text(found: float, limit: float = FARTHEST) -> str:
+def within_text(found: float, limit: float = FARTHEST) -> Phrase:
     """Return what was expected and found where a number is too large, or is none.
 
-    >>> within_text(1e20), within_text(float("inf"))
+    >>> str(within_text(1e20)), str(within_text(float("inf")))
     ('expected numbers up to 1e+09, found 1e+20', 'expected finite numbers, found inf')
     """
     if not np.isfinite(found):
-        return f"expected finite numbers, found {found:g}"
-    return f"expected numbers up to {limit:.2g}, found {found:g}"
+        return Phrase("not-finite", found=float(found))
+    return Phrase("beyond-limit", limit=limit, found=float(found))

@@ -15,6 +15,8 @@ import os
 import re
 from pathlib import Path
 
+from viewer.diagnostics import Phrase
+
 __all__ = ["referenced_path", "refused_text"]
 
 _DRIVE = re.compile(r"[A-Za-z]:")
@@ -42,15 +44,14 @@ def referenced_path(folder: Path, name: str) -> Path | None:
     return path if inside != base and inside.is_relative_to(base) else None
 
 
-def refused_text(name: str) -> str:
+def refused_text(name: str) -> Phrase:
     """Return why ``referenced_path`` gives no path, to follow the file's name in a message.
 
-    >>> refused_text("../a.png"), refused_text("/home/a.png")
+    >>> str(refused_text("../a.png")), str(refused_text("/home/a.png"))
     ('lies outside the folder: not read', 'is an absolute path: not followed, not read')
     """
-    if _is_absolute(name.replace("\\", "/")):
-        return "is an absolute path: not followed, not read"
-    return "lies outside the folder: not read"
+    is_absolute = _is_absolute(name.replace("\\", "/"))
+    return Phrase("absolute-path") if is_absolute else Phrase("outside-folder")
 
 
 def _is_absolute(written: str) -> bool:

@@ -2,32 +2,27 @@
 
 from __future__ import annotations
 
-import os
 import re
-import stat
 from collections.abc import Callable, Iterator
-from itertools import islice
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from viewer.errors import FormatError, printable
-from viewer.formats._faults import Fault, Part
+from viewer.diagnostics import MESSAGES, Collector, Diagnostic, Part
+from viewer.errors import FormatError
+from viewer.formats._file_bytes import FOLDER, MAX_SIZE, kind_of, no_file, read_bytes, read_head
 from viewer.formats._numbers import LARGEST, is_too_large, word_begins
-from viewer.near_names import did_you_mean
+from viewer.phrases import quoted
 from viewer.rig.arrays import Ints
 
 if TYPE_CHECKING:
     from viewer.formats._archive import Archive
 
-__all__ = ["MAX_SIZE", "Source", "no_number", "read_bytes", "shown"]
+__all__ = ["MAX_SIZE", "Source", "no_number", "read_bytes"]
 
-MAX_SIZE = 2 << 30
-"""Largest file that is read, in bytes, unless the caller says otherwise."""
-
-_MAX_WARNINGS = 100  # a file that earns more is no figure; nobody reads on
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _CONTROL_Z = b"\x1a"  # ends a text file written under CP/M or DOS
 _ANY_END = (b"ply\n", b"ply\r")  # numbers follow, whose last byte may be any
@@ -47,82 +42,11 @@ _MAGIC = (
     (b"\xfe\xff", "UTF-16 text"),
     (b"\x93NUMPY", "a numpy array"),
 )
-_MOST_FILES = 2000  # of a folder that are compared with the name of a missing one
-_ALIKE = 0.8  # names of files share their suffixes, and often more
 _LOOK = 4096  # bytes that show what a file is
-_KINDS = {
-    stat.S_IFDIR: "a folder",
-    stat.S_IFIFO: "a pipe",
-    stat.S_IFCHR: "a device",
-    stat.S_IFBLK: "a device",
-    stat.S_IFSOCK: "a socket",
-}
-
-
-def read_bytes(path: Path, max_size: int = MAX_SIZE) -> bytes:
-    """Read a regular file whole.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    max_size : int
-        Larger files, in bytes, are refused before they are read.
-
-    Raises
-    ------
-    FormatError
-        If the file is missing, unreadable, not a regular file, or too large.
-    """
-    kind = _check(path, max_size)
-    if kind is not None:
-        raise FormatError(path, f"expected a file, found {kind}")
-    return _read(path)
-
-
-def _check(path: Path, max_size: int) -> str | None:
-    """Look before opening, as a pipe would block: return what it is, None for a file."""
-    try:
-        status = path.stat()
-    except (OSError, ValueError) as problem:
-        raise _unreadable(path, problem) from None
-    if not stat.S_ISREG(status.st_mode):
-        return _KINDS.get(stat.S_IFMT(status.st_mode), "something else")
-    if status.st_size > max_size:
-        raise FormatError(
-            path, f"expected at most {max_size} bytes, found {status.st_size} (--max-size)"
-        )
-    return None
-
-
-def _read(path: Path, size: int = -1) -> bytes:
-    try:
-        with path.open("rb") as stream:
-            return stream.read(size)
-    except (OSError, ValueError) as problem:
-        raise _unreadable(path, problem) from None
-
-
-def _unreadable(path: Path, problem: Exception) -> FormatError:
-    reason = getattr(problem, "strerror", None) or problem
-    near = _near_files(path) if isinstance(problem, FileNotFoundError) else ""
-    return FormatError(path, f"cannot be read: {reason}{near}")
-
-
-def _near_files(path: Path) -> str:
-    """Return a question that offers files with a similar name, "" if there are none."""
-    try:
-        with os.scandir(path.parent) as entries:
-            names = [entry.name for entry in islice(entries, _MOST_FILES)]
-    except OSError:  # the folder is missing too, or may not be listed
-        return ""
-    # A link that leads nowhere has this name itself.
-    near = did_you_mean(path.name, [name for name in names if name != path.name], _ALIKE)
-    return f"; {near}" if near else ""
 
 
 class Source:
-    """One file, or folder of files, with the warnings that its reader adds.
+    """One file, or folder of files, with the diagnostics that its reader records.
 
     Attributes
     ----------
@@ -132,37 +56,39 @@ class Source:
         Whether it is a folder: then there are no bytes.
     max_size : int
         Largest size of a file, in bytes, also of those inside a folder or archive.
-    warnings : list of str
-        One line each, none twice.
+    diagnostics : Collector
+        What its reader records; shared with the files it was led to.
     also_read : list of Path
         Other files that its reader was led to: pictures, material libraries.
-    faults : list of Fault or None
-        None where the first fault ends the reading; a list takes in all that can be gone on from.
     """
 
     def __init__(
-        self, path: str | Path, data: bytes | None = None, max_size: int = MAX_SIZE
+        self,
+        path: str | Path,
+        data: bytes | None = None,
+        max_size: int = MAX_SIZE,
+        diagnostics: Collector | None = None,
     ) -> None:
         self.path = Path(path)
         self.is_folder = False
         self.max_size = max_size
-        self.warnings: list[str] = []
+        self.diagnostics = Collector() if diagnostics is None else diagnostics
         self.also_read: list[Path] = []
-        self.faults: list[Fault] | None = None
         self.archive: Archive | None = None  # opened once, by whoever asks first
         self._data = None if data is None else _without_marks(data)
-        self._warned: set[str] = set()
         self._counted = (0, 1)  # an offset whose line is known, and that line
         self._offsets: dict[str, tuple[Source, Callable[[int], int]]] = {}
 
     @classmethod
-    def open(cls, path: str | Path, max_size: int = MAX_SIZE) -> Source:
+    def open(
+        cls, path: str | Path, max_size: int = MAX_SIZE, diagnostics: Collector | None = None
+    ) -> Source:
         """Look at a file or folder; see ``read_bytes`` for what it raises."""
-        source = cls(path, max_size=max_size)
-        kind = _check(source.path, max_size)
-        source.is_folder = kind == _KINDS[stat.S_IFDIR]
+        source = cls(path, max_size=max_size, diagnostics=diagnostics)
+        kind = kind_of(source.path, max_size)
+        source.is_folder = kind == FOLDER
         if kind is not None and not source.is_folder:
-            raise FormatError(source.path, f"expected a file, found {kind}")
+            raise no_file(source.path, kind)
         return source
 
     @property
@@ -174,22 +100,21 @@ class Source:
 
     def peek(self, size: int) -> bytes:
         """Return the first bytes, without reading the others if nobody has."""
-        return _read(self.path, size) if self._data is None else self._data[:size]
+        return read_head(self.path, size) if self._data is None else self._data[:size]
 
     def inside(self, name: str) -> Source:
-        """Return a file of this folder; its warnings are this source's own."""
+        """Return a file of this folder; its diagnostics are this source's own."""
         return self._related(self.path / name)
 
     def beside(self, name: str) -> Source:
-        """Return a file next to this one; its warnings are this source's own."""
+        """Return a file next to this one; its diagnostics are this source's own."""
         return self._related(self.path.parent / name)
 
     def _related(self, path: Path) -> Source:
-        source = Source(path, max_size=self.max_size)
-        source.warnings, source._warned = self.warnings, self._warned
+        source = Source(path, max_size=self.max_size, diagnostics=self.diagnostics)
         source.also_read = self.also_read
         self.also_read.append(path)
-        source.faults, source._offsets = self.faults, self._offsets
+        source._offsets = self._offsets
         return source
 
     def words(self, start: int = 0, end: int | None = None) -> Iterator[re.Match[bytes]]:
@@ -233,36 +158,114 @@ class Source:
         """Offset behind the last word: where a file lacks something."""
         return len(self.data.rstrip())
 
-    def error(self, message: str, offset: int | None = None) -> FormatError:
-        """Return an error that names the file, and the line of ``offset``."""
-        return FormatError(self.path, message, None if offset is None else self.line(offset))
-
-    def warn(self, message: str, offset: int | None = None) -> None:
-        """Add a warning that names the file, and the line of ``offset``; each text only once."""
-        if message in self._warned or len(self._warned) > _MAX_WARNINGS:
-            return
-        self._warned.add(message)
-        if len(self._warned) > _MAX_WARNINGS:
-            message, offset = "further warnings are left out", None
-        self.warnings.append(str(self.error(message, offset)))
-
-    def refuse(
-        self, error: FormatError, count: int = 1, part: Part = "", places: ArrayLike = ()
-    ) -> None:
-        """Raise an error; where all faults are wanted, note it, so that the reader goes on.
+    def fault(self, key: str, offset: int | None = None, **values: Any) -> FormatError:
+        """Return the error of a fault that a reader cannot go on from.
 
         Parameters
         ----------
-        error : FormatError
-            The first of its kind.
-        count : int
-            How many there are.
-        part, places : str, (N,)
-            What the reader replaces by something neutral, see ``Fault``.
+        key : str
+            Of its message.
+        offset : int, optional
+            Where it is in the file, if that is known.
+        **values : object
+            What the message shows. They are keywords so that calls read like the templates.
         """
-        if self.faults is None:
-            raise error
-        self.faults.append(Fault(error, count, part, _indices(places)))
+        return FormatError(self._diagnostic(key, offset, values))
+
+    def refuse(
+        self,
+        key: str,
+        offset: int | None = None,
+        count: int = 1,
+        part: Part = "",
+        places: ArrayLike | None = None,
+        **values: Any,
+    ) -> None:
+        """Record a fault that the reader goes on from, but the file is refused for.
+
+        Parameters
+        ----------
+        key : str
+            Of its message.
+        offset : int, optional
+            Where it is in the file, if that is known; of several the first.
+        count : int
+            How many faults there are.
+        part, places : str, (N,)
+            The data that the reader replaces with neutral values, see ``Diagnostic``.
+        **values : object
+            What the message shows.
+
+        Raises
+        ------
+        FormatError
+            At once if the diagnostics keep no errors.
+        """
+        self._keep(self._diagnostic(key, offset, values), count, part, places)
+
+    def _keep(self, found: Diagnostic, count: int, part: Part, places: ArrayLike | None) -> None:
+        indices = None if places is None else _indices(places)
+        found = replace(found, is_refusal=True, count=count, part=part, places=indices)
+        if not self.diagnostics.keeps_errors:
+            raise FormatError(found)
+        self.diagnostics.add(found)
+
+    def warn(
+        self,
+        key: str,
+        offset: int | None = None,
+        count: int = 1,
+        part: Part = "",
+        places: ArrayLike | None = None,
+        **values: Any,
+    ) -> None:
+        """Record a fault or remark that the file is not refused for.
+
+        Parameters
+        ----------
+        key : str
+            Of its message.
+        offset : int, optional
+            Where it is in the file, if that is known.
+        count, part, places : int, str, (N,)
+            How many there are, and where; see ``Diagnostic``.
+        **values : object
+            What the message shows.
+        """
+        if key not in MESSAGES:  # until every reader names its messages
+            key, values = "F007.plain", {"message": key}
+        found = self._diagnostic(key, offset, values)
+        indices = None if places is None else _indices(places)
+        self.diagnostics.add(replace(found, count=count, part=part, places=indices))
+
+    def _diagnostic(self, key: str, offset: int | None, values: dict[str, Any]) -> Diagnostic:
+        line = None if offset is None else self.line(offset)
+        return Diagnostic(key, self.path, line, values=values)
+
+    # -- until every reader names its messages
+
+    def refuse_error(
+        self, error: FormatError, count: int = 1, part: Part = "", places: ArrayLike = ()
+    ) -> None:
+        """Record an error, see ``refuse``."""
+        found = error.diagnostic
+        if error.code:
+            found = replace(found, key=f"{error.code}.plain")
+        self._keep(found, count, part, places)
+
+    @property
+    def warnings(self) -> list[str]:
+        """Warnings as lines."""
+        return [str(found) for found in self.diagnostics.warnings]
+
+    @property
+    def faults(self) -> list[Diagnostic] | None:
+        """Errors, None if none are kept."""
+        return self.diagnostics.errors if self.diagnostics.keeps_errors else None
+
+    def error(self, message: str, offset: int | None = None) -> FormatError:
+        """Return an error that names the file, and the line of ``offset``."""
+        return self.fault("F002.plain", offset, message=message)
 
     def remember(self, kind: str, offset_of: Callable[[int], int]) -> None:
         """Keep how to find the offset of the index-th thing of a kind, for whoever asks.
@@ -321,15 +324,6 @@ def _without_marks(data: bytes) -> bytes:
     return data.removeprefix(_BYTE_ORDER_MARK).rstrip(_CONTROL_Z)
 
 
-def shown(word: bytes) -> str:
-    r"""Return a word of a file in quotes, on one line and not too long.
-
-    >>> shown(b"up\x00")
-    '"up\\x00"'
-    """
-    return f'"{printable(word[:200].decode("utf-8", "replace"), 40)}"'
-
-
 def no_number(word: bytes | None) -> str:
     """Return what was expected and found where a number should be, None for the end of the file.
 
@@ -340,4 +334,4 @@ def no_number(word: bytes | None) -> str:
         return "expected a number, found the end of the file"
     # What is too large is written as a number is: it says what is wrong with it.
     below = f" below {LARGEST:.1e}" if is_too_large(word) else ""
-    return f"expected a number{below}, found {shown(word)}"
+    return f"expected a number{below}, found {quoted(word)}"

@@ -38,9 +38,9 @@ def filled_normals(
     absent = np.isnan(normals[:, 0])
     zero = np.abs(normals).max(axis=1) < _SHORTEST
     if zero.any():
+        places = np.flatnonzero(zero)
         source.warn(
-            f"{counted(int(zero.sum()), 'normal')} of length 0, first of vertex {zero.argmax()}: "
-            "computed from the triangles"
+            "M007.normals", part="positions", places=places, n=len(places), vertex=int(places[0])
         )
     missing = absent | zero
     if not missing.any():

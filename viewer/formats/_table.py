@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.errors import FormatError
-from viewer.formats._faults import Part
+from viewer.diagnostics import Part, Phrase
 from viewer.formats._numbers import parse_numbers
-from viewer.formats._source import Source, no_number
-from viewer.formats._tolerant import read_words, refuse_words
+from viewer.formats._source import Source
+from viewer.formats._tolerant import Words, number_key, read_words, refuse_words
 from viewer.rig.arrays import Floats
 
-__all__ = ["read_broken_table", "read_numbers", "read_table", "row_error"]
+__all__ = ["read_numbers", "read_table"]
 
 Places = NDArray[np.int64]
 
 
-def read_table(source: Source, columns: int) -> Floats:
+def read_table(
+    source: Source, columns: int, part: Part = ""
+) -> tuple[Floats, Callable[[int], int]]:
     """Read a table of numbers.
 
     Parameters
@@ -26,22 +29,26 @@ def read_table(source: Source, columns: int) -> Floats:
         The file; blank lines are skipped.
     columns : int
         Numbers in every row.
+    part : str
+        What of a figure the rows are, see ``Diagnostic``.
 
     Returns
     -------
-    (N, columns)
-        As written.
+    rows : (N, columns)
+        As written; NaN in rows that cannot be used, if the file is not refused for them.
+    offset_of : callable
+        Returns where a row is in the file; slow, for errors only.
 
     Raises
     ------
     FormatError
         With the line of a row that has more or fewer numbers, or a word that is none.
     """
-    values = read_numbers(source)
-    if len(values) == 0:
-        raise source.error(f"expected rows of {columns} numbers, found {source.looks_like()}")
-    _check_rows(source, columns, len(values))
-    return values.reshape(-1, columns)
+    values, bad = parse_numbers(source.data, 0, len(source.data))
+    if bad < 0 and len(values) and _is_regular(source, columns, len(values)):
+        return values.reshape(-1, columns), lambda row: source.word_offset(0, row * columns)
+    rows, offsets = _read_rows(source, columns, part)
+    return rows, lambda row: int(offsets[row])
 
 
 def read_numbers(source: Source) -> Floats:
@@ -57,68 +64,51 @@ def read_numbers(source: Source) -> Floats:
     if bad >= 0:
         offset = source.word_offset(0, bad)
         word = source.next_word(offset)
-        raise source.error(no_number(word.group() if word else None), offset)
+        found = b"" if word is None else word.group()
+        raise source.fault(number_key(found), offset, item=Phrase("word", index=bad), found=found)
     return values
 
 
-def _check_rows(source: Source, columns: int, count: int) -> None:
-    """Hold every line to its number of words; lines end with LF, CR or both."""
+def _is_regular(source: Source, columns: int, count: int) -> bool:
+    """Return whether every line has so many words, or none; lines end with LF, CR or both."""
+    if count % columns:
+        return False
     letters = np.frombuffer(source.data, dtype=np.uint8)
     is_space = letters <= 32  # control characters were refused with the numbers
     begins = np.flatnonzero(~is_space & np.concatenate([[True], is_space[:-1]]))
     # Each run of `columns` words must lie on a line of its own.
     ends = np.flatnonzero((letters == 10) | (letters == 13))
-    lines = np.searchsorted(ends, begins)
-    if count % columns == 0:
-        rows = lines.reshape(-1, columns)
-        if (rows[:, 0] == rows[:, -1]).all() and (rows[1:, 0] > rows[:-1, -1]).all():
-            return
-    _, first, counts = np.unique(lines, return_index=True, return_counts=True)
-    wrong = int(np.flatnonzero(counts != columns)[0])
-    raise source.error(
-        f"expected {columns} numbers in a row, found {counts[wrong]}", int(begins[first[wrong]])
-    )
+    rows = np.searchsorted(ends, begins).reshape(-1, columns)
+    return bool((rows[:, 0] == rows[:, -1]).all() and (rows[1:, 0] > rows[:-1, -1]).all())
 
 
-def read_broken_table(source: Source, columns: int, part: Part) -> tuple[Floats, Places]:
-    """Read a table, noting all faults; see ``read_table``.
-
-    Parameters
-    ----------
-    source : Source
-        Takes the faults.
-    columns : int
-        Numbers in every row.
-    part : str
-        What of a figure the rows are, see ``Fault``.
-
-    Returns
-    -------
-    rows : (N, columns)
-        NaN in rows that cannot be used.
-    offsets : (N,)
-        Where each is in the file.
-    """
+def _read_rows(source: Source, columns: int, part: Part) -> tuple[Floats, Places]:
+    """Read what is broken word by word, and refuse what cannot be used."""
     words = read_words(source.data, 0, len(source.data))
+    if len(words.offsets) == 0:
+        raise source.fault("F002.table-empty", columns=columns, found=source.looks_like())
     begins, sizes = words.rows()
     fits = sizes == columns
-    if not fits.any():
-        read_table(source, columns)  # refuses it
     owners = np.repeat(np.arange(len(begins)), sizes)
+    if not fits.any() and len(words.bad):
+        raise _word_fault(source, words, int(words.bad[0]), int(owners[words.bad[0]]))
     bad = words.bad
-    refuse_words(source, words, bad, lambda word: f"row {owners[word]}", part, owners[bad])
+    refuse_words(
+        source, words, bad, lambda word: Phrase("row", index=int(owners[word])), part, owners[bad]
+    )
     wrong = np.flatnonzero(~fits)
     if len(wrong):
-        error = source.error(
-            f"expected {columns} numbers in a row, found {sizes[wrong[0]]}",
-            int(words.offsets[begins[wrong[0]]]),
-        )
-        source.refuse(error, len(wrong), part, wrong)
+        offset, found = int(words.offsets[begins[wrong[0]]]), int(sizes[wrong[0]])
+        values = {"expected": columns, "found": found}
+        if not fits.any():
+            raise source.fault("F002.table-width", offset, **values)
+        source.refuse("F002.table-width", offset, len(wrong), part, wrong, **values)
     rows = np.full((len(begins), columns), np.nan)
     rows[fits] = words.values[begins[fits, None] + np.arange(columns)]
     return rows, words.offsets[begins]
 
 
-def row_error(source: Source, row: int, columns: int, message: str) -> FormatError:
-    """Return an error with the line of a row."""
-    return source.error(message, source.word_offset(0, row * columns))
+def _word_fault(source: Source, words: Words, index: int, row: int) -> Exception:
+    found = words.word(index)
+    offset = int(words.offsets[index])
+    return source.fault(number_key(found), offset, item=Phrase("row", index=row), found=found)

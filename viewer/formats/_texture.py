@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from viewer.errors import FormatError, printable
+from viewer.errors import FormatError
 from viewer.formats._references import referenced_path, refused_text
 from viewer.formats._source import Source, read_bytes
 from viewer.media.image import decode_picture
@@ -30,13 +30,13 @@ def load_image(source: Source, name: str, offset: int) -> Bytes | None:
     """
     path = referenced_path(source.path.parent, name)
     if path is None:
-        source.warn(f"texture {printable(name)} {refused_text(name)}", offset)
+        source.warn("F005.texture-refused", offset, name=name, reason=refused_text(name))
         return None
     source.also_read.append(path)
     try:
         return decode_picture(path, read_bytes(path))
     except FormatError as problem:
-        source.warn(f"texture {problem}; drawn untextured", offset)
+        source.warn("F005.texture", offset, problem=problem.diagnostic)
         return None
 
 

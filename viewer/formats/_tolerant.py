@@ -2,20 +2,31 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.formats._faults import Part
-from viewer.formats._numbers import is_infinite, parse_words, word_begins
-from viewer.formats._source import Source, no_number
+from viewer.diagnostics import Part, Phrase
+from viewer.formats._numbers import is_infinite, is_too_large, parse_words, word_begins
+from viewer.formats._source import Source
 from viewer.rig.arrays import Bools, Floats, Ints
 
-__all__ = ["Words", "held_rows", "mended_corners", "mended_positions", "read_words", "refuse_words"]
+__all__ = [
+    "Words",
+    "held_rows",
+    "mended_corners",
+    "mended_positions",
+    "number_key",
+    "read_words",
+    "refuse_words",
+]
 
 Places = NDArray[np.int64]
+
+_WORD = re.compile(rb"[^ \t\n\r\v\f]+")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,8 +62,8 @@ class Words:
 
     def word(self, index: int) -> bytes:
         """Return a word as written."""
-        start = int(self.offsets[index])
-        return self.data[start : start + 200].split(None, 1)[0]
+        found = _WORD.match(self.data, int(self.offsets[index]))
+        return b"" if found is None else found.group()
 
 
 def read_words(data: bytes, start: int, end: int) -> Words:
@@ -68,7 +79,7 @@ def refuse_words(
     source: Source,
     words: Words,
     bad: Places,
-    named: Callable[[int], str],
+    named: Callable[[int], Phrase | str],
     part: Part,
     places: NDArray[np.integer],
 ) -> None:
@@ -85,22 +96,34 @@ def refuse_words(
     named : callable
         Gives for the index of a word what the number belongs to.
     part : str
-        What of the figure it is, see ``Fault``.
+        What of the figure it is, see ``Diagnostic``.
     places : (N,)
         Which vertex, triangle, joint or frame each belongs to.
     """
     lost = [is_infinite(words.word(index)) for index in bad.tolist()]
-    for is_lost, code in ((True, "F003"), (False, "F002")):
+    for is_lost in (True, False):
         chosen = np.flatnonzero(np.array(lost, dtype=np.bool_) == is_lost)
         if len(chosen) == 0:
             continue
         first = int(bad[chosen[0]])
-        error = source.error(
-            f"{named(first)}: {no_number(words.word(first))}",
+        source.refuse(
+            number_key(words.word(first), part),
             int(words.offsets[first]),
+            len(chosen),
+            part,
+            places[chosen],
+            item=named(first),
+            found=words.word(first),
         )
-        error.code = "W003" if part == "weights" and code == "F003" else code
-        source.refuse(error, len(chosen), part, places[chosen])
+
+
+def number_key(word: bytes, part: Part = "") -> str:
+    """Return the key of the message about a word that is no number."""
+    if not is_infinite(word):
+        return "F002.number"
+    # What is too large is written as a number is: the message gives the limit.
+    name = "too-large" if is_too_large(word) else "number"
+    return f"{'W003' if part == 'weights' else 'F003'}.{name}"
 
 
 def mended_positions(positions: Floats, triangles: Ints) -> Floats:

@@ -19,15 +19,16 @@ import math
 
 import numpy as np
 
-from viewer.errors import FormatError, counted, one_of, printable
+from viewer.errors import FormatError
 from viewer.formats._archive import Archive
 from viewer.formats._container import archive_of, finite
-from viewer.formats._reach import is_beyond, within_text
+from viewer.formats._reach import FARTHEST, is_beyond
 from viewer.formats._source import Source
 from viewer.formats._tolerant import held_rows
+from viewer.phrases import printable
 from viewer.rig.arrays import Deferred, Floats, Ints
 from viewer.rig.motion.body_motion import BodyMotion
-from viewer.rig.motion.timing import RATES, Timing, is_rate
+from viewer.rig.motion.timing import FASTEST, SLOWEST, Timing, is_rate
 from viewer.rig.smpl_family import FAMILY, members_by_numbers
 
 __all__ = ["has_frames", "read"]
@@ -116,7 +117,7 @@ def read(source: Source) -> BodyMotion:
     else:
         found = _first_key(source, archive, _ROOTS)
         if found is None:
-            raise source.error(_refusal(source, archive))
+            raise _refusal(source, archive)
         names, vectors, hands = _split_poses(source, archive, found)
     count = len(vectors)
     is_aist = found == "smpl_poses"
@@ -136,20 +137,15 @@ def read(source: Source) -> BodyMotion:
     )
 
 
-def _refusal(source: Source, archive: Archive) -> str:
-    keys = ", ".join(printable(key, 40) for key in archive.keys[:8])
+def _refusal(source: Source, archive: Archive) -> FormatError:
+    keys = list(archive.keys)
     if archive.has("markers_latent") or "stagei." in source.path.name:
-        return (
-            "expected a motion, found the first stage of a marker fit, which has no poses: open "
-            "the *_stageii.npz files beside it"
-        )
-    if archive.keys and set(archive.keys) <= {"betas", *_BESIDES.split(), *_RATES}:
-        return (
-            f"expected a motion, found a subject's shape (keys {keys}): open the *_poses.npz files "
-            "beside it"
-        )
-    found = f"the keys {keys}" if keys else "no keys"
-    return f"expected a motion (poses, or root_orient and pose_body), found {found}"
+        return source.fault("F002.motion-stage")
+    if not keys:
+        return source.fault("F002.motion-no-keys")
+    if set(keys) <= {"betas", *_BESIDES.split(), *_RATES}:
+        return source.fault("F002.motion-shape", keys=keys)
+    return source.fault("F002.motion", keys=keys)
 
 
 def _rows(archive: Archive, key: str, count: int | None = None, first: str = "") -> Floats:
@@ -157,21 +153,21 @@ def _rows(archive: Archive, key: str, count: int | None = None, first: str = "")
     array = archive.array(key)
     shape = array.shape if len(array.shape) > 1 else (1, *array.shape)
     if count is not None and shape[0] != count:
-        raise archive.error(
-            key, f"expected {counted(count, 'frame')} as in {first}, found {shape[0]}"
+        raise archive.fault(
+            "F002.motion-frames", item=key, expected=count, other=first, found=shape[0]
         )
     if not shape[0]:
-        raise archive.error(key, "expected frames, found none")
+        raise archive.fault("F002.motion-no-frames", item=key)
     values = array.values().reshape(shape[0], math.prod(shape[1:]))
-    rows = finite(archive, key, values, "frames" if shape[0] > 1 else "")
-    return held_rows(rows, ~np.isfinite(values).all(axis=1)) if archive.is_tolerant else rows
+    return finite(archive, key, values, "frames" if shape[0] > 1 else "")
 
 
 def _whole_poses(archive: Archive, key: str) -> tuple[tuple[str, ...], Floats]:
     rows, known = _rows(archive, key), members_by_numbers()
     if rows.shape[1] not in known:
-        wanted = one_of(sorted(known))
-        raise archive.error(key, f"expected {wanted} numbers a frame, found {rows.shape[1]}")
+        raise archive.fault(
+            "F002.motion-width", item=key, expected=sorted(known), found=rows.shape[1]
+        )
     return known[rows.shape[1]], rows.reshape(len(rows), -1, 3)
 
 
@@ -180,7 +176,7 @@ def _first_key(source: Source, archive: Archive, keys: tuple[str, ...]) -> str |
     there = [key for key in keys if archive.has(key)]
     for key in there[1:]:
         if not _are_same(_numbers(archive, there[0]), _numbers(archive, key)):
-            source.warn(f"{there[0]} and {key} differ: {there[0]} is taken")
+            source.warn("F007.motion-differ", first=there[0], others=[key])
     return there[0] if there else None
 
 
@@ -216,7 +212,7 @@ def _compare_parts(
         if not _are_same(vectors[:, columns].ravel(), numbers):
             odd.append(part)
     if odd:
-        source.warn(f"{key} and {', '.join(odd)} differ: {key} is taken")
+        source.warn("F007.motion-differ", first=key, others=odd)
 
 
 def _split_poses(
@@ -237,10 +233,9 @@ def _split_poses(
             hands[_HANDS[key]] = rows
             continue
         if columns not in joints:
-            wanted = " or ".join(map(str, joints))
-            raise archive.error(key, f"expected {wanted} numbers a frame, found {columns}")
+            raise archive.fault("F002.motion-width", item=key, expected=list(joints), found=columns)
         if key in _HANDS and archive.has("flat_hand_mean") and not _flag(archive, "flat_hand_mean"):
-            source.warn(f"{key}: angles are taken as they are; the mean hand is not added to them")
+            source.warn("F007.motion-angles", item=key)
         if set(joints[columns]) <= set(names):  # pose_eye holds both, leye_pose one of them
             _compare_again(source, key, joints[columns], rows, names, parts)
             continue
@@ -262,7 +257,7 @@ def _compare_again(
     vectors = np.concatenate(parts, axis=1).reshape(len(rows), -1, 3)
     columns = [names.index(name) for name in joints]
     if not _are_same(vectors[:, columns].ravel(), rows.ravel()):
-        source.warn(f"{key} and the part before it with the same joints differ: {key} is left out")
+        source.warn("F007.motion-again", item=key)
 
 
 def _flag(archive: Archive, key: str) -> bool:
@@ -272,23 +267,32 @@ def _flag(archive: Archive, key: str) -> bool:
 def _translations(source: Source, archive: Archive, count: int, first: str) -> Floats:
     key = _first_key(source, archive, _TRANSLATIONS)
     if key is None:
-        source.warn("no trans in it: the body stays in its place")
+        source.warn("F007.motion-place")
         return np.zeros((count, 3))
     rows = _rows(archive, key, count, first)
     if rows.shape[1] != 3:
-        raise archive.error(key, f"expected 3 numbers a frame, found {rows.shape[1]}")
+        raise archive.fault("F002.motion-width", item=key, expected=[3], found=rows.shape[1])
     scale = _single(archive, "smpl_scaling") if archive.has("smpl_scaling") else 1.0
     if not 1.0 / _MOST_SCALED <= scale <= _MOST_SCALED:
-        wanted = f"expected {1.0 / _MOST_SCALED:g} to {_MOST_SCALED:g}"
-        raise archive.error("smpl_scaling", f"{wanted}, found {scale:g}")
+        low, high = 1.0 / _MOST_SCALED, _MOST_SCALED
+        raise archive.fault(
+            "F002.motion-scale", item="smpl_scaling", low=low, high=high, found=scale
+        )
     rows = finite(archive, key, rows / scale)
     is_far = is_beyond(rows)
     if not is_far.any():
         return rows
     frame = int(is_far.argmax())
-    worst = rows[frame][np.abs(rows[frame]).argmax()]
-    error = archive.error(key, f"{within_text(worst)} in frame {frame}")
-    archive.refuse(error, int(is_far.sum()), "frames", np.flatnonzero(is_far))
+    archive.refuse(
+        "F003.motion-reach",
+        item=key,
+        count=int(is_far.sum()),
+        part="frames",
+        places=np.flatnonzero(is_far),
+        limit=FARTHEST,
+        found=float(rows[frame][np.abs(rows[frame]).argmax()]),
+        frame=frame,
+    )
     return held_rows(rows, is_far)
 
 
@@ -308,7 +312,7 @@ def _coefficients(
 def _single(archive: Archive, key: str) -> float:
     values = archive.array(key).values().ravel()
     if len(values) != 1:
-        raise archive.error(key, f"expected one number, found {len(values)}")
+        raise archive.fault("F002.motion-single", item=key, found=len(values))
     return float(finite(archive, key, values)[0])
 
 
@@ -316,15 +320,16 @@ def _rate(source: Source, archive: Archive, is_aist: bool) -> float:
     rates = {key: _single(archive, key) for key in _RATES if archive.has(key)}
     for key, rate in rates.items():
         if not is_rate(rate):
-            raise archive.error(key, f"expected {RATES}, found {rate:g}")
+            raise archive.fault("F002.motion-rate", item=key, low=SLOWEST, high=FASTEST, found=rate)
     if len(set(rates.values())) > 1:
-        given = ", ".join(f"{key} {rate:g}" for key, rate in rates.items())
-        source.warn(f"frame rates that differ ({given}): the first is taken")
+        source.warn("F007.motion-rates", rates=[f"{key} {rate:g}" for key, rate in rates.items()])
     if rates:
         return next(iter(rates.values()))
-    rate, reason = (_RATE_OF_AIST, "as AIST++ has") if is_aist else (_RATE, "as is usual")
-    source.warn(f"no frame rate in it: {rate:g} frames a second, {reason}")
-    return rate
+    if is_aist:
+        source.warn("F007.motion-aist-rate", rate=_RATE_OF_AIST)
+        return _RATE_OF_AIST
+    source.warn("F007.motion-no-rate", rate=_RATE)
+    return _RATE
 
 
 def _timed_rows(archive: Archive, count: int, first: str) -> Ints:
@@ -333,7 +338,13 @@ def _timed_rows(archive: Archive, count: int, first: str) -> Ints:
     if archive.has("present"):
         present = _rows(archive, "present").ravel()
         if len(present) != count:
-            raise archive.error("present", f"expected {count} as in {first}, found {len(present)}")
+            raise archive.fault(
+                "F002.motion-present",
+                item="present",
+                expected=count,
+                other=first,
+                found=len(present),
+            )
         rows[present == 0.0] = -1
     return rows
 
@@ -363,10 +374,10 @@ def _notice(source: Source, archive: Archive) -> None:
     if archive.has("dmpls"):
         moved = int(_rows(archive, "dmpls").any(axis=1).sum())
         if moved:
-            source.warn(f"dmpls, the soft tissue of {counted(moved, 'frame')}, are left out")
-    odd = [printable(key, 40) for key in archive.keys if key not in _KNOWN]
+            source.warn("F007.motion-tissue", n=moved)
+    odd = [key for key in archive.keys if key not in _KNOWN]
     if odd:
-        source.warn(f"keys that mean nothing in a motion: {', '.join(odd[:12])}")
+        source.warn("F007.motion-keys", keys=odd)
 
 
 def _facts(archive: Archive) -> tuple[tuple[str, str], ...]:

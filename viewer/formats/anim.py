@@ -17,13 +17,16 @@ from __future__ import annotations
 import math
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from viewer.diagnostics import Diagnostic, Part, Phrase
 from viewer.errors import FormatError, UnsupportedFormatError
 from viewer.formats._numbers import to_number
-from viewer.formats._reach import FARTHEST, within_text
-from viewer.formats._source import Source, no_number, shown
+from viewer.formats._reach import FARTHEST
+from viewer.formats._source import Source
+from viewer.formats._tolerant import number_key
 from viewer.media.saving import save_text
 from viewer.rig.figure import Figure
 from viewer.rig.motion.clip import (
@@ -74,8 +77,9 @@ class _Parser:
         self.source = source
         self.words = source.words()
         self.word: Word | None = None
-        self.what = "animation"
-        self.began = 0  # where that begins
+        # Where the current word is: in a channel, and there in a key.
+        self.channel: int | None = None
+        self.key: int | None = None
         self.starts: list[int] = []  # of all channels
 
     def clip(self) -> Clip:
@@ -98,7 +102,7 @@ class _Parser:
             elif text == b"channel":
                 channels.append(self._channel(len(channels)))
             else:
-                raise self._error(f"expected a channel, found {shown(text)}")
+                raise self._fault("F002.anim-item")
         self._finish(count, stated, len(channels))
         self.source.remember("channels", self.starts.__getitem__)
         return Clip(self.source.path.stem, tuple(channels), *(span or self._key_span(channels)))
@@ -107,35 +111,32 @@ class _Parser:
         word, start, end = self.word, self._number("range"), self._number("range")
         if start > end:
             where = None if word is None else word.start()
-            span = f"{number_text(end)} to {number_text(start)}"
-            self.source.warn(f"range ends before it begins: read as {span}", where)
+            low, high = number_text(end), number_text(start)
+            self.source.warn("F007.anim-reversed", where, start=low, end=high)
         return min(start, end), max(start, end)
 
     def _key_span(self, channels: list[Channel]) -> tuple[float, float]:
         times = np.concatenate([np.zeros(0), *(channel.times for channel in channels)])
         span = (float(times.min()), float(times.max())) if len(times) else (0.0, 0.0)
-        shown_span = f"{number_text(span[0])} to {number_text(span[1])}"
-        self.source.warn(f"no range: that of the keys is played, {shown_span}")
+        start, end = map(number_text, span)
+        self.source.warn("F007.anim-no-range", start=start, end=end)
         return span
 
     def _finish(self, count: int | None, stated: Word | None, found: int) -> None:
-        self.what, self.began = "animation", 0
+        self.channel = None
         if self.word is None:
-            self.source.warn('the last "}" is missing')
-        if count != found:
-            wanted = "numchannels" if count is None else f"{count} channels as numchannels says"
-            self.source.refuse(self._error(f"expected {wanted}, found {found}", stated))
+            self.source.warn("F006.closing")
+        if count is None:
+            self._refuse("F002.anim-no-count", found=found)
+        elif count != found:
+            self._refuse("F002.anim-channels", stated, expected=count, found=found)
         self._advance()
         if self.word is not None:
-            self.source.warn(
-                f"ignored what follows the animation, {shown(self.word.group())}",
-                self.word.start(),
-            )
+            self.source.warn("F006.anim-after", self.word.start(), found=self.word.group())
 
     def _channel(self, index: int) -> Channel:
-        self.what = f"channel {index}"
-        self.began = self.word.start() if self.word else 0
-        self.starts.append(self.began)
+        self.channel = index
+        self.starts.append(self.word.start() if self.word else 0)
         self._advance()
         # Some files number their channels; the order counts, not the number.
         while self.word is not None and self.word.group() not in (b"{", b"}", b"extrapolate"):
@@ -150,11 +151,11 @@ class _Parser:
                 extrapolation = (self._mode(), self._mode())
             elif text == b"keys":
                 if rows is not None:
-                    raise self._error("expected one list of keys, found another")
+                    raise self._fault("F002.anim-keys-again")
                 self._advance()
                 rows = self._keys()
             else:
-                raise self._error(f"expected extrapolate or keys, found {shown(text)}")
+                raise self._fault("F002.anim-channel-item")
         self._expect(b"}")
         return self._make_channel(index, rows or [], extrapolation)
 
@@ -166,11 +167,17 @@ class _Parser:
     ) -> Channel:
         times = [row[0] for row in rows]
         if not rows:
-            self.source.warn(f"channel {index} has no keys: its value is 0")
+            self.source.warn("C010.anim-no-keys", part="channels", places=[index], channel=index)
         if times != sorted(times):
             late = next(i for i in range(1, len(times)) if times[i] < times[i - 1])
             self.source.warn(
-                f"channel {index}: key {late} is before key {late - 1}; keys sorted", rows[late][4]
+                "C001.anim-sorted",
+                rows[late][4],
+                part="channels",
+                places=[index],
+                channel=index,
+                late=late,
+                before=late - 1,
             )
             rows = sorted(rows, key=lambda row: row[0])
         return Channel(
@@ -187,78 +194,98 @@ class _Parser:
         rows: list[_Key] = []
         lost = 0
         while self.word is not None and self.word.group() != b"}":
-            self.what = f"{self.what.split(',')[0]}, key {len(rows) + lost}"
+            self.key = len(rows) + lost
             start = self.word.start()
             time, value = self._number("time", of_key=True), self._number("value", of_key=True)
             row = time, value, self._tangent(), self._tangent(), start
             if math.isnan(time + value):
-                lost += 1  # it was noted; the curve is drawn through the other keys
+                lost += 1  # it was refused; the curve is drawn through the other keys
             else:
                 rows.append(row)
-        self.what = self.what.split(",")[0]
-        if len(rows) + lost != count:
-            found = f"expected {count} keys, found {len(rows) + lost}"
-            self.source.refuse(self._error(found, stated))
+        self.key = None
+        found = len(rows) + lost
+        if found != count:
+            self._refuse("F002.anim-keys", stated, expected=count, found=found)
         self._expect(b"}")
         return rows
 
     def _advance(self) -> None:
         self.word = next(self.words, None)
 
-    def _error(self, message: str, word: Word | None = None) -> FormatError:
-        """Return an error at a word, or else at the current one."""
-        word = self.word if word is None else word
-        if word is not None:
-            return self.source.error(f"{self.what}: {message}", word.start())
-        first = self.source.line(self.began)
-        return self.source.error(
-            f"{self.what}: {message} ({self.what.split(',')[0]} begins in line {first})",
-            len(self.source.data.rstrip()),
-        )
+    def _where(self) -> Phrase:
+        """Return what the current word belongs to."""
+        if self.channel is None:
+            return Phrase("animation")
+        if self.key is None:
+            return Phrase("anim-channel", channel=self.channel)
+        return Phrase("anim-key", channel=self.channel, index=self.key)
 
-    def _found(self) -> str:
-        return "the end of the file" if self.word is None else shown(self.word.group())
+    def _begins(self) -> Phrase | None:
+        """Return where the channel begins in which the file ends; None before its end."""
+        if self.word is not None:
+            return None
+        if self.channel is None:
+            return Phrase("anim-begins", where=Phrase("animation"), line=self.source.line(0))
+        channel = Phrase("anim-channel", channel=self.channel)
+        line = self.source.line(self.starts[self.channel])
+        return Phrase("anim-begins", where=channel, line=line)
+
+    def _values(self, own: dict[str, Any]) -> dict[str, Any]:
+        """Return what messages about the current word show, besides their own values."""
+        found = None if self.word is None else self.word.group()
+        return {"where": self._where(), "found": found, "begins": self._begins(), **own}
+
+    def _fault(self, key: str, **values: Any) -> FormatError:
+        """Return the error of a fault at the current word that nothing can follow."""
+        where = self.source.end if self.word is None else self.word.start()
+        return self.source.fault(key, where, **self._values(values))
+
+    def _refuse(self, key: str, word: Word | None = None, **values: Any) -> None:
+        """Refuse a word, or else the current one, and go on."""
+        word = self.word if word is None else word
+        where = self.source.end if word is None else word.start()
+        part: Part = "" if self.channel is None else "channels"
+        places = None if self.channel is None else [self.channel]
+        self.source.refuse(key, where, 1, part, places, **self._values(values))
 
     def _expect(self, text: bytes) -> None:
         if self.word is None or self.word.group() != text:
             looks = self.source.looks_like() if text == b"animation" else None
-            hint = f" ({looks})" if looks else ""
-            raise self._error(f'expected "{text.decode()}", found {self._found()}{hint}')
+            raise self._fault("F002.anim-word", expected=text.decode(), looks=looks)
         self._advance()
 
     def _number(self, item: str, of_key: bool = False) -> float:
-        """Read a number; NaN for a key's that is none, where faults are noted."""
-        value = None if self.word is None else to_number(self.word.group())
+        """Read a number; NaN in place of a number of a key that is refused."""
+        if self.word is None:
+            raise self._fault("F002.anim-end", item=self._item(item))
+        word = self.word.group()
+        value = to_number(word)
         if value is None:
-            word = None if self.word is None else self.word.group()
-            error = self._error(f"{item}: {no_number(word)}")
-            if not of_key or self.word is None or self.word.group() in (b"{", b"}"):
-                raise error
-            self.source.refuse(error)
+            if not of_key or word in (b"{", b"}"):
+                raise self._fault(number_key(word), item=self._item(item))
+            self._refuse(number_key(word), item=self._item(item))
             value = math.nan
         elif item == "value" and abs(value) > FARTHEST:
-            self.source.refuse(self._error(f"{item}: {within_text(value)}"))
+            self._refuse("F003.beyond", item=self._item(item), most=FARTHEST, found=value)
             value = math.nan
         self._advance()
         return value
+
+    def _item(self, item: str) -> Phrase:
+        return Phrase("anim-item", where=self._where(), item=item)
 
     def _count(self, item: str) -> int:
         word, value = self.word, self._number(item)
         left = len(self.source.data) - (word.end() if word else 0)
         if value != int(value) or value < 0 or value * _WORDS_PER_KEY > left:
             self.word = word
-            raise self._error(
-                f"{item}: expected a count that the file can hold, found {self._found()} "
-                f"with {left} bytes left"
-            )
+            raise self._fault("F002.anim-count", item=self._item(item), left=left)
         return int(value)
 
     def _mode(self) -> Extrapolation:
         mode = _MODES.get(self.word.group()) if self.word else None
         if mode is None:
-            raise self._error(
-                f"extrapolate: expected one of {', '.join(EXTRAPOLATIONS)}, found {self._found()}"
-            )
+            raise self._fault("F002.anim-mode", modes=EXTRAPOLATIONS)
         self._advance()
         return mode
 
@@ -266,12 +293,9 @@ class _Parser:
         text = self.word.group() if self.word else b""
         tangent = _RULES.get(text, to_number(text))
         if tangent is None:
-            error = self._error(
-                f"tangent: expected {', '.join(TANGENT_RULES)} or a number, found {self._found()}"
-            )
             if self.word is None or text in (b"{", b"}"):
-                raise error
-            self.source.refuse(error)
+                raise self._fault("F002.anim-tangent", rules=TANGENT_RULES)
+            self._refuse("F002.anim-tangent", rules=TANGENT_RULES)
             tangent = "smooth"
         self._advance()
         return tangent
@@ -295,9 +319,9 @@ def write(clip: Clip | Figure, path: str | Path) -> None:
         If the file cannot be written.
     """
     if not isinstance(clip, Clip):
-        raise UnsupportedFormatError(".anim holds a clip, not a figure")
+        raise UnsupportedFormatError(Diagnostic("F002.anim-figure"))
     if [channel.target for channel in clip.channels] != list(range(len(clip.channels))):
-        raise UnsupportedFormatError(".anim needs a channel for every DOF, in their order")
+        raise UnsupportedFormatError(Diagnostic("F002.anim-order"))
     head = f"animation {{\n\trange {clip.start!r} {clip.end!r}\n"
     head += f"\tnumchannels {len(clip.channels)}\n"
     save_text(path, head + "".join(map(_channel_text, clip.channels)) + "}\n")

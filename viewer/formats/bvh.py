@@ -22,11 +22,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from viewer.errors import printable
+from viewer.diagnostics import Phrase
 from viewer.formats._bvh.guess import frame_rate, guess_unit, guess_up
-from viewer.formats._bvh.hierarchy import BvhJoint, read_hierarchy
+from viewer.formats._bvh.hierarchy import BvhJoint, called, read_hierarchy
 from viewer.formats._bvh.motion import Motion, read_motion
-from viewer.formats._reach import is_beyond, within_text
+from viewer.formats._reach import FARTHEST, is_beyond
 from viewer.formats._source import Source
 from viewer.formats._tolerant import held_rows
 from viewer.rig.arrays import Floats, Ints
@@ -108,14 +108,25 @@ def _table(source: Source, joints: list[BvhJoint]) -> _Table:
     count = 0
     for index, joint in enumerate(joints):
         if joint.offset is None:
-            end = "an End Site of " * joint.is_end
-            source.warn(f"{end}{_called(joint)} has no OFFSET: taken for 0 0 0", joint.start)
+            at = place[joint.parent] if joint.is_end else len(kept)
+            source.warn(
+                "F007.bvh-no-offset",
+                joint.start,
+                part="joints",
+                places=[at],
+                joint=called(joint),
+            )
         codes = joint.channels or []
         if joint.is_end:
             ends.append((place[joint.parent], joint.offset or [0.0, 0.0, 0.0]))
             if codes:
-                what = f"the channels of an End Site of {_called(joint)}"
-                source.warn(f"ignored {what}", joint.start)
+                source.warn(
+                    "F006.bvh-end-channels",
+                    joint.start,
+                    part="joints",
+                    places=[place[joint.parent]],
+                    joint=called(joint),
+                )
         else:
             place[index] = len(kept)
             kept.append(joint)
@@ -131,17 +142,15 @@ def _table(source: Source, joints: list[BvhJoint]) -> _Table:
     )
 
 
-def _called(joint: BvhJoint) -> str:
-    return f"joint {printable(joint.name, 60)}" if joint.name else "a joint without a name"
-
-
 def _refuse_empty_joints(source: Source, table: _Table, motion: Motion) -> None:
     """Refuse what would fill the memory: many frames of many joints that have no channels."""
     rotations = len(motion.values) * len(table.names)
     if rotations > max(_SMALL_CLIP, _LARGEST_SHARE * motion.values.size):
-        raise source.error(
-            f"expected channels for most joints, found {table.n_channels} for "
-            f"{len(table.names)} joints in {len(motion.values)} frames"
+        raise source.fault(
+            "F002.bvh-few-channels",
+            channels=table.n_channels,
+            joints=len(table.names),
+            frames=len(motion.values),
         )
 
 
@@ -239,24 +248,32 @@ def _translations(source: Source, table: _Table, values: Floats) -> Floats | Non
     inner = [at for at, joint in enumerate(joints) if table.parents[joint] >= 0]
     base = table.offsets[joints, axes]
     if base[inner].any() and not shifts[:, inner].any():
-        source.warn("position channels are 0 but for the root's: taken as added to OFFSET")
+        source.warn("F007.bvh-positions")
         base[inner] = 0.0
     translations = np.zeros((len(values), len(table.names), 3))
-    names = [
-        f"{'XYZ'[axis]}position of joint {table.names[at]}"
-        for at, axis in zip(joints, axes, strict=True)
-    ]
+    names = [("XYZ"[axis], table.names[at]) for at, axis in zip(joints, axes, strict=True)]
     translations[:, joints, axes] = _within_reach(source, shifts - base, names)
     return translations
 
 
-def _within_reach(source: Source, shifts: Floats, names: list[str]) -> Floats:
-    """Refuse frames that carry a joint too far; where faults are noted, hold the one before."""
+def _within_reach(source: Source, shifts: Floats, names: list[tuple[str, str]]) -> Floats:
+    """Refuse frames that carry a joint too far, and hold the one before them.
+
+    ``names`` are the axis and joint of each column.
+    """
     is_far = is_beyond(shifts)
     if is_far.any():
         frame = int(is_far.argmax())
         at = int(np.abs(shifts[frame]).argmax())
-        text = f"frame {frame}: {printable(names[at], 80)}: {within_text(shifts[frame, at])}"
-        error = source.error(text, source.offset_of("frames", frame))
-        source.refuse(error, int(is_far.sum()), "frames", np.flatnonzero(is_far))
+        axis, joint = names[at]
+        source.refuse(
+            "F003.beyond",
+            source.offset_of("frames", frame),
+            int(is_far.sum()),
+            "frames",
+            np.flatnonzero(is_far),
+            item=Phrase("bvh-position", frame=frame, axis=axis, joint=joint),
+            most=FARTHEST,
+            found=float(shifts[frame, at]),
+        )
     return held_rows(shifts, is_far)

@@ -18,6 +18,7 @@ V = R(Rh) X(poses, shapes) + Th, turned about the model's origin. There is no fr
 
 from __future__ import annotations
 
+from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError
 from viewer.formats._easymocap.cameras import find_cameras
 from viewer.formats._easymocap.files import find_frames
@@ -117,10 +118,9 @@ def _name(source: Source) -> str:
     return folder_name(source.path) if source.is_folder else source.path.stem
 
 
-def _refusal(source: Source, count: int, fault: FormatError | None) -> FormatError:
-    frames = "1 frame" if count == 1 else f"{count} frames"
+def _refusal(source: Source, count: int, fault: Diagnostic | None) -> FormatError:
     if fault is None:
-        return source.error(f"expected people, found none in {frames}")
+        return source.fault("F002.capture-people", n=count)
     if not source.is_folder:
-        return fault
-    return source.error(f"expected people, found none in {frames}; the first: {fault}")
+        return FormatError(fault)
+    return source.fault("F002.capture-people-fault", n=count, problem=fault)

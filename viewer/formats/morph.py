@@ -12,20 +12,14 @@ be left out.
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 
 import numpy as np
 
 from viewer.errors import FormatError
-from viewer.formats._numbers import to_number
-from viewer.formats._skin.blocks import (
-    Block,
-    block_rows,
-    find_block,
-    opened,
-    to_whole,
-    word_at,
-)
-from viewer.formats._source import Source, shown
+from viewer.formats._skin.blocks import find_block, read_count, to_whole
+from viewer.formats._skin.rows import read_rows
+from viewer.formats._source import Source
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.morph_target import MorphTarget
 
@@ -34,7 +28,14 @@ __all__ = ["read"]
 _WIDTH = 4  # an index, x, y, z
 _SECTIONS = (b"positions", b"normals")
 
-Rows = tuple[Ints, Floats, Block]
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Section:
+    """The vertices that a section lists, ascending, and their numbers."""
+
+    vertices: Ints
+    values: Floats
+    header: int
 
 
 def read(source: Source) -> MorphTarget:
@@ -55,7 +56,7 @@ def read(source: Source) -> MorphTarget:
     FormatError
         With file and line, if the text breaks the grammar, or the sections list other vertices.
     """
-    sections: dict[bytes, Rows] = {}
+    sections: dict[bytes, _Section] = {}
     position = 0
     while (word := source.next_word(position)) is not None:
         name = word.group()
@@ -64,80 +65,81 @@ def read(source: Source) -> MorphTarget:
         sections[name], position = _section(source, name.decode(), word)
     if b"positions" not in sections:
         looks = source.looks_like()
-        hint = f" ({looks})" if looks else ""
-        raise source.error(f"no positions section{hint}", None if looks else source.end)
-    vertices, positions, _ = sections[b"positions"]
-    if not len(vertices):
-        source.warn("moves no vertex")
+        raise source.fault("F002.morph-positions", None if looks else source.end, looks=looks)
+    moved = sections[b"positions"]
+    if len(moved.vertices) == 0:
+        source.warn("F007.morph-empty")
     if b"normals" not in sections:
-        source.warn("no normals section: normals stay as they are")
-        return MorphTarget(source.path.stem, vertices, positions)
-    _check_same(source, sections)
-    return MorphTarget(source.path.stem, vertices, positions, sections[b"normals"][1])
+        source.warn("F007.morph-normals")
+        return MorphTarget(source.path.stem, moved.vertices, moved.values)
+    _check_same(source, moved, sections[b"normals"])
+    return MorphTarget(source.path.stem, moved.vertices, moved.values, sections[b"normals"].values)
 
 
 def _unexpected(source: Source, word: re.Match[bytes], is_repeated: bool) -> FormatError:
     if is_repeated:
-        return source.error(
-            f"expected one section of {word.group().decode()}, found another", word.start()
-        )
-    return source.error(f"expected positions or normals, found {shown(word.group())}", word.start())
+        return source.fault("F002.morph-repeated", word.start(), section=word.group().decode())
+    return source.fault("F002.morph-section", word.start(), found=word.group())
 
 
-def _section(source: Source, name: str, header: re.Match[bytes]) -> tuple[Rows, int]:
-    """Read a section: its vertices in ascending order, their numbers, and where it ends."""
-    count, position = _count(source, name, header)
+def _section(source: Source, name: str, header: re.Match[bytes]) -> tuple[_Section, int]:
+    """Read a section, and return where it ends; rows with faults are left out."""
+    count, position = read_count(source, name, header)
     block = find_block(source, name, header, position)
-    rows = block_rows(source, block, count, _WIDTH)
-    vertices, wrong = to_whole(rows[:, 0])
-    if wrong < 0 and len(vertices) and vertices.min() < 0:
-        wrong = int(vertices.argmin())
-    if wrong >= 0:
-        offset, word = word_at(source, block, _WIDTH * wrong)
-        raise source.error(f"{name}: expected a vertex index, found {shown(word)}", offset)
-    order = np.argsort(vertices, kind="stable")
-    vertices = vertices[order]
-    twice = np.flatnonzero(np.diff(vertices) == 0)
-    if len(twice):
-        offset, word = word_at(source, block, _WIDTH * int(order[twice[0] + 1]))
-        raise source.error(f"{name}: vertex {shown(word)} is listed twice", offset)
+    rows, offset_of = read_rows(source, block, count, _WIDTH, item="entry")
+    if len(rows) != count:
+        source.refuse(
+            "F002.skin-declared", header.start(), section=name, expected=count, found=len(rows)
+        )
     if not block.closed:
-        source.warn(f'the last "}}" is missing: {name} ends with the file')
-    return (vertices, rows[order, 1:], block), block.end + block.closed
-
-
-def _count(source: Source, name: str, header: re.Match[bytes]) -> tuple[int, int]:
-    """Read a section's count; refuse one that the rest of the file cannot hold."""
-    word = source.next_word(header.end())
-    if word is None:
-        raise source.error(f"{name}: expected a count, found the end of the file", header.start())
-    value, left = to_number(word.group()), len(source.data) - word.end()
-    if value is None or value != int(value) or value < 0:
-        raise source.error(f"{name}: expected a count, found {shown(word.group())}", word.start())
-    # Even an entry of one letter needs white space before it.
-    if value * 2 > left + 1:
-        raise source.error(
-            f"{name}: expected a count that the file can hold, found {int(value)} entries "
-            f"in {left} bytes",
-            word.start(),
+        source.warn("F006.last-brace", section=name)
+    known = np.flatnonzero(~np.isnan(rows).any(axis=1))
+    vertices, _ = to_whole(rows[known, 0])
+    wrong = known[(vertices != rows[known, 0]) | (vertices < 0)]
+    if len(wrong):
+        row = int(wrong[0])
+        source.refuse(
+            "F002.morph-index",
+            offset_of(row),
+            len(wrong),
+            section=name,
+            found=float(rows[row, 0]),
         )
-    return int(value), word.end()
+    known = np.setdiff1d(known, wrong)
+    known = known[np.argsort(rows[known, 0], kind="stable")]
+    listed, first = np.unique(rows[known, 0], return_index=True)
+    if len(listed) < len(known):
+        twice = np.setdiff1d(np.arange(len(known)), first)
+        row = int(known[twice[0]])
+        source.refuse(
+            "F002.morph-twice",
+            offset_of(row),
+            len(twice),
+            section=name,
+            vertex=int(rows[row, 0]),
+        )
+    known = known[first]
+    section = _Section(rows[known, 0].astype(np.int32), rows[known, 1:], block.header)
+    return section, block.end + block.closed
 
 
-def _check_same(source: Source, sections: dict[bytes, Rows]) -> None:
+def _check_same(source: Source, moved: _Section, turned: _Section) -> None:
     """Refuse positions and normals of different vertices."""
-    (first, _, block), (second, _, other) = (sections[name] for name in _SECTIONS)
-    if len(first) != len(second):
-        raise source.error(
-            f"{opened(source, block)} has {len(first)} vertices, "
-            f"{opened(source, other)} has {len(second)}",
-            other.header,
+    if len(moved.vertices) != len(turned.vertices):
+        raise source.fault(
+            "F002.morph-counts",
+            turned.header,
+            line=source.line(moved.header),
+            first=len(moved.vertices),
+            other=source.line(turned.header),
+            second=len(turned.vertices),
         )
-    differs = np.flatnonzero(first != second)
+    differs = np.flatnonzero(moved.vertices != turned.vertices)
     if len(differs):
         row = int(differs[0])
-        raise source.error(
-            f"normals: expected the vertices that positions has, found "
-            f"{second[row]} instead of {first[row]}",
-            other.header,
+        raise source.fault(
+            "F002.morph-vertices",
+            turned.header,
+            found=int(turned.vertices[row]),
+            expected=int(moved.vertices[row]),
         )

@@ -18,7 +18,6 @@ import re
 
 import numpy as np
 
-from viewer.errors import counted
 from viewer.formats._obj.lines import Places
 from viewer.formats._obj.mtl import read_libraries
 from viewer.formats._obj.parts import ObjParts, read_parts
@@ -57,8 +56,7 @@ def read(source: Source) -> Figure:
     parts = read_parts(source)
     if len(parts.positions) == 0:
         looks = source.looks_like()
-        found = f"no `v` line{f' ({looks})' * bool(looks)}"
-        raise source.error(f"expected a mesh, found {found}", None if looks else source.end)
+        raise source.fault("F002.obj-mesh", None if looks else source.end, looks=looks)
     rough = mended_positions(parts.positions, np.zeros((0, 3), np.int32))
     picks, owners = triangulate(rough, parts.corners[:, 0], parts.counts)
     triangles = parts.corners[picks, 0].astype(np.int32)
@@ -77,9 +75,9 @@ def read(source: Source) -> Figure:
         triangle_materials=of_face[owners],
     )
     if mesh.n_triangles == 0:
-        source.warn(f"no faces: {mesh.n_vertices} points, of which nothing is drawn")
+        source.warn("F007.no-faces", n=mesh.n_vertices)
     if uvs is None and any(material.texture for material in materials):
-        source.warn("a texture without vt lines: drawn untextured")
+        source.warn("F005.obj-texture")
     head = source.data[:_HEAD].decode("ascii", "replace")
     comments = "\n".join(re.findall(r"^#.*$", head, re.MULTILINE))
     return Figure(
@@ -105,17 +103,17 @@ def _facts(parts: ObjParts, mesh: Mesh, has_normals: bool) -> tuple[tuple[str, s
 
 def _uvs(source: Source, parts: ObjParts, picks: Places) -> tuple[Floats | None, Ints | None]:
     """Return the table of texture coordinates, and which ones the triangles' corners have."""
-    uvs = parts.uvs if source.faults is None else np.nan_to_num(parts.uvs)
+    # NaN stands for faults; the sum says at once whether there is one.
+    uvs = np.nan_to_num(parts.uvs) if np.isnan(parts.uvs.sum()) else parts.uvs
     if len(uvs) == 0:
         return None, None
     corners = parts.corners[picks, 1]
     absent = corners < 0
     if absent.all():
-        source.warn(f"{len(uvs)} texture coordinates that no face uses: left out")
+        source.warn("F007.obj-texcoords", n=len(uvs))
         return None, None
     if absent.any():
-        get = "it gets" if absent.sum() == 1 else "they get"
-        source.warn(f"{counted(int(absent.sum()), 'corner')} of triangles without vt: {get} 0 0")
+        source.warn("F007.obj-corners", n=int(absent.sum()))
         corners = np.where(absent, len(uvs), corners)
         uvs = np.vstack([uvs, [0.0, 0.0]])
     return uvs, corners.astype(np.int32)
@@ -128,10 +126,10 @@ def _normals(source: Source, parts: ObjParts) -> Floats | None:
         return None
     used: Bools = parts.corners[:, 2] >= 0
     if not used.any():
-        source.warn(f"{len(listed)} normals that no face uses: left out")
+        source.warn("F007.obj-normals", n=len(listed))
         return None
-    if source.faults is not None:
-        # What is no number was noted, and is computed from the triangles.
+    if np.isnan(listed.sum()):
+        # A normal with a fault is computed from the triangles.
         used &= ~np.isnan(listed.sum(axis=1)[parts.corners[:, 2]])
     vertices, indices = parts.corners[used, 0], parts.corners[used, 2]
     result = np.full((n_vertices, 3), np.nan)
@@ -139,11 +137,15 @@ def _normals(source: Source, parts: ObjParts) -> Floats | None:
     differs = (result[vertices] != listed[indices]).any(axis=1)
     several = np.bincount(vertices, differs, minlength=n_vertices) > 0
     if several.any():
-        have = counted(int(several.sum()), "vertex", "has", "have")
-        get = "it gets" if several.sum() == 1 else "they get"
+        first = int(several.argmax())
         source.warn(
-            f"{have} several normals, first {several.argmax()}: {get} the mean, so hard edges are "
-            "drawn smooth"
+            "F007.obj-hard-edges",
+            None,
+            1,
+            "positions",
+            [first],
+            n=int(several.sum()),
+            vertex=first,
         )
         result[several] = _means(n_vertices, vertices, indices, listed)[several]
     return result

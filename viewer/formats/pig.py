@@ -20,7 +20,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.errors import FormatError, counted
+from viewer.diagnostics import Phrase
+from viewer.errors import FormatError
 from viewer.formats._pig.names import JOINTS, KEYPOINTS
 from viewer.formats._pig.parts import Part, PigFiles, open_parts
 from viewer.formats._source import Source
@@ -35,12 +36,13 @@ from viewer.rig.hierarchy import cycle_members
 from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.posing.pose_vector import PoseLayout
 from viewer.rig.skeleton import ball_skeleton
-from viewer.rig.skin import Skin, has_influence, skin_from_entries, weight_sums
+from viewer.rig.skin import Skin, has_influence, owners, skin_from_entries, weight_sums
 
 __all__ = ["read"]
 
 Indices = NDArray[np.int64]
 
+_JOINT, _VERTEX = "noun-joint", "noun-vertex"  # phrases
 _ODD_SUM = 0.01  # the authors' rounding stays well below
 
 
@@ -67,11 +69,7 @@ def read(source: Source) -> Figure:
     positions = _mended_mesh(parts)
     n_vertices, n_joints = len(positions), len(parts["t_pose_joints"].values)
     if len(parts["parents"].values) != n_joints:
-        raise parts["parents"].count_error(
-            f"expected {n_joints} rows as in {parts['t_pose_joints'].name}, "
-            f"found {len(parts['parents'].values)}",
-            n_joints,
-        )
+        raise _count_fault(parts["parents"], n_joints, parts["t_pose_joints"])
     parents = _parents(parts["parents"])
     joints = np.nan_to_num(parts["t_pose_joints"].values)
     for kind, name in (
@@ -101,6 +99,18 @@ def read(source: Source) -> Figure:
     )
 
 
+def _count_fault(part: Part, wanted: int, other: Part) -> FormatError:
+    """Return the error of a part that has not as many rows as another."""
+    return part.source.fault(
+        "F002.pig-rows-as",
+        part.odd_offset(wanted),
+        item=part.item(),
+        expected=wanted,
+        other=other.name,
+        found=len(part.values),
+    )
+
+
 def _layout(n_joints: int) -> PoseLayout:
     is_euler = np.zeros(n_joints, dtype=bool)
     is_euler[0] = True
@@ -117,27 +127,38 @@ def _mended_mesh(parts: dict[str, Part]) -> Floats:
     return mended_positions(positions, faces[fits].astype(np.int32))
 
 
-def _indices(part: Part, column: int, end: int, what: str, rows_of: Part | None = None) -> Ints:
-    """Return a column of whole numbers from 0 to ``end - 1``, the rows of another part."""
-    return _columns(part, slice(column, column + 1), end, what, rows_of)[:, 0]
+def _indices(part: Part, column: int, end: int, noun: str, rows_of: Part | None = None) -> Ints:
+    """Return a column of whole numbers from 0 to ``end - 1``, the rows of another part.
+
+    ``noun`` is the phrase that says what they count, ``"noun-vertex"``.
+    """
+    return _columns(part, slice(column, column + 1), end, noun, rows_of)[:, 0]
 
 
-def _corners(part: Part, what: str, rows_of: Part) -> Ints:
-    return _columns(part, slice(0, 3), len(rows_of.values), what, rows_of)
+def _corners(part: Part, noun: str, rows_of: Part) -> Ints:
+    return _columns(part, slice(0, 3), len(rows_of.values), noun, rows_of)
 
 
-def _columns(part: Part, columns: slice, end: int, what: str, rows_of: Part | None) -> Ints:
+def _columns(part: Part, columns: slice, end: int, noun: str, rows_of: Part | None) -> Ints:
     values = part.values[:, columns]
     known = ~np.isnan(values)
     fits = (values >= 0) & (values < end) & (values == np.floor(values))
     wrong = np.argwhere(known & ~fits)
     if len(wrong):
         row, column = wrong[0].tolist()
-        proof = f": {rows_of.name} has {end} rows" if rows_of else ""
-        found = f"found {values[row, column]:.16g}{proof}"
-        error = part.error(f"expected a {what} from 0 to {end - 1}, {found}", row)
         is_mesh = part.name.startswith("faces_vert")
-        part.source.refuse(error, len(wrong), "triangles" if is_mesh else "", wrong[:, 0])
+        part.source.refuse(
+            "W010.pig-joint" if noun == _JOINT else "F002.pig-index",
+            part.offset(row),
+            len(wrong),
+            "triangles" if is_mesh else "",
+            wrong[:, 0] if is_mesh else None,
+            item=part.item(row),
+            noun=Phrase(noun),
+            last=end - 1,
+            found=float(values[row, column]),
+            proof=Phrase("rows-as", name=rows_of.name, n=end) if rows_of else "",
+        )
     if fits.all():
         return values.astype(np.int32)
     if values.shape[1] == 3:
@@ -149,43 +170,37 @@ def _parents(part: Part) -> Ints:
     parents = part.values[:, 0]
     result = parents.copy()
     for joint, parent in enumerate(parents.tolist()):
-        problem = _parent_error(part, parents, joint, parent)
-        if problem is not None:
-            part.source.refuse(problem, 1, "joints", [joint])
-        if problem is not None or np.isnan(parent):
-            result[joint] = 0.0 if joint else -1.0
+        if 0 <= parent < joint and parent == int(parent) if joint else parent == -1.0:
+            continue
+        if not np.isnan(parent):  # that was refused with its row
+            _refuse_parent(part, parents, joint)
+        result[joint] = 0.0 if joint else -1.0
     return result.astype(np.int32)
 
 
-def _parent_error(part: Part, parents: Floats, joint: int, parent: float) -> FormatError | None:
-    if np.isnan(parent):
-        return None  # it was noted
-    if parent == -1.0 and joint > 0:
-        return part.error(f"joint {joint}: expected one root, found another", joint)
-    if joint == 0 and parent != -1.0:
-        return part.error(f"joint 0: expected -1, the root, found {parent:g}", 0)
-    if joint > 0 and not (0 <= parent < joint and parent == int(parent)):
-        wanted = "expected a parent before it"
-        problem = part.error(f"joint {joint}: {wanted}, found {parent:g}", joint)
-        problem.code = "S002" if cycle_members(parents)[joint] else ""
-        return problem
-    return None
+def _refuse_parent(part: Part, parents: Floats, joint: int) -> None:
+    found, values = float(parents[joint]), {"joint": joint}
+    if joint == 0:
+        key, values = "F002.pig-root", {}
+    elif found == -1.0:
+        key = "F002.pig-roots"
+    else:
+        key = "S002.parent" if cycle_members(parents)[joint] else "S001.parent"
+    part.source.refuse(
+        key, part.offset(joint), 1, "joints", [joint], item=part.item(joint), found=found, **values
+    )
 
 
 def _mesh(source: Source, parts: dict[str, Part], positions: Floats) -> Mesh:
-    triangles = _corners(parts["faces_vert"], "vertex", parts["vertices"])
+    triangles = _corners(parts["faces_vert"], _VERTEX, parts["vertices"])
     uvs, uv_triangles = None, None
     if "textures" in parts and "faces_tex" in parts:
         uvs = parts["textures"].values
-        uv_triangles = _corners(parts["faces_tex"], "texture coordinate", parts["textures"])
+        uv_triangles = _corners(parts["faces_tex"], "noun-texture-coordinate", parts["textures"])
         if len(uv_triangles) != len(triangles):
-            raise parts["faces_tex"].count_error(
-                f"expected {len(triangles)} rows as in {parts['faces_vert'].name}, "
-                f"found {len(uv_triangles)}",
-                len(triangles),
-            )
+            raise _count_fault(parts["faces_tex"], len(triangles), parts["faces_vert"])
     else:
-        source.warn("no textures or faces_tex: shown without texture")
+        source.warn("F007.pig-texture")
     # Normals of the unsplit vertices, or seams would show.
     normals = vertex_normals(positions, triangles)
     return Mesh(positions, normals, triangles, uvs, uv_triangles=uv_triangles)
@@ -193,12 +208,14 @@ def _mesh(source: Source, parts: dict[str, Part], positions: Floats) -> Mesh:
 
 def _skin(source: Source, parts: dict[str, Part], joints: Floats, n_vertices: int) -> Skin:
     part = parts["skinning_weights"]
-    columns = _indices(part, 0, len(joints), "joint", parts["t_pose_joints"])
-    vertices = _indices(part, 1, n_vertices, "vertex", parts["vertices"])
+    columns = _indices(part, 0, len(joints), _JOINT, parts["t_pose_joints"])
+    vertices = _indices(part, 1, n_vertices, _VERTEX, parts["vertices"])
     weights = part.values[:, 2]
     usable = (columns >= 0) & (vertices >= 0) & ~np.isnan(weights)
+    lost = vertices[~usable & (vertices >= 0)]
     if not usable.all():
-        _note_lost(part, vertices, usable)
+        # What is wrong with these rows was said already; here is whose weights are not all there.
+        part.source.refuse("F002.pig-lost", None, 0, "weights", lost, item=part.item())
         columns, vertices, weights = columns[usable], vertices[usable], weights[usable]
     rows = np.flatnonzero(usable)
     part.remember("weights", lambda vertex: _row_of(rows, vertices, vertex))
@@ -207,14 +224,18 @@ def _skin(source: Source, parts: dict[str, Part], joints: Floats, n_vertices: in
     twice = np.flatnonzero(np.diff(keys[order]) == 0)
     if len(twice):
         row = int(order[twice + 1].min())
-        error = part.error(
-            f"expected each pair once, found joint {columns[row]} and vertex {vertices[row]} again",
-            int(rows[row]),
+        part.source.refuse(
+            "F002.pig-twice",
+            part.offset(int(rows[row])),
+            len(twice),
+            item=part.item(int(rows[row])),
+            joint=int(columns[row]),
+            vertex=int(vertices[row]),
         )
-        part.source.refuse(error, len(twice))
     skin = skin_from_entries(n_vertices, vertices, columns, weights, translation_matrix(-joints))
-    if source.faults is None:  # whoever wants all faults looks at the weights in full
-        _check_weights(source, part, skin)
+    known: Bools = np.ones(n_vertices, dtype=np.bool_)
+    known[lost] = False
+    _check_weights(source, part.name, skin, known)
     return skin
 
 
@@ -224,33 +245,43 @@ def _row_of(rows: Indices, vertices: Ints, vertex: int) -> int:
     return int(rows[found[0]]) if len(found) else 0
 
 
-def _note_lost(part: Part, vertices: Ints, usable: Bools) -> None:
-    """Note whose weights are not all there; what is wrong with their rows was said already."""
-    lost = np.flatnonzero(~usable & (vertices >= 0))
-    error = part.error("rows that cannot be used", None)
-    part.source.refuse(error, 0, "weights", vertices[lost])
-
-
-def _check_weights(source: Source, part: Part, skin: Skin) -> None:
-    bare = np.flatnonzero(~has_influence(skin))
+def _check_weights(source: Source, name: str, skin: Skin, known: Bools) -> None:
+    """Remark on the weights of the vertices whose rows are all known."""
+    moved = has_influence(skin)
+    bare = np.flatnonzero(~moved & known)
     if len(bare):
         source.warn(
-            f"{part.name}: {counted(len(bare), 'vertex')} without weights, first {bare[0]}: "
-            f"{'it stays' if len(bare) == 1 else 'they stay'} at rest"
+            "W004.pig-vertices",
+            part="weights",
+            places=bare,
+            name=name,
+            n=len(bare),
+            vertex=int(bare[0]),
         )
     negative = np.flatnonzero(skin.weights < 0.0)
     if len(negative):
+        of = owners(skin)[negative]
         source.warn(
-            f"{part.name}: {counted(len(negative), 'negative weight')}, kept as "
-            f"{'it is' if len(negative) == 1 else 'they are'}"
+            "W002.pig-negative",
+            part="weights",
+            places=of,
+            name=name,
+            n=len(negative),
         )
-    sums = np.where(has_influence(skin), weight_sums(skin), 1.0)
+    sums = np.where(moved & known, weight_sums(skin), 1.0)
     off = np.abs(sums - 1.0)
-    if off.max() > _ODD_SUM:
-        worst, n_off = int(off.argmax()), int((off > _ODD_SUM).sum())
+    wrong = np.flatnonzero(off > _ODD_SUM)
+    if len(wrong):
+        worst = int(off.argmax())
         source.warn(
-            f"{part.name}: {counted(n_off, 'weight sum', 'differs', 'differ')} from 1 by more than "
-            f"{_ODD_SUM}, most vertex {worst} with {sums[worst]:.4g}"
+            "W001.pig-sums",
+            part="weights",
+            places=wrong,
+            name=name,
+            n=len(wrong),
+            most=_ODD_SUM,
+            vertex=worst,
+            found=float(sums[worst]),
         )
 
 
@@ -258,26 +289,32 @@ def _regressor(parts: dict[str, Part], n_joints: int, n_vertices: int) -> JointR
     if "J_regressor" not in parts:
         return None
     part = parts["J_regressor"]
-    joints = _indices(part, 0, n_joints, "joint", parts["t_pose_joints"])
-    vertices = _indices(part, 1, n_vertices, "vertex", parts["vertices"])
+    joints = _indices(part, 0, n_joints, _JOINT, parts["t_pose_joints"])
+    vertices = _indices(part, 1, n_vertices, _VERTEX, parts["vertices"])
     usable = (joints >= 0) & (vertices >= 0)
     weights = part.values[usable, 2].astype(np.float64)
     return JointRegressor(n_joints, joints[usable], vertices[usable], weights)
 
 
-def _column(parts: dict[str, Part], name: str, rows: int, end: int, what: str) -> Ints | None:
+def _column(parts: dict[str, Part], name: str, rows: int, end: int, noun: str) -> Ints | None:
     """Return an optional column with one number a vertex."""
     if name not in parts:
         return None
     part = parts[name]
     if len(part.values) != rows:
-        raise part.count_error(f"expected {rows} rows, found {len(part.values)}", rows)
-    return _indices(part, 0, end, what)
+        raise part.source.fault(
+            "F002.pig-rows",
+            part.odd_offset(rows),
+            item=part.item(),
+            expected=rows,
+            found=len(part.values),
+        )
+    return _indices(part, 0, end, noun)
 
 
 def _body_parts(files: PigFiles, n_vertices: int) -> BodyParts | None:
     names = files.part_names
-    of_vertex = _column(files.parts, "body_parts", n_vertices, len(names) or 1000, "body part")
+    of_vertex = _column(files.parts, "body_parts", n_vertices, len(names) or 1000, "noun-body-part")
     if of_vertex is None:
         return None
     count = len(names) or int(of_vertex.max(initial=0)) + 1
@@ -285,16 +322,20 @@ def _body_parts(files: PigFiles, n_vertices: int) -> BodyParts | None:
 
 
 def _symmetry(parts: dict[str, Part], n_vertices: int) -> Ints | None:
-    partners = _column(parts, "sym", n_vertices, n_vertices, "vertex")
+    partners = _column(parts, "sym", n_vertices, n_vertices, _VERTEX)
     if partners is None:
         return None
     wrong = np.flatnonzero(partners[partners] != np.arange(n_vertices))
     if len(wrong):
         vertex = int(wrong[0])
-        raise parts["sym"].error(
-            f"expected partners in pairs, found {vertex} -> {partners[vertex]} -> "
-            f"{partners[partners[vertex]]}",
-            vertex,
+        part = parts["sym"]
+        raise part.source.fault(
+            "F002.pig-symmetry",
+            part.offset(vertex),
+            item=part.item(vertex),
+            vertex=vertex,
+            partner=int(partners[vertex]),
+            back=int(partners[partners[vertex]]),
         )
     return partners
 
@@ -302,8 +343,8 @@ def _symmetry(parts: dict[str, Part], n_vertices: int) -> Ints | None:
 def _reduced(parts: dict[str, Part], n_vertices: int) -> ReducedMesh | None:
     if "reduced_ids" not in parts or "reduced_faces" not in parts:
         return None
-    vertices = _indices(parts["reduced_ids"], 0, n_vertices, "vertex", parts["vertices"])
-    corners = _corners(parts["reduced_faces"], "reduced vertex", parts["reduced_ids"])
+    vertices = _indices(parts["reduced_ids"], 0, n_vertices, _VERTEX, parts["vertices"])
+    corners = _corners(parts["reduced_faces"], "noun-reduced-vertex", parts["reduced_ids"])
     return ReducedMesh(vertices, corners)
 
 

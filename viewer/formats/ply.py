@@ -13,12 +13,15 @@ corners (``vertex_indices`` or ``vertex_index``) and ``texcoord``, two numbers a
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.errors import counted, printable
+from viewer.diagnostics import Phrase
+from viewer.errors import printable
 from viewer.formats._numbers import LARGEST
-from viewer.formats._ply.header import Header, read_header
+from viewer.formats._ply.header import CORNERS, Header, read_header
 from viewer.formats._ply.rows import Table, read_tables
 from viewer.formats._polygons import first_known, triangles_of, triangulate
 from viewer.formats._source import Source
@@ -33,10 +36,8 @@ __all__ = ["read"]
 
 Indices = NDArray[np.int64]
 
-_CORNERS = ("vertex_indices", "vertex_index")
 _UVS = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 _TEXTURE = "texturefile"
-_SHOWN = 12  # names in a warning
 
 
 def read(source: Source) -> Figure:
@@ -80,7 +81,7 @@ def read(source: Source) -> Figure:
     )
     _report(source, tables, uv_corners is not None)
     if mesh.n_triangles == 0:
-        source.warn(f"no faces: {mesh.n_vertices} points, of which nothing is drawn")
+        source.warn("F007.ply-no-faces", n=mesh.n_vertices)
     comments = "\n".join(text for text, _ in header.comments)
     facts = []
     if (counts > 3).any():
@@ -108,32 +109,43 @@ def _remember(source: Source, tables: dict[str, Table], owners: Indices) -> None
 def _vertices(source: Source, header: Header, tables: dict[str, Table]) -> tuple[Table, Floats]:
     """Return the element of the vertices, and where they are."""
     if "vertex" not in tables:
-        names = ", ".join(printable(name, 40) for name in list(tables)[:_SHOWN]) or "none"
-        raise source.error(f"expected an element vertex, found {names}", header.end - 1)
+        if not tables:
+            raise source.fault("F002.ply-nothing", header.end - 1)
+        names = [printable(name, 40) for name in tables]
+        raise source.fault("F002.ply-no-vertex", header.end - 1, names=names)
     vertices = tables["vertex"]
     positions = _columns(source, vertices, ("x", "y", "z"))
-    if positions is None or len(positions) == 0:
-        found = "none" if positions is not None else "one without x, y and z"
-        raise source.error(
-            f"expected vertices with x, y and z, found {found}", vertices.element.offset
-        )
+    if positions is None:
+        raise source.fault("F002.ply-coordinates", vertices.element.offset)
+    if len(positions) == 0:
+        raise source.fault("F002.ply-vertices", vertices.element.offset)
     return vertices, positions
 
 
 def _columns(source: Source, table: Table, names: tuple[str, ...]) -> Floats | None:
-    """Return properties side by side, (N, len(names)); None if one is missing."""
+    """Return properties side by side, (N, len(names)); None if one is missing.
+
+    NaN in rows that cannot be used, which are refused: those of a text have been.
+    """
     if any(name not in table.columns for name in names):
         return None
     with np.errstate(over="ignore"):
         values = np.stack([table.columns[name].astype(np.float64) for name in names], axis=1)
     odd = np.flatnonzero(~(np.abs(values) <= LARGEST).all(axis=1))
     if len(odd):
-        row = values[odd[0]]
-        worst = row[~(np.abs(row) <= LARGEST)][0]
-        message = f"{table.element.name} {odd[0]}: expected finite {' '.join(names)}"
-        error = source.error(f"{message}, found {worst:g}", table.offset(int(odd[0])))
-        count = int((~(np.abs(values) <= LARGEST)).sum())
-        source.refuse(error, count, "positions" if names == ("x", "y", "z") else "", odd)
+        if table.offsets is None:
+            row = values[odd[0]]
+            is_place = names == ("x", "y", "z")
+            source.refuse(
+                "F003.ply-finite",
+                None,
+                int((~(np.abs(values) <= LARGEST)).sum()),
+                "positions" if is_place else "",
+                odd if is_place else None,
+                item=Phrase("ply-row", element=table.element.name, row=int(odd[0])),
+                names=" ".join(names),
+                found=float(row[~(np.abs(row) <= LARGEST)][0]),
+            )
         values[odd] = np.nan
     return values
 
@@ -146,39 +158,48 @@ def _faces(
     nothing = np.zeros(0, np.int64)
     if faces is None:
         if "tristrips" in tables:
-            raise source.error(
-                "expected an element face, found tristrips", tables["tristrips"].element.offset
-            )
+            raise source.fault("F002.ply-strips", tables["tristrips"].element.offset)
         return nothing, nothing, None
-    name = next((name for name in _CORNERS if name in faces.lists), None)
+    name = next((name for name in CORNERS if name in faces.lists), None)
     if name is None:
-        raise source.error("face: expected a list vertex_indices, found none", faces.element.offset)
+        raise source.fault("F002.ply-no-corners", faces.element.offset)
     counts, values = faces.lists[name]
-    corners = np.clip(np.nan_to_num(values, nan=-1.0), -1.0, n_vertices).astype(np.int64)
-    first = np.cumsum(counts) - counts
-    wrong = np.flatnonzero((corners != values) | (corners < 0) | (corners >= n_vertices))
-    if len(wrong):
-        face = int(np.searchsorted(first, wrong[0], side="right")) - 1
-        error = source.error(
-            f"face {face}: expected a vertex from 0 to {n_vertices - 1}, "
-            f"found {values[wrong[0]]:g}",
-            faces.offset(face),
-        )
-        owners = np.repeat(np.arange(len(counts)), counts)
-        source.refuse(error, len(wrong), "triangles", triangles_of(counts, owners[wrong]))
-        corners[wrong] = -1
-        corners = first_known(corners, counts, owners)
+    corners = _corners(source, faces, counts, values, n_vertices)
     small = counts < 3
     uvs = _wedges(source, faces, counts)
     if small.any():
-        source.warn(
-            f"left out {counted(int(small.sum()), 'face')} with fewer than 3 corners, first face "
-            f"{small.argmax()}"
-        )
+        source.warn("F007.ply-small-faces", n=int(small.sum()), face=int(small.argmax()))
         keeps = np.repeat(~small, counts)
         counts, corners = counts[~small], corners[keeps]
         uvs = None if uvs is None else uvs[keeps]
     return counts, corners, uvs
+
+
+def _corners(
+    source: Source, faces: Table, counts: Indices, values: NDArray[Any], n_vertices: int
+) -> Indices:
+    """Return the vertices of all faces; in place of what is none, another of the same face."""
+    corners = np.clip(np.nan_to_num(values, nan=-1.0), -1.0, n_vertices).astype(np.int64)
+    is_wrong = (corners != values) | (corners < 0) | (corners >= n_vertices)
+    if not is_wrong.any():
+        return corners
+    owners = np.repeat(np.arange(len(counts)), counts)
+    # Words of a text that are no numbers have been refused.
+    wrong = np.flatnonzero(is_wrong & ~np.isnan(values) if faces.offsets is not None else is_wrong)
+    if len(wrong):
+        face = int(owners[wrong[0]])
+        source.refuse(
+            "F002.ply-corner",
+            faces.offset(face),
+            len(wrong),
+            "triangles",
+            triangles_of(counts, owners[wrong]),
+            face=face,
+            last=n_vertices - 1,
+            found=float(values[wrong[0]]),
+        )
+    corners[is_wrong] = -1
+    return first_known(corners, counts, owners)
 
 
 def _wedges(source: Source, faces: Table, counts: Indices) -> Floats | None:
@@ -188,19 +209,20 @@ def _wedges(source: Source, faces: Table, counts: Indices) -> Floats | None:
     found, values = faces.lists["texcoord"]
     wrong = np.flatnonzero(found != 2 * counts)
     if len(wrong):
-        source.warn(
-            f"texcoord of {len(wrong)} faces is not two numbers a corner, first face {wrong[0]}: "
-            "texture coordinates are left out"
-        )
+        source.warn("F007.ply-texcoord", n=len(wrong), face=int(wrong[0]))
         return None
     uvs = values.astype(np.float64).reshape(-1, 2)
     odd = np.flatnonzero(~(np.abs(uvs) <= LARGEST).all(axis=1))
     if len(odd):
-        face = int(np.searchsorted(np.cumsum(counts), odd[0], side="right"))
-        source.refuse(
-            source.error(f"face {face}: expected finite texcoord, found {uvs[odd[0]].max():g}"),
-            len(odd),
-        )
+        if faces.offsets is None:
+            face = int(np.searchsorted(np.cumsum(counts), odd[0], side="right"))
+            source.refuse(
+                "F003.ply-finite",
+                count=len(odd),
+                item=Phrase("ply-row", element="face", row=face),
+                names="texcoord",
+                found=float(uvs[odd[0]].max()),
+            )
         uvs = np.where(np.abs(uvs) <= LARGEST, uvs, 0.0)
     return uvs
 
@@ -232,37 +254,23 @@ def _materials(source: Source, header: Header, has_uvs: bool) -> tuple[Material,
     if not named or not has_uvs:
         return ()
     if len(named) > 1:
-        source.warn(f"{len(named)} textures: only the first is used", named[1][1])
+        source.warn("F007.ply-textures", named[1][1], n=len(named))
     name, offset = named[0]
     return (Material(name, name, load_image(source, name, offset)),)
-
-
-def _note_words(source: Source, table: Table, names: list[str]) -> None:
-    """Refuse what is no number in properties that are not used: only a text may hold such."""
-    for name in names:
-        column = table.columns.get(name)
-        if column is None or table.offsets is None or not np.isnan(column).any():
-            continue
-        row, count = int(np.isnan(column).argmax()), int(np.isnan(column).sum())
-        message = f"{table.element.name} {row}: expected a number for {printable(name, 40)}"
-        source.refuse(source.error(f"{message}, found a word", table.offset(row)), count)
 
 
 def _report(source: Source, tables: dict[str, Table], uses_wedges: bool) -> None:
     """Warn, once, of everything that the file holds and the mesh does not."""
     used = {
         "vertex": {"x", "y", "z", "nx", "ny", "nz", *(name for pair in _UVS for name in pair)},
-        "face": {*_CORNERS, *(("texcoord",) if uses_wedges else ())},
+        "face": {*CORNERS, *(("texcoord",) if uses_wedges else ())},
     }
     left = []
     for name, table in tables.items():
         if name not in used:
             left.append(f"element {name}")
             continue
-        others = [prop.name for prop in table.element.properties if prop.name not in used[name]]
-        _note_words(source, table, others)
-        left += [f"{name} {other}" for other in others]
+        others = (prop.name for prop in table.element.properties)
+        left += [f"{name} {other}" for other in others if other not in used[name]]
     if left:
-        names = ", ".join(printable(name, 40) for name in left[:_SHOWN])
-        more = f" and {len(left) - _SHOWN} more" * (len(left) > _SHOWN)
-        source.warn(f"not used: {names}{more}")
+        source.warn("F007.ply-unused", names=[printable(name, 40) for name in left])

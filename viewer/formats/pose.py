@@ -25,12 +25,14 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from viewer.errors import FormatError, RigError, UnsupportedFormatError, printable
+from viewer.diagnostics import Diagnostic, Phrase
+from viewer.errors import FormatError, RigError, UnsupportedFormatError
 from viewer.formats._archive import describe
 from viewer.formats._container import archive_of
 from viewer.formats._pose.named_values import NamedValues, described, parse_json
@@ -39,6 +41,7 @@ from viewer.formats._source import Source
 from viewer.formats._table import read_numbers
 from viewer.media.saving import save_arrays, save_text
 from viewer.near_names import did_you_mean, near_names, question
+from viewer.phrases import printable
 from viewer.rig.arrays import Deferred, Floats
 from viewer.rig.figure import Figure
 from viewer.rig.motion.clip import Clip
@@ -91,7 +94,7 @@ def read(source: Source) -> PoseRecord:
         return _from_values(parse_json(source))
     numbers = read_numbers(source)
     if len(numbers) == 0:
-        raise source.error(f"expected the numbers of a pose, found {source.looks_like()}")
+        raise source.fault("F002.pose-empty", found=source.looks_like())
     end = len(source.data.rstrip())
     return PoseRecord(vector=numbers, line_of=lambda part, name: source.line(end))
 
@@ -107,12 +110,11 @@ def _archive_values(source: Source) -> NamedValues:
     names, dofs = values.pop("dof_names", None), values.get("dofs")
     if names is not None and dofs is not None:
         both = NamedValues(source, {"dof_names": names, "dofs": dofs})
-        labels = both.array("dof_names", "U", "names")
-        numbers = both.array("dofs", "iuf", "numbers")
+        labels = both.array("dof_names", "U", Phrase("pose-names"))
+        numbers = both.array("dofs", "iuf", Phrase("pose-numbers"))
         if labels.ndim != 1 or labels.shape != numbers.shape:
-            raise source.error(
-                f"dof_names: expected {numbers.size} names as in dofs, found {labels.size}"
-            )
+            sizes = {"expected": numbers.size, "found": labels.size}
+            raise source.fault("F002.pose-names", item="dof_names", **sizes)
         values["dofs"] = dict(zip(labels.tolist(), numbers.tolist(), strict=True))
     return NamedValues(source, values)
 
@@ -122,8 +124,13 @@ def _from_values(named: NamedValues) -> PoseRecord:
     version = values.get("viewer_pose", _VERSION)
     version = version.tolist() if isinstance(version, np.ndarray) else version
     if version != _VERSION:
-        found = describe(version)
-        raise named.error(f"viewer_pose: expected {_VERSION}, found {found}", "viewer_pose")
+        raise named.fault(
+            "F002.pose-array",
+            "viewer_pose",
+            item="viewer_pose",
+            expected=_VERSION,
+            found=describe(version),
+        )
     # Which key each part of the pose is read from.
     keys = {part: _first(named, names) for part, names in _NAMES.items()}
     vector = _first(named, _VECTORS)
@@ -143,8 +150,9 @@ def _from_values(named: NamedValues) -> PoseRecord:
         line_of=_line_of(named, {**keys, "vector": vector}),
     )
     if translation is not None and len(translation) != 3:
-        found = f"translation: expected 3 numbers, found {len(translation)}"
-        raise named.error(found, keys["translation"])
+        raise named.fault(
+            "F002.pose-three", keys["translation"], item="translation", found=len(translation)
+        )
     _check_keys(named, record)
     return record
 
@@ -164,36 +172,36 @@ def _check_keys(named: NamedValues, record: PoseRecord) -> None:
     arrays = (record.vector, record.shape, record.expression, record.translation)
     is_empty = not record.dofs and not record.parts and record.scale is None
     if is_empty and all(array is None for array in arrays):
-        keys = ", ".join(printable(key, 40) for key in list(named.values)[:12])
         known = (*_KNOWN, *_NOT_NEEDED, *KEYS)
         odd = next((key for key in named.values if key not in known), "")
+        if not named.values:
+            raise named.fault("F002.pose-no-keys")
+        where = [odd] if odd else []
         near = did_you_mean(odd, known)
-        found = f"found {f'keys {keys}' if keys else 'no keys'}{f'; {near}' if near else ''}"
-        message = f"expected a pose (dofs, poses, body_pose, betas …), {found}"
-        raise named.error(message, *([odd] if odd else []))
+        raise named.fault("F002.pose-keys", *where, keys=list(named.values), near=near)
     used = (*_KNOWN, *_NOT_NEEDED) if record.turns is None else (*_KNOWN, *_NOT_NEEDED, *KEYS)
     unread = [key for key in named.values if key not in used]
     if unread:
-        shown = ", ".join(_with_hint(key) for key in unread[:12])
-        named.warn(f"keys that mean nothing in a pose: {shown}", unread[0])
+        named.warn("F007.pose-keys", unread[0], keys=[*map(_with_hint, unread)])
 
 
-def _with_hint(key: str) -> str:
+def _with_hint(key: str) -> Phrase | str:
     """Return a key that nobody reads, with the one that was probably meant."""
     near = [] if key in KEYS else near_names(key, (*_KNOWN, *KEYS))[:1]
-    return printable(key, 40) + (f" ({question(near)})" if near else "")
+    shown = printable(key, 40)
+    return Phrase("pose-key-near", name=shown, near=question(near)) if near else shown
 
 
 def _flag(named: NamedValues, key: str) -> bool | None:
     if named.values.get(key) is None:
         return None
-    return bool(named.array(key, "bi", "true or false").all())
+    return bool(named.array(key, "bi", Phrase("pose-flag")).all())
 
 
 def _single(named: NamedValues, key: str) -> float | None:
     values = _numbers(named, key)
     if values is not None and len(values) != 1:
-        raise named.error(f"{key}: expected one number, found {len(values)}", key)
+        raise named.fault("F002.pose-single", key, item=key, found=len(values))
     return None if values is None else float(values[0])
 
 
@@ -210,7 +218,7 @@ def _numbers(named: NamedValues, key: str) -> Floats | None:
     is_per_joint = key in _PER_JOINT and array.shape[-1:] == (3,)
     frames = math.prod(array.shape[: -2 if is_per_joint else -1])
     if frames > 1:
-        raise named.error(f"{key}: expected one pose, found {frames} frames", key)
+        raise named.fault("F002.pose-frames", key, item=key, found=frames)
     return array.ravel()
 
 
@@ -219,14 +227,13 @@ def _dofs(named: NamedValues) -> dict[str, float]:
     if given is None:
         return {}
     if not isinstance(given, Mapping):
-        found = described(given)
-        raise named.error(f"dofs: expected names with numbers, found {found}", "dofs")
+        raise named.fault("F002.pose-dofs", "dofs", found=described(given))
     dofs: dict[str, float] = {}
     for name, value in given.items():
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
         if not is_number or not abs(value) < 1e9:
-            found = f"dofs: {printable(name, 60)}: expected a number, found {describe(value)}"
-            raise named.error(found, "dofs", name)
+            item = printable(name, 60)
+            raise named.fault("F002.pose-dof", "dofs", name, item=item, found=describe(value))
         dofs[str(name)] = float(value)
     return dofs
 
@@ -236,7 +243,10 @@ def pose_error(path: Path, record: PoseRecord, problem: RigError) -> FormatError
     line = None
     if isinstance(problem, PosePartError) and record.line_of is not None:
         line = record.line_of(problem.part, problem.name)
-    return FormatError(path, str(problem), line)
+    found = problem.diagnostic
+    if found is None:
+        found = Diagnostic("F002.pose-misfit", values={"problem": str(problem)})
+    return FormatError(replace(found, path=path, line=line))
 
 
 def pose_text(record: PoseRecord) -> str:

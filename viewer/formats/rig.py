@@ -15,10 +15,9 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from viewer.errors import FormatError
 from viewer.formats._numbers import to_number
 from viewer.formats._references import referenced_path
-from viewer.formats._source import Source, shown
+from viewer.formats._source import Source
 
 __all__ = ["NamedFiles", "read"]
 
@@ -67,12 +66,11 @@ def read(source: Source) -> NamedFiles:
     while words and words[-1].group() != b"}":
         files += _item(source, words)
     if not words:
-        source.warn('the last "}" is missing')
+        source.warn("F006.closing")
     elif len(words) > 1:
-        source.warn(f"ignored what follows the rig, {shown(words[-2].group())}", words[-2].start())
+        source.warn("F006.rig-after", words[-2].start(), found=words[-2].group())
     if not files:
-        where = words[-1].start() if words else source.end
-        raise source.error("expected a skeleton or a skin, found no name of a file", where)
+        raise source.fault("F002.rig-empty", _next(source, words)[0])
     return NamedFiles(" ".join(name) or source.path.stem, tuple(files))
 
 
@@ -81,33 +79,30 @@ def _item(source: Source, words: Words) -> list[Path]:
     if word.group() in (b"skeleton", b"skin"):
         return [_file(source, words, word.group().decode())]
     if word.group() != b"morphs":
-        raise source.error(
-            f"expected skeleton, skin or morphs, found {shown(word.group())}", word.start()
-        )
+        raise source.fault("F002.rig-item", word.start(), found=word.group())
     count = to_number(words[-1].group()) if words else None
     if count is None or count != int(count) or count < 0:
-        raise _wrong(source, words, "morphs: expected a count")
+        where, found = _next(source, words)
+        raise source.fault("F002.count", where, item="morphs", found=found)
     stated = words.pop()
     _expect(source, words, b"{")
     files = []
     while words and words[-1].group() != b"}":
         files.append(_file(source, words, "morphs"))
     if len(files) != count:
-        raise source.error(f"morphs: expected {count:g} files, found {len(files)}", stated.start())
+        raise source.fault("F002.rig-morphs", stated.start(), expected=int(count), found=len(files))
     _expect(source, words, b"}")
     return files
 
 
-def _file(source: Source, words: Words, what: str) -> Path:
+def _file(source: Source, words: Words, item: str) -> Path:
     if not words or words[-1].group() in (b"{", b"}"):
-        raise _wrong(source, words, f"{what}: expected the name of a file")
+        where, found = _next(source, words)
+        raise source.fault("F002.rig-name", where, item=item, found=found)
     word = words.pop()
     path = referenced_path(source.path.parent, _text(word))
     if path is None:
-        raise source.error(
-            f"{what}: expected a file below the folder of the .rig, found {shown(word.group())}",
-            word.start(),
-        )
+        raise source.fault("F002.rig-outside", word.start(), item=item, found=word.group())
     return path
 
 
@@ -117,12 +112,11 @@ def _text(word: re.Match[bytes]) -> str:
 
 def _expect(source: Source, words: Words, text: bytes) -> None:
     if not words or words[-1].group() != text:
-        raise _wrong(source, words, f'expected "{text.decode()}"')
+        where, found = _next(source, words)
+        raise source.fault("F002.rig-word", where, expected=text.decode(), found=found)
     words.pop()
 
 
-def _wrong(source: Source, words: Words, expected: str) -> FormatError:
-    """Return an error at the next word."""
-    there = shown(words[-1].group()) if words else "the end of the file"
-    where = words[-1].start() if words else source.end
-    return source.error(f"{expected}, found {there}", where)
+def _next(source: Source, words: Words) -> tuple[int, bytes | None]:
+    """Return the next word and its offset, None at the end of the file."""
+    return (words[-1].start(), words[-1].group()) if words else (source.end, None)

@@ -23,16 +23,17 @@ and not read: ``target_dofs``, ``target_translations``, ``target_rotations``, ``
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.errors import RigError
+from viewer.diagnostics import Part
+from viewer.errors import FormatError, RigError
 from viewer.formats._archive import Archive
 from viewer.formats._container import archive_of, corners_of, finite
-from viewer.formats._faults import Part
 from viewer.formats._source import Source
 from viewer.formats._tolerant import mended_positions
 from viewer.media.saving import save_arrays
@@ -74,10 +75,10 @@ def read(source: Source) -> Figure:
     archive = archive_of(source)
     version = int(_finite(archive, "viewer_rig", ()))
     if version != _VERSION:
-        raise archive.error("viewer_rig", f"expected version {_VERSION}, found {version}")
+        raise archive.fault("F002.rig-version", item="viewer_rig", expected=_VERSION, found=version)
     up = archive.text("up")
     if up not in ("y", "z"):
-        raise archive.error("up", f'expected y or z, found "{up[:20]}"')
+        raise archive.fault("F002.rig-up", item="up", found=up[:20])
     try:
         skeleton = _skeleton(archive)
         count = skeleton.n_joints
@@ -85,7 +86,7 @@ def read(source: Source) -> Figure:
             name=archive.text("name") or source.path.stem,
             mesh=_mesh(archive),
             skeleton=skeleton,
-            skin=_skin(archive),
+            skin=_skin(archive, count),
             up="z" if up == "z" else "y",
             unit=archive.text("unit"),
             correctives=_correctives(archive, count),
@@ -94,7 +95,9 @@ def read(source: Source) -> Figure:
             fields=_fields(archive),
         )
     except RigError as problem:
-        raise source.error(str(problem)) from None
+        if problem.diagnostic is not None:
+            raise FormatError(replace(problem.diagnostic, path=source.path)) from None
+        raise source.fault("F002.rig-parts", problem=str(problem)) from None
 
 
 def _numbers(archive: Archive, key: str, shape: tuple[int | None, ...]) -> NDArray[Any]:
@@ -132,7 +135,9 @@ def _materials(archive: Archive) -> tuple[Material, ...]:
         return ()
     names, textures = _texts(archive, "material_names"), _texts(archive, "material_textures")
     if len(names) != len(textures):
-        raise archive.error("material_textures", f"expected {len(names)}, found {len(textures)}")
+        raise archive.fault(
+            "F002.value", item="material_textures", expected=len(names), found=len(textures)
+        )
     images = [
         _numbers(archive, f"image_{index}", (None, None, 4))
         if archive.has(f"image_{index}")
@@ -161,42 +166,51 @@ def _skeleton(archive: Archive) -> Skeleton:
 
 
 def _parents(archive: Archive, count: int) -> NDArray[Any]:
-    """Return the parents; where faults are noted, those that come too late are made roots."""
+    """Return the parents; refuse those that come too late, and make these joints roots."""
     parents = _numbers(archive, "parents", (count,))
     late = np.flatnonzero((parents >= np.arange(count)) | (parents < -1))
-    if not archive.is_tolerant or len(late) == 0:
-        return parents  # the skeleton refuses them
+    if len(late) == 0:
+        return parents
     cycles = cycle_members(parents)
-    for code, joints in (("S002", late[cycles[late]]), ("S001", late[~cycles[late]])):
+    for key, joints in (
+        ("S002.parent", late[cycles[late]]),
+        ("S001.parent", late[~cycles[late]]),
+    ):
         if len(joints):
-            error = archive.error(
-                "parents",
-                f"joint {joints[0]}: expected a parent before it, found {parents[joints[0]]}",
+            archive.refuse(
+                key,
+                item="parents",
+                count=len(joints),
+                part="joints",
+                places=joints,
+                joint=int(joints[0]),
+                found=parents[joints[0]],
             )
-            error.code = code
-            archive.refuse(error, len(joints), "joints", joints)
     mended = parents.copy()
     mended[late] = -1
     return mended
 
 
 def _limits(archive: Archive, n_dofs: int) -> Floats:
-    """Return the limits; where faults are noted, none in place of those that contradict."""
+    """Return the limits; refuse those that contradict, and put none in their place."""
     limits = _numbers(archive, "dof_limits", (n_dofs, 2)).astype(np.float64)
     wrong = ~(limits[:, 0] <= limits[:, 1])
-    if not archive.is_tolerant or not wrong.any():
-        return limits  # the skeleton refuses them
+    if not wrong.any():
+        return limits
     dof = int(wrong.argmax())
-    low, high = limits[dof]
-    error = archive.error(
-        "dof_limits",
-        f"DOF {dof}: expected a minimum not above the maximum, found {low:g} and {high:g}",
+    low, high = limits[dof].tolist()
+    archive.refuse(
+        "S003.rig-limits",
+        item="dof_limits",
+        count=int(wrong.sum()),
+        dof=dof,
+        low=low,
+        high=high,
     )
-    archive.refuse(error, int(wrong.sum()))
     return np.where(wrong[:, None], [-np.inf, np.inf], limits)
 
 
-def _skin(archive: Archive) -> Skin:
+def _skin(archive: Archive, n_joints: int) -> Skin:
     starts = _numbers(archive, "skin_starts", (None,))
     joints = _numbers(archive, "skin_joints", (None,))
     listed = _numbers(archive, "skin_weights", (None,))
@@ -204,18 +218,23 @@ def _skin(archive: Archive) -> Skin:
     owners = np.searchsorted(np.sort(starts), np.arange(len(listed)), side="right") - 1
     weights = finite(archive, "skin_weights", listed, "weights", np.maximum(owners, 0))
     inverse_bind = _finite(archive, "inverse_bind", (None, 4, 4), "bindings")
-    if archive.is_tolerant and len(joints) == len(weights):
-        wrong = (joints < 0) | (joints >= len(inverse_bind))
-        if wrong.any():
-            found = f"found {joints[wrong][0]} of vertex {owners[wrong][0]}"
-            error = archive.error(
-                "skin_joints", f"expected a joint from 0 to {len(inverse_bind) - 1}, {found}"
-            )
-            archive.refuse(error, int(wrong.sum()), "weights", owners[wrong])
-            joints, weights = np.where(wrong, 0, joints), np.where(wrong, 0.0, weights)
-        # Of a matrix that is not finite nothing can be used: a 0 would make it another one.
-        lost = ~np.isfinite(_numbers(archive, "inverse_bind", (None, 4, 4))).all(axis=(1, 2))
-        inverse_bind = np.where(lost[:, None, None], np.eye(4), inverse_bind)
+    if len(inverse_bind) != n_joints:
+        raise archive.fault(
+            "B001.rig-matrices", item="inverse_bind", expected=n_joints, found=len(inverse_bind)
+        )
+    wrong = (joints < 0) | (joints >= n_joints)
+    if wrong.any() and len(joints) == len(weights):
+        archive.refuse(
+            "W010.vertex",
+            item="skin_joints",
+            count=int(wrong.sum()),
+            part="weights",
+            places=owners[wrong],
+            last=n_joints - 1,
+            found=joints[wrong][0],
+            vertex=int(owners[wrong][0]),
+        )
+        joints, weights = np.where(wrong, 0, joints), np.where(wrong, 0.0, weights)
     return Skin(starts=starts, joints=joints, weights=weights, inverse_bind=inverse_bind)
 
 
@@ -236,7 +255,9 @@ def _layout(archive: Archive, n_joints: int) -> PoseLayout | None:
     total, translation, scale = map(int, _finite(archive, "layout_counts", (3,)))
     ends = (int(starts.max()) + 3, translation + 3 * (translation >= 0), scale + 1)
     if starts.min() < 0 or max(ends) > total:
-        raise archive.error("layout_counts", f"expected at least {max(ends)}, found {total}")
+        raise archive.fault(
+            "F002.rig-layout", item="layout_counts", expected=max(ends), found=total
+        )
     return PoseLayout(total, starts.astype(np.int32), is_euler, translation, scale)
 
 
@@ -248,7 +269,7 @@ def _hand(archive: Archive, index: int, n_joints: int) -> Hand:
     key = f"hand_{index}_joints"
     joints = _numbers(archive, key, (None,))
     if ((joints < 0) | (joints >= n_joints)).any():
-        raise archive.error(key, f"expected joints 0 to {n_joints - 1}, found others")
+        raise archive.fault("F002.rig-hand", item=key, last=n_joints - 1)
     return Hand(
         archive.text(f"hand_{index}_side"),
         joints,

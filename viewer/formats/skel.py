@@ -21,10 +21,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from viewer.errors import FormatError, counted
+from viewer.diagnostics import Part, Phrase
+from viewer.errors import counted
 from viewer.formats._numbers import is_infinite, is_number, to_number
 from viewer.formats._skel.writing import KEYWORDS, UNLIMITED, write
-from viewer.formats._source import Source, no_number, shown
+from viewer.formats._source import Source
+from viewer.formats._tolerant import number_key
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.posing.dof_text import beyond_text
@@ -75,8 +77,8 @@ def read(source: Source) -> Figure:
     joints = _Parser(source).joints()
     if not joints:
         looks = source.looks_like()
-        found = f"no balljoint{f' ({looks})' * bool(looks)}"
-        raise source.error(f"expected a skeleton, found {found}", None if looks else source.end)
+        where = None if looks else source.end
+        raise source.fault("F002.no-joint", where, looks=looks)
     source.remember("joints", lambda joint: joints[joint].start)
     skeleton, dofs = _skeleton(source, joints)
     return Figure(name=source.path.stem, skeleton=skeleton, facts=_facts(skeleton, dofs))
@@ -137,9 +139,10 @@ class _Parser:
             self._advance()
         joint = _Joint(" ".join(name), self.open[-1] if self.open else -1, start)
         if self.word is None or self.word.group() != b"{":
-            found = "the end of the file" if self.word is None else shown(self.word.group())
             where = start if self.word is None else self.word.start()
-            raise self.source.error(f'joint {_called(joint)}: expected "{{", found {found}', where)
+            raise self.source.fault(
+                "F002.opening", where, item=_called(joint), found=_text(self.word)
+            )
         self.open.append(len(self.found))
         self.found.append(joint)
         self._advance()
@@ -161,7 +164,7 @@ class _Parser:
     def _numbers(self, count: int) -> list[float]:
         """Read the numbers of an item; the current word is its keyword.
 
-        None at all where a fault was noted: the item is as if it were not there.
+        None at all where a fault was recorded: the item is as if it were not there.
         """
         assert self.word is not None  # the caller looked at it
         keyword = self.word
@@ -170,24 +173,32 @@ class _Parser:
         while len(values) < count:
             value = None if self.word is None else to_number(self.word.group())
             if value is None:
-                self._refuse(self._numbers_error(keyword, count, len(values)), keyword)
+                self._refuse(keyword, count, len(values))
                 return []
             values.append(value)
             self._advance()
         if self.word is not None and is_number(self.word.group()):
-            error = self.source.error(
-                f"{self._item(keyword)}: expected {count} numbers, found more: "
-                f"{shown(self.word.group())}",
-                self.word.start(),
-            )
-            self._refuse(error, keyword)
+            self._refuse(keyword, count, count)
             return []
         return values
 
-    def _refuse(self, error: FormatError, keyword: Word) -> None:
-        """Refuse an item; where faults are noted, go on behind it."""
-        moves = keyword.group() == b"offset"
-        self.source.refuse(error, 1, "joints" if moves else "", [self.open[-1]] if moves else ())
+    def _refuse(self, keyword: Word, expected: int, found: int) -> None:
+        """Refuse an item for the word after its numbers, and go on behind it."""
+        refuse, word, places = self.source.refuse, _text(self.word), [self.open[-1]]
+        part: Part = "joints" if keyword.group() == b"offset" else "items"
+        owner = _called(self.found[self.open[-1]])
+        item = Phrase("of", item=keyword.group().decode(), owner=owner)
+        start, here = keyword.start(), self.word.start() if self.word else 0
+        if found == expected:
+            refuse("F002.more", here, 1, part, places, item=item, expected=expected, found=word)
+        elif word is None:
+            refuse(
+                "F002.width-end", start, 1, part, places, item=item, expected=expected, found=found
+            )
+        elif word in (b"{", b"}", *KEYWORDS):
+            refuse("F002.width", start, 1, part, places, item=item, expected=expected, found=found)
+        else:
+            refuse(number_key(word), here, 1, part, places, item=item, found=word)
         self._skip_item()
 
     def _skip_item(self, on_line: bool = True) -> None:
@@ -206,25 +217,11 @@ class _Parser:
         between = self.source.data[last.end() : self.word.start()]
         return b"\n" not in between and b"\r" not in between
 
-    def _numbers_error(self, keyword: Word, count: int, found: int) -> FormatError:
-        if self.word is not None and self.word.group() not in (b"{", b"}", *KEYWORDS):
-            return self.source.error(
-                f"{self._item(keyword)}: {no_number(self.word.group())}",
-                self.word.start(),
-            )
-        end = ", then the end of the file" * (self.word is None)
-        return self.source.error(
-            f"{self._item(keyword)}: expected {count} numbers, found {found}{end}", keyword.start()
-        )
-
-    def _item(self, keyword: Word) -> str:
-        return f"{keyword.group().decode()} of joint {_called(self.found[self.open[-1]])}"
-
     def _skip_unknown(self) -> None:
         """Skip a word we do not know with its line and numbers, or its whole balanced block."""
         assert self.word is not None  # the caller looked at it
         keyword = self.word
-        self.source.warn(f"skipped unknown {shown(keyword.group())}", keyword.start())
+        self.source.warn("F006.unknown", keyword.start(), found=keyword.group())
         if keyword.group() != b"{":
             self._advance()
             # One warning for its whole line: "colour red" is one thing that we do not know.
@@ -237,9 +234,7 @@ class _Parser:
             self._advance()
             if depth == 0:
                 return
-        raise self.source.error(
-            f"{shown(keyword.group())} is still open where the file ends", keyword.start()
-        )
+        raise self.source.fault("F002.open", keyword.start(), word=keyword.group())
 
     def _finds_block(self) -> bool:
         """Move to the "{" of ``word name? {`` if the rest of one follows."""
@@ -256,19 +251,25 @@ class _Parser:
     def _finish(self) -> None:
         if len(self.open) > 1:
             joint = self.found[self.open[-1]]
-            raise self.source.error(
-                f'expected "}}", found the end of the file: joint {_called(joint)} '
-                f"(line {self.source.line(joint.start)}) is still open",
-                len(self.source.data.rstrip()),
+            raise self.source.fault(
+                "F002.joint-open",
+                self.source.end,
+                found=None,
+                joint=_called(joint),
+                line=self.source.line(joint.start),
             )
         if self.open:
-            self.source.warn('the last "}" is missing')
+            self.source.warn("F006.closing")
         if self.extra_braces:
-            self.source.warn(f'ignored {self.extra_braces} "}}" after the root')
+            self.source.warn("F006.extra-braces", n=self.extra_braces)
 
 
-def _called(joint: _Joint) -> str:
-    return shown(joint.name.encode("utf-8", "surrogateescape"))[1:-1] or "without a name"
+def _text(word: Word | None) -> bytes | None:
+    return None if word is None else word.group()
+
+
+def _called(joint: _Joint) -> Phrase:
+    return Phrase("joint", name=joint.name) if joint.name else Phrase("unnamed-joint")
 
 
 def _skeleton(source: Source, joints: list[_Joint]) -> tuple[Skeleton, Floats]:
@@ -307,11 +308,17 @@ def _check_limits(source: Source, joints: list[_Joint], limits: Floats) -> None:
     limits[limits[:, 1] >= UNLIMITED, 1] = np.inf
     wrong = np.flatnonzero(limits[:, 0] > limits[:, 1])
     if len(wrong):
-        joint, axis = joints[wrong[0] // 3], DOF_KINDS[3 + wrong[0] % 3]
-        low, high = limits[wrong[0]]
+        joint, axis = joints[wrong[0] // 3], int(wrong[0] % 3)
+        low, high = limits[wrong[0]].tolist()
         source.warn(
-            f"ignored {counted(len(wrong), 'limit')} whose minimum is above the maximum, first "
-            f"rot{axis}limit {low:g} {high:g} of joint {_called(joint)}",
-            joint.limits[int(wrong[0] % 3)][1],
+            "S003.ignored",
+            joint.limits[axis][1],
+            part="items",
+            places=wrong // 3,
+            n=len(wrong),
+            axis=DOF_KINDS[3 + axis],
+            low=low,
+            high=high,
+            joint=_called(joint),
         )
         limits[wrong] = -np.inf, np.inf

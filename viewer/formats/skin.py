@@ -23,7 +23,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.errors import OutputError, UnsupportedFormatError, counted, printable
+from viewer.errors import OutputError, UnsupportedFormatError, printable
 from viewer.formats._numbers import LARGEST
 from viewer.formats._skin.blocks import KEYWORDS
 from viewer.formats._skin.checks import (
@@ -79,13 +79,11 @@ def _mesh(source: Source, sections: Sections) -> Mesh:
     _require_positions(source, sections)
     even_counts(source, sections)
     if not sections.triangles:
-        raise source.error("expected triangles, found no `triangles` section", source.end)
+        raise source.fault("F002.skin-triangles", source.end)
     triangles = checked_triangles(source, sections, len(sections.tables["positions"]))
     if len(triangles) == 0:
-        raise source.error(
-            "expected at least one triangle, found none", sections.offsets["triangles"]
-        )
-    source.remember("triangles", lambda triangle: sections.triangle_offset(source, triangle))
+        raise source.fault("F002.skin-no-triangle", sections.offsets["triangles"])
+    source.remember("triangles", sections.triangle_offset)
     materials = np.repeat(
         [run.material for run in sections.triangles],
         [len(run.triangles) for run in sections.triangles],
@@ -96,7 +94,8 @@ def _mesh(source: Source, sections: Sections) -> Mesh:
         positions=positions,
         normals=_normals(source, sections, positions, triangles),
         triangles=triangles,
-        uvs=uvs if uvs is None or source.faults is None else np.nan_to_num(uvs),
+        # NaN stands for faults; the sum says at once whether there is one.
+        uvs=uvs if uvs is None or not np.isnan(uvs.sum()) else np.nan_to_num(uvs),
         materials=tuple(sections.materials),
         triangle_materials=materials.astype(np.int32),
     )
@@ -106,31 +105,31 @@ def _require_positions(source: Source, sections: Sections) -> None:
     table = sections.tables.get("positions")
     if table is None:
         looks = source.looks_like()
-        raise source.error(
-            f"expected a skin, found no `positions` section{f' ({looks})' * bool(looks)}",
-            None if looks else source.end,
-        )
+        raise source.fault("F002.skin-positions", None if looks else source.end, looks=looks)
     if len(table) == 0:
-        raise source.error(
-            "expected at least one vertex, found positions 0", sections.offsets["positions"]
-        )
+        raise source.fault("F002.skin-no-vertex", sections.offsets["positions"])
 
 
 def _normals(source: Source, sections: Sections, positions: Floats, triangles: Ints) -> Floats:
     normals = sections.tables.get("normals")
     if normals is None:
         if "normals" not in sections.offsets:
-            source.warn("no `normals` section: computed them from the triangles")
+            source.warn("F007.skin-normals")
         return vertex_normals(positions, triangles)
     # Column by column: numpy reduces rows of three slowly.
     x, y, z = np.abs(normals.T)
     longest = np.maximum(np.maximum(x, y), z)
     zero: Bools = longest < _SHORTEST
     if zero.any():
+        first = int(zero.argmax())
         source.warn(
-            f"{counted(int(zero.sum()), 'normal')} of length 0, first of vertex {zero.argmax()}: "
-            "computed from the triangles",
-            source.offset_of("normals", int(zero.argmax())),
+            "M007.skin-normals",
+            source.offset_of("normals", first),
+            1,
+            "positions",
+            [first],
+            n=int(zero.sum()),
+            vertex=first,
         )
     missing: Bools = zero | np.isnan(longest)
     if missing.any():
@@ -140,26 +139,26 @@ def _normals(source: Source, sections: Sections, positions: Floats, triangles: I
 
 def _skin(source: Source, sections: Sections) -> Skin | None:
     if sections.starts is None and sections.bindings is None:
-        source.warn("no `skinweights` and no `bindings`: the mesh cannot follow a skeleton")
+        source.warn("F007.skin-unbound")
         return None
     if sections.starts is None or sections.bindings is None:
         missing = "skinweights" if sections.starts is None else "bindings"
         present = "bindings" if sections.starts is None else "skinweights"
         skin = None if sections.starts is None else unbound_skin(sections)
         source.refuse(
-            source.error(
-                f"expected a `{missing}` section beside `{present}`, found none",
-                sections.offsets[present],
-            ),
+            "B001.skin-section",
+            sections.offsets[present],
             1,
             "bindings",
             np.arange(0 if skin is None else skin.n_joints),
+            missing=missing,
+            present=present,
         )
         return skin
     inverse_bind = invert_bindings(source, sections)
     joints, weights = checked_influences(source, sections, len(inverse_bind))
     skin = Skin(starts=sections.starts, joints=joints, weights=weights, inverse_bind=inverse_bind)
-    if source.faults is None:  # whoever wants all faults looks at the weights in full
+    if not source.diagnostics.errors:  # what a file is refused for says enough of its weights
         check_weights(source, skin)
     return skin
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.errors import FormatError, printable
+from viewer.diagnostics import Phrase
 from viewer.formats._archive import Archive, Opaque, Sparse, describe
 from viewer.formats._container import archive_of, corners_of, finite
 from viewer.formats._numbers import LARGEST
@@ -30,6 +30,7 @@ from viewer.formats._smpl.parts import (
 )
 from viewer.formats._source import Source
 from viewer.formats._tolerant import mended_positions
+from viewer.phrases import printable
 from viewer.rig.arrays import Deferred, Floats, Ints
 from viewer.rig.blendshapes import BlendShapes, Correctives, JointRegressor, regress_joints
 from viewer.rig.figure import Figure
@@ -72,10 +73,7 @@ def read(source: Source) -> Figure:
     archive = archive_of(source)
     missing = [key for key in KEYS if not archive.has(key)]
     if missing:
-        found = ", ".join(printable(key, 40) for key in archive.keys[:12]) or "none"
-        raise source.error(
-            f"expected a body model; keys missing: {', '.join(missing)}; keys found: {found}"
-        )
+        raise source.fault("F002.smpl-keys", missing=missing, found=list(archive.keys))
     used: list[str] = []
     mesh = _mesh(source, archive, used)
     parents = _parents(archive, used)
@@ -111,7 +109,7 @@ def _mesh(source: Source, archive: Archive, used: list[str]) -> Mesh:
     template = archive.array("v_template", ("V", 3)).values()
     positions = finite(archive, "v_template", template, "positions")
     if len(positions) == 0:
-        raise archive.error("v_template", "expected at least one vertex, found none")
+        raise archive.fault("F002.smpl-no-vertex", item="v_template")
     triangles = corners_of(archive, "f", archive.array("f", (None, 3)).values(), len(positions))
     positions = mended_positions(positions, triangles)
     used += ["v_template", "f"]
@@ -129,47 +127,48 @@ def _parents(archive: Archive, used: list[str]) -> Ints:
     """Return each joint's parent; the root's is written in four ways."""
     table = archive.array("kintree_table").values()
     if table.ndim not in (1, 2) or (table.ndim == 2 and len(table) != 2) or table.size == 0:
-        found = describe(archive.get("kintree_table"))
-        raise archive.error("kintree_table", f"expected 2 x J numbers, found {found}")
+        raise archive.fault(
+            "F002.value",
+            item="kintree_table",
+            expected=Phrase("wanted-numbers", shape=(2, "J")),
+            found=describe(archive.get("kintree_table")),
+        )
     rows = np.atleast_2d(table).astype(np.float64)
     ids = rows[1] if len(rows) == 2 else np.arange(rows.shape[1])
     if (ids != np.arange(len(ids))).any():
-        raise archive.error("kintree_table", "expected joints 0, 1, 2 … in order in its second row")
+        raise archive.fault("F002.smpl-joints", item="kintree_table")
     parents = rows[0].copy()
     if np.isin(parents[0], (*_ROOTS, 0.0)):
         parents[0] = -1.0
     result = parents.copy()
     for joint, parent in enumerate(parents):
-        problem = _parent_error(archive, parents, joint, parent)
-        if problem is not None:
-            archive.refuse(problem, 1, "joints", [joint])
-            result[joint] = 0.0 if joint else -1.0
+        if parent == -1 if joint == 0 else 0 <= parent < joint and parent % 1 == 0:
+            continue
+        _refuse_parent(archive, parents, joint)
+        result[joint] = 0.0 if joint else -1.0
     used.append("kintree_table")
     return result.astype(np.int32)
 
 
-def _parent_error(
-    archive: Archive, parents: Floats, joint: int, parent: float
-) -> FormatError | None:
-    if joint and np.isin(parent, _ROOTS):
-        return archive.error("kintree_table", f"expected one root, found joints 0 and {joint}")
-    if parent == -1 if joint == 0 else 0 <= parent < joint and parent % 1 == 0:
-        return None
-    wanted = "a parent before it" if joint else "the root, whose parent is -1"
-    problem = archive.error("kintree_table", f"joint {joint}: expected {wanted}, found {parent:g}")
-    problem.code = "S002" if cycle_members(parents)[joint] else ""
-    return problem
+def _refuse_parent(archive: Archive, parents: Floats, joint: int) -> None:
+    key, found = "kintree_table", float(parents[joint])
+    is_cycle = cycle_members(parents)[joint]
+    if joint and np.isin(found, _ROOTS):
+        archive.refuse("F002.roots", item=key, part="joints", places=[joint], joint=joint)
+    elif joint:
+        code = "S002.parent" if is_cycle else "S001.parent"
+        archive.refuse(code, item=key, part="joints", places=[joint], joint=joint, found=found)
+    else:
+        code = "S002.root" if is_cycle else "F002.root"
+        archive.refuse(code, item=key, part="joints", places=[0], found=found)
 
 
 def _matrix(archive: Archive, key: str, shape: tuple[int, int]) -> Sparse:
     value = archive.get(key)
     if isinstance(value, Opaque):
         # numpy pickles a sparse matrix in an .npz, and pickles are programs.
-        raise archive.error(
-            key,
-            f"expected {shape[0]} x {shape[1]} numbers, found an unread value ({value.what}): "
-            "save it as a dense array (`.toarray()`)",
-        )
+        problem = Phrase("matrix-objects", shape=shape, what=value.what)
+        raise archive.fault("F002.archive-value", item=key, problem=problem)
     return archive.sparse(key, shape)
 
 
@@ -180,13 +179,16 @@ def _regressor(archive: Archive, n_joints: int, n_vertices: int, used: list[str]
     sums = np.bincount(joints, weights, minlength=n_joints)
     worst = int(np.abs(sums - 1.0).argmax())
     if abs(sums[worst] - 1.0) > _ODD_SUM:
-        error = archive.error(
-            "J_regressor",
-            f"joint {worst}: expected weights with the sum 1, found {sums[worst]:.4g}",
-        )
-        error.code = "F002"  # these weights are not the skin's
         wrong = np.flatnonzero(np.abs(sums - 1.0) > _ODD_SUM)
-        archive.refuse(error, len(wrong), "joints", wrong)
+        archive.refuse(
+            "F002.smpl-regressor",
+            item="J_regressor",
+            count=len(wrong),
+            part="joints",
+            places=wrong,
+            joint=worst,
+            found=float(sums[worst]),
+        )
     used.append("J_regressor")
     return JointRegressor(n_joints, joints.astype(np.int32), vertices.astype(np.int32), weights)
 
@@ -198,13 +200,12 @@ def _skin(
     vertices, columns, numbers = matrix.entries()
     weights = finite(archive, "weights", numbers, "weights", vertices)
     if (weights < 0.0).any():
-        vertex = int(vertices[weights.argmin()])
         archive.refuse(
-            archive.error(
-                "weights",
-                f"vertex {vertex}: expected no negative weight, found {weights.min():.4g}",
-            ),
-            int((weights < 0.0).sum()),
+            "W002.vertex",
+            item="weights",
+            count=int((weights < 0.0).sum()),
+            vertex=int(vertices[weights.argmin()]),
+            found=float(weights.min()),
         )
     sums = np.bincount(vertices, weights, minlength=n_vertices)
     known = np.ones(n_vertices, dtype=np.bool_)
@@ -212,10 +213,13 @@ def _skin(
     errors = np.where(known, np.abs(sums - 1.0), 0.0)
     worst = int(errors.argmax())
     if errors[worst] > _ROUNDED:
-        error = archive.error(
-            "weights", f"vertex {worst}: expected weights with the sum 1, found {sums[worst]:.4g}"
+        archive.refuse(
+            "W001.vertex",
+            item="weights",
+            count=int((errors > _ROUNDED).sum()),
+            vertex=worst,
+            found=float(sums[worst]),
         )
-        archive.refuse(error, int((errors > _ROUNDED).sum()))
     used.append("weights")
     kept = weights != 0.0
     # What was rounded is put right, and nothing else.
@@ -233,7 +237,7 @@ def _correctives(
     source: Source, archive: Archive, n_vertices: int, n_joints: int, used: list[str]
 ) -> Correctives | None:
     if not archive.has("posedirs"):
-        source.warn("no `posedirs`: plain linear blend skinning")
+        source.warn("F007.smpl-posedirs")
         return None
     array = archive.array("posedirs")
     count = 9 * (n_joints - 1)

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from viewer.diagnostics import CODES, SEVERITIES, Code
 from viewer.lint._again import Again, lint_again
 from viewer.lint._aim import Places, places_of, points_of
-from viewer.lint._codes import CODES, SEVERITIES, Code
 from viewer.lint._counting import counting_of
 from viewer.lint._finding import MAX_TURN, Finding, LintOptions, Subject
 from viewer.lint._report import describe, finding_text, summary, worst_first

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.lint._codes import CODES
+from viewer.diagnostics import CODES, Diagnostic
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.motion.evaluation import DEFAULT_RATE
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from viewer.lint._counting import Counting
     from viewer.lint._tracks import Track
 
-__all__ = ["MAX_TURN", "Finding", "LintOptions", "Subject", "listed"]
+__all__ = ["MAX_TURN", "Finding", "LintOptions", "Subject"]
 
 MAX_TURN = 3400.0
 """Degrees a second that a joint may turn against its parent unless somebody says otherwise."""
@@ -67,20 +67,12 @@ class LintOptions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Finding:
-    """One fault, or something worth knowing.
+    """A diagnostic with its place in a scene.
 
     Attributes
     ----------
-    code : str
-        A key of ``CODES``.
-    message : str
-        One line with numbers.
-    severity : str
-        One of ``SEVERITIES``.
-    file : Path or None
-        Where it comes from, if that is known.
-    line : int or None
-        In that file, from 1.
+    diagnostic : Diagnostic
+        What was found, and the file and line if they are known.
     actor : int or None
         Index in the scene.
     name : str
@@ -100,11 +92,7 @@ class Finding:
         ``("weights", 5)`` is the line of vertex 5's weights.
     """
 
-    code: str
-    message: str
-    severity: str = ""
-    file: Path | None = None
-    line: int | None = None
+    diagnostic: Diagnostic
     actor: int | None = None
     name: str = ""
     part: Literal["", "mesh", "skeleton", "clip"] = ""
@@ -116,13 +104,34 @@ class Finding:
     seek: float | None = None
     at: tuple[str, int] | None = None
 
-    def __post_init__(self) -> None:
-        if not self.severity:
-            object.__setattr__(self, "severity", CODES[self.code].severity)
+    @property
+    def code(self) -> str:
+        """A key of ``CODES``."""
+        return self.diagnostic.code
+
+    @property
+    def severity(self) -> str:
+        """One of ``SEVERITIES``."""
+        return self.diagnostic.severity
+
+    @property
+    def message(self) -> str:
+        """One line with numbers."""
+        return self.diagnostic.full_message
+
+    @property
+    def file(self) -> Path | None:
+        """Where it comes from, if that is known."""
+        return self.diagnostic.path
+
+    @property
+    def line(self) -> int | None:
+        """Line of ``file``, from 1."""
+        return self.diagnostic.line
 
     @property
     def title(self) -> str:
-        """What this kind of finding is called."""
+        """Name of this kind of finding."""
         return CODES[self.code].title
 
     @property
@@ -130,6 +139,13 @@ class Finding:
         """What to do about it."""
         code = CODES[self.code]
         return code.other_hint if code.other_hint and self.line is None else code.hint
+
+    def located(self, file: Path | None, line: int | None = None, severity: str = "") -> Finding:
+        """Return the finding with another place in the files, and severity if one is given."""
+        found = replace(
+            self.diagnostic, path=file, line=line, level=severity or self.diagnostic.level
+        )
+        return replace(self, diagnostic=found)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -225,8 +241,7 @@ class Subject:
 
     def found(
         self,
-        code: str,
-        message: str,
+        key: str,
         *,
         part: Literal["mesh", "skeleton", "clip"] = "mesh",
         severity: str = "",
@@ -237,12 +252,11 @@ class Subject:
         times: Floats = _NO_TIMES,
         seek: float | None = None,
         at: tuple[str, int] | None = None,
+        **values: Any,
     ) -> Finding:
-        """Return a finding about this actor."""
+        """Return a finding about this actor; ``values`` are what the message of ``key`` shows."""
         return Finding(
-            code=code,
-            message=message,
-            severity=severity,
+            Diagnostic(key, level=severity, values=values),
             actor=self.index,
             name=self.actor.name,
             part=part,
@@ -254,13 +268,3 @@ class Subject:
             seek=seek,
             at=at,
         )
-
-
-def listed(names: list[str], limit: int = 6) -> str:
-    """Return names in one line, not too many.
-
-    >>> listed(["a", "b", "c"], 2)
-    'a, b and 1 more'
-    """
-    more = f" and {len(names) - limit} more" * (len(names) > limit)
-    return ", ".join(names[:limit]) + more

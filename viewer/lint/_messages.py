@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
-import numpy as np
+from viewer.diagnostics import Diagnostic
+from viewer.errors import ViewerError
+from viewer.lint._finding import Finding
+from viewer.phrases import printable
 
-from viewer.errors import FormatError, ViewerError, printable
-from viewer.formats import Fault
-from viewer.lint._finding import Finding, listed
-
-__all__ = ["CHECKED", "of_error", "of_faults", "of_refusal", "of_warning"]
+__all__ = ["CHECKED", "of_diagnostic", "of_error", "of_refusal"]
 
 # The first pattern that is found counts.
 _ERRORS = (
@@ -65,99 +64,44 @@ _WARNINGS = (
 CHECKED = frozenset(("W001", "W002", "W004", "B003", "M010", "C005"))
 """Codes of warnings that checks of the scene find again, with all places."""
 
-# Fields of a finding, and what messages call them, by what a reader put something neutral for.
-_PLACES = {
-    "positions": ("vertices", "vertices"),
-    "weights": ("vertices", "vertices"),
-    "triangles": ("triangles", "triangles"),
-    "bindings": ("joints", "joints"),
-    "joints": ("joints", "joints"),
-    "frames": ("frames", "frames"),
+_FIELDS = {
+    "positions": "vertices",
+    "weights": "vertices",
+    "triangles": "triangles",
+    "bindings": "joints",
+    "joints": "joints",
+    "items": "joints",
+    "frames": "frames",
 }
-_NAMED = re.compile(r'"[^"]*"|[-+]?\d[-+.\w]*|\b(?:nan|inf)\b')  # what differs between alike faults
-_PLACE = re.compile(r"(?P<path>.+?)(?::(?P<line>\d+))?: (?P<text>.*)", re.DOTALL)
+"""Fields of a finding by the part of a diagnostic."""
 
 
 def of_error(problem: ViewerError, path: Path | None = None) -> Finding:
-    """Return a refusal as a finding.
-
-    Parameters
-    ----------
-    problem : ViewerError
-        A cycle of parents is told from other errors by the attribute ``code`` of a FormatError.
-    path : Path, optional
-        The file at fault, if the error does not say.
-    """
-    text, line = str(problem), None
-    code = ""
-    if isinstance(problem, FormatError):
-        path, line, code = problem.path, problem.line, problem.code
-    text = _without_place(text, path)
-    return Finding(code or _code(text, _ERRORS, "F002"), text, "error", file=path, line=line)
+    """Return a refusal as a finding; ``path`` is the file at fault, if the error does not say."""
+    found = problem.diagnostic
+    if found is None:
+        text = _without_place(str(problem), path)
+        found = Diagnostic("F002.plain", path, values={"message": text})
+    return of_diagnostic(found)
 
 
 def of_refusal(problem: ViewerError, path: Path) -> Finding:
-    """Return what ended the reading of a file as a finding, which says that it was the end."""
+    """Return what ended the reading of a file as a finding."""
     finding = of_error(problem, path)
-    if finding.code == "F001":
-        return finding  # of a file that cannot be read nobody expects more
-    return replace(finding, message=f"{finding.message}; nothing else in this file was checked")
+    return replace(finding, diagnostic=replace(finding.diagnostic, is_final=True))
 
 
-def of_faults(faults: Sequence[Fault]) -> list[Finding]:
-    """Return faults that a reader went on from as findings, those of one kind as one."""
-    kinds: dict[tuple[str, ...], list[Fault]] = {}
-    for fault in faults:
-        if fault.count == 0:
-            continue
-        finding = of_error(fault.error)
-        kind = _NAMED.sub("#", finding.message)
-        kinds.setdefault((finding.code, fault.part, str(finding.file), kind), []).append(fault)
-    return [_of_kind(alike) for alike in kinds.values()]
-
-
-def _of_kind(faults: list[Fault]) -> Finding:
-    """Return faults that say the same of different places as one finding."""
-    finding = of_error(faults[0].error)
-    count = sum(fault.count for fault in faults)
-    places = np.unique(np.concatenate([fault.places for fault in faults]))
-    field, noun = _PLACES.get(faults[0].part, ("", ""))
-    text = finding.message
-    if count > 1:
-        text += f", the first of {count}"
-        if len(places) > 1 and field:
-            text += f" ({noun} {listed(list(map(str, places.tolist())))})"
-    if field == "vertices":
-        return replace(finding, message=text, vertices=places)
-    if field == "triangles":
-        return replace(finding, message=text, triangles=places)
-    if field == "joints":
-        return replace(finding, message=text, joints=places)
-    return replace(finding, message=text, frames=places if field else finding.frames)
-
-
-def of_warning(warning: str, path: Path) -> Finding:
-    """Return a remark as a finding; what is not known to be a fault is a note.
-
-    Parameters
-    ----------
-    warning : str
-        One line, which begins with the file's name and the line, if it has one.
-    path : Path
-        The file that was read.
-    """
-    start = printable(path, 300)
-    if not warning.startswith(start):
-        found = _PLACE.fullmatch(warning)
-        if found is not None and Path(found["path"]).parent == path.parent:
-            path, start = Path(found["path"]), found["path"]
-    line = None
-    if warning.startswith(start):
-        found = re.fullmatch(r"(?::(\d+))?: (.*)", warning[len(start) :], re.DOTALL)
-        if found is not None:
-            line = None if found[1] is None else int(found[1])
-            warning = found[2]
-    return Finding(_code(warning, _WARNINGS, "F007"), warning, file=path, line=line)
+def of_diagnostic(found: Diagnostic) -> Finding:
+    """Return what a reader recorded as a finding."""
+    if found.key.endswith(".plain"):
+        patterns, other = (_ERRORS, "F002") if found.code == "F002" else (_WARNINGS, "F007")
+        if found.code in ("F002", "F007"):
+            found = replace(found, key=_code(found.message, patterns, other) + ".plain")
+    field = _FIELDS.get(found.part)
+    if field is None or found.places is None:
+        return Finding(found)
+    places: dict[str, Any] = {field: found.places}
+    return Finding(found, **places)
 
 
 def _without_place(text: str, path: Path | None) -> str:

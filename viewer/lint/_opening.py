@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -9,11 +10,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from viewer.diagnostics import SEVERITIES, Collector, Diagnostic
+from viewer.diagnostics.merging import merged
 from viewer.errors import FormatError, ViewerError, printable
-from viewer.formats import MAX_SIZE, Fault, Source
-from viewer.lint._codes import SEVERITIES
+from viewer.formats import MAX_SIZE, Source
 from viewer.lint._finding import Finding
-from viewer.lint._messages import CHECKED, of_error, of_faults, of_refusal, of_warning
+from viewer.lint._messages import CHECKED, of_diagnostic, of_error, of_refusal
 from viewer.lint._named import aimed_at
 from viewer.loading import Contents, MotionSettings, begin, read_source
 from viewer.rig.arrays import Ints
@@ -111,19 +113,18 @@ def _resolved(path: Path) -> Path:
 
 def _read(opened: Opened, path: Path, settings: MotionSettings, max_size: int) -> tuple[Path, ...]:
     """Read one file, noting all faults that can be gone on from; return files that it names."""
-    contents, faults = Contents(), list[Fault]()
+    contents, recorded = Contents(), Collector(keeps_errors=True)
     named: tuple[Path, ...] = ()
     refusals: list[Finding] = []
-    remarks: list[str] = []
     try:
-        opened.sources[path] = source = Source.open(path, max_size)
-        source.faults, remarks = faults, source.warnings
+        opened.sources[path] = source = Source.open(path, max_size, recorded)
         named = read_source(source, contents, settings)
         contents.figures = [(path, _loaded(figure, refusals)) for path, figure in contents.figures]
     except ViewerError as problem:
         refusals.append(of_refusal(problem, path))
-    opened.findings += [*of_faults(faults), *refusals]
-    opened.findings += [of_warning(text, path) for text in remarks]
+    opened.findings += map(of_diagnostic, merged(recorded.errors))
+    opened.findings += refusals
+    opened.findings += map(of_diagnostic, recorded.warnings)
     for name in _LISTS:
         getattr(opened.contents, name).extend(getattr(contents, name))
     return named
@@ -174,7 +175,7 @@ def _assemble(opened: Opened, settings: MotionSettings | None, progress: Progres
         else:
             alone += _take_out(contents, culprit)
     opened.findings += [
-        of_warning(text, _owner(text, opened.contents)) for text in opened.scene.warnings
+        of_diagnostic(_of_scene(text, opened.contents)) for text in opened.scene.warnings
     ]
     opened.scene.actors += [Actor(figure) for figure in alone]
 
@@ -198,8 +199,12 @@ def _read_on(
 
 def _is_unbound(figure: Figure, source: Source) -> bool:
     """Return whether no bind matrix is the file's own: nobody knows how many joints there were."""
-    lost = {place for fault in source.faults or () if fault.part == "bindings"
-            for place in fault.places.tolist()}  # fmt: skip
+    lost = {
+        place
+        for fault in source.diagnostics.errors
+        if fault.part == "bindings" and fault.places is not None
+        for place in fault.places.tolist()
+    }
     return figure.skin is not None and len(lost) == figure.skin.n_joints and figure.skeleton is None
 
 
@@ -222,6 +227,17 @@ def _take_out(contents: Contents, culprit: Path) -> list[Figure]:
     for name in _LISTS:
         setattr(contents, name, [item for item in getattr(contents, name) if item[0] != culprit])
     return figures
+
+
+def _of_scene(text: str, contents: Contents) -> Diagnostic:
+    """Return a remark about the scene as a diagnostic, until loading records them so."""
+    path = _owner(text, contents)
+    start = printable(path, 300)
+    found = re.fullmatch(r"(?::(\d+))?: (.*)", text[len(start) :], re.DOTALL)
+    if not text.startswith(start) or found is None:
+        return Diagnostic("F007.plain", path, values={"message": text})
+    line = None if found[1] is None else int(found[1])
+    return Diagnostic("F007.plain", path, line, values={"message": found[2]})
 
 
 def _owner(text: str, contents: Contents) -> Path:
@@ -260,7 +276,7 @@ def with_files(
         # The reader knows whether the file is refused for it, the check all places.
         severity = max(remark.severity, placed[twin].severity, key=SEVERITIES.index)
         line = remark.line if placed[twin].at is None else None
-        placed[twin] = replace(placed[twin], severity=severity, line=line)
+        placed[twin] = placed[twin].located(placed[twin].file, line, severity)
     return remarks + [_with_line(finding, opened) for finding in placed]
 
 
@@ -279,7 +295,7 @@ def _with_line(finding: Finding, opened: Opened) -> Finding:
     kind, index = finding.at
     # Normals that the file lacks are computed: then the vertex is what can be mended.
     place = source.place(kind, index) or source.place(_INSTEAD.get(kind, ""), index)
-    return finding if place is None else replace(finding, file=place[0], line=place[1])
+    return finding if place is None else finding.located(*place)
 
 
 def _placed(finding: Finding, opened: Opened, owners: Sequence[Owners]) -> Finding:
@@ -288,7 +304,7 @@ def _placed(finding: Finding, opened: Opened, owners: Sequence[Owners]) -> Findi
     if owner is None:
         return finding
     paths = _files_of(opened.scene.actors[owner], finding.part, opened.contents)
-    return replace(finding, file=paths[0]) if paths else finding
+    return finding.located(paths[0], finding.line) if paths else finding
 
 
 def _aimed(opened: Opened, scene: Scene, owners: Sequence[Owners]) -> list[Finding]:
@@ -348,8 +364,8 @@ def _spoiled(actor: Actor, opened: Opened) -> dict[str, Ints]:
     lost: dict[str, Ints] = {}
     for part, keys in _SPOILED.items():
         for path in _files_of(actor, part, opened.contents):
-            for fault in opened.sources[path].faults or ():
-                if fault.part in keys:
+            for fault in opened.sources[path].diagnostics.errors:
+                if fault.part in keys and fault.places is not None:
                     known = lost.get(fault.part, fault.places)
                     lost[fault.part] = np.union1d(known, fault.places)
     return lost

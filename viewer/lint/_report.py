@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from viewer.diagnostics import SEVERITIES
 from viewer.errors import counted, printable
 from viewer.formats import folder_name
-from viewer.lint._codes import SEVERITIES
 from viewer.lint._finding import Finding
 from viewer.rig.scene import Scene
 from viewer.rig.skeleton import joint_labels

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.errors import counted
-from viewer.lint._finding import Finding, Subject, listed
+from viewer.lint._finding import Finding, Subject
+from viewer.phrases import listed
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure
 from viewer.rig.kinematics import world_matrices
@@ -85,8 +86,8 @@ def _about(
         names = [labels[joint] for joint in joints]
     return [
         subject.found(
-            code,
-            f"{counted(len(joints), 'bind matrix', *what, of=len(values))}: {listed(names)} "
+            f"{code}.plain",
+            message=f"{counted(len(joints), 'bind matrix', *what, of=len(values))}: {listed(names)} "
             f"({measure} {values[joints[0]]:.3g})",
             joints=joints,
             at=("bindings", int(joints[0])),
@@ -120,8 +121,8 @@ def _elsewhere(subject: Subject, figure: Figure, usable: Bools) -> list[Finding]
     rest = "it rests" if len(away) == 1 else "they rest"
     return [
         subject.found(
-            "B004",
-            f"{counted(len(away), 'joint', 'was', 'were')} bound away from where {rest}, {label} "
+            "B004.plain",
+            message=f"{counted(len(away), 'joint', 'was', 'were')} bound away from where {rest}, {label} "
             f"by {subject.length(distances[away[0]])}: at rest the mesh is not as it was bound",
             joints=away,
             at=("bindings", int(away[0])),

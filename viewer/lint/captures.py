@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.errors import counted
-from viewer.lint._finding import Finding, Subject, listed
+from viewer.lint._finding import Finding, Subject
 from viewer.lint.clips import missing_frames
+from viewer.phrases import listed
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.captures.points import PointClip
 
@@ -51,7 +52,7 @@ def _confidence(subject: Subject, clip: PointClip, names: list[str]) -> list[Fin
     if len(never):
         shown = listed([names[point] for point in never])
         text = f"{counted(len(never), 'keypoint', 'is', 'are', of=len(names))} never seen: {shown}"
-        findings.append(subject.found("C012", text, part="clip", joints=never))
+        findings.append(subject.found("C012.plain", message=text, part="clip", joints=never))
     return findings + _low(subject, clip, names, numbers, confidence)
 
 
@@ -99,8 +100,8 @@ def _low_finding(
     subject: Subject, clip: PointClip, text: str, points: Indices | list[int], frames: Indices
 ) -> Finding:
     return subject.found(
-        "C011",
-        text,
+        "C011.plain",
+        message=text,
         part="clip",
         joints=points,
         frames=frames + clip.timing.first_frame,
@@ -129,8 +130,8 @@ def _jumps(subject: Subject, clip: PointClip, names: list[str]) -> list[Finding]
     frames = both[wrong]
     return [
         subject.found(
-            "C003",
-            f"{counted(len(wrong), 'frame', of=_n_frames(rows))}: {names[point]} moves at "
+            "C003.plain",
+            message=f"{counted(len(wrong), 'frame', of=_n_frames(rows))}: {names[point]} moves at "
             f"{fastest[wrong[0]]:.3g} units a second (limit {limit:.3g}) to frame "
             f"{frames[0] + clip.timing.first_frame}",
             part="clip",

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.errors import counted
-from viewer.lint._finding import Finding, Subject, listed
+from viewer.lint._finding import Finding, Subject
 from viewer.lint._tracks import Indices, Track, frame_numbers, key_times, track_of
+from viewer.phrases import listed
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.clip import SHORTEST, Clip
@@ -38,7 +39,7 @@ def check(subject: Subject) -> list[Finding]:
         findings += _outside(subject, clip, skeleton)
     if clip.end - clip.start <= SHORTEST:
         text = f"it begins and ends at {number_text(clip.start)} s"
-        return [*findings, subject.found("C010", text, part="clip")]
+        return [*findings, subject.found("C010.plain", message=text, part="clip")]
     track = track_of(subject)
     assert track is not None  # there is a clip and a skeleton
     return findings + _jumps(subject, track, skeleton) + _turns(subject, track, skeleton)
@@ -61,8 +62,8 @@ def missing_frames(subject: Subject, timing: Timing) -> list[Finding]:
     times = timing.start + gaps / timing.frame_rate + subject.actor.offset
     return [
         subject.found(
-            "C005",
-            f"{missing} missing in {counted(len(runs), 'gap')}: {shown}",
+            "C005.plain",
+            message=f"{missing} missing in {counted(len(runs), 'gap')}: {shown}",
             part="clip",
             frames=numbers,
             times=times,
@@ -87,8 +88,8 @@ def _keys(subject: Subject, clip: Clip) -> list[Finding]:
     channel = next(index for index, found in enumerate(times) if len(found))
     return [
         subject.found(
-            "C002",
-            f"{counted(count, 'key', 'lies', 'lie')} at the time of the one before, first in "
+            "C002.plain",
+            message=f"{counted(count, 'key', 'lies', 'lie')} at the time of the one before, first in "
             f"channel {channel} at {number_text(float(times[channel][0]))} s",
             part="clip",
             times=np.unique(np.concatenate(times)) + subject.actor.offset,
@@ -118,8 +119,8 @@ def _outside(subject: Subject, clip: Clip, skeleton: Skeleton) -> list[Finding]:
     order = np.flatnonzero((beyond > _ROUNDING).any(axis=1))
     return [
         subject.found(
-            "C006",
-            f"{counted(len(outside), 'curve', 'leaves its', 'leave their')} limits: {text}",
+            "C006.plain",
+            message=f"{counted(len(outside), 'curve', 'leaves its', 'leave their')} limits: {text}",
             part="clip",
             joints=np.unique(skeleton.dof_joints[targets[outside]]),
             times=times[order] + subject.actor.offset,
@@ -168,8 +169,8 @@ def _too_fast(
     each = track.of_each(frames)
     return [
         subject.found(
-            code,
-            f"{counted(len(each), 'frame', of=track.n_frames)}: {label} {how} to frame "
+            f"{code}.plain",
+            message=f"{counted(len(each), 'frame', of=track.n_frames)}: {label} {how} to frame "
             f"{track.numbers[frames[0]]} at {number_text(track.times[frames[0]], '.3f')} s",
             part="clip",
             joints=np.concatenate([[joint], joints[joints != joint]]),

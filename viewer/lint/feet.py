@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.errors import counted
-from viewer.lint._finding import Finding, Subject, listed
+from viewer.lint._finding import Finding, Subject
 from viewer.lint._ground import Ground, ground_of
 from viewer.lint._soles import extent
 from viewer.lint._tracks import Track, track_of
+from viewer.phrases import listed
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure
 from viewer.rig.skeleton import joint_labels
@@ -74,7 +75,7 @@ def _unsure(subject: Subject, found: Ground, step: float) -> Finding:
     else:
         why = "feet rest at no height for long"
     text = f"{why}: it is not clear where the ground is, and they were not checked"
-    return subject.found("C013", text, part="clip")
+    return subject.found("C013.plain", message=text, part="clip")
 
 
 def _sunk(
@@ -99,8 +100,8 @@ def _sunk(
     each = track.of_each(frames)
     return [
         subject.found(
-            "C008",
-            f"{counted(len(each), 'frame', of=track.n_frames)}: {labels[worst]} is "
+            "C008.plain",
+            message=f"{counted(len(each), 'frame', of=track.n_frames)}: {labels[worst]} is "
             f"{subject.length(deepest[frames[0]] / track.scale)} below the ground in frame "
             f"{track.numbers[frames[0]]}",
             part="clip",
@@ -141,8 +142,8 @@ def _slipped(
     each = track.of_each(np.concatenate([[fastest + width], frames]))
     return [
         subject.found(
-            "C007",
-            f"{counted(len(each), 'frame', of=track.n_frames)}: {labels[worst]} slides by "
+            "C007.plain",
+            message=f"{counted(len(each), 'frame', of=track.n_frames)}: {labels[worst]} slides by "
             f"{subject.length(paths[worst] / track.scale)} in all, at most "
             f"{subject.speed(speeds[fastest, worst] / track.scale)} to frame "
             f"{track.numbers[fastest + width]}",

@@ -72,8 +72,8 @@ def _flat(subject: Subject, flat: Bools) -> list[Finding]:
         return []
     return [
         subject.found(
-            "M001",
-            f"{counted(len(triangles), 'triangle', 'has', 'have', of=len(flat))} no area, first "
+            "M001.plain",
+            message=f"{counted(len(triangles), 'triangle', 'has', 'have', of=len(flat))} no area, first "
             f"triangle {triangles[0]}",
             triangles=triangles,
             at=("triangles", int(triangles[0])),
@@ -92,8 +92,8 @@ def _doubled(subject: Subject, mesh: Mesh, whole: Indices) -> list[Finding]:
         return []
     return [
         subject.found(
-            "M011",
-            f"{counted(len(copies), 'triangle', 'has', 'have')} the corners of another one, first "
+            "M011.plain",
+            message=f"{counted(len(copies), 'triangle', 'has', 'have')} the corners of another one, first "
             f"triangle {copies[0]}",
             triangles=copies,
             at=("triangles", int(copies[0])),
@@ -112,8 +112,8 @@ def _crowded_edges(subject: Subject, mesh: Mesh, whole: Indices) -> list[Finding
     vertices = np.unique(ends)
     return [
         subject.found(
-            "M006",
-            f"{counted(len(ends), 'edge', 'belongs', 'belong')} to more than two triangles, at "
+            "M006.plain",
+            message=f"{counted(len(ends), 'edge', 'belongs', 'belong')} to more than two triangles, at "
             f"most {int(edges.counts.max())}, first between vertices {ends[0, 0]} and {ends[0, 1]}",
             triangles=triangles,
             vertices=vertices,
@@ -141,8 +141,8 @@ def _sides(
         wound = ("is wound against its", "are wound against their")
         findings.append(
             subject.found(
-                "M002",
-                f"{counted(len(triangles), 'triangle', *wound, of=mesh.n_triangles)} neighbours, "
+                "M002.plain",
+                message=f"{counted(len(triangles), 'triangle', *wound, of=mesh.n_triangles)} neighbours, "
                 f"first triangle {triangles[0]}",
                 triangles=triangles,
                 at=("triangles", int(triangles[0])),
@@ -152,8 +152,8 @@ def _sides(
         triangles = sound[one_sided]
         findings.append(
             subject.found(
-                "M012",
-                f"a surface of {counted(len(triangles), 'triangle')} has no two sides, with "
+                "M012.plain",
+                message=f"a surface of {counted(len(triangles), 'triangle')} has no two sides, with "
                 f"triangle {triangles[0]}",
                 triangles=triangles,
                 at=("triangles", int(triangles[0])),
@@ -175,8 +175,8 @@ def _borders(subject: Subject, mesh: Mesh, sound: Indices, border: Bools) -> lis
     first = ends[np.lexsort(ends.T[::-1])[0]]
     return [
         subject.found(
-            "M005",
-            f"{counted(len(ends), 'edge', 'belongs', 'belong')} to one triangle only, first "
+            "M005.plain",
+            message=f"{counted(len(ends), 'edge', 'belongs', 'belong')} to one triangle only, first "
             f"between vertices {first[0]} and {first[1]}",
             vertices=vertices,
             triangles=sound[np.unique(np.flatnonzero(border) // 3)],
@@ -220,8 +220,8 @@ def _inside_out(
     triangles = sound[np.isin(component, wrong)]
     return [
         subject.found(
-            "M003",
-            f"{counted(len(wrong), 'closed part')} with {counted(len(triangles), 'triangle')} "
+            "M003.plain",
+            message=f"{counted(len(wrong), 'closed part')} with {counted(len(triangles), 'triangle')} "
             f"{'is' if len(wrong) == 1 else 'are'} inside out, first triangle {triangles[0]}",
             triangles=triangles,
             at=("triangles", int(triangles[0])),
@@ -247,8 +247,8 @@ def _normals(subject: Subject, mesh: Mesh) -> list[Finding]:
     if len(zero):
         findings.append(
             subject.found(
-                "M007",
-                f"{counted(len(zero), 'normal', 'has', 'have')} length 0, first of vertex "
+                "M007.plain",
+                message=f"{counted(len(zero), 'normal', 'has', 'have')} length 0, first of vertex "
                 f"{zero[0]}",
                 vertices=zero,
                 at=("normals", int(zero[0])),
@@ -259,8 +259,8 @@ def _normals(subject: Subject, mesh: Mesh) -> list[Finding]:
         odd = odd[np.argsort(-np.abs(lengths[odd] - 1.0), kind="stable")]
         findings.append(
             subject.found(
-                "M008",
-                f"{counted(len(odd), 'normal', 'is', 'are')} not of length 1, that of vertex "
+                "M008.plain",
+                message=f"{counted(len(odd), 'normal', 'is', 'are')} not of length 1, that of vertex "
                 f"{odd[0]} is {lengths[odd[0]]:.4g} long",
                 vertices=odd,
                 at=("normals", int(odd[0])),
@@ -290,8 +290,8 @@ def _against(subject: Subject, mesh: Mesh, sound: Indices) -> list[Finding]:
     point = "points against all of its" if len(against) == 1 else "point against all of their"
     return [
         subject.found(
-            "M009",
-            f"{counted(len(against), 'normal', of=used)} {point} triangles, first of vertex "
+            "M009.plain",
+            message=f"{counted(len(against), 'normal', of=used)} {point} triangles, first of vertex "
             f"{against[0]}",
             vertices=against,
             at=("normals", int(against[0])),
@@ -307,8 +307,8 @@ def _vertices(subject: Subject, mesh: Mesh) -> list[Finding]:
     if len(unused):
         findings.append(
             subject.found(
-                "M004",
-                f"{counted(len(unused), 'vertex', 'belongs', 'belong', of=mesh.n_vertices)} to no "
+                "M004.plain",
+                message=f"{counted(len(unused), 'vertex', 'belongs', 'belong', of=mesh.n_vertices)} to no "
                 f"triangle, first vertex {unused[0]}",
                 vertices=unused,
                 at=("positions", int(unused[0])),
@@ -321,8 +321,8 @@ def _vertices(subject: Subject, mesh: Mesh) -> list[Finding]:
         far = far[np.argsort(-distances[far], kind="stable")]
         findings.append(
             subject.found(
-                "M010",
-                f"{counted(len(far), 'vertex', 'is', 'are')} far from the others, vertex {far[0]} "
+                "M010.plain",
+                message=f"{counted(len(far), 'vertex', 'is', 'are')} far from the others, vertex {far[0]} "
                 f"by {distances[far[0]] / typical:.2g} times what is usual",
                 vertices=far,
                 at=("positions", int(far[0])),

@@ -8,7 +8,8 @@ from collections import Counter
 import numpy as np
 
 from viewer.errors import counted, printable
-from viewer.lint._finding import Finding, Subject, listed
+from viewer.lint._finding import Finding, Subject
+from viewer.phrases import listed
 from viewer.rig.number_text import number_text
 from viewer.rig.pose import Pose
 from viewer.rig.posing.dof_text import beyond_text
@@ -44,8 +45,8 @@ def _names(subject: Subject, skeleton: Skeleton) -> list[Finding]:
         shown = listed([f'"{printable(name, 40)}" ({counts[name]})' for name in names])
         findings.append(
             subject.found(
-                "S006",
-                f"{counted(len(repeated), 'joint')} share their names with others: {shown}",
+                "S006.plain",
+                message=f"{counted(len(repeated), 'joint')} share their names with others: {shown}",
                 part="skeleton",
                 joints=repeated,
                 at=("joints", repeated[0]),
@@ -55,8 +56,8 @@ def _names(subject: Subject, skeleton: Skeleton) -> list[Finding]:
     if nameless:
         findings.append(
             subject.found(
-                "S007",
-                f"{counted(len(nameless), 'joint', 'has', 'have')} no name, first joint "
+                "S007.plain",
+                message=f"{counted(len(nameless), 'joint', 'has', 'have')} no name, first joint "
                 f"{nameless[0]}",
                 part="skeleton",
                 joints=nameless,
@@ -68,8 +69,8 @@ def _names(subject: Subject, skeleton: Skeleton) -> list[Finding]:
         labels = joint_labels(skeleton)
         findings.append(
             subject.found(
-                "S008",
-                f"{len(roots)} joints have no parent: {listed([labels[j] for j in roots])}",
+                "S008.plain",
+                message=f"{len(roots)} joints have no parent: {listed([labels[j] for j in roots])}",
                 part="skeleton",
                 joints=roots,
                 at=("joints", int(roots[1])),
@@ -87,8 +88,8 @@ def _rest(subject: Subject, skeleton: Skeleton) -> list[Finding]:
     if len(odd):
         findings.append(
             subject.found(
-                "S009",
-                f"{counted(len(odd), 'rest rotation', 'is', 'are')} not of length 1, "
+                "S009.plain",
+                message=f"{counted(len(odd), 'rest rotation', 'is', 'are')} not of length 1, "
                 f"{labels[odd[0]]} has {lengths[odd[0]]:.4g}",
                 part="skeleton",
                 joints=odd,
@@ -100,8 +101,8 @@ def _rest(subject: Subject, skeleton: Skeleton) -> list[Finding]:
         scale = " ".join(map(number_text, skeleton.rest_scales[flat[0]].tolist()))
         findings.append(
             subject.found(
-                "S010",
-                f"{counted(len(flat), 'rest scale', 'is', 'are')} 0 or less, {labels[flat[0]]} has "
+                "S010.plain",
+                message=f"{counted(len(flat), 'rest scale', 'is', 'are')} 0 or less, {labels[flat[0]]} has "
                 f"{scale}",
                 part="skeleton",
                 joints=flat,
@@ -124,7 +125,9 @@ def _limits(subject: Subject, skeleton: Skeleton, pose: Pose | None) -> list[Fin
         if heading == OUTSIDE:
             joints = _named(skeleton, text)
             at = ("joints", joints[0]) if joints else None
-            findings.append(subject.found("S004", text, part="skeleton", joints=joints, at=at))
+            findings.append(
+                subject.found("S004.plain", message=text, part="skeleton", joints=joints, at=at)
+            )
     low, high = skeleton.dof_limits.T
     if pose is not None:
         beyond = np.maximum(low - pose.dofs, pose.dofs - high)
@@ -136,8 +139,8 @@ def _limits(subject: Subject, skeleton: Skeleton, pose: Pose | None) -> list[Fin
             are = "is outside its" if len(outside) == 1 else "are outside their"
             findings.append(
                 subject.found(
-                    "S004",
-                    f"{which} of the pose {are} limits: "
+                    "S004.plain",
+                    message=f"{which} of the pose {are} limits: "
                     f"{beyond_text(skeleton, int(worst), float(pose.dofs[worst]))}",
                     part="skeleton",
                     joints=np.unique(skeleton.dof_joints[outside]),
@@ -150,8 +153,8 @@ def _limits(subject: Subject, skeleton: Skeleton, pose: Pose | None) -> list[Fin
         more = f" and {len(locked) - 6} more" * (len(locked) > 6)
         findings.append(
             subject.found(
-                "S005",
-                f"{counted(len(locked), 'DOF', 'is', 'are', of=skeleton.n_dofs)} locked: "
+                "S005.plain",
+                message=f"{counted(len(locked), 'DOF', 'is', 'are', of=skeleton.n_dofs)} locked: "
                 f"{', '.join(labels)}{more}",
                 part="skeleton",
                 joints=np.unique(skeleton.dof_joints[locked]),

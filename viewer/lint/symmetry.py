@@ -55,8 +55,8 @@ def _positions(subject: Subject, figure: Figure, mesh: Mesh) -> list[Finding]:
     where = "is not where its partner's" if len(off) == 1 else "are not where their partners'"
     return [
         subject.found(
-            "Y001",
-            f"{counted(len(off), 'vertex')} {where} mirror images are: "
+            "Y001.plain",
+            message=f"{counted(len(off), 'vertex')} {where} mirror images are: "
             f"{subject.length(distances[worst])} at vertex {worst}",
             severity="warning" if distances[worst] > _ASKEW * size else "note",
             vertices=off,
@@ -77,8 +77,8 @@ def _weights(
     whose = "its partner's" if len(off) == 1 else "their partners'"
     return [
         subject.found(
-            "Y002",
-            f"weights of {counted(len(off), 'vertex')} differ from {whose}: by "
+            "Y002.plain",
+            message=f"weights of {counted(len(off), 'vertex')} differ from {whose}: by "
             f"{differences[worst]:.3g} in sum at vertex {worst}",
             severity="warning" if differences[worst] > _UNEQUAL else "note",
             vertices=off,

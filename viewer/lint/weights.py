@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.errors import counted
-from viewer.lint._finding import Finding, Subject, listed
+from viewer.diagnostics import Phrase
+from viewer.lint._finding import Finding, Subject
 from viewer.lint._poses import some_poses
 from viewer.lint._topology import components, welded
 from viewer.lint.bindings import are_singular
@@ -50,9 +50,11 @@ def _sums(subject: Subject, skin: Skin, moved: Bools) -> list[Finding]:
     worst = int(off[0])
     return [
         subject.found(
-            "W001",
-            f"weights of {counted(len(off), 'vertex')} do not sum to 1: {sums[worst]:.6g} at "
-            f"vertex {worst}, an error of {errors[worst]:.3g}",
+            "W001.sums",
+            n=len(off),
+            sum=float(sums[worst]),
+            vertex=worst,
+            error=float(errors[worst]),
             severity="warning" if errors[worst] > _WRONG else "note",
             vertices=off,
             at=("weights", worst),
@@ -69,9 +71,11 @@ def _negative(subject: Subject, skin: Skin) -> list[Finding]:
     first = negative[0]
     return [
         subject.found(
-            "W002",
-            f"{counted(len(negative), 'weight', 'is', 'are')} negative: {skin.weights[first]:.6g} "
-            f"at vertex {vertices[0]} for joint {_label(subject, int(skin.joints[first]))}",
+            "W002.negative",
+            n=len(negative),
+            weight=float(skin.weights[first]),
+            vertex=int(vertices[0]),
+            joint=_label(subject, int(skin.joints[first])),
             vertices=_distinct(vertices),
             joints=_distinct(skin.joints[negative]),
             at=("weights", int(vertices[0])),
@@ -94,13 +98,12 @@ def _bare(subject: Subject, skin: Skin, mesh: Mesh, moved: Bools) -> list[Findin
     if lost.any():
         vertices = np.unique(mesh.triangles[lost])
         names = np.unique(islands[lost])
-        what = counted(len(vertices), "vertex", "has", "have" if len(names) > 1 else "has")
-        stay = "it stays where it was" if len(names) == 1 else "they stay where they were"
         findings.append(
             subject.found(
-                "W005",
-                f"{counted(len(names), 'island')} with {what} no weight at all, first at vertex "
-                f"{vertices[0]}: {stay} bound",
+                "W005.islands",
+                n=len(names),
+                n_vertices=len(vertices),
+                vertex=int(vertices[0]),
                 vertices=vertices,
                 triangles=np.flatnonzero(lost),
                 at=("weights", int(vertices[0])),
@@ -110,12 +113,11 @@ def _bare(subject: Subject, skin: Skin, mesh: Mesh, moved: Bools) -> list[Findin
         bare[vertices] = False
     single = np.flatnonzero(bare)
     if len(single):
-        stay = "stays where it was" if len(single) == 1 else "stay where they were"
         findings.append(
             subject.found(
-                "W004",
-                f"{counted(len(single), 'vertex')} without influence {stay} bound, first vertex "
-                f"{single[0]}",
+                "W004.vertices",
+                n=len(single),
+                vertex=int(single[0]),
                 vertices=single,
                 at=("weights", int(single[0])),
             )
@@ -129,8 +131,8 @@ def _idle_joints(subject: Subject, figure: Figure, skin: Skin) -> list[Finding]:
     if len(idle) == 0 or len(subject.spoiled.get("weights", ())):
         return []  # weights that are lost may have been theirs
     labels = [_label(subject, int(joint)) for joint in idle]
-    text = f"{counted(len(idle), 'joint', 'moves', 'move')} no vertex: {listed(labels)}"
-    return [subject.found("W006", text, joints=idle, at=("bindings", int(idle[0])))]
+    at = ("bindings", int(idle[0]))
+    return [subject.found("W006.joints", n=len(idle), names=labels, joints=idle, at=at)]
 
 
 def _doubled(subject: Subject, skin: Skin, known: Bools) -> list[Finding]:
@@ -140,9 +142,9 @@ def _doubled(subject: Subject, skin: Skin, known: Bools) -> list[Finding]:
         return []
     return [
         subject.found(
-            "W009",
-            f"{counted(len(fewer), 'vertex', 'lists', 'list')} a joint more than once, first "
-            f"vertex {fewer[0]}",
+            "W009.joints",
+            n=len(fewer),
+            vertex=int(fewer[0]),
             vertices=fewer,
             at=("weights", int(fewer[0])),
         )
@@ -162,40 +164,46 @@ def _crowded(subject: Subject, figure: Figure, known: Bools) -> list[Finding]:
         crowded = np.flatnonzero(used > limit)
         if len(crowded) == 0:
             continue
-        text = (
-            f"{counted(len(crowded), 'vertex', 'has', 'have')} more than {limit} influences, at "
-            f"most {int(used.max())}"
-        )
+        cost: Phrase | str = ""
         if can_pose:
             cost, crowded = _cost(subject, skin, limit, crowded)
-            text += f"; {cost}"
-        at = ("weights", int(crowded[0]))
-        findings.append(subject.found(code, text, vertices=crowded, at=at))
+        findings.append(
+            subject.found(
+                f"{code}.influences",
+                n=len(crowded),
+                most=int(used.max()),
+                cost=cost,
+                vertices=crowded,
+                at=("weights", int(crowded[0])),
+            )
+        )
     return findings
 
 
-def _cost(subject: Subject, skin: Skin, limit: int, crowded: np.ndarray) -> tuple[str, np.ndarray]:
-    """Return what a cut would move, in words, and the vertices with the largest cost first.
+def _cost(
+    subject: Subject, skin: Skin, limit: int, crowded: np.ndarray
+) -> tuple[Phrase, np.ndarray]:
+    """Return what a cut would move, and the vertices with the largest cost first.
 
-    Vertices whose cost nobody can know come last, and are counted.
+    Vertices of unknown cost come last, and are counted.
     """
     errors, n_poses = _cut_errors(subject, limit)
-    is_told = (_posable(subject, skin) & np.isfinite(errors))[crowded]
-    told, lost = crowded[is_told], crowded[~is_told]
-    needs = "it needs" if len(lost) == 1 else "they need"
-    left_out = (
-        f"{counted(len(lost), 'vertex', 'is', 'are')} left out, as a position or bind matrix that "
-        f"{needs} cannot be used"
+    is_known = (_posable(subject, skin) & np.isfinite(errors))[crowded]
+    known, lost = crowded[is_known], crowded[~is_known]
+    left_out = Phrase("cut-cost-left-out", n=len(lost)) if len(lost) else ""
+    if len(known) == 0:
+        return Phrase("cut-cost-unknown", limit=limit, left_out=left_out), crowded
+    known = known[np.argsort(-errors[known], kind="stable")]
+    cost = Phrase(
+        "cut-cost",
+        limit=limit,
+        most=subject.length(float(errors[known[0]])),
+        vertex=int(known[0]),
+        mean=subject.length(float(errors[known].mean())),
+        poses=n_poses,
+        left_out=left_out,
     )
-    if len(told) == 0:
-        return f"what keeping {limit} would move is not known: {left_out}", crowded
-    told = told[np.argsort(-errors[told], kind="stable")]
-    text = (
-        f"kept to {limit} the mesh moves by up to {subject.length(float(errors[told[0]]))} "
-        f"(vertex {told[0]}), {subject.length(float(errors[told].mean()))} on average "
-        f"of these, over {counted(n_poses, 'pose')}"
-    )
-    return text + f"; {left_out}" * bool(len(lost)), np.concatenate([told, lost])
+    return cost, np.concatenate([known, lost])
 
 
 def _posable(subject: Subject, skin: Skin) -> Bools:

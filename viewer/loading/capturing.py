@@ -113,7 +113,7 @@ class Builder:
             If the bodies do not fit the model.
         """
         new: list[Actor] = []
-        notes = [*part.warnings]
+        notes = [*map(str, part.warnings)]
         for person, motion in sorted(part.bodies.items(), key=_order):
             notes += self._add_body(person, motion, new)
         for person, (layout, clip) in sorted(part.points.items(), key=_order):

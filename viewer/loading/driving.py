@@ -200,7 +200,7 @@ def _begin_capture(
     """Read a capture until somebody is seen; the rest is read later."""
     called = cast.free_title(capture.name)
     builder = Builder(capture, model, called=called, keeps_shape=not is_bundled)
-    cast.notes += capture.warnings
+    cast.notes += map(str, capture.warnings)
     while not builder.actors and not builder.is_done:
         try:
             cast.notes += builder.read_some()[1]

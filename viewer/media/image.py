@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from viewer.errors import FormatError, OutputError, printable
+from viewer.diagnostics import Diagnostic
+from viewer.errors import FormatError, OutputError
 from viewer.media.png import encode_png
 from viewer.media.saving import save_bytes
+from viewer.phrases import printable
 from viewer.rig.arrays import Bytes
 
 if TYPE_CHECKING:
@@ -59,9 +61,10 @@ def decode_picture(path: Path, data: bytes) -> Bytes:
                 pixels.flags.writeable = False  # materials may share it
                 return pixels
     except UnidentifiedImageError:
-        raise FormatError(path, "not a picture that can be read") from None
+        raise FormatError(Diagnostic("F002.picture", path)) from None
     except (*_REFUSALS, Image.DecompressionBombError) as problem:
-        raise FormatError(path, f"a picture that cannot be read: {printable(problem)}") from None
+        values = {"reason": str(problem)}
+        raise FormatError(Diagnostic("F001.picture", path, values=values)) from None
 
 
 def _open(data: bytes) -> Image.Image:

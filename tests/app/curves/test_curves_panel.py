@@ -612,6 +612,7 @@ def test_far_times_and_values_do_no_harm(curves):
     assert curves.screen().any()
 
 
+@pytest.mark.golden("app_curves")
 def test_panel_looks_as_it_did(curves):
     curves.click("curves of arm")
     curves.state.playback.seek(0.5)

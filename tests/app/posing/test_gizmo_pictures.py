@@ -1,6 +1,6 @@
 """Golden pictures of the handles, compared coarsely; see test_panel_pictures.py.
 
-VIEWER_UPDATE_GOLDEN=1 draws them anew; look at them before they are committed.
+``make golden NAME…`` draws them anew; look at them before they are committed.
 """
 
 from __future__ import annotations
@@ -56,6 +56,7 @@ def _moving(drive):
 PICTURES = {"gizmo_rotate": _rotate, "gizmo_turning": _turning, "gizmo_moving": _moving}
 
 
+@pytest.mark.golden("app_{name}")
 @pytest.mark.parametrize("name", PICTURES)
 def test_handles_look_as_they_did(drive, name):
     hand = PICTURES[name](drive)

@@ -234,9 +234,9 @@ def test_thousands_of_joints_stay_usable(drive, tmp_path, text):
     joint_tree(hand.state).opened = set(range(hand.state.actor.figure.skeleton.n_joints))
     hand.step(2)
     assert len(hand.state.item_rects) < 150  # rows out of sight are not drawn
-    started = time.perf_counter()
+    started = time.process_time()
     hand.step(5)
-    assert (time.perf_counter() - started) / 5 < 0.25
+    assert (time.process_time() - started) / 5 < 0.25
     label = next(label for label in hand.state.item_rects if label.endswith(".y"))
     index = hand.dof_index(label)
     hand.click(hand.place(label, 0.9))

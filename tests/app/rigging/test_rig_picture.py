@@ -28,6 +28,7 @@ def _result(hand):
     hand.move((5, 5))
 
 
+@pytest.mark.golden("app_{name}")
 @pytest.mark.parametrize(("name", "prepare"), [("rig", _aligned), ("rigged", _result)])
 def test_rig_panel_looks_as_it_did(drive, name, prepare):
     hand = drive(scene=rig_scene.scene(), size=SIZE, samples=1)

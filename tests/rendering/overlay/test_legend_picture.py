@@ -17,6 +17,7 @@ from viewer.rendering.overlay.legend_picture import legend_pixels
 from viewer.rig.scene import Actor, Scene, scene_box, scene_points
 
 SIZE = 640, 360
+CODE = np.array([1 << 16, 1 << 8, 1])  # makes a number of a colour
 
 
 @pytest.fixture(scope="module")
@@ -64,8 +65,11 @@ def joints(count, size, name="joint {}"):
         Entry((200, index % 256, 40 + index // 256), name.format(index)) for index in range(count)
     )
     pixels = legend_pixels(Legend("Dominant joint", entries=entries), size)
-    found = [(pixels[..., :3] == entry.color).all(axis=2).any(axis=0) for entry in entries]
-    return pixels, [int(np.flatnonzero(one)[0]) if one.any() else None for one in found]
+    # The first of a colour, counted down the columns, is in its leftmost one.
+    columns = np.swapaxes(pixels[..., :3], 0, 1).astype(int)
+    codes, first = np.unique(columns @ CODE, return_index=True)
+    lefts = dict(zip(codes.tolist(), (first // pixels.shape[0]).tolist(), strict=True))
+    return pixels, [lefts.get(int(np.array(entry.color) @ CODE)) for entry in entries]
 
 
 @pytest.mark.parametrize("size", [(400, 300), (1280, 720), (1920, 1080)])

@@ -340,11 +340,11 @@ def test_names_that_say_nothing_mean_nothing() -> None:
 
 
 def test_huge_skeletons_are_no_bodies() -> None:
-    start = time.perf_counter()
+    start = time.process_time()
     assert set(canonical_names(["LeftArm"] * 50000, np.arange(50000) - 1)) == {""}
     deep = canonical_names(["spine", "LeftArm", "RightArm"] * 600, np.arange(1800) - 1)
     assert "spine1" in deep
-    assert time.perf_counter() - start < 2.0
+    assert time.process_time() - start < 2.0
 
 
 def test_plain_names_are_unique_and_of_plain_letters() -> None:

@@ -48,7 +48,6 @@ _POOR, _BENT = 0.01, np.radians(45.0)
 _SURE = 0.004  # misfit after the fit up to which a figure faces the right way: no other is tried
 _ALIKE = 1.5  # misfits nearer than this do not tell front from back
 _CLEARLY = 0.85  # of the misfit, which standing the other way must reach after the fit
-_SAMPLES, _DENSE = 2_000, 12_000  # as for alignments
 _ROUNDS = 30  # to lay the template the other way round
 _AXES_ROUNDS = 20
 _FOUND = ("search", "in place")  # alignments that nobody vouches for
@@ -94,6 +93,7 @@ class _Job:
     cloud: Cloud
     exact: Triangles
     scales: bool
+    settings: AlignmentSettings
 
 
 def align_posed(
@@ -145,18 +145,18 @@ def align_posed(
     gap = misfit(rigid, is_part)
     if settings.scale == "axes" or gap <= min(_CLOSE, _STRETCH_GAP):
         return kept
-    exact = Triangles(target.positions, triangles, _SAMPLES)
+    exact = Triangles(target.positions, triangles, settings.samples)
     stretched = None
     if settings.scale == "uniform" and rigid.how in _FOUND and not is_part:
         report(0.5, "proportions")
-        stretched = _stretched(ours, exact, kept)
+        stretched = _stretched(ours, exact, kept, settings.samples)
         if fits and stretched is not None and misfit(stretched.alignment, False) <= _STRETCH_GAP:
             return stretched
     if fits and gap > _CLOSE:
-        dense = sample_surface(target.positions, triangles, _DENSE)
+        dense = sample_surface(target.positions, triangles, settings.dense)
         scales = settings.scale != "none" and not is_part
-        job = _Job(template, pose, Cloud(exact.samples, dense), exact, scales)
-        kept = _if_better(job, ours, kept, settings.facing, report)
+        job = _Job(template, pose, Cloud(exact.samples, dense), exact, scales, settings)
+        kept = _if_better(job, ours, kept, report)
     if stretched is None or not _is_closer(stretched, kept):
         return kept
     return stretched if fits else replace(kept, lines=(_advice(stretched, kept),))
@@ -166,7 +166,6 @@ def _if_better(
     job: _Job,
     ours: Posed,
     kept: PosedAlignment,
-    facing: str | None,
     report: Callable[[float, str], None],
 ) -> PosedAlignment:
     """Return the template with fitted pose and proportions if these close most of the gap."""
@@ -174,7 +173,7 @@ def _if_better(
     is_part = rigid.away > PART
     before = misfit(rigid, is_part)
     found = _fitted(job, rigid, lambda share: report(0.5 + 0.25 * share, "pose"))
-    may_turn = rigid.how in _FOUND and facing is None and not is_part
+    may_turn = rigid.how in _FOUND and job.settings.facing is None and not is_part
     if may_turn and misfit(found.alignment, False) > _SURE:
         behind = _turned_round(job, ours, rigid, job.template.up)
         if misfit(behind, False) < _ALIKE * before:
@@ -201,7 +200,7 @@ def _fitted(job: _Job, start: Alignment, report: Callable[[float], None]) -> Pos
     assert template.mesh is not None  # the caller looked
     found = fit_pose(template, job.pose, start.placed, job.cloud, job.exact, job.scales, report)
     posed = deform(found.figure, found.pose)[0]
-    ours = Triangles(posed, template.mesh.triangles, _SAMPLES)
+    ours = Triangles(posed, template.mesh.triangles, job.settings.samples)
     how = start.how if start.how == "landmarks" else "fit"
     alignment = Alignment.of(ours, job.exact, found.placed, how)
     return PosedAlignment(
@@ -216,18 +215,21 @@ def _turned_round(job: _Job, ours: Posed, rigid: Alignment, up: str) -> Alignmen
     middle = placed.apply(ours.positions.mean(axis=0))
     rotation = placed.rotation @ half
     shift = middle - placed.scale * rotation @ ours.positions.mean(axis=0)
-    exact = Triangles(ours.positions, ours.triangles, _SAMPLES)
-    cloud = Cloud(exact.samples, sample_surface(ours.positions, ours.triangles, _DENSE))
+    exact = Triangles(ours.positions, ours.triangles, job.settings.samples)
+    dense = sample_surface(ours.positions, ours.triangles, job.settings.dense)
+    cloud = Cloud(exact.samples, dense)
     start = Similarity(placed.scale, rotation, shift, placed.factors)
     return Alignment.of(
         exact, job.exact, iterate(cloud, job.cloud, start, _ROUNDS, job.scales), "search"
     )
 
 
-def _stretched(ours: Posed, exact: Triangles, kept: PosedAlignment) -> PosedAlignment | None:
+def _stretched(
+    ours: Posed, exact: Triangles, kept: PosedAlignment, samples: int
+) -> PosedAlignment | None:
     """Return the template with a scale along each axis, if that closes most of the gap."""
     rigid = kept.alignment
-    template = Triangles(ours.positions, ours.triangles, _SAMPLES)
+    template = Triangles(ours.positions, ours.triangles, samples)
     trials = [
         fit_axes(template, exact, rigid.placed, _AXES_ROUNDS, turns=True, own=own)
         for own in (False, True)

@@ -40,7 +40,6 @@ __all__ = [
 SCALES = ("uniform", "axes", "none")
 """One scale; one along each axis of the target; or the template's size as it is."""
 
-_DENSE, _SAMPLES = 12_000, 2_000  # points that are searched, and that are asked for
 _ROUNDS, _SLIDES = 60, 25  # of points to points, and to planes
 _AXES_ROUNDS = 20
 _IN_PLACE = 0.03  # misfit over size up to which a mesh may lie in place already
@@ -89,6 +88,9 @@ class AlignmentSettings:
         Whether closest points improve on landmarks or on what the search found.
     matrix : (4, 4) or None
         An alignment that is known, as dragged in the window: nothing is searched.
+    samples : int
+        Points spread over each surface whose partners on the other one are looked for. The time
+        that a fit takes is proportional to it.
     """
 
     up: str | None = None
@@ -97,6 +99,12 @@ class AlignmentSettings:
     landmarks: Floats | None = None
     refines: bool = True
     matrix: Floats | None = None
+    samples: int = 2_000
+
+    @property
+    def dense(self) -> int:
+        """Points of each surface that stand for all of it where the first rounds search."""
+        return 6 * self.samples
 
     def __post_init__(self) -> None:
         if self.scale not in SCALES:
@@ -214,13 +222,13 @@ def align(
     """
     report(0.0, "alignment")
     ours, theirs = (
-        Triangles(side.positions, side.triangles, _SAMPLES) for side in (template, target)
+        Triangles(side.positions, side.triangles, settings.samples) for side in (template, target)
     )
     fine = (ours, theirs)
     if settings.matrix is not None:
         return Alignment.of(ours, theirs, similarity_of(settings.matrix), "given")
     coarse = [
-        Cloud(exact.samples, sample_surface(side.positions, side.triangles, _DENSE))
+        Cloud(exact.samples, sample_surface(side.positions, side.triangles, settings.dense))
         for exact, side in zip(fine, (template, target), strict=True)
     ]
     if settings.landmarks is not None:

@@ -37,13 +37,14 @@ def frame_rate(source: Source, frame_time: bytes | None) -> float:
 
     ``0.0333333`` is 30 a second, ``0.033367`` is 30000/1001, ``0.1`` is 10.
     """
-    seconds = 0.0 if frame_time is None else float(frame_time.rstrip(b"fF"))
-    if seconds == 0.0 or not is_rate(1.0 / seconds):
-        usual = f"expected {1.0 / FASTEST:g} to {1.0 / SLOWEST:,.0f} seconds"
-        found = "is missing" if frame_time is None else f"is {seconds:g}, {usual}"
-        source.warn(f"Frame Time {found}: taken for {DEFAULT_RATE:g} frames a second")
+    if frame_time is None:
+        source.warn("F007.bvh-no-time", rate=DEFAULT_RATE)
         return DEFAULT_RATE
-    assert frame_time is not None  # or there would be no seconds
+    seconds = float(frame_time.rstrip(b"fF"))
+    if seconds == 0.0 or not is_rate(1.0 / seconds):
+        low, high = 1.0 / FASTEST, 1.0 / SLOWEST
+        source.warn("F007.bvh-time", seconds=seconds, low=low, high=high, rate=DEFAULT_RATE)
+        return DEFAULT_RATE
     digits = frame_time.lower().partition(b"e")[0].rstrip(b"f").replace(b".", b"").lstrip(b"+0")
     exact = 1.0 / seconds
     if len(digits) < 2:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
+from typing import Any
 
-from viewer.errors import FormatError, printable
+from viewer.diagnostics import Phrase
+from viewer.errors import FormatError
 from viewer.formats._numbers import to_number
-from viewer.formats._source import Source, no_number, shown
+from viewer.formats._source import Source
+from viewer.formats._tolerant import number_key
 
-__all__ = ["CHANNELS", "BvhJoint", "Hierarchy", "read_hierarchy"]
+__all__ = ["CHANNELS", "BvhJoint", "Hierarchy", "called", "read_hierarchy"]
 
 CHANNELS = {
     f"{axis}{kind}".encode(): code
@@ -19,7 +22,6 @@ CHANNELS = {
 }
 """Codes of channel names in capitals: 0 to 2 are positions, 3 to 5 rotations."""
 
-_CHANNEL_NAMES = "Xposition … Zrotation"
 _ITEMS = (b"OFFSET", b"CHANNELS", b"JOINT", b"END", b"ENDSITE")
 
 Word = re.Match[bytes]
@@ -81,18 +83,16 @@ class _Parser:
         """Return the joints and the place of the motion."""
         self._advance()
         if self.keyword != b"HIERARCHY":
-            looks = self.source.looks_like()
-            hint = f" ({looks})" if looks else ""
-            raise self._error(f"expected HIERARCHY, found {self._shown()}{hint}")
+            raise self._fault("F002.bvh-start", looks=self.source.looks_like())
         self._advance()
         while self.word is not None and (self.open or self.keyword != b"MOTION"):
             self._item()
         if self.open:
             raise self._still_open()
         if not self.found:
-            raise self._error(f"expected ROOT, found {self._shown()}")
+            raise self._fault("F002.bvh-no-root")
         if self.extra_braces:
-            self.source.warn(f'ignored {self.extra_braces} "}}" after the root')
+            self.source.warn("F006.extra-braces", n=self.extra_braces)
         return Hierarchy(self.found, -1 if self.word is None else self.word.end())
 
     def _item(self) -> None:
@@ -102,7 +102,7 @@ class _Parser:
             self._close()
         elif joint is None:
             if keyword != b"ROOT":
-                raise self._error(f"expected ROOT or MOTION, found {self._shown()}")
+                raise self._fault("F002.bvh-root")
             self._open_joint()
         elif keyword == b"OFFSET":
             self._offset(joint)
@@ -114,9 +114,10 @@ class _Parser:
             self._open_joint(is_end=True)
         elif keyword in (b"MOTION", b"ROOT"):
             raise self._still_open()
+        elif joint.is_end:
+            raise self._fault("F002.bvh-end-item", joint=called(joint))
         else:
-            wanted = "OFFSET" if joint.is_end else "OFFSET, CHANNELS, JOINT, End Site"
-            raise self._error(f'{_called(joint)}: expected {wanted} or "}}", found {self._shown()}')
+            raise self._fault("F002.bvh-item", joint=called(joint))
 
     def _open_joint(self, is_end: bool = False) -> None:
         assert self.word is not None  # the caller looked at it
@@ -136,9 +137,7 @@ class _Parser:
             joint.name = self.found[parent].name
         if self.word is None or self.word.group() != b"{":
             where = start if self.word is None else self.word.start()
-            raise self.source.error(
-                f'{_called(joint)}: expected "{{", found {self._shown()}', where
-            )
+            raise self.source.fault("F002.opening", where, item=called(joint), found=self._found())
         self.open.append(len(self.found))
         self.found.append(joint)
         self.n_joints += not is_end
@@ -163,31 +162,33 @@ class _Parser:
         assert self.word is not None  # the caller looked at it
         keyword = self.word
         if joint.offset is not None:
-            raise self._error(f"{_called(joint)}: expected one OFFSET, found another")
+            raise self._fault("F002.bvh-offset-again", joint=called(joint))
         self._advance()
         values: list[float] = []
         while len(values) < 3:
             value = None if self.word is None else to_number(self.word.group())
             if value is None:
-                self._refuse_offset(joint, self._offset_error(joint, keyword, len(values)))
+                self._refuse_offset(joint, keyword, len(values))
                 return
             values.append(value)
             self._advance()
         if self.word is not None and to_number(self.word.group()) is not None:
-            more = f"expected 3 numbers, found more: {self._shown()}"
-            self._refuse_offset(joint, self._error(f"OFFSET of {_called(joint)}: {more}"))
+            self._refuse_offset(joint, keyword, 3)
         joint.offset = values
 
-    def _offset_error(self, joint: BvhJoint, keyword: Word, found: int) -> FormatError:
-        if self.word is not None and self.keyword not in (b"{", b"}", *_ITEMS):
-            return self._error(f"OFFSET of {_called(joint)}: {no_number(self.word.group())}")
-        return self.source.error(
-            f"OFFSET of {_called(joint)}: expected 3 numbers, found {found}", keyword.start()
-        )
-
-    def _refuse_offset(self, joint: BvhJoint, error: FormatError) -> None:
-        """Refuse an OFFSET; where faults are noted it is 0 0 0, and reading goes on behind it."""
-        self.source.refuse(error, 1, "joints", () if joint.is_end else [self.n_joints - 1])
+    def _refuse_offset(self, joint: BvhJoint, keyword: Word, found: int) -> None:
+        """Refuse an OFFSET for the word after its numbers, and go on behind it."""
+        refuse, word = self.source.refuse, self._found()
+        places = None if joint.is_end else [self.n_joints - 1]
+        item = Phrase("of", item="OFFSET", owner=called(joint))
+        here = keyword.start() if self.word is None else self.word.start()
+        if found == 3:
+            refuse("F002.more", here, 1, "joints", places, item=item, expected=3, found=word)
+        elif word is None or self.keyword in (b"{", b"}", *_ITEMS):
+            start = keyword.start()
+            refuse("F002.width", start, 1, "joints", places, item=item, expected=3, found=found)
+        else:
+            refuse(number_key(word), here, 1, "joints", places, item=item, found=word)
         joint.offset = [0.0, 0.0, 0.0]
         while self.word is not None and self.keyword not in (b"{", b"}", *_ITEMS):
             self._advance()
@@ -196,35 +197,27 @@ class _Parser:
         assert self.word is not None  # the caller looked at it
         keyword = self.word
         if joint.channels is not None:
-            raise self._error(f"{_called(joint)}: expected one CHANNELS, found another")
+            raise self._fault("F002.bvh-channels-again", joint=called(joint))
         self._advance()
+        item = Phrase("of", item="CHANNELS", owner=called(joint))
         count = None if self.word is None else to_number(self.word.group())
         if count is None or count != int(count) or count < 0:
-            raise self._error(
-                f"CHANNELS of {_called(joint)}: expected a count, found {self._shown()}"
-            )
+            raise self._fault("F002.count", item=item)
         stated = self.word
         self._advance()
         codes: list[int] = []
         while self.word is not None and self.keyword not in (b"{", b"}", *_ITEMS):
             code = CHANNELS.get(self.keyword)
             if code is None:
-                raise self._error(
-                    f"CHANNELS of {_called(joint)}: expected {_CHANNEL_NAMES}, "
-                    f"found {self._shown()}"
-                )
+                raise self._fault("F002.bvh-channel", item=item)
             if code < 3 and code in codes:
-                raise self._error(
-                    f"CHANNELS of {_called(joint)}: expected each position once, "
-                    f"found {self._shown()} again"
-                )
+                raise self._fault("F002.bvh-position-again", item=item)
             codes.append(code)
             self._advance()
         if len(codes) != count:
-            raise self.source.error(
-                f"CHANNELS of {_called(joint)}: expected {count:.0f} channel names, "
-                f"found {len(codes)}",
-                stated.start() if stated else keyword.start(),
+            where = stated.start() if stated else keyword.start()
+            raise self.source.fault(
+                "F002.bvh-channel-count", where, item=item, expected=int(count), found=len(codes)
             )
         joint.channels = codes
 
@@ -232,21 +225,21 @@ class _Parser:
         self.word = next(self.words, None)
         self.keyword = b"" if self.word is None else self.word.group().upper()
 
-    def _shown(self) -> str:
-        return "the end of the file" if self.word is None else shown(self.word.group())
+    def _found(self) -> bytes | None:
+        return None if self.word is None else self.word.group()
 
-    def _error(self, message: str) -> FormatError:
-        where = len(self.source.data.rstrip()) if self.word is None else self.word.start()
-        return self.source.error(message, where)
+    def _fault(self, key: str, **values: Any) -> FormatError:
+        """Return the error of a fault at the current word."""
+        where = self.source.end if self.word is None else self.word.start()
+        return self.source.fault(key, where, found=self._found(), **values)
 
     def _still_open(self) -> FormatError:
         joint = self.found[self.open[-1]]
-        return self._error(
-            f'expected "}}", found {self._shown()}: {_called(joint)} '
-            f"(line {self.source.line(joint.start)}) is still open"
-        )
+        line = self.source.line(joint.start)
+        return self._fault("F002.joint-open", joint=called(joint), line=line)
 
 
-def _called(joint: BvhJoint) -> str:
-    name = f"joint {printable(joint.name, 60)}" if joint.name else "joint without a name"
-    return f"End Site of {name}" if joint.is_end else name
+def called(joint: BvhJoint) -> Phrase:
+    """Return what messages call a joint or End Site."""
+    name = Phrase("joint", name=joint.name) if joint.name else Phrase("unnamed-joint")
+    return Phrase("end-site", joint=name) if joint.is_end else name

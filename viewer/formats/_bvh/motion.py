@@ -6,14 +6,18 @@ import re
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from viewer.errors import FormatError, counted
+from viewer.diagnostics import Phrase
+from viewer.errors import FormatError
 from viewer.formats._numbers import parse_numbers, to_number
-from viewer.formats._source import Source, no_number, shown
-from viewer.formats._tolerant import held_rows, read_words, refuse_words
+from viewer.formats._source import Source
+from viewer.formats._tolerant import Words, held_rows, number_key, read_words, refuse_words
 from viewer.rig.arrays import Floats
 
 __all__ = ["Motion", "read_motion"]
+
+Places = NDArray[np.int64]
 
 _FRAMES = re.compile(rb"\s*Frames[ \t]*:?\s*(\S*)", re.IGNORECASE)
 _TIME = re.compile(rb"\s*Frame[ \t]*Time[ \t]*:?\s*(\S*)", re.IGNORECASE)
@@ -59,7 +63,7 @@ def read_motion(source: Source, start: int, n_channels: int) -> Motion:
         With the line of a word that should be a number, or of a row that is too short or long.
     """
     if start < 0:
-        source.warn("no MOTION: shown in the rest pose", len(source.data.rstrip()))
+        source.warn("F007.bvh-no-motion", source.end)
         return _rest(n_channels, None)
     declared: int | None = None
     time: bytes | None = None
@@ -71,9 +75,9 @@ def read_motion(source: Source, start: int, n_channels: int) -> Motion:
         if time is None and (match := _TIME.match(source.data, start)):
             time, start, is_header = _seconds(source, match), match.end(), True
     if declared is None:
-        source.warn("Frames is missing: all rows are used", start)
+        source.warn("F007.bvh-no-count", start)
     if n_channels == 0:
-        source.warn("no joint has channels: shown in the rest pose", start)
+        source.warn("F007.bvh-no-channels", start)
         return _rest(0, time)
     return Motion(_rows(source, start, n_channels, declared), time)
 
@@ -85,86 +89,116 @@ def _rest(n_channels: int, time: bytes | None) -> Motion:
 def _count(source: Source, match: re.Match[bytes]) -> int:
     value = to_number(match[1])
     if value is None or value < 0 or value != int(value):
-        raise source.error(f"Frames: expected a count, found {_found(match[1])}", match.start(1))
+        raise source.fault("F002.count", match.start(1), item="Frames", found=match[1] or None)
     return int(value)
 
 
 def _seconds(source: Source, match: re.Match[bytes]) -> bytes:
     value = to_number(match[1])
     if value is None or value < 0.0:
-        raise source.error(
-            f"Frame Time: expected seconds, found {_found(match[1])}", match.start(1)
-        )
+        raise source.fault("F002.bvh-seconds", match.start(1), found=match[1] or None)
     return match[1]
 
 
-def _found(word: bytes) -> str:
-    return shown(word) if word else "the end of the file"
+def _rows(source: Source, start: int, width: int, declared: int | None) -> Floats:
+    """Return all whole frames: (N, C)."""
+    data = source.data
+    source.remember("frames", lambda row: source.number_offset(start, len(data), row * width))
+    values, bad = parse_numbers(data, start, len(data))
+    whole, rest = divmod(len(values), width)
+    is_whole = bad < 0 and rest == 0 and whole > 0
+    if is_whole and (declared is None or whole == declared):
+        return values.reshape(whole, width)
+    repaired = _repaired(source, start, width, declared)
+    if repaired is not None:
+        return repaired
+    if bad >= 0:
+        _refuse_word(source, start, bad, width, declared)
+    if rest or (declared is not None and whole != declared):
+        _check_lines(source, start, width, declared)
+        _say_difference(source, width, declared, whole, rest)
+    if whole == 0:
+        source.warn("F007.bvh-empty", start)
+        return _rest(width, None).values
+    return values[: whole * width].reshape(whole, width)
 
 
-def _mended(source: Source, start: int, width: int, declared: int | None) -> Floats | None:
-    """Return the frames, noting all faults in them; None if there are none, or too many to tell.
+def _refuse_word(source: Source, start: int, bad: int, width: int, declared: int | None) -> None:
+    """Refuse a word that is no number; behind the last frame anything may follow."""
+    offset = source.word_offset(start, bad)
+    match = source.next_word(offset)
+    word = b"" if match is None else match.group()
+    if declared is not None and bad >= declared * width:
+        source.warn("F006.bvh-after", offset, found=word)
+        return
+    frame = Phrase("bvh-frame", frame=bad // width)
+    raise source.fault(number_key(word), offset, item=frame, found=word)
 
-    A frame that cannot be used is as the one before.
+
+def _repaired(source: Source, start: int, width: int, declared: int | None) -> Floats | None:
+    """Refuse all faults in the frames, and return those that can be used, each bad one as the last.
+
+    None if there is no fault in them, or nobody can tell where each frame begins.
     """
     words = read_words(source.data, start, len(source.data))
-    bad = words.bad
     begins, sizes = words.rows()
-    by_line = (sizes == width).sum() * 2 > len(sizes)
-    if by_line and declared is not None:
+    rest = 0
+    if (sizes == width).sum() * 2 > len(sizes):  # a frame per line
+        begins, sizes, rest = _without_rest(words, begins, sizes, width)
         begins, sizes = begins[:declared], sizes[:declared]
-    if not by_line:
+    else:
         end = len(words.values) if declared is None else declared * width
         if len(words.values) < end or end % width:
             return None
         begins, sizes = np.arange(0, end, width), np.full(end // width, width)
     last = int(begins[-1] + sizes[-1]) if len(begins) else 0
-    bad = bad[bad < last]
+    bad = words.bad[words.bad < last]
     fits = sizes == width
     if fits.all() and len(bad) == 0:
         return None
     frames = np.searchsorted(begins, bad, side="right") - 1
-    names = dict(zip(bad.tolist(), frames.tolist(), strict=True))
-    refuse_words(source, words, bad, lambda word: f"frame {names[word]}", "frames", frames)
-    wrong = np.flatnonzero(~fits)
-    if len(wrong):
-        first = int(wrong[0])
-        place = int(words.offsets[begins[first]]), int(sizes[first])
-        error = _wrong_row(source, first, width, place)
-        source.refuse(error, len(wrong), "frames", wrong)
+    frame_of = dict(zip(bad.tolist(), frames.tolist(), strict=True))
+    refuse_words(
+        source,
+        words,
+        bad,
+        lambda word: Phrase("bvh-frame", frame=frame_of[word]),
+        "frames",
+        frames,
+    )
+    _refuse_sizes(source, words.offsets[begins], sizes, width)
     rows = np.full((len(begins), width), np.nan)
     rows[fits] = words.values[begins[fits, None] + np.arange(width)]
-    if declared is not None and len(rows) != declared:
-        _say_difference(source, width, declared, len(rows), 0)
+    if rest or (declared is not None and len(rows) != declared):
+        _say_difference(source, width, declared, len(rows), rest)
     return held_rows(rows, np.isnan(rows).any(axis=1))
 
 
-def _rows(source: Source, start: int, width: int, declared: int | None) -> Floats:
-    """Return all whole frames: (N, C)."""
-    source.remember(
-        "frames", lambda row: source.number_offset(start, len(source.data), row * width)
-    )
-    if source.faults is not None:
-        mended = _mended(source, start, width, declared)
-        if mended is not None:
-            return mended
-    values, bad = parse_numbers(source.data, start, len(source.data))
-    if bad >= 0:
-        offset = source.word_offset(start, bad)
-        word = source.next_word(offset)
-        found = shown(word.group()) if word else "the end of the file"
-        if declared is None or bad < declared * width:
-            text = no_number(word.group() if word else None)
-            raise source.error(f"frame {bad // width}: {text}", offset)
-        source.warn(f"ignored what follows the last frame, {found}", offset)
-    whole, rest = divmod(len(values), width)
-    if rest or (declared is not None and whole != declared):
-        _check_lines(source, start, width, declared)
-        _say_difference(source, width, declared, whole, rest)
-    if whole == 0:
-        source.warn("no frames: shown in the rest pose", start)
-        return _rest(width, None).values
-    return values[: whole * width].reshape(whole, width)
+def _without_rest(
+    words: Words, begins: Places, sizes: Places, width: int
+) -> tuple[Places, Places, int]:
+    """Return lines without a last one that is cut off, and how many numbers that has."""
+    size = int(sizes[-1])
+    if size >= width or np.isnan(words.values[begins[-1] :]).any():
+        return begins, sizes, 0
+    return begins[:-1], sizes[:-1], size
+
+
+def _refuse_sizes(source: Source, offsets: Places, sizes: Places, width: int) -> None:
+    """Refuse rows that are too short or too long."""
+    wrong = np.flatnonzero(sizes != width)
+    if len(wrong):
+        first = int(wrong[0])
+        source.refuse(
+            "F002.bvh-row",
+            int(offsets[first]),
+            len(wrong),
+            "frames",
+            wrong,
+            frame=first,
+            expected=width,
+            found=int(sizes[first]),
+        )
 
 
 def _check_lines(source: Source, start: int, width: int, declared: int | None) -> None:
@@ -187,16 +221,14 @@ def _check_lines(source: Source, start: int, width: int, declared: int | None) -
 
 
 def _wrong_row(source: Source, row: int, width: int, line: tuple[int, int]) -> FormatError:
-    return source.error(
-        f"frame {row}: expected {width} numbers as CHANNELS says, found {line[1]}", line[0]
-    )
+    return source.fault("F002.bvh-row", line[0], frame=row, expected=width, found=line[1])
 
 
 def _say_difference(
     source: Source, width: int, declared: int | None, whole: int, rest: int
 ) -> None:
-    wanted = "" if declared is None else f"expected {counted(declared, 'frame')} as Frames says, "
-    part = f" and {rest} of {width} numbers of the next" if rest else ""
+    expected = None if declared is None else Phrase("bvh-frames", n=declared)
+    part = Phrase("bvh-part", n=rest, width=width) if rest else None
     if whole == 0 and (declared or rest):
-        raise source.error(f"{wanted}found none{part}", len(source.data.rstrip()))
-    source.warn(f"{wanted}found {whole}{part}; the whole ones are used", len(source.data.rstrip()))
+        raise source.fault("F002.bvh-no-frame", source.end, expected=expected, rest=part)
+    source.warn("F007.bvh-frames", source.end, expected=expected, found=whole, rest=part)

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from viewer.errors import one_of
+from viewer.diagnostics import Phrase
 from viewer.formats._easymocap.json_frames import (
-    MisfitError,
+    RecordError,
     has_numbers,
     limit_of,
     row_of,
@@ -36,8 +36,6 @@ _SMPL, _SMPLH, _SMPLX, _MANO = FAMILY[24], FAMILY[52], FAMILY[55], FAMILY[16]
 _BODY = members_by_numbers()[66]
 _FACE = _SMPLX.names[22:25]
 _VPOSER = 32
-_LAST = "no {} in this record: the person's last ones are kept, wherever there are none"
-_NO_LAST = "no {} in this record, nor in earlier ones of the same person: 0 is taken"
 _SHAPES = 10  # shape numbers that the legacy code puts before those of the expression
 
 
@@ -98,20 +96,17 @@ def body_layout(record: dict[str, Any]) -> BodyLayout:
 
     Raises
     ------
-    MisfitError
+    RecordError
         If no layout has this length, or the record cannot be used: other records must not be
         measured by it.
     """
     count = len(row_of(record, "poses"))
     if count == _VPOSER:
-        raise MisfitError(
-            "poses",
-            f"expected rotations, found {count} numbers, a code of VPoser that only its "
-            "network can decode: write full poses in EasyMocap",
-        )
+        raise RecordError("poses", Phrase("record-vposer", found=count))
     layout = _LAYOUTS.get(count)
     if layout is None:
-        raise MisfitError("poses", f"expected {one_of(sorted(_LAYOUTS))} numbers, found {count}")
+        problem = Phrase("record-lengths", expected=sorted(_LAYOUTS), found=count)
+        raise RecordError("poses", problem)
     widths = [("Rh", 3), ("Th", 3), ("poses", count)]
     keys = [key for key in COEFFICIENTS if has_numbers(record, key)]
     hands = layout.hands
@@ -135,7 +130,7 @@ def with_coefficients(layout: BodyLayout, record: dict[str, Any]) -> BodyLayout:
 
     Raises
     ------
-    MisfitError
+    RecordError
         If they are no finite numbers.
     """
     known = [key for key, _ in layout.widths]
@@ -144,8 +139,11 @@ def with_coefficients(layout: BodyLayout, record: dict[str, Any]) -> BodyLayout:
     return replace(layout, widths=(*layout.widths, *more))
 
 
-RowFault = tuple[int, str, str]
-"""A record that cannot be used: its row, the key at fault, and what is wrong."""
+RowFault = tuple[int, str, RecordError]
+"""A record that cannot be used: its row, what messages call the part, and what is wrong."""
+
+Remark = tuple[str, str, str]
+"""What is odd but no fault: the key of its message, the file, and the key of the record."""
 
 
 @dataclass(slots=True)
@@ -186,14 +184,14 @@ class BodyRows(Rows):
         for people without a track, whose rows have nothing to do with one another.
     buffers : list of array
         Numbers of the layout's keys, one record behind the other.
-    remarks : list of (str, str)
-        Found by ``values``: file and text of what is odd but no fault.
+    remarks : list of Remark
+        Found by ``values``: what is odd but no fault.
     """
 
     layout: BodyLayout
     known: dict[str, Floats] | None = None
     buffers: list[array[float]] = field(default_factory=list)
-    remarks: list[tuple[str, str]] = field(default_factory=list)
+    remarks: list[Remark] = field(default_factory=list)
     _lacking: dict[str, list[int]] = field(default_factory=dict)
     _plan: list[tuple[str, int, Callable[[list[Any]], None]]] = field(default_factory=list)
 
@@ -213,7 +211,7 @@ class BodyRows(Rows):
 
         Raises
         ------
-        MisfitError
+        RecordError
             If something is missing, or has another length than before.
         """
         try:
@@ -240,7 +238,7 @@ class BodyRows(Rows):
                     take_row(record, key, count, put)
                 else:
                     self._lack(key, count, put)
-        except MisfitError:
+        except RecordError:
             self._drop_unfinished()
             raise
 
@@ -271,8 +269,8 @@ class BodyRows(Rows):
             Of the rows that can be used.
         keep : (rows,) bool
             Which ones those are.
-        faults : list of (int, str, str)
-            Row, key and text for each of the others.
+        faults : list of RowFault
+            What is wrong with each of the others.
         """
         keep: Bools = np.ones(len(self.frames), dtype=np.bool_)
         values: dict[str, Floats] = {}
@@ -288,7 +286,8 @@ class BodyRows(Rows):
                 is_good = (np.abs(rows) <= limit).all(axis=1)
                 for row in np.flatnonzero(~is_good & keep):
                     odd = rows[row][~(np.abs(rows[row]) <= limit)][0]
-                    faults.append((int(row), key, f"{key}: {within_text(odd, limit)}"))
+                    problem = RecordError(key, within_text(odd, limit), "F003")
+                    faults.append((int(row), key, problem))
                 keep &= is_good
         if faults:
             values = {key: rows[keep] for key, rows in values.items()}
@@ -301,7 +300,7 @@ class BodyRows(Rows):
         is_given[lacking] = False
         if self.known is None:
             if lacking:
-                self.remarks.append((self.paths[lacking[0]], _NO_LAST.format(key)))
+                self.remarks.append(("F007.record-no-last", self.paths[lacking[0]], key))
             return rows
         before = self.known.get(key)
         filled = carry(rows, is_given, before)
@@ -310,9 +309,8 @@ class BodyRows(Rows):
             self.known[key] = last
         if lacking:
             is_first = before is None and lacking[0] == 0
-            self.remarks.append(
-                (self.paths[lacking[0]], (_NO_LAST if is_first else _LAST).format(key))
-            )
+            message = "F007.record-no-last" if is_first else "F007.record-last"
+            self.remarks.append((message, self.paths[lacking[0]], key))
         return filled
 
     def motion(

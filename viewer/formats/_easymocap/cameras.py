@@ -24,12 +24,17 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from viewer.errors import FormatError, printable
+from viewer.diagnostics import Diagnostic
+from viewer.errors import FormatError
+from viewer.formats._misfit import remark_on
 from viewer.formats._numbers import to_number
-from viewer.formats._source import Source, no_number, shown
+from viewer.formats._source import Source
+from viewer.formats._tolerant import number_key
+from viewer.phrases import printable
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.camera_view import CameraView
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
@@ -67,16 +72,20 @@ class Storage:
     values: dict[str, Value] = field(default_factory=dict)
     lines: dict[str, int] = field(default_factory=dict)
 
-    def error(self, key: str, message: str) -> FormatError:
-        """Return an error at the line of a key; of one that is missing, at the cameras' names."""
+    def fault(self, key: str, *, item: str, **values: Any) -> FormatError:
+        """Return an error at the line of an item; of one that is missing, at the cameras' names."""
         end = self.source.line(self.source.end)
-        line = self.lines.get(key, self.lines.get("names", end))
-        return FormatError(self.source.path, f"{printable(key, 40)}: {message}", line)
+        line = self.lines.get(item, self.lines.get("names", end))
+        return _fault(self.source, key, line, item=printable(item, 40), **values)
+
+
+def _fault(source: Source, key: str, line: int, **values: Any) -> FormatError:
+    return FormatError(Diagnostic(key, source.path, line, values=values))
 
 
 def find_cameras(
     folders: Sequence[Path], max_size: int
-) -> tuple[tuple[CameraView, ...], list[str]]:
+) -> tuple[tuple[CameraView, ...], list[Diagnostic]]:
     """Return the cameras of the first folder that has their files.
 
     Parameters
@@ -90,8 +99,8 @@ def find_cameras(
     -------
     views : tuple of CameraView
         In the order of the files; none if there are no files, or they cannot be used.
-    notes : list of str
-        What cannot be used and why, one line each.
+    notes : list of Diagnostic
+        What cannot be used and why.
     """
     for folder in folders:
         there = [name for name in (_INTRINSIC, _EXTRINSIC) if (folder / name).is_file()]
@@ -99,22 +108,24 @@ def find_cameras(
             try:
                 return _cameras(*(Source.open(folder / name, max_size) for name in there))
             except FormatError as problem:
-                return (), [f"{problem}; the cameras are left out"]
+                return (), [remark_on("F007.cameras", problem.diagnostic)]
         if there:
             lacking = _EXTRINSIC if there == [_INTRINSIC] else _INTRINSIC
-            shown_path = printable(folder / there[0], 300)
-            return (), [f"{shown_path}: no {lacking} beside it; the cameras are left out"]
+            values = {"name": lacking}
+            return (), [Diagnostic("F007.cameras-beside", folder / there[0], values=values)]
     return (), []
 
 
-def _cameras(intrinsic: Source, extrinsic: Source) -> tuple[tuple[CameraView, ...], list[str]]:
+def _cameras(
+    intrinsic: Source, extrinsic: Source
+) -> tuple[tuple[CameraView, ...], list[Diagnostic]]:
     inner, outer = read_storage(intrinsic), read_storage(extrinsic)
     views, notes = [], []
     for name in _names(inner, outer):
         try:
             views.append(_camera(name, inner, outer))
         except FormatError as problem:
-            notes.append(f"{problem}; this camera is left out")
+            notes.append(remark_on("F007.camera", problem.diagnostic))
     return tuple(views), notes
 
 
@@ -131,10 +142,16 @@ def _camera(name: str, inner: Storage, outer: Storage) -> CameraView:
     matrix = _matrix(inner, f"K_{name}", (3, 3))
     focal = matrix[[0, 1], [0, 1]]
     if not (focal > 0).all() or not np.allclose(matrix[2], [0, 0, 1]):
-        raise inner.error(f"K_{name}", "expected focal lengths above 0 and the last row 0 0 1")
+        raise inner.fault("F002.camera-focal", item=f"K_{name}")
     if not (focal.min() >= _SHORTEST and focal.max() <= _LARGEST):
-        wanted = f"expected focal lengths of {_SHORTEST:g} to {_LARGEST:g} pixels"
-        raise inner.error(f"K_{name}", f"{wanted}, found {focal[0]:g} and {focal[1]:g}")
+        raise inner.fault(
+            "F002.camera-focal-range",
+            item=f"K_{name}",
+            low=_SHORTEST,
+            high=_LARGEST,
+            first=float(focal[0]),
+            second=float(focal[1]),
+        )
     _check_size(inner, f"K_{name}", matrix[:2])
     lens = next((key for key in (f"dist_{name}", f"D_{name}") if key in inner.values), "")
     values = inner.values.get(lens)
@@ -158,7 +175,7 @@ def _check_size(file: Storage, key: str, values: Floats, largest: float = _LARGE
     """Refuse numbers beyond those with which single precision can draw."""
     worst = float(values.ravel()[np.abs(values).argmax()]) if values.size else 0.0
     if abs(worst) > largest:
-        raise file.error(key, f"expected numbers up to {largest:g}, found {worst:g}")
+        raise file.fault("F003.camera-limit", item=key, limit=largest, found=worst)
 
 
 def _rotation(file: Storage, name: str) -> Floats:
@@ -168,19 +185,18 @@ def _rotation(file: Storage, name: str) -> Floats:
     rotation = _matrix(file, f"Rot_{name}", (3, 3))
     off = np.abs(rotation @ rotation.T - np.eye(3)).max()
     if off > _NEAR or np.linalg.det(rotation) < 0.0:
-        raise file.error(f"Rot_{name}", "expected a rotation, found a matrix that is none")
+        raise file.fault("F002.camera-rotation", item=f"Rot_{name}")
     return rotation
 
 
 def _matrix(file: Storage, key: str, shape: tuple[int, ...]) -> Floats:
     value = file.values.get(key)
-    wanted = " x ".join(map(str, shape))
+    if value is None:
+        raise file.fault("F002.camera-no-key", item=key, shape=shape)
     if not isinstance(value, np.ndarray):
-        found = "no such key" if value is None else "something else"
-        raise file.error(key, f"expected {wanted} numbers, found {found}")
+        raise file.fault("F002.camera-other", item=key, shape=shape)
     if value.size != np.prod(shape) or (len(shape) == 2 and value.shape != shape):
-        found = " x ".join(map(str, value.shape))
-        raise file.error(key, f"expected {wanted} numbers, found {found}")
+        raise file.fault("F002.camera-shape", item=key, shape=shape, found=value.shape)
     return value.reshape(shape)
 
 
@@ -226,7 +242,7 @@ def read_storage(source: Source) -> Storage:
             matrix, listed = None, None
             name, rest = _text(key[1]), key[2].strip()
             if name in values:
-                raise FormatError(source.path, f'expected every key once, found "{name}"', number)
+                raise _fault(source, "F002.camera-twice", number, found=name)
             file.lines[name] = number
             if rest.startswith(b"!!opencv-matrix"):
                 matrix = _Matrix(name, number)
@@ -241,8 +257,7 @@ def read_storage(source: Source) -> Storage:
         elif listed is not None and (item := _ITEM.fullmatch(line)):
             listed.append(_text(item[1]))
         else:
-            found = shown(line.strip())
-            raise FormatError(source.path, f"expected name: value, found {found}", number)
+            raise _fault(source, "F002.camera-value", number, found=line.strip())
     _close(source, matrix, values)
     return file
 
@@ -263,14 +278,12 @@ def _continue(source: Source, matrix: _Matrix, line: bytes, number: int) -> None
     """Take in one line of a matrix."""
     part = None if matrix.is_open else _PART.fullmatch(line)
     if part is None and not matrix.is_open:
-        raise FormatError(
-            source.path, f"expected rows, cols, dt or data, found {shown(line.strip())}", number
-        )
+        raise _fault(source, "F002.camera-part", number, found=line.strip())
     text = line.strip() if part is None else part[2].strip()
     if part is not None and part[1] in (b"rows", b"cols"):
         size = to_number(text)
         if size is None or size != int(size) or not 0 <= size <= _MOST:
-            raise FormatError(source.path, f"expected a size, found {shown(text)}", number)
+            raise _fault(source, "F002.camera-size", number, found=text)
         if part[1] == b"rows":
             matrix.rows = int(size)
         else:
@@ -280,7 +293,7 @@ def _continue(source: Source, matrix: _Matrix, line: bytes, number: int) -> None
         return
     if part is not None:
         if not text.startswith(b"["):
-            raise FormatError(source.path, f"expected [ numbers ], found {shown(text)}", number)
+            raise _fault(source, "F002.camera-data", number, found=text)
         text, matrix.is_open = text[1:], True
     numbers, bracket, _ = text.partition(b"]")
     matrix.is_open = not bracket
@@ -295,22 +308,15 @@ def _close(source: Source, matrix: _Matrix | None, values: dict[str, Value]) -> 
         return
     if min(matrix.rows, matrix.columns) < 0:
         lacking = "rows" if matrix.rows < 0 else "cols"
-        raise FormatError(
-            source.path,
-            f"{matrix.key}: expected rows, cols and data, found no {lacking}",
-            matrix.line,
-        )
+        raise _fault(source, "F002.camera-lacks", matrix.line, item=matrix.key, name=lacking)
     numbers = [to_number(word) for word in matrix.data]
     if None in numbers:
         at = numbers.index(None)
-        text = f"{matrix.key}: {no_number(matrix.data[at])}"
-        raise FormatError(source.path, text, matrix.lines[at])
+        word = matrix.data[at]
+        item = printable(matrix.key, 60)
+        raise _fault(source, number_key(word), matrix.lines[at], item=item, found=word)
     if matrix.is_open or matrix.rows * matrix.columns != len(numbers):
-        raise FormatError(
-            source.path,
-            f"{matrix.key}: expected {matrix.rows} x {matrix.columns} numbers, "
-            f"found {len(numbers)}",
-            matrix.line,
-        )
+        sizes: dict[str, Any] = {"item": matrix.key, "shape": (matrix.rows, matrix.columns)}
+        raise _fault(source, "F002.camera-count", matrix.line, found=len(numbers), **sizes)
     array = np.array(numbers, dtype=np.float64).reshape(matrix.rows, matrix.columns)
     values[matrix.key] = array

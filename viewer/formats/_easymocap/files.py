@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from viewer.errors import counted, printable
 from viewer.formats._source import Source
+from viewer.phrases import printable
 
 __all__ = ["BODIES", "POINTS", "FrameFiles", "FrameFolder", "find_frames"]
 
@@ -88,9 +88,7 @@ def find_frames(source: Source) -> FrameFiles:
             names = _first_camera(source, folder, inside)
         found.append(names)
     if not any(found):
-        raise source.error(
-            f"expected frame files ({', '.join((*BODIES, POINTS))}: 000000{_SUFFIX} …), found none"
-        )
+        raise source.fault("F002.capture-frames")
     first = ((folder.path, names[0]) for folder, names in zip(folders, found, strict=True) if names)
     source.also_read += [(path / name).parent for path, name in first]
     return _on_timeline(source, folders, found)
@@ -110,10 +108,10 @@ def _look(source: Source, folder: Path) -> tuple[list[str], list[str]]:
                 elif is_frame:
                     others.append(entry.name)
     except OSError as problem:
-        reason = problem.strerror or problem
-        raise source.error(f"{printable(folder.name, 100)}: cannot be read: {reason}") from None
+        name, reason = printable(folder.name, 100), str(problem.strerror or problem)
+        raise source.fault("F001.capture-folder", item=name, reason=reason) from None
     if others:
-        source.warn(f"{_listed(others)}: expected files, found something else")
+        source.warn("F007.capture-no-files", names=others)
     return sorted(files), sorted(folders)
 
 
@@ -124,9 +122,9 @@ def _folders(source: Source, names: list[str], inside: list[str]) -> list[FrameF
     if not bodies and not points:
         return [FrameFolder(source.path)]
     if len(bodies) > 1:
-        source.warn(f"{bodies[0]}/ is read, {' and '.join(bodies[1:])}/ beside it is not")
+        source.warn("F007.capture-beside", name=bodies[0], others=" and ".join(bodies[1:]))
     if names:
-        source.warn(f"files beside the folders of frames are not read: {_listed(names)}")
+        source.warn("F007.capture-files", names=names)
     both = bool(bodies and points)
     return [
         FrameFolder(source.path / name, name != POINTS or not both, name == POINTS or not both)
@@ -141,15 +139,10 @@ def _first_camera(source: Source, folder: FrameFolder, inside: list[str]) -> lis
         return []
     first, files = holding[0]
     if len(holding) > 1:
-        others = _listed([name for name, _ in holding[1:]])
-        source.warn(f"{folder.path.name}/{printable(first, 100)} is read, others are not: {others}")
+        others = [name for name, _ in holding[1:]]
+        source.warn("F007.capture-camera", folder=folder.path.name, name=first, others=others)
     folder.path = folder.path / first
     return files
-
-
-def _listed(names: list[str]) -> str:
-    shown = ", ".join(printable(name, 60) for name in names[:6])
-    return shown if len(names) <= 6 else f"{shown} and {len(names) - 6} more"
 
 
 def _on_timeline(source: Source, folders: list[FrameFolder], found: list[list[str]]) -> FrameFiles:
@@ -165,10 +158,7 @@ def _on_timeline(source: Source, folders: list[FrameFolder], found: list[list[st
             place = {name: number - first for name, number in numbers.items()}
             files.first_frame = first
         else:
-            source.warn(
-                f"{counted(len(order), 'frame')} numbered from {first} to {last}: taken one after "
-                "the other"
-            )
+            source.warn("F007.capture-numbers", n=len(order), first=first, last=last)
             rank = {number: index for index, number in enumerate(order)}
             place = {name: rank[number] for name, number in numbers.items()}
     else:
@@ -186,4 +176,4 @@ def _put(source: Source, folder: FrameFolder, frames: Iterable[tuple[int, str]])
         if folder.names.setdefault(frame, name) != name:
             doubled.append(name)
     if doubled:
-        source.warn(f"frames that another file has too are left out: {_listed(doubled)}")
+        source.warn("C005.capture-twice", names=doubled)

@@ -6,10 +6,13 @@ import json
 import os
 from array import array
 from collections import Counter
+from pathlib import Path
 from typing import Any
 
-from viewer.errors import FormatError, counted, printable
+from viewer.diagnostics import Diagnostic, Phrase
+from viewer.errors import FormatError
 from viewer.formats._archive import describe
+from viewer.formats._file_bytes import unreadable
 from viewer.formats._json_places import (
     MOST_DIGITS,
     Keys,
@@ -19,11 +22,13 @@ from viewer.formats._json_places import (
     nearest_place,
     repeated_key,
 )
+from viewer.formats._misfit import MisfitError
 from viewer.formats._numbers import LARGEST
 from viewer.formats._reach import FARTHEST, within_text
+from viewer.phrases import printable
 
 __all__ = [
-    "MisfitError",
+    "RecordError",
     "has_numbers",
     "limit_of",
     "load_people",
@@ -39,22 +44,24 @@ _TRANSLATION = "Th"
 _WRAPPER = "annots"  # key of the people, in files that hold more
 
 
-class MisfitError(ValueError):
-    """A person's record that cannot be used; the text says ``key: expected …, found …``.
+class RecordError(MisfitError):
+    """A person's record, or a part of it, that cannot be used.
 
     Attributes
     ----------
     key : str
         What is at fault; empty for the record itself.
+    code : str
+        A key of ``CODES``.
     """
 
-    def __init__(self, key: str, message: str) -> None:
-        self.key = key
-        super().__init__(f"{key}: {message}" if key else message)
+    def __init__(self, key: str, problem: Phrase, code: str = "F002") -> None:
+        self.key, self.code = key, code
+        super().__init__(problem)
 
 
 class _RepeatedKeyError(ValueError):
-    """An object that has a key twice."""
+    """An object that has a key twice, which is the text."""
 
 
 def _unique(pairs: list[tuple[str, Any]]) -> Record:
@@ -62,7 +69,7 @@ def _unique(pairs: list[tuple[str, Any]]) -> Record:
     if len(values) != len(pairs):
         counts = Counter(key for key, _ in pairs)
         twice = next(key for key, count in counts.items() if count > 1)
-        raise _RepeatedKeyError(f'expected every key once, found "{printable(twice, 40)}" twice')
+        raise _RepeatedKeyError(printable(twice, 40))
     return values
 
 
@@ -88,24 +95,27 @@ def load_people(path: str, max_size: int) -> list[Any]:
     try:
         content = _decode(text)
     except json.JSONDecodeError as problem:
-        what = f"expected JSON, found a mistake: {printable(problem.msg, 100)}"
-        raise FormatError(path, what, problem.lineno) from None
+        reason = printable(problem.msg, 100)
+        raise _fault("F002.json", path, problem.lineno, reason=reason) from None
     except RecursionError:
-        what = "expected JSON, found too deep a nesting"
-        raise FormatError(path, what, line_at(text, deepest_place(text))) from None
+        raise _fault("F002.json-nesting", path, line_at(text, deepest_place(text))) from None
     except _RepeatedKeyError as problem:
         found = repeated_key(text)
         line = _line(text, found[1] if found else None)
-        raise FormatError(path, str(problem), line) from None
+        raise _fault("F002.json-twice", path, line, found=str(problem)) from None
     except ValueError:  # the only other one that decoding raises
-        what = f"expected numbers of up to {MOST_DIGITS} digits, found a longer one"
-        raise FormatError(path, what, _line(text, long_number_place(text))) from None
+        line = _line(text, long_number_place(text))
+        raise _fault("F002.capture-digits", path, line, most=MOST_DIGITS) from None
     if isinstance(content, dict) and _WRAPPER in content:
         content = content[_WRAPPER]
     if not isinstance(content, list):
-        what = f"expected a list of people, found {describe(content)}"
-        raise FormatError(path, what, _line(text, nearest_place(text, (_WRAPPER,))) or 1)
+        line = _line(text, nearest_place(text, (_WRAPPER,))) or 1
+        raise _fault("F002.capture-list", path, line, found=describe(content))
     return content
+
+
+def _fault(key: str, path: str, line: int | None, **values: Any) -> FormatError:
+    return FormatError(Diagnostic(key, Path(path), line, values=values))
 
 
 def record_line(path: str, max_size: int, place: int, key: str) -> int | None:
@@ -138,12 +148,12 @@ def _text(path: str, max_size: int) -> str:
     try:
         data = _read(path, max_size)
     except OSError as problem:
-        raise FormatError(path, f"cannot be read: {problem.strerror or problem}") from None
+        raise unreadable(Path(path), problem.strerror or problem) from None
     try:
         return data.decode().removeprefix("\ufeff")
     except UnicodeDecodeError as problem:
         line = 1 + data.count(b"\n", 0, problem.start)
-        raise FormatError(path, "expected text in UTF-8, found other bytes", line) from None
+        raise _fault("F002.capture-text", path, line) from None
 
 
 def _read(path: str, max_size: int) -> bytes:
@@ -152,7 +162,7 @@ def _read(path: str, max_size: int) -> bytes:
     try:
         size = os.fstat(handle).st_size
         if size > max_size:
-            raise FormatError(path, f"expected at most {max_size} bytes, found {size} (--max-size)")
+            raise _fault("F001.too-large", path, None, most=max_size, size=size)
         data = os.read(handle, size + 1)
         while 0 < len(data) < size and (more := os.read(handle, size - len(data) + 1)):
             data += more
@@ -166,20 +176,20 @@ def person_of(record: Any, place: int) -> int:
 
     Raises
     ------
-    MisfitError
+    RecordError
         If it is no record, or names nobody.
     """
     if type(record) is dict and type(person := record.get("id")) is int and -1 <= person < 1 << 31:
         return person
     if not isinstance(record, dict):
-        raise MisfitError("", f"expected a person with names and values, found {describe(record)}")
+        raise RecordError("", Phrase("record-person", found=describe(record)))
     person = record.get("id", record.get("personID", place))
     if isinstance(person, float) and person.is_integer():
         person = int(person)
     if isinstance(person, bool) or not isinstance(person, int):
-        raise MisfitError("id", f"expected a whole number, found {describe(person)}")
+        raise RecordError("id", Phrase("record-id", found=describe(person)))
     if abs(person) >= 1 << 31:
-        raise MisfitError("id", f"expected less than 2147483648, found {describe(person)}")
+        raise RecordError("id", Phrase("record-id-limit", limit=1 << 31, found=describe(person)))
     return person
 
 
@@ -193,15 +203,15 @@ def row_of(record: Record, key: str) -> list[Any]:
 
     Raises
     ------
-    MisfitError
+    RecordError
         If it is no list.
     """
     values = record.get(key)
     if isinstance(values, list) and len(values) == 1 and isinstance(values[0], list):
         values = values[0]
     if not isinstance(values, list):
-        found = "no such key" if key not in record else describe(record[key])
-        raise MisfitError(key, f"expected numbers, found {found}")
+        found = describe(record[key]) if key in record else Phrase("found-no-key")
+        raise RecordError(key, Phrase("record-numbers", found=found))
     return values
 
 
@@ -222,7 +232,7 @@ def width_of(record: Record, key: str, count: int | None = None) -> int:
 
     Raises
     ------
-    MisfitError
+    RecordError
         If it is no list, has more or fewer, or others than finite numbers are among them.
     """
     count = len(row_of(record, key)) if count is None else count
@@ -231,7 +241,7 @@ def width_of(record: Record, key: str, count: int | None = None) -> int:
     limit = limit_of(key)
     odd = [number for number in numbers if not abs(number) <= limit]
     if odd:
-        raise MisfitError(key, within_text(odd[0], limit))
+        raise RecordError(key, within_text(odd[0], limit), "F003")
     return count
 
 
@@ -240,7 +250,7 @@ def take_row(record: Record, key: str, count: int, put: Any) -> None:
 
     Raises
     ------
-    MisfitError
+    RecordError
         If there are more or fewer, or others than numbers.
     """
     try:
@@ -252,10 +262,11 @@ def take_row(record: Record, key: str, count: int, put: Any) -> None:
             return
     except (KeyError, TypeError, ValueError, OverflowError):
         pass  # looked at below
-    values, wanted = row_of(record, key), counted(count, "number")
+    values = row_of(record, key)
     if len(values) != count:
-        raise MisfitError(key, f"expected {wanted}, found {len(values)}")
-    raise MisfitError(key, f"expected {wanted}, found {describe(_odd_one(values))} among them")
+        raise RecordError(key, Phrase("record-count", expected=count, found=len(values)))
+    found = describe(_odd_one(values))
+    raise RecordError(key, Phrase("record-odd", expected=count, found=found))
 
 
 def _odd_one(values: list[Any]) -> Any:

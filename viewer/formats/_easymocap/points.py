@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from viewer.errors import counted
+from viewer.diagnostics import Phrase
 from viewer.formats._archive import describe
 from viewer.formats._easymocap.bodies import RowFault, Rows
-from viewer.formats._easymocap.json_frames import MisfitError
+from viewer.formats._easymocap.json_frames import RecordError
 from viewer.formats._numbers import LARGEST
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.captures.keypoint_layouts import TITLES, joined_layout, keypoint_layout
@@ -44,7 +44,7 @@ def point_layout(record: dict[str, Any], title: str = "") -> tuple[PointLayout, 
 
     Raises
     ------
-    MisfitError
+    RecordError
         If a key holds no rows.
     """
     parts = [(key, _count(record, key)) for key in (KEY, *_BESIDE) if key in record]
@@ -75,9 +75,9 @@ def _one_hand(side: int) -> PointLayout:
 def _count(record: dict[str, Any], key: str) -> int:
     rows = record[key]
     if not isinstance(rows, list) or not rows or not all(isinstance(row, list) for row in rows):
-        raise MisfitError(key, f"expected rows of 3 or 4 numbers, found {describe(rows)}")
+        raise RecordError(key, Phrase("record-rows", found=describe(rows)))
     if len(rows) > _MOST:
-        raise MisfitError(key, f"expected at most {_MOST} keypoints, found {len(rows)}")
+        raise RecordError(key, Phrase("record-most-points", most=_MOST, found=len(rows)))
     return len(rows)
 
 
@@ -104,14 +104,14 @@ class PointRows(Rows):
 
         Raises
         ------
-        MisfitError
+        RecordError
             If something is missing, or has another number of points than before.
         """
         before = len(self.buffer)
         try:
             for key, count in self.parts:
                 self._take(record.get(key), key, count)
-        except MisfitError:
+        except RecordError:
             del self.buffer[before:]
             raise
         self.keep_origin(frame, path, place)
@@ -121,11 +121,11 @@ class PointRows(Rows):
 
         Raises
         ------
-        MisfitError
+        RecordError
             If every keypoint is at fault.
         """
         if _is_odd(self._rows()).all():
-            raise MisfitError(KEY, "expected rows of 3 or 4 finite numbers, found none")
+            raise RecordError(KEY, Phrase("record-no-rows"))
 
     def _take(self, rows: Any, key: str, count: int) -> None:
         try:
@@ -141,10 +141,10 @@ class PointRows(Rows):
         except (TypeError, ValueError, OverflowError):
             pass  # said below
         if not isinstance(rows, list):
-            raise MisfitError(key, f"expected {counted(count, 'keypoint')}, found {describe(rows)}")
+            raise RecordError(key, Phrase("record-points", expected=count, found=describe(rows)))
         if len(rows) != count:
-            raise MisfitError(key, f"expected {counted(count, 'keypoint')}, found {len(rows)}")
-        raise MisfitError(key, "expected rows of 3 or 4 numbers, found others")
+            raise RecordError(key, Phrase("record-points", expected=count, found=len(rows)))
+        raise RecordError(key, Phrase("record-other-rows"))
 
     def points(self) -> tuple[Floats, list[RowFault]]:
         """Return the points (N, K, 4), and what was wrong with some."""
@@ -152,7 +152,7 @@ class PointRows(Rows):
         is_odd, is_unseen = _is_odd(points), points[..., 3] == 0.0
         points[is_odd | is_unseen] = 0.0
         faults = [
-            (int(row), KEY, _unseen_text(int(is_odd[row].sum())))
+            (int(row), "", RecordError(KEY, Phrase("record-unseen", n=int(is_odd[row].sum()))))
             for row in np.flatnonzero(is_odd.any(axis=1))
         ]
         points.flags.writeable = False  # so that it is not copied again
@@ -168,8 +168,3 @@ def _is_odd(points: Floats) -> Bools:
     confidence = points[..., 3]
     is_good = (np.abs(points) <= LARGEST).all(axis=-1) & (confidence >= 0.0)
     return ~is_good & (confidence != 0.0)
-
-
-def _unseen_text(count: int) -> str:
-    which, verb = counted(count, "keypoint"), "counts" if count == 1 else "count"
-    return f"{which} without finite numbers, or of a confidence below 0, {verb} as not seen"

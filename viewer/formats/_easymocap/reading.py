@@ -5,9 +5,11 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
-from viewer.errors import FormatError, printable
+from viewer.diagnostics import Diagnostic, Phrase
+from viewer.errors import FormatError
 from viewer.formats._easymocap.bodies import (
     BodyLayout,
     BodyRows,
@@ -18,7 +20,7 @@ from viewer.formats._easymocap.bodies import (
 )
 from viewer.formats._easymocap.files import FrameFiles, FrameFolder
 from viewer.formats._easymocap.json_frames import (
-    MisfitError,
+    RecordError,
     has_numbers,
     load_people,
     person_of,
@@ -26,6 +28,7 @@ from viewer.formats._easymocap.json_frames import (
 )
 from viewer.formats._easymocap.points import KEY, Parts, PointRows, point_layout
 from viewer.formats._easymocap.shapes import COEFFICIENTS
+from viewer.formats._misfit import remark_on
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.capture import CapturePart
 from viewer.rig.captures.person import is_tracked, person_label
@@ -36,11 +39,6 @@ __all__ = ["Options", "Reading"]
 
 _SIZES = (64, 256, 1024, 4096)  # frames of a part; all further ones have the last number
 _MOST_WARNINGS = 20
-_LISTED = 6  # people in one line
-_UNTRACKED = (
-    'people without a track (id -1) are called "untracked" and numbered within each frame: '
-    "nobody says who of them is who in the next"
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +74,7 @@ class Reading:
         What the files leave open.
     body_layout, point_layout : layouts or None
         Of the first record that had one; all others must be alike, but may bring coefficients.
-    first_fault : FormatError or None
+    first_fault : Diagnostic or None
         What was wrong first.
     """
 
@@ -84,14 +82,14 @@ class Reading:
     options: Options
     body_layout: BodyLayout | None = None
     point_layout: tuple[PointLayout, Parts] | None = None
-    first_fault: FormatError | None = None
+    first_fault: Diagnostic | None = None
     _prefixes: list[str] = field(default_factory=list)
     _n_faults: int = 0
     _known: dict[int, dict[str, Floats]] = field(default_factory=dict)
     _awaited: tuple[str, ...] = ()
     _has_seen: dict[int, bool] = field(default_factory=dict)
-    _texts: list[str] = field(default_factory=list)
-    _said: set[str] = field(default_factory=set)
+    _found: list[Diagnostic] = field(default_factory=list)
+    _said: set[tuple[object, ...]] = field(default_factory=set)
 
     def parts(self) -> Iterator[CapturePart]:
         """Yield the frames up to the first with somebody in it, then more and more at a time."""
@@ -116,7 +114,7 @@ class Reading:
             try:
                 people = load_people(path, self.options.max_size)
             except FormatError as problem:
-                self._fault(problem)
+                self._fault(problem.diagnostic)
                 continue
             self._take_people(people, folder, frame, path, part)
 
@@ -127,15 +125,16 @@ class Reading:
         for place, record in enumerate(people):
             try:
                 person = person_of(record, place)
-            except MisfitError as problem:
-                self._fault_of(path, place, problem.key, str(problem))
+            except RecordError as problem:
+                self._fault_of(path, place, problem, problem.key)
                 continue
             if person < 0:  # nobody knows who: told apart within the frame
                 person = min(seen) - 1 if -1 in seen else -1
-                self._say_once(path, _UNTRACKED)
+                self.note("F007.record-untracked", path)
             if person in seen:
-                twice = f"person {person} is there twice: the first counts"
-                self._fault_of(path, place, "", twice)
+                line = self._line(path, place, "")
+                values = {"item": f"person {person}"}
+                self._fault(Diagnostic("F002.record-twice", Path(path), line, values=values))
                 continue
             if "id" not in record or "personID" in record:
                 self._say_of_ids(path, record)
@@ -145,9 +144,9 @@ class Reading:
     def _say_of_ids(self, path: str, record: dict[str, Any]) -> None:
         """Say whose number is used where there is none, or two that differ."""
         if "id" not in record and "personID" not in record:
-            self._say_once(path, "people without id: numbered in the order of their lists")
+            self.note("F007.record-no-id", path)
         elif "id" in record and record["id"] != record["personID"]:
-            self._say_once(path, "people whose id and personID differ: id counts everywhere")
+            self.note("F007.record-ids", path)
 
     def _take_person(
         self,
@@ -167,14 +166,13 @@ class Reading:
             if has_body:
                 self._add_body(part, person, record, frame, origin)
             elif not has_points:
-                raise MisfitError("", _lacks(record, folder))
-        except MisfitError as problem:
-            text = f"{person_label(person)}: {problem}"
-            self._fault_of(path, place, problem.key, text)
+                raise RecordError("", _lacks(record, folder))
+        except RecordError as problem:
+            self._fault_of(path, place, problem, person_label(person), problem.key)
         if has_body and KEY in record and not has_points:
-            self._say_once(path, f"{KEY} in it and beside it: those in the folder {KEY} count")
+            self.note("F007.record-points", path)
         elif has_points and "poses" in record and not has_body:
-            self._say_once(path, "poses in it and beside it: those beside it count")
+            self.note("F007.record-poses", path)
 
     def _add_body(
         self, part: _Part, person: int, record: dict[str, Any], frame: int, origin: tuple[str, int]
@@ -190,7 +188,7 @@ class Reading:
         rows.add(record, frame, path, place)
         part.bodies[person] = rows
         if "vertices" in record:
-            self._say_once(path, "vertices are not needed, and left out everywhere")
+            self.note("F007.record-vertices", path)
 
     def _layout_of(self, record: dict[str, Any], path: str) -> BodyLayout:
         """Return the layout of all bodies, wider from the first record with coefficients on."""
@@ -199,7 +197,7 @@ class Reading:
             layout = body_layout(record)
         elif first := [key for key in self._awaited if has_numbers(record, key)]:
             layout = with_coefficients(layout, record)
-            self._say_once(path, f"no earlier record has {' or '.join(first)}: 0 is taken there")
+            self.note("F007.record-first", path, keys=tuple(first))
         else:
             return layout
         self.body_layout, keys = layout, [key for key, _ in layout.widths]
@@ -228,8 +226,8 @@ class Reading:
         for person, rows in part.bodies.items():
             values, keep, faults = rows.values()
             self._faults(person, rows, faults)
-            for path, text in rows.remarks:
-                self._say_once(path, text)
+            for message, path, key in rows.remarks:
+                self.note(message, path, item=key)
             if keep.any():
                 bodies[person] = rows.motion(
                     options.name,
@@ -247,49 +245,56 @@ class Reading:
             clip = PointClip(options.name, seen.timing(*where), places)
             points[person] = seen.layout, clip
         if stop == files.n_frames:
-            self._texts += self._last_words()
-        texts, self._texts = self._texts, []
-        return CapturePart(stop, bodies, points, tuple(texts))
+            self._found += self._last_words()
+        found, self._found = self._found, []
+        return CapturePart(stop, bodies, points, tuple(found))
 
-    def _last_words(self) -> list[str]:
+    def _last_words(self) -> list[Diagnostic]:
         """Return what is only known when everything was read."""
-        name, texts = printable(self.options.name), []
+        found: list[Diagnostic] = []
         unseen = [person for person, has_seen in self._has_seen.items() if not has_seen]
+        values: dict[str, Any] = {"name": self.options.name}
         if unseen:
-            who = ", ".join(map(person_label, unseen[:_LISTED]))
-            more = f" and {len(unseen) - _LISTED} more" * (len(unseen) > _LISTED)
-            texts.append(f"{name}: no keypoint of {who}{more} is ever seen: every confidence is 0")
-        if self._n_faults > _MOST_WARNINGS:
-            more = f"{self._n_faults - _MOST_WARNINGS} more faults"
-            texts.append(f"{name}: {more} in frame files")
-        return texts
+            people = [*map(person_label, unseen)]
+            found.append(Diagnostic("F007.record-unseen", values={**values, "people": people}))
+        more = self._n_faults - _MOST_WARNINGS
+        if more > 0:
+            found.append(Diagnostic("F007.records", values={**values, "n": more}))
+        return found
 
     def _faults(self, person: int, rows: Rows, faults: list[RowFault]) -> None:
-        for row, key, text in faults:
+        for row, name, problem in faults:
             label = person_label(person)
-            self._fault_of(rows.paths[row], rows.places[row], key, f"{label}: {text}")
+            self._fault_of(rows.paths[row], rows.places[row], problem, label, name)
 
-    def _fault_of(self, path: str, place: int, key: str, text: str) -> None:
+    def _fault_of(self, path: str, place: int, problem: RecordError, *names: str) -> None:
         """Note what is wrong with a person's record, or a key of it."""
-        # Finding the line reads the file again, which is not done for faults that nobody sees.
-        is_said = self._n_faults < _MOST_WARNINGS
-        line = record_line(path, self.options.max_size, place, key) if is_said else None
-        self._fault(FormatError(path, text, line))
+        line = self._line(path, place, problem.key)
+        values = {"item": ": ".join(filter(None, names)), "problem": problem.problem}
+        self._fault(Diagnostic(f"{problem.code}.record", Path(path), line, values=values))
 
-    def _fault(self, fault: FormatError) -> None:
+    def _line(self, path: str, place: int, key: str) -> int | None:
+        # Finding the line reads the file again, which is not done for faults that nobody sees.
+        if self._n_faults >= _MOST_WARNINGS:
+            return None
+        return record_line(path, self.options.max_size, place, key)
+
+    def _fault(self, fault: Diagnostic) -> None:
         self.first_fault = self.first_fault or fault
         self._n_faults += 1
         if self._n_faults <= _MOST_WARNINGS:
-            self._texts.append(str(fault))
+            self._found.append(remark_on("F007.record", fault))
 
-    def _say_once(self, path: str, text: str) -> None:
-        if text not in self._said:
-            self._said.add(text)
-            self._texts.append(f"{printable(path, 300)}: {text}")
+    def note(self, key: str, path: str, **values: Any) -> None:
+        """Remark once on what is odd in the files."""
+        mark = key, *values.values()
+        if mark not in self._said:
+            self._said.add(mark)
+            self._found.append(Diagnostic(key, Path(path), values=values))
 
 
-def _lacks(record: dict[str, Any], folder: FrameFolder) -> str:
+def _lacks(record: dict[str, Any], folder: FrameFolder) -> Phrase:
     wanted = ("poses",) * folder.has_bodies + (KEY,) * folder.has_points
-    keys = ", ".join(printable(key, 40) for key in list(record)[:8])
-    found = f"the keys {keys}" if keys else "no keys"
-    return f"expected {' or '.join(wanted)}, found {found}"
+    if not record:
+        return Phrase("record-no-keys", expected=wanted)
+    return Phrase("record-lacks", expected=wanted, keys=list(record))

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.formats._numbers import parse_numbers, word_begins
-from viewer.formats._source import Source, no_number
+from viewer.formats._source import Source
 from viewer.rig.arrays import Bools, Floats
 
-__all__ = ["KEYWORDS", "Lines", "Places", "Rows", "number_rows", "pieces", "rows_of"]
+__all__ = ["KEYWORDS", "Lines", "NumberRows", "Places", "Rows", "number_rows", "pieces", "rows_of"]
 
 Places = NDArray[np.int64]
 Letters = NDArray[np.uint8]
@@ -150,17 +150,16 @@ def rows_of(lines: Lines, keyword: str) -> Rows:
     return Rows(letters.tobytes(), letters, places, starts + lines.base)
 
 
-def number_rows(
-    source: Source, lines: Lines, keyword: str, width: int
-) -> tuple[Floats, Places, Floats, Rows]:
+NumberRows = tuple[Floats, Places, Floats, Rows]
+
+
+def number_rows(lines: Lines, keyword: str, width: int) -> NumberRows | None:
     """Parse the numbers behind a keyword.
 
     Parameters
     ----------
-    source : Source
-        For errors.
     lines : Lines
-        Some lines of it.
+        Some lines of a file.
     keyword : str
         v, vt or vn.
     width : int
@@ -177,27 +176,17 @@ def number_rows(
     rows : Rows
         Where they come from.
 
-    Raises
-    ------
-    FormatError
-        With the line that has too few numbers, or a word that is none.
+    None instead of all of them if a line has too few numbers, or a word is none.
     """
     rows = rows_of(lines, keyword)
     begins = word_begins(rows.letters)
     values, bad = parse_numbers(rows.body, 0, len(rows.body))
     if bad >= 0:
-        offset = rows.offset(int(begins[bad]))
-        word = source.next_word(offset)
-        assert word is not None  # it was found there
-        raise source.error(f"{keyword}: {no_number(word.group())}", offset)
+        return None
     firsts = np.searchsorted(begins, rows.starts)
     counts = np.diff(firsts)
-    short = np.flatnonzero(counts < width)
-    if len(short):
-        raise source.error(
-            f"{keyword}: expected {width} numbers, found {counts[short[0]]}",
-            int(rows.origins[short[0]]) - 1,
-        )
+    if (counts < width).any():
+        return None
     if (counts == width).all():
         return values.reshape(-1, width), counts, values, rows
     return values[firsts[:-1, None] + np.arange(width)], counts, values, rows

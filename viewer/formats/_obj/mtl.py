@@ -10,7 +10,7 @@ Colours and other maps are not shown. An option is a word that begins with ``-``
 
 from __future__ import annotations
 
-from viewer.errors import FormatError, counted, printable
+from viewer.errors import FormatError, printable
 from viewer.formats._references import referenced_path, refused_text
 from viewer.formats._source import Source
 from viewer.formats._texture import load_image
@@ -48,11 +48,7 @@ def read_libraries(
             _read(library, pictures, known)
     missing = [name for name in names if name not in known]
     if missing and libraries:
-        source.warn(
-            f"{counted(len(missing), 'material', 'is', 'are')} in no library, first "
-            f"{printable(missing[0], 60)}: "
-            "drawn without a texture"
-        )
+        source.warn("F005.mtl-materials", n=len(missing), material=missing[0])
     loaded: dict[str, Bytes | None] = {}
     materials = []
     for name in names:

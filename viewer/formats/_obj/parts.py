@@ -7,11 +7,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from viewer.errors import counted
-from viewer.formats._obj.faces import CORNER_KINDS, FaceRows, read_faces
-from viewer.formats._obj.lines import KEYWORDS, Lines, Places, Rows, number_rows, pieces
-from viewer.formats._obj.mending import mended_faces, mended_rows, settled_corners
-from viewer.formats._source import Source, shown
+from viewer.formats._obj.faces import FaceRows, read_faces
+from viewer.formats._obj.faulty_lines import checked_corners, faulty_faces, faulty_rows
+from viewer.formats._obj.lines import KEYWORDS, Lines, NumberRows, Places, number_rows, pieces
+from viewer.formats._source import Source
 from viewer.rig.arrays import Floats
 
 __all__ = ["ObjParts", "read_parts"]
@@ -92,27 +91,19 @@ def read_parts(source: Source) -> ObjParts:
     for lines in pieces(source):
         _read_piece(source, lines, gathered)
     for what, (count, offset) in gathered.unused.items():
-        source.warn(f"{what} of {counted(count, 'vertex')} is not used", offset)
+        source.warn(f"F007.obj-{what}", offset, n=count)
     for keyword, name in _SHAPES.items():
         if gathered.odd[keyword]:
-            source.warn(f"{counted(gathered.odd[keyword], name, 'is', 'are')} not drawn")
-    if source.faults is None:
-        _check_indices(source, gathered)
-        every = [rows.corners for rows in gathered.faces]
-        corners = np.concatenate([np.zeros((0, 3), np.int64), *every])
-    else:
-        vertices = np.concatenate([np.zeros(0, np.int64), *gathered.vertices])
-        source.remember("positions", lambda vertex: int(vertices[vertex]))
-        corners = settled_corners(
-            source, gathered.faces, gathered.before, lambda keyword: _limits(gathered, keyword)
-        )
+            source.warn(f"F007.obj-{name}s", n=gathered.odd[keyword])
+    vertices = np.concatenate([np.zeros(0, np.int64), *gathered.vertices])
+    source.remember("positions", lambda vertex: int(vertices[vertex]))
     offsets = [rows.offsets for rows in gathered.faces]
     return ObjParts(
         positions=_stacked(gathered.tables["v"], 3),
         normals=_stacked(gathered.tables["vn"], 3),
         uvs=_stacked(gathered.tables["vt"], 2),
         counts=np.concatenate([np.zeros(0, np.int64), *(rows.counts for rows in gathered.faces)]),
-        corners=corners,
+        corners=checked_corners(source, gathered.faces, gathered.before),
         offsets=np.concatenate([np.zeros(0, np.int64), *offsets]),
         runs=gathered.runs,
         libraries=gathered.libraries,
@@ -128,8 +119,8 @@ def _read_piece(source: Source, lines: Lines, gathered: _Gathered) -> None:
         if len(lines.of[keyword]):
             gathered.tables[keyword].append(read(source, lines, gathered))
     if len(lines.of["f"]):
-        read_some = read_faces if source.faults is None else mended_faces
-        gathered.faces.append(read_some(source, lines, gathered.before))
+        faces = read_faces(lines, gathered.before)
+        gathered.faces.append(faces or faulty_faces(source, lines, gathered.before))
     _read_others(source, lines, gathered)
     for keyword, found in lines.of.items():
         gathered.before[keyword] += len(found)
@@ -137,33 +128,28 @@ def _read_piece(source: Source, lines: Lines, gathered: _Gathered) -> None:
 
 def _rows(
     source: Source, lines: Lines, gathered: _Gathered, keyword: str, width: int
-) -> tuple[Floats, Places, Floats, Rows]:
-    if source.faults is None:
-        return number_rows(source, lines, keyword, width)
-    return mended_rows(source, lines, keyword, width, gathered.before[keyword])
+) -> NumberRows:
+    found = number_rows(lines, keyword, width)
+    return found or faulty_rows(source, lines, keyword, width, gathered.before[keyword])
 
 
 def _positions(source: Source, lines: Lines, gathered: _Gathered) -> Floats:
     table, counts, values, rows = _rows(source, lines, gathered, "v", 3)
-    if source.faults is not None:
-        gathered.vertices.append(rows.origins - 1)
+    gathered.vertices.append(rows.origins - 1)
     if len(values) == table.size:
         return table
     wrong = np.flatnonzero((counts == 5) | (counts > 7))
     if len(wrong):
-        error = source.error(
-            f"v: expected 3 numbers, or 4, 6 or 7 with w or a colour, found {counts[wrong[0]]}",
-            int(rows.origins[wrong[0]]) - 1,
-        )
-        source.refuse(error, len(wrong))
+        offset = int(rows.origins[wrong[0]]) - 1
+        source.refuse("F002.obj-vertex", offset, len(wrong), found=int(counts[wrong[0]]))
     colored = np.flatnonzero(counts >= 6)
     if len(colored):
-        gathered.leave_out("the colour", len(colored), int(rows.origins[colored[0]]) - 1)
+        gathered.leave_out("colour", len(colored), int(rows.origins[colored[0]]) - 1)
     firsts = np.cumsum(counts) - counts
     fourth = np.flatnonzero(counts == 4)
     weighted = fourth[values[firsts[fourth] + 3] != 1.0]
     if len(weighted):
-        gathered.leave_out("the w", len(weighted), int(rows.origins[weighted[0]]) - 1)
+        gathered.leave_out("w", len(weighted), int(rows.origins[weighted[0]]) - 1)
     return table
 
 
@@ -195,27 +181,5 @@ def _read_others(source: Source, lines: Lines, gathered: _Gathered) -> None:
             gathered.libraries.append((rest, offset))
         elif words[0] not in _QUIET:
             if words[0] not in _SHAPES and not gathered.odd[words[0]]:
-                source.warn(f"skipped unknown {shown(words[0])}", offset)
+                source.warn("F006.unknown", offset, found=words[0])
             gathered.odd[words[0]] += 1
-
-
-def _check_indices(source: Source, gathered: _Gathered) -> None:
-    """Refuse faces that refer to what is nowhere in the file."""
-    for column, (keyword, kind) in enumerate(CORNER_KINDS.items()):
-        end = gathered.before[keyword]
-        for rows in gathered.faces:
-            corners = rows.corners[:, column]
-            if corners.max() < end:
-                continue
-            corner = int((corners >= end).argmax())
-            face = int(np.searchsorted(np.cumsum(rows.counts), corner, side="right"))
-            limits = _limits(gathered, keyword)
-            raise source.error(
-                f"f: expected a {kind} {limits}, found {corners[corner] + 1}",
-                int(rows.offsets[face]),
-            )
-
-
-def _limits(gathered: _Gathered, keyword: str) -> str:
-    end = gathered.before[keyword]
-    return f"1 to {end}" if end else "only where the file has one"

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import re
 
+from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
 from viewer.formats._pickle.values import Span
-from viewer.formats._source import Source, shown
+from viewer.formats._source import Source
 
 __all__ = ["Machine"]
 
@@ -44,9 +45,9 @@ class Machine:
         self._budget = _MAX_STEPS
         self._step_at = 0
 
-    def fail(self, message: str) -> FormatError:
+    def fail(self, problem: Phrase) -> FormatError:
         """Return an error that names the place of the current step."""
-        return self.source.error(f"{message} at byte {self._step_at}")
+        return self.source.fault("F002.pickle-step", problem=problem, at=self._step_at)
 
     def next_step(self) -> int:
         """Return the code of the next step, and pay for it."""
@@ -61,7 +62,7 @@ class Machine:
         """Pay for so many items; refuse a pickle that makes more than any real one."""
         self._budget -= count
         if self._budget < 0:
-            raise self.fail(f"expected at most {_MAX_STEPS} steps in a pickle, found more")
+            raise self.fail(Phrase("pickle-steps", most=_MAX_STEPS))
 
     # Bytes of the file.
 
@@ -88,9 +89,9 @@ class Machine:
         start = self.at
         end = self.data.find(b"\n", start)
         if end < 0:
-            raise self.fail("expected the end of a line, found the end of the file (cut short?)")
+            raise self.fail(Phrase("pickle-line-end"))
         if longest is not None and end - start > longest:
-            raise self.fail(f"expected at most {longest} letters in a line, found {end - start}")
+            raise self.fail(Phrase("pickle-line", most=longest, found=end - start))
         self.at = end + 1
         return start, end
 
@@ -104,19 +105,16 @@ class Machine:
     def decimal(self, word: bytes) -> int:
         """Return a number of the text protocols; their length is bounded already."""
         if not _INTEGER.fullmatch(word):
-            raise self.fail(f"expected a whole number, found {shown(word)}")
+            raise self.fail(Phrase("pickle-decimal", found=word))
         return int(word)
 
     def cut_short(self, wanted: int, found: int) -> FormatError:
         """Return the error of a length that goes beyond the end of the file."""
-        return self.fail(f"expected {wanted} more bytes, found {found} (a file cut short?)")
+        return self.fail(Phrase("pickle-cut", expected=wanted, found=found))
 
     def damaged_line_ends(self) -> FormatError:
         """Return the error of a file that passed through a text-mode transfer."""
-        return self.source.error(
-            "expected a pickle, found Windows line ends: damaged in transfer, "
-            "download it again in binary mode"
-        )
+        return self.source.fault("F002.pickle-line-ends")
 
     # The stack.
 
@@ -127,7 +125,7 @@ class Machine:
     def top(self) -> object:
         """Return the last value."""
         if len(self.stack) <= self._floor:
-            raise self.fail("expected a value on the stack, found none")
+            raise self.fail(Phrase("pickle-stack"))
         return self.stack[-1]
 
     def pop(self) -> object:
@@ -144,7 +142,7 @@ class Machine:
     def pop_mark(self) -> list[object]:
         """Take all values since the last mark, and the mark."""
         if not self._marks:
-            raise self.fail("expected a mark on the stack, found none")
+            raise self.fail(Phrase("pickle-mark"))
         values = self.stack[self._floor :]
         del self.stack[self._floor :]
         self._floor = self._marks.pop()
@@ -162,11 +160,11 @@ class Machine:
     def remember(self, index: int) -> None:
         """Give the last value a number."""
         if index < 0:
-            raise self.fail(f"expected a number from 0 on, found {index}")
+            raise self.fail(Phrase("pickle-memo", found=index))
         self.memo[index] = self.top()
 
     def recall(self, index: int) -> None:
         """Put the value of a number on the stack."""
         if index not in self.memo:
-            raise self.fail(f"expected a value remembered before, found number {index}")
+            raise self.fail(Phrase("pickle-recall", found=index))
         self.stack.append(self.memo[index])

@@ -2,7 +2,7 @@
 
 ``find`` looks a pair of module and name up in a literal table. It imports nothing, and what it
 returns is a stand-in. ``call``, ``create`` and ``build`` accept exactly what numpy, scipy, chumpy
-and Python themselves write. All four raise ``ValueError`` for everything else.
+and Python themselves write. All four raise ``MisfitError`` for everything else.
 """
 
 from __future__ import annotations
@@ -10,9 +10,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeGuard
 
-from viewer.errors import printable
+from viewer.diagnostics import Phrase
 from viewer.formats._archive import Opaque
+from viewer.formats._misfit import MisfitError
 from viewer.formats._pickle.values import Array, Dtype, Instance, Span, StandIn, is_sizes, noun
+from viewer.phrases import printable
 
 __all__ = ["as_key", "build", "call", "create", "find"]
 
@@ -67,16 +69,13 @@ def find(module: str, name: str) -> StandIn:
 
     Raises
     ------
-    ValueError
+    MisfitError
         If the pair is not in the table.
     """
     full = ".".join(printable(part[:_LONGEST_NAME]) for part in (module, name))
     role = _ROLES.get((module, name))
     if role is None:
-        raise ValueError(
-            f'expected arrays and plain data, found the global "{full}", '
-            "which is not allowed; nothing was executed"
-        )
+        raise MisfitError(Phrase("pickle-global", name=full))
     return StandIn(full, role)
 
 
@@ -91,21 +90,21 @@ def call(function: object, arguments: object) -> tuple[object, int]:
         A tuple; everything else is refused.
     """
     if not isinstance(function, StandIn) or function.role not in _CALLS:
-        raise ValueError(f"expected a call of a known function, found a call of {noun(function)}")
+        raise MisfitError(Phrase("pickle-call", found=noun(function)))
     if isinstance(arguments, tuple) and len(arguments) <= _MOST_ARGUMENTS:
         made = _CALLS[function.role](arguments)
         if made is not _WRONG:
             copies = function.role in ("dict", "scalar", "set")
             sizes = [len(each) for each in arguments if isinstance(each, list | Span)]
             return made, sum(sizes) if copies else 0
-    found = ", ".join(map(noun, arguments[:6])) if isinstance(arguments, tuple) else "none"
-    raise ValueError(f"expected the usual arguments of {function.name}, found ({found})")
+    found = [*map(noun, arguments)] if isinstance(arguments, tuple) else []
+    raise MisfitError(Phrase("pickle-arguments", name=function.name, found=found))
 
 
 def create(of: object, arguments: object) -> Instance:
     """Return a new object of a class, whose state is still to come."""
     if not isinstance(of, StandIn) or of.role not in _CLASSES or arguments != ():
-        raise ValueError(f"expected a new object of a known class, found {noun(of)}")
+        raise MisfitError(Phrase("pickle-create", found=noun(of)))
     return Instance(of)
 
 
@@ -117,10 +116,11 @@ def build(target: object, state: object) -> None:
         _build_dtype(target, state)
     elif isinstance(target, Instance):
         if not isinstance(state, dict):
-            raise ValueError(f"expected a dict as state of {target.of.name}, found {noun(state)}")
+            problem = Phrase("pickle-state", name=target.of.name, found=noun(state))
+            raise MisfitError(problem)
         target.state = state
     else:
-        raise ValueError(f"expected an object that takes a state, found {noun(target)}")
+        raise MisfitError(Phrase("pickle-build", found=noun(target)))
 
 
 def as_key(value: object) -> str | bytes | int:
@@ -128,7 +128,7 @@ def as_key(value: object) -> str | bytes | int:
 
     Raises
     ------
-    ValueError
+    MisfitError
         If it is something else. Objects never are keys, so none is ever asked for its hash; and
         large numbers, which can be chosen so that all of them collide, are none either.
     """
@@ -138,7 +138,7 @@ def as_key(value: object) -> str | bytes | int:
         return value.raw() if value.coding is None else value.text()
     if type(value) is int and abs(value) < _LARGEST_KEY:
         return value
-    raise ValueError(f"expected a name or a number as a key, found {noun(value)}")
+    raise MisfitError(Phrase("pickle-as-key", found=noun(value)))
 
 
 def _is_text(value: object, text: str) -> bool:
@@ -263,7 +263,7 @@ def _build_array(target: Array, state: object) -> None:
             if isinstance(payload, list) and dtype.code.startswith("O"):
                 target.what = dtype.what()
                 return
-    raise ValueError(f"expected the state of an array, found {noun(state)}")
+    raise MisfitError(Phrase("pickle-array-state", found=noun(state)))
 
 
 def _build_dtype(target: Dtype, state: object) -> None:
@@ -271,11 +271,11 @@ def _build_dtype(target: Dtype, state: object) -> None:
         case (3 | 4, order, sub, names, fields, size, int(), int(), *_) if len(state) <= 9:
             letter = _short(order)
             if letter is None or letter not in _ORDERS:
-                raise ValueError(f"expected the byte order of an array, found {noun(order)}")
+                raise MisfitError(Phrase("pickle-byte-order", found=noun(order)))
             if any(part is not None for part in (sub, names, fields)):
                 target.code = "V"  # records, whatever their size
             target.order = letter
             dtype = target.dtype()
             if dtype is None or size in (-1, dtype.itemsize):
                 return
-    raise ValueError(f"expected the state of an element type, found {noun(state)}")
+    raise MisfitError(Phrase("pickle-dtype-state", found=noun(state)))

@@ -15,13 +15,13 @@ their element size does not divide: whoever computes with one in a loop should c
 
 from __future__ import annotations
 
-from viewer.errors import counted, printable
 from viewer.formats._archive import Archive, Value
 from viewer.formats._pickle.machine import Machine
 from viewer.formats._pickle.resolving import resolve
 from viewer.formats._pickle.steps import run
 from viewer.formats._pickle.values import noun
 from viewer.formats._source import Source
+from viewer.phrases import printable
 
 __all__ = ["open_pickle"]
 
@@ -38,27 +38,26 @@ def open_pickle(source: Source) -> Archive:
     whole = run(machine)
     rest = len(source.data) - machine.at
     if rest:
-        was = "was" if rest == 1 else "were"
-        source.warn(f"{counted(rest, 'byte')} after the end of the pickle {was} ignored")
+        source.warn("F006.pickle-rest", n=rest)
     values = _named(source, whole)
     path, size = source.path, len(source.data)
 
     def load(key: str) -> Value:
         return resolve(path, size, key, values[key])
 
-    return Archive(path, "pickle", tuple(values), load)
+    return Archive(source, "pickle", tuple(values), load)
 
 
 def _named(source: Source, whole: object) -> dict[str, object]:
     """Return the values by name; names may be bytes, as Python 3 writes those of Python 2."""
     if not isinstance(whole, dict):
-        raise source.error(f"expected a dict of named values, found {noun(whole)}")
+        raise source.fault("F002.pickle-named", found=noun(whole))
     values: dict[str, object] = {}
     for key, value in whole.items():
         if isinstance(key, int):
-            raise source.error(f"expected a dict of named values, found the key {key}")
+            raise source.fault("F002.pickle-key", found=key)
         name = key if isinstance(key, str) else key.decode("latin-1")
         if name in values:
-            raise source.error(f"{printable(name, 60)}: expected one of this name, found two")
+            raise source.fault("F002.pickle-twice", item=printable(name, 60))
         values[name] = value
     return values

@@ -14,9 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.errors import FormatError, printable
+from viewer.diagnostics import Diagnostic, Phrase
+from viewer.errors import FormatError
 from viewer.formats._archive import Opaque, Sparse, Value
+from viewer.formats._misfit import MisfitError
 from viewer.formats._pickle.values import Array, Dtype, Instance, Span, StandIn, is_sizes
+from viewer.phrases import printable
 from viewer.rig.arrays import Deferred
 
 __all__ = ["resolve"]
@@ -53,15 +56,16 @@ def resolve(path: Path, size: int, key: str, value: object) -> Value:
     try:
         return _Resolver(path, key, max(size, _SMALLEST_BUDGET)).value(value, 0)
     except _EndlessError:
-        return Opaque("data nested without end")
+        return Opaque(Phrase("unread-endless"))
 
 
 class _Resolver:
     def __init__(self, path: Path, key: str, budget: int) -> None:
         self.path, self.key, self.budget = path, key, budget
 
-    def fail(self, message: str) -> FormatError:
-        return FormatError(self.path, f"{printable(self.key, 60)}: {message}")
+    def fail(self, problem: Phrase) -> FormatError:
+        values = {"item": printable(self.key, 60), "problem": problem}
+        return FormatError(Diagnostic("F002.archive-value", self.path, values=values))
 
     def value(self, value: object, depth: int) -> Value:
         self.budget -= 1
@@ -86,7 +90,7 @@ class _Resolver:
         try:
             return span.text()
         except UnicodeError:
-            raise self.fail("expected a text, found bytes that are none") from None
+            raise self.fail(Phrase("pickle-bytes")) from None
 
     def thing(self, value: object) -> Deferred | Sparse | Opaque:
         if isinstance(value, Array):
@@ -96,25 +100,27 @@ class _Resolver:
         if isinstance(value, Instance):
             return self.expression(value, 0)
         if isinstance(value, StandIn | Dtype):
-            return Opaque(value.name if isinstance(value, StandIn) else "element type")
-        raise self.fail("expected a value, found something else")
+            if isinstance(value, Dtype):
+                return Opaque(Phrase("unread-element-type"))
+            return Opaque(Phrase("unread-name", name=value.name))
+        raise self.fail(Phrase("pickle-other"))
 
     def sparse(self, matrix: Instance) -> Sparse:
         state = matrix.state or {}
         shape = state.get("_shape", state.get("shape"))
         if not is_sizes(shape) or len(shape) != 2:
-            raise self.fail("expected a sparse matrix with rows and columns, found none")
+            raise self.fail(Phrase("sparse-no-shape"))
         data, indices, indptr = (self.part(state, name) for name in ("data", "indices", "indptr"))
         try:
             return Sparse((shape[0], shape[1]), data, indices, indptr, matrix.of.role)
-        except ValueError as problem:
-            raise self.fail(str(problem)) from None
+        except MisfitError as problem:
+            raise self.fail(problem.problem) from None
 
     def part(self, state: dict[str | bytes | int, object], name: str) -> NDArray[Any]:
         array = state.get(name)
         later = array.deferred(self.fail) if isinstance(array, Array) else None
         if later is None:
-            raise self.fail(f"expected a sparse matrix with {name}, found none")
+            raise self.fail(Phrase("sparse-no-part", part=name))
         return later.values()
 
     def expression(self, value: Instance, depth: int) -> Deferred | Opaque:
@@ -122,9 +128,9 @@ class _Resolver:
         state = value.state or {}
         name = value.of.name
         if depth > _DEEPEST_EXPRESSION:
-            return Opaque(f"{name} expression nested without end")
+            return Opaque(Phrase("unread-expression-endless", name=name))
         if value.of.role == "expression":
-            return Opaque(f"{name} expression")
+            return Opaque(Phrase("unread-expression", name=name))
         inner = state.get("x" if value.of.role == "Ch" else "a")
         if isinstance(inner, Instance) and inner.of.role not in ("csc", "csr"):
             found: Deferred | Opaque = self.expression(inner, depth + 1)
@@ -134,7 +140,7 @@ class _Resolver:
             number = np.array(inner)
             found = Deferred((), number.dtype, lambda: number)
         else:
-            found = Opaque(f"{name} without values")
+            found = Opaque(Phrase("unread-chumpy", name=name))
         if isinstance(found, Opaque) or value.of.role == "Ch":
             return found
         return self.selection(state, found, name)
@@ -146,18 +152,19 @@ class _Resolver:
         idxs, shape = state.get("idxs"), state.get("preferred_shape")
         chosen = idxs.deferred(self.fail) if isinstance(idxs, Array) else None
         if chosen is None or chosen.dtype.kind not in "iu" or whole.dtype.kind not in _NUMBERS:
-            return Opaque(f"{name} without plain indices")
+            return Opaque(Phrase("unread-indices", name=name))
         wanted = shape if is_sizes(shape) else chosen.shape
         count, found = math.prod(wanted), math.prod(chosen.shape)
         if count != found:
-            raise self.fail(f"expected {printable(count, 40)} indices in {name}, found {found}")
+            values = {"expected": printable(count, 40), "name": name, "found": found}
+            raise self.fail(Phrase("pickle-selection", **values))
         return Deferred(wanted, whole.dtype, partial(self.take, whole, chosen, wanted))
 
     def take(self, whole: Deferred, chosen: Deferred, shape: tuple[int, ...]) -> NDArray[Any]:
         flat, indices = whole.values().reshape(-1), chosen.values()
         if indices.size and (int(indices.min()) < 0 or int(indices.max()) >= len(flat)):
+            low, high = int(indices.min()), int(indices.max())
             raise self.fail(
-                f"expected indices 0 to {len(flat) - 1}, "
-                f"found {int(indices.min())} to {int(indices.max())}"
+                Phrase("pickle-selection-range", last=len(flat) - 1, low=low, high=high)
             )
         return flat.take(indices.reshape(-1).astype(np.intp)).reshape(shape)

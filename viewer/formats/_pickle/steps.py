@@ -13,10 +13,11 @@ import struct
 from collections.abc import Callable
 from typing import TypeVar
 
+from viewer.diagnostics import Phrase
+from viewer.formats._misfit import MisfitError
 from viewer.formats._pickle import names as names
 from viewer.formats._pickle.machine import Machine
 from viewer.formats._pickle.values import Span, noun
-from viewer.formats._source import shown
 
 __all__ = ["run"]
 
@@ -44,7 +45,7 @@ def run(machine: Machine) -> object:
     while code != _STOP:
         step = _STEPS.get(code)
         if step is None:
-            raise machine.fail(f"expected a step of a pickle, found {shown(bytes([code]))}")
+            raise machine.fail(Phrase("pickle-step", found=bytes([code])))
         step(machine)
         code = machine.next_step()
     return machine.pop()
@@ -55,9 +56,9 @@ def _guarded(machine: Machine, action: Callable[[], Result]) -> Result:
     try:
         return action()
     except UnicodeError:
-        raise machine.fail("expected a text, found bytes that are none") from None
-    except ValueError as problem:
-        raise machine.source.error(str(problem)) from None
+        raise machine.fail(Phrase("pickle-bytes")) from None
+    except MisfitError as problem:
+        raise machine.source.fault("F002.pickle", problem=problem.problem) from None
 
 
 def _constant(value: object) -> Step:
@@ -72,12 +73,10 @@ def _span(width: int, coding: str | None = None, *, is_signed: bool = False) -> 
     return lambda machine: machine.push(machine.span(width, coding, is_signed=is_signed))
 
 
-def _refused(what: str) -> Step:
+def _refused(found: Phrase) -> Step:
     def refuse(machine: Machine) -> None:
-        raise machine.source.error(
-            f"expected arrays and plain data, found {what}, "
-            "which is not allowed; nothing was executed"
-        )
+        problem = Phrase("pickle-refused", found=found)
+        raise machine.source.fault("F002.pickle", problem=problem)
 
     return refuse
 
@@ -89,7 +88,7 @@ def _long_integer(width: int) -> Step:
     def step(machine: Machine) -> None:
         size = machine.number(width, is_signed=width == 4)
         if not 0 <= size <= _MAX_INTEGER:
-            raise machine.fail(f"expected a number of at most {_MAX_INTEGER} bytes, found {size}")
+            raise machine.fail(Phrase("pickle-long", most=_MAX_INTEGER, found=size))
         machine.push(machine.number(size, is_signed=True))
 
     return step
@@ -109,7 +108,7 @@ def _long_decimal(machine: Machine) -> None:
 def _float_text(machine: Machine) -> None:
     word = machine.word()
     if not _FLOAT.fullmatch(word):
-        raise machine.fail(f"expected a number, found {shown(word)}")
+        raise machine.fail(Phrase("pickle-number", found=word))
     machine.push(float(word))
 
 
@@ -126,13 +125,13 @@ def _quoted(machine: Machine) -> None:
     if text.endswith(b"\r"):
         raise machine.damaged_line_ends()
     if len(text) < 2 or text[:1] not in (b"'", b'"') or text[-1:] != text[:1]:
-        raise machine.fail(f"expected a text in quotes, found {shown(text)}")
+        raise machine.fail(Phrase("pickle-quotes", found=text))
     if b"\\" not in text:
         machine.push(Span(machine.data, start + 1, end - 1, "latin-1"))
         return
     # Pairs of backslashes go first, so that each of the others begins an escape.
     if _ODD_ESCAPE.search(text[1:-1].replace(b"\\\\", b"..")):
-        raise machine.fail("expected a text as Python 2 writes it, found another escape")
+        raise machine.fail(Phrase("pickle-escape"))
     data = codecs.escape_decode(text[1:-1])[0]
     machine.push(Span(data, 0, len(data), "latin-1"))
 
@@ -155,7 +154,7 @@ def _tuple(count: int) -> Step:
 def _list_of(machine: Machine) -> list[object]:
     target = machine.top()
     if not isinstance(target, list):
-        raise machine.fail(f"expected a list to add to, found {noun(target)}")
+        raise machine.fail(Phrase("pickle-list", found=noun(target)))
     return target
 
 
@@ -172,9 +171,9 @@ def _appends(machine: Machine) -> None:
 def _put_pairs(machine: Machine, values: list[object]) -> None:
     target = machine.top()
     if not isinstance(target, dict):
-        raise machine.fail(f"expected a dict to add to, found {noun(target)}")
+        raise machine.fail(Phrase("pickle-dict", found=noun(target)))
     if len(values) % 2:
-        raise machine.fail("expected keys with values, found a key without")
+        raise machine.fail(Phrase("pickle-pairs"))
     keys = _guarded(machine, lambda: [names.as_key(key) for key in values[0::2]])
     target.update(zip(keys, values[1::2], strict=True))
 
@@ -217,7 +216,8 @@ def _stack_global(machine: Machine) -> None:
     parts = [machine.pop(), machine.pop()]
     texts = [part for part in parts if isinstance(part, Span) and len(part) <= _LONGEST_NAME]
     if len(texts) < len(parts):
-        raise machine.fail(f"expected short names, found {noun(parts[1])} and {noun(parts[0])}")
+        found = [noun(part) for part in parts]
+        raise machine.fail(Phrase("pickle-names", module=found[1], name=found[0]))
     name, module = _guarded(machine, lambda: [text.text() for text in texts])
     machine.push(_find(machine, module, name))
 
@@ -241,7 +241,7 @@ def _new(machine: Machine) -> None:
 def _new_with_keywords(machine: Machine) -> None:
     keywords = machine.pop()
     if keywords != {}:
-        raise machine.fail(f"expected no arguments with names, found {noun(keywords)}")
+        raise machine.fail(Phrase("pickle-keywords", found=noun(keywords)))
     _new(machine)
 
 
@@ -266,7 +266,7 @@ def _build(machine: Machine) -> None:
 def _protocol(machine: Machine) -> None:
     protocol = machine.number(1)
     if protocol > _LAST_PROTOCOL:
-        raise machine.fail(f"expected a pickle of protocol 0 to 5, found {protocol}")
+        raise machine.fail(Phrase("pickle-protocol", found=protocol))
 
 
 def _frame(machine: Machine) -> None:
@@ -344,11 +344,11 @@ _STEPS: dict[int, Step] = {
     0x80: _protocol,
     0x95: _frame,
     # What reaches outside the file
-    ord("P"): _refused("a persistent id"),
-    ord("Q"): _refused("a persistent id"),
-    0x82: _refused("an extension code"),
-    0x83: _refused("an extension code"),
-    0x84: _refused("an extension code"),
-    0x97: _refused("an out-of-band buffer"),
-    0x98: _refused("an out-of-band buffer"),
+    ord("P"): _refused(Phrase("noun-persistent")),
+    ord("Q"): _refused(Phrase("noun-persistent")),
+    0x82: _refused(Phrase("noun-extension")),
+    0x83: _refused(Phrase("noun-extension")),
+    0x84: _refused(Phrase("noun-extension")),
+    0x97: _refused(Phrase("noun-buffer")),
+    0x98: _refused(Phrase("noun-buffer")),
 }

@@ -9,14 +9,15 @@ from __future__ import annotations
 import codecs
 import io
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.errors import printable
+from viewer.diagnostics import Phrase
+from viewer.formats._misfit import MisfitError
 from viewer.formats._npz import array_dtype, item_count, shaped
 from viewer.rig.arrays import Deferred
 
@@ -123,10 +124,10 @@ class Dtype:
         """Return numpy's type, or None if it is none of numbers or text."""
         return array_dtype(self.order + self.code)
 
-    def what(self) -> str:
+    def what(self) -> Phrase:
         """Return why it is not evaluated."""
-        known = {"O": "object array", "V": "array of records"}
-        return known.get(self.code[:1], f"array of type {self.code[:20]}")
+        known = {"O": Phrase("unread-objects"), "V": Phrase("unread-records")}
+        return known.get(self.code[:1]) or Phrase("unread-dtype", dtype=self.code[:20])
 
 
 @dataclass(slots=True, eq=False)
@@ -148,15 +149,15 @@ class Array:
     payload: Span | None = None
     is_fortran: bool = False
     axes: tuple[int, ...] | None = None
-    what: str = "array without values"
+    what: Phrase = field(default_factory=lambda: Phrase("unread-unset"))
 
     def fill(self, shape: tuple[int, ...], dtype: Dtype, is_fortran: bool, payload: Span) -> None:
         """Take shape and values, which must have the same number of bytes.
 
         Raises
         ------
-        ValueError
-            If they have not; the text says ``expected …, found …``.
+        MisfitError
+            If they have not.
         """
         found = dtype.dtype()
         if found is None:
@@ -165,12 +166,12 @@ class Array:
         packed = payload.packed()
         n_items = item_count(shape, found.itemsize)
         if n_items is None or n_items * found.itemsize != len(packed):
-            sides = printable(" x ".join(map(str, shape)), 80) or "one"
-            raise ValueError(f"expected {sides} {found.name}, found {len(packed)} bytes")
+            size = len(packed)
+            raise MisfitError(Phrase("array-bytes", shape=shape, dtype=found.name, found=size))
         self.shape, self.dtype, self.payload = shape, found, packed
         self.is_fortran = is_fortran
 
-    def deferred(self, fail: Callable[[str], Exception]) -> Deferred | None:
+    def deferred(self, fail: Callable[[Phrase], Exception]) -> Deferred | None:
         """Return the array for later, or None if it is not evaluated."""
         if self.dtype is None or self.payload is None:
             return None
@@ -184,11 +185,11 @@ class Array:
 
         Raises
         ------
-        ValueError
+        MisfitError
             If a text holds something else than letters.
         """
         if self.payload is None or self.dtype is None:
-            raise ValueError(f"expected an array of numbers, found {self.what}")
+            raise MisfitError(Phrase("array-not-numbers", found=self.what))
         flat = np.empty(0, self.dtype)
         if len(self.payload):  # numpy makes no view of nothing
             n_items = len(self.payload) // self.dtype.itemsize
@@ -196,11 +197,11 @@ class Array:
         array = shaped(flat, self.shape, self.is_fortran)
         return array if self.axes is None else np.ascontiguousarray(array.transpose(self.axes))
 
-    def _load(self, fail: Callable[[str], Exception]) -> NDArray[Any]:
+    def _load(self, fail: Callable[[Phrase], Exception]) -> NDArray[Any]:
         try:
             return self.values()
-        except ValueError as problem:
-            raise fail(str(problem)) from None
+        except MisfitError as problem:
+            raise fail(problem.problem) from None
 
 
 def is_sizes(value: object) -> TypeGuard[tuple[int, ...]]:
@@ -212,20 +213,22 @@ def is_sizes(value: object) -> TypeGuard[tuple[int, ...]]:
     )
 
 
-def noun(value: object) -> str:
+def noun(value: object) -> Phrase:
     """Return what a thing on the stack is, for a message.
 
-    >>> noun([1, 2]), noun(StandIn("numpy.ndarray", "ndarray"))
+    >>> str(noun([1, 2])), str(noun(StandIn("numpy.ndarray", "ndarray")))
     ('a list', 'numpy.ndarray')
     """
     if isinstance(value, StandIn):
-        return value.name
+        return Phrase("noun", name=value.name)
     if isinstance(value, Instance):
-        return f"an object of {value.of.name}"
+        return Phrase("noun-object", name=value.of.name)
     if isinstance(value, Span):
-        return "bytes" if value.coding is None else "a text"
+        return Phrase("noun-bytes") if value.coding is None else Phrase("noun-text")
     if isinstance(value, bool | int | float):
-        return "a number"
-    if value is None or isinstance(value, Array):
-        return "nothing" if value is None else "an array"
-    return f"a {type(value).__name__.lower()}"
+        return Phrase("noun-number")
+    if value is None:
+        return Phrase("noun-nothing")
+    if isinstance(value, Array):
+        return Phrase("noun-array")
+    return Phrase("noun-other", kind=type(value).__name__.lower())

@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.errors import FormatError, printable
+from viewer.diagnostics import Part as FaultPart
+from viewer.diagnostics import Phrase
 from viewer.formats._archive import Archive
 from viewer.formats._container import archive_of, finite
-from viewer.formats._faults import Part as FaultPart
 from viewer.formats._source import Source
-from viewer.formats._table import read_broken_table, read_table, row_error
+from viewer.formats._table import read_table
+from viewer.phrases import printable
 from viewer.rig.arrays import Floats
 
 __all__ = ["CORE", "OPTIONAL", "Part", "PigFiles", "open_parts"]
@@ -59,33 +60,37 @@ class Part:
         File name or key, for messages.
     values : (N, columns)
         Numbers; of a sparse matrix (joint, vertex, weight) rows.
-    error : callable
-        (message, row or None) to an error that names the file, and the line if there is one.
     source : Source
         Takes faults.
-    offsets : (N,) or None
-        Where each row is in a text that was read to its end in spite of faults.
-    has_lines : bool
-        Whether it is a text.
+    offset_of : callable or None
+        Returns where a row is in a text; None for archives, which have no lines.
     """
 
     name: str
     values: NDArray[Any]
-    error: Callable[[str, int | None], FormatError]
     source: Source
-    offsets: NDArray[np.int64] | None = None
-    has_lines: bool = False
+    offset_of: Callable[[int], int] | None = None
 
-    def count_error(self, message: str, wanted: int) -> FormatError:
-        """Return an error at the first row too many, or at the last row where some are missing."""
-        row = min(wanted, len(self.values) - 1)
-        return self.error(message, row if self.has_lines and row >= 0 else None)
+    def offset(self, row: int) -> int | None:
+        """Return where a row is in the file, None for archives."""
+        return None if self.offset_of is None else self.offset_of(row)
+
+    def item(self, row: int | None = None) -> Phrase | str:
+        """Return what messages call a row, or the whole: nothing where the file tells."""
+        if self.offset_of is not None:
+            return ""
+        name = printable(self.name, 60)
+        return name if row is None else Phrase("row-of", name=name, index=row)
+
+    def odd_offset(self, wanted: int) -> int | None:
+        """Return where the first row too many is, or the last row if some are missing."""
+        return self.offset(min(wanted, len(self.values) - 1))
 
     def remember(self, kind: str, row_of: Callable[[int], int]) -> None:
         """Let the source remember in which row a thing of a kind is, see ``Source.remember``."""
-        offsets = self.offsets
-        if offsets is not None:
-            self.source.remember(kind, lambda index: int(offsets[row_of(index)]))
+        offset_of = self.offset_of
+        if offset_of is not None:
+            self.source.remember(kind, lambda index: offset_of(row_of(index)))
 
 
 @dataclass(slots=True)
@@ -112,7 +117,7 @@ def _from_folder(source: Source) -> PigFiles:
     present = {path.name for path in source.path.iterdir()}
     missing = [f"{name}.txt" for name in CORE if f"{name}.txt" not in present]
     if missing:
-        raise source.error(f"expected a PIG folder, found no {', '.join(missing)}")
+        raise source.fault("F002.pig-folder", missing=missing)
     files = PigFiles()
     for name, columns in _WIDTHS.items():
         if f"{name}.txt" in present:
@@ -130,29 +135,17 @@ def _from_folder(source: Source) -> PigFiles:
 
 
 def _text_part(source: Source, name: str, columns: int) -> Part:
-    def error(message: str, row: int | None) -> FormatError:
-        return source.error(message) if row is None else row_error(source, row, columns, message)
-
-    if source.faults is None:
-        return Part(f"{name}.txt", read_table(source, columns), error, source, has_lines=True)
-    rows, offsets = read_broken_table(source, columns, _PARTS.get(name, ""))
-
-    def error_at(message: str, row: int | None) -> FormatError:
-        return source.error(message, None if row is None else int(offsets[row]))
-
-    if name not in CORE and np.isnan(rows).any():
-        rows, offsets = rows[:0], offsets[:0]  # nobody needs a part of it
-    return Part(f"{name}.txt", rows, error_at, source, offsets, has_lines=True)
+    rows, offset_of = read_table(source, columns, _PARTS.get(name, ""))
+    if name not in CORE and np.isnan(rows.sum()):
+        rows = rows[:0]  # nobody needs a part of it
+    return Part(f"{name}.txt", rows, source, offset_of)
 
 
 def _from_archive(source: Source) -> PigFiles:
     archive = archive_of(source)
     missing = [name for name in CORE if not archive.has(name)]
     if missing:
-        found = ", ".join(printable(key, 40) for key in archive.keys[:12]) or "none"
-        raise source.error(
-            f"expected a PIG model; keys missing: {', '.join(missing)}; keys found: {found}"
-        )
+        raise source.fault("F002.pig-keys", missing=missing, found=list(archive.keys))
     files = PigFiles()
     for name, columns in _WIDTHS.items():
         if archive.has(name):
@@ -166,20 +159,17 @@ def _from_archive(source: Source) -> PigFiles:
 def _archive_part(source: Source, name: str, columns: int) -> Part:
     archive = archive_of(source)
 
-    def error(message: str, row: int | None) -> FormatError:
-        return archive.error(name, message if row is None else f"row {row}: {message}")
-
     if name in _SPARSE and not _is_entries(archive, name):
         joints, vertices, weights = _entries(archive, name)
-        return Part(name, np.stack([joints, vertices, weights], axis=1), error, source)
+        return Part(name, np.stack([joints, vertices, weights], axis=1), source)
     shape = (None,) if columns == 1 else (None, columns)
     if columns == 1 and len(getattr(archive.get(name), "shape", ())) == 2:
         shape = (None, 1)
     numbers = archive.array(name, shape).values()
     values = finite(archive, name, numbers, _PARTS.get(name, "")).reshape(-1, columns)
     if len(values) == 0:
-        raise archive.error(name, "expected at least one row, found none")
-    return Part(name, values, error, source)
+        raise archive.fault("F002.no-rows", item=name)
+    return Part(name, values, source)
 
 
 def _entries(archive: Archive, name: str) -> tuple[NDArray[Any], NDArray[Any], Floats]:

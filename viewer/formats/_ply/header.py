@@ -5,10 +5,13 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 
-from viewer.errors import FormatError, printable
-from viewer.formats._source import Source, shown
+from viewer.errors import FormatError
+from viewer.formats._source import Source
 
-__all__ = ["Element", "Header", "Property", "read_header"]
+__all__ = ["CORNERS", "Element", "Header", "Property", "read_header"]
+
+CORNERS = ("vertex_indices", "vertex_index")
+"""Names of the list of a face's vertices."""
 
 TYPES = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
@@ -81,13 +84,10 @@ def read_header(source: Source) -> Header:
         assert match is not None  # the pattern matches anything
         words = match[1].decode("utf-8", "surrogateescape").split()
         if number == 0 and words != ["ply"]:
-            looks = source.looks_like() or shown(match[1][:40])
-            raise source.error(f'expected "ply" in the first line, found {looks}', 0)
+            raise _no_ply(source, match[1])
         if words == ["end_header"]:
             if not has_format:
-                raise source.error(
-                    "expected a line `format`, found none before end_header", position
-                )
+                raise source.fault("F002.ply-no-format", position)
             header.end = _behind(source.data, match)
             return header
         if words and words[0] == "format":
@@ -95,7 +95,15 @@ def read_header(source: Source) -> Header:
         elif number:
             _take(source, header, words, match[1], position)
         position, number = match.end(), number + 1
-    raise source.error("expected end_header, found the end of the header", position)
+    raise source.fault("F002.ply-no-end", position)
+
+
+def _no_ply(source: Source, line: bytes) -> FormatError:
+    """Return the error of a file of another kind."""
+    looks = source.looks_like()
+    if looks is not None:
+        return source.fault("F002.ply-looks", 0, looks=looks)
+    return source.fault("F002.ply-start", 0, found=line[:40])
 
 
 def _behind(data: bytes, match: re.Match[bytes]) -> int:
@@ -107,11 +115,8 @@ def _behind(data: bytes, match: re.Match[bytes]) -> int:
 
 def _order(source: Source, words: list[str], offset: int) -> str:
     if len(words) != 3 or words[1] not in _ORDERS or words[2] != "1.0":
-        known = ", ".join(_ORDERS)
-        raise source.error(
-            f"format: expected one of {known} and 1.0, found {_quoted(*words[1:])}",
-            offset,
-        )
+        found = " ".join(words[1:])
+        raise source.fault("F002.ply-format", offset, orders=list(_ORDERS), found=found)
     return _ORDERS[words[1]]
 
 
@@ -125,22 +130,16 @@ def _take(source: Source, header: Header, words: list[str], line: bytes, offset:
         header.elements.append(_element(source, words, offset))
     elif keyword == "property":
         if not header.elements:
-            raise source.error("property: expected an element before it, found none", offset)
+            raise source.fault("F002.ply-no-element", offset)
         _add(source, header.elements[-1], words, offset)
     elif keyword:
-        raise source.error(
-            f"expected element, property, comment or end_header, found {_quoted(keyword)}",
-            offset,
-        )
+        raise source.fault("F002.ply-line", offset, found=keyword)
 
 
 def _element(source: Source, words: list[str], offset: int) -> Element:
     is_count = len(words) == 3 and words[2].isascii() and words[2].isdecimal()
     if not is_count or len(words[2]) > 18:
-        raise source.error(
-            f"element: expected a name and a count, found {_quoted(*words[1:])}",
-            offset,
-        )
+        raise source.fault("F002.ply-element", offset, found=" ".join(words[1:]))
     return Element(words[1], int(words[2]), offset)
 
 
@@ -148,24 +147,9 @@ def _add(source: Source, element: Element, words: list[str], offset: int) -> Non
     kinds, name = (words[2:-1], words[-1]) if words[1:2] == ["list"] else (words[1:-1], words[-1])
     is_list = words[1:2] == ["list"]
     if len(kinds) != 1 + is_list or any(kind not in TYPES for kind in kinds):
-        raise _property_error(source, words, offset)
+        raise source.fault("F002.ply-property", offset, found=" ".join(words[1:]))
     if any(prop.name == name for prop in element.properties):
-        raise source.error(f"property: expected a new name, found {_quoted(name)} again", offset)
+        raise source.fault("F002.ply-property-again", offset, found=name)
     if is_list and TYPES[kinds[0]].startswith("f"):
-        raise source.error(
-            f"property: expected a list counted in whole numbers, found {_quoted(kinds[0])}",
-            offset,
-        )
+        raise source.fault("F002.ply-list-count", offset, found=kinds[0])
     element.properties.append(Property(name, TYPES[kinds[-1]], TYPES[kinds[0]] if is_list else ""))
-
-
-def _quoted(*words: str) -> str:
-    return f'"{printable(" ".join(words), 60)}"'
-
-
-def _property_error(source: Source, words: list[str], offset: int) -> FormatError:
-    return source.error(
-        "property: expected a type and a name, or list, two types and a name, "
-        f"found {_quoted(*words[1:])}",
-        offset,
-    )

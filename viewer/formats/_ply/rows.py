@@ -8,10 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.errors import counted
+from viewer.diagnostics import Part, Phrase
+from viewer.errors import FormatError
 from viewer.formats._numbers import parse_numbers, parse_words
-from viewer.formats._ply.header import Element, Header
-from viewer.formats._source import Source, no_number
+from viewer.formats._ply.header import CORNERS, Element, Header, Property
+from viewer.formats._polygons import triangles_of
+from viewer.formats._source import Source
+from viewer.formats._tolerant import Words, number_key
 
 __all__ = ["Table", "read_tables"]
 
@@ -33,12 +36,15 @@ class Table:
         Its lists: how many values each row has, and the values of all rows.
     offsets : (N,) or None
         Where each row is in a text.
+    is_first : bool
+        Whether no element before it has its name; the others are read and dropped.
     """
 
     element: Element
     columns: dict[str, Numbers] = field(default_factory=dict)
     lists: dict[str, tuple[Places, Numbers]] = field(default_factory=dict)
     offsets: Places | None = None
+    is_first: bool = True
 
     def offset(self, row: int) -> int | None:
         """Return where in the file a row is; None in one of bytes, which has no lines."""
@@ -57,15 +63,15 @@ def read_tables(source: Source, header: Header) -> dict[str, Table]:
     body = _Binary(source, header) if header.order else _Text(source, header)
     tables: dict[str, Table] = {}
     for element in header.elements:
-        table = Table(element)
+        table = Table(element, is_first=element.name not in tables)
         cursor = body.begin(element)
         table.offsets = body.offsets(cursor)
         for prop in element.properties:
             if prop.count_kind:
-                counts, values, cursor = body.take_lists(table, cursor, prop.count_kind, prop.kind)
+                counts, values, cursor = body.take_lists(table, cursor, prop)
                 table.lists[prop.name] = counts, values
             else:
-                table.columns[prop.name], cursor = body.take(cursor, prop.kind)
+                table.columns[prop.name], cursor = body.take(table, cursor, prop)
         body.end(element, cursor)
         tables.setdefault(element.name, table)
     body.finish()
@@ -79,7 +85,7 @@ def _flat(starts: Places, counts: Places, step: int) -> Places:
 
 
 class _Text:
-    """Numbers as words, one row a line."""
+    """Numbers as words, one row a line; NaN stands for words that are no numbers."""
 
     def __init__(self, source: Source, header: Header) -> None:
         self.source, self.start = source, header.end
@@ -89,14 +95,10 @@ class _Text:
         inked = ~((letters == 32) | ((letters >= 9) & (letters <= 13)))
         self.begins = np.flatnonzero(inked & ~np.concatenate([[False], inked[:-1]]))
         if bad >= 0:
-            offset = self.start + int(self.begins[bad])
-            word = source.next_word(offset)
-            assert word is not None  # it was found there
-            if source.faults is None:
-                raise source.error(no_number(word.group()), offset)
             self.values = parse_words(self.data, self.start, len(self.data))
         ends = np.flatnonzero((letters == 10) | (letters == 13))
-        lines = np.searchsorted(ends, self.begins)
+        self.lines = lines = np.searchsorted(ends, self.begins)
+        self.has_bad = bad >= 0
         # The first word of every line with words, and how many it has.
         is_first = np.concatenate([[True], lines[1:] != lines[:-1]]) if len(lines) else lines > 0
         self.firsts = np.flatnonzero(is_first)
@@ -107,10 +109,12 @@ class _Text:
         """Return the first word of each row."""
         last = self.line + element.count * bool(element.properties)
         if last > len(self.firsts):
-            raise self.source.error(
-                f"{element.name}: expected {element.count} lines, "
-                f"found {len(self.firsts) - self.line}",
+            raise self.source.fault(
+                "F002.ply-lines",
                 element.offset,
+                element=element.name,
+                expected=element.count,
+                found=len(self.firsts) - self.line,
             )
         rows = slice(self.line, last)
         self.rows_left = self.firsts[rows] + self.counts[rows]
@@ -121,25 +125,65 @@ class _Text:
         """Return where in the file words are."""
         return self.begins[cursor] + self.start
 
-    def take(self, cursor: Places, kind: str) -> tuple[Numbers, Places]:
+    def take(self, table: Table, cursor: Places, prop: Property) -> tuple[Numbers, Places]:
         """Return the next number of each row."""
         self._need(cursor + 1)
-        return self.values[cursor], cursor + 1
+        values = self.values[cursor]
+        if self.has_bad:
+            rows = np.flatnonzero(np.isnan(values))
+            is_place = table.element.name == "vertex" and prop.name in ("x", "y", "z")
+            part: Part = "positions" if is_place and table.is_first else ""
+            self._refuse_words(table, cursor[rows], rows, part, rows if part else None)
+        return values, cursor + 1
 
     def take_lists(
-        self, table: Table, cursor: Places, count_kind: str, kind: str
+        self, table: Table, cursor: Places, prop: Property
     ) -> tuple[Places, Numbers, Places]:
         """Return the next list of each row."""
-        counts, cursor = self.take(cursor, count_kind)
+        self._need(cursor + 1)
+        counts = self.values[cursor]
         whole = np.clip(np.nan_to_num(counts), -(2.0**40), 2.0**40).astype(np.int64)
         wrong = np.flatnonzero((whole != counts) | (whole < 0))
         if len(wrong):
-            raise self.source.error(
-                f"{table.element.name}: expected how many follow, found {counts[wrong[0]]:g}",
-                self._offset(cursor[wrong[0]] - 1),
-            )
+            raise self._no_count(table, int(wrong[0]), int(cursor[wrong[0]]))
+        cursor = cursor + 1
         self._need(cursor + whole)
-        return whole, self.values[_flat(cursor, whole, 1)], cursor + whole
+        places = _flat(cursor, whole, 1)
+        values = self.values[places]
+        if self.has_bad:
+            bad = np.flatnonzero(np.isnan(values))
+            rows = np.repeat(np.arange(len(whole)), whole)[bad]
+            is_face = table.element.name == "face" and prop.name in CORNERS and table.is_first
+            part: Part = "triangles" if is_face else ""
+            lost = triangles_of(whole, rows) if is_face else None
+            self._refuse_words(table, places[bad], rows, part, lost)
+        return whole, values, cursor + whole
+
+    def _refuse_words(
+        self, table: Table, words: Places, rows: Places, part: Part, places: Places | None
+    ) -> None:
+        """Refuse words that are no numbers, each in a row of a table."""
+        if len(words):
+            item = Phrase("ply-row", element=table.element.name, row=int(rows[0]))
+            self._refuse_first(words, item, part, places)
+
+    def _refuse_first(
+        self, words: Places, item: Phrase, part: Part = "", places: Places | None = None
+    ) -> None:
+        first = int(words[0])
+        word = self._word(first)
+        self.source.refuse(
+            number_key(word), self._offset(first), len(words), part, places, item=item, found=word
+        )
+
+    def _no_count(self, table: Table, row: int, word: int) -> FormatError:
+        """Return the error of a list without the number of its entries."""
+        item = Phrase("ply-row", element=table.element.name, row=row)
+        found = float(self.values[word])
+        if np.isnan(found):
+            text = self._word(word)
+            return self.source.fault(number_key(text), self._offset(word), item=item, found=text)
+        return self.source.fault("F002.ply-list", self._offset(word), item=item, found=found)
 
     def end(self, element: Element, cursor: Places) -> None:
         """Refuse rows with more numbers than their properties take."""
@@ -151,12 +195,11 @@ class _Text:
         """Warn of lines that no element has."""
         left = len(self.firsts) - self.line
         if left:
-            self.source.warn(f"ignored {counted(left, 'line')} after the last element")
-            words = np.flatnonzero(np.isnan(self.values[self.firsts[self.line] :]))
-            if len(words):  # only where faults are noted: others were refused at the start
-                offset = self._offset(int(self.firsts[self.line] + words[0]))
-                message = "expected numbers, found words after the last element"
-                self.source.refuse(self.source.error(message, offset), len(words))
+            self.source.warn("F006.ply-lines", n=left)
+            first = self.firsts[self.line]
+            words = first + np.flatnonzero(np.isnan(self.values[first:]))
+            if len(words):
+                self._refuse_first(words, Phrase("ply-rest"))
 
     def _need(self, cursor: Places) -> None:
         short = np.flatnonzero(cursor > self.rows_left)
@@ -166,11 +209,13 @@ class _Text:
     def _refuse(self, row: int, cursor: int) -> None:
         line = self.line - len(self.rows_left) + row
         first = int(self.firsts[line])
-        raise self.source.error(
-            f"expected {cursor - first}{' or more' * bool(cursor > self.rows_left[row])} numbers "
-            f"in the line, found {self.counts[line]}",
-            self._offset(first),
-        )
+        expected, found, where = cursor - first, int(self.counts[line]), self._offset(first)
+        if cursor > self.rows_left[row]:
+            raise self.source.fault("F002.ply-fewer", where, expected=expected, found=found)
+        raise self.source.fault("F002.ply-more", where, expected=expected, found=found)
+
+    def _word(self, word: int) -> bytes:
+        return Words(self.data, self.values, self.begins + self.start, self.lines).word(word)
 
     def _offset(self, word: int) -> int:
         return self.start + int(self.begins[word])
@@ -210,7 +255,7 @@ class _Binary:
         cursor = starts
         for prop in element.properties:
             if prop.count_kind:
-                counts, cursor = self.take(cursor, prop.count_kind)
+                counts, cursor = self._numbers(cursor, prop.count_kind)
                 if (counts != counts[0]).any():
                     return None
                 cursor = cursor + int(counts[0]) * int(prop.kind[1])
@@ -249,8 +294,12 @@ class _Binary:
                 raise self._short(element, end - self.position)
         return starts
 
-    def take(self, cursor: Places, kind: str) -> tuple[Numbers, Places]:
-        """Return the next number of each row, in the machine's own order of bytes."""
+    def take(self, table: Table, cursor: Places, prop: Property) -> tuple[Numbers, Places]:
+        """Return the next number of each row."""
+        return self._numbers(cursor, prop.kind)
+
+    def _numbers(self, cursor: Places, kind: str) -> tuple[Numbers, Places]:
+        """Return the number at each offset, in the machine's own order of bytes."""
         size = int(kind[1])
         if len(cursor) == 0:
             return np.zeros(0, dtype=kind), cursor
@@ -261,19 +310,18 @@ class _Binary:
         return windows[cursor].astype(kind), cursor + size
 
     def take_lists(
-        self, table: Table, cursor: Places, count_kind: str, kind: str
+        self, table: Table, cursor: Places, prop: Property
     ) -> tuple[Places, Numbers, Places]:
         """Return the next list of each row."""
-        counts, cursor = self.take(cursor, count_kind)
+        counts, cursor = self._numbers(cursor, prop.count_kind)
         whole = counts.astype(np.int64)
         wrong = np.flatnonzero(whole < 0)
         if len(wrong):
-            raise self.source.error(
-                f"{table.element.name} {wrong[0]}: expected how many follow, "
-                f"found {whole[wrong[0]]}"
-            )
-        size = int(kind[1])
-        values, _ = self.take(_flat(cursor, whole, size), kind)
+            row = int(wrong[0])
+            item = Phrase("ply-row", element=table.element.name, row=row)
+            raise self.source.fault("F002.ply-list", item=item, found=int(whole[row]))
+        size = int(prop.kind[1])
+        values, _ = self._numbers(_flat(cursor, whole, size), prop.kind)
         return whole, values, cursor + whole * size
 
     def end(self, element: Element, cursor: Places) -> None:
@@ -285,11 +333,13 @@ class _Binary:
         """Warn of bytes that no element has."""
         left = len(self.data) - self.position
         if left:
-            self.source.warn(f"ignored {counted(left, 'byte')} after the last element")
+            self.source.warn("F006.ply-bytes", n=left)
 
-    def _short(self, element: Element, left: int) -> Exception:
-        return self.source.error(
-            f"{element.name}: expected {element.count} rows, found the end of the file after "
-            f"{left} bytes of them",
+    def _short(self, element: Element, left: int) -> FormatError:
+        return self.source.fault(
+            "F002.ply-short",
             element.offset,
+            element=element.name,
+            expected=element.count,
+            size=left,
         )

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.errors import FormatError, printable
+from viewer.diagnostics import Phrase
+from viewer.errors import FormatError
 from viewer.formats._archive import describe
 from viewer.formats._json_places import (
     constant_place,
@@ -20,6 +21,7 @@ from viewer.formats._json_places import (
 )
 from viewer.formats._numbers import LARGEST
 from viewer.formats._source import Source
+from viewer.phrases import printable
 from viewer.rig.arrays import Deferred, Floats
 
 __all__ = ["NamedValues", "described", "parse_json"]
@@ -57,15 +59,15 @@ class NamedValues:
             path = path[:-1]
         return _byte_offset(self.text, place)
 
-    def error(self, message: str, *path: str | int) -> FormatError:
+    def fault(self, key: str, *path: str | int, **values: Any) -> FormatError:
         """Return an error that names the file, and the line of a value if it has lines."""
-        return self.source.error(message, self.offset(*path))
+        return self.source.fault(key, self.offset(*path), **values)
 
-    def warn(self, message: str, *path: str | int) -> None:
+    def warn(self, key: str, *path: str | int, **values: Any) -> None:
         """Add a warning that names the file, and the line of a value if it has lines."""
-        self.source.warn(message, self.offset(*path))
+        self.source.warn(key, self.offset(*path), **values)
 
-    def array(self, key: str, kinds: str, what: str) -> NDArray[Any]:
+    def array(self, key: str, kinds: str, expected: Phrase) -> NDArray[Any]:
         """Return an array of some kinds of values, written as an array or as lists.
 
         Parameters
@@ -74,7 +76,7 @@ class NamedValues:
             Of the value.
         kinds : str
             Of numpy: ``"iuf"``, ``"bi"`` or ``"U"``.
-        what : str
+        expected : Phrase
             What is expected, for the message.
 
         Raises
@@ -90,17 +92,19 @@ class NamedValues:
         if array.dtype.kind in kinds or (array.size == 0 and array.dtype.kind == "f"):
             return array
         path, odd = _odd_value(value, kinds)
-        found = "lists of different lengths or depths" if path is None else described(odd)
-        raise self.error(f"{key}: expected {what}, found {found}", key, *(path or ()))
+        found = Phrase("pose-ragged") if path is None else described(odd)
+        raise self.fault(
+            "F002.pose-array", key, *(path or ()), item=key, expected=expected, found=found
+        )
 
     def numbers(self, key: str) -> Floats:
         """Return an array of finite numbers; see ``array``."""
-        array = self.array(key, "iuf", "numbers").astype(np.float64)
+        array = self.array(key, "iuf", Phrase("pose-numbers")).astype(np.float64)
         wrong = np.argwhere(~(np.abs(array) <= LARGEST))
         if len(wrong):
             place = wrong[0].tolist()
-            found = f"{array[tuple(place)]:g}"
-            raise self.error(f"{key}: expected finite numbers, found {found}", key, *place)
+            found = float(array[tuple(place)])
+            raise self.fault("F003.pose-number", key, *place, item=key, found=found)
         return array
 
 
@@ -125,18 +129,18 @@ def parse_json(source: Source) -> NamedValues:
             text, object_pairs_hook=unique, parse_int=_whole, parse_constant=odd.add
         )
     except json.JSONDecodeError as problem:
-        what = f"expected JSON, found a mistake: {printable(problem.msg, 100)}"
-        raise source.error(what, _byte_offset(text, problem.pos)) from None
+        place = _byte_offset(text, problem.pos)
+        raise source.fault("F002.json", place, reason=printable(problem.msg, 100)) from None
     except RecursionError:
         place = _byte_offset(text, nesting_place(text, _DEEPEST))
-        raise source.error("expected JSON, found too deep a nesting", place) from None
+        raise source.fault("F002.json-nesting", place) from None
     if odd:
         raise _odd_json(source, text)
     named = NamedValues(source, values if isinstance(values, dict) else {}, text)
     if not isinstance(values, dict):
         is_word = values is None or isinstance(values, bool)
-        found = json.dumps(values) if is_word else describe(values)
-        raise named.error(f"expected a pose (an object with names), found {found}")
+        found = Phrase("pose-word", word=json.dumps(values)) if is_word else describe(values)
+        raise named.fault("F002.pose-object", found=found)
     return named
 
 
@@ -149,11 +153,12 @@ def _odd_json(source: Source, text: str) -> FormatError:
     """Return an error on NaN, an infinity, or a key that comes twice."""
     constant, repeated = constant_place(text), repeated_key(text)
     if constant is not None:
-        found = f"expected a finite number, found {constant[0]}"
-        return source.error(found, _byte_offset(text, constant[1]))
+        return source.fault(
+            "F002.json-constant", _byte_offset(text, constant[1]), found=constant[0]
+        )
     assert repeated is not None  # one of the two was noticed
-    found = f'expected every key once, found "{printable(repeated[0], 40)}" twice'
-    return source.error(found, _byte_offset(text, repeated[1]))
+    found = printable(repeated[0], 40)
+    return source.fault("F002.json-twice", _byte_offset(text, repeated[1]), found=found)
 
 
 def _byte_offset(text: str, place: int) -> int:
@@ -186,7 +191,7 @@ def _is_of(one: Any, kinds: str) -> bool:
     return isinstance(one, int | float) and not isinstance(one, bool)
 
 
-def described(value: Any) -> str:
+def described(value: Any) -> Phrase:
     """Return what a value is, for a message: an array by its shape and type."""
     is_array = isinstance(value, np.ndarray)
     return describe(Deferred(value.shape, value.dtype, lambda: value) if is_array else value)

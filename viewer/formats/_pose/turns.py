@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from viewer.errors import printable
+from viewer.diagnostics import Phrase
 from viewer.formats._archive import describe
 from viewer.formats._pose.named_values import NamedValues
+from viewer.phrases import printable
 from viewer.rig.arrays import Floats
 from viewer.rig.retargeting.pose_transfer import JointTurns
 
@@ -80,18 +81,20 @@ def named_turns(turns: JointTurns) -> dict[str, Any]:
 
 
 def _names(named: NamedValues) -> tuple[str, ...]:
-    names = named.array("joint_names", "U", "names")
+    names = named.array("joint_names", "U", Phrase("pose-names"))
     if names.ndim != 1:
-        found = f"joint_names: expected a list of names, found {names.ndim} dimensions"
-        raise named.error(found, "joint_names")
+        key = "joint_names"
+        raise named.fault("F002.pose-list", key, item=key, found=names.ndim)
     return tuple(names.tolist())
 
 
 def _rows(named: NamedValues, key: str, count: int, width: int) -> Floats:
-    array = named.array(key, "iuf", "numbers")
+    array = named.array(key, "iuf", Phrase("pose-numbers"))
     if array.shape != (count, width):
-        found = " x ".join(map(str, array.shape)) or "one number"
-        raise named.error(f"{key}: expected {count} x {width} numbers, found {found}", key)
+        expected = Phrase("wanted-numbers", shape=(count, width))
+        shape = Phrase("pose-shape", shape=array.shape)
+        found = shape if array.shape else Phrase("pose-one-number")
+        raise named.fault("F002.pose-array", key, item=key, expected=expected, found=found)
     return named.numbers(key)
 
 
@@ -101,8 +104,8 @@ def _quaternions(named: NamedValues, key: str, names: tuple[str, ...]) -> Floats
     short = np.flatnonzero(np.linalg.norm(rows, axis=1) < _SHORTEST)
     if len(short):
         row = int(short[0])
-        found = f"{key}: {printable(names[row], 60)}: expected a quaternion, found four zeros"
-        raise named.error(found, key, row)
+        joint = printable(names[row], 60)
+        raise named.fault("F002.pose-quaternion", key, row, item=key, joint=joint)
     return rows
 
 
@@ -110,12 +113,12 @@ def _word(named: NamedValues, key: str, default: str) -> str:
     value = named.values.get(key, default)
     word = value.item() if isinstance(value, np.ndarray) and value.ndim == 0 else value
     if not isinstance(word, str):
-        raise named.error(f"{key}: expected a word, found {describe(value)}", key)
+        raise named.fault("F002.pose-word", key, item=key, found=describe(value))
     return word[:_LONGEST_WORD]
 
 
 def _up(named: NamedValues) -> str:
     word = _word(named, "up", "y")
     if word not in _UPS:
-        raise named.error(f'up: expected "y" or "z", found "{printable(word, 20)}"', "up")
+        raise named.fault("F002.pose-up", "up", found=printable(word, 20))
     return word

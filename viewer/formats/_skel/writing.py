@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from viewer.errors import UnsupportedFormatError, printable
+from viewer.diagnostics import Diagnostic
+from viewer.errors import UnsupportedFormatError
 from viewer.formats._numbers import LARGEST
 from viewer.media.saving import as_words, save_text
 from viewer.rig.arrays import Floats
@@ -44,7 +46,7 @@ def write(figure: Figure, path: str | Path) -> None:
         If the file cannot be written.
     """
     if figure.skeleton is None:
-        raise UnsupportedFormatError(f"figure {figure.name} has no skeleton to write as .skel")
+        raise _unsupported("F002.skel-none", figure=figure.name)
     _check_dofs(figure.skeleton)
     _check_numbers(figure.skeleton)
     _check_names(figure.skeleton)
@@ -55,28 +57,26 @@ def _check_dofs(skeleton: Skeleton) -> None:
     unturned = np.allclose(skeleton.rest_rotations[:, :3], 0.0, atol=1e-12)
     unscaled = np.allclose(skeleton.rest_scales, 1.0, atol=1e-12)
     if not (unturned and unscaled):
-        raise UnsupportedFormatError(".skel cannot hold joints with a rest rotation or scale")
+        raise _unsupported("F002.skel-rest")
     rotations = np.arange(6, 3 * skeleton.n_joints + 3)
     table = np.concatenate([np.arange(6), np.tile([3, 4, 5], skeleton.n_joints - 1)])
     owners = np.concatenate([np.zeros(6, int), 1 + (rotations - 6) // 3])
     if not (
         np.array_equal(skeleton.dof_kinds, table) and np.array_equal(skeleton.dof_joints, owners)
     ):
-        raise UnsupportedFormatError(".skel holds the DOFs x, y, z of each joint, no others")
+        raise _unsupported("F002.skel-dofs")
     if skeleton.rest_dofs[:3].any() or np.isfinite(skeleton.dof_limits[:3]).any():
-        raise UnsupportedFormatError(
-            ".skel cannot hold a translation of the root in its pose, nor limits of one"
-        )
+        raise _unsupported("F002.skel-root")
 
 
 def _check_numbers(skeleton: Skeleton) -> None:
     limits = skeleton.dof_limits
     finite = np.isfinite(limits)
     if (finite & np.stack([limits[:, 0] <= -UNLIMITED, limits[:, 1] >= UNLIMITED], 1)).any():
-        raise UnsupportedFormatError(f".skel takes limits beyond +-{UNLIMITED:.0f} for none")
+        raise _unsupported("F002.skel-limits", most=UNLIMITED)
     arrays = [skeleton.rest_translations, skeleton.boxes, skeleton.rest_dofs, limits[finite]]
     if any(np.abs(array).max(initial=0.0) > LARGEST for array in arrays if array is not None):
-        raise UnsupportedFormatError(f".skel cannot hold numbers beyond {LARGEST:.3g}")
+        raise _unsupported("F002.skel-numbers", most=LARGEST)
 
 
 def _check_names(skeleton: Skeleton) -> None:
@@ -85,15 +85,16 @@ def _check_names(skeleton: Skeleton) -> None:
         while ancestors and ancestors[-1] != parent:
             ancestors.pop()
         if parent >= 0 and not ancestors:
-            raise UnsupportedFormatError(
-                f".skel lists joints depth-first; joint {joint_label(skeleton, joint)} "
-                "comes too late"
-            )
+            raise _unsupported("F002.skel-order", joint=joint_label(skeleton, joint))
         ancestors.append(joint)
     for name in skeleton.names:
         words = as_words(name)
         if words is None or KEYWORDS & set(words):
-            raise UnsupportedFormatError(f'.skel cannot hold the joint name "{printable(name)}"')
+            raise _unsupported("F002.skel-name", name=name)
+
+
+def _unsupported(key: str, **values: Any) -> UnsupportedFormatError:
+    return UnsupportedFormatError(Diagnostic(key, values=values))
 
 
 def _lines(skeleton: Skeleton) -> list[str]:

@@ -6,10 +6,11 @@ import re
 
 import numpy as np
 
-from viewer.errors import counted
-from viewer.formats._skin.blocks import Block, block_numbers, find_block, opened
-from viewer.formats._source import Source, shown
-from viewer.formats._tolerant import read_words, refuse_words
+from viewer.diagnostics import Phrase
+from viewer.formats._numbers import parse_numbers
+from viewer.formats._skin.blocks import find_block, unclosed, words_of
+from viewer.formats._source import Source
+from viewer.formats._tolerant import refuse_words
 from viewer.rig.arrays import Floats
 
 __all__ = ["read_bindings"]
@@ -34,52 +35,48 @@ def read_bindings(source: Source, count: int, position: int) -> tuple[Floats, in
     source.remember("bindings", offsets.__getitem__)
     if len(matrices) != count:
         is_whole = word is not None and word.group() == b"}"
-        there = "the end of the file" if word is None else shown(word.group())
         end = source.end if word is None else word.start()
+        then = word and word.group()
+        found = len(matrices)
         # A count that is wrong is the fault; if the text breaks off, the end of it is.
-        where, other = (stated, end) if is_whole else (end, stated)
-        error = source.error(
-            f"bindings ({'to' if is_whole else 'from'} line {source.line(other)}): expected "
-            f"{counted(count, 'matrix')}, found {counted(len(matrices), 'matrix')}, then {there}",
-            where,
-        )
         if not is_whole:
-            error.code = "F002"  # the text is broken, whatever was bound
-            raise error
-        source.refuse(error)
+            line = source.line(stated)
+            raise source.fault(
+                "F002.skin-bindings-end", end, line=line, expected=count, found=found, then=then
+            )
+        line = source.line(end)
+        source.refuse("B001.skin-count", stated, line=line, expected=count, found=found, then=then)
     if word is None:
-        source.warn('the last "}" is missing: bindings ends with the file')
+        source.warn("F006.last-brace", section="bindings")
     elif word.group() != b"}":
-        raise source.error(f'bindings: expected "}}", found {shown(word.group())}', word.start())
+        raise source.fault("F002.skin-bindings-brace", word.start(), found=word.group())
     bindings = np.tile(np.eye(4), (len(matrices), 1, 1))
     if matrices:
         bindings[:, :3, :] = np.array(matrices).reshape(-1, 4, 3).transpose(0, 2, 1)
     return bindings, len(source.data) if word is None else word.end()
 
 
-def _mended(source: Source, block: Block, index: int) -> Floats:
-    """Return the numbers of a matrix, a neutral one if some are none."""
-    words = read_words(source.data, block.start, block.end)
-    bad = words.bad
-    if len(bad) == 0 or any(b"{" in words.word(place) for place in bad.tolist()):
-        return block_numbers(source, block)
-    places = np.full(len(bad), index)
-    refuse_words(source, words, bad, lambda _: block.name, "bindings", places)
-    return _NEUTRAL
-
-
 def _read_matrix(source: Source, index: int, word: Word) -> tuple[Floats, int]:
     block = find_block(source, f"matrix {index} of bindings", word, word.end())
-    values = (
-        block_numbers(source, block) if source.faults is None else _mended(source, block, index)
-    )
+    values, bad = parse_numbers(source.data, block.start, block.end)
+    words = words_of(source, block) if bad >= 0 else None
     if not block.closed:
-        raise source.error(
-            f'expected "}}" to close {opened(source, block)}, found the end of the file',
-            len(source.data.rstrip()),
+        raise unclosed(source, block, source.end, None)
+    if words is not None:
+        places = np.full(len(words.bad), index)
+        item = Phrase("matrix", index=index)
+        refuse_words(source, words, words.bad, lambda _: item, "bindings", places)
+        return _NEUTRAL, block.end + 1
+    if len(values) != len(_NEUTRAL):
+        source.refuse(
+            "F002.width",
+            word.start(),
+            1,
+            "bindings",
+            [index],
+            item=Phrase("matrix", index=index),
+            expected=len(_NEUTRAL),
+            found=len(values),
         )
-    if len(values) != 12:
-        message = f"matrix {index} of bindings: expected 12 numbers, found {len(values)}"
-        source.refuse(source.error(message, word.start()), 1, "bindings", [index])
         return _NEUTRAL, block.end + 1
     return values, block.end + 1

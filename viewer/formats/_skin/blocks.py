@@ -1,4 +1,4 @@
-"""Blocks of numbers in a ``.skin`` file: found, parsed, and every fault put into words."""
+"""Blocks of numbers in a ``.skin`` file."""
 
 from __future__ import annotations
 
@@ -8,22 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from viewer.errors import FormatError
-from viewer.formats._numbers import parse_numbers
-from viewer.formats._source import Source, no_number, shown
+from viewer.formats._numbers import to_number
+from viewer.formats._source import Source
+from viewer.formats._tolerant import Words, read_words
 from viewer.rig.arrays import Floats, Ints
 
-__all__ = [
-    "KEYWORDS",
-    "Block",
-    "block_numbers",
-    "block_rows",
-    "find_block",
-    "opened",
-    "to_whole",
-    "unclosed",
-    "whole_numbers",
-    "word_at",
-]
+__all__ = ["KEYWORDS", "Block", "find_block", "read_count", "to_whole", "unclosed", "words_of"]
 
 KEYWORDS = frozenset(
     (b"positions", b"normals", b"texcoords", b"skinweights", b"material", b"triangles", b"bindings")
@@ -69,9 +59,8 @@ def find_block(source: Source, name: str, header: Word, position: int) -> Block:
     if brace is not None and brace.group() == b"{":
         position = brace.end()
     elif name != "skinweights":
-        found = "the end of the file" if brace is None else shown(brace.group())
         where = header.start() if brace is None else brace.start()
-        raise source.error(f'{name}: expected "{{", found {found}', where)
+        raise source.fault("F002.skin-brace", where, section=name, found=brace and brace.group())
     end = source.data.find(b"}", position)
     closed = end >= 0
     return Block(
@@ -79,82 +68,42 @@ def find_block(source: Source, name: str, header: Word, position: int) -> Block:
     )
 
 
-def block_numbers(source: Source, block: Block) -> Floats:
-    """Parse all numbers of a block."""
-    values, bad = parse_numbers(source.data, block.start, block.end)
-    if bad < 0:
-        return values
-    offset, word = word_at(source, block, bad)
-    if word in KEYWORDS or word == b"{":
-        raise unclosed(source, block, offset, word)
-    raise source.error(f"{block.name}: {no_number(word)}", offset)
-
-
-def unclosed(source: Source, block: Block, offset: int, word: bytes) -> FormatError:
-    """Return the error that a word begins something else before a block ends."""
-    return source.error(
-        f'expected "}}" to close {opened(source, block)}, found {shown(word)}', offset
-    )
-
-
-def opened(source: Source, block: Block) -> str:
-    """Return what an error calls a block: its name and the line of its header."""
-    return f"{block.name} (line {source.line(block.header)})"
-
-
-def word_at(source: Source, block: Block, index: int) -> tuple[int, bytes]:
-    """Return a word of a block and its offset; slow, for errors only."""
-    offset = source.word_offset(block.start, index)
-    word = source.next_word(offset)
-    return offset, b"" if word is None else word.group()
-
-
-def block_rows(source: Source, block: Block, count: int, width: int) -> Floats:
-    """Parse a block of ``count`` rows of ``width`` numbers: (count, width)."""
-    values = block_numbers(source, block)
-    if len(values) == count * width:
-        values.flags.writeable = False  # so that nobody has to copy it
-        return values.reshape(count, width)
-    if not block.closed:
-        raise source.error(
-            f'expected "}}" to close {opened(source, block)}, found the end of the file '
-            f"after {len(values) // width} of {count} rows",
-            len(source.data.rstrip()),
+def read_count(source: Source, name: str, word: Word) -> tuple[int, int]:
+    """Read a section's count and the offset behind it; refuse one that the file cannot hold."""
+    found = source.next_word(word.end())
+    value = None if found is None else to_number(found.group())
+    if found is None or value is None or value != int(value) or value < 0:
+        at = word.start() if found is None else found.start()
+        raise source.fault("F002.skin-count", at, section=name, found=found and found.group())
+    # Even an entry of one letter needs white space before it.
+    left = len(source.data) - found.end()
+    if value * 2 > left + 1:
+        raise source.fault(
+            "F002.skin-too-many", found.start(), section=name, found=int(value), size=left
         )
-    _raise_for_short_line(source, block, width)
-    raise source.error(
-        f"{block.name}: expected {count} rows of {width} numbers, "
-        f"found {len(values) // width}"
-        + (f" and {len(values) % width} numbers" if len(values) % width else "")
-        + f" (to line {source.line(block.end)})",
-        block.count,
-    )
+    return int(value), found.end()
 
 
-def _raise_for_short_line(source: Source, block: Block, width: int) -> None:
-    """Find the line at fault: in files written row by row, the one that is not a row."""
-    text = source.data[block.start : block.end]
-    offset = block.start
-    lines = text.splitlines(keepends=True)
-    lengths = [len(line.split()) for line in lines]
-    filled = [length for length in lengths if length]
-    # Lines mean nothing to the format; only a file that keeps to them tells more this way.
-    if sum(length == width for length in filled) * 2 < len(filled):
-        return
-    for line, length in zip(lines, lengths, strict=True):
-        if length % width:
-            start = offset + len(line) - len(line.lstrip())
-            raise source.error(f"expected {width} numbers, found {length} ({block.name})", start)
-        offset += len(line)
+def words_of(source: Source, block: Block) -> Words:
+    """Return the words of a block, of which none may begin another section.
+
+    Raises
+    ------
+    FormatError
+        If the block is not closed before another section begins.
+    """
+    words = read_words(source.data, block.start, block.end)
+    for index in words.bad.tolist():
+        word = words.word(index)
+        if word in KEYWORDS or b"{" in word:
+            raise unclosed(source, block, int(words.offsets[index]), word)
+    return words
 
 
-def whole_numbers(source: Source, block: Block, values: Floats, what: str) -> Ints:
-    """Return whole numbers of a block as int32; what is none is an error."""
-    whole, wrong = to_whole(values)
-    if wrong >= 0:
-        offset, word = word_at(source, block, wrong)
-        raise source.error(f"{block.name}: expected {what}, found {shown(word)}", offset)
-    return whole
+def unclosed(source: Source, block: Block, offset: int, found: bytes | None) -> FormatError:
+    """Return the error that something else follows before a block ends; None is the file's end."""
+    line = source.line(block.header)
+    return source.fault("F002.unclosed", offset, section=block.name, line=line, found=found)
 
 
 def to_whole(values: Floats) -> tuple[Ints, int]:

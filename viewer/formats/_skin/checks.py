@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.errors import FormatError, counted
 from viewer.formats._numbers import LARGEST
-from viewer.formats._skin.mending import LOST
+from viewer.formats._skin.rows import LOST
 from viewer.formats._skin.sections import Sections, check_declared
 from viewer.formats._source import Source
 from viewer.formats._tolerant import mended_corners
@@ -34,7 +33,7 @@ _FAR = 1e6  # a vertex this many times the median distance away is no part of th
 def even_counts(source: Source, sections: Sections) -> None:
     """Refuse sections of more or fewer vertices than there are positions.
 
-    Where all faults are wanted and the others agree, the positions are those at fault.
+    Where all others agree, the positions are those at fault.
     """
     tables = sections.tables
     counts = {name: len(table) for name, table in tables.items()}
@@ -42,11 +41,20 @@ def even_counts(source: Source, sections: Sections) -> None:
         counts["skinweights"] = len(sections.starts) - 1
     n_positions = counts["positions"]
     others = {name: count for name, count in counts.items() if name != "positions"}
-    if source.faults is not None and len(others) > 1 and len(set(others.values())) == 1:
+    if len(others) > 1 and len(set(others.values())) == 1:
         name, wanted = next(iter(others.items()))
         if wanted != n_positions:
-            error = _count_error(source, sections, "positions", wanted, name, n_positions)
-            source.refuse(error, 1, "positions", np.arange(wanted))
+            source.refuse(
+                "F002.skin-entries",
+                sections.offsets["positions"],
+                1,
+                "positions",
+                np.arange(wanted),
+                section="positions",
+                expected=wanted,
+                other=name,
+                found=n_positions,
+            )
             missing = max(wanted - n_positions, 0)
             padded = np.pad(tables["positions"], ((0, missing), (0, 0)), constant_values=np.nan)
             tables["positions"] = padded[:wanted]
@@ -55,21 +63,22 @@ def even_counts(source: Source, sections: Sections) -> None:
         if count == n_positions:
             check_declared(source, sections, name)
             continue
-        error = _count_error(source, sections, name, n_positions, "positions", count)
-        if name == "skinweights":
-            source.refuse(error, 1, "weights", np.arange(count, n_positions))
+        is_weights = name == "skinweights"
+        source.refuse(
+            "F002.skin-entries",
+            sections.offsets[name],
+            1,
+            "weights" if is_weights else "",
+            np.arange(count, n_positions) if is_weights else (),
+            section=name,
+            expected=n_positions,
+            other="positions",
+            found=count,
+        )
+        if is_weights:
             _fit_weights(sections, n_positions)
         else:
-            source.refuse(error)
             del tables[name]
-
-
-def _count_error(
-    source: Source, sections: Sections, name: str, wanted: int, other: str, found: int
-) -> FormatError:
-    return source.error(
-        f"{name}: expected {wanted} entries as in {other}, found {found}", sections.offsets[name]
-    )
 
 
 def _fit_weights(sections: Sections, count: int) -> None:
@@ -95,9 +104,9 @@ def check_mesh(source: Source, sections: Sections, mesh: Mesh) -> None:
     """Warn of textures that cannot be drawn and of vertices that are far from all others."""
     has_texture = any(material.texture for material in mesh.materials)
     if mesh.uvs is not None and not has_texture:
-        source.warn("texcoords without a texture: drawn untextured", sections.offsets["texcoords"])
+        source.warn("F007.skin-texcoords", sections.offsets["texcoords"])
     if mesh.uvs is None and has_texture:
-        source.warn("a texture without texcoords: drawn untextured", sections.offsets["material"])
+        source.warn("F005.skin-texture", sections.offsets["material"])
     # Some thousand vertices tell where the others are.
     some = mesh.positions[:: max(1, mesh.n_vertices // 4096)]
     # The middle value instead of np.median, which imports numpy.ma: 14 ms at the start.
@@ -107,9 +116,15 @@ def check_mesh(source: Source, sections: Sections, mesh: Mesh) -> None:
     farthest = np.abs(bounding_box(mesh.positions) - center).max()
     if typical > 0 and farthest > _FAR * typical:
         distance = np.abs(mesh.positions - center).max(axis=1)
+        vertex = int(distance.argmax())
         source.warn(
-            f"vertex {distance.argmax()} is {distance.max():.2g} units away from the others",
-            source.offset_of("positions", int(distance.argmax())),
+            "M010.skin-vertex",
+            source.offset_of("positions", vertex),
+            1,
+            "positions",
+            [vertex],
+            vertex=vertex,
+            distance=float(distance[vertex]),
         )
 
 
@@ -123,13 +138,16 @@ def checked_triangles(source: Source, sections: Sections, n_vertices: int) -> In
             wrong = ~fits & (rows != LOST)
             if wrong.any():
                 row, corner = np.argwhere(wrong)[0].tolist()
-                error = source.error(
-                    f"triangle {row + first}: expected a vertex index below {n_vertices}, "
-                    f"found {rows[row, corner]}",
-                    run.offset(source, row, corner),
+                source.refuse(
+                    "F002.skin-corner-range",
+                    run.offset_of(row),
+                    int(wrong.sum()),
+                    "triangles",
+                    np.flatnonzero(wrong.any(axis=1)) + first,
+                    triangle=row + first,
+                    limit=n_vertices,
+                    found=int(rows[row, corner]),
                 )
-                triangles = np.flatnonzero(wrong.any(axis=1)) + first
-                source.refuse(error, int(wrong.sum()), "triangles", triangles)
             rows = mended_corners(rows, fits)
         tables.append(rows)
         first += len(rows)
@@ -149,22 +167,30 @@ def invert_bindings(source: Source, sections: Sections) -> Floats:
         flat |= ~(np.abs(inverse) <= LARGEST).all(axis=(1, 2))
     if flat.any():
         index = int(flat.argmax())
-        error = source.error(
-            f"bindings: expected matrices that can be inverted, found matrix {index} "
-            f"with determinant {determinants[index]:.3g}",
+        source.refuse(
+            "B002.skin-matrix",
             source.offset_of("bindings", index),
+            int(flat.sum()),
+            "bindings",
+            np.flatnonzero(flat),
+            matrix=index,
+            determinant=float(determinants[index]),
         )
-        source.refuse(error, int(flat.sum()), "bindings", np.flatnonzero(flat))
         # A joint that is where it was bound, unturned.
         inverse[flat] = translation_matrix(-bindings[flat, :3, 3])
         linear = np.where(flat[:, None, None], np.eye(3), linear)
     if len(linear):
         conditions = np.linalg.cond(linear)
         if conditions.max() > _NEARLY_SINGULAR:
+            worst = int(conditions.argmax())
             source.warn(
-                f"matrix {conditions.argmax()} of bindings can hardly be inverted "
-                f"(condition number {conditions.max():.2g})",
-                source.offset_of("bindings", int(conditions.argmax())),
+                "B003.skin-matrix",
+                source.offset_of("bindings", worst),
+                1,
+                "bindings",
+                [worst],
+                matrix=worst,
+                condition=float(conditions[worst]),
             )
     return inverse.astype(np.float64, copy=False)
 
@@ -178,18 +204,17 @@ def checked_influences(source: Source, sections: Sections, n_joints: int) -> tup
     assert sections.starts is not None  # the caller looked
     wrong = np.flatnonzero(~fits)
     vertices = np.searchsorted(sections.starts, wrong, side="right") - 1
-    vertex, influence = int(vertices[0]), int(wrong[0])
-    offset = source.offset_of("weights", vertex)
-    if source.faults is None:
-        # Words before it: a count for each vertex up to this one, and two for each influence.
-        block = sections.blocks["skinweights"]
-        offset = source.number_offset(block.start, block.end, vertex + 1 + 2 * influence)
-    error = source.error(
-        f"skinweights of vertex {vertex}: expected a joint index below {n_joints}, "
-        f"found {joints[influence]}",
-        offset,
+    vertex = int(vertices[0])
+    source.refuse(
+        "W010.skin-joint",
+        source.offset_of("weights", vertex),
+        len(wrong),
+        "weights",
+        vertices,
+        vertex=vertex,
+        limit=n_joints,
+        found=int(joints[wrong[0]]),
     )
-    source.refuse(error, len(wrong), "weights", vertices)
     return np.where(fits, joints, 0).astype(np.int32), np.where(fits, weights, 0.0)
 
 
@@ -197,26 +222,41 @@ def check_weights(source: Source, skin: Skin) -> None:
     """Warn, once each, of weights that are negative, missing, or do not add up to 1."""
     moved = has_influence(skin)
     if not moved.all():
-        first, count = int((~moved).argmax()), int((~moved).sum())
-        stay = "stays where it was" if count == 1 else "stay where they were"
+        first = int((~moved).argmax())
         source.warn(
-            f"{counted(count, 'vertex')} without influence {stay} bound, first vertex {first}",
+            "W004.vertices",
             source.offset_of("weights", first),
+            1,
+            "weights",
+            [first],
+            n=int((~moved).sum()),
+            vertex=first,
         )
     negative = skin.weights < 0
     if negative.any():
         vertex = int(np.searchsorted(skin.starts, negative.argmax(), side="right")) - 1
         source.warn(
-            f"{counted(int(negative.sum()), 'negative weight', 'is', 'are')} used as stored, first "
-            f"{skin.weights[negative][0]:g} of vertex {vertex}",
+            "W002.skin-negative",
             source.offset_of("weights", vertex),
+            1,
+            "weights",
+            [vertex],
+            n=int(negative.sum()),
+            weight=float(skin.weights[negative][0]),
+            vertex=vertex,
         )
-    errors = np.where(moved, np.abs(weight_sums(skin) - 1.0), 0.0)
+    sums = weight_sums(skin)
+    errors = np.where(moved, np.abs(sums - 1.0), 0.0)
     off = errors > WEIGHT_TOLERANCE
     if off.any():
         worst = int(errors.argmax())
         source.warn(
-            f"the weights of {counted(int(off.sum()), 'vertex')} do not add up to 1 and are used "
-            f"as stored, worst vertex {worst} with {weight_sums(skin)[worst]:.6g}",
+            "W001.skin-sums",
             source.offset_of("weights", worst),
+            1,
+            "weights",
+            [worst],
+            n=int(off.sum()),
+            vertex=worst,
+            sum=float(sums[worst]),
         )

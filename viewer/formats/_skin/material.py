@@ -6,7 +6,7 @@ import re
 from collections.abc import Container
 
 from viewer.formats._numbers import is_number
-from viewer.formats._source import Source, shown
+from viewer.formats._source import Source
 from viewer.formats._texture import load_image
 from viewer.rig.arrays import Bytes
 from viewer.rig.mesh import Material
@@ -58,16 +58,13 @@ def read_material(
             texture = rest[1].strip().decode("utf-8", "surrogateescape") or None
             named, position = word.start(), rest.end()
         else:
-            source.warn(f"skipped unknown {shown(word.group())} in a material", word.start())
+            source.warn("F006.skin-material", word.start(), found=word.group())
             position = _skip(source, word)
     if word is None:
-        raise source.error(
-            f'expected "}}" to close material (line {source.line(header.start())}), '
-            "found the end of the file",
-            len(source.data.rstrip()),
-        )
+        line = source.line(header.start())
+        raise source.fault("F002.unclosed", source.end, section="material", line=line, found=None)
     if texture is None:
-        source.warn("material without texture: drawn untextured", header.start())
+        source.warn("F005.skin-material", header.start())
         return Material(name), word.end()
     if texture not in pictures:
         pictures[texture] = load_image(source, texture, named)
@@ -82,9 +79,10 @@ def _name(source: Source, header: Word, keywords: Container[bytes]) -> tuple[str
         words.append(word.group())
         word = source.next_word(word.end())
     if word is None or word.group() != b"{":
-        found = "the end of the file" if word is None else shown(word.group())
         where = header.start() if word is None else word.start()
-        raise source.error(f'material: expected "{{", found {found}', where)
+        raise source.fault(
+            "F002.skin-brace", where, section="material", found=word and word.group()
+        )
     return b" ".join(words).decode("utf-8", "surrogateescape"), word
 
 
@@ -100,5 +98,5 @@ def _skip(source: Source, word: Word) -> int:
         if text == b"}" and depth == 0:
             return position
     if depth:
-        raise source.error(f"{shown(word.group())} is still open where the file ends", word.start())
+        raise source.fault("F002.open", word.start(), word=word.group())
     return position

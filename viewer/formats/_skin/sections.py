@@ -6,15 +6,13 @@ import re
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from viewer.formats._numbers import to_number
 from viewer.formats._skin.bindings import read_bindings
-from viewer.formats._skin.blocks import KEYWORDS, Block, block_rows, find_block, whole_numbers
+from viewer.formats._skin.blocks import KEYWORDS, Block, find_block, read_count
 from viewer.formats._skin.material import read_material
-from viewer.formats._skin.mending import mended_rows, mended_weights, whole_corners
+from viewer.formats._skin.rows import OffsetOf, read_rows, whole_corners
 from viewer.formats._skin.weights import read_weights
-from viewer.formats._source import Source, shown
+from viewer.formats._source import Source
 from viewer.rig.arrays import Bytes, Floats, Ints
 from viewer.rig.mesh import Material
 
@@ -22,9 +20,6 @@ __all__ = ["Sections", "TriangleRun", "check_declared", "read_sections"]
 
 _WIDTHS = {"positions": 3, "normals": 3, "texcoords": 2}
 Word = re.Match[bytes]
-
-
-Places = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,23 +32,13 @@ class TriangleRun:
         Vertex indices.
     material : int
         That before it, -1 for none.
-    block : Block
-        Where it is.
-    offsets : (M,) or None
-        Where each triangle is, if the words before it do not tell.
+    offset_of : callable
+        Gives the offset of a triangle.
     """
 
     triangles: Ints
     material: int
-    block: Block
-    offsets: Places | None = None
-
-    def offset(self, source: Source, triangle: int, corner: int = 0) -> int:
-        """Return where in the file a corner is, or its triangle."""
-        if self.offsets is not None:
-            return int(self.offsets[triangle])
-        place = 3 * triangle + corner
-        return source.number_offset(self.block.start, self.block.end, place)
+    offset_of: OffsetOf
 
 
 @dataclass(slots=True)
@@ -70,14 +55,13 @@ class Sections:
     bindings: Floats | None = None
     offsets: dict[str, int] = field(default_factory=dict)
     counts: dict[str, int] = field(default_factory=dict)  # as declared
-    blocks: dict[str, Block] = field(default_factory=dict)
 
-    def triangle_offset(self, source: Source, triangle: int) -> int:
+    def triangle_offset(self, triangle: int) -> int:
         """Return where in the file a triangle is, counted through all sections."""
         ends = np.cumsum([len(run.triangles) for run in self.triangles])
         run = int(np.searchsorted(ends, triangle, side="right"))
         first = int(ends[run]) - len(self.triangles[run].triangles)
-        return self.triangles[run].offset(source, triangle - first)
+        return self.triangles[run].offset_of(triangle - first)
 
 
 def read_sections(source: Source) -> Sections:
@@ -104,10 +88,10 @@ def read_sections(source: Source) -> Sections:
             extra_braces += 1
             position = word.end()
         else:
-            source.warn(f"skipped unknown section {shown(name)}", word.start())
+            source.warn("F006.skin-section", word.start(), found=name)
             position = _skip(source, word)
     if extra_braces:
-        source.warn(f'ignored {extra_braces} "}}" outside all sections')
+        source.warn("F006.skin-braces", n=extra_braces)
     return sections
 
 
@@ -115,19 +99,19 @@ def _read_section(source: Source, sections: Sections, word: Word) -> int:
     """Read one section and return the offset behind it."""
     name = word.group().decode()
     if name in sections.offsets and name not in ("triangles", "material"):
-        source.warn(f"{name} occurs again: the last one counts", word.start())
+        source.warn("F007.skin-again", word.start(), section=name)
         check_declared(source, sections, name)
     sections.offsets[name] = word.start()
     if name == "material":
         material, position = read_material(source, word, KEYWORDS, sections.pictures)
         sections.materials.append(material)
         return position
-    count, position = _count(source, name, word)
+    count, position = read_count(source, name, word)
     if name == "bindings":
         sections.bindings, position = read_bindings(source, count, position)
         return position
     block = find_block(source, name, word, position)
-    sections.blocks[name], sections.counts[name] = block, count
+    sections.counts[name] = count
     if name == "skinweights":
         _read_weights(source, sections, block, count)
     elif name == "triangles":
@@ -135,45 +119,27 @@ def _read_section(source: Source, sections: Sections, word: Word) -> int:
     else:
         sections.tables[name] = _read_table(source, block, count)
     if not block.closed:
-        source.warn(f'the last "}}" is missing: {name} ends with the file')
+        source.warn("F006.last-brace", section=name)
     return block.end + block.closed
 
 
 def _read_table(source: Source, block: Block, count: int) -> Floats:
-    """Parse a table, NaN where it has faults that the source takes, and remember its rows."""
-    width = _WIDTHS[block.name]
-    if source.faults is None:
-        source.remember(
-            block.name, lambda row: source.number_offset(block.start, block.end, width * row)
-        )
-        return block_rows(source, block, count, width)
-    rows, offsets = mended_rows(source, block, count, width)
-    source.remember(block.name, lambda row: int(offsets[row]))
+    """Parse a table, NaN where it has faults, and remember its rows."""
+    rows, offset_of = read_rows(source, block, count, _WIDTHS[block.name])
+    source.remember(block.name, offset_of)
     return rows
 
 
 def _read_triangles(source: Source, sections: Sections, block: Block, count: int) -> TriangleRun:
-    material = len(sections.materials) - 1
-    if source.faults is None:
-        rows = block_rows(source, block, count, 3)
-        corners = whole_numbers(source, block, rows.ravel(), "a vertex index")
-        return TriangleRun(corners.reshape(-1, 3), material, block)
     first = sum(len(run.triangles) for run in sections.triangles)
-    rows, offsets = mended_rows(source, block, count, 3, first)
-    return TriangleRun(whole_corners(source, rows, offsets, first), material, block, offsets)
+    rows, offset_of = read_rows(source, block, count, 3, first, "triangle")
+    corners = whole_corners(source, rows, offset_of, first)
+    return TriangleRun(corners, len(sections.materials) - 1, offset_of)
 
 
 def _read_weights(source: Source, sections: Sections, block: Block, count: int) -> None:
-    if source.faults is None:
-        starts, joints, weights = read_weights(source, block, count)
-        source.remember(
-            "weights",
-            # Words before it: a count for each vertex, and two for each influence.
-            lambda row: source.number_offset(block.start, block.end, row + 2 * int(starts[row])),
-        )
-    else:
-        starts, joints, weights, offsets = mended_weights(source, block, count)
-        source.remember("weights", lambda row: int(offsets[row]))
+    starts, joints, weights, offset_of = read_weights(source, block, count)
+    source.remember("weights", offset_of)
     sections.starts, sections.joints, sections.weights = starts, joints, weights
 
 
@@ -186,27 +152,8 @@ def check_declared(source: Source, sections: Sections, name: str) -> None:
         found = len(sections.starts) - 1
     declared = sections.counts[name]
     if declared != found:
-        message = f"{name}: expected {declared} entries as its count says, found {found}"
-        source.refuse(source.error(message, sections.offsets[name]))
-
-
-def _count(source: Source, name: str, word: Word) -> tuple[int, int]:
-    """Read a section's count; refuse one that the rest of the file cannot hold."""
-    found = source.next_word(word.end())
-    if found is None:
-        raise source.error(f"{name}: expected a count, found the end of the file", word.start())
-    value = to_number(found.group())
-    if value is None or value != int(value) or value < 0:
-        raise source.error(f"{name}: expected a count, found {shown(found.group())}", found.start())
-    # Even an entry of one letter needs white space before it.
-    left = len(source.data) - found.end()
-    if value * 2 > left + 1:
-        raise source.error(
-            f"{name}: expected a count that the file can hold, found {int(value)} entries "
-            f"in {left} bytes",
-            found.start(),
-        )
-    return int(value), found.end()
+        offset = sections.offsets[name]
+        source.refuse("F002.skin-declared", offset, section=name, expected=declared, found=found)
 
 
 def _skip(source: Source, word: Word) -> int:
@@ -222,5 +169,5 @@ def _skip(source: Source, word: Word) -> int:
         if text == b"}" and depth == 0:
             return position
     if depth:
-        raise source.error(f"{shown(word.group())} is still open where the file ends", word.start())
+        raise source.fault("F002.open", word.start(), word=word.group())
     return position

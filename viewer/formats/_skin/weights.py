@@ -1,168 +1,219 @@
-"""The ``skinweights`` section of a ``.skin`` file."""
+"""The ``skinweights`` section of a ``.skin`` file.
+
+A count for each vertex, and that many pairs of joint and weight. Without faults the numbers are
+taken at once; otherwise every word is looked at, and a vertex that cannot be told has no influence.
+"""
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
-from viewer.formats._skin.blocks import Block, block_numbers, opened, to_whole, word_at
-from viewer.formats._source import Source, shown
-from viewer.formats._tolerant import read_words
+from viewer.formats._numbers import parse_numbers
+from viewer.formats._skin.blocks import Block, to_whole, words_of
+from viewer.formats._skin.influence_counts import find_heads
+from viewer.formats._skin.rows import OffsetOf
+from viewer.formats._source import Source
+from viewer.formats._tolerant import Words, refuse_words
 from viewer.rig.arrays import Floats, Ints
 
-__all__ = ["find_heads", "read_weights"]
+__all__ = ["read_weights"]
 
-_LEAP = 16  # vertices that one step of the Python loop passes over
-_SMALL = 1 << 29  # numbers for which three times their count is an int32
+Places = NDArray[np.int64]
+Influences = tuple[Ints, Ints, Floats, OffsetOf]
 
 
-def read_weights(source: Source, block: Block, count: int) -> tuple[Ints, Ints, Floats]:
-    """Return where each vertex's influences start, their joints and their weights.
+def read_weights(source: Source, block: Block, count: int) -> Influences:
+    """Parse the influences of all vertices.
 
     Parameters
     ----------
     source : Source
-        The file.
+        Takes the faults.
     block : Block
-        Where the numbers are: a count and that many pairs of joint and weight per vertex.
+        Where the numbers are.
     count : int
-        Number of vertices.
+        Vertices that the file declares; if it has others, those count.
+
+    Returns
+    -------
+    starts : (N + 1,)
+        Where the influences of each vertex begin; one that cannot be told has none.
+    joints, weights : (M,)
+        Both 0 where one is no number.
+    offset_of : callable
+        Gives the offset of a vertex.
 
     Raises
     ------
     FormatError
-        With vertex and line.
+        If it cannot be told which numbers belong to which vertex.
     """
-    values = block_numbers(source, block)
-    heads = find_heads(values, count)
-    if heads is None:
-        raise _explain(source, block, values, count)
+    values, bad = parse_numbers(source.data, block.start, block.end)
+    heads = find_heads(values, count) if bad < 0 else None
+    found = None if heads is None else _whole_influences(source, block, values, heads)
+    return _faulty_influences(source, block, count) if found is None else found
+
+
+def _whole_influences(
+    source: Source, block: Block, values: Floats, heads: NDArray[np.integer]
+) -> Influences | None:
+    """Return all influences, None if a joint is no whole number."""
     is_pair = np.ones(len(values), dtype=bool)
     is_pair[heads] = False
     pairs = values[is_pair].reshape(-1, 2)
     joints, wrong = to_whole(pairs[:, 0])
     if wrong >= 0:
-        place = int(np.flatnonzero(is_pair)[2 * wrong])
-        vertex = int(np.searchsorted(heads, place)) - 1
-        raise _error(source, block, vertex, place, "a joint index")
-    starts = np.zeros(count + 1, dtype=np.int32)
+        return None
+    starts = np.zeros(len(heads) + 1, dtype=np.int32)
     np.cumsum(values[heads].astype(np.int32), out=starts[1:])
     weights = pairs[:, 1].copy()
     starts.flags.writeable = weights.flags.writeable = False  # so that nobody has to copy them
-    return starts, joints, weights
+    begin, end = block.start, block.end
+
+    def offset_of(vertex: int) -> int:
+        # Words before it: a count for each vertex, and two for each influence.
+        return source.number_offset(begin, end, vertex + 2 * int(starts[vertex]))
+
+    return starts, joints, weights, offset_of
 
 
-def find_heads(values: Floats, count: int) -> NDArray[np.integer] | None:
-    """Return the places of the vertices' counts, (V,), or None if they do not fill the block.
-
-    Each count tells where the next one is, so they can only be followed one by one. Squaring
-    the map "place to next place" four times makes each step of that loop pass 16 vertices.
-    """
-    size = len(values)
-    if count == 0:
-        return None if size else np.zeros(0, np.int32)
-    # Two places behind the last: the end of the block, and beyond it; they lead to the latter.
-    kind: type[np.int32] | type[np.int64] = np.int32 if size < _SMALL else np.int64
-    after = np.full(size + 2, size + 1, dtype=kind)
-    counts: NDArray[Any] = np.clip(values, 0, size).astype(kind)
-    is_count = counts == values
-    counts *= 2
-    counts += np.arange(1, size + 1, dtype=kind)
-    is_count &= counts <= size
-    np.copyto(after[:size], counts, where=is_count)
-    leap = after
-    for _ in range(_LEAP.bit_length() - 1):
-        leap = leap[leap]
-    anchors = [0]
-    for _ in range((count - 1) // _LEAP):
-        anchors.append(int(leap[anchors[-1]]))
-    columns = [np.array(anchors, dtype=kind)]
-    for _ in range(_LEAP - 1):
-        columns.append(after[columns[-1]])
-    heads = np.stack(columns, axis=1).ravel()[:count]
-    fills = heads[-1] < size and after[heads[-1]] == size
-    return heads if fills else None
+def _faulty_influences(source: Source, block: Block, count: int) -> Influences:
+    words = words_of(source, block)
+    known = np.where(np.isnan(words.values), -1.0, words.values)
+    found = find_heads(known, count)
+    if found is not None:
+        heads = found.astype(np.int64)
+        fits = np.ones(len(heads), dtype=np.bool_)
+    else:
+        heads, sizes = words.rows()
+        # A line holds how many follow, and pairs.
+        fits = known[heads] * 2 + 1 == sizes
+        if not block.closed or fits.sum() * 2 <= len(fits):
+            raise _no_influences(source, block, words, known, count)
+    after = np.append(heads[1:], len(words.values))
+    _refuse_lines(source, words, heads, np.flatnonzero(~fits), after)
+    counts = np.where(fits, known[heads], 0).astype(np.int32)
+    starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+    owners = np.repeat(np.arange(len(heads)), counts)
+    # The joint of each influence follows the head of its vertex and two words for each before it.
+    places = heads[owners] + 1 + 2 * (np.arange(len(owners)) - starts[owners])
+    joints, weights = _faulty_pairs(source, words, places, owners)
+    offsets = words.offsets[heads]
+    return starts, joints, weights, lambda vertex: int(offsets[vertex])
 
 
-def _explain(source: Source, block: Block, values: Floats, count: int) -> FormatError:
-    """Follow the counts once more, slowly, to where they go wrong."""
-    misstated = _misstated(source, block, count)
-    if misstated is not None:
-        return misstated
-    numbers = values.tolist()
+def _refuse_lines(
+    source: Source, words: Words, heads: Places, vertices: Places, after: Places
+) -> None:
+    """Refuse lines whose number of words is not what their first word says."""
+    if len(vertices) == 0:
+        return
+    vertex = int(vertices[0])
+    head = int(heads[vertex])
+    is_count = words.values[head] >= 0 and words.values[head] % 1 == 0
+    if is_count:
+        source.refuse(
+            "F002.skin-influences",
+            int(words.offsets[head]),
+            len(vertices),
+            "weights",
+            vertices,
+            vertex=vertex,
+            pairs=words.word(head),
+            found=int(after[vertex]) - head - 1,
+        )
+    else:
+        source.refuse(
+            "F002.skin-influence-count",
+            int(words.offsets[head]),
+            len(vertices),
+            "weights",
+            vertices,
+            vertex=vertex,
+            found=words.word(head),
+        )
+
+
+def _faulty_pairs(
+    source: Source, words: Words, places: Places, owners: Places
+) -> tuple[Ints, Floats]:
+    """Return joints and weights, both 0 where one is no number."""
+    joints, weights = words.values[places], words.values[places + 1]
+    bad = np.flatnonzero(np.isnan(np.stack([joints, weights], axis=1)).any(axis=1))
+    at = np.where(np.isnan(joints[bad]), places[bad], places[bad] + 1)
+    vertices = dict(zip(at.tolist(), owners[bad].tolist(), strict=True))
+    refuse_words(
+        source,
+        words,
+        at,
+        lambda word: Phrase("of-vertex", section="skinweights", index=vertices[word]),
+        "weights",
+        owners[bad],
+    )
+    whole, _ = to_whole(np.nan_to_num(joints, nan=0.0))
+    wrong = np.flatnonzero(~np.isnan(joints) & (whole != joints))
+    if len(wrong):
+        place = int(places[wrong[0]])
+        source.refuse(
+            "F002.skin-joint",
+            int(words.offsets[place]),
+            len(wrong),
+            "weights",
+            owners[wrong],
+            vertex=int(owners[wrong[0]]),
+            found=words.word(place),
+        )
+    lost = np.isnan(joints) | np.isnan(weights) | (whole != joints)
+    return np.where(lost, 0, whole).astype(np.int32), np.where(lost, 0.0, weights)
+
+
+def _no_influences(
+    source: Source, block: Block, words: Words, known: Floats, count: int
+) -> FormatError:
+    """Follow the counts, slowly, to where they go wrong."""
+    numbers = known.tolist()
     heads: list[int] = []
     position = 0
     while position < len(numbers) and len(heads) < count:
         heads.append(position)
         length = numbers[position]
         if length < 0 or length != int(length):
-            return _error(source, block, len(heads) - 1, position, "a number of influences")
+            return source.fault(
+                "F002.skin-influence-count",
+                int(words.offsets[position]),
+                vertex=len(heads) - 1,
+                found=words.word(position),
+            )
         position += 1 + 2 * int(length)
-    return _count_error(source, block, count, heads, len(numbers))
+    return _count_fault(source, block, words, count, heads)
 
 
-def _misstated(source: Source, block: Block, count: int) -> FormatError | None:
-    """Return the error of a line whose count is not that of its pairs, or of too many lines.
-
-    Lines mean nothing to the format. Only where most are a vertex each do they tell more than the
-    counts, which all shift behind one that is wrong; None for other files.
-    """
-    words = read_words(source.data, block.start, block.end)
-    heads, sizes = words.rows()
-    fits = words.values[heads] * 2 + 1 == sizes
-    if not block.closed or fits.sum() * 2 <= len(fits):
-        return None
-    wrong = np.flatnonzero(~fits)
-    if len(wrong) == 0:
-        return source.error(
-            f"skinweights: expected {count} vertices, found {len(heads)} "
-            f"(to line {source.line(block.end)})",
-            block.count,
-        )
-    vertex = int(wrong[0])
-    head = int(heads[vertex])
-    stated = words.values[head]
-    if stated < 0 or stated % 1:
-        return _error(source, block, vertex, head, "a number of influences")
-    return source.error(
-        f"skinweights of vertex {vertex}: expected {shown(words.word(head))[1:-1]} pairs of joint "
-        f"and weight, found {int(sizes[vertex]) - 1} numbers in the line",
-        int(words.offsets[head]),
-    )
-
-
-def _error(source: Source, block: Block, vertex: int, place: int, wanted: str) -> FormatError:
-    offset, word = word_at(source, block, place)
-    return source.error(
-        f"skinweights of vertex {vertex}: expected {wanted}, found {shown(word)}", offset
-    )
-
-
-def _count_error(
-    source: Source, block: Block, count: int, heads: list[int], n_numbers: int
+def _count_fault(
+    source: Source, block: Block, words: Words, count: int, heads: list[int]
 ) -> FormatError:
     if not block.closed:
-        return source.error(
-            f'expected "}}" to close {opened(source, block)}, found the end of the file '
-            f"after {len(heads)} of {count} vertices",
-            len(source.data.rstrip()),
+        return source.fault(
+            "F002.skin-weights-end",
+            source.end,
+            line=source.line(block.header),
+            found=len(heads),
+            expected=count,
         )
     if len(heads) < count:
-        return source.error(
-            f"skinweights: expected {count} vertices, found {len(heads)} "
-            f"(to line {source.line(block.end)})",
-            block.count,
+        end = source.line(block.end)
+        return source.fault(
+            "F002.skin-weights", block.count, expected=count, found=len(heads), end=end
         )
     if count == 0:
-        return source.error(
-            f"skinweights: expected no vertices, found {n_numbers} numbers", block.count
-        )
-    offset, word = word_at(source, block, heads[-1])
-    return source.error(
-        f"skinweights of vertex {count - 1}, the last: expected {word.decode()} pairs of joint "
-        f"and weight, found {n_numbers - heads[-1] - 1} numbers up to the closing brace",
-        offset,
+        return source.fault("F002.skin-no-weights", block.count, found=len(words.values))
+    head = heads[-1]
+    return source.fault(
+        "F002.skin-influences-end",
+        int(words.offsets[head]),
+        vertex=count - 1,
+        pairs=words.word(head),
+        found=len(words.values) - head - 1,
     )

@@ -40,7 +40,7 @@ def model_shapes(
 ) -> BlendShapes | None:
     """Return shape and expression directions, read when first used."""
     if not archive.has("shapedirs"):
-        source.warn("no `shapedirs`: one fixed shape")
+        source.warn("F007.smpl-shapedirs")
         return None
     array = archive.array("shapedirs", (n_vertices, 3, "S"))
     count = array.shape[2]
@@ -93,7 +93,7 @@ def model_uvs(
     uvs = finite(archive, "vt", archive.array("vt", ("U", 2)).values())
     corners = archive.array("ft", (n_triangles, 3)).values()
     if not are_indices(corners, len(uvs)):
-        source.warn("`vt` and `ft` do not fit each other: left out")
+        source.warn("F007.smpl-uvs")
         return None, None
     used += ["vt", "ft"]
     return uvs, corners.astype(np.int32)
@@ -107,11 +107,11 @@ def model_symmetry(
         return None
     partners = archive.array("vert_sym_idxs", (n_vertices,)).values()
     if not are_indices(partners, n_vertices):
-        source.warn("`vert_sym_idxs` refers to vertices that do not exist: left out")
+        source.warn("F007.smpl-symmetry-range")
         return None
     indices = partners.astype(np.int32)
     if (indices[indices] != np.arange(n_vertices)).any():
-        source.warn("`vert_sym_idxs` does not pair vertices: left out")
+        source.warn("F007.smpl-symmetry")
         return None
     used.append("vert_sym_idxs")
     return indices
@@ -127,7 +127,7 @@ def model_keypoints(
     shares = archive.array("lmk_bary_coords", (len(faces), 3)).values()
     weights = finite(archive, "lmk_bary_coords", shares)
     if not are_indices(faces, mesh.n_triangles):
-        source.warn("`lmk_faces_idx` refers to triangles that do not exist: left out")
+        source.warn("F007.smpl-landmarks")
         return None
     used += ["lmk_faces_idx", "lmk_bary_coords"]
     return Keypoints(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
+from viewer.diagnostics import Diagnostic
 from viewer.rig.captures.camera_view import CameraView
 from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.motion.body_motion import BodyMotion
@@ -24,14 +25,14 @@ class CapturePart:
         Only the rows of this part; their ``timing`` spans the whole capture, -1 elsewhere.
     points : mapping of person to (PointLayout, PointClip)
         The same for keypoints.
-    warnings : tuple of str
-        What the reader noticed in these frames, one line each.
+    warnings : tuple of Diagnostic
+        What the reader noticed in these frames.
     """
 
     stop: int
     bodies: dict[int, BodyMotion] = field(default_factory=dict)
     points: dict[int, tuple[PointLayout, PointClip]] = field(default_factory=dict)
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Diagnostic, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,7 +56,7 @@ class Capture:
         Calibrated cameras.
     model : str
         The member of the SMPL family that its bodies are, e.g. ``"SMPL+H"``; empty for none.
-    warnings : tuple of str
+    warnings : tuple of Diagnostic
         What was noticed when looking.
     """
 
@@ -66,4 +67,4 @@ class Capture:
     up: str = ""
     views: tuple[CameraView, ...] = ()
     model: str = ""
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Diagnostic, ...] = ()

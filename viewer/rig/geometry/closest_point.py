@@ -8,7 +8,9 @@ of different size go into different trees: one large r would make every search a
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain, pairwise
 from typing import Any
 
 import numpy as np
@@ -21,10 +23,12 @@ __all__ = ["Surface", "SurfacePoints", "interpolate"]
 
 _PAIRS = 1 << 19  # pairs of point and piece looked at together; some 150 bytes each
 _LONG = 3.0  # pieces are cut above this many times the median radius
-_NEAREST = 8  # pieces asked for at first; four times as many where the bound is not reached
+_NEAREST = 8  # pieces asked for at first; where that is not all, all within the bound
+_POINTS = 1 << 16  # points looked at together
 _FLAT = 1e-20  # sin^2 of an angle below which a triangle counts as a segment
 # Bounds of radii are rounded up by this much, so that no triangle is missed by a last digit.
 _SLACK = 1.0 + 1e-9
+_ROUNDED = 1e-12  # and squared distances by this share of the larger ones they are the rest of
 _FEW = 10_000  # points for which starting threads takes longer than it saves
 
 
@@ -88,7 +92,7 @@ class Surface:
         # Far from the origin float64 has fewer digits left for what is near.
         self._center = positions.mean(axis=0)
         self._corners = (positions - self._center)[triangles]
-        self._levels = _levels(self._corners)
+        self._all, self._levels = _levels(self._corners)
 
     def closest(self, points: Floats) -> SurfacePoints:
         """Find the closest point of the surface to each point.
@@ -110,9 +114,8 @@ class Surface:
         """
         points = frozen("points", points, (None, 3)) - self._center
         found = np.zeros(len(points), dtype=np.int32)
-        block = _PAIRS // _NEAREST
-        for start in range(0, len(points), block):
-            part = slice(start, start + block)
+        for start in range(0, len(points), _POINTS):
+            part = slice(start, start + _POINTS)
             found[part] = self._search(points[part])
         corners = self._corners[found]
         barycentric = _barycentric(points, corners)
@@ -124,62 +127,68 @@ class Surface:
         """Return the closest triangle of each point."""
         best = np.zeros(len(points), dtype=np.int32)
         nearest = np.full(len(points), np.inf)
-        for level in self._levels:  # a first guess, which makes the bounds below short
-            pieces = level.tree.query(points, workers=_workers(len(points)))[1]
-            self._keep_nearer(points, level.triangles[pieces][:, None], best, nearest)
+        # A first guess makes the bounds below short. It is found again there, so that of equally
+        # near triangles always the same one is taken.
+        pieces = self._all.tree.query(points, workers=_workers(len(points)))[1]
+        self._keep_nearer(self._all, points, np.arange(len(points)), pieces, best, nearest)
+        nearest = np.nextafter(nearest, np.inf)
         for level in self._levels:
-            pending = np.arange(len(points))
-            count = min(_NEAREST, len(level.triangles))
-            while len(pending):
-                pending = self._look(level, count, points, pending, best, nearest)
-                count = min(4 * count, len(level.triangles))
+            self._look(level, points, best, nearest)
         return best
 
-    def _look(
-        self, level: _Level, count: int, points: Floats, pending: Any, best: Ints, nearest: Floats
-    ) -> Any:
-        """Look at the nearest pieces of some points; return the points that need more."""
-        left = []
-        block = max(1, _PAIRS // count)
-        for start in range(0, len(pending), block):
-            part = pending[start : start + block]
-            reach = float(nearest[part].max() + level.radius) * _SLACK
-            # ``range`` as k keeps the second axis where only one piece is asked for.
-            distances, pieces = level.tree.query(
-                points[part],
-                k=range(1, count + 1),
-                distance_upper_bound=reach,
-                workers=_workers(len(part)),
-            )
-            is_piece = pieces < len(level.triangles)  # beyond the reach the tree gives none
-            pieces[~is_piece] = 0
-            lowest = distances - _SLACK * level.radii[pieces]
-            near = is_piece & (lowest < nearest[part, None])
-            candidates = np.where(near, level.triangles[pieces], np.int32(-1))
-            guess, found = best[part], nearest[part]
-            self._keep_nearer(points[part], candidates, guess, found)
-            best[part], nearest[part] = guess, found
-            reached = ~is_piece[:, -1] | (distances[:, -1] - _SLACK * level.radius > found)
-            left.append(part[~reached])
+    def _look(self, level: _Level, points: Floats, best: Ints, nearest: Floats) -> None:
+        """Look at all pieces of a level that may be nearer than what has been found."""
+        count = min(_NEAREST, len(level.triangles))
+        workers = _workers(len(points))
+        reach = float(nearest.max(initial=0.0) + level.radius) * _SLACK
+        # ``range`` as k keeps the second axis where only one piece is asked for.
+        distances, pieces = level.tree.query(
+            points, k=range(1, count + 1), distance_upper_bound=reach, workers=workers
+        )
+        # Beyond the reach the tree gives none.
+        near = (pieces < len(level.triangles)) & (
+            distances - _SLACK * level.radii[pieces % len(level.triangles)] < nearest[:, None]
+        )
+        rows, columns = np.nonzero(near)
+        self._keep_nearer(level, points, rows, pieces[rows, columns], best, nearest)
         if count == len(level.triangles):
-            return pending[:0]
-        return np.concatenate(left)
+            return
+        farthest = distances[:, -1]  # infinite beyond the reach
+        more = np.flatnonzero(farthest - _SLACK * level.radius <= nearest)
+        reaches = (nearest[more] + level.radius) * _SLACK
+        counts = level.tree.query_ball_point(
+            points[more], reaches, return_length=True, workers=workers
+        )
+        for part in _blocks(counts):
+            lists = level.tree.query_ball_point(
+                points[more[part]], reaches[part], return_sorted=False, workers=workers
+            )
+            total = int(counts[part].sum())
+            found = np.fromiter(chain.from_iterable(lists), dtype=np.intp, count=total)
+            self._keep_nearer(
+                level, points, np.repeat(more[part], counts[part]), found, best, nearest
+            )
 
-    def _keep_nearer(self, points: Floats, candidates: Ints, best: Ints, nearest: Floats) -> None:
-        """Put the nearest of some candidates (N, K), -1 for none, into best and nearest."""
-        rows, columns = np.nonzero(candidates >= 0)
-        corners = self._corners[candidates[rows, columns]]
-        offsets = points[rows]
-        barycentric = _barycentric(offsets, corners)
-        offsets -= np.einsum("nk,nka->na", barycentric, corners)
-        distances = np.full(candidates.shape, np.inf)
-        distances[rows, columns] = np.sqrt(np.einsum("na,na->n", offsets, offsets))
-        column = distances.argmin(axis=1)
-        every = np.arange(len(points))
-        lowest = distances[every, column]
-        nearer = lowest < nearest
-        best[nearer] = candidates[every, column][nearer]
-        nearest[nearer] = lowest[nearer]
+    def _keep_nearer(
+        self, level: _Level, points: Floats, rows: Any, pieces: Any, best: Ints, nearest: Floats
+    ) -> None:
+        """Put the nearest of some pieces, each for a row of points, into best and nearest.
+
+        Of equally near ones that whose centroid is nearest is taken.
+        """
+        offsets = points[rows] - level.centers[pieces]
+        apart = _dot(offsets, offsets)
+        kept = np.flatnonzero(_may_be_nearer(level, pieces, offsets, apart, nearest[rows]))
+        rows, apart, triangles = rows[kept], apart[kept], level.triangles[pieces[kept]]
+        corners, offsets = self._corners[triangles], points[rows]
+        offsets -= np.einsum("nk,nka->na", _barycentric(offsets, corners), corners)
+        distances = np.sqrt(_dot(offsets, offsets))
+        order = np.lexsort((apart, distances, rows))
+        found, first = np.unique(rows[order], return_index=True)
+        winners = order[first]
+        nearer = distances[winners] < nearest[found]
+        best[found[nearer]] = triangles[winners[nearer]]
+        nearest[found[nearer]] = distances[winners[nearer]]
 
 
 def interpolate(found: SurfacePoints, triangles: Ints, values: Any) -> Any:
@@ -217,32 +226,35 @@ def interpolate(found: SurfacePoints, triangles: Ints, values: Any) -> Any:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Level:
-    """Pieces of similar size: a tree of their centroids, their radii and triangles."""
+    """Pieces of similar size: a tree of their centroids, their normals, radii and triangles."""
 
     tree: Any
+    centers: Floats
+    normals: Floats
     radii: Floats
     triangles: Ints
     radius: float
 
+    @classmethod
+    def of(cls, pieces: Floats, triangles: Ints) -> _Level:
+        """Return pieces (P, 3, 3) of triangles (P,) ready to be searched."""
+        centers, radii = pieces.mean(axis=1), _radii(pieces)
+        tree = scipy_part("spatial").cKDTree(centers)
+        return cls(tree, centers, _normals(pieces), radii, triangles, float(radii.max()))
 
-def _levels(corners: Floats) -> list[_Level]:
-    """Sort pieces of triangles (T, 3, 3) into trees by size, each up to twice the last one's."""
+
+def _levels(corners: Floats) -> tuple[_Level, list[_Level]]:
+    """Cut triangles (T, 3, 3) into pieces: all of them, and by size, up to twice the last one's."""
     pieces, triangles = _pieces(corners)
-    centroids = pieces.mean(axis=1)
     radii = _radii(pieces)
     smallest = float(np.median(radii)) / 2.0
     if smallest > 0.0:
         size = np.ceil(np.log2(np.maximum(radii / smallest, 1.0))).astype(int)
     else:
         size = np.zeros(len(radii), dtype=int)
-    spatial = scipy_part("spatial")
-    levels = []
-    for value in np.unique(size):
-        inside = np.nonzero(size == value)[0]
-        tree = spatial.cKDTree(centroids[inside])
-        largest = float(radii[inside].max())
-        levels.append(_Level(tree, radii[inside], triangles[inside], largest))
-    return levels
+    parts = (np.nonzero(size == value)[0] for value in np.unique(size))
+    levels = [_Level.of(pieces[part], triangles[part]) for part in parts]
+    return (levels[0] if len(levels) == 1 else _Level.of(pieces, triangles)), levels
 
 
 def _pieces(corners: Floats) -> tuple[Floats, Ints]:
@@ -278,6 +290,41 @@ def _halves(pieces: Floats) -> tuple[Floats, Floats]:
     a, b, c = np.moveaxis(np.take_along_axis(pieces, order[:, :, None], axis=1), 1, 0)
     middle = 0.5 * (a + b)
     return np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)
+
+
+def _normals(pieces: Floats) -> Floats:
+    """Return the unit normals of pieces (T, 3, 3), 0 for those without area: (T, 3)."""
+    normals = np.cross(pieces[:, 1] - pieces[:, 0], pieces[:, 2] - pieces[:, 0])
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals /= np.where(lengths > 0.0, lengths, 1.0)
+    return normals
+
+
+def _may_be_nearer(
+    level: _Level, pieces: Any, offsets: Floats, apart: Floats, nearest: Floats
+) -> Bools:
+    """Tell which pieces may be nearer than the nearest so far: all that are, and few others.
+
+    A piece lies in a disc of its radius r around its centroid. With h the height of the point
+    above the disc's plane, a the distance from the centroid and s = sqrt(a^2 - h^2), the disc is
+    sqrt(h^2 + max(0, s - r)^2) away. From afar that rules out all but the pieces below the point,
+    where a - r, the distance from the sphere of that radius, leaves a wide circle of them.
+    """
+    squared_heights = _dot(offsets, level.normals[pieces]) ** 2
+    beside = np.sqrt(np.maximum(apart - squared_heights, 0.0))
+    beyond = np.maximum(beside - level.radii[pieces] * _SLACK, 0.0)
+    # a^2 is far larger than what is compared where a large triangle is almost touched.
+    bound = nearest**2 * _SLACK + _ROUNDED * apart
+    result: Bools = squared_heights + beyond**2 <= bound
+    return result
+
+
+def _blocks(counts: Ints) -> Iterator[slice]:
+    """Yield slices of points with about as many pairs as may be looked at together."""
+    block = np.cumsum(counts) // _PAIRS
+    starts = np.flatnonzero(np.diff(block, prepend=-1))
+    for start, stop in pairwise([*starts, len(counts)]):
+        yield slice(int(start), int(stop))
 
 
 def _radii(pieces: Floats) -> Floats:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError, counted
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.coefficients import apply_coefficients
@@ -94,7 +95,7 @@ class PosePartError(RigError):
 
     Parameters
     ----------
-    message : object
+    problem : RigError
         What is wrong.
     part : str
         ``"dofs"``, ``"vector"``, ``"shape"``, ``"expression"`` or a name in ``parts``.
@@ -102,9 +103,9 @@ class PosePartError(RigError):
         Of the DOF, empty for other parts.
     """
 
-    def __init__(self, message: object, part: str, name: str = "") -> None:
+    def __init__(self, problem: RigError, part: str, name: str = "") -> None:
         self.part, self.name = part, name
-        super().__init__(str(message))
+        super().__init__(problem.diagnostic or str(problem))
 
 
 @contextmanager
@@ -264,7 +265,8 @@ def _dof(figure: Figure, label: str) -> int:
         return find_dof(figure.skeleton, label)
     except RigError as problem:
         why = str(problem).removeprefix(f'"{label}": ')  # once is enough
-        raise RigError(f'expected a DOF of {figure.name}, found "{label}": {why}') from None
+        values = {"figure": figure.name, "found": label, "reason": why}
+        raise RigError(Diagnostic("F002.pose-unknown-dof", values=values)) from None
 
 
 def _beyond_limits(skeleton: Skeleton, dofs: Floats) -> list[str]:
@@ -284,11 +286,10 @@ def _apply_vector(vector: Floats, figure: Figure, pose: Pose) -> list[str]:
         read_vector(layout, skeleton, pose, vector)
         return _beyond_limits(skeleton, vector) if layout is None else []
     is_family = "pelvis" in skeleton.names and layout is not None and layout.translation < 0
-    if not is_family:
-        raise RigError(f"expected {own} pose numbers for {figure.name}, found {len(vector)}")
-    names = members_by_numbers().get(len(vector))
+    names = members_by_numbers().get(len(vector)) if is_family else None
     if names is None:
-        raise RigError(f"expected {own} pose numbers for {figure.name}, found {len(vector)}")
+        values = {"expected": own, "figure": figure.name, "found": len(vector)}
+        raise RigError(Diagnostic("F002.pose-vector", values=values))
     # Joints that this model has and the vector's model has not go to rest.
     joints = np.arange(skeleton.n_joints, dtype=np.int32)
     wanted = np.zeros((skeleton.n_joints, 3))
@@ -320,7 +321,7 @@ def _apply_part(
             return [f"{name}: {figure.name} has no such joint, left out"]
         return []
     if len(values) != 3:
-        raise RigError(f"{name}: expected 3 numbers, found {len(values)}")
+        raise _odd_length(name, 3, len(values))
     _turn(figure, pose, np.array([skeleton.names.index(known[0])], dtype=np.int32), values)
     return []
 
@@ -333,11 +334,16 @@ def _apply_body(values: Floats, figure: Figure, pose: Pose) -> list[str]:
     own = _BODY if has_more else skeleton.n_joints - 1
     most = _LONGEST_BODY if has_more else own
     if len(values) % 3 or len(values) > 3 * most:
-        wanted = f"3 numbers a joint, of up to {most} joints"
-        raise RigError(f"body_pose: expected {wanted}, found {counted(len(values), 'number')}")
+        numbers = {"most": most, "found": len(values)}
+        raise RigError(Diagnostic("F002.pose-body", values=numbers))
     taken = values[: 3 * own]
     _turn(figure, pose, np.arange(1, len(taken) // 3 + 1, dtype=np.int32), taken)
     return [_left_out(values[3 * own :], own)] if values[3 * own :].any() else []
+
+
+def _odd_length(name: str, expected: int, found: int) -> RigError:
+    values = {"item": name, "expected": expected, "found": found}
+    return RigError(Diagnostic("F002.pose-part", values=values))
 
 
 def _left_out(rest: Floats, own: int) -> str:
@@ -381,7 +387,7 @@ def _apply_hand(
     elif len(values) == 45:
         vectors = (values + (0.0 if flat else hand.mean)).reshape(-1, 3)
     else:
-        raise RigError(f"{name}: expected 45 numbers, found {len(values)}")
+        raise _odd_length(name, 45, len(values))
     _turn(figure, pose, hand.joints, vectors.ravel())
     return []
 

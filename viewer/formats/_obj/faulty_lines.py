@@ -1,34 +1,25 @@
-"""Lines of a broken ``.obj``: every fault is noted, and something neutral stands in its place."""
+"""Lines of an ``.obj`` with faults: each is recorded, and something neutral stands in its place."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable
-
 import numpy as np
 
-from viewer.errors import FormatError
-from viewer.formats._faults import Part
-from viewer.formats._numbers import parse_words, word_begins
-from viewer.formats._obj.faces import CORNER, CORNER_KINDS, FEWEST, FaceRows, fits_corner
-from viewer.formats._obj.lines import Lines, Places, Rows, rows_of
+from viewer.diagnostics import Part, Phrase
+from viewer.formats._numbers import parse_words, to_number, word_begins
+from viewer.formats._obj.faces import CORNER_KINDS, FEWEST, CornerFault, FaceRows, fits_corner
+from viewer.formats._obj.lines import Lines, NumberRows, Places, Rows, rows_of
 from viewer.formats._polygons import first_known, triangles_of
-from viewer.formats._source import Source, shown
+from viewer.formats._source import Source
 from viewer.formats._tolerant import Words, refuse_words
-from viewer.rig.arrays import Bools, Floats
+from viewer.rig.arrays import Bools
 
-__all__ = ["mended_faces", "mended_rows", "settled_corners"]
+__all__ = ["checked_corners", "faulty_faces", "faulty_rows"]
 
-_ITEMS = {"v": "v of vertex", "vt": "vt", "vn": "vn"}
-_ZERO = re.compile(rb"(?:\A|/)[+-]?0+(?:\.0*)?(?:/|\Z)")
-_NOTHING: Part = ""
 _LOST = -(2**40)
 """In place of a vertex that cannot be told: no file has so many."""
 
 
-def mended_rows(
-    source: Source, lines: Lines, keyword: str, width: int, first: int
-) -> tuple[Floats, Places, Floats, Rows]:
+def faulty_rows(source: Source, lines: Lines, keyword: str, width: int, first: int) -> NumberRows:
     """Parse the numbers behind a keyword; see ``number_rows``.
 
     Parameters
@@ -59,30 +50,37 @@ def mended_rows(
     part: Part = "positions" if keyword == "v" else ""
     bad = words.bad
     is_used = bad - firsts[owners[bad]] < width
-    for chosen, whose in ((is_used, part), (~is_used, _NOTHING)):
+    parts: tuple[Part, Part] = (part, "")  # further numbers are nothing that checks look at
+    for chosen, whose in zip((is_used, ~is_used), parts, strict=True):
+        owned = owners[bad[chosen]] + first
         refuse_words(
             source,
             words,
             bad[chosen],
-            lambda word: f"{_ITEMS[keyword]} {owners[word] + first}",
+            lambda word: Phrase(f"obj-{keyword}", index=int(owners[word]) + first),
             whose,
-            owners[bad[chosen]] + first,
+            owned,
         )
     short = np.flatnonzero(counts < width)
     if len(short):
-        error = source.error(
-            f"{_ITEMS[keyword]} {short[0] + first}: expected {width} numbers, "
-            f"found {counts[short[0]]}",
-            int(rows.origins[short[0]]) - 1,
+        row = int(short[0])
+        source.refuse(
+            "F002.width",
+            int(rows.origins[row]) - 1,
+            len(short),
+            part,
+            short + first,
+            item=Phrase(f"obj-{keyword}", index=row + first),
+            expected=width,
+            found=int(counts[row]),
         )
-        source.refuse(error, len(short), part, short + first)
     table = np.full((len(counts), width), np.nan)
     long = counts >= width
     table[long] = values[firsts[:-1][long, None] + np.arange(width)]
     return table, counts, values, rows
 
 
-def mended_faces(source: Source, lines: Lines, before: dict[str, int]) -> FaceRows:
+def faulty_faces(source: Source, lines: Lines, before: dict[str, int]) -> FaceRows:
     """Read the faces of some lines; see ``read_faces``.
 
     Parameters
@@ -105,37 +103,38 @@ def mended_faces(source: Source, lines: Lines, before: dict[str, int]) -> FaceRo
     owners = np.repeat(np.arange(len(counts)), counts)
     small = np.flatnonzero(counts < FEWEST)
     if len(small):
-        found = f"f: expected {FEWEST} or more corners, found {counts[small[0]]}"
-        source.refuse(source.error(found, int(rows.origins[small[0]]) - 1), len(small))
+        offset = int(rows.origins[small[0]]) - 1
+        found = int(counts[small[0]])
+        source.refuse("F002.obj-face", offset, len(small), least=FEWEST, found=found)
     written, lost = _corners(rows, begins)
     kept = counts >= FEWEST
     places = (np.cumsum(kept) - 1)[owners]
     faults = []
     broken = np.flatnonzero(lost & kept[owners])
     if len(broken):
-        error = _corner_error(source, rows.offset(int(begins[broken[0]])))
-        faults.append((error, len(broken), places[broken]))
-    for column, (keyword, kind) in enumerate(CORNER_KINDS.items()):
+        offset = rows.offset(int(begins[broken[0]]))
+        faults.append(_corner_fault(source, offset, places[broken]))
+    for column, keyword in enumerate(CORNER_KINDS):
         numbers = written[:, column]
         known = before[keyword] + np.searchsorted(lines.of[keyword], lines.of["f"])[owners]
         far = np.flatnonzero((-numbers > known) & ~lost & kept[owners])
         if len(far):
-            limits = f"-1 to {-known[far[0]]}" if known[far[0]] else "after the first"
+            values = {"least": -int(known[far[0]]), "found": int(numbers[far[0]])}
+            key = f"F002.obj-{keyword}-back" if known[far[0]] else f"F002.obj-{keyword}-early"
             offset = rows.offset(int(begins[far[0]]))
-            error = _index_error(source, kind, limits, int(numbers[far[0]]), offset)
-            faults.append((error, len(far), places[far]))
+            faults.append(CornerFault(key, offset, values, places[far]))
             lost[far] = True
         numbers[numbers < 0] += known[numbers < 0] + 1
     written[lost] = _LOST, 0, 0
     return FaceRows(counts[kept], written[kept[owners]] - 1, rows.origins[kept] - 1, tuple(faults))
 
 
-def _corner_error(source: Source, offset: int) -> FormatError:
-    word = source.next_word(offset)
-    assert word is not None  # it was found there
-    if _ZERO.search(word.group()):
-        return source.error("f: expected an index from 1, found 0", offset)
-    return source.error(f"f: {CORNER}, found {shown(word.group())}", offset)
+def _corner_fault(source: Source, offset: int, faces: Places) -> CornerFault:
+    found = source.next_word(offset)
+    word = b"" if found is None else found.group()
+    if any(to_number(number) == 0.0 for number in word.split(b"/")):
+        return CornerFault("F002.obj-zero", offset, {}, faces)
+    return CornerFault("F002.obj-corner", offset, {"found": word}, faces)
 
 
 def _corners(rows: Rows, begins: Places) -> tuple[Places, Bools]:
@@ -158,10 +157,8 @@ def _corners(rows: Rows, begins: Places) -> tuple[Places, Bools]:
     return whole, lost
 
 
-def settled_corners(
-    source: Source, faces: list[FaceRows], ends: dict[str, int], limit: Callable[[str], str]
-) -> Places:
-    """Return the corners of all faces, those that nothing has replaced by others of their face.
+def checked_corners(source: Source, faces: list[FaceRows], ends: dict[str, int]) -> Places:
+    """Return the corners of all faces, those of nothing replaced by others of their face.
 
     Parameters
     ----------
@@ -171,34 +168,44 @@ def settled_corners(
         All of the file.
     ends : dict of str to int
         How many lines of each keyword there are.
-    limit : callable
-        Says which indices a keyword allows.
 
     Returns
     -------
     (C, 3)
         Of texture coordinates and normals -1 where the index is wrong.
     """
-    counts = np.concatenate([np.zeros(0, np.int64), *(rows.counts for rows in faces)])
     corners = np.concatenate([np.zeros((0, 3), np.int64), *(rows.corners for rows in faces)])
+    limits = np.array([ends[keyword] for keyword in CORNER_KINDS])
+    if not any(rows.faults for rows in faces) and (corners < limits).all():
+        return corners
+    counts = np.concatenate([np.zeros(0, np.int64), *(rows.counts for rows in faces)])
     offsets = np.concatenate([np.zeros(0, np.int64), *(rows.offsets for rows in faces)])
     first = 0
     for rows in faces:
-        for error, count, places in rows.faults:
-            source.refuse(error, count, "triangles", triangles_of(counts, places + first))
+        for fault in rows.faults:
+            triangles = triangles_of(counts, fault.faces + first)
+            source.refuse(
+                fault.key,
+                fault.offset,
+                len(fault.faces),
+                "triangles",
+                triangles,
+                **fault.values,
+            )
         first += len(rows.counts)
     owners = np.repeat(np.arange(len(counts)), counts)
-    for column, (keyword, kind) in enumerate(CORNER_KINDS.items()):
+    for column, keyword in enumerate(CORNER_KINDS):
         wrong = np.flatnonzero(corners[:, column] >= ends[keyword])
         if len(wrong):
-            error = _index_error(source, kind, limit(keyword), corners[wrong[0], column] + 1,
-                                 int(offsets[owners[wrong[0]]]))  # fmt: skip
-            part: Part = "triangles" if column == 0 else ""
-            source.refuse(error, len(wrong), part, triangles_of(counts, owners[wrong]))
+            source.refuse(
+                f"F002.obj-{keyword}-range" if ends[keyword] else f"F002.obj-{keyword}-none",
+                int(offsets[owners[wrong[0]]]),
+                len(wrong),
+                "triangles" if column == 0 else "",
+                triangles_of(counts, owners[wrong]),
+                limit=ends[keyword],
+                found=int(corners[wrong[0], column]) + 1,
+            )
             corners[wrong, column] = -1
     corners[:, 0] = first_known(corners[:, 0], counts, owners)
     return corners
-
-
-def _index_error(source: Source, kind: str, limits: str, found: int, offset: int) -> FormatError:
-    return source.error(f"f: expected a {kind} {limits}, found {found}", offset)

@@ -1,4 +1,4 @@
-"""Every finding's code: how bad it is, what it is called, and what to do about it."""
+"""The codes of diagnostics: severity, title and cure of each."""
 
 from __future__ import annotations
 

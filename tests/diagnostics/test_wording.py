@@ -1,0 +1,85 @@
+"""Every message renders, and every call gives the values that its template shows."""
+
+from __future__ import annotations
+
+import ast
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import viewer
+from viewer.diagnostics import CODES, MESSAGES, Diagnostic, Phrase
+from viewer.diagnostics.template import fields
+from viewer.diagnostics.wording import PHRASES
+
+ROOT = Path(viewer.__file__).parent
+CALLS = {
+    "fault": {"offset"},
+    "refuse": {"offset", "count", "part", "places"},
+    "warn": {"offset", "count", "part", "places"},
+    "found": {"part", "severity", "vertices", "triangles", "joints", "frames", "times", "seek",
+              "at"},
+    "Phrase": set(),
+    "note": {"path", "line", "part", "places"},
+}  # fmt: skip
+"""Functions that take a key and values, and their other keywords."""
+
+
+def sample(spec: str) -> Any:
+    """Return a value that a specification can show."""
+    if spec[:1] in "#?" and spec:
+        return 3
+    if spec == "word":
+        return b"x"
+    if spec.startswith("list") or spec in ("axes", "or"):
+        return ["first", "second\n"]
+    if spec in ("text", "name", "quoted") or spec.startswith("+"):
+        return "x\ny"  # may come from a file
+    return 1.5 if re.fullmatch(r"[+,.\d]*[efg%]", spec) else 3 if spec == "d" else "x"
+
+
+@pytest.mark.parametrize("key", MESSAGES)
+def test_every_message_renders_on_one_line(key: str) -> None:
+    values = {name: sample(spec) for name, spec in fields(MESSAGES[key]).items()}
+    assert key.partition(".")[0] in CODES
+    found = Diagnostic(key, Path("a.skin"), 7, values=values)
+    line = str(found)
+    assert line.startswith("a.skin:7: ") and len(line) > len("a.skin:7: ")
+    assert "{" not in line.replace('"{"', "") and line.isprintable()
+
+
+@pytest.mark.parametrize("key", PHRASES)
+def test_every_phrase_renders(key: str) -> None:
+    values = {name: sample(spec) for name, spec in fields(PHRASES[key]).items()}
+    assert "{" not in str(Phrase(key, **values)).replace('"{"', "")
+
+
+def calls() -> list[tuple[str, str, set[str]]]:
+    """Return (place, key, names of values) for every call whose key is written out."""
+    found = []
+    for path in sorted(ROOT.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if not isinstance(node, ast.Call) or not node.args:
+                continue
+            name = getattr(node.func, "attr", getattr(node.func, "id", ""))
+            first = node.args[0]
+            if name not in CALLS or not isinstance(first, ast.Constant):
+                continue
+            if not isinstance(first.value, str) or any(word.arg is None for word in node.keywords):
+                continue  # values are passed on
+            known = PHRASES if name == "Phrase" else MESSAGES
+            if first.value in known:
+                names = {word.arg for word in node.keywords if word.arg} - CALLS[name]
+                found.append((f"{path.relative_to(ROOT)}:{node.lineno}", first.value, names))
+    return found
+
+
+def test_every_call_gives_the_values_that_its_template_shows() -> None:
+    wrong = []
+    for place, key, names in calls():
+        wanted = set(fields({**MESSAGES, **PHRASES}[key]))
+        if not wanted <= names:
+            wrong.append(f"{place}: {key} misses {sorted(wanted - names)}")
+    assert wrong == []

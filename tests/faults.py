@@ -1,0 +1,40 @@
+"""What a call refuses or warns of, as data: (key, line, values)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import pytest
+
+from viewer.diagnostics import Diagnostic
+from viewer.errors import ViewerError
+
+Fault = tuple[str, int | None, dict[str, Any]]
+
+NAN = pytest.approx(float("nan"), nan_ok=True)
+"""Equals NaN, as values of faults."""
+
+INF = float("inf")
+
+
+def fault_of(found: Diagnostic) -> Fault:
+    """Return the key, line and values of a diagnostic; a diagnostic among these likewise."""
+    values = {
+        name: fault_of(value) if isinstance(value, Diagnostic) else value
+        for name, value in found.values.items()
+    }
+    return found.key, found.line, values
+
+
+def refusal_of(work: Callable[[], Any]) -> Fault:
+    """Return the fault that a call raises, which must be one with data."""
+    with pytest.raises(ViewerError) as caught:
+        work()
+    assert caught.value.diagnostic is not None
+    return fault_of(caught.value.diagnostic)
+
+
+def warnings_of(found: Iterable[Diagnostic]) -> list[Fault]:
+    """Return the warnings among diagnostics."""
+    return [fault_of(one) for one in found if not one.is_refusal]

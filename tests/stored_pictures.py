@@ -1,0 +1,47 @@
+"""Stored pictures: where they lie, and which of them a run draws anew.
+
+``VIEWER_UPDATE_GOLDEN`` holds their names, or ``all``; ``make golden NAME…`` sets it. Look at every
+picture that was drawn anew before it is committed.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+GOLDEN = Path(__file__).resolve().parent / "golden"
+ALL = "all"
+
+
+def asked() -> set[str]:
+    """Return the names of the pictures to be drawn anew, or that of all."""
+    return set(os.environ.get("VIEWER_UPDATE_GOLDEN", "").split())
+
+
+def is_redrawn(name: str) -> bool:
+    """Tell whether this run draws a picture anew."""
+    return bool(asked() & {name, ALL})
+
+
+def name_of(item: pytest.Item) -> str:
+    """Return the picture that a test marked ``golden`` compares; empty for other tests."""
+    mark = item.get_closest_marker("golden")
+    if mark is None:
+        return ""
+    given = item.callspec.params if hasattr(item, "callspec") else {}
+    return str(mark.args[0]).format(**given)
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out all but the tests of the pictures that are drawn anew."""
+    names = asked()
+    if not names:
+        return
+    left = [item for item in items if name_of(item) and is_redrawn(name_of(item))]
+    unknown = names - {ALL} - {name_of(item) for item in left}
+    if unknown:
+        raise pytest.UsageError(f"no stored picture is called {', '.join(sorted(unknown))}")
+    config.hook.pytest_deselected(items=[item for item in items if item not in left])
+    items[:] = left

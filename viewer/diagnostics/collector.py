@@ -1,0 +1,57 @@
+"""Diagnostics in the order in which they are found."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from viewer.diagnostics.diagnostic import Diagnostic
+
+_MOST = 100  # warnings of one file; nobody reads more
+
+
+class Collector:
+    """Takes in what readers and operations find.
+
+    Warnings of the same message are kept once, and not more than a hundred of them; errors are
+    all kept.
+
+    Parameters
+    ----------
+    keeps_errors : bool
+        Whether a reader goes on after an error, so that all of them are found. Otherwise the
+        first one is raised where it is recorded.
+    """
+
+    def __init__(self, keeps_errors: bool = False) -> None:
+        self.keeps_errors = keeps_errors
+        self._found: list[Diagnostic] = []
+        self._warned: set[str] = set()
+
+    def __iter__(self) -> Iterator[Diagnostic]:
+        return iter(self._found)
+
+    def __len__(self) -> int:
+        return len(self._found)
+
+    def add(self, found: Diagnostic) -> None:
+        """Keep an error, or a warning that has not been given yet."""
+        if found.is_refusal:
+            self._found.append(found)
+            return
+        message = found.message
+        if message in self._warned or len(self._warned) > _MOST:
+            return
+        self._warned.add(message)
+        if len(self._warned) > _MOST:
+            found = Diagnostic("F007.further-warnings", found.path)
+        self._found.append(found)
+
+    @property
+    def errors(self) -> list[Diagnostic]:
+        """Errors in the order found; ``load`` refuses a file for the first."""
+        return [found for found in self._found if found.is_refusal]
+
+    @property
+    def warnings(self) -> list[Diagnostic]:
+        """Everything else."""
+        return [found for found in self._found if not found.is_refusal]

@@ -1,0 +1,42 @@
+"""Diagnostics that say the same of different places, as one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from viewer.diagnostics.diagnostic import Diagnostic
+from viewer.diagnostics.phrase import Phrase
+
+
+def merged(found: Iterable[Diagnostic]) -> list[Diagnostic]:
+    """Return diagnostics in order, those of one kind joined to their first.
+
+    They are of one kind if they have the same message, file and part, and name the same things:
+    values that are ``str`` are names, others (numbers, words of a file in ``bytes``) may differ.
+    """
+    kinds: dict[tuple[object, ...], list[Diagnostic]] = {}
+    for one in found:
+        if one.count == 0:
+            continue
+        kinds.setdefault((one.key, one.path, one.part, *_names(one.values)), []).append(one)
+    return [_joined(alike) for alike in kinds.values()]
+
+
+def _names(values: Mapping[str, Any]) -> Iterator[tuple[object, ...]]:
+    for name, value in sorted(values.items()):
+        if isinstance(value, Phrase):
+            yield (name, value.key, *_names(value.values))
+        elif isinstance(value, str):
+            yield name, value
+
+
+def _joined(alike: list[Diagnostic]) -> Diagnostic:
+    if len(alike) == 1:
+        return alike[0]
+    known = [one.places for one in alike if one.places is not None]
+    places = np.unique(np.concatenate(known)) if known else None
+    return replace(alike[0], places=places, count=sum(one.count for one in alike))

@@ -1,0 +1,41 @@
+"""A part of a message with a template of its own."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from viewer.diagnostics.template import rendered
+from viewer.diagnostics.wording import PHRASES
+
+
+class Phrase:
+    """A value of a message that is itself a template with values.
+
+    Parameters
+    ----------
+    key : str
+        A key of ``PHRASES``.
+    **values : object
+        What the template shows.
+    """
+
+    __slots__ = ("key", "values")
+
+    def __init__(self, key: str, **values: Any) -> None:
+        self.key = key
+        self.values = values
+
+    def __str__(self) -> str:
+        """Return the rendered template."""
+        return rendered(PHRASES[self.key], self.values)
+
+    def __repr__(self) -> str:
+        """Return the call that makes it."""
+        values = "".join(f", {name}={value!r}" for name, value in self.values.items())
+        return f"Phrase({self.key!r}{values})"
+
+    def __eq__(self, other: object) -> bool:
+        """Return whether the other has the same key and values."""
+        return isinstance(other, Phrase) and (self.key, self.values) == (other.key, other.values)
+
+    __hash__ = None  # type: ignore[assignment]

@@ -1,0 +1,98 @@
+"""Templates of messages: ``str.format`` with a few specifications of our own.
+
+=====================  ===========================================================================
+``{word:quoted}``      a word in quotes; None is the end of the file
+``{word:word}``        the word without quotes
+``{name}``             numbers as they are, texts with control characters escaped
+``{name:text}``        the same, not more than 200 letters
+``{name:name}``        a name in a file, cut after 60 characters; bytes that are no text show as �
+``{names:list}``       the first six and how many more, ``none``; ``list12`` for twelve
+``{shape:axes}``       the axes of an array: ``800 x 3``; letters stand for any number
+``{names:or}``         alternatives
+``{n:#vertex}``        a count with its noun: ``3 vertices``
+``{n:#vertex|is|are}`` the same with a verb that agrees
+``{n:#frame/{all}}``   a count of a total: ``3 of 20 frames``; a verb may follow
+``{n:?one|many}``      the first for 1, the second for other counts
+``{near:+; {}}``       the rest of the specification, if the value is not empty; ``{}`` is the value
+=====================  ===========================================================================
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from string import Formatter
+from typing import Any
+
+from viewer.phrases import counted, listed, one_of, printable, quoted
+
+_PLACE = "\0"  # of a value inside its own specification
+_LONGEST = 1000  # letters of a text that is a value
+_LONGEST_NAME = 60
+_NO_TEXT = re.compile("[\udc80-\udcff]")  # bytes that were decoded with "surrogateescape"
+
+
+def rendered(template: str, values: Mapping[str, Any]) -> str:
+    """Return a template with its values in place."""
+    return _FORMATTER.vformat(template, (), values)
+
+
+def fields(template: str) -> dict[str, str]:
+    """Return the names of the values that a template shows, each with its specification."""
+    return {name: spec or "" for _, name, spec, _ in Formatter().parse(template) if name}
+
+
+class _Formatter(Formatter):
+    def format_field(self, value: Any, format_spec: str) -> str:
+        """Return one value as its specification says."""
+        kind, rest = format_spec[:1], format_spec[1:]
+        if kind == "#":
+            noun, one, many, *_ = [*rest.split("|"), "", ""]
+            noun, _, total = noun.partition("/")
+            return counted(value, noun, one, many, of=int(total) if total else None)
+        if kind == "?":
+            one, many = rest.split("|")
+            return one if value == 1 else many
+        if kind == "+":
+            # An empty pair of braces in a specification has been filled with "" by now.
+            return rest.replace(_PLACE, printable(value, 300)) if value else ""
+        if not format_spec and isinstance(value, str) and value != _PLACE:
+            return printable(value, _LONGEST)
+        if format_spec.startswith("list"):
+            return listed([*map(printable, value)], int(format_spec[4:] or 6)) or "none"
+        plain = _PLAIN.get(format_spec)
+        return plain(value) if plain is not None else str(format(value, format_spec))
+
+    def get_value(self, key: int | str, args: Any, kwargs: Mapping[str, Any]) -> Any:
+        """Return a value by name; the empty name inside a specification is a placeholder."""
+        return kwargs[key] if isinstance(key, str) and key else _PLACE
+
+
+def _word(word: bytes | str | None) -> str:
+    return "the end of the file" if word is None else quoted(word)
+
+
+def _bare(word: bytes) -> str:
+    return printable(word.decode("utf-8", "replace"), 40)
+
+
+def _name(name: str) -> str:
+    return printable(_NO_TEXT.sub("\ufffd", name[: _LONGEST_NAME + 1]), _LONGEST_NAME)
+
+
+def _axes(shape: Sequence[int | str | None]) -> str:
+    if not shape:
+        return "a single"
+    # Files may declare 32 axes of any size.
+    return printable(" x ".join("any" if axis is None else str(axis) for axis in shape), 80)
+
+
+_PLAIN: dict[str, Callable[[Any], str]] = {
+    "quoted": _word,
+    "word": _bare,
+    "text": printable,
+    "name": _name,
+    "axes": _axes,
+    "or": one_of,
+}
+_FORMATTER = _Formatter()

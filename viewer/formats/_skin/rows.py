@@ -1,0 +1,183 @@
+"""Tables of numbers in a ``.skin`` file: positions, normals, texture coordinates, triangles.
+
+A block without faults is parsed at once. Otherwise every word is looked at: each fault is recorded,
+and NaN stands in its place. Lines mean nothing to the format, but most files have a vertex or
+triangle a line: there, one that is too short or too long costs no other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.diagnostics import Part, Phrase
+from viewer.errors import FormatError
+from viewer.formats._numbers import parse_numbers
+from viewer.formats._skin.blocks import Block, to_whole, words_of
+from viewer.formats._source import Source
+from viewer.formats._tolerant import Words, refuse_words
+from viewer.rig.arrays import Floats, Ints
+
+__all__ = ["LOST", "OffsetOf", "read_rows", "whole_corners"]
+
+LOST = -(2**31)
+"""In place of a corner that is no whole number."""
+
+Places = NDArray[np.int64]
+OffsetOf = Callable[[int], int]
+"""Gives the offset of the index-th thing; slow."""
+
+_PARTS: dict[str, Part] = {"positions": "positions", "triangles": "triangles"}
+
+
+def read_rows(
+    source: Source,
+    block: Block,
+    count: int,
+    width: int,
+    first: int = 0,
+    item: str = "of-vertex",
+) -> tuple[Floats, OffsetOf]:
+    """Parse a block of rows.
+
+    Parameters
+    ----------
+    source : Source
+        Takes the faults.
+    block : Block
+        Where the numbers are.
+    count : int
+        Rows that the file declares; if it has others, those count.
+    width : int
+        Numbers in a row.
+    first : int
+        Index of the first row, for messages.
+    item : str
+        Key of the phrase that names a row.
+
+    Returns
+    -------
+    rows : (N, width)
+        NaN for numbers that are none, and in rows with more or fewer numbers.
+    offset_of : callable
+        Gives the offset of a row.
+
+    Raises
+    ------
+    FormatError
+        If it cannot be told which numbers make a row.
+    """
+    values, bad = parse_numbers(source.data, block.start, block.end)
+    if bad < 0 and len(values) == count * width:
+        values.flags.writeable = False  # so that nobody has to copy it
+        begin, end = block.start, block.end
+        return values.reshape(count, width), lambda row: source.number_offset(
+            begin, end, width * row
+        )
+    rows, offsets = _faulty_rows(source, block, count, width, first, item)
+    return rows, lambda row: int(offsets[row])
+
+
+def _faulty_rows(
+    source: Source, block: Block, count: int, width: int, first: int, item: str
+) -> tuple[Floats, Places]:
+    def named(row: int) -> Phrase:
+        return Phrase(item, section=block.name, index=row)
+
+    words = words_of(source, block)
+    begins, sizes = _row_begins(source, block, words, count, width)
+    fits = sizes == width
+    rows = np.full((len(begins), width), np.nan)
+    rows[fits] = words.values[begins[fits, None] + np.arange(width)]
+    part = _PARTS.get(block.name, "")
+    owners = np.repeat(np.arange(len(begins)), sizes) + first
+    bad = words.bad
+    refuse_words(source, words, bad, lambda word: named(int(owners[word])), part, owners[bad])
+    wrong = np.flatnonzero(~fits)
+    if len(wrong):
+        source.refuse(
+            "F002.width",
+            int(words.offsets[begins[wrong[0]]]),
+            len(wrong),
+            part,
+            wrong + first,
+            item=named(int(wrong[0]) + first),
+            expected=width,
+            found=int(sizes[wrong[0]]),
+        )
+    if block.name == "triangles" and len(begins) != count:
+        source.refuse("F002.skin-triangle-rows", block.header, expected=count, found=len(begins))
+    return rows, words.offsets[begins]
+
+
+def _row_begins(
+    source: Source, block: Block, words: Words, count: int, width: int
+) -> tuple[Places, Places]:
+    """Return the first word of each row, and how many words it has."""
+    total = len(words.values)
+    if total != count * width:
+        begins, sizes = words.rows()
+        if block.closed and (sizes == width).sum() * 2 >= len(sizes):
+            return begins, sizes
+        if not block.closed or total % width:
+            raise _no_rows(source, block, total, count, width)
+    begins = np.arange(0, total, width)
+    return begins, np.full(len(begins), width)
+
+
+def _no_rows(source: Source, block: Block, total: int, count: int, width: int) -> FormatError:
+    if not block.closed:
+        return source.fault(
+            "F002.skin-rows-end",
+            source.end,
+            section=block.name,
+            line=source.line(block.header),
+            found=total // width,
+            expected=count,
+        )
+    return source.fault(
+        "F002.skin-rows",
+        block.count,
+        section=block.name,
+        expected=count,
+        width=width,
+        found=total // width,
+        rest=total % width,
+        end=source.line(block.end),
+    )
+
+
+def whole_corners(source: Source, rows: Floats, offset_of: OffsetOf, first: int) -> Ints:
+    """Return triangles as whole numbers, ``LOST`` for corners that are none: (T, 3).
+
+    Parameters
+    ----------
+    source : Source
+        Takes the faults.
+    rows, offset_of : (T, 3), callable
+        As ``read_rows`` gives them: its own faults are known.
+    first : int
+        Index of the first triangle, for messages.
+    """
+    known = ~np.isnan(rows)
+    if known.all():
+        corners, changed = to_whole(rows)
+        if changed < 0:
+            return corners
+    corners, _ = to_whole(np.where(known, rows, LOST))
+    wrong = known & (corners != rows)
+    triangles = np.flatnonzero(wrong.any(axis=1))
+    if len(triangles):
+        row = int(triangles[0])
+        source.refuse(
+            "F002.skin-corner",
+            offset_of(row),
+            int(wrong.sum()),
+            "triangles",
+            triangles + first,
+            triangle=row + first,
+            found=float(rows[row][wrong[row]][0]),
+        )
+    return np.where(wrong, LOST, corners).astype(np.int32)

@@ -1,0 +1,80 @@
+"""Counts, lists and names as messages write them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+__all__ = ["counted", "listed", "one_of", "printable", "quoted"]
+
+_PLURALS = {"vertex": "vertices", "matrix": "matrices"}
+
+
+def printable(text: object, limit: int = 200) -> str:
+    r"""Return ``text`` on one line: control characters escaped, cut after ``limit`` characters.
+
+    >>> printable("two\nlines")
+    'two\\nlines'
+    """
+    shown = "".join(
+        letter
+        if letter.isprintable()
+        else letter.encode("unicode_escape", "surrogatepass").decode()
+        for letter in str(text)
+    )
+    return shown if len(shown) <= limit else shown[: limit - 1] + "…"
+
+
+def quoted(word: bytes | str, limit: int = 40) -> str:
+    r"""Return a word of a file in double quotes, on one line and not too long.
+
+    >>> quoted(b"up\x00"), quoted("left")
+    ('"up\\x00"', '"left"')
+    """
+    text = word[:200].decode("utf-8", "replace") if isinstance(word, bytes) else word
+    return f'"{printable(text, limit)}"'
+
+
+def counted(count: int, noun: str, one: str = "", many: str = "", of: int | None = None) -> str:
+    """Return a count with its noun and, if given, the verb that agrees with it.
+
+    Parameters
+    ----------
+    count : int
+        How many.
+    noun : str
+        Singular; its last word takes the plural: ``"negative weight"``.
+    one, many : str
+        Verb for one and for several: ``"is"``, ``"are"``; none if left out.
+    of : int, optional
+        The total.
+
+    >>> counted(1, "vertex", "has", "have"), counted(3, "vertex", "has", "have")
+    ('1 vertex has', '3 vertices have')
+    >>> counted(1, "frame", "is", "are", of=20)
+    '1 of 20 frames is'
+    """
+    head, space, last = noun.rpartition(" ")
+    plural = f"{head}{space}{_PLURALS.get(last, f'{last}s')}"
+    total = "" if of is None else f"of {of} "
+    text = f"{count} {total}{noun if (count if of is None else of) == 1 else plural}"
+    return f"{text} {one if count == 1 else many}" if one else text
+
+
+def one_of(values: Sequence[object]) -> str:
+    """Return alternatives joined by commas and "or".
+
+    >>> one_of([9, 48, 63]), one_of([3])
+    ('9, 48 or 63', '3')
+    """
+    *others, last = map(str, values)
+    return f"{', '.join(others)} or {last}" if others else last
+
+
+def listed(names: Sequence[object], limit: int = 6) -> str:
+    """Return names on one line, at most ``limit`` of them.
+
+    >>> listed(["a", "b", "c"], 2)
+    'a, b and 1 more'
+    """
+    more = f" and {len(names) - limit} more" * (len(names) > limit)
+    return ", ".join(map(str, names[:limit])) + more
