@@ -16,9 +16,9 @@ import viewer
 from viewer.app.features import KEYS, MOUSE
 from viewer.commands import COMMANDS
 from viewer.commands._usage import command_parser
+from viewer.diagnostics import CODES
 from viewer.export import EXPORTERS
 from viewer.formats import FORMATS
-from viewer.lint import CODES
 from viewer.media.video_kinds import VIDEOS
 from viewer.rendering.gpu.program import SHADING
 from viewer.rig.scalars import SCALARS

@@ -13,10 +13,10 @@ from viewer.app.features import KEYS
 from viewer.cli import _protect_numbers
 from viewer.commands import COMMANDS
 from viewer.commands._usage import command_parser
+from viewer.diagnostics import CODES
 from viewer.errors import ViewerError
 from viewer.export import EXPORTERS
 from viewer.formats import FORMATS
-from viewer.lint import CODES
 from viewer.manual import PAGES, page_text
 
 ROOT = Path(__file__).resolve().parents[2]

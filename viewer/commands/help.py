@@ -17,6 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "topic",
         nargs="?",
+        choices=[*PAGES, *COMMANDS],
         metavar="TOPIC",
         help="a page of the manual, or a command whose options to list (default: list the topics)",
     )

@@ -38,13 +38,13 @@ from viewer.app.rigging.state import RigChoices, Rigging, Template
 from viewer.app.rigging.work import start_adding, start_match, start_reading, start_run
 from viewer.autorig.settings import JOINTS, METHODS
 from viewer.errors import printable
+from viewer.formats import MESHES
 from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.mesh import bounding_box
 from viewer.rig.scene import Actor, actor_points, free_title
 
 __all__ = ["draw"]
 
-_MESHES = (".obj", ".ply")
 _MOST_ROUNDS, _MOST_INFLUENCES = 50, 16
 _NEAREST_WHY = "the method nearest has no such choice"
 _ADVANCED = ("refines", "joints", "smoothing", "max_influences", "correctives")
@@ -94,7 +94,7 @@ def _draw_sources(state: AppState) -> None:
     if found and chosen in names:
         choose_target(state, found[int(chosen)])
     if button(state, "Add mesh…", why):
-        _ask(state, _add_mesh, "Add a mesh to rig: .obj, .ply", _MESHES)
+        _ask(state, _add_mesh, f"Add a mesh to rig: {', '.join(MESHES)}", MESHES)
     if not why:
         explain("a mesh without a rig, put into this scene")
     with disabled(why):

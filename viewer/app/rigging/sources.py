@@ -6,7 +6,8 @@ from pathlib import Path
 
 from viewer.app.core.state import AppState
 from viewer.app.rigging.state import Rigging, Template
-from viewer.errors import RigError, printable
+from viewer.errors import RigError, one_of, printable
+from viewer.formats import MESHES
 from viewer.loading import bundled_body, bundled_files, load
 from viewer.rig.mesh import Mesh
 from viewer.rig.scene import Actor
@@ -136,7 +137,7 @@ def no_target(state: AppState) -> str:
     """Say why there is nothing to rig."""
     if state.of(Rigging).target is not None:
         return ""
-    return "every mesh here has a rig: add one without, an .obj or .ply"
+    return f"every mesh here has a rig: add one without, an {one_of(MESHES)}"
 
 
 def no_results(state: AppState) -> str:
