@@ -69,15 +69,8 @@ class FormatError(ViewerError):
     """
 
     diagnostic: Diagnostic
-    code = ""
 
-    def __init__(
-        self, diagnostic: Diagnostic | str | Path, message: str = "", line: int | None = None
-    ) -> None:
-        if not isinstance(diagnostic, Diagnostic):
-            diagnostic = Diagnostic(
-                "F002.plain", Path(diagnostic), line, values={"message": message}
-            )
+    def __init__(self, diagnostic: Diagnostic) -> None:
         super().__init__(replace(diagnostic, is_refusal=True))
 
     @property

@@ -182,12 +182,9 @@ def _with_models(problem: FormatError, files: Sequence[str]) -> ViewerError:
         return problem
     models = [*known_models(folder)]
     near = did_you_mean(str(problem.path), models) if len(models) > _MOST_MODELS else ""
-    names = ", ".join(models[:_MOST_MODELS]) or "none"
-    return FormatError(
-        problem.path,
-        f"no such file, and no such model in {printable(folder, 200)}; "
-        + (near or f"models there: {names}"),
-    )
+    values = {"folder": folder, "near": near, "names": models[:_MOST_MODELS]}
+    key = "F001.no-model-near" if near else "F001.no-model"
+    return FormatError(Diagnostic(key, problem.path, values=values))
 
 
 def _announce(files: Sequence[str | Path]) -> None:

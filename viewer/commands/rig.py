@@ -25,6 +25,7 @@ from viewer.commands._numbers import number
 from viewer.commands._pose import add_pose_arguments, apply_pose, pose_files
 from viewer.commands._progress import Progress
 from viewer.commands._scene import print_warnings
+from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, RigError, ViewerError, printable
 from viewer.export._rigged_files import files_of, write_rigged
 from viewer.formats import MESHES, Source, all_or_none, check_targets
@@ -256,7 +257,7 @@ def _template_files(name: str) -> list[Path]:
     path = resolve(name)
     near = "" if path.exists() or len(path.parts) != 1 else did_you_mean(name, _BUNDLED)
     if near:
-        raise FormatError(path, f"no such file; {near}")
+        raise FormatError(Diagnostic("F001.no-template", path, values={"near": near}))
     return [path]
 
 

@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from viewer.diagnostics.codes import CODES
 from viewer.diagnostics.template import rendered
-from viewer.diagnostics.wording import FURTHER, MESSAGES, NOTHING_ELSE, PLACES
+from viewer.diagnostics.wording import CODES, FURTHER, MESSAGES, NOTHING_ELSE, PLACES
 from viewer.phrases import listed, printable
 
 if TYPE_CHECKING:
@@ -84,8 +83,6 @@ class Diagnostic:
     @property
     def message(self) -> str:
         """What is wrong, on one line, without the place."""
-        if self.key.endswith(".plain"):  # until every caller names its message
-            return str(self.values["message"])
         return rendered(MESSAGES[self.key], self.values)
 
     @property

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from viewer.diagnostics import MESSAGES, Collector, Diagnostic, Part
+from viewer.diagnostics import Collector, Diagnostic, Part
 from viewer.errors import FormatError
 from viewer.formats._file_bytes import FOLDER, MAX_SIZE, kind_of, no_file, read_bytes, read_head
 from viewer.formats._numbers import LARGEST, is_too_large, word_begins
@@ -232,8 +232,6 @@ class Source:
         **values : object
             What the message shows.
         """
-        if key not in MESSAGES:  # until every reader names its messages
-            key, values = "F007.plain", {"message": key}
         found = self._diagnostic(key, offset, values)
         indices = None if places is None else _indices(places)
         self.diagnostics.add(replace(found, count=count, part=part, places=indices))
@@ -242,30 +240,10 @@ class Source:
         line = None if offset is None else self.line(offset)
         return Diagnostic(key, self.path, line, values=values)
 
-    # -- until every reader names its messages
-
-    def refuse_error(
-        self, error: FormatError, count: int = 1, part: Part = "", places: ArrayLike = ()
-    ) -> None:
-        """Record an error, see ``refuse``."""
-        found = error.diagnostic
-        if error.code:
-            found = replace(found, key=f"{error.code}.plain")
-        self._keep(found, count, part, places)
-
     @property
     def warnings(self) -> list[str]:
-        """Warnings as lines."""
+        """Warnings as lines for a person."""
         return [str(found) for found in self.diagnostics.warnings]
-
-    @property
-    def faults(self) -> list[Diagnostic] | None:
-        """Errors, None if none are kept."""
-        return self.diagnostics.errors if self.diagnostics.keeps_errors else None
-
-    def error(self, message: str, offset: int | None = None) -> FormatError:
-        """Return an error that names the file, and the line of ``offset``."""
-        return self.fault("F002.plain", offset, message=message)
 
     def remember(self, kind: str, offset_of: Callable[[int], int]) -> None:
         """Keep how to find the offset of the index-th thing of a kind, for whoever asks.

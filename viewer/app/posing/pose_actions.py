@@ -79,7 +79,7 @@ def paste_pose(state: AppState) -> None:
         words = text if "{" in text else re.sub(r"[\[\],;]", " ", text)
         source = Source("clipboard", words.encode("utf-8", "replace"))
         if not text.strip():
-            raise source.error("expected a pose, found nothing")
+            raise source.fault("F002.pose-clipboard")
         record = pose.read(source)
         try:
             notes = apply_record(record, actor.figure, actor.pose)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError
 from viewer.formats import FORMATS, Source, detect
 
@@ -26,8 +27,8 @@ def input_files(text: str) -> list[Path]:
     suffixes = [suffix for kind in FORMATS.values() for suffix in kind.suffixes if suffix != ".txt"]
     files = sorted(file for file in path.iterdir() if file.suffix.lower() in suffixes)
     if not files:
-        known = ", ".join(dict.fromkeys(suffixes))
-        raise FormatError(path, f"expected a folder with files of a rig ({known}), found none")
+        known = list(dict.fromkeys(suffixes))
+        raise FormatError(Diagnostic("F002.no-rig", path, values={"suffixes": known}))
     return files
 
 

@@ -1,4 +1,4 @@
-"""The wording of all diagnostics: one template per message, one table per area.
+"""The wording of all diagnostics: codes and their messages, one table per area.
 
 See ``template.py`` for what may stand in braces. A key is the code, a dot and a name; within a
 code the name is unique. ``PHRASES`` are parts of messages, by a name alone.
@@ -6,6 +6,7 @@ code the name is unique. ``PHRASES`` are parts of messages, by a name alone.
 
 from __future__ import annotations
 
+from viewer.diagnostics.codes import Code
 from viewer.diagnostics.wording import (
     anim,
     archives,
@@ -37,6 +38,12 @@ _TABLES = (
     *(archives, body_models, easymocap, poses, pictures),
     *(bindings, skeletons, meshes, clips, motion, loading, rigging),
 )
+_CODED = (reading, weights, bindings, skeletons, meshes, clips, rigging)
+
+CODES: dict[str, Code] = {
+    code: row for table in _CODED for code, row in sorted(table.CODES.items())
+}
+"""By code; a code is never given to another fault."""
 
 MESSAGES: dict[str, str] = {
     key: template for table in _TABLES for key, template in table.MESSAGES.items()

@@ -1,5 +1,25 @@
 """Messages about clips, captured points and feet."""
 
+from viewer.diagnostics.codes import Code
+
+CODES = {
+    "C001": Code("warning", "keys out of time order", "sort the keys"),
+    "C002": Code("warning", "several keys at one time", "keep one of them"),
+    "C003": Code("warning", "joint jumps between frames", "look for a bad frame or a cut there"),
+    "C004": Code(
+        "warning", "joint rotates too fast between frames", "look for a flip of its angles"
+    ),
+    "C005": Code("warning", "missing frames", "interpolate them (--fill-gaps) or capture again"),
+    "C006": Code("warning", "keys outside the limits", "widen the limits or move the keys"),
+    "C007": Code("warning", "foot sliding", "lock the foot or move the root along"),
+    "C008": Code("warning", "foot below the ground", "raise the motion or lower the ground"),
+    "C009": Code("error", "clip of another skeleton", "open it with the skeleton it was made for"),
+    "C010": Code("note", "clip without duration", "give it keys at two different times"),
+    "C011": Code("warning", "keypoints of low confidence", "leave them out or capture again"),
+    "C012": Code("note", "keypoints that are never seen", "none if the camera cannot see them"),
+    "C013": Code("note", "no ground found for the feet", "give its height (--ground)"),
+}
+
 MESSAGES = {
     "C002.keys": "{n:#key|lies|lie} at the time of the one before, first in channel {channel} at "
     "{time:zg} s",

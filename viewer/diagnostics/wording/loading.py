@@ -1,6 +1,11 @@
 """Messages about files that are put together."""
 
 MESSAGES = {
+    "F001.no-model": "no such file, and no such model in {folder:text}; models there: {names:all}",
+    "F001.no-model-near": "no such file, and no such model in {folder:text}; {near}",
+    "F001.no-template": "no such file; {near}",
+    "F002.no-rig": "expected a folder with files of a rig ({suffixes:all}), found none",
+    "F002.misfit": "{message}",
     # What does not fit
     "B001.joints": "expected {joints:#binding matrix}, one for each joint of {skeleton:text}, "
     "found {n}",

@@ -1,5 +1,26 @@
 """Messages about meshes and the symmetry of figures."""
 
+from viewer.diagnostics.codes import Code
+
+CODES = {
+    "M001": Code("warning", "degenerate triangles", "merge their corners or delete them"),
+    "M002": Code("warning", "flipped triangles", "reverse their winding"),
+    "M003": Code("warning", "mesh inside out", "reverse the winding of all its triangles"),
+    "M004": Code("note", "unused vertices", "delete them unless something refers to them"),
+    "M005": Code("note", "open boundaries", "close them if the mesh is meant to be solid"),
+    "M006": Code("warning", "non-manifold edges", "split the parts that meet there"),
+    "M007": Code("warning", "zero-length normals", "compute the normals again"),
+    "M008": Code("warning", "normals that are not unit length", "normalise them"),
+    "M009": Code(
+        "warning", "normals opposite to their triangles", "reverse the normals or the winding"
+    ),
+    "M010": Code("warning", "stray vertices", "move or delete them"),
+    "M011": Code("warning", "duplicate triangles", "delete the copies"),
+    "M012": Code("warning", "non-orientable surface", "cut it where its winding reverses"),
+    "Y001": Code("warning", "asymmetric positions", "mirror one side"),
+    "Y002": Code("warning", "asymmetric weights", "mirror the weights of one side"),
+}
+
 MESSAGES = {
     "M001.triangles": "{n:#triangle/{all}|has|have} no area, first triangle {triangle}",
     "M002.triangles": "{n:#triangle/{all}|is wound against its|are wound against their} "

@@ -24,6 +24,8 @@ MESSAGES = {
     "F002.obj-vt-none": f"f: expected a texture coordinate {_NONE}",
     "F002.obj-vn-none": f"f: expected a normal {_NONE}",
     "F005.obj-texture": "a texture without vt lines: drawn untextured",
+    "F005.library": "material library {problem}; drawn without textures",
+    "F005.library-refused": "material library {name:text} {reason}",
     "F005.mtl-materials": "{n:#material|is|are} in no library, first {material:text}: drawn "
     "without a texture",
     "F007.obj-colour": "the colour of {n:#vertex} is not used",

@@ -3,6 +3,8 @@
 _JSON = "expected JSON, found "
 
 MESSAGES = {
+    "F002.pose-clipboard": "expected a pose, found nothing",
+    "F002.no-pose": "--pose: expected a pose, found a figure or motion",
     # JSON
     "F002.json": _JSON + "a mistake: {reason:text}",
     "F002.json-nesting": _JSON + "too deep a nesting",

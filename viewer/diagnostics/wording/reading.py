@@ -1,5 +1,24 @@
 """Messages that readers of several formats share."""
 
+from viewer.diagnostics.codes import Code
+
+CODES = {
+    "F001": Code("error", "file cannot be read", "check the name and the permissions"),
+    "F002": Code(
+        "error",
+        "file breaks its format",
+        "fix the line or export the file again",
+        "export it again, or open another file",
+    ),
+    "F003": Code(
+        "error", "number that is not finite", "look for a division by zero where the file was made"
+    ),
+    "F004": Code("error", "files that do not fit each other", "open files that belong together"),
+    "F005": Code("warning", "texture or material library missing", "put it next to the file"),
+    "F006": Code("warning", "unknown part of a file", "remove it or correct its name"),
+    "F007": Code("note", "remark of a reader", "none if intentional"),
+}
+
 _NUMBER = "{item}: expected a number, found {found:quoted}"
 _BELOW = "{item}: expected a number below 3.4e+38, found {found:quoted}"
 

@@ -1,5 +1,36 @@
 """Messages about meshes that get the rig of a template."""
 
+from viewer.diagnostics.codes import Code
+
+CODES = {
+    "R001": Code("note", "alignment of the template", "none if the template lies on the target"),
+    "R002": Code(
+        "warning",
+        "doubtful alignment",
+        "give --up, --facing or landmarks, or pose the template like the target",
+    ),
+    "R003": Code("note", "fitted pose and proportions", "none if they match the target"),
+    "R004": Code(
+        "warning",
+        "poor fit of pose or proportions",
+        "choose a template of the same kind as the target",
+    ),
+    "R005": Code("note", "matched weights", "none if most vertices are matched"),
+    "R006": Code(
+        "warning", "few matched vertices", "check the alignment or allow a larger distance"
+    ),
+    "R007": Code("note", "rigid part", "none if the part is stiff"),
+    "R008": Code("note", "transferred joints", "none if they lie inside the limbs"),
+    "R009": Code("warning", "joints outside the mesh", "check the alignment or move the joints"),
+    "R010": Code(
+        "warning", "pose bent too far for inverse skinning", "use a target in a less bent pose"
+    ),
+    "R011": Code("note", "accuracy of the rigged figure", "none if the error is small"),
+    "R012": Code("warning", "rigged figure differs from the target", "check the alignment"),
+    "R013": Code("note", "omitted part of the template", "none if it is not needed"),
+    "R014": Code("note", "property derived from the target", "none if it is correct"),
+}
+
 MESSAGES = {
     "R001.alignment": "alignment: {how}; scale {scale:.6g}{factors}, turned by {angle:.2f} "
     "degrees, shift ({x:z.4g}, {y:z.4g}, {z:z.4g})",

@@ -1,5 +1,28 @@
 """Messages about skeletons and their limits."""
 
+from viewer.diagnostics.codes import Code
+
+CODES = {
+    "S001": Code("error", "parent after its child", "list joints parents first"),
+    "S002": Code("error", "cycle of parents", "give one of these joints another parent"),
+    "S003": Code("error", "limit with its minimum above its maximum", "swap the two numbers"),
+    "S004": Code("warning", "pose outside its limits", "widen the limit or change the pose"),
+    "S005": Code("note", "locked DOFs", "none if these joints should not move"),
+    "S006": Code(
+        "warning", "joints with the same name", "rename them: many programs match joints by name"
+    ),
+    "S007": Code(
+        "warning", "joints without a name", "name them: many programs match joints by name"
+    ),
+    "S008": Code(
+        "note", "several roots", "give them a common parent for programs that expect one root"
+    ),
+    "S009": Code(
+        "warning", "rest rotation that is not a unit quaternion", "normalise the quaternion"
+    ),
+    "S010": Code("warning", "rest scale of 0 or less", "freeze the scale of this joint"),
+}
+
 MESSAGES = {
     "S004.clamped": "{n:#DOF}, {dof}: clamped",
     "S004.pose": "{n:#DOF} of the pose {n:?is outside its|are outside their} limits: {dof}",

@@ -1,5 +1,26 @@
 """Messages about the weights of a skin."""
 
+from viewer.diagnostics.codes import Code
+
+CODES = {
+    "W001": Code(
+        "warning", "weights do not sum to 1", "normalise them (--normalize shows the effect)"
+    ),
+    "W002": Code("warning", "negative weights", "set them to 0 and normalise"),
+    "W003": Code("error", "weights that are not finite", "paint or copy these weights again"),
+    "W004": Code(
+        "warning", "vertices without influence", "give them the weights of their neighbours"
+    ),
+    "W005": Code("error", "island without any weight", "bind it to one joint as a whole"),
+    "W006": Code("note", "joints without influence", "none if they are helpers"),
+    "W007": Code("note", "more than 4 influences", "prune and normalise for engines that keep 4"),
+    "W008": Code("note", "more than 8 influences", "prune and normalise for engines that keep 8"),
+    "W009": Code("note", "joint listed twice for a vertex", "merge the two influences"),
+    "W010": Code(
+        "error", "weight of a joint that does not exist", "bind the joint or correct the index"
+    ),
+}
+
 MESSAGES = {
     "W001.sums": "weights of {n:#vertex} do not sum to 1: {sum:.6g} at vertex {vertex}, an error "
     "of {error:.3g}",

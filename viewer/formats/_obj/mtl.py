@@ -10,7 +10,7 @@ Colours and other maps are not shown. An option is a word that begins with ``-``
 
 from __future__ import annotations
 
-from viewer.errors import FormatError, printable
+from viewer.errors import FormatError
 from viewer.formats._references import referenced_path, refused_text
 from viewer.formats._source import Source
 from viewer.formats._texture import load_image
@@ -72,13 +72,13 @@ def _opened(source: Source, text: bytes, offset: int) -> list[Source]:
     found = []
     for name in names:
         if referenced_path(source.path.parent, name) is None:
-            source.warn(f"material library {printable(name)} {refused_text(name)}", offset)
+            source.warn("F005.library-refused", offset, name=name, reason=refused_text(name))
             continue
         library = source.beside(name.replace("\\", "/"))
         try:
             _ = library.data
         except FormatError as problem:
-            source.warn(f"material library {problem}; drawn without textures", offset)
+            source.warn("F005.library", offset, problem=problem.diagnostic)
             continue
         found.append(library)
     return found
