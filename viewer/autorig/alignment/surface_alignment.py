@@ -213,10 +213,7 @@ def align(
         If a mesh has no area, landmarks lie on a line, or axes contradict each other.
     """
     report(0.0, "alignment")
-    ours, theirs = (
-        Triangles(side.positions, side.triangles, _SAMPLES) for side in (template, target)
-    )
-    fine = (ours, theirs)
+    ours, theirs = fine = _surface(template), _surface(target)
     if settings.matrix is not None:
         return Alignment.of(ours, theirs, similarity_of(settings.matrix), "given")
     coarse = [
@@ -252,6 +249,10 @@ def align(
     fraction = _PART_BETTER if is_part else _BETTER
     gap = misfit(left, is_part)
     return found if gap > _IN_PLACE or misfit(found, is_part) < fraction * gap else left
+
+
+def _surface(side: Posed) -> Triangles:
+    return Triangles(side.positions, side.triangles, _SAMPLES)
 
 
 def _landmark_fit(landmarks: Floats, scale: str) -> Similarity:
