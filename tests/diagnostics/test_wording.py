@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 import viewer
-from viewer.diagnostics import CODES, MESSAGES, Diagnostic, Phrase
+from viewer.diagnostics import CODES, MESSAGES, Diagnostic, Phrase, wording
 from viewer.diagnostics.template import fields
 from viewer.diagnostics.wording import PHRASES
 
@@ -83,3 +83,9 @@ def test_every_call_gives_the_values_that_its_template_shows() -> None:
         if not wanted <= names:
             wrong.append(f"{place}: {key} misses {sorted(wanted - names)}")
     assert wrong == []
+
+
+def test_no_key_is_in_two_tables() -> None:
+    for name in ("CODES", "MESSAGES", "PHRASES"):
+        keys = [key for table in wording.TABLES for key in getattr(table, name, ())]
+        assert len(keys) == len(set(keys)) > 0

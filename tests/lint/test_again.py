@@ -16,6 +16,7 @@ from lint.test_planted_files import LATE_KEYS
 import viewer
 from viewer.diagnostics import Diagnostic
 from viewer.lint import Finding, finding_text, lint_again, lint_files
+from viewer.lint._messages import of_diagnostic
 from viewer.lint._named import aimed_at
 from viewer.loading import bundled_files
 from viewer.rig.scene import Scene
@@ -153,24 +154,29 @@ def test_progress_may_stop_while_frames_are_read(shared_data: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "part", "vertices", "joints"),
+    ("found", "part", "vertices", "joints"),
     [
-        ("a.skin:8: 3 normals of length 0, first of vertex 5: computed", "mesh", [5], []),
-        ("a.skin:8: vertex 99 is far", "mesh", None, None),  # there are 20
-        ("a.skin:8: matrix 1 of bindings can hardly be inverted", "mesh", [], [1]),
-        ("a.skel:8: ignored 1 limit, first rotxlimit 1 -1 of joint knee", "skeleton", [], [1]),
-        ("a.skel:8: ignored 1 limit, first rotxlimit 1 -1 of joint tail", "skeleton", None, None),
-        ("a.anim:8: channel 4: key 1 is before key 0; keys sorted", "clip", [], [0]),
-        ("a.anim: no range: that of the keys is played, 0 to 1", "clip", None, None),
+        (("M007.computed", "positions", [5]), "mesh", [5], []),
+        (("M010.skin-vertex", "positions", [99]), "mesh", None, None),  # there are 20
+        (("B003.skin-matrix", "bindings", [1]), "mesh", [], [1]),
+        (("S003.limits", "items", [1]), "skeleton", [], [1]),
+        (("F006.unknown", "", None), "skeleton", None, None),
+        (("C001.keys", "channels", [4]), "clip", [], [0]),
+        (("C001.keys", "channels", [99]), "clip", None, None),
+        (("F007.anim-range", "", None), "clip", None, None),
     ],
 )
-def test_words_of_readers_name_places(text, part, vertices, joints) -> None:
-    found = aimed_at(
-        Finding(Diagnostic("F007.plain", values={"message": text.split(": ", 1)[1]})),
-        scene_of(column()).actors[0],
-        part,
-    )
+def test_remarks_of_readers_keep_their_places(found, part, vertices, joints) -> None:
+    key, data, places = found
+    remark = Diagnostic(key, Path("a.skin"), 8, data, None if places is None else np.array(places))
+    aimed = aimed_at(of_diagnostic(remark), scene_of(column()).actors[0], part)
     if vertices is None:
-        assert found is None
+        assert aimed is None
     else:
-        assert (found.vertices.tolist(), found.joints.tolist()) == (vertices, joints)
+        assert (aimed.vertices.tolist(), aimed.joints.tolist()) == (vertices, joints)
+
+
+def test_a_vertex_that_only_a_value_names_is_found() -> None:
+    remark = Diagnostic("W002.vertex", Path("a.npz"), values={"vertex": 3})
+    aimed = aimed_at(of_diagnostic(remark), scene_of(column()).actors[0], "mesh")
+    assert aimed.vertices.tolist() == [3]

@@ -40,7 +40,7 @@ def filled_normals(
     if zero.any():
         places = np.flatnonzero(zero)
         source.warn(
-            "M007.normals", part="positions", places=places, n=len(places), vertex=int(places[0])
+            "M007.computed", part="positions", places=places, n=len(places), vertex=int(places[0])
         )
     missing = absent | zero
     if not missing.any():

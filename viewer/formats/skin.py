@@ -123,7 +123,7 @@ def _normals(source: Source, sections: Sections, positions: Floats, triangles: I
     if zero.any():
         first = int(zero.argmax())
         source.warn(
-            "M007.normals",
+            "M007.computed",
             source.offset_of("normals", first),
             1,
             "positions",

@@ -32,13 +32,15 @@ def aimed_at(remark: Finding, actor: Actor, part: str) -> Finding | None:
 
 
 def _in_mesh(remark: Finding, actor: Actor) -> Finding | None:
-    if len(remark.vertices) or len(remark.triangles) or len(remark.joints):
-        return remark
-    # Of faults whose data stay as they are only the value tells the vertex.
-    vertex, mesh = remark.diagnostic.values.get("vertex"), actor.figure.mesh
-    if mesh is None or not isinstance(vertex, int) or vertex >= mesh.n_vertices:
+    mesh, skin, found = actor.figure.mesh, actor.figure.skin, remark.diagnostic
+    if mesh is None:
         return None
-    return replace(remark, vertices=np.array([vertex], dtype=np.int32))
+    if len(remark.triangles) or len(remark.joints):
+        return remark if found.part != "bindings" or skin is not None else None
+    # Of faults whose data stay as they are only the value tells the vertex.
+    vertices = remark.vertices if len(remark.vertices) else [found.values.get("vertex")]
+    known = [vertex for vertex in vertices if vertex is not None and vertex < mesh.n_vertices]
+    return replace(remark, vertices=np.array(known, dtype=np.int32)) if known else None
 
 
 def _in_clip(remark: Finding, actor: Actor) -> Finding | None:

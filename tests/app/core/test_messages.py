@@ -58,7 +58,7 @@ def test_message_line(message, line):
 def test_warnings_of_a_scene_are_said_and_kept_from_the_start(rig):
     scene = viewer.load(*rig)
     scene.diagnostics = (
-        Diagnostic("M007.normals", Path("tiny.skin"), values={"n": 3, "vertex": 0}),
+        Diagnostic("M007.computed", Path("tiny.skin"), values={"n": 3, "vertex": 0}),
         Diagnostic("F007.several-pictures", Path("tiny"), values={"n": 2}),
     )
     state = make_state(scene)
@@ -208,7 +208,7 @@ def test_messages_without_room_are_only_counted(drive, rig, texts):
 def test_picture_of_the_interface_shows_warnings_however_long_it_takes(drive, rig, monkeypatch):
     scene = viewer.load(*rig)
     values = {"n": 3, "vertex": 0}
-    scene.diagnostics = (Diagnostic("M007.normals", Path("tiny.skin"), values=values),)
+    scene.diagnostics = (Diagnostic("M007.computed", Path("tiny.skin"), values=values),)
     hand = drive(scene=scene, samples=1)
     for note in hand.state.messages.notes:
         note.until = 1e11  # as if it had been said just before the next line

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 pytest.importorskip("scipy")
 
-from viewer.autorig.transfer import corrective_transfer as carried_correctives
+from viewer.autorig.transfer import corrective_transfer
 from viewer.autorig.transfer.corrective_transfer import transfer_correctives
 from viewer.rig.blendshapes import Correctives
 from viewer.rig.geometry.closest_point import SurfacePoints
@@ -59,7 +59,7 @@ def test_offsets_fade_out_where_the_target_leaves_the_template():
 
 
 def test_more_numbers_than_fit_are_left_out(monkeypatch):
-    monkeypatch.setattr(carried_correctives, "MOST_NUMBERS", 9 * 4 * 3 - 1)
+    monkeypatch.setattr(corrective_transfer, "MOST_NUMBERS", 9 * 4 * 3 - 1)
     positions, triangles = strip(2)
     found = transfer_correctives(
         Correctives(OFFSETS), points(np.tile([1.0, 0, 0], (4, 1))), TRIANGLES, np.ones(4, bool),

@@ -128,7 +128,7 @@ def spread() -> Figure:
 
 
 @pytest.mark.parametrize(
-    ("carried", "left", "right"),
+    ("transferred", "left", "right"),
     [
         ([True] * 4, 1.25, 1.25),  # both were measured: their mean
         ([True, True, False, True], 1.4, 1.4),  # one was: it counts for both

@@ -225,10 +225,10 @@ def align(
         If a mesh has no area, landmarks lie on a line, or axes contradict each other.
     """
     report(0.0, "alignment")
-    ours, theirs = (
-        Triangles(side.positions, side.triangles, settings.samples) for side in (template, target)
+    ours, theirs = fine = (
+        _surface(template, settings.samples),
+        _surface(target, settings.samples),
     )
-    fine = (ours, theirs)
     if settings.matrix is not None:
         return Alignment.of(ours, theirs, similarity_of(settings.matrix), "given")
     coarse = [
@@ -264,6 +264,10 @@ def align(
     fraction = _PART_BETTER if is_part else _BETTER
     gap = misfit(left, is_part)
     return found if gap > _IN_PLACE or misfit(found, is_part) < fraction * gap else left
+
+
+def _surface(side: Posed, samples: int) -> Triangles:
+    return Triangles(side.positions, side.triangles, samples)
 
 
 def _landmark_fit(landmarks: Floats, scale: str) -> Similarity:

@@ -33,7 +33,7 @@ from viewer.diagnostics.wording import (
     weights,
 )
 
-_TABLES = (
+TABLES = (
     *(reading, kinds, skin, obj, ply, morph, rig, joints, bvh, anim, weights),
     *(archives, body_models, easymocap, poses, pictures),
     *(bindings, skeletons, meshes, clips, motion, loading, rigging),
@@ -46,12 +46,12 @@ CODES: dict[str, Code] = {
 """By code; a code is never given to another fault."""
 
 MESSAGES: dict[str, str] = {
-    key: template for table in _TABLES for key, template in table.MESSAGES.items()
+    key: template for table in TABLES for key, template in table.MESSAGES.items()
 }
 """Templates by key."""
 
 PHRASES: dict[str, str] = {
-    key: template for table in _TABLES for key, template in table.PHRASES.items()
+    key: template for table in TABLES for key, template in table.PHRASES.items()
 }
 """Templates of parts of messages, by name."""
 

@@ -39,7 +39,7 @@ MESSAGES = {
     "F002.count": "{item}: expected a count, found {found:quoted}",
     "F002.open": "{word:quoted} is still open where the file ends",
     "F003.beyond": "{item}: expected numbers up to {most:.2g}, found {found:g}",
-    "M007.normals": "{n:#normal} of length 0, first of vertex {vertex}: computed from the "
+    "M007.computed": "{n:#normal} of length 0, first of vertex {vertex}: computed from the "
     "triangles",
     "F006.closing": 'the last "}}" is missing',
     "F006.last-brace": 'the last "}}" is missing: {section} ends with the file',
