@@ -13,8 +13,9 @@ from run_time import RunTime
 
 pytest_plugins = ["stored_pictures"]
 
-TESTS = Path(__file__).resolve().parent
-DRAWING = ("app", "rendering")  # folders of tests that draw
+ROOT = Path(__file__).resolve().parents[1]
+# What draws in all of its tests and examples, or in one that all of it depends on.
+DRAWING = ("tests/app", "tests/rendering", "viewer/rendering", "viewer/__init__.py")
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 SHARED = SHARED_DATA / "cse169"
 
@@ -30,7 +31,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
-        if item.path.is_relative_to(TESTS) and item.path.relative_to(TESTS).parts[0] in DRAWING:
+        if any(item.path.is_relative_to(ROOT / place) for place in DRAWING):
             item.add_marker("slow")
 
 

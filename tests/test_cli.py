@@ -16,6 +16,8 @@ from children import listening
 import viewer
 from viewer.cli import run
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).resolve().parents[1]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONWARNINGS": "error"}
 COMMAND = [sys.executable, "-m", "viewer"]

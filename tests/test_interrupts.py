@@ -21,6 +21,8 @@ from PIL import Image
 from viewer.cli import run
 from viewer.interrupts import Interrupted, deferred, hold, poll, raising, watched
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).resolve().parents[1]
 OLD = b"the old file"
 INT, TERM = signal.SIGINT, signal.SIGTERM

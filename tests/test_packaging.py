@@ -11,6 +11,8 @@ import pytest
 
 from viewer.manual import PAGES
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).resolve().parent.parent
 
 

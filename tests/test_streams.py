@@ -20,7 +20,10 @@ ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONWARNINGS": "error"}
 FULL = Path("/dev/full")
 NAMES = ["/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"]
 
-pytestmark = pytest.mark.skipif(not Path(NAMES[0]).exists(), reason="no name for the output stream")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not Path(NAMES[0]).exists(), reason="no name for the output stream"),
+]
 
 
 @pytest.fixture

@@ -27,6 +27,8 @@ from viewer.rendering.camera import facing_camera, fit
 from viewer.rig.inspection.front import guess_front
 from viewer.rig.scene import scene_points
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).resolve().parents[1]
 SHARED = ROOT.parent / "shared" / "data" / "cse169"
 SIZE = (1280, 800)

@@ -23,6 +23,8 @@ from viewer.rig.pose import rest_pose
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import deform
 
+pytestmark = pytest.mark.slow
+
 # A quarter of the usual number: the search takes a quarter of the time.
 QUICK = TransferSettings(alignment=AlignmentSettings(samples=500))
 ROTATION = turn([0.1, 1, 0.2], 2.0)

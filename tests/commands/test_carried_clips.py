@@ -18,6 +18,8 @@ from viewer.rig.motion.clip_edit import clip_from_frames
 from viewer.rig.motion.evaluation import pose_actor
 from viewer.rig.scene import Actor
 
+pytestmark = pytest.mark.slow
+
 TURN = [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]
 
 

@@ -21,6 +21,8 @@ from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor
 
+pytestmark = pytest.mark.slow
+
 LAYOUT = PointLayout("pair", ("nose", "neck"), np.zeros((0, 2)), np.zeros(2))
 
 

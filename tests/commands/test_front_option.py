@@ -16,6 +16,8 @@ from viewer.rendering.camera import Camera, fit
 from viewer.rendering.offscreen import default_camera
 from viewer.rig.scene import scene_points
 
+pytestmark = pytest.mark.slow
+
 SIZE = (64, 48)
 
 

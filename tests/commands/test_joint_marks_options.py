@@ -9,6 +9,8 @@ from PIL import Image
 
 from viewer.cli import run
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def rig(tmp_path):

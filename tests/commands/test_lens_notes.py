@@ -7,6 +7,8 @@ from formats.capture_files import points, write_frames
 
 from viewer.cli import run
 
+pytestmark = pytest.mark.slow
+
 # Cameras without a size: the middle of the picture is its principal point, so 1000 x 1000 pixels.
 _NAMES = "".join(
     f"""{key}_{name}: !!opencv-matrix

@@ -12,6 +12,8 @@ from formats.synthetic_smpl import model
 from viewer.cli import run
 from viewer.rig.scalars import SCALARS
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):

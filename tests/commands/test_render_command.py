@@ -21,6 +21,8 @@ from viewer.rendering.camera import Camera, fit
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.scene import scene_points
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).resolve().parents[2]
 
 

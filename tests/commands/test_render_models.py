@@ -14,6 +14,8 @@ from PIL import Image
 from viewer.cli import run
 from viewer.rig.scalars import SCALARS
 
+pytestmark = pytest.mark.slow
+
 PLAIN = ["--background", "transparent", "--no-grid", "--samples", "1", "--size", "96x96"]
 SIDE = ["--orthographic", "--inclination", "0"]
 

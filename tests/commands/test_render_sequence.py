@@ -22,6 +22,8 @@ from viewer.cli import run
 from viewer.commands._shots import Turntable, parse_turntable
 from viewer.rig.motion.evaluation import pose_actor
 
+pytestmark = pytest.mark.slow
+
 av = pytest.importorskip("av")
 ROOT = Path(__file__).resolve().parents[2]
 NOTHING_MOVES = "nothing moves: no file is a clip (--turntable turns the camera)"

@@ -21,6 +21,8 @@ from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.pose import rest_pose
 from viewer.rig.scene import Actor
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):

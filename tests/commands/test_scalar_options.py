@@ -17,6 +17,8 @@ from viewer.rig.annotations import VertexField
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor, Scene
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def body():

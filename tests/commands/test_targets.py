@@ -17,6 +17,8 @@ from commands.writing_runs import (
 
 from viewer.cli import run
 
+pytestmark = pytest.mark.slow
+
 CONVERTING, DRAWING = [*converting(Inputs())], [*drawing(Inputs())]
 
 

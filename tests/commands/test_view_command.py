@@ -10,6 +10,8 @@ from PIL import Image
 import viewer
 from viewer.cli import run
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(autouse=True)
 def _no_display(monkeypatch):

@@ -13,6 +13,8 @@ from commands.writing_runs import Inputs, contents, converting, drawing, into, w
 from viewer.cli import run
 from viewer.media import saving as _save
 
+pytestmark = pytest.mark.slow
+
 CONVERTING = [*converting(Inputs()), "people as a folder"]
 PICTURES = [case for case in drawing(Inputs()) if not case.startswith("v.")]
 FULL = os.strerror(errno.ENOSPC)

@@ -92,6 +92,7 @@ def test_vertices_between_frames_are_told_too(tmp_path):
     assert [float(each) for each, _ in found] == pytest.approx([size, 3.0 * size], rel=TOLD)
 
 
+@pytest.mark.slow
 def test_motions_too_long_to_be_sure_of_say_so(tmp_path):
     """Two minutes at 20 a second: more spans between frames than are all sampled."""
     actor = swinging(end=120.0)

@@ -428,6 +428,7 @@ def test_a_bvh_comes_back_with_its_end_sites(tmp_path: Path) -> None:
     np.testing.assert_allclose(again.frames, first.frames, atol=2e-6)
 
 
+@pytest.mark.slow
 def test_keyed_clips_with_root_translation(tmp_path: Path) -> None:
     figure = viewer.load().actors[0].figure
     rng = np.random.default_rng(2)

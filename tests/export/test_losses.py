@@ -114,6 +114,7 @@ def test_gltf_tells_the_same_of_the_shape_that_is_baked_in(tmp_path):
     assert_allclose(np.linalg.norm(drawn - wanted, axis=1), [0, 0.1, 0.2, 0.5], rtol=0, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_expressions_are_no_part_of_a_bvh(tmp_path):
     """SMPL-X, faces that move: what a skin on the file's joints lacks, by plain formulas."""
     figure = replace(family_figure("smplx", tmp_path), correctives=None)
@@ -266,6 +267,7 @@ def test_anim_tells_of_the_mesh_too(tmp_path):
 # Nothing
 
 
+@pytest.mark.slow
 def test_nothing_is_said_where_nothing_is_lost(tmp_path):
     figure = replace(family_figure("smpl", tmp_path), correctives=None)
     animation = family_animation(figure, family_motion(24, frames=30))

@@ -16,6 +16,8 @@ from viewer.rig.pose import rest_pose
 from viewer.rig.skeleton import Skeleton
 from viewer.rig.skinning import deform
 
+pytestmark = pytest.mark.slow
+
 SKEL = b"""balljoint root {
 \toffset 0 1 0
 \tboxmin -0.1 -0.2 -0.3

@@ -19,6 +19,8 @@ from viewer.rig.pose import rest_pose
 from viewer.rig.posing.pose_record import PoseRecord, apply_record, record_of
 from viewer.rig.skinning import deform, joint_matrices
 
+pytestmark = pytest.mark.slow
+
 HEAD = model("flame", 16, 2, 1)
 HEAD |= {"vt": HEAD["v_template"][:, :2], "ft": HEAD["f"], "vert_sym_idxs": np.arange(16)}
 HEAD |= {"lmk_faces_idx": np.arange(3), "lmk_bary_coords": np.eye(3), "gender": np.array("male")}

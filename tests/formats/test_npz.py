@@ -283,6 +283,7 @@ def test_headers_that_break_the_grammar(text: str) -> None:
     assert len(str(values["problem"])) < 400
 
 
+@pytest.mark.slow
 def test_bomb_is_refused_before_it_is_unpacked() -> None:
     lead = npy(header(shape=f"({60 << 20},)"))
     size = len(lead) + 8 * (60 << 20)

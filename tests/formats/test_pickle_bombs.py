@@ -38,6 +38,8 @@ from viewer.errors import FormatError
 from viewer.formats._archive import Opaque
 from viewer.rig.arrays import Deferred
 
+pytestmark = pytest.mark.slow
+
 BOUND = 64 << 20  # bytes that a refusal may take
 PATIENCE = 5.0  # seconds for what should take a fraction of one, on a busy machine
 

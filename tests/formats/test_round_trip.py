@@ -17,6 +17,8 @@ from viewer.rig.mesh import Material, Mesh
 from viewer.rig.skeleton import Skeleton
 from viewer.rig.skin import skin_from_lists
 
+pytestmark = pytest.mark.slow
+
 INF = math.inf
 LARGEST = float(np.finfo(np.float32).max)
 

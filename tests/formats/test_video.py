@@ -18,6 +18,8 @@ from viewer.media import video_kinds as _video_kinds
 from viewer.media.video import VideoSink
 from viewer.media.video_kinds import video_kind
 
+pytestmark = pytest.mark.slow
+
 av = pytest.importorskip("av")
 ROOT = Path(__file__).resolve().parents[2]
 COLORS = {"red": (220, 40, 30), "green": (30, 170, 60), "blue": (40, 60, 200), "gray": (128,) * 3}

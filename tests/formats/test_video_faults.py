@@ -17,6 +17,8 @@ from viewer.errors import OutputError
 from viewer.media.video import VideoSink
 from viewer.media.video_file import VideoFile
 
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("av")
 ROOT = Path(__file__).resolve().parents[2]
 SUFFIXES = [".mp4", ".webm", ".gif"]

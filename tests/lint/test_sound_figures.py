@@ -16,6 +16,8 @@ from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.scene import Actor
 
+pytestmark = pytest.mark.slow
+
 
 def heavy(findings: list[Finding]) -> list[tuple[str, str]]:
     return [(finding.code, finding.message) for finding in findings if finding.severity != "note"]

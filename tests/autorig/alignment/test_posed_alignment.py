@@ -18,6 +18,8 @@ from viewer.loading import bundled_body, load
 from viewer.rig.pose import rest_pose
 from viewer.rig.skinning import deform, joint_matrices
 
+pytestmark = pytest.mark.slow
+
 # A quarter of the usual number: a fit takes a quarter of the time, and is nearly as good.
 SAMPLES = 500
 LANDMARKS = np.array([[[0, 0, 0]] * 2, [[1, 0, 0]] * 2, [[0, 0, 1]] * 2], dtype=float)

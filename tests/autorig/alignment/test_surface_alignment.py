@@ -19,6 +19,8 @@ from viewer.autorig.alignment.surface_alignment import (
 from viewer.errors import RigError
 from viewer.rig.mesh import vertex_normals
 
+pytestmark = pytest.mark.slow
+
 POSITIONS, TRIANGLES = tube()
 # A quarter of the usual number: a search takes a quarter of the time.
 SAMPLES = 500

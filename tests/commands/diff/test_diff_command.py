@@ -10,6 +10,8 @@ from PIL import Image
 
 from viewer.cli import run
 
+pytestmark = pytest.mark.slow
+
 SKEL = """balljoint base {
   offset 0 0 0
   boxmin -1 -1 -1

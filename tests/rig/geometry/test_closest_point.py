@@ -69,6 +69,7 @@ def test_closest_agrees_with_trying_every_triangle(size):
     check(rng.uniform(-1.5, 1.5, (60, 3)), positions, triangles)
 
 
+@pytest.mark.slow
 def test_closest_finds_long_triangles_among_small_ones():
     rng = np.random.default_rng(2)
     positions, triangles = soup(rng, 150, 0.02)
@@ -122,6 +123,7 @@ def test_closest_is_as_exact_far_from_the_origin():
     np.testing.assert_allclose(far.distances, near.distances, atol=1e-11)
 
 
+@pytest.mark.slow
 def test_closest_from_the_middle_of_a_sphere_looks_at_every_triangle():
     turns = np.linspace(0, 2 * np.pi, 41)[:-1]
     heights = np.linspace(0.05, np.pi - 0.05, 40)
