@@ -225,10 +225,8 @@ def align(
         If a mesh has no area, landmarks lie on a line, or axes contradict each other.
     """
     report(0.0, "alignment")
-    ours, theirs = fine = (
-        _surface(template, settings.samples),
-        _surface(target, settings.samples),
-    )
+    samples = settings.samples
+    ours, theirs = fine = _surface(template, samples), _surface(target, samples)
     if settings.matrix is not None:
         return Alignment.of(ours, theirs, similarity_of(settings.matrix), "given")
     coarse = [

@@ -6,7 +6,6 @@ MESSAGES = {
     "F006.extra-braces": 'ignored {n} "}}" after the root',
     # .skel
     "F002.no-joint": "expected a skeleton, found no balljoint{looks:+ ({})}",
-    "F006.unknown": "skipped unknown {found:quoted}",
     "S003.ignored": "ignored {n:#limit} whose minimum is above the maximum, first "
     "rot{axis}limit {low:g} {high:g} of {joint}",
     "F002.skel-none": "figure {figure:text} has no skeleton to write as .skel",
