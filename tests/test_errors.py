@@ -1,7 +1,15 @@
+from pathlib import Path
+
 import pytest
 
 from viewer import errors
+from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, OutputError, RenderError, ViewerError, printable
+
+
+def wrong(path, line=None):
+    values = {"n": 3, "expected": 3, "found": 2, "item": "positions"}
+    return FormatError(Diagnostic("F002.width", Path(path), line, values=values))
 
 
 @pytest.mark.parametrize("name", [name for name in errors.__all__ if name.endswith("Error")])
@@ -15,14 +23,14 @@ def test_exit_codes_tell_input_graphics_and_output_apart():
 
 
 def test_format_error_begins_with_file_and_line():
-    error = FormatError("dir/tube.skin", "expected 3 numbers, found 2", 41)
-    assert str(error) == "dir/tube.skin:41: expected 3 numbers, found 2"
+    error = wrong("dir/tube.skin", 41)
+    assert str(error) == "dir/tube.skin:41: positions: expected 3 numbers, found 2"
     assert (str(error.path), error.line) == ("dir/tube.skin", 41)
-    assert str(FormatError("a b.skel", "x")) == "a b.skel: x"
+    assert str(wrong("a b.skel")) == "a b.skel: positions: expected 3 numbers, found 2"
 
 
 def test_format_error_shows_an_odd_path_on_one_line():
-    assert str(FormatError("a\nb\udcff\x1b[0m{}%s", "x")) == "a\\nb\\udcff\\x1b[0m{}%s: x"
+    assert str(wrong("a\nb\udcff\x1b[0m{}%s")).startswith("a\\nb\\udcff\\x1b[0m{}%s: positions: expected")
 
 
 @pytest.mark.parametrize(

@@ -66,7 +66,7 @@ def box(drive_body):
 @pytest.fixture
 def quick_fits(monkeypatch):
     """Fits take a quarter of the usual time, and are nearly as good."""
-    monkeypatch.setattr("viewer.autorig.alignment.SAMPLES", 500)
+    monkeypatch.setattr("viewer.autorig.alignment.surface_alignment.SAMPLES", 500)
 
 
 @pytest.fixture

@@ -177,7 +177,7 @@ def test_time_counts_only_where_motion_paths_are_drawn(state):
     before = keys.key(state, SIZE)
     state.scene.time = 1.0
     assert keys.key(state, SIZE) == before
-    state.options.trail_joints = ((0, 0),)
+    state.options.path_joints = ((0, 0),)
     before = keys.key(state, SIZE)
     state.scene.time = 2.0
     assert keys.key(state, SIZE) != before

@@ -27,6 +27,7 @@ from typing import Any
 
 from viewer.phrases import counted, listed, one_of, printable, quoted
 
+_SIGNED = re.compile(r"\+z?[.\d]*[efg%]")  # a number with its sign
 _PLACE = "\0"  # of a value inside its own specification
 _LONGEST = 1000  # letters of a text that is a value
 _LONGEST_NAME = 60
@@ -59,7 +60,7 @@ class _Formatter(Formatter):
         if kind == "?":
             one, many = rest.split("|")
             return one if value == 1 else many
-        if kind == "+":
+        if kind == "+" and not _SIGNED.fullmatch(format_spec):
             # An empty pair of braces in a specification has been filled with "" by now.
             return rest.replace(_PLACE, printable(value, 300)) if value else ""
         if not format_spec and isinstance(value, str) and value != _PLACE:
@@ -103,7 +104,7 @@ _PLAIN: dict[str, Callable[[Any], str]] = {
     "text": printable,
     "name": _name,
     "axes": _axes,
-    "all": lambda names: ", ".join(map(printable, names)),
+    "all": lambda names: ", ".join(map(printable, names)) or "none",
     "or": _alternatives,
 }
 _FORMATTER = _Formatter()

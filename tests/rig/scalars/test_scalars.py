@@ -157,7 +157,7 @@ def test_views_of_weights_and_parts_need_no_pose(name):
 def test_unknown_view_is_refused():
     with pytest.raises(RigError) as caught:
         compute("magic", sliding([[]] * 3), None, Skinning())
-    expected = f'no scalar view "magic"; there are {len(SCALARS)}: {", ".join(SCALARS)}'
+    expected = f'no scalar quantity "magic"; there are {len(SCALARS)}: {", ".join(SCALARS)}'
     assert str(caught.value) == expected
 
 
