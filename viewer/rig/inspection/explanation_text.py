@@ -104,8 +104,8 @@ class _Text:
         """Say where the vertex ends up."""
         one = self.one
         if self.method.result:
-            share = f"{one.skinning.share:.{self.digits}f}"
-            self._vector(self.method.result.format(share=share), one.skinned)
+            blend_factor = f"{one.skinning.blend_factor:.{self.digits}f}"
+            self._vector(self.method.result.format(blend_factor=blend_factor), one.skinned)
         if not np.array_equal(one.placement, np.eye(4)):
             self.lines.append(f"figure: times {one.placement[0, 0]:.{self.digits}f}, plus")
             self._vector("", one.placement[:3, 3])

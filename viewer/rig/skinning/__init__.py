@@ -49,11 +49,11 @@ class Method:
     uses_quaternions : bool
         Whether it blends dual quaternions: its shader reads ``u_rigid``.
     ends : tuple of str
-        The two methods between which ``Skinning.share`` interpolates; empty for methods of
+        The two methods between which ``Skinning.blend_factor`` interpolates; empty for methods of
         their own.
     result : str
         Label of the result in an explanation of a vertex, where it is not the last sum that is
-        shown anyway; ``{share}`` stands for the blend factor.
+        shown anyway; ``{blend_factor}`` stands for the blend factor.
     """
 
     title: str
@@ -72,7 +72,7 @@ METHODS = {
         "Mixed",
         uses_quaternions=True,
         ends=("lbs", "dqs"),
-        result="{share} of the way",
+        result="{blend_factor} of the way",
     ),
 }
 """Modules in this folder, each with ``deform`` and a GLSL chunk in ``shaders/skin``."""
@@ -89,7 +89,7 @@ class Skinning:
     ----------
     method : str
         A key of ``METHODS``.
-    share : float
+    blend_factor : float
         Blend factor of methods between two others, 0 to 1; of DQS in the method ``"mix"``.
     max_influences : int
         Only so many of the strongest, scaled to a sum of 1; 0 for all, as stored.
@@ -100,7 +100,7 @@ class Skinning:
     """
 
     method: str = "lbs"
-    share: float = 0.5
+    blend_factor: float = 0.5
     max_influences: int = 0
     normalize: bool = False
     correctives: bool = True
@@ -191,7 +191,8 @@ def skinned(
     if vertices is not None:
         used, normals = skin_rows(used, vertices), normals[vertices]
     module = import_module(f"{__name__}.{skinning.method}")
-    moved: tuple[Floats, Floats] = module.deform(rest, normals, used, palette, skinning.share)
+    factor = skinning.blend_factor
+    moved: tuple[Floats, Floats] = module.deform(rest, normals, used, palette, factor)
     return moved
 
 

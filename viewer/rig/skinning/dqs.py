@@ -29,7 +29,7 @@ _TINY = 1e-12  # influences that cancel out give no rotation
 
 
 def deform(
-    positions: Floats, normals: Floats, skin: Skin, palette: Floats, share: float = 1.0
+    positions: Floats, normals: Floats, skin: Skin, palette: Floats, blend_factor: float = 1.0
 ) -> tuple[Floats, Floats]:
     """Stretch linearly, then move by the unit dual quaternion of the weighted sum.
 
@@ -45,7 +45,7 @@ def deform(
         A vertex without influence stays at its bind position.
     palette : (J, 4, 4)
         Skinning matrices, bind to posed; they may scale, uniformly or not.
-    share : float
+    blend_factor : float
         Not used: there is nothing to mix with.
 
     Returns

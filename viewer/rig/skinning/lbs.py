@@ -20,7 +20,7 @@ _IDENTITY = np.eye(3, 4).reshape(12)
 
 
 def deform(
-    positions: Floats, normals: Floats, skin: Skin, palette: Floats, share: float = 1.0
+    positions: Floats, normals: Floats, skin: Skin, palette: Floats, blend_factor: float = 1.0
 ) -> tuple[Floats, Floats]:
     """Blend matrices, then move: v' = B [v 1] and n' = unit(B [n 0]), with B = sum_i w_i M_i.
 
@@ -35,7 +35,7 @@ def deform(
         Weights as stored; a vertex without any stays at its bind position.
     palette : (J, 4, 4)
         Skinning matrices, bind to posed.
-    share : float
+    blend_factor : float
         Not used: there is nothing to mix with.
 
     Returns

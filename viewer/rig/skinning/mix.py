@@ -1,4 +1,4 @@
-"""A mixture of linear blend and dual quaternion skinning: between the two by a share."""
+"""A mixture of linear blend and dual quaternion skinning: between the two by a blend factor."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ __all__ = ["deform"]
 
 
 def deform(
-    positions: Floats, normals: Floats, skin: Skin, palette: Floats, share: float = 0.5
+    positions: Floats, normals: Floats, skin: Skin, palette: Floats, blend_factor: float = 0.5
 ) -> tuple[Floats, Floats]:
-    """Return (1 - share) LBS + share DQS, vertex by vertex.
+    """Return (1 - blend_factor) LBS + blend_factor DQS, vertex by vertex.
 
     Where joints scale or shear, normals take the inverse transpose of the mixed linear maps.
 
@@ -29,7 +29,7 @@ def deform(
         Of V vertices.
     palette : (J, 4, 4)
         Skinning matrices, bind to posed.
-    share : float
+    blend_factor : float
         0 for LBS alone, 1 for DQS alone.
 
     Returns
@@ -41,9 +41,11 @@ def deform(
     """
     linear = lbs.deform(positions, normals, skin, palette)
     dual = dqs.deform(positions, normals, skin, palette)
-    moved, turned = ((1.0 - share) * a + share * b for a, b in zip(linear, dual, strict=True))
+    moved, turned = (
+        (1.0 - blend_factor) * a + blend_factor * b for a, b in zip(linear, dual, strict=True)
+    )
     if not is_rigid(palette):
-        maps = (1.0 - share) * lbs.blended_matrices(skin, palette)[:, :, :3]
-        maps += share * dqs.linear_maps(skin, palette)
+        maps = (1.0 - blend_factor) * lbs.blended_matrices(skin, palette)[:, :, :3]
+        maps += blend_factor * dqs.linear_maps(skin, palette)
         turned = inverse_transposed(np.moveaxis(maps, 0, -1), normals)
     return moved, unit(turned)
