@@ -41,9 +41,9 @@ class Method:
     Attributes
     ----------
     title : str
-        For menus.
+        Label in menus.
     short : str
-        For buttons and legends.
+        Label on buttons and in legends.
     uses_matrices : bool
         Whether it blends skinning matrices: its shader reads ``u_palette``.
     uses_quaternions : bool
@@ -52,8 +52,8 @@ class Method:
         The two methods between which ``Skinning.blend_factor`` interpolates; empty for methods of
         their own.
     result : str
-        Label of the result in an explanation of a vertex, where it is not the last sum that is
-        shown anyway; ``{blend_factor}`` stands for the blend factor.
+        Label of the result in the explanation of a vertex; empty if the last sum already is the
+        result. ``{blend_factor}`` is replaced by the number.
     """
 
     title: str
@@ -83,7 +83,7 @@ PURE = tuple(name for name, method in METHODS.items() if not method.ends)
 
 @dataclass(slots=True)
 class Skinning:
-    """How a figure is skinned; the defaults are what its files say.
+    """Skinning options; the defaults follow the file.
 
     Attributes
     ----------
@@ -92,11 +92,11 @@ class Skinning:
     blend_factor : float
         Blend factor of methods between two others, 0 to 1; of DQS in the method ``"mix"``.
     max_influences : int
-        Only so many of the strongest, scaled to a sum of 1; 0 for all, as stored.
+        Keep only this many of the strongest, scaled to a sum of 1; 0 for all, as stored.
     normalize : bool
         Scale each vertex's weights to a sum of 1.
     correctives : bool
-        Add the pose correctives of figures that have some.
+        Add pose correctives, if the figure has any.
     """
 
     method: str = "lbs"
@@ -109,24 +109,24 @@ class Skinning:
 def deform(
     figure: Figure, pose: Pose | None = None, method: str | Skinning = "lbs"
 ) -> tuple[Floats, Floats]:
-    """Return a figure's posed vertices: the float64 reference that the GPU is held to.
+    """Return a figure's posed vertices, the float64 reference for the shaders.
 
     Parameters
     ----------
     figure : Figure
-        With a mesh. Without skeleton or skin the mesh comes back in its binding space.
+        With a mesh. Without skeleton or skin the mesh is returned in its binding space.
     pose : Pose, optional
         DOFs in lengths and radians; the file's own pose if omitted.
     method : str or Skinning
-        A key of ``METHODS``, or everything about how to skin.
+        A key of ``METHODS``, or all skinning options.
 
     Returns
     -------
     positions : (V, 3)
         Figure units.
     normals : (V, 3)
-        Unit length. They are turned with the rest normals of the shaped mesh: what correctives
-        do to normals is left out.
+        Unit length. They are the rest normals of the shaped mesh, transformed by the joints: the
+        effect of correctives on normals is left out.
 
     Raises
     ------
@@ -165,7 +165,7 @@ def skinned(
     skinning: Skinning,
     vertices: Ints | None = None,
 ) -> tuple[Floats, Floats]:
-    """Move vertices by skinning matrices.
+    """Transform vertices by skinning matrices.
 
     Parameters
     ----------
@@ -174,18 +174,18 @@ def skinned(
     skin : Skin
         As stored.
     rest : (N, 3)
-        The vertices in binding space, with pose correctives.
+        Vertices in binding space, with pose correctives.
     palette : (J, 4, 4)
         Skinning matrices.
     skinning : Skinning
         Method and influences.
     vertices : (N,), optional
-        Their indices; all if omitted.
+        Indices of these vertices; all if omitted.
 
     Returns
     -------
     positions, normals : (N, 3)
-        Figure units, before the figure's own placement; unit length.
+        Figure units, before the figure's own scale and translation; unit length.
     """
     used, normals = skin_used(skin, skinning), mesh.normals
     if vertices is not None:
@@ -199,14 +199,14 @@ def skinned(
 def deform_frames(
     figure: Figure, poses: Sequence[Pose], skinning: Skinning | None = None
 ) -> Floats:
-    """Return the vertices of many poses of one shape, linearly blended, without normals.
+    """Return the vertices of many poses of one shape by LBS, without normals.
 
     Parameters
     ----------
     figure : Figure
         With mesh, skeleton and skin.
     poses : sequence of F Pose
-        Their shape is that of the first.
+        All are shaped by the weights of the first.
     skinning : Skinning, optional
         Its method must be ``"lbs"``.
 
@@ -218,7 +218,7 @@ def deform_frames(
     Raises
     ------
     RigError
-        If the figure cannot be skinned so.
+        If the figure cannot be skinned, there are no poses, or the method is not LBS.
     """
     how = skinning or Skinning()
     if not poses or not figure.is_attached or how.method != "lbs":
@@ -238,7 +238,7 @@ def deform_frames(
 
 
 def joint_matrices(figure: Figure, pose: Pose) -> Floats:
-    """Return where a pose puts a figure's joints, its shape and place included.
+    """Return the joint matrices of a posed figure, with its shape and placement.
 
     Parameters
     ----------
@@ -261,7 +261,7 @@ _varied: Memo[Skin, Skin] = Memo(kept=4)
 
 
 def skin_used(skin: Skin, skinning: Skinning) -> Skin:
-    """Return the influences that count: all as stored, or cut and scaled as asked."""
+    """Return the effective influences: as stored, or pruned and normalised as the options say."""
     count, normalize = skinning.max_influences, skinning.normalize
     if not count and not normalize:
         return skin
