@@ -1,20 +1,20 @@
 #pragma needs lbs dqs
-// Between linear blend and dual quaternion skinning: (1 - share) LBS + share DQS.
-uniform float u_share;          // of DQS, 0 to 1
+// Between linear blend and dual quaternion skinning: (1 - blend factor) LBS + blend factor DQS.
+uniform float u_blend_factor;   // of DQS, 0 to 1
 
 void skin(inout vec3 position, inout vec3 normal) {
     vec3 rest_normal = normal, dual_position = position, dual_normal = normal;
     skin_lbs(position, normal);
 #ifdef AFFINE_PALETTE
-    mat3 mixed = (1.0 - u_share) * linear;
+    mat3 mixed = (1.0 - u_blend_factor) * linear;
 #endif
     skin_dqs(dual_position, dual_normal);
-    position = mix(position, dual_position, u_share);
-    normal = mix(unit(normal), unit(dual_normal), u_share);
+    position = mix(position, dual_position, u_blend_factor);
+    normal = mix(unit(normal), unit(dual_normal), u_blend_factor);
 #ifdef AFFINE_PALETTE
     if (!is_rigid) {
         // Of the map as a whole: normals of scaled joints do not mix.
-        mixed = transpose(mixed + u_share * linear);
+        mixed = transpose(mixed + u_blend_factor * linear);
         normal = blended_normal(mixed[0], mixed[1], mixed[2], rest_normal);
     }
 #endif

@@ -192,8 +192,9 @@ HALF = math.sqrt(0.5)
         ([], HALF),  # LBS: the middle of a quarter turn
         (["--method", "lbs"], HALF),
         (["--method", "dqs"], 1),
-        (["--method", "mix", "--dqs-share", "0"], HALF),
-        (["--method", "mix", "--dqs-share", "1"], 1),
+        (["--method", "mix", "--blend-factor", "0"], HALF),
+        (["--method", "mix", "--blend-factor", "1"], 1),
+        (["--method", "mix", "--dqs-share", "1"], 1),  # the option's second spelling
         (["--method", "mix"], (1 + HALF) / 2),
     ],
 )

@@ -118,8 +118,8 @@ NUMBERS_WANTED = "expected numbers separated by commas, found"
             "--frame and --time: expected one of them, found both",
         ),
         # Skinning
-        ("smpl.npz --dqs-share -0.1", "--dqs-share: expected 0 to 1, found -0.1"),
-        ("smpl.npz --dqs-share 1.5", "--dqs-share: expected 0 to 1, found 1.5"),
+        ("smpl.npz --blend-factor -0.1", "--blend-factor: expected 0 to 1, found -0.1"),
+        ("smpl.npz --dqs-share 1.5", "--blend-factor: expected 0 to 1, found 1.5"),
         ("smpl.npz --influences -1", "--influences: expected 0 or more, found -1"),
         # Hands, mirror
         ("smpl.npz --hands mean", "--hands: no file has hand components"),
@@ -140,8 +140,8 @@ def test_wrong_value_is_refused_in_one_line(folder, capsys, arguments, message):
         "--method cubic",
         "--hands fist",
         "--influences many",
-        "--dqs-share half",
-        "--dqs-share nan",
+        "--blend-factor half",
+        "--blend-factor nan",
         "--frame 1.5",
         "--fps fast",
         "--time soon",

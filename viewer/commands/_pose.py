@@ -73,11 +73,12 @@ def add_skinning_arguments(parser: argparse.ArgumentParser) -> None:
         + " (default: lbs)",
     )
     group.add_argument(
+        "--blend-factor",
         "--dqs-share",
         type=number,
         default=0.5,
-        metavar="S",
-        help="of dual quaternions with --method mix, 0 to 1 (default: 0.5)",
+        metavar="F",
+        help="of --method mix: 0 for LBS alone, 1 for DQS alone (default: 0.5)",
     )
     group.add_argument(
         "--influences",
@@ -94,13 +95,13 @@ def add_skinning_arguments(parser: argparse.ArgumentParser) -> None:
 
 def skinning_of(arguments: argparse.Namespace) -> Skinning:
     """Return how joints are asked to move the mesh."""
-    if not 0.0 <= arguments.dqs_share <= 1.0:
-        raise ViewerError(f"--dqs-share: expected 0 to 1, found {arguments.dqs_share:g}")
+    if not 0.0 <= arguments.blend_factor <= 1.0:
+        raise ViewerError(f"--blend-factor: expected 0 to 1, found {arguments.blend_factor:g}")
     if arguments.influences < 0:
         raise ViewerError(f"--influences: expected 0 or more, found {arguments.influences}")
     return Skinning(
         method=arguments.method,
-        share=arguments.dqs_share,
+        blend_factor=arguments.blend_factor,
         max_influences=arguments.influences,
         normalize=arguments.normalize,
         correctives=not arguments.no_correctives,

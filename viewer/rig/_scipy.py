@@ -1,4 +1,4 @@
-"""SciPy, which only rigging needs: imported when asked for, missed with one line."""
+"""Lazy import of SciPy, which only rigging needs."""
 
 from __future__ import annotations
 
@@ -9,11 +9,7 @@ from viewer.errors import RigError
 
 
 def scipy_part(name: str) -> ModuleType:
-    """Import a part of SciPy.
-
-    ``name``: below ``scipy``, such as ``sparse.linalg``.
-    Raises RigError if SciPy is not installed: it is the optional extra ``rig``.
-    """
+    """Import a submodule of SciPy, such as ``sparse.linalg``; RigError if it is not installed."""
     try:
         return import_module(f"scipy.{name}")
     except ModuleNotFoundError:

@@ -1,4 +1,4 @@
-"""What is known of a figure beyond how it moves: parts, keypoints, coarser meshes, fields."""
+"""Annotations of a figure: body parts, keypoints, reduced meshes, fields."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ __all__ = ["BodyParts", "Keypoints", "ReducedMesh", "VertexField", "keypoint_pos
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyParts:
-    """A part for every vertex.
+    """The body part of every vertex.
 
     Attributes
     ----------
     names : tuple of P str
-        May name parts without vertices.
+        Names of the parts; a part may have no vertices.
     of_vertex : (V,) int32
         Index into ``names``.
     """
@@ -39,18 +39,18 @@ class BodyParts:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Keypoints:
-    """Named points that follow a joint, or a place on a triangle.
+    """Named points, each attached to a joint or to a point on a triangle.
 
     Attributes
     ----------
     names : tuple of N str
-        As the field calls them.
+        Standard names.
     joints : (N,) int32
-        The joint of each, -1 for a place on the mesh.
+        Joint of each keypoint, -1 for a point on the mesh.
     vertices : (N, 3) int32
-        The corners of each place; any where a joint is given.
+        Corners of the triangle; ignored where a joint is given.
     weights : (N, 3)
-        Barycentric coordinates.
+        Barycentric coordinates in that triangle.
     """
 
     names: tuple[str, ...]
@@ -68,7 +68,7 @@ class Keypoints:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReducedMesh:
-    """A second level of detail over some of the same vertices.
+    """A coarser level of detail over a subset of the vertices.
 
     Attributes
     ----------
@@ -95,20 +95,20 @@ class ReducedMesh:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VertexField:
-    """A number for every vertex that somebody computed: a distance, a confidence.
+    """A precomputed number per vertex, such as a distance or a confidence.
 
     Attributes
     ----------
     name : str
         One word, for the command line.
     title : str
-        For menus and the legend.
+        Label in menus and the legend.
     values : (V,)
         In ``unit``, or indices into ``names``.
     unit : str
-        ``"length"``: figure units; else the word for it, empty for none.
+        ``"length"`` for figure units, otherwise the unit's name; empty if dimensionless.
     names : tuple of str
-        What the numbers stand for if those are indices: ``("matched", "filled")``.
+        Names of the classes if the values are indices.
     """
 
     name: str
@@ -129,16 +129,16 @@ class VertexField:
 
 
 def keypoint_positions(keypoints: Keypoints, vertices: Floats, joints: Floats) -> Floats:
-    """Return where the keypoints are.
+    """Return the positions of keypoints: sum_k b_k v_k of their corners, or that of their joint.
 
     Parameters
     ----------
     keypoints : Keypoints
-        N of them.
+        N keypoints.
     vertices : (V, 3)
-        Posed.
+        Posed vertices.
     joints : (J, 3)
-        Posed, in the same space.
+        Posed joints, in the same space.
 
     Returns
     -------

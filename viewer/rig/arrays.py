@@ -1,4 +1,4 @@
-"""Array types, and the check that every array of a rig passes once."""
+"""Array types, and the validation of every array of a rig."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Bytes = NDArray[np.uint8]
 
 
 class Deferred:
-    """An array in a file that is read when its values are asked for, and then kept.
+    """An array of a file that is read on first use and then kept.
 
     Parameters
     ----------
@@ -28,12 +28,12 @@ class Deferred:
     dtype : dtype
         As the file declares it.
     load : callable
-        Returns the array; called once, and may raise a ``FormatError``.
+        Reads the array; called once, may raise a ``FormatError``.
 
     Attributes
     ----------
     is_loaded : bool
-        Whether the values were asked for before.
+        Whether the values are in memory.
     """
 
     __slots__ = ("_load", "_values", "dtype", "shape")
@@ -55,7 +55,7 @@ class Deferred:
         Raises
         ------
         FormatError
-            If the file cannot be read any more, or holds something else than it declares.
+            If the file can no longer be read, or its contents contradict its declaration.
         """
         if self._values is None:
             values = self._load()
@@ -72,18 +72,18 @@ def frozen(
     Parameters
     ----------
     name : str
-        What the array is called in the error message.
+        Name of the array in error messages.
     values : array-like of ``shape``
-        The numbers; an array that nobody can write to is taken as it is.
+        Copied unless nothing can write to its memory any more.
     shape : tuple
-        Wanted shape; ``None`` leaves an axis free.
+        Required shape; ``None`` leaves an axis free.
     dtype : dtype
-        Wanted element type.
+        Required element type.
 
     Raises
     ------
     RigError
-        If the shape differs, or a number is not finite, or not whole where it must be.
+        If the shape differs, a number is not finite, or one that must be an integer is not.
 
     >>> frozen("offset", [1, 2, 3], (3,)).flags.writeable
     False
@@ -97,7 +97,7 @@ def frozen(
         found_text = " x ".join(map(str, array.shape)) or "a single number"
         raise RigError(f"{name}: expected shape {wanted_text}, found {found_text}")
     if array.dtype.kind == "f" and not np.isfinite(array).all():
-        raise RigError(f"{name}: expected finite numbers, found {_first_odd(array)}")
+        raise RigError(f"{name}: expected finite numbers, found {_first_not_finite(array)}")
     if (array is values or array.base is not None) and _is_writeable_by_others(array):
         array = array.copy()
     array.flags.writeable = False
@@ -105,7 +105,7 @@ def frozen(
 
 
 def _is_writeable_by_others(array: NDArray[Any]) -> bool:
-    """Return whether some name that is not ours may still change the memory."""
+    """Return whether another reference can still change the array's memory."""
     owner: Any = array
     while isinstance(owner, np.ndarray):
         if owner.flags.writeable:
@@ -113,11 +113,12 @@ def _is_writeable_by_others(array: NDArray[Any]) -> bool:
         if owner.base is None:
             return False
         owner = owner.base
-    # Bytes never change; memory of anything else may do as it likes.
+    # Bytes are immutable; the memory of any other owner may change.
     return not isinstance(owner, bytes)
 
 
 def _converted(name: str, values: Any, dtype: np.dtype[Any]) -> NDArray[Any]:
+    """Return values as an array of a type; integers must not lose a fraction."""
     try:
         given = np.asarray(values)
         if given.dtype == dtype:
@@ -131,7 +132,8 @@ def _converted(name: str, values: Any, dtype: np.dtype[Any]) -> NDArray[Any]:
     return array
 
 
-def _first_odd(array: NDArray[Any]) -> str:
+def _first_not_finite(array: NDArray[Any]) -> str:
+    """Return the first NaN or infinity of an array and its index, for a message."""
     index = tuple(int(axis[0]) for axis in np.nonzero(~np.isfinite(array)))
     place = ", ".join(map(str, index))
     return f"{array[index]} at index {place}"

@@ -1,4 +1,4 @@
-"""Offsets added to rest vertices by weight: blend shapes, pose correctives, joints that follow."""
+"""Weighted offsets of rest vertices: blend shapes, pose correctives, and the joint regressor."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ __all__ = ["BlendShapes", "Correctives", "JointRegressor", "corrective_weights",
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BlendShapes:
-    """Directions in which the rest mesh changes, each with a weight: v = v_rest + sum_s w_s d_s.
+    """Per-vertex offsets of the rest mesh, scaled by weights: v = v_rest + sum_s w_s d_s.
 
     Attributes
     ----------
     names : tuple of S str
-        Told apart by index, shown as they are.
+        Labels; may repeat, as blend shapes are identified by index.
     offsets : (S, V, 3), or Deferred
-        Figure units per unit of weight; read from the file when a weight is first not 0.
+        Figure units per unit of weight; read from the file when a weight first becomes non-zero.
     groups : tuple of S str
-        What each belongs to: ``"shape"`` (a weight of 1 is one standard deviation),
-        ``"expression"``, or ``"morph"`` (a weight of 1 is a target reached).
+        Group of each: ``"shape"`` (a weight of 1 is one standard deviation), ``"expression"``,
+        or ``"morph"`` (a weight of 1 is the target itself).
     normal_offsets : (S, V, 3), or Deferred, or None
-        Directions in which the rest normals change, per unit of weight; None if the normals are
-        those of the changed surface.
+        Offsets of the rest normals per unit of weight; None if the normals are recomputed from
+        the changed surface.
     """
 
     names: tuple[str, ...]
@@ -53,7 +53,7 @@ class BlendShapes:
 
     @property
     def n_shapes(self) -> int:
-        """Number of directions, S."""
+        """Number of blend shapes, S."""
         return len(self.names)
 
     @property
@@ -77,12 +77,12 @@ class BlendShapes:
         Raises
         ------
         RigError
-            If there are more weights than directions.
+            If there are more weights than blend shapes.
         """
         return self._weighted(self.offsets, weights)
 
     def normal_displacement(self, weights: Floats) -> Floats | None:
-        """Return what is added to the rest normals, as ``displacement`` is to the vertices.
+        """Return the offsets of the rest normals, sum_s w_s n_s.
 
         Parameters
         ----------
@@ -92,17 +92,18 @@ class BlendShapes:
         Returns
         -------
         (V, 3) or None
-            None if the normals are to be those of the changed surface.
+            None if the normals have to be recomputed from the changed surface.
 
         Raises
         ------
         RigError
-            If there are more weights than directions.
+            If there are more weights than blend shapes.
         """
         offsets = self.normal_offsets
         return None if offsets is None else self._weighted(offsets, weights)
 
     def _weighted(self, offsets: Floats | Deferred, weights: Floats) -> Floats:
+        """Return the weighted sum of offsets; without a non-zero weight nothing is read."""
         if len(weights) > self.n_shapes:
             raise RigError(f"expected at most {self.n_shapes} shape weights, found {len(weights)}")
         active = np.flatnonzero(weights)
@@ -111,11 +112,11 @@ class BlendShapes:
         return np.einsum("s,sva->va", weights[active], _values(offsets)[active])
 
     def direction_values(self) -> Floats:
-        """Return the offsets, read from the file now if they were not before: (S, V, 3)."""
+        """Return the offsets, read from the file on first use: (S, V, 3)."""
         return _values(self.offsets)
 
     def normal_values(self) -> Floats:
-        """Return the offsets of normals, zeros if there are none: (S, V, 3)."""
+        """Return the offsets of the normals, zeros if there are none: (S, V, 3)."""
         offsets = self.normal_offsets
         return np.zeros(self.offsets.shape) if offsets is None else _values(offsets)
 
@@ -145,11 +146,11 @@ class Correctives:
         return self.offsets.shape[1]
 
     def values(self) -> Floats:
-        """Return the offsets, read from the file now if they were not before."""
+        """Return the offsets, read from the file on first use."""
         return _values(self.offsets)
 
     def displacement(self, weights: Floats) -> Floats:
-        """Return sum_p c_p d_p; joints at rest cost nothing.
+        """Return sum_p c_p d_p, skipping joints without rotation.
 
         Parameters
         ----------
@@ -175,12 +176,12 @@ def active_rows(weights: Floats) -> list[slice]:
 
 
 def corrective_weights(rotations: Floats) -> Floats:
-    """Return what drives the correctives: the nine numbers R - I of every joint but the root.
+    """Return the weights of the correctives: the nine entries of R - I of each non-root joint.
 
     Parameters
     ----------
     rotations : (J, 3, 3)
-        Of each joint within its parent.
+        Rotation of each joint relative to its parent.
 
     Returns
     -------

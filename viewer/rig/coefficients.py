@@ -1,4 +1,4 @@
-"""Coefficients of blend shapes in a pose record, as far as a figure has them."""
+"""Shape and expression coefficients of a pose record, applied to a figure."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from viewer.rig.pose import Pose
 
 __all__ = ["apply_coefficients", "unused_coefficients"]
 
-_MOST_SIGMA = 1e6  # of a shape coefficient: beyond it the mesh has no shape
+_MOST_SIGMA = 1e6  # standard deviations; larger coefficients are not plausible
 
 
 def unused_coefficients(group: str, values: Floats, used: int, name: str) -> list[Diagnostic]:
-    """Return a remark on coefficients that a figure does not have; none if all of those are 0.
+    """Return a diagnostic of coefficients that a figure does not have; none if they are all 0.
 
     Parameters
     ----------
     group : str
         ``"shape"`` or ``"expression"``.
     values : (..., S)
-        All that are given.
+        All coefficients of the group in the record.
     used : int
-        How many the figure has.
+        Number of coefficients that the figure has.
     name : str
-        Of the figure.
+        Name of the figure.
     """
     rest, count = values[..., used:], values.shape[-1]
     if not rest.any():
@@ -47,35 +47,35 @@ def unused_coefficients(group: str, values: Floats, used: int, name: str) -> lis
 def apply_coefficients(
     group: str, values: Floats | None, figure: Figure, pose: Pose, cut: bool
 ) -> list[Diagnostic]:
-    """Set the weights of one group of blend shapes, in place; the others of the group become 0.
+    """Set the weights of one group of blend shapes in place; the rest of the group becomes 0.
 
     Parameters
     ----------
     group : str
         ``"shape"`` or ``"expression"``.
     values : (N,) or None
-        Of the first shapes of the group; None leaves all as they are.
+        Coefficients of the group's first shapes; None changes nothing.
     figure : Figure
-        With any shapes.
+        With or without blend shapes.
     pose : Pose
-        Changed.
+        Changed in place.
     cut : bool
-        Leave out those that the figure does not have, instead of refusing them.
+        Ignore coefficients that the figure does not have instead of rejecting them.
 
     Returns
     -------
     list of Diagnostic
-        What was left out.
+        The ignored coefficients.
 
     Raises
     ------
     RigError
-        If there are too many, or one is too large for the mesh to have a shape.
+        If there are too many coefficients, or one is implausibly large.
     """
     if values is None or len(values) == 0:
         return []
     groups = figure.blend_shapes.groups if figure.blend_shapes else ()
-    # Whatever is no shape was recorded as an expression, morphs among them.
+    # Records keep every weight that is not a shape's, morphs included, as an expression.
     rows = [index for index, name in enumerate(groups) if (name == "shape") == (group == "shape")]
     values = np.asarray(values, dtype=np.float64).ravel()
     notes = unused_coefficients(group, values, len(rows), figure.name)

@@ -1,4 +1,4 @@
-"""Figure: a mesh, a skeleton and the skin that ties them; any part may be missing."""
+"""Figures: a mesh, a skeleton and the skin that binds them; any part may be missing."""
 
 from __future__ import annotations
 
@@ -41,37 +41,38 @@ class Figure:
     Attributes
     ----------
     name : str
-        What menus call it.
+        Label in menus.
     mesh : Mesh or None
-        In the space where it was bound.
+        In binding space.
     skeleton : Skeleton or None
         Without one the mesh stays in its binding space.
     skin : Skin or None
         Without one the mesh does not follow the skeleton.
     up : "y" or "z"
-        The axis that points up in the file; the camera obeys it.
+        Up axis of the file, which the camera follows.
     unit : str
-        Of its lengths, a key of ``viewer.rig.units.METRES``, known or guessed; empty if neither.
+        Unit of length, a key of ``viewer.rig.units.METRES``, stated by the file or guessed;
+        empty if unknown.
     blend_shapes : BlendShapes or None
-        Directions in which the rest mesh changes; joints follow.
+        Weighted offsets of the rest mesh; the joints follow.
     correctives : Correctives or None
         Offsets that depend on the pose.
     joint_regressor : JointRegressor or None
-        Gives the joints of a changed rest mesh.
+        Computes the joints of a changed rest mesh.
     hands : tuple of Hand
-        Principal components of the hands' poses.
+        Principal components of the hand poses.
     pose_layout : PoseLayout or None
-        The order of the model's own pose numbers; None if those are the DOFs.
+        Order of the values in the model's own pose vectors; None if those are the DOFs.
     body_parts, keypoints, reduced : BodyParts, Keypoints, ReducedMesh, or None
-        What else the file says about the mesh.
+        Further annotations of the mesh.
     symmetry : (V,) int32 or None
-        Each vertex's mirror partner.
+        Mirror partner of each vertex.
     points : PointLayout or None
-        Of a figure that is nothing but captured keypoints.
+        Layout of a figure that consists of captured keypoints only.
     fields : tuple of VertexField
-        Numbers of the vertices that can be shown as colours.
+        Precomputed numbers of the vertices, to be shown as colours.
     facts : tuple of (str, str or Diagnostic)
-        What the reader found out, for ``viewer info``: a heading and a text each.
+        Findings of the reader for ``viewer info``, each a heading and a text.
     """
 
     name: str
@@ -112,7 +113,7 @@ class Figure:
             )
 
     def _check_vertices(self) -> None:
-        """Hold everything that is said of vertices to their number."""
+        """Check that all data about vertices fits the mesh."""
         count = 0 if self.mesh is None else self.mesh.n_vertices
         if self.symmetry is not None:
             symmetry = frozen("symmetry", self.symmetry, (count,), np.int32)

@@ -14,16 +14,16 @@ __all__ = ["Hand", "hand_coefficients", "hand_vectors"]
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Hand:
-    """One hand's joints and the directions in which they usually bend together.
+    """The finger joints of one hand and the principal components of their rotations.
 
     Attributes
     ----------
     side : str
-        ``"left"``, ``"right"``, or empty where a model has one hand.
+        ``"left"``, ``"right"``, or empty for a model of a single hand.
     joints : (H,) int32
-        The finger joints, in the order of the components.
+        Finger joints, in the order of the components.
     components : (C, 3 H)
-        Rotation vectors one after the other, radians per unit of coefficient.
+        Concatenated rotation vectors, radians per unit of coefficient.
     mean : (3 H,)
         Rotation vectors of the mean hand; zeros are the flat hand.
     """
@@ -47,11 +47,11 @@ def hand_vectors(hand: Hand, coefficients: Floats, flat: bool) -> Floats:
     Parameters
     ----------
     hand : Hand
-        Gives components and mean.
+        Its components and mean.
     coefficients : (N,)
         N <= C; the others count as 0.
     flat : bool
-        Leave the mean out.
+        Whether to omit the mean.
 
     Returns
     -------
@@ -72,23 +72,23 @@ def hand_vectors(hand: Hand, coefficients: Floats, flat: bool) -> Floats:
 
 
 def hand_coefficients(hand: Hand, vectors: Floats, flat: bool, count: int) -> Floats:
-    """Return the first ``count`` coefficients of the nearest hand that they can make.
+    """Return the first ``count`` coefficients that best reproduce a hand pose.
 
     Parameters
     ----------
     hand : Hand
-        Gives components and mean.
+        Its components and mean.
     vectors : (H, 3)
         Rotation vectors of its joints, radians.
     flat : bool
         As for ``hand_vectors``.
     count : int
-        How many components may be used.
+        Number of components to use.
 
     Returns
     -------
     (count,)
-        In the least-squares sense, so components need not be orthogonal.
+        The least-squares solution; the components need not be orthogonal.
     """
     wanted = vectors.ravel() - (0.0 if flat else hand.mean)
     found = np.linalg.lstsq(hand.components[:count].T, wanted, rcond=None)[0]

@@ -1,4 +1,4 @@
-"""Lists of parents: cycles in them, and joints in depth-first order."""
+"""Joint hierarchies as parent lists: cycles, and depth-first order."""
 
 from __future__ import annotations
 
@@ -10,20 +10,21 @@ __all__ = ["cycle_members", "depth_first"]
 
 
 def cycle_members(parents: Floats | Ints) -> Bools:
-    """Return which joints are their own ancestors.
+    """Return a mask of the joints that are their own ancestors.
 
-    Every pass doubles how far each joint looks up, so after log2(J) passes those that still see
-    an ancestor are in a cycle or below one; what they see is in it.
+    Pointer doubling: every pass doubles the distance from each joint to the ancestor that it
+    points to. Joints that still point to an ancestor after log2(J) passes are in a cycle or below
+    one, and the ancestor is in the cycle.
 
     Parameters
     ----------
     parents : (J,)
-        As a file lists them; what is no index of a joint counts as no parent.
+        As listed in a file; a value that is not a joint index counts as no parent.
 
     Returns
     -------
     (J,)
-        True in cycles, False for joints that hang below one.
+        True for joints in a cycle, False for joints below one.
 
     >>> cycle_members(np.array([-1, 2, 1, 2])).tolist()
     [False, True, True, False]
@@ -40,7 +41,7 @@ def cycle_members(parents: Floats | Ints) -> Bools:
 
 
 def depth_first(parents: Ints) -> Ints:
-    """Return joints as a file that nests them lists them: each before its children, these by index.
+    """Return the joints in depth-first order: each before its children, siblings by index.
 
     Parameters
     ----------
@@ -50,7 +51,7 @@ def depth_first(parents: Ints) -> Ints:
     Returns
     -------
     (J,) int32
-        Indices of joints.
+        Joint indices.
 
     >>> depth_first(np.array([-1, 0, 0, 1])).tolist()
     [0, 1, 3, 2]

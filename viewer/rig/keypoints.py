@@ -1,4 +1,4 @@
-"""Where a posed figure's keypoints are, without skinning its whole mesh."""
+"""Keypoints of a posed figure, computed without skinning its whole mesh."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def posed_keypoints(figure: Figure, pose: Pose, skinning: Skinning | None = None
     pose : Pose
         DOFs in lengths and radians.
     skinning : Skinning, optional
-        How joints move the mesh.
+        Skinning method and influences; the defaults if omitted.
 
     Returns
     -------
@@ -60,6 +60,7 @@ def _with_binds(skin: Skin | None, whole: Skin | None) -> Skin | None:
 
 
 def _part(figure: Figure) -> tuple[Figure, Keypoints]:
+    """Return a figure of the vertices that keypoints use, and the keypoints on that figure."""
     keypoints = figure.keypoints
     assert keypoints is not None  # the caller looked
     vertices, index = np.unique(keypoints.vertices, return_inverse=True)
@@ -68,19 +69,19 @@ def _part(figure: Figure) -> tuple[Figure, Keypoints]:
 
 
 def some_vertices(figure: Figure, vertices: Ints) -> Figure:
-    """Return a figure of a few vertices, without triangles, that moves as the whole one does.
+    """Return a figure of a few vertices, without triangles, that deforms like the whole one.
 
     Parameters
     ----------
     figure : Figure
         With a mesh.
     vertices : (N,)
-        Which ones.
+        Their indices.
 
     Returns
     -------
     Figure
-        Without joint regressor: its joints do not follow its shape by themselves.
+        Without a joint regressor, so its joints do not follow its shape.
     """
     mesh = figure.require_mesh()
     shapes, correctives = figure.blend_shapes, figure.correctives

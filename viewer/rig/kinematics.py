@@ -18,14 +18,17 @@ __all__ = [
     "world_matrices",
 ]
 
-_RIGID = 1e-5  # relative; normals taken for rigid are off by half as many radians at most
+_RIGID = (
+    1e-5  # relative; treating the rest as rigid rotates normals by at most half as many radians
+)
 
 
 def forward_kinematics(parents: Ints, local: Floats, root: Floats | None = None) -> Floats:
     """Concatenate local matrices down the hierarchy: W[j] = W[parent[j]] @ L[j].
 
-    Every pass multiplies each joint by what its ancestor pointer has gathered so far and then
-    doubles the pointer, so a chain of n joints takes log2(n) passes (Hillis and Steele 1986).
+    Pointer doubling: every pass multiplies each joint's matrix by that of the ancestor it points
+    to and then takes over that ancestor's pointer, so a chain of n joints takes log2(n) passes
+    (Hillis and Steele 1986).
 
     Parameters
     ----------
@@ -58,12 +61,12 @@ def forward_kinematics(parents: Ints, local: Floats, root: Floats | None = None)
 
 
 def world_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
-    """Return where a pose puts every joint.
+    """Return the world matrices of all joints in a pose.
 
     Parameters
     ----------
     skeleton : Skeleton
-        Gives hierarchy and DOF table.
+        Its hierarchy and DOF table.
     pose : Pose
         DOFs in lengths and radians.
 
@@ -76,22 +79,21 @@ def world_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
 
 
 def posed_skeleton(skeleton: Skeleton, pose: Pose) -> PosedSkeleton:
-    """Return world and skinning matrices of a pose, computed once until a number of it changes.
+    """Return the world and skinning matrices of a pose, cached until the pose changes.
 
-    The pose keeps the result: whatever draws or describes it in one frame shares one run of forward
-    kinematics.
+    The pose stores the result, so forward kinematics runs once a frame for all passes and panels.
 
     Parameters
     ----------
     skeleton : Skeleton
-        Of the shaped figure; told apart by identity.
+        Of the shaped figure; compared by identity.
     pose : Pose
         DOFs in lengths and radians.
 
     Returns
     -------
     PosedSkeleton
-        With read-only matrices.
+        Its matrices are read-only.
     """
     known, key = pose.posed, pose.skinning_key
     if known is None or known.skeleton is not skeleton or known.key is not key:
@@ -100,13 +102,13 @@ def posed_skeleton(skeleton: Skeleton, pose: Pose) -> PosedSkeleton:
 
 
 def is_posed(skeleton: Skeleton, pose: Pose) -> bool:
-    """Return whether a pose keeps the ``posed_skeleton`` of its present numbers."""
+    """Return whether the ``posed_skeleton`` that a pose has stored is up to date."""
     known = pose.posed
     return known is not None and known.skeleton is skeleton and known.key is pose.skinning_key
 
 
 def skinning_matrices(world: Floats, inverse_bind: Floats) -> Floats:
-    """Return what carries a bound vertex with each joint: M[j] = W[j] inverse(B[j]).
+    """Return the skinning matrices: M[j] = W[j] inverse(B[j]).
 
     Parameters
     ----------
@@ -124,7 +126,7 @@ def skinning_matrices(world: Floats, inverse_bind: Floats) -> Floats:
 
 
 def is_rigid(palette: Floats) -> Bools:
-    """Return whether all joints rotate and translate only, or share one uniform scale as well.
+    """Return whether all joints only rotate and translate, up to one common uniform scale.
 
     Parameters
     ----------
@@ -144,7 +146,8 @@ def is_rigid(palette: Floats) -> Bools:
     gram = np.swapaxes(linear, -1, -2) @ linear
     squares = gram[..., 0, 0].max(axis=-1, initial=0.0)
     errors = np.abs(gram - squares[..., None, None, None] * np.eye(3))
-    is_alike = errors.max(axis=(-3, -2, -1), initial=0.0) <= _RIGID * squares
+    is_uniform = errors.max(axis=(-3, -2, -1), initial=0.0) <= _RIGID * squares
     first, second, third = np.moveaxis(linear, -1, 0)
     volumes = np.einsum("...a,...a->...", np.cross(first, second), third)
-    return is_alike & (volumes > 0.0).all(axis=-1)
+    # A reflection has orthogonal columns too, but a negative determinant.
+    return is_uniform & (volumes > 0.0).all(axis=-1)

@@ -1,4 +1,4 @@
-"""Results that are remembered as long as what they were made from is in use."""
+"""Caches of derived results that live as long as the objects they were derived from."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ _Value = TypeVar("_Value")
 
 
 class Memo(Generic[_Owner, _Value]):
-    """A few results per owner; they go when the owner does. Threads may share it.
+    """A thread-safe cache of a few results per owner, released together with the owner.
 
     Parameters
     ----------
     kept : int
-        How many of one owner; the oldest makes room.
+        Results kept per owner; the oldest is evicted first.
     """
 
     def __init__(self, kept: int = 1) -> None:
@@ -29,20 +29,20 @@ class Memo(Generic[_Owner, _Value]):
         self._values: WeakKeyDictionary[_Owner, dict[Hashable, _Value]] = WeakKeyDictionary()
 
     def get(self, owner: _Owner, key: Hashable, make: Callable[[], _Value]) -> _Value:
-        """Return what ``make`` gave for this owner and key, calling it the first time.
+        """Return the cached result of an owner and key, calling ``make`` if there is none.
 
         Parameters
         ----------
         owner : object
-            Frozen, told apart by identity; ``make``'s result must not refer to it.
+            Immutable, compared by identity; the result must not refer to it.
         key : hashable
-            What else the result depends on.
+            Everything else that the result depends on.
         make : callable
             Without arguments.
         """
         known = self._values.setdefault(owner, {})
         if key in known:
-            with contextlib.suppress(KeyError):  # another thread made room meanwhile
+            with contextlib.suppress(KeyError):  # another thread may have evicted it
                 return known[key]
         value = make()
         with self._lock:

@@ -25,16 +25,16 @@ _ROW = 64  # points reduced side by side
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Material:
-    """What a run of triangles is covered with.
+    """The surface appearance of some triangles.
 
     Attributes
     ----------
     name : str
-        As in the file; nothing refers to it.
+        As in the file; triangles refer to materials by index.
     texture : str or None
         File name of the picture, relative to the figure's folder.
     image : (H, W, 4) uint8 or None
-        Its pixels, sRGB with alpha, first row at v = 1; None if it could not be read.
+        Pixels of the picture, sRGB with alpha, first row at v = 1; None if it could not be read.
     """
 
     name: str = ""
@@ -50,7 +50,7 @@ class Material:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mesh:
-    """Triangles over vertices, in the space where the skin was bound.
+    """An indexed triangle mesh, in binding space.
 
     Attributes
     ----------
@@ -130,6 +130,7 @@ class Mesh:
 
 
 def _check_range(name: str, indices: Ints, end: int) -> None:
+    """Raise RigError unless all indices are from 0 to ``end`` - 1."""
     if indices.min() < 0 or indices.max() >= end:
         raise RigError(
             f"{name}: expected vertex indices 0 to {end - 1}, "
@@ -143,7 +144,7 @@ def bounding_box(points: Floats) -> Floats:
     Parameters
     ----------
     points : (N, 3)
-        Any points; none at all give a box of size 0 at the origin.
+        Any points; an empty array gives a box of size 0 at the origin.
 
     Returns
     -------
@@ -166,7 +167,7 @@ def bounding_box(points: Floats) -> Floats:
 
 
 def box_size(box: Floats) -> float:
-    """Return the length of a box's diagonal: the "size" that tolerances refer to.
+    """Return the length of a box's diagonal, the "size" that tolerances refer to.
 
     >>> box_size(np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 2.0]]))
     3.0
@@ -193,12 +194,12 @@ def triangle_areas(positions: Floats, triangles: Ints) -> Floats:
 
 
 def volume(positions: Floats, triangles: Ints) -> float:
-    """Return the volume a closed mesh encloses, sum a . (b x c) / 6, by the divergence theorem.
+    """Return the volume that a closed mesh encloses: sum a . (b x c) / 6 (divergence theorem).
 
     Parameters
     ----------
     positions : (V, 3)
-        Figure units. Relative to their mean, so that small holes matter little.
+        Figure units.
     triangles : (T, 3)
         Vertex indices, counter-clockwise from outside.
 
@@ -211,13 +212,14 @@ def volume(positions: Floats, triangles: Ints) -> float:
     >>> round(volume(corners, np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])), 12)
     0.166666666667
     """
+    # Tetrahedra start at the mean, so that a small hole changes the sum little.
     centered = positions - positions.mean(axis=0)
     a, b, c = (centered[triangles[:, corner]] for corner in range(3))
     return float(np.einsum("ta,ta->", a, np.cross(b, c)) / 6.0)
 
 
 def split_seams(mesh: Mesh) -> tuple[Ints, Ints, Ints]:
-    """Return a numbering in which every vertex has one texture coordinate, as GPUs need it.
+    """Split vertices along texture seams, so that each has one texture coordinate, as on GPUs.
 
     Parameters
     ----------
@@ -227,9 +229,9 @@ def split_seams(mesh: Mesh) -> tuple[Ints, Ints, Ints]:
     Returns
     -------
     sources : (R,) int32
-        The mesh's vertex that each split vertex is a copy of. Vertices of no triangle stay.
+        Mesh vertex that each split vertex is a copy of; vertices without triangles are kept.
     uv_indices : (R,) int32
-        The texture coordinate of each split vertex.
+        Texture coordinate of each split vertex.
     triangles : (T, 3) int32
         Indices into the split vertices.
     """
@@ -258,7 +260,7 @@ def vertex_normals(positions: Floats, triangles: Ints) -> Floats:
     Returns
     -------
     (V, 3)
-        Unit normals; +y for a vertex whose triangles have no area or that has none.
+        Unit normals; +y for a vertex without triangles or with degenerate ones only.
 
     >>> square = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
     >>> vertex_normals(square, np.array([[0, 1, 2]]))[0].tolist()
@@ -278,5 +280,6 @@ def vertex_normals(positions: Floats, triangles: Ints) -> Floats:
 
 
 def _area_vectors(positions: Floats, triangles: Ints) -> Floats:
+    """Return (b - a) x (c - a) of each triangle: along its normal, twice its area long."""
     a, b, c = (positions[triangles[:, corner]] for corner in range(3))
     return np.cross(b - a, c - a)

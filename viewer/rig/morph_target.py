@@ -1,4 +1,4 @@
-"""Targets of ``.morph`` files: where some vertices of a mesh go, as blend shapes of a figure."""
+"""Morph targets of ``.morph`` files, as blend shapes of a figure."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from viewer.rig.skin import Skin
 __all__ = ["MORPH_GROUP", "MorphTarget", "on_one_joint", "with_morphs"]
 
 MORPH_GROUP = "morph"
-"""Of blend shapes whose weight 1 is a target reached, and 0 is the mesh as it is."""
+"""Group of blend shapes whose weight 1 is the target itself and 0 the unchanged mesh."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MorphTarget:
-    """Where some vertices of a mesh are, not how far they go.
+    """Target positions of some vertices of a mesh, absolute rather than offsets.
 
     Attributes
     ----------
     name : str
-        What its slider is called.
+        Label of its slider.
     vertices : (N,) int32
-        Indices into the mesh, none twice.
+        Indices into the mesh, without repetition.
     positions : (N, 3)
         In the mesh's own space and unit.
     normals : (N, 3) or None
-        As stored; None leaves those of the mesh.
+        As stored; None keeps the normals of the mesh.
     """
 
     name: str
@@ -95,20 +95,21 @@ def with_morphs(figure: Figure, targets: Sequence[MorphTarget]) -> Figure:
         names, groups = shapes.names + names, shapes.groups + groups
         known = np.stack([shapes.direction_values(), shapes.normal_values()])
         offsets = np.concatenate([known, offsets], axis=1)
-    offsets.flags.writeable = False  # so that nobody has to copy it
+    # Read-only arrays are taken over without a copy.
+    offsets.flags.writeable = False
     return replace(figure, blend_shapes=BlendShapes(names, offsets[0], groups, offsets[1]))
 
 
 def on_one_joint(figure: Figure) -> Figure:
-    """Return a mesh without a skeleton on a single joint that never moves.
+    """Bind a mesh without a skeleton to a single fixed joint.
 
-    Blend shapes have their weights in a pose, and poses are of skeletons. The mesh stays in its
+    Weights of blend shapes belong to a pose, and a pose needs a skeleton. The mesh stays in its
     binding space.
 
     Parameters
     ----------
     figure : Figure
-        With a mesh; its skin, which no skeleton moves, is replaced.
+        With a mesh; a skin without a skeleton is replaced.
     """
     mesh = figure.require_mesh()
     empty = np.zeros(0, dtype=np.int32)
@@ -133,6 +134,7 @@ def on_one_joint(figure: Figure) -> Figure:
 
 
 def _check_vertices(target: MorphTarget, figure_name: str, count: int) -> None:
+    """Raise RigError if a target refers to a vertex that the mesh does not have."""
     wrong = np.flatnonzero((target.vertices < 0) | (target.vertices >= count))
     if len(wrong):
         raise RigError(

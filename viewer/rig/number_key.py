@@ -1,4 +1,4 @@
-"""Numbers of arrays, kept to know whether the arrays still hold them."""
+"""Keys that identify the contents of arrays, to detect changes."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ __all__ = ["NumberKey"]
 
 
 class NumberKey:
-    """The numbers that some arrays had when the key was made.
+    """A snapshot of the contents of some arrays.
 
-    Keys of equal numbers are equal. Asking whether arrays still have the numbers copies nothing.
+    Keys of equal contents are equal. ``is_of`` compares without copying.
 
     Parameters
     ----------
     *arrays : (...)
         Of any shapes.
 
-    >>> turned = np.zeros(3)
-    >>> key = NumberKey(turned)
-    >>> turned[1] = 0.5
-    >>> key.is_of(turned), key.is_of(np.zeros(3)), key == NumberKey(np.zeros(3))
+    >>> angles = np.zeros(3)
+    >>> key = NumberKey(angles)
+    >>> angles[1] = 0.5
+    >>> key.is_of(angles), key.is_of(np.zeros(3)), key == NumberKey(np.zeros(3))
     (False, True, True)
     """
 
@@ -32,12 +32,12 @@ class NumberKey:
         self._parts = tuple(map(bytearray, arrays))
 
     def is_of(self, *arrays: Floats) -> bool:
-        """Return whether there are as many arrays and all hold the same numbers, bit by bit."""
+        """Return whether the arrays have the contents of the key, bit by bit."""
         if len(arrays) != len(self._parts):
             return False
         for part, array in zip(self._parts, arrays, strict=True):
             packed = array if array.flags.c_contiguous else np.ascontiguousarray(array)
-            # A bytearray compares itself with the array's memory, and no array of answers is made.
+            # A bytearray compares with the array's memory directly, without a temporary array.
             if part != packed:
                 return False
         return True

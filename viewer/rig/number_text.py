@@ -1,4 +1,4 @@
-"""Numbers as text, for everything that shows numbers to people."""
+"""Formatting of numbers and angles for display."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ _NOT_ZERO = set("123456789n")  # "inf" and "nan" have an n
 
 
 def number_text(value: float, spec: str = "g") -> str:
-    """Return a number in a format; one that is shown as 0 has no minus.
+    """Format a number; one that rounds to 0 has no minus sign.
 
     Parameters
     ----------
     value : float
-        Any.
+        Any number.
     spec : str
-        Of Python's ``format``.
+        Format specification, as for Python's ``format``.
 
     >>> number_text(-0.0), number_text(-0.04, ".1f"), number_text(-0.0, "+.1f")
     ('0', '0.0', '+0.0')
@@ -29,7 +29,7 @@ def number_text(value: float, spec: str = "g") -> str:
 
 
 def short_number(value: float) -> str:
-    """Return a number with three digits, or with all before the point if there are more.
+    """Format a number with three significant digits, or all integer digits if there are more.
 
     >>> short_number(0.012345), short_number(1234.5), short_number(-0.0)
     ('0.0123', '1,234', '0')
@@ -38,16 +38,16 @@ def short_number(value: float) -> str:
 
 
 def angle_text(radians: float, in_degrees: bool, sign: str = "") -> str:
-    """Return an angle in the unit that is shown: ``"28.6°"`` or ``"0.500 rad"``.
+    """Format an angle in the unit of the display: ``"28.6°"`` or ``"0.500 rad"``.
 
     Parameters
     ----------
     radians : float
         The angle.
     in_degrees : bool
-        Whether it is shown in degrees.
+        Degrees rather than radians.
     sign : str
-        ``"+"`` to give angles above 0 a sign too.
+        ``"+"`` to show the sign of positive angles too.
     """
     if in_degrees:
         return f"{number_text(math.degrees(radians), f'{sign}.1f')}\N{DEGREE SIGN}"

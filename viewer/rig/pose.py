@@ -1,4 +1,4 @@
-"""The state that moves: one figure's DOFs, local transforms, shape and place."""
+"""Poses: DOFs, local transforms, shape weights and placement of one figure."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
 
 @dataclass(slots=True, eq=False)
 class Pose:
-    """What a skeleton's joints do right now; arrays are changed in place.
+    """The mutable state of one figure; arrays are changed in place.
 
     Attributes
     ----------
@@ -37,15 +37,15 @@ class Pose:
     translations : (J, 3)
         Added to the skeleton's rest translations, which follow the figure's shape.
     rotations, scales : (J, 4), (J, 3)
-        Local transforms beneath the DOFs: quaternions (x, y, z, w), factors.
+        Local rotations before the DOFs, as quaternions (x, y, z, w), and local scale factors.
     shape_weights : (S,)
-        Of the figure's blend shapes; those that are missing at the end count as 0.
+        Weights of the figure's blend shapes; missing trailing weights count as 0.
     figure_scale : float
-        Of the whole skinned figure about its origin, after everything else.
+        Scale of the whole skinned figure about its origin, applied after skinning.
     figure_translation : (3,)
-        Of the whole skinned figure, after its scale; not weighted by the skin.
+        Translation of the whole skinned figure, applied after its scale.
     posed : PosedSkeleton or None
-        What was made of the pose last; its key tells whether that is of the present numbers.
+        Cached matrices; up to date if they have the key of the present values.
     """
 
     dofs: Floats
@@ -60,9 +60,9 @@ class Pose:
 
     @property
     def skinning_key(self) -> NumberKey:
-        """The key of all numbers but the figure's place, the same object until one of them changes.
+        """Key of all values but the figure's placement, the same object until one of them changes.
 
-        Whoever has the same key has the same joints, and need not skin again.
+        Poses with equal keys have the same joints and need no second skinning.
         """
         key, arrays = self._key, self._arrays
         if key is None or not key.is_of(*arrays):
@@ -74,7 +74,7 @@ class Pose:
         return self.dofs, self.translations, self.rotations, self.scales, self.shape_weights
 
     def is_like(self, other: Pose) -> bool:
-        """Return whether another pose has the same numbers; of the two, this one keeps a key."""
+        """Return whether another pose has the same values; only this one caches a key."""
         places = (self.figure_scale, *self.figure_translation.tolist())
         if places != (other.figure_scale, *other.figure_translation.tolist()):
             return False
@@ -94,7 +94,7 @@ class Pose:
 
 
 def pose_key(pose: Pose) -> tuple[object, ...]:
-    """Return what changes if and only if a pose does: to know when to draw again."""
+    """Return a key that identifies the pose, to decide when to redraw."""
     return pose.skinning_key, pose.figure_scale, *pose.figure_translation.tolist()
 
 
@@ -107,17 +107,17 @@ def placement_matrix(pose: Pose) -> Floats:
 
 
 def rest_pose(skeleton: Skeleton) -> Pose:
-    """Return a new pose that holds the file's own values, clamped to the limits.
+    """Return a new pose with the file's own values, clamped to the limits.
 
     Parameters
     ----------
     skeleton : Skeleton
-        Gives the rest transforms and DOF values.
+        Its rest transforms and DOF values.
 
     Returns
     -------
     Pose
-        Free to change.
+        Shares no array with the skeleton.
     """
     return Pose(
         dofs=clamp_dofs(skeleton, skeleton.rest_dofs),
@@ -136,7 +136,7 @@ def local_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
     Parameters
     ----------
     skeleton : Skeleton
-        Gives the DOF table.
+        Its DOF table.
     pose : Pose
         DOFs in lengths and radians.
 
@@ -148,26 +148,26 @@ def local_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
     local = np.zeros((skeleton.n_joints, 4, 4))
     local[:, 3, 3] = 1.0
     local[:, :3, 3] = skeleton.rest_translations + pose.translations
-    moves = skeleton.dof_kinds < _FIRST_ROTATION
-    np.add.at(
-        local[:, :3, 3], (skeleton.dof_joints[moves], skeleton.dof_kinds[moves]), pose.dofs[moves]
-    )
+    is_translation = skeleton.dof_kinds < _FIRST_ROTATION
+    joints, axes = skeleton.dof_joints[is_translation], skeleton.dof_kinds[is_translation]
+    # A joint may have several translation DOFs along one axis: unlike +=, add.at sums them all.
+    np.add.at(local[:, :3, 3], (joints, axes), pose.dofs[is_translation])
     local[:, :3, :3] = joint_rotations(skeleton, pose) * pose.scales[:, None, :]
     return local
 
 
 def joint_rotations(skeleton: Skeleton, pose: Pose) -> Floats:
-    """Return each joint's rotation within its parent, R(quaternion) R(DOFs): (J, 3, 3)."""
+    """Return each joint's rotation relative to its parent, R(quaternion) R(DOFs): (J, 3, 3)."""
     return quaternion_to_matrix(pose.rotations) @ dof_rotations(skeleton, pose.dofs)
 
 
 def dof_rotations(skeleton: Skeleton, dofs: Floats) -> Floats:
-    """Multiply every joint's rotation DOFs, k-th rows of all joints at once.
+    """Multiply the rotation DOFs of every joint, the k-th rows of all joints at once.
 
     Parameters
     ----------
     skeleton : Skeleton
-        Gives the DOF table.
+        Its DOF table.
     dofs : (..., D)
         Lengths and radians, of any number of poses.
 
@@ -184,8 +184,9 @@ def dof_rotations(skeleton: Skeleton, dofs: Floats) -> Floats:
         axes = skeleton.dof_kinds[rank_rows] - _FIRST_ROTATION
         for axis in range(3):
             chosen = axes == axis
-            turn = axis_rotations(axis, dofs[..., rank_rows[chosen]])
-            rotations[..., joints[chosen], :, :] = turn @ rotations[..., joints[chosen], :, :]
+            # From the left: a later row is applied after the earlier ones.
+            rotation = axis_rotations(axis, dofs[..., rank_rows[chosen]])
+            rotations[..., joints[chosen], :, :] = rotation @ rotations[..., joints[chosen], :, :]
     return rotations
 
 

@@ -1,4 +1,4 @@
-"""A skeleton in one pose: where its joints are, and what carries the vertices of its skins."""
+"""World and skinning matrices of a skeleton in one pose."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ __all__ = ["PosedSkeleton"]
 
 
 class PosedSkeleton:
-    """World and skinning matrices of one pose, made once for whoever asks; they are read-only.
+    """Read-only world and skinning matrices of one pose, each computed once.
 
-    A pose keeps the one that was made of it last, see ``viewer.rig.kinematics.posed_skeleton``.
+    A pose caches its latest instance, see ``viewer.rig.kinematics.posed_skeleton``.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class PosedSkeleton:
         self._palette: Floats = world
 
     def palette(self, skin: Skin) -> Floats:
-        """Return what carries a bound vertex with each joint: M[j] = W[j] inverse(B[j]).
+        """Return the skinning matrices: M[j] = W[j] inverse(B[j]).
 
         Parameters
         ----------

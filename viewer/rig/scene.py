@@ -1,4 +1,4 @@
-"""Scene: what is shown together; an actor is a figure with its own pose and placement."""
+"""Scenes and their actors: figures, each with its own pose and placement."""
 
 from __future__ import annotations
 
@@ -39,40 +39,40 @@ if TYPE_CHECKING:
     from viewer.rig.motion.sampled_clip import SampledClip
 
 Motion: TypeAlias = "Clip | SampledClip | PointClip"
-"""Whatever moves an actor; all have ``name``, ``start`` and ``end`` in seconds."""
+"""The motion of an actor; every kind has ``name``, and ``start`` and ``end`` in seconds."""
 
-_OUTLIER_SHARE = 0.001  # the camera fits the box of the other 99.9 % of the points
+_OUTLIER_FRACTION = 0.001  # the camera fits the box of the other 99.9 % of the points
 _OUTLIER_RATIO = 100.0  # ... if the whole box is this much larger
 
 
 @dataclass(slots=True, eq=False)
 class Actor:
-    """A figure that takes part in a scene.
+    """A figure posed and placed in a scene.
 
     Attributes
     ----------
     figure : Figure
-        Shared, never changed.
+        Immutable; actors may share it.
     pose : Pose or None
-        This actor's own; None if the figure has no skeleton.
+        This actor's own pose; None if the figure has no skeleton.
     clip : Motion or None
-        Its motion; ``viewer.rig.motion.evaluation.pose_actor`` poses the actor by it.
+        Its motion, which ``viewer.rig.motion.evaluation.pose_actor`` evaluates.
     placement : (4, 4)
         Figure space to scene.
     visible : bool
         Whether it is drawn.
     offset : float
-        Seconds by which its clip starts later than the scene's clock.
+        Delay of its clip on the scene's clock, seconds.
     person : int or None
-        Its number in a capture of several people; below 0 where it has no track.
+        Track number in a capture of several people; negative without a track.
     color : (r, g, b) or None
-        Its own, linear, 0 to 1; None for the usual one.
+        Linear, 0 to 1; None for the default colour.
     points : (K, 4) or None
-        Of figures that are captured points: x, y, z and confidence, right now.
+        Captured points at the current time: x, y, z, confidence.
     is_present : bool
-        Whether its clip has it at the time that is shown.
+        Whether its clip covers the current time.
     called : str
-        What was opened for it, a recording, if it is not called after its figure.
+        Name of the recording that was opened for it; empty to use the figure's name.
     """
 
     figure: Figure
@@ -89,19 +89,19 @@ class Actor:
 
     @property
     def title(self) -> str:
-        """What was opened for it: a recording, else its figure; all people of one share it."""
+        """Name of its recording, or else of its figure; the same for all people of a recording."""
         return self.called or self.figure.name
 
     @property
     def name(self) -> str:
-        """What menus and files call it: what was opened, and which part of that it is."""
+        """Label in menus and files: the title, and the part of the recording that it is."""
         is_part = self.called and self.figure.points is not None
         name = f"{self.title} {self.figure.name}" if is_part else self.title
         return name if self.person is None else f"{name} {person_name(self.person)}"
 
     @property
     def is_drawn(self) -> bool:
-        """Whether it is to be seen: visible, and there at the time that is shown."""
+        """Whether it is drawn: visible, and present at the current time."""
         return self.visible and self.is_present
 
     def __post_init__(self) -> None:
@@ -133,7 +133,7 @@ class Actor:
         return self.clip
 
     def copy(self) -> Actor:
-        """Return an actor that can be posed and placed by itself; figure and clip are shared."""
+        """Return a copy that is posed and placed independently; figure and clip are shared."""
         return replace(
             self,
             pose=None if self.pose is None else self.pose.copy(),
@@ -143,7 +143,7 @@ class Actor:
 
 
 def free_title(actors: Iterable[Actor], title: str) -> str:
-    """Return a title that no actor has: ``walk``, then ``walk-2``, and so on."""
+    """Return a title that no actor uses: ``walk``, then ``walk-2``, and so on."""
     taken, number, free = {actor.title for actor in actors}, 1, title
     while free in taken:
         number += 1
@@ -160,22 +160,22 @@ def figure_pose(figure: Figure) -> Pose:
 
 @dataclass(slots=True, eq=False, weakref_slot=True)
 class Scene:
-    """Everything that is shown together.
+    """Actors that are shown together, and the cameras of their capture.
 
     Attributes
     ----------
     actors : list of Actor
         In drawing order.
     diagnostics : tuple of Diagnostic
-        What the readers noticed.
+        Findings of the readers.
     world_up : "y", "z" or None
-        The axis that points up; None for that of the first figure.
+        Up axis; None for that of the first figure.
     views : tuple of CameraView
         Calibrated cameras of a capture.
     time : float or None
-        Seconds at which its motions are shown; None for their start.
+        Current time of its motions, seconds; None for their start.
     files : tuple of Path
-        All that it was read from, pictures too: never to be replaced by a result.
+        All files that it was read from, pictures included; no output may overwrite them.
     """
 
     actors: list[Actor]
@@ -187,33 +187,33 @@ class Scene:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the readers noticed, one line each."""
+        """Findings of the readers, one line each."""
         return tuple(map(str, self.diagnostics))
 
     @property
     def title(self) -> str:
-        """What pictures and videos of it are called: the title of its first actor."""
+        """Default name of its pictures and videos: the title of its first actor."""
         return self.actors[0].title if self.actors else ""
 
     @property
     def up(self) -> Literal["y", "z"]:
-        """The axis that points up, ``"y"`` or ``"z"``."""
+        """Up axis, ``"y"`` or ``"z"``."""
         if self.world_up is not None:
             return self.world_up
         return self.actors[0].figure.up if self.actors else "y"
 
 
 def scene_points(scene: Scene, show: str = "skin") -> Floats:
-    """Return what a camera should fit: posed meshes and skeletons of visible actors.
+    """Return the points that a camera should frame: posed meshes and skeletons of visible actors.
 
-    A few stray points far outside do not count: they are moved to the box of the other 99.9 %.
+    A few outliers far away are clamped to the bounding box of the other 99.9 % of the points.
 
     Parameters
     ----------
     scene : Scene
         With any number of actors.
     show : "skin", "skeleton", "both" or "binding"
-        What of them is drawn.
+        Parts that are drawn.
 
     Returns
     -------
@@ -223,14 +223,14 @@ def scene_points(scene: Scene, show: str = "skin") -> Floats:
     clouds = [actor_points(actor, show) for actor in scene.actors if actor.is_drawn]
     clouds = [cloud for cloud in clouds if len(cloud)]
     points = np.concatenate(clouds) if clouds else np.zeros((1, 3))
-    if len(points) < 1.0 / _OUTLIER_SHARE:
+    if len(points) < 1.0 / _OUTLIER_FRACTION:
         return points
     size = box_size(bounding_box(points))
-    share = _OUTLIER_SHARE / 2
+    tail = _OUTLIER_FRACTION / 2
     # Partitioning finds the two quantiles of an axis without sorting it.
-    inner = np.quantile(points, [share, 1.0 - share], axis=0, method="nearest")
-    has_strays = size > _OUTLIER_RATIO * box_size(inner) > 0
-    return np.clip(points, *inner) if has_strays else points
+    inner = np.quantile(points, [tail, 1.0 - tail], axis=0, method="nearest")
+    has_outliers = size > _OUTLIER_RATIO * box_size(inner) > 0
+    return np.clip(points, *inner) if has_outliers else points
 
 
 def scene_box(scene: Scene, show: str = "skin") -> Floats:
@@ -239,14 +239,14 @@ def scene_box(scene: Scene, show: str = "skin") -> Floats:
 
 
 def actor_points(actor: Actor, show: str = "skin") -> Floats:
-    """Return the points of what is drawn of an actor.
+    """Return the points of the drawn parts of an actor.
 
     Parameters
     ----------
     actor : Actor
         Placed and posed.
     show : "skin", "skeleton", "both" or "binding"
-        What is drawn of it; what the figure lacks is replaced by what it has.
+        Parts that are drawn; a part that the figure lacks is replaced by one that it has.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""A figure's rest mesh changed, and with it its joints and inverse bind matrices."""
+"""Figures with a changed rest mesh, whose joints and inverse bind matrices follow."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ __all__ = [
     "with_rest_mesh",
 ]
 
-_shaped: Memo[Figure, Figure] = Memo(kept=32)  # shapes that are in one scene
+_shaped: Memo[Figure, Figure] = Memo(kept=32)  # distinct shapes in one scene
 
 
 def shaped(figure: Figure, weights: Floats) -> Figure:
     """Return the figure with its blend shapes applied: mesh, normals, joints and bindings.
 
-    The last few results are remembered, so that passes and panels may ask for the same one.
+    The last few results are cached, as several passes and panels need the same one.
 
     Parameters
     ----------
@@ -51,33 +51,33 @@ def shaped(figure: Figure, weights: Floats) -> Figure:
     RigError
         If there are more weights than blend shapes.
     FormatError
-        If the offsets are read now, and the file is bad.
+        If the offsets are read by this call and the file is invalid.
     """
     mesh, shapes = figure.mesh, figure.blend_shapes
     if shapes is None or mesh is None or not weights.any():
         return figure
 
     def make() -> Figure:
-        turned = shapes.normal_displacement(weights)
-        normals = None if turned is None else mesh.normals + turned
+        offsets = shapes.normal_displacement(weights)
+        normals = None if offsets is None else mesh.normals + offsets
         return with_rest_mesh(figure, mesh.positions + shapes.displacement(weights), normals)
 
     return _shaped.get(figure, weights.tobytes(), make)
 
 
 def with_rest_mesh(figure: Figure, positions: Floats, normals: Floats | None = None) -> Figure:
-    """Return the figure with another rest mesh, its joints regressed from it.
+    """Return the figure with another rest mesh and the joints regressed from it.
 
-    Without a joint regressor the joints stay where they are. Rest rotations stay.
+    Without a joint regressor the joints keep their positions. Rest rotations never change.
 
     Parameters
     ----------
     figure : Figure
         With a mesh.
     positions : (V, 3)
-        Its new rest vertices, figure units.
+        New rest vertices, figure units.
     normals : (V, 3), optional
-        Its new rest normals; those of the new surface if omitted.
+        New rest normals; computed from the new surface if omitted.
 
     Returns
     -------
@@ -103,27 +103,27 @@ def _moved_skeleton(skeleton: Skeleton, joints: Floats) -> Skeleton:
 
 
 def moved_rest_translations(skeleton: Skeleton, joints: Floats) -> Floats:
-    """Return the rest translations that put joints elsewhere, rest rotations and scales as before.
+    """Return the rest translations for new joint positions; rest rotations and scales are kept.
 
     Parameters
     ----------
     skeleton : Skeleton
-        Gives rest rotations and scales.
+        Its rest rotations and scales.
     joints : (..., J, 3)
-        Figure units.
+        New rest positions, figure units.
 
     Returns
     -------
     (..., J, 3)
-        Each within its parent.
+        Relative to the parent joint.
     """
-    linear = world_matrices(skeleton, _undeflected(skeleton))[:, :3, :3]
+    linear = world_matrices(skeleton, _zero_pose(skeleton))[:, :3, :3]
     parents = skeleton.parents
     has_parent = parents >= 0
     above = parents[has_parent]
     translations = joints.copy()
     offsets = joints[..., has_parent, :] - joints[..., above, :]
-    # Solved, not transposed: rest transforms may scale.
+    # Solved rather than transposed, as rest transforms may scale.
     translations[..., has_parent, :] = np.linalg.solve(linear[above], offsets[..., None])[..., 0]
     return translations
 
@@ -132,23 +132,24 @@ def _moved_skin(skin: Skin, shifts: Floats) -> Skin:
     return replace(skin, inverse_bind=skin.inverse_bind @ translation_matrix(-shifts))
 
 
-def _undeflected(skeleton: Skeleton) -> Pose:
+def _zero_pose(skeleton: Skeleton) -> Pose:
+    """Return the rest pose with all DOFs at 0."""
     pose = rest_pose(skeleton)
     pose.dofs[:] = 0.0
     return pose
 
 
 def rest_joints(figure: Figure) -> Floats:
-    """Return where the joints are with all DOFs at 0: (J, 3), figure units."""
+    """Return the joint positions with all DOFs at 0: (J, 3), figure units."""
     skeleton = figure.require_skeleton()
-    return world_matrices(skeleton, _undeflected(skeleton))[:, :3, 3]
+    return world_matrices(skeleton, _zero_pose(skeleton))[:, :3, 3]
 
 
 _directions: Memo[Figure, Floats] = Memo()
 
 
 def joint_directions(figure: Figure) -> Floats:
-    """Return how far each blend shape moves each rest joint: J(beta) = J(0) + sum_s beta_s D_s.
+    """Return the offsets D of the rest joints per blend shape: J(beta) = J(0) + sum_s beta_s D_s.
 
     Parameters
     ----------
@@ -177,7 +178,7 @@ def joint_directions(figure: Figure) -> Floats:
 
 
 def rest_positions(figure: Figure, mesh: Mesh, pose: Pose, correct: bool = True) -> Floats:
-    """Return the vertices that a pose skins: the rest mesh plus the pose correctives.
+    """Return the vertices before skinning: the rest mesh plus the pose correctives.
 
     Parameters
     ----------
@@ -188,7 +189,7 @@ def rest_positions(figure: Figure, mesh: Mesh, pose: Pose, correct: bool = True)
     pose : Pose
         DOFs in lengths and radians.
     correct : bool
-        Whether correctives are added, if the figure has some.
+        Whether to add the pose correctives, if the figure has any.
 
     Returns
     -------

@@ -35,18 +35,18 @@ class Skeleton:
     Attributes
     ----------
     names : tuple of J str
-        May repeat or be empty: joints are told apart by index.
+        May repeat or be empty: joints are identified by index.
     parents : (J,) int32
         Index of the parent, smaller than the joint's own; -1 for a root.
     rest_translations, rest_rotations, rest_scales : (J, 3), (J, 4), (J, 3)
         Local transform before any DOF: lengths, quaternions (x, y, z, w), factors.
     dof_joints, dof_kinds : (D,) int32
-        The joint each DOF moves, and its index into ``DOF_KINDS``. Of one joint's rotations
-        the first row is applied first.
+        Joint of each DOF, and its index into ``DOF_KINDS``. The first rotation row of a joint
+        is applied first.
     rest_dofs : (D,)
         Values of the file's own pose: lengths or radians, within the limits.
     dof_limits : (D, 2)
-        Smallest and largest value; -inf and inf where there is none.
+        Smallest and largest value; -inf and inf without a limit.
     boxes : (J, 2, 3) or None
         Lowest and highest corner of the box drawn for each joint, in joint space.
     """
@@ -87,9 +87,9 @@ class Skeleton:
     def _check_order(self) -> None:
         if len(self.names) == 0:
             raise RigError("a skeleton needs at least one joint")
-        late = np.flatnonzero(self.parents >= np.arange(self.n_joints))
-        if len(late) or self.parents.min() < -1:
-            joint = int(late[0]) if len(late) else int(self.parents.argmin())
+        misplaced = np.flatnonzero(self.parents >= np.arange(self.n_joints))
+        if len(misplaced) or self.parents.min() < -1:
+            joint = int(misplaced[0]) if len(misplaced) else int(self.parents.argmin())
             raise RigError(
                 f"joint {joint_label(self, joint)}: expected a parent before it, "
                 f"found {self.parents[joint]}"
@@ -129,7 +129,7 @@ class Skeleton:
 
     @property
     def locked(self) -> Bools:
-        """Which DOFs have equal limits and so never move: (D,) bool."""
+        """Mask of the DOFs with equal limits, which never move: (D,) bool."""
         return self.dof_limits[:, 0] == self.dof_limits[:, 1]
 
 
@@ -139,9 +139,9 @@ def ball_skeleton(names: tuple[str, ...], parents: Ints, joints: Floats) -> Skel
     Parameters
     ----------
     names : tuple of J str
-        Of the joints.
+        Names of the joints.
     parents : (J,)
-        -1 for the root; parents come first.
+        -1 for the root; parents come before their children.
     joints : (J, 3)
         Rest positions, figure units.
 
@@ -166,12 +166,12 @@ def ball_skeleton(names: tuple[str, ...], parents: Ints, joints: Floats) -> Skel
 
 
 def clamp_dofs(skeleton: Skeleton, dofs: Floats) -> Floats:
-    """Return DOF values brought within their limits.
+    """Clamp DOF values to their limits.
 
     Parameters
     ----------
     skeleton : Skeleton
-        Gives the limits.
+        Its limits.
     dofs : (..., D)
         Lengths or radians.
 
@@ -184,17 +184,17 @@ def clamp_dofs(skeleton: Skeleton, dofs: Floats) -> Floats:
 
 
 def joint_labels(skeleton: Skeleton) -> tuple[str, ...]:
-    """Return what every joint is called, so that no two are called the same.
+    """Return a unique label for every joint.
 
     Parameters
     ----------
     skeleton : Skeleton
-        Holds the names.
+        Its joint names.
 
     Returns
     -------
     tuple of J str
-        ``"knee"``, ``"knee#5"`` if several joints are called so, ``"#5"`` without a name.
+        ``"knee"``, ``"knee#5"`` if several joints have that name, ``"#5"`` without a name.
     """
     counts = Counter(skeleton.names)
     return tuple(
@@ -204,7 +204,7 @@ def joint_labels(skeleton: Skeleton) -> tuple[str, ...]:
 
 
 def joint_label(skeleton: Skeleton, joint: int) -> str:
-    """Return what one joint is called, as ``joint_labels`` does for all."""
+    """Return the label of one joint, as in ``joint_labels``."""
     name = skeleton.names[joint]
     if name and skeleton.names.count(name) == 1:
         return name
@@ -212,12 +212,12 @@ def joint_label(skeleton: Skeleton, joint: int) -> str:
 
 
 def dof_label(skeleton: Skeleton, dof: int) -> str:
-    """Return a DOF's name as the command line takes it: ``"knee.x"``, ``"root.ty"``.
+    """Return the label of a DOF, as on the command line: ``"knee.x"``, ``"root.ty"``.
 
     Parameters
     ----------
     skeleton : Skeleton
-        Holds the DOF table.
+        Its DOF table.
     dof : int
         Row of the DOF.
 
@@ -230,7 +230,7 @@ def dof_label(skeleton: Skeleton, dof: int) -> str:
 
 
 def dof_labels(skeleton: Skeleton) -> list[str]:
-    """Return the names of all DOFs, as ``dof_label`` does for one; linear in the joints."""
+    """Return the labels of all DOFs, as ``dof_label``, in linear time."""
     joints = joint_labels(skeleton)
     owners, kinds = skeleton.dof_joints.tolist(), skeleton.dof_kinds.tolist()
     return [f"{joints[joint]}.{DOF_KINDS[kind]}" for joint, kind in zip(owners, kinds, strict=True)]
@@ -242,14 +242,14 @@ def find_dof(skeleton: Skeleton, label: str) -> int:
     Parameters
     ----------
     skeleton : Skeleton
-        Holds the DOF table.
+        Its DOF table.
     label : str
-        ``"NAME.KIND"``, or ``"#INDEX.KIND"`` with a joint's index, in any case of letters.
+        ``"NAME.KIND"``, or ``"#INDEX.KIND"`` with a joint's index; case-insensitive.
 
     Raises
     ------
     RigError
-        If there is none, or several joints have that name.
+        If there is none, or if several joints have that name.
     """
     joint_text, dot, kind = label.rpartition(".")
     if not dot or kind.lower() not in DOF_KINDS:
@@ -270,14 +270,14 @@ def find_joint(skeleton: Skeleton, text: str) -> int:
     Parameters
     ----------
     skeleton : Skeleton
-        Holds the names.
+        Its joint names.
     text : str
-        A joint's name in any case of letters, ``"NAME#INDEX"`` or ``"#INDEX"``.
+        A joint's name, ``"NAME#INDEX"`` or ``"#INDEX"``; case-insensitive.
 
     Raises
     ------
     RigError
-        If there is none, or several joints have that name.
+        If there is none, or if several joints have that name.
     """
     name, hash_sign, index = text.rpartition("#")
     if hash_sign and index.isdecimal() and len(index) < 10 and int(index) < skeleton.n_joints:
@@ -290,5 +290,5 @@ def find_joint(skeleton: Skeleton, text: str) -> int:
         return found[0]
     if found:
         labels = ", ".join(joint_label(skeleton, joint) for joint in found[:4])
-        raise RigError(f'"{text}" names {len(found)} joints: say which one, {labels}')
+        raise RigError(f'"{text}" names {len(found)} joints: use one of {labels}')
     raise RigError(f'no joint is called "{text}"; {name_hint(text, joint_labels(skeleton))}')

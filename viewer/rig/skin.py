@@ -1,4 +1,4 @@
-"""Skin: which joints move which vertices, how strongly, and where the joints were bound."""
+"""Skins: the influences of joints on vertices, and the inverse bind matrices."""
 
 from __future__ import annotations
 
@@ -27,22 +27,22 @@ __all__ = [
     "weight_sums",
 ]
 
-_NO_SUM = 1e-12  # weights that add up to less cannot be scaled to a sum
+_NO_SUM = 1e-12  # smaller sums of weights cannot be scaled to 1
 
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Skin:
-    """Influences of all vertices, one after the other, as the files list them.
+    """The influences of all vertices in one flat list, as stored in the file.
 
-    A padded (V, K) table would cost V times the largest K: one vertex with a thousand
+    A padded (V, K) table would need V times the largest K: one vertex with a thousand
     influences would multiply the memory of all others. A flat list holds any count exactly.
 
     Attributes
     ----------
     starts : (V + 1,) int32
-        Vertex v owns influences ``starts[v]`` up to ``starts[v + 1]``.
+        Vertex v has the influences from ``starts[v]`` up to, not including, ``starts[v + 1]``.
     joints : (N,) int32
-        Joint of each influence; a joint may occur twice in a vertex, weights then add up.
+        Joint of each influence; if a vertex lists a joint twice, the weights add up.
     weights : (N,)
         As stored: not sorted, not normalised, may be 0.
     inverse_bind : (J, 4, 4)
@@ -64,7 +64,7 @@ class Skin:
         put("inverse_bind", (None, 4, 4))
         counts = np.diff(self.starts)
         if len(self.starts) == 0 or self.starts[0] != 0 or (counts < 0).any():
-            raise RigError("starts: expected indices that begin at 0 and never fall")
+            raise RigError("starts: expected indices that begin at 0 and never decrease")
         if self.starts[-1] != len(self.joints):
             raise RigError(
                 f"starts: expected to end at {len(self.joints)}, found {self.starts[-1]}"
@@ -84,7 +84,7 @@ class Skin:
 
     @property
     def n_joints(self) -> int:
-        """Number of joints that were bound, J."""
+        """Number of bound joints, J."""
         return len(self.inverse_bind)
 
 
@@ -119,26 +119,26 @@ def skin_from_lists(
 
 
 def bind_positions(skin: Skin) -> Floats:
-    """Return where the joints were bound: (J, 3), binding space."""
+    """Return the bind positions of the joints: (J, 3), binding space."""
     positions: Floats = np.linalg.inv(skin.inverse_bind)[:, :3, 3].astype(np.float64, copy=False)
     return positions
 
 
 def influence_counts(skin: Skin) -> Ints:
-    """Return how many influences each vertex lists: (V,) int32."""
+    """Return the number of influences of each vertex: (V,) int32."""
     return np.diff(skin.starts)
 
 
 def weight_sums(skin: Skin) -> Floats:
-    """Return the sum of each vertex's weights: (V,), 0 where it lists none."""
+    """Return the sum of each vertex's weights: (V,), 0 without influences."""
     sums = np.bincount(owners(skin), weights=skin.weights, minlength=skin.n_vertices)
     return sums.astype(np.float64, copy=False)
 
 
 def has_influence(skin: Skin) -> Bools:
-    """Return which vertices any joint moves: at least one weight that is not 0. (V,) bool.
+    """Return a mask of the vertices with at least one non-zero weight: (V,) bool.
 
-    The others stay where they were bound; summing nothing would send them to the origin.
+    The others stay at their bind position; an empty sum would move them to the origin.
     """
     counts = influence_counts(skin)
     zero = skin.weights == 0.0
@@ -157,7 +157,7 @@ def skin_from_entries(
     n_vertices : int
         V.
     vertices, joints : (N,)
-        Row and column of each weight; of one vertex they keep their order.
+        Row and column of each weight; the order within a vertex is kept.
     weights : (N,)
         As stored.
     inverse_bind : (J, 4, 4)
@@ -187,10 +187,10 @@ def skin_rows(skin: Skin, vertices: Ints) -> Skin:
 
 
 def row_norms(n_vertices: int, vertices: Ints, joints: Ints, weights: Floats) -> Floats:
-    """Return each vertex's sum over joints of |weight|, entries of one joint added up first.
+    """Return each vertex's sum over joints of |weight|, after adding up entries of the same joint.
 
-    With the entries of one skin and, negative, those of another this is the L1 distance of their
-    rows, however those are ordered or split.
+    For the entries of one skin and the negated entries of another this is the L1 distance of
+    their rows, in whatever order or parts they list the weights.
 
     Parameters
     ----------
@@ -199,12 +199,12 @@ def row_norms(n_vertices: int, vertices: Ints, joints: Ints, weights: Floats) ->
     vertices, joints : (N,)
         Row and column of each entry.
     weights : (N,)
-        With their signs.
+        Signed.
 
     Returns
     -------
     (V,)
-        0 where nothing is left.
+        0 for a vertex without entries.
     """
     n_joints = int(joints.max(initial=0)) + 1
     entries, places = np.unique(vertices.astype(np.int64) * n_joints + joints, return_inverse=True)
@@ -214,25 +214,25 @@ def row_norms(n_vertices: int, vertices: Ints, joints: Ints, weights: Floats) ->
 
 
 def strongest_first(skin: Skin) -> Skin:
-    """Return the same influences, each vertex's sorted by falling weight, ties as they were."""
+    """Return the skin with each vertex's influences by decreasing weight; ties keep their order."""
     order = np.lexsort((-skin.weights, owners(skin)))
     return replace(skin, joints=skin.joints[order], weights=skin.weights[order])
 
 
 def limit_influences(skin: Skin, count: int) -> Skin:
-    """Return what an engine with ``count`` influences a vertex makes of a skin.
+    """Prune the influences of each vertex, as an engine with a limit of ``count`` does.
 
     Parameters
     ----------
     skin : Skin
         Any number of influences.
     count : int
-        How many of the strongest are kept.
+        Number of the strongest influences to keep.
 
     Returns
     -------
     Skin
-        Influences of one joint added up first, then cut, then scaled to a sum of 1.
+        Influences of the same joint are merged, then pruned, then scaled to a sum of 1.
     """
     ordered = strongest_first(merged(skin))
     rank = np.arange(len(ordered.joints)) - np.repeat(
@@ -240,24 +240,24 @@ def limit_influences(skin: Skin, count: int) -> Skin:
     )
     kept = rank < count
     counts = np.bincount(owners(ordered)[kept], minlength=skin.n_vertices)
-    cut = Skin(
+    pruned = Skin(
         starts=np.concatenate([[0], np.cumsum(counts)]).astype(np.int32),
         joints=ordered.joints[kept],
         weights=ordered.weights[kept],
         inverse_bind=skin.inverse_bind,
     )
-    return normalized(cut)
+    return normalized(pruned)
 
 
 def normalized(skin: Skin) -> Skin:
-    """Return the skin with each vertex's weights scaled to a sum of 1; sums of 0 stay."""
+    """Return the skin with each vertex's weights scaled to a sum of 1; sums of 0 are kept."""
     sums = weight_sums(skin)
     factors = np.divide(1.0, sums, out=np.ones_like(sums), where=np.abs(sums) > _NO_SUM)
     return replace(skin, weights=skin.weights * factors[owners(skin)])
 
 
 def merged(skin: Skin) -> Skin:
-    """Return the skin with the weights added up that a vertex lists for one joint several times."""
+    """Return the skin with several influences of a joint on a vertex added up to one."""
     keys = owners(skin).astype(np.int64) * skin.n_joints + skin.joints
     unique, inverse = np.unique(keys, return_inverse=True)
     if len(unique) == len(keys):

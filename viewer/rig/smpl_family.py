@@ -1,4 +1,4 @@
-"""Joint names and parents of the SMPL family (shared by SMPL, SMPL+H, SMPL-X, MANO, FLAME)."""
+"""Joint names and hierarchies of the SMPL family: SMPL, SMPL+H, SMPL-X, MANO, FLAME."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _FACE = ["jaw", "left_eye", "right_eye"]
 
 @dataclass(frozen=True, slots=True)
 class Member:
-    """One model of the family: its title, its joints, and the joints of its hands."""
+    """One model of the family: title, joints, and finger joints."""
 
     title: str
     names: tuple[str, ...]
@@ -58,7 +58,7 @@ FAMILY = {
 
 
 def member_of(parents: tuple[int, ...]) -> Member | None:
-    """Return the member with exactly this hierarchy, None for other models of the same layout.
+    """Return the member with exactly this hierarchy; None for any other model.
 
     >>> member_of((-1, 0, 1, 1, 1)).title
     'FLAME'
@@ -68,7 +68,7 @@ def member_of(parents: tuple[int, ...]) -> Member | None:
 
 
 def members_by_numbers() -> dict[int, tuple[str, ...]]:
-    """Return the joints that pose vectors of the family turn, by the vector's length.
+    """Return the joint names of the family's pose vectors, by vector length.
 
     >>> members_by_numbers()[66][-1]
     'right_wrist'

@@ -53,7 +53,7 @@ def test_share_slider_mixes_from_either_method(skinning):
         skinning.click(label)
         skinning.drag("DQS share", 0.25, "DQS share")
         assert _chosen(skinning).method == "mix"
-        assert _chosen(skinning).share == pytest.approx(0.25, abs=0.02)
+        assert _chosen(skinning).blend_factor == pytest.approx(0.25, abs=0.02)
 
 
 def test_share_drag_is_one_step(skinning):
@@ -63,14 +63,14 @@ def test_share_drag_is_one_step(skinning):
     assert _chosen(skinning) == Skinning()
     skinning.key("z", "ctrl shift")
     assert _chosen(skinning).method == "mix"
-    assert _chosen(skinning).share == pytest.approx(0.75, abs=0.02)
+    assert _chosen(skinning).blend_factor == pytest.approx(0.75, abs=0.02)
 
 
 def test_typed_share_stays_between_the_methods(skinning):
     for text in ("7", "-3", "nan", "1e39", ""):
         skinning.click("Mixed")
         skinning.enter_value("DQS share", text)
-        assert 0.0 <= _chosen(skinning).share <= 1.0
+        assert 0.0 <= _chosen(skinning).blend_factor <= 1.0
     assert skinning.scene_picture().any()
 
 

@@ -82,7 +82,7 @@ def check(instances: Instances, actors, how: Skinning, eye=(0.0, 0.0, 0.0)) -> N
         assert (cosines[lengths > 0] > 1.0 - 1e-5).all()
 
 
-HOW = [Skinning("lbs"), Skinning("dqs"), Skinning("mix", share=0.3)]
+HOW = [Skinning("lbs"), Skinning("dqs"), Skinning("mix", blend_factor=0.3)]
 assert {how.method for how in HOW} == set(METHODS)
 
 

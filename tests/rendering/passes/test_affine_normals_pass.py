@@ -21,7 +21,7 @@ from viewer.rig.scene import Actor
 from viewer.rig.skin import Skin, skin_from_lists
 from viewer.rig.skinning import METHODS, Skinning
 
-HOW = [Skinning("lbs"), Skinning("dqs"), Skinning("mix", share=0.3)]
+HOW = [Skinning("lbs"), Skinning("dqs"), Skinning("mix", blend_factor=0.3)]
 assert {how.method for how in HOW} == set(METHODS)
 TOLERANCE = 1e-5  # of a unit normal
 N_JOINTS = 4

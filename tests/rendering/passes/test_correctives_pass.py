@@ -97,7 +97,7 @@ def test_gpu_matches_the_reference_for_other_methods(family, posed, method, way)
     figure = family("smplx")
     mesh = posed(figure, way)
     for seed in range(3):
-        check(mesh, shaped_pose(figure, seed), Skinning(method, share=0.3))
+        check(mesh, shaped_pose(figure, seed), Skinning(method, blend_factor=0.3))
 
 
 @pytest.mark.parametrize("way", WAYS)

@@ -20,7 +20,7 @@ from viewer.rig.skinning import Skinning
 
 TOLERANCE = 1e-5  # of the figure's size, as for linear blending
 NORMAL_TOLERANCE = 5e-5  # quaternions of five influences may shorten to a fifth when added
-METHODS = [Skinning("dqs"), Skinning("mix", share=0.3)]
+METHODS = [Skinning("dqs"), Skinning("mix", blend_factor=0.3)]
 METHOD_IDS = ["dqs", "mix"]
 
 
@@ -183,18 +183,18 @@ def test_methods_follow_each_other_on_one_mesh(posed):
     figure = random_figure(np.random.default_rng(12), 30)
     pose = random_pose(figure.skeleton, np.random.default_rng(12))
     for name in ("lbs", "dqs", "mix", "dqs", "lbs", "mix"):
-        for share in (0.25, 0.75):
-            how = Skinning(name, share=share)
+        for blend_factor in (0.25, 0.75):
+            how = Skinning(name, blend_factor=blend_factor)
             found, wanted = posed(figure, pose, how)[0], viewer.deform(figure, pose, how)[0]
             np.testing.assert_allclose(found, wanted, rtol=0, atol=1.7e-5)
 
 
-@pytest.mark.parametrize("share", [0.0, 1.0])
-def test_mix_at_its_ends_is_one_of_the_two(posed, share):
+@pytest.mark.parametrize("blend_factor", [0.0, 1.0])
+def test_mix_at_its_ends_is_one_of_the_two(posed, blend_factor):
     figure = random_figure(np.random.default_rng(13), 10)
     pose = random_pose(figure.skeleton, np.random.default_rng(13))
-    found, _ = posed(figure, pose, Skinning("mix", share=share))
-    other, _ = posed(figure, pose, "dqs" if share else "lbs")
+    found, _ = posed(figure, pose, Skinning("mix", blend_factor=blend_factor))
+    other, _ = posed(figure, pose, "dqs" if blend_factor else "lbs")
     np.testing.assert_allclose(found, other, rtol=0, atol=1e-6)
 
 
@@ -204,7 +204,14 @@ def test_every_word_of_the_skinning_counts_as_a_change(ctx):
     pose = random_pose(figure.skeleton, np.random.default_rng(14))
     how = Skinning("mix")
     for count, change in enumerate(
-        ({}, {"share": 0.9}, {"normalize": True}, {"max_influences": 2}, {"correctives": False}), 1
+        (
+            {},
+            {"blend_factor": 0.9},
+            {"normalize": True},
+            {"max_influences": 2},
+            {"correctives": False},
+        ),
+        1,
     ):
         for name, value in change.items():
             setattr(how, name, value)

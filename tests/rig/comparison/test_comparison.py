@@ -137,8 +137,8 @@ def test_joints_in_another_order_are_told() -> None:
     other = Figure("b", skeleton=skeleton([-1, 0, 0], names=("a", "d", "b")))
     found = compare(Actor(one), Actor(other))
     assert found.notes == (
-        "joints come in another order, which .skin and .anim files go by: where the first has b, "
-        "the second has d",
+        "joints are in a different order, which matters to .skin and .anim files: where the first "
+        "has b, the second has d",
     )
     less = Figure("c", skeleton=skeleton([-1, 0, 0], names=("a", "c", "d")))
     assert compare(Actor(one), Actor(less)).notes == ()
@@ -147,18 +147,20 @@ def test_joints_in_another_order_are_told() -> None:
 def test_joint_with_another_parent_is_a_mismatch() -> None:
     one = Figure("a", skeleton=skeleton([-1, 0, 1], names=("a", "b", "c")))
     other = Figure("b", skeleton=skeleton([-1, 0, 0], names=("a", "b", "c")))
-    assert compare(Actor(one), Actor(other)).mismatches == ("other parents: c",)
+    assert compare(Actor(one), Actor(other)).mismatches == ("different parents: c",)
 
 
 def test_joints_without_a_common_name_are_compared_by_number() -> None:
     one = Figure("a", skeleton=skeleton([-1, 0], names=("a", "b")))
     other = Figure("b", skeleton=skeleton([-1, 0], names=("x", "y")))
-    assert compare(Actor(one), Actor(other)).notes == ("joints share no name: compared by number",)
+    assert compare(Actor(one), Actor(other)).notes == (
+        "no joint names in common: compared by index",
+    )
 
 
 def test_other_limits_are_told_with_both() -> None:
     found = compare(Actor(figure()), Actor(figure(joints=arm(low=-0.5))))
-    assert found.mismatches == ("other limits of 1 DOF, as tip.z: -1 to 1 and -0.5 to 1",)
+    assert found.mismatches == ("different limits of 1 DOF, such as tip.z: -1 to 1 and -0.5 to 1",)
 
 
 def walk(angles, rate=10.0, name="walk") -> SampledClip:
@@ -189,7 +191,7 @@ def test_motions_are_compared_frame_by_frame_and_the_worst_is_named() -> None:
 
 def test_motions_of_other_length_are_a_mismatch_and_the_common_part_is_compared() -> None:
     found = compare(Actor(bare(), clip=walk([0.0] * 4)), Actor(bare(), clip=walk([0.0] * 6)))
-    assert found.mismatches == ("one lasts 0.3 s, the other 0.5 s",)
+    assert found.mismatches == ("durations differ: 0.3 s and 0.5 s",)
     assert measures(found)["joint positions"].n_compared == 2 * 4
 
 

@@ -36,7 +36,7 @@ def test_product_is_the_product_of_matrices():
 
 
 @pytest.mark.parametrize(
-    ("start", "end", "share", "expected"),
+    ("start", "end", "fraction", "expected"),
     [
         (0, 90, 0.5, 45),
         (0, 90, 0.1, 9),
@@ -47,8 +47,8 @@ def test_product_is_the_product_of_matrices():
         (20, 20, 0.7, 20),
     ],
 )
-def test_slerp_goes_the_shorter_way_at_even_speed(start, end, share, expected):
-    found = slerp(about_z(start), about_z(end), share)
+def test_slerp_goes_the_shorter_way_at_even_speed(start, end, fraction, expected):
+    found = slerp(about_z(start), about_z(end), fraction)
     assert_allclose(
         quaternion_to_matrix(found), quaternion_to_matrix(about_z(expected)), atol=1e-13
     )
@@ -78,9 +78,9 @@ def test_slerp_agrees_with_the_power_of_the_rotation_between():
             ]
         )
         axis /= np.linalg.norm(axis)
-        share = RANDOM.uniform()
-        wanted = a @ rotation_vector_to_matrix(share * angle * axis)
+        fraction = RANDOM.uniform()
+        wanted = a @ rotation_vector_to_matrix(fraction * angle * axis)
         from viewer.rig.geometry.rotation import matrix_to_quaternion
 
-        found = slerp(matrix_to_quaternion(a), matrix_to_quaternion(b), share)
+        found = slerp(matrix_to_quaternion(a), matrix_to_quaternion(b), fraction)
         assert_allclose(quaternion_to_matrix(found), wanted, atol=1e-12)

@@ -228,10 +228,10 @@ def test_text_of_dual_quaternions_and_placement():
     assert lines[lines.index("sum of w = 1.00") :] == [
         "sum of w = 1.00",
         "sum of w M p        (  2.00   1.00   0.00 )",
-        "q1: share 1.00",
+        "q1: relative weight 1.00",
         "   real [  0.00   0.00   0.71   0.71 ]",
         "   dual [  0.00  -1.41   0.00   0.00 ]",
-        "q = sum of share times q, with these signs",
+        "q = sum of relative weight times q, with these signs",
         "   real [  0.00   0.00   0.71   0.71 ]",
         "   dual [  0.00  -1.41   0.00   0.00 ]",
         "length of its real part = 1.00",
@@ -246,13 +246,15 @@ def test_text_says_what_is_special():
     figure = arm()
     free = explanation_text(explain(figure, bent(figure), Skinning("dqs"), 3))
     assert free[3:] == [
-        "no influence: the vertex stays where it was bound",
+        "no influence: the vertex stays at its bind position",
         "position            (  5.0000   5.0000   5.0000 )",
     ]
     both = arm([[(0, 0.5), (1, 0.5)]] * 4)
     pose = bent(both, np.deg2rad(170), np.deg2rad(170))
     mixed = explanation_text(explain(both, pose, Skinning("mix", 0.25), 0))
-    assert any(line == "q2: share 0.5000, turned to the side of q1" for line in mixed)
+    assert any(
+        line == "q2: relative weight 0.5000, negated to the hemisphere of q1" for line in mixed
+    )
     assert any(line.startswith("0.2500 of the way   (") for line in mixed)
 
 

@@ -154,7 +154,7 @@ def test_views_of_weights_and_parts_need_no_pose(name):
     assert name == "dominant" or still.any()
 
 
-def test_unknown_view_is_refused():
+def test_unknown_quantity_is_refused():
     with pytest.raises(RigError) as caught:
         compute("magic", sliding([[]] * 3), None, Skinning())
     expected = f'no scalar quantity "magic"; there are {len(SCALARS)}: {", ".join(SCALARS)}'
@@ -227,7 +227,7 @@ def test_joint_is_found_by_name_or_index(text, joint):
             'no joint is called "tail"; there are 6: a, b, c, d, e, f',
         ),
         (("a", "b"), "#2", 'no joint is called "#2"; there are 2: a, b'),
-        (("a", "a"), "a", '"a" names 2 joints: say which one, a#0, a#1'),
+        (("a", "a"), "a", '"a" names 2 joints: use one of a#0, a#1'),
     ],
 )  # fmt: skip
 def test_unknown_joint_is_refused_with_names_that_are_close(names, text, message):

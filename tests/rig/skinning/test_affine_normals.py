@@ -14,7 +14,7 @@ from viewer.rig.pose import rest_pose
 from viewer.rig.skin import skin_from_lists
 from viewer.rig.skinning import Skinning, deform, dqs, lbs, mix
 
-HOW = [Skinning("lbs"), Skinning("dqs"), Skinning("mix", share=0.4)]
+HOW = [Skinning("lbs"), Skinning("dqs"), Skinning("mix", blend_factor=0.4)]
 DIRECTIONS = unit(np.random.default_rng(0).normal(size=(200, 3)))
 EYES = np.tile(np.eye(4), (2, 1, 1))
 
@@ -150,8 +150,8 @@ def test_palettes_of_several_poses_are_judged_one_by_one():
     assert is_rigid(np.array([RIGID, stretched, RIGID])).tolist() == [True, False, True]
 
 
-@pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
-def test_mixed_normals_are_those_of_the_surface_that_is_mixed(share):
+@pytest.mark.parametrize("blend_factor", [0.0, 0.3, 1.0])
+def test_mixed_normals_are_those_of_the_surface_that_is_mixed(blend_factor):
     """With equal weights everywhere, each method maps the sphere linearly, and so does the mixture.
 
     Its matrix is found by moving the three unit vectors; the ellipsoid A p has normals A^-T p.
@@ -160,8 +160,8 @@ def test_mixed_normals_are_those_of_the_surface_that_is_mixed(share):
     pairs = [(0, 0.6), (1, 0.4)]
     skin = skin_from_lists([pairs] * 4, EYES)
     corners = np.concatenate([np.zeros((1, 3)), np.eye(3)])
-    moved, _ = mix.deform(corners, corners, skin, palette, share)
+    moved, _ = mix.deform(corners, corners, skin, palette, blend_factor)
     linear = (moved[1:] - moved[0]).T
     skin = skin_from_lists([pairs] * len(DIRECTIONS), EYES)
-    found = mix.deform(DIRECTIONS, DIRECTIONS, skin, palette, share)[1]
+    found = mix.deform(DIRECTIONS, DIRECTIONS, skin, palette, blend_factor)[1]
     assert_allclose(found, unit(DIRECTIONS @ np.linalg.inv(linear)), atol=1e-13)

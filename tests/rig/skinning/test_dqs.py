@@ -228,15 +228,15 @@ def test_mesh_without_vertices_is_skinned_to_nothing():
     assert dqs.deform(none, none, bound([], 2), np.array(RIGID[:2]))[0].shape == (0, 3)
 
 
-@pytest.mark.parametrize("share", [0.0, 0.25, 0.5, 1.0])
-def test_mix_is_the_straight_line_between_both(share):
+@pytest.mark.parametrize("blend_factor", [0.0, 0.25, 0.5, 1.0])
+def test_mix_is_the_straight_line_between_both(blend_factor):
     figure = random_arm(6)
     pose = rest_pose(figure.skeleton)
     pose.dofs[:] = np.random.default_rng(7).uniform(-2, 2, 21)
     linear, dual = deform(figure, pose), deform(figure, pose, "dqs")
-    positions, normals = deform(figure, pose, Skinning("mix", share=share))
-    assert_allclose(positions, linear[0] + share * (dual[0] - linear[0]), atol=ROUNDING)
-    between = linear[1] + share * (dual[1] - linear[1])
+    positions, normals = deform(figure, pose, Skinning("mix", blend_factor=blend_factor))
+    assert_allclose(positions, linear[0] + blend_factor * (dual[0] - linear[0]), atol=ROUNDING)
+    between = linear[1] + blend_factor * (dual[1] - linear[1])
     between /= np.linalg.norm(between, axis=1, keepdims=True)
     assert_allclose(normals, between, atol=1e-13)
 

@@ -45,10 +45,10 @@ def _draw_method(state: AppState, skinning: Skinning) -> None:
 
 def _draw_share(state: AppState, skinning: Skinning, key: str, ends: tuple[str, ...]) -> None:
     """Draw the blend factor of a method between two others; moving it selects the method."""
-    shown = dict(zip(ends, (0.0, 1.0), strict=True)).get(skinning.method, skinning.share)
+    shown = dict(zip(ends, (0.0, 1.0), strict=True)).get(skinning.method, skinning.blend_factor)
     share = slider(state, f"{METHODS[ends[1]].short} share", shown, 0.0, 1.0, flags=_CLAMP)
     if share != shown:
-        skinning.method, skinning.share = key, share
+        skinning.method, skinning.blend_factor = key, share
 
 
 def _draw_influences(state: AppState, figure: Figure, skinning: Skinning) -> None:

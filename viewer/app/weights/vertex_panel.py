@@ -231,7 +231,7 @@ def _draw_end(sheet: _Sheet, one: Explanation) -> None:
     method = METHODS[one.skinning.method]
     if method.result:
         ends = " to ".join(METHODS[end].short for end in method.ends)
-        text = method.result.format(share=f"{one.skinning.share:.2f}")
+        text = method.result.format(blend_factor=f"{one.skinning.blend_factor:.2f}")
         imgui.text_wrapped(f"{text} from {ends}" if ends else text)
         _draw_rows(sheet, "result", [("skinned", one.skinned)])
     if not np.array_equal(one.placement, np.eye(4)):

@@ -191,7 +191,7 @@ class InstanceBuffers:
         values = {
             "u_projection": as_uniform(view.projection),
             "u_orthographic": view.camera.is_parallel,
-            "u_share": self._how.share,
+            "u_blend_factor": self._how.blend_factor,
             "u_n_joints": self._n_joints,
             "u_n_summed": self._offsets.n_summed,
             "u_n_offsets": self._offsets.n_listed,

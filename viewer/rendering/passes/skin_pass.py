@@ -119,7 +119,7 @@ class PosedMesh:
             "u_attached": attached,
             "u_rest_shift": tuple(self.mesh.center - self.center),
             "u_center": tuple(self.center),
-            "u_share": how.share,
+            "u_blend_factor": how.blend_factor,
             "u_n_summed": 0,
             "u_n_offsets": self._rest.n_offsets if attached else 0,
             "u_n_sources": len(self.mesh.copies),
@@ -183,4 +183,4 @@ class PosedMesh:
 
 def skinning_words(how: Skinning) -> tuple[object, ...]:
     """Return what changes if and only if the way of skinning does."""
-    return (how.method, how.share, how.max_influences, how.normalize, how.correctives)
+    return (how.method, how.blend_factor, how.max_influences, how.normalize, how.correctives)

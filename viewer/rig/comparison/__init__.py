@@ -1,4 +1,4 @@
-"""Two figures or two motions held against each other: how far apart they are, and where."""
+"""Comparison of two figures or motions: the size and place of their differences."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from viewer.rig.skinning import Skinning, deform
 
 __all__ = ["Difference", "Measure", "compare", "rotation_distance"]
 
-_MOST_SEARCHES = 32  # steps in which closest points are sought; each takes about a second
+_MOST_SEARCHES = 32  # steps with a closest-point search, each of which takes about a second
 
 
 def compare(
@@ -34,41 +34,41 @@ def compare(
     frames: FrameRange | None = None,
     report: Callable[[int, int], None] | None = None,
 ) -> Difference:
-    """Hold two actors against each other; placements in their scenes are left out.
+    """Compare two actors, regardless of their placements in a scene.
 
-    Joints are matched by name. Vertices are compared by number where the triangles are the
-    same, else by the closest point of the other's surface, in both directions. Both actors are
-    posed on the way, and left as they are where the meshes are farthest apart.
+    Joints are matched by name. Vertices are compared by index if the triangles are the same, else
+    by the closest point on the other's surface, in both directions. Both actors are posed, and
+    left in the step in which the meshes are farthest apart.
 
     Parameters
     ----------
     first, second : Actor
-        The first is the reference: lengths are in its unit and as shares of its size.
+        The first is the reference: lengths are in its unit and as fractions of its size.
     skinning : Skinning, optional
-        How joints move both meshes.
+        Skinning options of both meshes.
     n_poses : int
         Test poses for figures without motion, see ``steps_of``.
     frames : (int or None, int or None), optional
-        First frame and the one behind the last, as the first motion numbers them.
+        First frame and end frame (exclusive), in the numbering of the first motion.
     report : callable, optional
-        Called with the number of steps done and of all.
+        Called with the number of finished steps and their total.
 
     Returns
     -------
     Difference
-        With a mismatch for everything that only one of them has.
+        With a mismatch for everything that only one actor has.
 
     Raises
     ------
     RigError
-        If the range of frames holds none, or SciPy is missing where surfaces differ.
+        If the range contains no frame, or surfaces differ and SciPy is missing.
     """
     steps = steps_of(first, second, n_poses, frames)
     return _Comparison(first, second, skinning or Skinning(), steps).run(report)
 
 
 class _Comparison:
-    """Two actors, what of them can be paired, and the tallies."""
+    """Two actors, their matched parts, and the tallies of their differences."""
 
     def __init__(self, first: Actor, second: Actor, skinning: Skinning, steps: Steps) -> None:
         self.first, self.second, self.skinning, self.steps = first, second, skinning, steps
@@ -80,7 +80,7 @@ class _Comparison:
         self._pair_points()
         if first.figure.up != second.figure.up:
             ups = f"{first.figure.up} and {second.figure.up}"
-            self.notes.append(f"{ups} point up: compared as they are")
+            self.notes.append(f"up axes differ ({ups}): compared without conversion")
 
     def _pair_skeletons(self) -> None:
         first, second = self.first.figure.skeleton, self.second.figure.skeleton
@@ -93,7 +93,7 @@ class _Comparison:
         self.notes += self.joints.notes
         names = self.joints.names
         self.places = self._tally("joint positions", "length", len(names), names)
-        self.turns = self._tally("joint orientations", "angle", len(names), names)
+        self.orientations = self._tally("joint orientations", "angle", len(names), names)
 
     def _pair_meshes(self) -> None:
         first, second = self.first.figure.mesh, self.second.figure.mesh
@@ -132,7 +132,7 @@ class _Comparison:
         return self.tallies[-1]
 
     def run(self, report: Callable[[int, int], None] | None) -> Difference:
-        """Go through all steps."""
+        """Compare the actors in all steps."""
         count, size = self.steps.count, 0.0
         n_searches = min(count, _MOST_SEARCHES)
         searched = set(np.linspace(0, count - 1, n_searches).round().astype(int).tolist())
@@ -155,7 +155,7 @@ class _Comparison:
             self._compare_points(step)
             self._compare_meshes(step, number in searched)
         if absent:
-            self.mismatches.append(f"in {counted(absent, 'frame')} only one of them is there")
+            self.mismatches.append(f"only one of them is present in {counted(absent, 'frame')}")
         self._pose_at_worst()
         measures = [tally.result() for tally in self.tallies]
         return Difference(
@@ -168,11 +168,11 @@ class _Comparison:
 
     def _pose_at_worst(self) -> None:
         """Pose both as in the step in which the meshes, or the joints, are farthest apart."""
-        told = [tally for tally in self.tallies if tally.kind == "length" and tally.step]
-        if not told:
+        lengths = [tally for tally in self.tallies if tally.kind == "length" and tally.step]
+        if not lengths:
             return
-        of_meshes = [tally for tally in told if not tally.items]
-        worst = max(of_meshes or told, key=lambda tally: tally.worst).step
+        of_meshes = [tally for tally in lengths if not tally.items]
+        worst = max(of_meshes or lengths, key=lambda tally: tally.worst).step
         self.steps.pose(self.numbers[worst], self.first, self.second)
 
     def _compare_joints(self, step: str) -> None:
@@ -187,8 +187,9 @@ class _Comparison:
         ]
         offsets = worlds[0][:, :3, 3] - worlds[1][:, :3, 3]
         self.places.add(step, np.linalg.norm(offsets, axis=1))
-        turns = [nearest_rotations(world[:, :3, :3])[0] for world in worlds]
-        self.turns.add(step, rotation_distance(turns[0], turns[1]))
+        # Joints may scale or shear: only the rotations are compared.
+        rotations = [nearest_rotations(world[:, :3, :3])[0] for world in worlds]
+        self.orientations.add(step, rotation_distance(rotations[0], rotations[1]))
 
     def _compare_points(self, step: str) -> None:
         if self.points is None or self.first.points is None or self.second.points is None:
@@ -210,7 +211,7 @@ class _Comparison:
         self.back.add(step, _closest(other, one, self.first).distances)
 
     def _compare_weights(self) -> None:
-        """Compare weights once: they are the same in every pose."""
+        """Compare the weights, once, as they do not depend on the pose."""
         first, second = self.first.figure, self.second.figure
         if first.skin is None or second.skin is None or self.joints is None:
             return
@@ -242,14 +243,14 @@ def _is_same_topology(first: Mesh, second: Mesh) -> bool:
 
 
 def _joint_frames(actor: Actor) -> Floats:
-    """Return the joints' matrices with the figure's own place: (J, 4, 4)."""
+    """Return the joint matrices with the figure's own scale and translation: (J, 4, 4)."""
     pose = actor.require_pose()
     shape = shaped(actor.figure, pose.shape_weights).require_skeleton()
     return placement_matrix(pose) @ world_matrices(shape, pose)
 
 
 def _size(actor: Actor) -> float:
-    """Return the diagonal of the rest mesh's box, without a mesh that of what is posed."""
+    """Return the diagonal of the rest mesh's box, or of the posed joints without a mesh."""
     mesh = actor.figure.mesh
     points = actor_points(actor) if mesh is None else mesh.positions
     return box_size(bounding_box(points))

@@ -1,4 +1,4 @@
-"""What a comparison found: measures with their maximum, mean and place."""
+"""Results of a comparison: measures with maximum, mean and place."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ __all__ = ["Difference", "Measure", "Tally"]
 
 @dataclass(frozen=True, slots=True)
 class Measure:
-    """How far one thing is off.
+    """The difference in one respect.
 
     Attributes
     ----------
     name : str
         ``"joint positions"``, ``"joint orientations"``, ``"vertices"`` …
     kind : "length", "angle" or "weight"
-        Lengths are in the first figure's unit, angles in radians, weights plain.
+        Lengths are in the first figure's unit, angles in radians, weights dimensionless.
     maximum, mean : float
         Over all items and steps that were compared.
     step, item : str
-        Where the maximum is: a frame or test pose, a joint or vertex. Weights are the same in
-        every pose: their step is empty.
+        Place of the maximum: a frame or test pose, a joint or vertex. The step is empty for
+        weights, which do not depend on the pose.
     items : tuple of str
-        What each entry of ``item_maxima`` is; empty for vertices, which are numbered.
+        Names of the entries of ``item_maxima``; empty for vertices, which have indices.
     item_maxima : (N,)
         Largest value of each joint or vertex over all steps; 0 where nothing was compared.
     n_compared : int
-        Numbers that went into the mean.
+        Number of values in the mean.
     """
 
     name: str
@@ -45,22 +45,22 @@ class Measure:
     n_compared: int
 
     def relative(self, size: float) -> float:
-        """Return what a tolerance is held against: lengths as a share of the size."""
+        """Return the value that a tolerance applies to: lengths as a fraction of the size."""
         return self.maximum / size if self.kind == "length" and size > 0.0 else self.maximum
 
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """How two figures or motions differ.
+    """The differences of two figures or motions.
 
     Attributes
     ----------
     measures : tuple of Measure
-        What could be compared.
+        One for everything that both have.
     mismatches : tuple of str
-        What one has and the other lacks: joints, frames, triangles. No tolerance covers them.
+        Joints, frames and the like that only one has. No tolerance applies to them.
     notes : tuple of str
-        How it was compared.
+        Remarks on the method of comparison.
     size : float
         Diagonal of the box of the first figure's rest mesh, or of its skeleton, in its unit.
     unit : str
@@ -74,36 +74,36 @@ class Difference:
     unit: str
 
     def exceeds(self, tolerance: float) -> bool:
-        """Return whether anything differs by more.
+        """Return whether any difference exceeds a tolerance.
 
         Parameters
         ----------
         tolerance : float
-            Lengths count as shares of the size, angles in radians, weights as they are.
+            Lengths count as fractions of the size, angles in radians, weights as they are.
         """
-        # "Not within" instead of "more than", so that NaN exceeds.
+        # Written as "not within" rather than "more than", so that NaN exceeds any tolerance.
         within = all(measure.relative(self.size) <= tolerance for measure in self.measures)
         return bool(self.mismatches) or not within or not self.measures
 
 
 class Tally:
-    """Gathers a measure step by step.
+    """Accumulates a measure step by step.
 
     Parameters
     ----------
     name, kind : str
         As in ``Measure``.
     count : int
-        Joints or vertices.
+        Number of joints or vertices.
     items : tuple of str
-        Their names; empty for numbers.
+        Their names; empty for vertices, which have indices.
 
     Attributes
     ----------
     worst : float
-        Largest value so far, below 0 before there is one.
+        Largest value so far, negative before the first.
     step : str
-        Where that was.
+        Step of the largest value.
     """
 
     def __init__(self, name: str, kind: str, count: int, items: tuple[str, ...] = ()) -> None:
@@ -113,7 +113,7 @@ class Tally:
         self.worst, self.step, self._item = -1.0, "", -1
 
     def add(self, step: str, values: Floats) -> None:
-        """Take in the values of one step, NaN where nothing can be compared."""
+        """Add the values of one step, NaN where nothing can be compared."""
         known = ~np.isnan(values)
         if not known.any():
             return

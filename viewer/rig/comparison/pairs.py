@@ -1,4 +1,4 @@
-"""Which joint of one figure is which of another, and how far their frames are apart."""
+"""Matching of two figures' joints by name, and the angle between rotations."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ class Pairs:
     Attributes
     ----------
     first, second : (N,) int32
-        Indices into both lists, in the first's order.
+        Indices into both lists, in the order of the first.
     names : tuple of N str
-        As the first calls them.
+        Names in the first list.
     mismatches, notes : tuple of str
-        What has no partner; how partners were found, if not by name.
+        Names without a partner; remarks on partners that were not matched by name.
     """
 
     first: Ints
@@ -38,18 +38,18 @@ class Pairs:
 
 
 def pair_joints(first: Skeleton, second: Skeleton) -> Pairs:
-    """Match joints by name, or by number where no name is shared and the numbers agree.
+    """Match joints by name, or by index if no name matches and both have as many joints.
 
     Parameters
     ----------
     first, second : Skeleton
-        Of two figures.
+        Skeletons of two figures.
 
     Returns
     -------
     Pairs
-        With a mismatch for joints without a partner, and for partners with other parents; a note
-        if both have them in another order, which skins and clips go by.
+        With a mismatch for joints without a partner, and for partners with different parents; a
+        note if their order differs, as skins and clips refer to joints by index.
     """
     pairs = pair_names(_called(first), _called(second), "joint")
     parents = [
@@ -58,7 +58,7 @@ def pair_joints(first: Skeleton, second: Skeleton) -> Pairs:
         for above in (skeleton.parents[found],)
     ]
     other = np.flatnonzero(parents[0] != parents[1])
-    texts = [f"other parents: {_listed([pairs.names[place] for place in other])}"] * bool(
+    texts = [f"different parents: {_listed([pairs.names[place] for place in other])}"] * bool(
         len(other)
     )
     return replace(
@@ -69,7 +69,7 @@ def pair_joints(first: Skeleton, second: Skeleton) -> Pairs:
 
 
 def _called(skeleton: Skeleton) -> tuple[str, ...]:
-    """Return what messages call the joints, no two alike; those without a name by number."""
+    """Return unique labels of the joints for messages; nameless joints have their index."""
     return tuple(
         label if name else f"joint {joint} (no name)"
         for joint, (name, label) in enumerate(
@@ -86,13 +86,13 @@ def _order_notes(pairs: Pairs, second: Skeleton) -> list[str]:
     place = int(other[0])
     here, there = pairs.names[place], _called(second)[int(pairs.second[order[place]])]
     return [
-        f"joints come in another order, which .skin and .anim files go by: where the first has "
-        f"{here}, the second has {there}"
+        f"joints are in a different order, which matters to .skin and .anim files: where the first "
+        f"has {here}, the second has {there}"
     ]
 
 
 def _places(found: Ints, count: int) -> Ints:
-    """Return where each joint is in a list of some, -1 for those outside; one more for "none"."""
+    """Return each joint's position in a list, -1 if absent; the extra last entry stands for -1."""
     places = np.full(count + 1, -1, dtype=np.int32)
     places[found] = np.arange(len(found))
     return places
@@ -106,18 +106,18 @@ def pair_names(first: Sequence[str], second: Sequence[str], what: str) -> Pairs:
     first, second : sequences of str
         Each without repetition.
     what : str
-        What one of them is, for messages: ``"joint"``.
+        The kind of item in messages: ``"joint"``.
 
     Returns
     -------
     Pairs
-        By number, with a note, if no name is shared and both are as long.
+        By index, with a note, if no name matches and both have the same length.
     """
     numbers = {name: number for number, name in enumerate(second)}
     shared = [(number, numbers[name]) for number, name in enumerate(first) if name in numbers]
     if not shared and len(first) == len(second) > 0:
         same = np.arange(len(first), dtype=np.int32)
-        note = f"{what}s share no name: compared by number"
+        note = f"no {what} names in common: compared by index"
         return Pairs(same, same, tuple(first), notes=(note,))
     both = np.array(shared, dtype=np.int32).reshape(-1, 2)
     mismatches = []
@@ -138,7 +138,7 @@ def _listed(names: Sequence[str]) -> str:
 def rotation_distance(first: Floats, second: Floats) -> Floats:
     """Return the angle between rotations: 2 asin(|A - B| / sqrt(8)), Frobenius norm.
 
-    It is exact to rounding for small angles, where the arc cosine of the trace is not.
+    It stays accurate for small angles, where the arc cosine of the trace does not.
 
     Parameters
     ----------
@@ -150,8 +150,8 @@ def rotation_distance(first: Floats, second: Floats) -> Floats:
     (...)
         Radians, 0 to pi.
 
-    >>> turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    >>> round(float(rotation_distance(np.eye(3), turn)), 12) == round(np.pi / 2, 12)
+    >>> quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    >>> round(float(rotation_distance(np.eye(3), quarter)), 12) == round(np.pi / 2, 12)
     True
     """
     norm = np.linalg.norm(first - second, axis=(-2, -1))

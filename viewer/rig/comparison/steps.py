@@ -18,10 +18,10 @@ from viewer.rig.skeleton import Skeleton, dof_labels
 __all__ = ["FrameRange", "Steps", "steps_of"]
 
 FrameRange = tuple[int | None, int | None]
-"""First frame and the one behind the last, as the first motion numbers them."""
+"""First frame and end frame (exclusive), in the numbering of the first motion."""
 
-_FREE = 0.7  # radians to each side that a rotation without limits is turned
-_SHIFT = 0.05  # of the skeleton's reach that a translation without limits is moved
+_FREE = 0.7  # radians to either side in test poses, for rotations without limits
+_SHIFT = 0.05  # of the skeleton's reach to either side, for translations without limits
 _SAME_TIME = 1e-6  # seconds
 
 
@@ -34,15 +34,15 @@ class Steps:
     times : (F,)
         Seconds, for two motions; empty for test poses.
     dofs : (N, D)
-        Test poses: values of the DOFs that both share.
+        Test poses: values of the DOFs that both have.
     first, second : (D,) int32
-        Those DOFs' rows in both.
+        Rows of those DOFs in either skeleton.
     first_frame : int
-        What the first frame is called.
+        Number of the first frame.
     mismatches, notes : tuple of str
-        What one has and the other lacks; how steps were chosen.
+        DOFs or motions that only one has; remarks on the choice of steps.
     own : (Pose or None, Pose or None)
-        Where both start without motions.
+        Initial poses of figures without motion.
     """
 
     times: Floats
@@ -60,9 +60,9 @@ class Steps:
         return len(self.times) or 1 + len(self.dofs)
 
     def pose(self, number: int, first: Actor, second: Actor) -> str:
-        """Pose both actors as in one step, in any order, and return what it is called."""
+        """Pose both actors as in one step, in any order, and return the name of the step."""
         if len(self.times):
-            # Both from their own start: captures may count from any frame.
+            # Each from its own start, as captures may start at any frame.
             for actor in (first, second):
                 time = float(self.times[number]) + actor.require_clip().start + actor.offset
                 pose_actor(actor, time)
@@ -79,24 +79,24 @@ class Steps:
 def steps_of(first: Actor, second: Actor, n_poses: int, frames: FrameRange | None = None) -> Steps:
     """Choose the poses in which two actors are compared.
 
-    Two motions are compared frame by frame at the first's rate, each from its own start, as far
-    as both last. Figures at rest are compared in their files' own poses and, where both have
-    DOFs of the same names, in ``n_poses`` test poses drawn within the limits of both: always the
-    same ones for the same names and limits.
+    Two motions are compared frame by frame at the frame rate of the first, each from its own
+    start, up to the end of the shorter. Figures at rest are compared in their files' own poses
+    and, for DOFs with the same names, in ``n_poses`` test poses within the limits of both. The
+    test poses are the same for the same names and limits.
 
     Parameters
     ----------
     first, second : Actor
-        Left as they are.
+        Not changed.
     n_poses : int
         Test poses for figures without motion.
     frames : (int or None, int or None), optional
-        First frame and the one behind the last, as the first motion numbers them.
+        First frame and end frame (exclusive), in the numbering of the first motion.
 
     Raises
     ------
     RigError
-        If the range holds no frame.
+        If the range contains no frame.
     """
     if first.clip is not None and second.clip is not None:
         return _motion_steps(first, second, frames)
@@ -104,7 +104,7 @@ def steps_of(first: Actor, second: Actor, n_poses: int, frames: FrameRange | Non
 
 
 def _own_pose(actor: Actor) -> Pose | None:
-    """Return where an actor starts; a motion without a partner counts for nothing."""
+    """Return an actor's initial pose, ignoring a motion that the other actor lacks."""
     if actor.clip is None:
         return None if actor.pose is None else actor.pose.copy()
     return None if actor.figure.skeleton is None else figure_pose(actor.figure)
@@ -128,10 +128,11 @@ def _motion_steps(first: Actor, second: Actor, frames: FrameRange | None) -> Ste
     lasts = clips[0].end - clips[0].start, clips[1].end - clips[1].start
     mismatches = []
     if abs(lasts[0] - lasts[1]) > 0.5 / rates[0]:
-        mismatches.append(f"one lasts {lasts[0]:.6g} s, the other {lasts[1]:.6g} s")
+        mismatches.append(f"durations differ: {lasts[0]:.6g} s and {lasts[1]:.6g} s")
     notes = []
     if abs(rates[0] - rates[1]) > _SAME_TIME * rates[0]:
-        notes.append(f"{rates[0]:g} and {rates[1]:g} frames a second: compared at the first's")
+        text = f"frame rates differ ({rates[0]:g} and {rates[1]:g} frames a second)"
+        notes.append(f"{text}: compared at that of the first")
     base = 0 if isinstance(clips[0], Clip) else clips[0].timing.first_frame
     last = base + int(np.floor(min(lasts) * rates[0] + _SAME_TIME))
     start, end = (None, None) if frames is None else frames
@@ -155,7 +156,7 @@ def _test_poses(first: Skeleton, second: Skeleton, n_poses: int) -> Steps:
         dof = int(other[0])
         low, high = limits[0][dof].tolist(), limits[1][dof].tolist()
         mismatches.append(
-            f"other limits of {counted(len(other), 'DOF')}, as {pairs.names[dof]}: "
+            f"different limits of {counted(len(other), 'DOF')}, such as {pairs.names[dof]}: "
             f"{low[0]:.6g} to {low[1]:.6g} and {high[0]:.6g} to {high[1]:.6g}"
         )
     dofs = _drawn(first, pairs.first, limits, n_poses)
@@ -164,14 +165,14 @@ def _test_poses(first: Skeleton, second: Skeleton, n_poses: int) -> Steps:
 
 
 def _drawn(skeleton: Skeleton, rows: Ints, limits: Floats, count: int) -> Floats:
-    """Draw DOF values within both limits; where those do not meet, the first's count."""
-    turns = skeleton.dof_kinds[rows] >= 3
-    # A reach of unit length keeps bare skeletons in view without knowing their unit.
+    """Draw random DOF values within both limits; those of the first win if they are disjoint."""
+    is_rotation = skeleton.dof_kinds[rows] >= 3
+    # Relative to the skeleton's own extent, as its unit may be unknown.
     reach = _SHIFT * float(np.abs(skeleton.rest_translations).sum(axis=0).max())
-    free = np.where(turns, _FREE, reach)
+    free = np.where(is_rotation, _FREE, reach)
     low = np.maximum(limits[:, :, 0].max(axis=0), -free)
     high = np.minimum(limits[:, :, 1].min(axis=0), free)
-    # Limits that lie wholly outside the usual range are taken at their near end.
+    # Limits that lie entirely outside the default range are taken at their closer end.
     low, high = np.minimum(low, limits[:, :, 1].min(axis=0)), np.maximum(high, low)
-    shares = np.random.default_rng(0).random((count, len(rows)))
-    return np.clip(low + shares * (high - low), limits[0, :, 0], limits[0, :, 1])
+    fractions = np.random.default_rng(0).random((count, len(rows)))
+    return np.clip(low + fractions * (high - low), limits[0, :, 0], limits[0, :, 1])

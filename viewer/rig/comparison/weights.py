@@ -1,4 +1,4 @@
-"""How differently two skins weight the same vertices."""
+"""Distances between the weights of two skins."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ __all__ = ["row_distances", "skin_at"]
 def row_distances(first: Skin, second: Skin, pairs: Pairs) -> Floats:
     """Return the L1 distance of each vertex's weights: sum over joints of |w - w'|.
 
-    Rows that sum to 1 differ by 2 at most: all weight on other joints.
+    The maximum for rows that sum to 1 is 2: all weight is on different joints.
 
     Parameters
     ----------
     first, second : Skin
-        Of the same vertices, V.
+        Influences of the same V vertices.
     pairs : Pairs
-        Which joint is which; weights on joints without a partner count in full.
+        Matched joints; weights of joints without a partner count in full.
 
     Returns
     -------
     (V,)
-        0 for equal rows, however they are ordered or split.
+        0 for equal rows, in whatever order or parts they list the weights.
     """
-    # Joints of the second without a partner are joints of their own.
+    # Joints of the second without a partner get indices that the first does not use.
     names = np.arange(second.n_joints, dtype=np.int32) + first.n_joints
     names[pairs.second] = pairs.first
     return row_norms(
@@ -43,22 +43,22 @@ def row_distances(first: Skin, second: Skin, pairs: Pairs) -> Floats:
 
 
 def skin_at(skin: Skin, triangles: Ints, found: SurfacePoints) -> Skin:
-    """Return a skin's weights at points of its surface, mixed by barycentric coordinates.
+    """Interpolate a skin's weights at points of its surface by barycentric coordinates.
 
     Parameters
     ----------
     skin : Skin
-        Of the mesh that the points lie on.
+        Influences on the mesh that the points lie on.
     triangles : (T, 3)
-        Of that mesh.
+        Triangles of that mesh.
     found : SurfacePoints
         N points.
 
     Returns
     -------
     Skin
-        Of N vertices; a joint may occur several times in one.
+        Influences of N vertices; a vertex may list a joint several times.
     """
     corners = skin_rows(skin, triangles[found.triangles].ravel())
-    shares = np.repeat(found.barycentric.ravel(), np.diff(corners.starts))
-    return replace(corners, starts=corners.starts[::3], weights=shares * corners.weights)
+    factors = np.repeat(found.barycentric.ravel(), np.diff(corners.starts))
+    return replace(corners, starts=corners.starts[::3], weights=factors * corners.weights)

@@ -1,9 +1,9 @@
-"""The closest point of a triangle mesh to each of many points, exactly.
+"""Exact search for the closest points of a triangle mesh to many points.
 
 A k-d tree finds the triangles whose centroids are near. A triangle within distance u of a point
-has its centroid within u + r, r being the centroid's distance to the farthest corner; so all
-triangles inside that bound are looked at. Long triangles are cut into pieces first, and pieces
-of different size go into different trees: one large r would make every search a long one.
+has its centroid within u + r, where r is the distance from the centroid to the farthest corner,
+so all triangles inside that bound are examined. Long triangles are split into pieces first, and
+pieces of different sizes go into different trees, as one large r would slow every search down.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from viewer.rig.arrays import Bools, Floats, Ints, frozen
 
 __all__ = ["Surface", "SurfacePoints", "interpolate"]
 
-_PAIRS = 1 << 19  # pairs of point and piece looked at together; some 150 bytes each
-_LONG = 3.0  # pieces are cut above this many times the median radius
-_NEAREST = 8  # pieces asked for at first; where that is not all, all within the bound
-_POINTS = 1 << 16  # points looked at together
-_FLAT = 1e-20  # sin^2 of an angle below which a triangle counts as a segment
-# Bounds of radii are rounded up by this much, so that no triangle is missed by a last digit.
+_PAIRS = 1 << 19  # pairs of point and piece per batch; some 150 bytes each
+_LONG = 3.0  # pieces are split above this many times the median radius
+_NEAREST = 8  # pieces in the first query; if there may be more, a second finds all in the bound
+_POINTS = 1 << 16  # points per batch
+_FLAT = 1e-20  # sin^2 of the angle below which a triangle counts as a segment
+# Bounds are rounded up by this factor, so that rounding never excludes a triangle.
 _SLACK = 1.0 + 1e-9
-_ROUNDED = 1e-12  # and squared distances by this share of the larger ones they are the rest of
-_FEW = 10_000  # points for which starting threads takes longer than it saves
+_ROUNDED = 1e-12  # rounding of a difference of squared distances, relative to the larger one
+_FEW = 10_000  # points; with fewer, starting threads takes longer than it saves
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,13 +39,13 @@ class SurfacePoints:
     Attributes
     ----------
     triangles : (N,) int32
-        Which triangle each point lies on; of several equally near, any.
+        Triangle that each point lies on; any of several equally close ones.
     barycentric : (N, 3)
         Weights of its corners, from 0 to 1, adding up to 1.
     positions : (N, 3)
-        The points, in the mesh's space.
+        Positions in the mesh's space.
     distances : (N,)
-        From the points asked for, in the mesh's unit.
+        Distances from the query points, in the mesh's unit.
     """
 
     triangles: Ints
@@ -64,14 +64,14 @@ class SurfacePoints:
 
 
 class Surface:
-    """A mesh prepared for searches of closest points.
+    """A mesh prepared for closest-point queries.
 
     Parameters
     ----------
     positions : (V, 3)
         Any unit.
     triangles : (T, 3)
-        Vertex indices. Triangles without area count as the segment or point they are.
+        Vertex indices. Degenerate triangles count as segments or points.
 
     Raises
     ------
@@ -89,7 +89,7 @@ class Surface:
                 f"triangles: expected vertex indices 0 to {len(positions) - 1}, "
                 f"found {triangles.min()} to {triangles.max()}"
             )
-        # Far from the origin float64 has fewer digits left for what is near.
+        # Far from the origin float64 has fewer digits left for small distances.
         self._center = positions.mean(axis=0)
         self._corners = (positions - self._center)[triangles]
         self._all, self._levels = _levels(self._corners)
@@ -127,8 +127,8 @@ class Surface:
         """Return the closest triangle of each point."""
         best = np.zeros(len(points), dtype=np.int32)
         nearest = np.full(len(points), np.inf)
-        # A first guess makes the bounds below short. It is found again there, so that of equally
-        # near triangles always the same one is taken.
+        # A first guess tightens the bounds below. The search finds it again, so that ties between
+        # equally close triangles are always resolved alike.
         pieces = self._all.tree.query(points, workers=_workers(len(points)))[1]
         self._keep_nearer(self._all, points, np.arange(len(points)), pieces, best, nearest)
         nearest = np.nextafter(nearest, np.inf)
@@ -137,7 +137,7 @@ class Surface:
         return best
 
     def _look(self, level: _Level, points: Floats, best: Ints, nearest: Floats) -> None:
-        """Look at all pieces of a level that may be nearer than what has been found."""
+        """Examine all pieces of a level that may be closer than the closest so far."""
         count = min(_NEAREST, len(level.triangles))
         workers = _workers(len(points))
         reach = float(nearest.max(initial=0.0) + level.radius) * _SLACK
@@ -145,7 +145,7 @@ class Surface:
         distances, pieces = level.tree.query(
             points, k=range(1, count + 1), distance_upper_bound=reach, workers=workers
         )
-        # Beyond the reach the tree gives none.
+        # Beyond the reach the tree returns the index one past the last piece.
         near = (pieces < len(level.triangles)) & (
             distances - _SLACK * level.radii[pieces % len(level.triangles)] < nearest[:, None]
         )
@@ -172,9 +172,9 @@ class Surface:
     def _keep_nearer(
         self, level: _Level, points: Floats, rows: Any, pieces: Any, best: Ints, nearest: Floats
     ) -> None:
-        """Put the nearest of some pieces, each for a row of points, into best and nearest.
+        """Update best and nearest with the closest of some pieces, each tested for a row of points.
 
-        Of equally near ones that whose centroid is nearest is taken.
+        Among equally close ones the piece with the closest centroid wins.
         """
         offsets = points[rows] - level.centers[pieces]
         apart = _dot(offsets, offsets)
@@ -192,7 +192,7 @@ class Surface:
 
 
 def interpolate(found: SurfacePoints, triangles: Ints, values: Any) -> Any:
-    """Return values of vertices at points of the surface: x = b0 x_a + b1 x_b + b2 x_c.
+    """Interpolate vertex values at points of the surface: x = b0 x_a + b1 x_b + b2 x_c.
 
     Parameters
     ----------
@@ -201,7 +201,7 @@ def interpolate(found: SurfacePoints, triangles: Ints, values: Any) -> Any:
     triangles : (T, 3)
         Vertex indices of the same mesh.
     values : (V, ...) array or (V, J) sparse matrix
-        Of the mesh's vertices.
+        One row per vertex of the mesh.
 
     Returns
     -------
@@ -226,7 +226,7 @@ def interpolate(found: SurfacePoints, triangles: Ints, values: Any) -> Any:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Level:
-    """Pieces of similar size: a tree of their centroids, their normals, radii and triangles."""
+    """Pieces of similar size: k-d tree of their centroids, normals, radii and triangles."""
 
     tree: Any
     centers: Floats
@@ -237,14 +237,14 @@ class _Level:
 
     @classmethod
     def of(cls, pieces: Floats, triangles: Ints) -> _Level:
-        """Return pieces (P, 3, 3) of triangles (P,) ready to be searched."""
+        """Return a searchable level of pieces (P, 3, 3) of triangles (P,)."""
         centers, radii = pieces.mean(axis=1), _radii(pieces)
         tree = scipy_part("spatial").cKDTree(centers)
         return cls(tree, centers, _normals(pieces), radii, triangles, float(radii.max()))
 
 
 def _levels(corners: Floats) -> tuple[_Level, list[_Level]]:
-    """Cut triangles (T, 3, 3) into pieces: all of them, and by size, up to twice the last one's."""
+    """Split triangles (T, 3, 3) into pieces: a level of all, and one per doubling of size."""
     pieces, triangles = _pieces(corners)
     radii = _radii(pieces)
     smallest = float(np.median(radii)) / 2.0
@@ -258,7 +258,7 @@ def _levels(corners: Floats) -> tuple[_Level, list[_Level]]:
 
 
 def _pieces(corners: Floats) -> tuple[Floats, Ints]:
-    """Halve long triangles across their longest edge; at most double the number, and 1000."""
+    """Halve long triangles across their longest edge, at most T + 1000 times."""
     pieces, triangles = corners, np.arange(len(corners), dtype=np.int32)
     radii = _radii(pieces)
     limit = _LONG * float(np.median(radii))
@@ -279,11 +279,12 @@ def _pieces(corners: Floats) -> tuple[Floats, Ints]:
 
 
 def _workers(n_points: int) -> int:
-    """Return how many threads a tree should be asked with: one, or -1 for all there are."""
+    """Return the number of threads for a query: one, or -1 for all processors."""
     return 1 if n_points < _FEW else -1
 
 
 def _halves(pieces: Floats) -> tuple[Floats, Floats]:
+    """Split pieces at the middle of their longest edge."""
     edges = np.roll(pieces, -1, axis=1) - pieces  # edge k leads from corner k to the next one
     longest = np.einsum("tka,tka->tk", edges, edges).argmax(axis=1)
     order = (longest[:, None] + np.arange(3)) % 3
@@ -293,7 +294,7 @@ def _halves(pieces: Floats) -> tuple[Floats, Floats]:
 
 
 def _normals(pieces: Floats) -> Floats:
-    """Return the unit normals of pieces (T, 3, 3), 0 for those without area: (T, 3)."""
+    """Return the unit normals of pieces (T, 3, 3), 0 for degenerate ones: (T, 3)."""
     normals = np.cross(pieces[:, 1] - pieces[:, 0], pieces[:, 2] - pieces[:, 0])
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     normals /= np.where(lengths > 0.0, lengths, 1.0)
@@ -303,24 +304,24 @@ def _normals(pieces: Floats) -> Floats:
 def _may_be_nearer(
     level: _Level, pieces: Any, offsets: Floats, apart: Floats, nearest: Floats
 ) -> Bools:
-    """Tell which pieces may be nearer than the nearest so far: all that are, and few others.
+    """Return a conservative mask of the pieces that may be closer than the closest so far.
 
-    A piece lies in a disc of its radius r around its centroid. With h the height of the point
-    above the disc's plane, a the distance from the centroid and s = sqrt(a^2 - h^2), the disc is
-    sqrt(h^2 + max(0, s - r)^2) away. From afar that rules out all but the pieces below the point,
-    where a - r, the distance from the sphere of that radius, leaves a wide circle of them.
+    A piece lies in a disc of radius r around its centroid. With the height h of the point above
+    the disc's plane, the distance a from the centroid and s = sqrt(a^2 - h^2), the distance from
+    the disc is sqrt(h^2 + max(0, s - r)^2). For distant points this excludes all pieces but those
+    below the point, whereas the bounding sphere, a - r, would leave a wide circle of them.
     """
     squared_heights = _dot(offsets, level.normals[pieces]) ** 2
     beside = np.sqrt(np.maximum(apart - squared_heights, 0.0))
     beyond = np.maximum(beside - level.radii[pieces] * _SLACK, 0.0)
-    # a^2 is far larger than what is compared where a large triangle is almost touched.
+    # Close to a large triangle the difference a^2 - h^2 loses digits relative to a^2.
     bound = nearest**2 * _SLACK + _ROUNDED * apart
     result: Bools = squared_heights + beyond**2 <= bound
     return result
 
 
 def _blocks(counts: Ints) -> Iterator[slice]:
-    """Yield slices of points with about as many pairs as may be looked at together."""
+    """Yield slices of points with about ``_PAIRS`` pairs each."""
     block = np.cumsum(counts) // _PAIRS
     starts = np.flatnonzero(np.diff(block, prepend=-1))
     for start, stop in pairwise([*starts, len(counts)]):
@@ -328,15 +329,16 @@ def _blocks(counts: Ints) -> Iterator[slice]:
 
 
 def _radii(pieces: Floats) -> Floats:
+    """Return the distance from each piece's centroid to its farthest corner."""
     offsets = pieces - pieces.mean(axis=1, keepdims=True)
     return np.sqrt(np.einsum("tka,tka->tk", offsets, offsets).max(axis=1))
 
 
 def _barycentric(points: Floats, corners: Floats) -> Floats:
-    """Return the weights of each triangle's corners (N, 3, 3) at its point closest to a point.
+    """Return the barycentric coordinates of the point of each triangle closest to a point.
 
-    Inside, the projection onto the plane solves the 2 x 2 normal equations of
-    |a + s ab + t ac - p|^2; otherwise the nearest of the three edges has the closest point.
+    If the projection onto the plane is inside, it solves the 2 x 2 normal equations of
+    |a + s ab + t ac - p|^2; otherwise the closest point is on one of the three edges.
     """
     ab, ac = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     ap = points - corners[:, 0]
@@ -356,14 +358,14 @@ def _barycentric(points: Floats, corners: Floats) -> Floats:
 
 
 def _on_edges(points: Floats, corners: Floats) -> Floats:
-    """Return the weights of the corners at the closest point of the three edges."""
+    """Return the barycentric coordinates of the closest point of the three edges."""
     best = np.full(len(points), np.inf)
     weights = np.zeros_like(points)
     for start in range(3):
         end = (start + 1) % 3
         edge, offset = corners[:, end] - corners[:, start], points - corners[:, start]
         length = _dot(edge, edge)
-        # An edge of length 0 is its first corner.
+        # A degenerate edge counts as its first corner.
         along = np.clip(_dot(edge, offset) / np.where(length > 0.0, length, 1.0), 0.0, 1.0)
         offset -= along[:, None] * edge
         distance = _dot(offset, offset)

@@ -1,4 +1,4 @@
-"""Quaternions (x, y, z, w): products, vectors to quaternions, and the shorter arc between two."""
+"""Quaternions (x, y, z, w): from rotation vectors, products, spherical interpolation."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from viewer.rig.arrays import Floats
 
 __all__ = ["multiply", "rotation_vector_to_quaternion", "slerp"]
 
-_PARALLEL = 1e-6  # sine of the angle below which sin(u t) / sin(t) is u to the last digit
+_PARALLEL = 1e-6  # sine of the angle t below which sin(u t) / sin(t) equals u to the last digit
 
 
 def rotation_vector_to_quaternion(vectors: Floats) -> Floats:
@@ -29,12 +29,12 @@ def rotation_vector_to_quaternion(vectors: Floats) -> Floats:
     """
     vectors = np.asarray(vectors, dtype=np.float64)
     half = 0.5 * np.sqrt(np.einsum("...a,...a->...", vectors, vectors))[..., None]
-    # sinc has no hole at 0: np.sinc(x) = sin(pi x) / (pi x).
+    # sinc is defined at 0: np.sinc(x) = sin(pi x) / (pi x).
     return np.concatenate([0.5 * np.sinc(half / np.pi) * vectors, np.cos(half)], axis=-1)
 
 
 def multiply(first: Floats, second: Floats) -> Floats:
-    """Return the Hamilton product: the rotation ``second`` followed by ``first``.
+    """Return the Hamilton product: the rotation ``second``, followed by ``first``.
 
     Parameters
     ----------
@@ -55,8 +55,8 @@ def multiply(first: Floats, second: Floats) -> Floats:
     return result
 
 
-def slerp(start: Floats, end: Floats, share: Floats | float) -> Floats:
-    """Return rotations between two, at even speed on the shorter arc (Shoemake 1985).
+def slerp(start: Floats, end: Floats, fraction: Floats | float) -> Floats:
+    """Interpolate rotations at constant speed along the shorter arc (Shoemake 1985).
 
     q(u) = (sin((1 - u) t) q0 + sin(u t) q1) / sin(t), q1 negated where q0 . q1 < 0.
 
@@ -64,7 +64,7 @@ def slerp(start: Floats, end: Floats, share: Floats | float) -> Floats:
     ----------
     start, end : (..., 4)
         Unit quaternions (x, y, z, w).
-    share : (...)
+    fraction : (...)
         0 gives ``start``, 1 gives ``end`` (or its negative, the same rotation).
 
     Returns
@@ -80,14 +80,14 @@ def slerp(start: Floats, end: Floats, share: Floats | float) -> Floats:
     start, end = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
     cosine = np.einsum("...a,...a->...", start, end)
     end = np.where(cosine[..., None] < 0.0, -end, end)
-    # The chord gives small angles exactly, where the cosine has lost them.
+    # The chord keeps the digits of small angles, which the cosine loses.
     half_chord = 0.5 * np.linalg.norm(end - start, axis=-1)
     angle = 2.0 * np.arcsin(np.minimum(half_chord, 1.0))
     sine = np.sin(angle)
-    share = np.broadcast_to(np.asarray(share, dtype=np.float64), cosine.shape)
+    fraction = np.broadcast_to(np.asarray(fraction, dtype=np.float64), cosine.shape)
     near = sine < _PARALLEL
     divisor = np.where(near, 1.0, sine)
-    first = np.where(near, 1.0 - share, np.sin((1.0 - share) * angle) / divisor)
-    second = np.where(near, share, np.sin(share * angle) / divisor)
+    first = np.where(near, 1.0 - fraction, np.sin((1.0 - fraction) * angle) / divisor)
+    second = np.where(near, fraction, np.sin(fraction * angle) / divisor)
     mixed = first[..., None] * start + second[..., None] * end
     return mixed / np.linalg.norm(mixed, axis=-1, keepdims=True)

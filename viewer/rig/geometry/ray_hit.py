@@ -1,4 +1,4 @@
-"""Where a line of sight meets a surface."""
+"""Intersection of a ray with a triangle mesh."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from viewer.rig.arrays import Floats, Ints
 __all__ = ["RayHit", "first_hit", "surface_point"]
 
 _AT_ONCE = 1 << 18  # triangles; some 300 bytes each
-_EDGE = 1e-9  # barycentric: edges belong to both of their triangles
+_EDGE = 1e-9  # barycentric tolerance: no ray slips through between two triangles
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RayHit:
-    """A point of a surface.
+    """The intersection of a ray with a surface.
 
     Attributes
     ----------
     triangle : int
-        Which one it lies on.
+        Index of the triangle that is hit.
     barycentric : (3,)
-        Weights of the corners, adding up to 1.
+        Weights of its corners, adding up to 1.
     distance : float
-        From the ray's origin, in lengths of its direction.
+        Distance from the ray's origin, in lengths of its direction.
     """
 
     triangle: int
@@ -36,7 +36,7 @@ class RayHit:
 def first_hit(
     positions: Floats, triangles: Ints, origin: Floats, direction: Floats
 ) -> RayHit | None:
-    """Return where a ray first meets a surface, from either side; None if nowhere.
+    """Return the first intersection of a ray with a surface, from either side; None without one.
 
     With edges e1, e2 from corner a, o + t d = a + u e1 + v e2 is solved by determinants
     (Möller and Trumbore 1997, eq. 6).
@@ -48,7 +48,7 @@ def first_hit(
     triangles : (T, 3)
         Vertex indices.
     origin, direction : (3,)
-        In the same space; what is behind the origin does not count.
+        In the same space; triangles behind the origin are ignored.
 
     >>> corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     >>> eye, ahead = np.array([0.25, 0.25, 2.0]), np.array([0.0, 0.0, -1.0])
@@ -67,17 +67,18 @@ def first_hit(
 def _nearest(
     positions: Floats, triangles: Ints, origin: Floats, direction: Floats
 ) -> RayHit | None:
+    """Intersect a ray with all of some triangles and return the nearest hit."""
     a, b, c = (positions[triangles[:, corner]] for corner in range(3))
     first, second, away = b - a, c - a, origin - a
-    across = np.cross(direction, second)
-    determinant = np.einsum("na,na->n", first, across)
-    turned = np.cross(away, first)
-    # Triangles seen from their edge are not hit.
+    # The vectors P and Q of the paper.
+    p, q = np.cross(direction, second), np.cross(away, first)
+    determinant = np.einsum("na,na->n", first, p)
+    # Triangles parallel to the ray are not hit.
     seen = determinant != 0.0
     inverse = np.divide(1.0, determinant, out=np.zeros(len(determinant)), where=seen)
-    u = np.einsum("na,na->n", away, across) * inverse
-    v = (turned @ direction) * inverse
-    t = np.einsum("na,na->n", second, turned) * inverse
+    u = np.einsum("na,na->n", away, p) * inverse
+    v = (q @ direction) * inverse
+    t = np.einsum("na,na->n", second, q) * inverse
     inside = seen & (u >= -_EDGE) & (v >= -_EDGE) & (u + v <= 1.0 + _EDGE) & (t > 0.0)
     t = np.where(inside, t, np.inf)
     nearest = int(t.argmin()) if len(t) else -1
@@ -88,5 +89,5 @@ def _nearest(
 
 
 def surface_point(positions: Floats, triangles: Ints, hit: RayHit) -> Floats:
-    """Return a hit's place on the surface as its vertices lie now: (3,)."""
+    """Return the position of a hit for the current vertices of the surface: (3,)."""
     return np.asarray(hit.barycentric @ positions[triangles[hit.triangle]])

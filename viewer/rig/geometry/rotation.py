@@ -1,4 +1,4 @@
-"""Rotations: about an axis, in sequence (Euler), as vectors, and as quaternions (x, y, z, w)."""
+"""Conversions of rotations: matrices, Euler angles, rotation vectors, quaternions (x, y, z, w)."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ __all__ = [
     "rotation_vector_to_matrix",
 ]
 
-_SMALL = 1e-8  # squared angle below which the series are exact to the last digit
+_SMALL = 1e-8  # squared angle below which the Taylor series are exact to the last digit
 
 
 def axis_rotations(axis: int, angles: Floats) -> Floats:
-    """Return the matrices that turn about one coordinate axis, right-handed.
+    """Return the matrices of right-handed rotations about one coordinate axis.
 
     Parameters
     ----------
@@ -63,8 +63,8 @@ def quaternion_to_matrix(quaternions: Floats) -> Floats:
         Matrices for column vectors.
 
     >>> half = np.sqrt(0.5)
-    >>> turned = quaternion_to_matrix(np.array([0, 0, half, half])) @ [1, 0, 0]
-    >>> bool(np.allclose(turned, [0, 1, 0]))
+    >>> rotated = quaternion_to_matrix(np.array([0, 0, half, half])) @ [1, 0, 0]
+    >>> bool(np.allclose(rotated, [0, 1, 0]))
     True
     """
     x, y, z, w = np.moveaxis(np.asarray(quaternions, dtype=np.float64), -1, 0)
@@ -85,8 +85,8 @@ def quaternion_to_matrix(quaternions: Floats) -> Floats:
 def rotation_vector_to_matrix(vectors: Floats) -> Floats:
     """Return the matrices of rotation vectors: R = I + a K + b K^2 with K = [r]x (Rodrigues).
 
-    a = sin(t) / t and b = 2 sin^2(t / 2) / t^2 lose nothing at any angle t: (1 - cos t) / t^2
-    would cancel near 0.
+    a = sin(t) / t and b = 2 sin^2(t / 2) / t^2 are accurate at any angle t, whereas
+    (1 - cos t) / t^2 suffers from cancellation near 0.
 
     Parameters
     ----------
@@ -98,8 +98,8 @@ def rotation_vector_to_matrix(vectors: Floats) -> Floats:
     (..., 3, 3)
         Matrices for column vectors.
 
-    >>> turned = rotation_vector_to_matrix(np.array([0, 0, np.pi / 2])) @ [1, 0, 0]
-    >>> bool(np.allclose(turned, [0, 1, 0]))
+    >>> rotated = rotation_vector_to_matrix(np.array([0, 0, np.pi / 2])) @ [1, 0, 0]
+    >>> bool(np.allclose(rotated, [0, 1, 0]))
     True
     """
     vectors = np.asarray(vectors, dtype=np.float64)
@@ -136,7 +136,7 @@ def matrix_to_quaternion(matrices: Floats) -> Floats:
     m = np.asarray(matrices, dtype=np.float64)
     diagonal = np.moveaxis(np.diagonal(m, axis1=-2, axis2=-1), -1, 0)
     trace = diagonal.sum(axis=0)
-    # The four squares, times four: dividing by the largest loses no digits.
+    # 4 x^2, 4 y^2, 4 z^2, 4 w^2. Dividing by the largest of them avoids cancellation.
     squares = np.stack([1.0 + 2.0 * part - trace for part in diagonal] + [1.0 + trace], axis=-1)
     xy, xz, yz = (
         m[..., 1, 0] + m[..., 0, 1],
@@ -164,7 +164,7 @@ def matrix_to_quaternion(matrices: Floats) -> Floats:
 
 
 def matrix_to_rotation_vector(matrices: Floats) -> Floats:
-    """Return axis times angle, the angle from 0 to pi, of rotation matrices.
+    """Return the rotation vectors of rotation matrices: axis times angle, 0 to pi.
 
     Parameters
     ----------
@@ -182,7 +182,7 @@ def matrix_to_rotation_vector(matrices: Floats) -> Floats:
     """
     quaternions = matrix_to_quaternion(matrices)
     sines = np.linalg.norm(quaternions[..., :3], axis=-1)
-    # 2 atan2 keeps its digits at both ends; near 0 the ratio is 2 / w.
+    # 2 atan2 is accurate at 0 and at pi, unlike 2 acos(w).
     angles = 2.0 * np.arctan2(sines, quaternions[..., 3])
     is_zero = sines == 0.0
     factors = np.where(is_zero, 2.0, angles / np.where(is_zero, 1.0, sines))
@@ -190,10 +190,10 @@ def matrix_to_rotation_vector(matrices: Floats) -> Floats:
 
 
 def matrix_to_euler(matrices: Floats) -> Floats:
-    """Return angles about x, y and z with R = Rz Ry Rx, x applied first.
+    """Return Euler angles about x, y and z with R = Rz Ry Rx, x applied first.
 
-    Where y is a right angle, x and z turn about one axis: any share of the two gives the same
-    rotation, and this one keeps R exact.
+    In gimbal lock (y = +-90 degrees) x and z rotate about the same axis, so only their sum or
+    difference is determined. The angles returned still reproduce R exactly.
 
     Parameters
     ----------
@@ -211,7 +211,7 @@ def matrix_to_euler(matrices: Floats) -> Floats:
     m = np.asarray(matrices, dtype=np.float64)
     z = np.arctan2(m[..., 1, 0], m[..., 0, 0])
     sine, cosine = np.sin(z), np.cos(z)
-    # The rest is read from Rz^T R, which is Ry Rx however badly z is determined.
+    # y and x are taken from Rz^T R, which is Ry Rx even where z is ill-conditioned.
     y = np.arctan2(-m[..., 2, 0], cosine * m[..., 0, 0] + sine * m[..., 1, 0])
     x = np.arctan2(
         sine * m[..., 0, 2] - cosine * m[..., 1, 2], cosine * m[..., 1, 1] - sine * m[..., 0, 1]
@@ -225,7 +225,7 @@ def nearest_rotations(matrices: Floats) -> tuple[Floats, Floats]:
     Parameters
     ----------
     matrices : (..., 3, 3)
-        Any; a mirroring one gives a stretch with a negative determinant.
+        Any; a reflection gives a stretch with a negative determinant.
 
     Returns
     -------
@@ -234,6 +234,7 @@ def nearest_rotations(matrices: Floats) -> tuple[Floats, Floats]:
     stretches : (..., 3, 3)
         R^T M.
     """
+    # M = U S V^T gives R = U V^T, with the last column of U negated where that is a reflection.
     left, _, right = np.linalg.svd(matrices)
     signs = np.ones((*left.shape[:-2], 3))
     signs[..., 2] = np.where(np.linalg.det(left @ right) < 0.0, -1.0, 1.0)

@@ -11,7 +11,7 @@ __all__ = ["apply_transform", "rotation_transform", "translation_matrix"]
 
 
 def translation_matrix(offset: Floats) -> Floats:
-    """Return the matrices that move by ``offset``.
+    """Return the matrices that translate by ``offset``.
 
     Parameters
     ----------
@@ -34,26 +34,26 @@ def translation_matrix(offset: Floats) -> Floats:
 
 
 def rotation_transform(axis: int, angle: float) -> Floats:
-    """Return the (4, 4) matrix that turns about a coordinate axis by ``angle`` radians."""
+    """Return the (4, 4) matrix that rotates about a coordinate axis by ``angle`` radians."""
     matrix = np.eye(4)
     matrix[:3, :3] = axis_rotations(axis, np.asarray(angle))
     return matrix
 
 
 def apply_transform(matrix: Floats, points: Floats) -> Floats:
-    """Move points: p' = M [p 1].
+    """Transform points: p' = M [p 1].
 
     Parameters
     ----------
     matrix : (4, 4)
         Affine matrix.
     points : (..., 3)
-        Points in the space the matrix maps from.
+        Points in the space that the matrix maps from.
 
     Returns
     -------
     (..., 3)
-        Points in the space it maps to.
+        Points in the space that it maps to.
 
     >>> apply_transform(translation_matrix(np.array([1.0, 0.0, 0.0])), np.zeros(3))
     array([1., 0., 0.])

@@ -1,4 +1,4 @@
-"""Vectors: unit length."""
+"""Normalisation of vectors."""
 
 from __future__ import annotations
 

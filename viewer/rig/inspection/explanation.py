@@ -1,4 +1,4 @@
-"""Why a vertex is where it is: every number of skinning, so that a person can check by hand."""
+"""All intermediate values of the skinning of one vertex, to be checked by hand."""
 
 from __future__ import annotations
 
@@ -22,31 +22,31 @@ from viewer.rig.skinning.dqs import split_palette
 
 __all__ = ["DualTerms", "Explanation", "explain"]
 
-_TINY = 1e-12  # weights or quaternions that cancel out give no rotation
+_TINY = 1e-12  # weights or quaternions that cancel each other define no rotation
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DualTerms:
-    """What dual quaternion skinning adds up (Kavan et al. 2008, section 4).
+    """The terms of dual quaternion skinning (Kavan et al. 2008, section 4).
 
     Attributes
     ----------
     shares : (K,)
-        Weights over their sum.
+        Weights divided by their sum.
     duals : (K, 8)
         Each influence's unit dual quaternion (x, y, z, w), real part, then dual part.
     signs : (K,)
-        -1 where the quaternion was turned to the side of the strongest influence's.
+        -1 where the quaternion was negated, to the hemisphere of the strongest influence.
     stretches : (K, 3, 4)
-        What of each matrix is no rigid motion; applied before it.
+        The non-rigid part of each matrix, applied before the rigid motion.
     blended : (8,)
         sum_i share_i sign_i dual_i.
     length : float
-        Of the real part of ``blended``, which is divided by it.
+        Length of the real part of ``blended``, by which both parts are divided.
     stretched : (3,)
         The rest position after sum_i share_i stretch_i.
     position : (3,)
-        Moved by the blended dual quaternion; the rest position where influences cancel out.
+        ``stretched`` moved by the blended dual quaternion; the rest position if influences cancel.
     """
 
     shares: Floats
@@ -61,42 +61,42 @@ class DualTerms:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Explanation:
-    """All steps from the file's vertex to the one that is drawn.
+    """All steps from the vertex in the file to its drawn position.
 
     Attributes
     ----------
     vertex : int
         Its index.
     skinning : Skinning
-        How it was moved.
+        Skinning options.
     stored : (3,)
-        The vertex as the file has it, binding space.
+        Position in the file, binding space.
     shaped : (3,)
-        With the figure's blend shapes.
+        After the figure's blend shapes.
     rest : (3,)
-        With pose correctives too: p, what the joints move.
+        p, after pose correctives too: the position before skinning.
     joints : (K,)
-        Of the influences that count, strongest first.
+        Joints of the effective influences, strongest first.
     names : tuple of K str
-        Of these joints.
+        Names of these joints.
     weights : (K,)
-        w_i, after cutting and normalising if that is on.
+        w_i, after pruning and normalising if enabled.
     matrices : (K, 4, 4)
         M_i: skinning matrices, binding space to figure space.
     images : (K, 3)
-        M_i p: where each joint alone would carry the vertex.
+        M_i p: the vertex transformed by each joint alone.
     terms : (K, 3)
         w_i M_i p.
     linear : (3,)
         Their sum: linear blend skinning; the rest position of a vertex without influence.
     dual : DualTerms or None
-        Of methods that use dual quaternions.
+        For methods that use dual quaternions.
     skinned : (3,)
-        What the method gives.
+        Result of the skinning method.
     placement : (4, 4)
         The figure's own scale and translation, applied last.
     position : (3,)
-        Where it is drawn, figure space.
+        Drawn position, figure space.
     """
 
     vertex: int
@@ -118,12 +118,12 @@ class Explanation:
 
     @property
     def is_free(self) -> bool:
-        """Whether no joint moves the vertex: it stays where it was bound."""
+        """Whether the vertex has no influence and stays at its bind position."""
         return not bool((self.weights != 0.0).any())
 
 
 def explain(figure: Figure, pose: Pose, skinning: Skinning, vertex: int) -> Explanation:
-    """Return every number that puts a vertex where it is.
+    """Return all intermediate values of the skinning of one vertex.
 
     Linear blend skinning: v' = sum_i w_i M_i [p 1]. Dual quaternion skinning: q = sum_i s_i q_i
     w_i / sum_j w_j, v' = (q / |q|) applied to the stretched p.
@@ -137,7 +137,7 @@ def explain(figure: Figure, pose: Pose, skinning: Skinning, vertex: int) -> Expl
     skinning : Skinning
         How the mesh is drawn.
     vertex : int
-        Index.
+        Index of the vertex.
 
     Returns
     -------
@@ -187,7 +187,7 @@ def explain(figure: Figure, pose: Pose, skinning: Skinning, vertex: int) -> Expl
 
 
 def _dual_terms(row: Skin, palette: Floats, rest: Floats) -> DualTerms:
-    """Return what dual quaternion skinning does to one vertex, as ``dqs.deform`` does it."""
+    """Return the terms of dual quaternion skinning for one vertex, as in ``dqs.deform``."""
     duals, stretches = (
         values[row.joints] for values in split_palette(palette, bind_positions(row))
     )

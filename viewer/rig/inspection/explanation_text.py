@@ -1,4 +1,4 @@
-"""An explanation of a vertex as lines of text, with digits that stand below each other."""
+"""The explanation of a vertex as lines of text with aligned columns."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from viewer.rig.skinning import METHODS
 __all__ = ["explanation_text"]
 
 _LONGEST = 40  # letters of a joint's name
-_RIGID = 1e-9  # a stretch nearer to the identity is rounding
+_RIGID = 1e-9  # a stretch closer to the identity is rounding
 
 
 def explanation_text(explanation: Explanation, digits: int = 4) -> list[str]:
-    """Return the numbers of an explanation as lines, in the order in which one would compute them.
+    """Return the values of an explanation as lines, in the order of computation.
 
     Parameters
     ----------
     explanation : Explanation
-        Of one vertex.
+        Explanation of one vertex.
     digits : int
-        Behind the decimal point, of all numbers alike.
+        Decimal places of all numbers.
 
     Returns
     -------
     list of str
-        To be shown in letters of one width.
+        Lines for a monospaced font.
     """
     text = _Text(explanation, digits)
     text.rest()
     if explanation.is_free:
-        text.lines.append("no influence: the vertex stays where it was bound")
+        text.lines.append("no influence: the vertex stays at its bind position")
     for index in range(len(explanation.joints)):
         text.influence(index)
     if not explanation.is_free:
@@ -46,7 +46,7 @@ def explanation_text(explanation: Explanation, digits: int = 4) -> list[str]:
 
 
 class _Text:
-    """Lines that all use the same width for a number."""
+    """Lines of an explanation in which all numbers have the same width."""
 
     def __init__(self, explanation: Explanation, digits: int) -> None:
         self.one, self.digits = explanation, digits
@@ -57,7 +57,7 @@ class _Text:
         self.lines = [f"vertex {explanation.vertex}: {self.method.title}"]
 
     def rest(self) -> None:
-        """Say where the vertex is before joints move it."""
+        """Add the position before skinning."""
         one = self.one
         self._vector("stored", one.stored)
         if not np.array_equal(one.shaped, one.stored):
@@ -67,7 +67,7 @@ class _Text:
         self._vector("p", one.rest)
 
     def influence(self, index: int) -> None:
-        """Say what one joint does: its matrix, its image of the vertex, its term."""
+        """Add the matrix of one influence, its image of the vertex, and its term."""
         one, number = self.one, index + 1
         name = printable(one.names[index], _LONGEST)
         self.lines.append(
@@ -80,19 +80,19 @@ class _Text:
         self._vector(f"   w{number} M{number} p", one.terms[index])
 
     def sums(self) -> None:
-        """Say what the terms add up to."""
+        """Add the sums of weights and terms."""
         self.lines.append(f"sum of w = {self._number(float(self.one.weights.sum()))}")
         self._vector("sum of w M p", self.one.linear)
 
     def dual(self, dual: DualTerms) -> None:
-        """Say what dual quaternions are added, and what they make of the vertex."""
+        """Add the dual quaternions, their sum, and the position that it gives."""
         for index, values in enumerate(dual.duals):
             number = index + 1
-            flip = "" if dual.signs[index] > 0.0 else ", turned to the side of q1"
-            share = f"{dual.shares[index]:.{self.digits}f}"
-            self.lines.append(f"q{number}: share {share}{flip}")
+            flip = "" if dual.signs[index] > 0.0 else ", negated to the hemisphere of q1"
+            weight = f"{dual.shares[index]:.{self.digits}f}"
+            self.lines.append(f"q{number}: relative weight {weight}{flip}")
             self._quaternions("   ", values)
-        self.lines.append("q = sum of share times q, with these signs")
+        self.lines.append("q = sum of relative weight times q, with these signs")
         self._quaternions("   ", dual.blended)
         self.lines.append(f"length of its real part = {dual.length:.{self.digits}f}")
         identity = np.eye(3, 4)
@@ -101,11 +101,11 @@ class _Text:
         self._vector("moved by q / length", dual.position)
 
     def end(self) -> None:
-        """Say where the vertex ends up."""
+        """Add the result of the method, the figure's placement, and the final position."""
         one = self.one
         if self.method.result:
-            share = f"{one.skinning.share:.{self.digits}f}"
-            self._vector(self.method.result.format(share=share), one.skinned)
+            blend_factor = f"{one.skinning.blend_factor:.{self.digits}f}"
+            self._vector(self.method.result.format(blend_factor=blend_factor), one.skinned)
         if not np.array_equal(one.placement, np.eye(4)):
             self.lines.append(f"figure: times {one.placement[0, 0]:.{self.digits}f}, plus")
             self._vector("", one.placement[:3, 3])

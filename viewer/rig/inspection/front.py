@@ -1,4 +1,4 @@
-"""The horizontal axis that the front of a figure or scene faces."""
+"""The facing direction of a figure or scene: a horizontal axis."""
 
 from __future__ import annotations
 
@@ -25,26 +25,26 @@ from viewer.rig.skinning import joint_matrices
 __all__ = ["FRONTS", "Front", "front_axes", "guess_front", "usual_front"]
 
 Front: TypeAlias = str
-"""An axis with its sign, as ``"+z"``; never the one that points up."""
+"""A signed axis, as ``"+z"``; never the up axis."""
 
 FRONTS = ("+x", "-x", "+y", "-y", "+z", "-z")
-"""All there are; which two do not apply depends on the up axis."""
+"""All signed axes; the two along the up axis do not apply to a scene."""
 
 _MOST_ACTORS, _MOST_JOINTS, _MOST_VERTICES = 16, 2000, 100_000
-_N_TIMES = 9  # at which a motion is looked at
-_SURE = 0.5  # of a vote for one axis: less is no answer
+_N_TIMES = 9  # samples of a motion
+_SURE = 0.5  # smaller components of a vote along an axis are inconclusive
 _WEIGHTS = {"sides": 3.0, "toes": 2.0, "face": 2.0, "ends": 2.0, "travel": 1.0}
-"""How much each kind of evidence counts. Left and right are said by names; the others are rules of
-thumb that have to agree to outvote them, and a walk may go backwards."""
+"""Weight of each kind of evidence. Names state left and right; the others are heuristics that have
+to agree to outvote them, and a walk may go backwards."""
 
 
 def usual_front(up: str) -> Front:
-    """Return the front where nothing shows another: +z if y is up, -y if z is up."""
+    """Return the default front: +z if y is up, -y if z is up."""
     return "+z" if up == "y" else "-y"
 
 
 def front_axes(up: str) -> tuple[Front, ...]:
-    """Return the four fronts that there are with an up axis.
+    """Return the four horizontal fronts for an up axis.
 
     >>> front_axes("y")
     ('+x', '-x', '+z', '-z')
@@ -53,16 +53,16 @@ def front_axes(up: str) -> tuple[Front, ...]:
 
 
 def guess_front(scene: Scene) -> Front:
-    """Return the front of what is shown, ``usual_front`` where the evidence is weak.
+    """Estimate the front of a scene; ``usual_front`` if the evidence is weak.
 
-    Each actor votes by its joints as they are posed now: by left and right, toes, face, head and
-    tail, and the way its motion goes; by the shape of its feet if it has neither joints nor
-    captured points. Actors that face different ways leave the usual front.
+    Each actor votes by its posed joints: left and right, toes, face, head and tail, and the
+    direction of its motion; by the shape of its feet if it has neither joints nor captured
+    points. Actors that face different directions cancel each other.
 
     Parameters
     ----------
     scene : Scene
-        Posed; nothing of it changes.
+        Posed; not changed.
     """
     up = np.zeros(3)
     up["xyz".index(scene.up)] = 1.0
@@ -72,17 +72,17 @@ def guess_front(scene: Scene) -> Front:
 
 
 def _nearest(vote: Floats, up: str) -> Front:
-    """Return the axis that a vote is nearest to; the usual one if it is not near to any."""
+    """Return the axis closest to a vote; the usual one if none is close."""
     fronts = front_axes(up)
     signs = [1.0 if front[0] == "+" else -1.0 for front in fronts]
     axes = ["xyz".index(front[1]) for front in fronts]
-    shares = vote[axes] * signs
-    best = int(np.argmax(shares))
-    return fronts[best] if shares[best] >= _SURE else usual_front(up)
+    components = vote[axes] * signs
+    best = int(np.argmax(components))
+    return fronts[best] if components[best] >= _SURE else usual_front(up)
 
 
 def _vote(actor: Actor, up: Floats) -> Floats:
-    """Return where an actor's front is: a unit vector, 0 if that is not clear."""
+    """Return the direction of an actor's front: a unit vector, 0 if unclear."""
     names, parents, places = _places(actor)
     if not names:
         mesh = actor.figure.mesh
@@ -109,7 +109,7 @@ def _unit(way: Floats, least: float) -> Floats:
 
 
 def _places(actor: Actor) -> tuple[tuple[str, ...], Ints, Floats]:
-    """Return names, parents and places of an actor's joints or captured points."""
+    """Return names, parents and positions of an actor's joints or captured points."""
     nothing: tuple[tuple[str, ...], Ints, Floats] = (), np.zeros(0, np.int32), np.zeros((0, 3))
     figure = actor.figure
     if actor.points is not None and figure.points is not None:
@@ -128,7 +128,7 @@ def _places(actor: Actor) -> tuple[tuple[str, ...], Ints, Floats]:
 
 
 def _path(actor: Actor) -> Floats:
-    """Return where the middle of an actor is from the start of its motion to the end: (F, 3)."""
+    """Return the path of an actor's centre over its motion: (F, 3)."""
     clip, places = actor.clip, []
     if clip is None or clip.end <= clip.start:
         return np.zeros((0, 3))

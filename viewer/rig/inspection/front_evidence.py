@@ -1,7 +1,7 @@
-"""Evidence of where a figure's front is: sides, toes, faces, heads and tails, soles, travel.
+"""Evidence of a figure's facing direction: sides, toes, faces, heads and tails, soles, travel.
 
-Each kind gives a horizontal vector towards the front. Its length says how sure it is: 1 for
-evidence that is complete and consistent, 0 for none.
+Each kind gives a horizontal vector towards the front. Its length is the confidence: 1 for complete
+and consistent evidence, 0 for none.
 """
 
 from __future__ import annotations
@@ -16,30 +16,30 @@ from viewer.rig.retargeting.joint_names import sided_words
 
 __all__ = ["from_ends", "from_face", "from_sides", "from_soles", "from_toes", "from_travel"]
 
-_LEAST = 0.01  # of the figure's size: what is closer together shows no direction
-_CLEAR = 0.2  # of the figure's size: a head that far out is in front of a body
+_LEAST = 0.01  # of the figure's size; shorter offsets have no reliable direction
+_CLEAR = 0.2  # of the figure's size; a head that far from the centre is in front of the body
 _TOES, _FACE = ("toe", "ball"), ("eye", "nose", "jaw", "beak", "muzzle", "snout")
 _SLAB, _ABOVE = 0.015, (0.05, 0.09)  # of the height: the soles, and the ankles above them
-_MIRRORED = 0.98  # of the vertices: so many lie about where another's mirror image is
-_LOOKED_AT = 2000  # vertices that are mirrored
+_MIRRORED = 0.98  # fraction of vertices near another's mirror image in a symmetric mesh
+_LOOKED_AT = 2000  # vertices in the symmetry test
 
 
 def from_sides(names: Sequence[str], places: Floats, up: Floats) -> Floats:
-    """Judge by left and right: the front is left x up.
+    """Return evidence from left and right: the front is left x up.
 
     Parameters
     ----------
     names : sequence of J str
-        Of joints or keypoints.
+        Names of joints or keypoints.
     places : (J, 3)
-        Where they are.
+        Their positions.
     up : (3,)
         Unit vector.
 
     Returns
     -------
     (3,)
-        Sum of the unit vectors of all pairs over their number.
+        Mean of the unit vectors of all pairs.
     """
     found: dict[str, dict[str, list[Floats]]] = {}
     for (side, word), place in zip(sided_words(names), places, strict=True):
@@ -55,19 +55,19 @@ def from_sides(names: Sequence[str], places: Floats, up: Floats) -> Floats:
 
 
 def from_toes(names: Sequence[str], parents: Ints, places: Floats, up: Floats) -> Floats:
-    """Judge by the feet: toes are ahead of the joints that they hang from."""
+    """Return evidence from the feet: toes are ahead of their parent joints."""
     return _by_word(_TOES, names, parents, places, up)
 
 
 def from_face(names: Sequence[str], parents: Ints, places: Floats, up: Floats) -> Floats:
-    """Judge by the face: eyes and jaws are ahead of the head."""
+    """Return evidence from the face: eyes and jaws are ahead of the head."""
     return _by_word(_FACE, names, parents, places, up)
 
 
 def from_ends(names: Sequence[str], places: Floats, up: Floats) -> Floats:
-    """Judge by the ends of an animal: heads are in front of its middle, tails behind.
+    """Return evidence from the ends of an animal: heads are ahead of its centre, tails behind.
 
-    Heads above the middle, as those of people, show nothing.
+    A head above the centre, as in people, is no evidence.
     """
     words = [word for _, word in sided_words(names)]
     heads = [j for j, word in enumerate(words) if word.startswith("head")]
@@ -84,21 +84,21 @@ def from_ends(names: Sequence[str], places: Floats, up: Floats) -> Floats:
 
 
 def from_travel(places: Floats, size: float, up: Floats) -> Floats:
-    """Judge by a motion: figures mostly go forwards.
+    """Return evidence from a motion: figures mostly move forwards.
 
     Parameters
     ----------
     places : (F, 3)
-        Where the figure is, in time order.
+        Positions of the figure, in time order.
     size : float
-        Of the figure.
+        Size of the figure.
     up : (3,)
         Unit vector.
 
     Returns
     -------
     (3,)
-        The whole way over the length of the path; shorter if it is less than the figure's size.
+        Total displacement over path length; shorter if the path is shorter than the figure's size.
     """
     steps = _horizontal(np.diff(places, axis=0), up)
     path = float(np.linalg.norm(steps, axis=1).sum())
@@ -106,7 +106,7 @@ def from_travel(places: Floats, size: float, up: Floats) -> Floats:
 
 
 def from_soles(positions: Floats, up: Floats) -> Floats:
-    """Judge by a mesh alone: a mirror plane between two soles that reach ahead of the ankles.
+    """Return evidence from a mesh alone: two symmetric soles that extend ahead of the ankles.
 
     Parameters
     ----------
@@ -118,12 +118,14 @@ def from_soles(positions: Floats, up: Floats) -> Floats:
     Returns
     -------
     (3,)
-        0 if the mesh has no mirror plane or two of them, or does not stand on two or more feet.
+        0 unless the mesh has exactly one mirror plane and stands on feet on both sides of it.
     """
     height = positions @ up
     low, tall = float(height.min()), float(np.ptp(height))
     planes = [
-        axis for axis in range(3) if up[axis] == 0.0 and tall > 0.0 and _mirrors(positions, axis)
+        axis
+        for axis in range(3)
+        if up[axis] == 0.0 and tall > 0.0 and _is_symmetric(positions, axis)
     ]
     if len(planes) != 1:
         return np.zeros(3)
@@ -140,8 +142,8 @@ def from_soles(positions: Floats, up: Floats) -> Floats:
     return way / max(float(np.linalg.norm(way)), 1.0)
 
 
-def _mirrors(positions: Floats, axis: int) -> bool:
-    """Return whether a mesh is about its own mirror image across its middle."""
+def _is_symmetric(positions: Floats, axis: int) -> bool:
+    """Return whether a mesh is nearly symmetric about the plane through its centre."""
     size = _LEAST * _size(positions)
     mirrored = positions[:: max(len(positions) // _LOOKED_AT, 1)].copy()
     middle = bounding_box(positions).mean(axis=0)[axis]
@@ -156,7 +158,7 @@ def _mirrors(positions: Floats, axis: int) -> bool:
 
 
 def _cells(places: Floats) -> Ints:
-    """Return the numbers of the unit cells that places are in: (N,)."""
+    """Return the index of the unit cell that contains each position: (N,)."""
     x, y, z = np.floor(places).astype(np.int64).T + 2
     return np.asarray((x * 1000 + y) * 1000 + z)
 
@@ -175,7 +177,7 @@ def _by_word(
 
 
 def _agreement(ways: Floats, size: float) -> Floats:
-    """Return the mean of the unit vectors of those that are long enough."""
+    """Return the mean of the unit vectors of all vectors that are long enough."""
     lengths = np.linalg.norm(ways, axis=1)
     clear = lengths > _LEAST * size
     if not clear.any():

@@ -1,4 +1,4 @@
-"""Read-outs of a body: height, volume and what it would weigh."""
+"""Measurements of a body: height, volume and mass."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from viewer.rig.mesh import bounding_box, volume
 __all__ = ["DENSITY", "Measures", "measure"]
 
 DENSITY = 985.0
-"""Of a human body, kg per cubic metre."""
+"""Density of a human body, kg per cubic metre."""
 
 
 @dataclass(frozen=True, slots=True)
 class Measures:
-    """Of a rest mesh, in its own unit.
+    """Measurements of a rest mesh, in its own unit.
 
     Attributes
     ----------
     height : float
-        Along the up axis.
+        Extent along the up axis.
     volume : float
-        Enclosed, cubed units.
+        Enclosed volume, cubed units.
     mass : float or None
         Volume times ``DENSITY``, kilograms; None unless the unit is metres.
     """
@@ -34,7 +34,7 @@ class Measures:
 
 
 def measure(figure: Figure) -> Measures:
-    """Measure a figure's rest mesh; shape it before.
+    """Measure the rest mesh of a figure that has been shaped.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A few vertices of a posed figure, without the work of posing all of them."""
+"""Skinning of a few vertices of a posed figure."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ __all__ = ["check_vertices", "deform_vertices", "rest_vertices"]
 def deform_vertices(
     figure: Figure, pose: Pose | None, skinning: Skinning, vertices: Ints
 ) -> tuple[Floats, Floats]:
-    """Return what ``viewer.rig.skinning.deform`` returns, for some vertices only.
+    """Skin some vertices only, with the results of ``viewer.rig.skinning.deform``.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def deform_vertices(
 
 
 def rest_vertices(figure: Figure, pose: Pose, vertices: Ints, correct: bool = True) -> Floats:
-    """Return what a pose skins: some vertices of the rest mesh plus their pose correctives.
+    """Return some vertices before skinning: the rest mesh plus the pose correctives.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def rest_vertices(figure: Figure, pose: Pose, vertices: Ints, correct: bool = Tr
     vertices : (N,)
         Indices.
     correct : bool
-        Whether correctives are added, if the figure has some.
+        Whether to add the pose correctives, if the figure has any.
 
     Returns
     -------
@@ -90,12 +90,12 @@ def rest_vertices(figure: Figure, pose: Pose, vertices: Ints, correct: bool = Tr
 
 
 def check_vertices(figure: Figure, vertices: Ints) -> None:
-    """Refuse indices that are no vertices of a figure.
+    """Check that indices refer to vertices of a figure.
 
     Raises
     ------
     RigError
-        With the index and how many vertices there are.
+        If one is out of range, with the index and the range.
     """
     count = 0 if figure.mesh is None else figure.mesh.n_vertices
     wrong = vertices[(vertices < 0) | (vertices >= count)]

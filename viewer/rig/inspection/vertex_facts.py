@@ -1,4 +1,4 @@
-"""What is known of one vertex of a posed figure, to be shown where the mouse is."""
+"""Properties of one vertex of a posed figure, for the hover text."""
 
 from __future__ import annotations
 
@@ -19,31 +19,31 @@ from viewer.rig.skinning import Skinning, skin_used
 __all__ = ["VertexFacts", "facts_text", "nearest_corner", "vertex_facts"]
 
 _LONGEST = 40  # letters of a name
-_MOST = 8  # influences that are listed in full
+_MOST = 8  # influences that are listed one by one
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VertexFacts:
-    """What is known of a vertex.
+    """Properties of a vertex.
 
     Attributes
     ----------
     vertex, triangle : int
         Indices; -1 for no triangle.
     position : (3,)
-        Where it is drawn, figure space and units.
+        Drawn position, figure space and units.
     normal : (3,)
         Unit length.
     uvs : (N, 2)
-        Its texture coordinates, several along a seam, those of the triangle first; none without.
+        Texture coordinates, several along a seam, those of the triangle first.
     body_part : str
         Empty without one.
     joints : (K,)
-        Of the influences that count, those of weight 0 left out, by falling weight.
+        Joints of the effective influences of non-zero weight, by decreasing weight.
     names : tuple of K str
-        Of these joints.
+        Names of these joints.
     weights : (K,)
-        Those that a joint has several times added up.
+        Weights, duplicates of a joint added up.
     """
 
     vertex: int
@@ -60,7 +60,7 @@ class VertexFacts:
 def vertex_facts(
     figure: Figure, pose: Pose | None, skinning: Skinning, vertex: int, triangle: int = -1
 ) -> VertexFacts:
-    """Return what is known of a vertex.
+    """Return the properties of a vertex.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def vertex_facts(
     vertex : int
         Index.
     triangle : int
-        The one that was pointed at, -1 for none.
+        Triangle under the mouse, -1 for none.
 
     Raises
     ------
@@ -105,22 +105,22 @@ def vertex_facts(
 
 
 def nearest_corner(positions: Floats, triangle: Ints, point: Floats) -> int:
-    """Return the vertex of a triangle that is nearest to a point on it.
+    """Return the vertex of a triangle that is closest to a point on it.
 
     Parameters
     ----------
     positions : (3, 3)
-        Where its corners are, in the space of the point.
+        Positions of its corners.
     triangle : (3,)
         Their indices.
     point : (3,)
-        In any unit.
+        In the same space.
     """
     return int(triangle[np.linalg.norm(positions - point, axis=1).argmin()])
 
 
 def facts_text(facts: VertexFacts) -> list[str]:
-    """Return the facts as lines: indices, place, and influences by falling weight."""
+    """Return the properties as lines: indices, position, and influences by decreasing weight."""
     triangle = f", triangle {facts.triangle}" if facts.triangle >= 0 else ""
     part = f", {printable(facts.body_part, _LONGEST)}" if facts.body_part else ""
     lines = [
@@ -142,7 +142,7 @@ def facts_text(facts: VertexFacts) -> list[str]:
 
 
 def _uvs(figure: Figure, vertex: int, triangle: int) -> Floats:
-    """Return a vertex's texture coordinates, each once, that of a triangle first: (N, 2)."""
+    """Return a vertex's distinct texture coordinates, that of a triangle first: (N, 2)."""
     mesh = figure.require_mesh()
     if mesh.uvs is None or len(mesh.uvs) == 0:
         return np.zeros((0, 2))

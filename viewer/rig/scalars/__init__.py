@@ -1,7 +1,7 @@
-"""Scalar quantities: a number for every vertex of a posed figure, to be shown as a colour.
+"""Scalar quantities: a number per vertex of a posed figure, shown as a colour.
 
-A quantity is named by its key, one that is about something as ``"weight:left_knee"``,
-``"weight:#4"``, ``"field:distance"``.
+A quantity is named by its key, followed by its joint or field if it has one: ``"stretch"``,
+``"weight:left_knee"``, ``"weight:#4"``, ``"field:distance"``.
 """
 
 from __future__ import annotations
@@ -57,28 +57,28 @@ class Quantity:
     Attributes
     ----------
     title : str
-        For menus and the legend.
+        Label in menus and the legend.
     module : str
-        In this folder; its function is called like the view.
+        Module of this folder; its function has the name of the quantity's key.
     needs : str
-        What a figure must have, for the message that says it has not.
+        Part that a figure must have, as named in the message if it is missing.
     kind : str
-        ``"sequential"``: from nothing to much; ``"diverging"``: less or more than 0;
-        ``"discrete"``: a count; ``"categorical"``: the index of a thing with a name.
+        ``"sequential"``: amounts from 0; ``"diverging"``: below or above 0; ``"discrete"``:
+        counts; ``"categorical"``: indices of named items.
     unit : str
-        ``"length"``: figure units; else as the numbers are, empty for none.
+        ``"length"`` for figure units, otherwise the unit's name; empty if dimensionless.
     moves : bool
-        Whether the numbers depend on the pose.
+        Whether the values depend on the pose.
     about : str
-        ``"joint"`` or ``"field"`` for a quantity of one of those, which its name may say; else
+        ``"joint"`` or ``"field"`` if the quantity belongs to one, which its name may give; else
         empty.
     isolines : bool
-        Whether lines of equal number are drawn unless asked otherwise.
+        Whether isolines are drawn by default.
     least : float
-        The automatic range ends there at least.
+        Lower bound of the automatic range's maximum.
     robust : bool
-        Whether the automatic range leaves the largest hundredth of what is not 0 out: one bad
-        triangle would take all colour from the rest.
+        Whether the automatic range excludes the largest hundredth of the non-zero values, so that
+        one degenerate triangle does not use up the whole colour map.
     """
 
     title: str
@@ -98,9 +98,9 @@ class Quantity:
         return self.about == "joint"
 
     def shown(self, low: float, high: float) -> tuple[float, float]:
-        """Return what the ends of the colour map stand for, given the lowest and highest number.
+        """Return the values at the ends of the colour map, given the lowest and highest value.
 
-        Amounts begin at 0, differences reach as far down as up.
+        Sequential ranges include 0, diverging ones are symmetric about 0.
         """
         if self.kind == "diverging":
             most = max(-low, high) or 1.0
@@ -148,7 +148,7 @@ SCALARS = {
 
 
 def split_name(name: str) -> tuple[str, str]:
-    """Return a quantity's key and what stands behind its colon: a joint or field, empty for none.
+    """Split a quantity's name into its key and the joint or field after the colon, if any.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def split_name(name: str) -> tuple[str, str]:
     Raises
     ------
     RigError
-        If there is no such quantity, or it is about nothing and something is given.
+        If there is no such quantity, or it takes no joint or field and one is given.
     """
     key, colon, about = name.partition(":")
     if key not in SCALARS:
@@ -169,23 +169,23 @@ def split_name(name: str) -> tuple[str, str]:
 
 
 def find_quantity(name: str) -> Quantity:
-    """Return the quantity of a name, with or without a joint.
+    """Return the quantity of a name, with or without a joint or field.
 
     Raises
     ------
     RigError
-        As ``split_name``.
+        As in ``split_name``.
     """
     return SCALARS[split_name(name)[0]]
 
 
 def compute(name: str, figure: Figure, pose: Pose | None, skinning: Skinning) -> Floats:
-    """Return a scalar quantity's numbers.
+    """Return the values of a scalar quantity.
 
     Parameters
     ----------
     name : str
-        A key of ``SCALARS``, with a joint if the quantity is about one.
+        A key of ``SCALARS``, with a joint or field if the quantity has one.
     figure : Figure
         With a mesh.
     pose : Pose or None
@@ -196,13 +196,13 @@ def compute(name: str, figure: Figure, pose: Pose | None, skinning: Skinning) ->
     Returns
     -------
     (V,)
-        In figure units or the quantity's own; zeros if the figure lacks what the quantity shows, -1
-        where that is a thing with a name.
+        In figure units or the quantity's own unit. If the figure lacks the part that the quantity
+        needs: 0, or -1 for categorical quantities.
 
     Raises
     ------
     RigError
-        If the quantity is unknown, or is about a joint or field and the figure has not that one.
+        If the quantity is unknown, or the figure lacks its joint or field.
     """
     key, about = split_name(name)
     quantity = SCALARS[key]
@@ -215,14 +215,14 @@ def compute(name: str, figure: Figure, pose: Pose | None, skinning: Skinning) ->
         Asked(figure, pose, skinning, index, about)
     )
     if quantity.moves:
-        # Rounding is no effect, and must not fill the colour map where there is nothing else.
+        # Without this, rounding would span the colour map where there is no effect at all.
         size = box_size(bounding_box(mesh.positions)) if quantity.unit == "length" else 1.0
         values[np.abs(values) < _NOISE * size] = 0.0
     return values
 
 
 def categories(name: str, figure: Figure) -> tuple[str, ...]:
-    """Return what a categorical quantity's numbers stand for: names of joints, parts, classes."""
+    """Return the names of a categorical quantity's values: joints, body parts or classes."""
     key, about = split_name(name)
     if key == "parts":
         return () if figure.body_parts is None else figure.body_parts.names
@@ -236,14 +236,14 @@ def categories(name: str, figure: Figure) -> tuple[str, ...]:
 
 
 def menu_title(key: str, skinning: Skinning) -> str:
-    """Return what a quantity is called, with the number if it is about one: ``"... 4 influences"``.
+    """Return the label of a quantity in menus, with its number of influences if it depends on it.
 
     Parameters
     ----------
     key : str
-        Of ``SCALARS``.
+        A key of ``SCALARS``.
     skinning : Skinning
-        How many influences count.
+        Gives the number of influences.
     """
     if key != "cut":
         return SCALARS[key].title
@@ -252,14 +252,14 @@ def menu_title(key: str, skinning: Skinning) -> str:
 
 
 def quantity_title(name: str, figure: Figure, skinning: Skinning) -> str:
-    """Return what a quantity of a figure is called: ``"Weight of left_knee"``.
+    """Return the title of a quantity of a figure: ``"Weight of left_knee"``.
 
     Parameters
     ----------
     name : str
-        Of the view.
+        Name of the quantity.
     figure : Figure
-        Gives names of joints and fields.
+        Gives the names of joints and fields.
     skinning : Skinning
         How the mesh is drawn.
 
@@ -279,7 +279,7 @@ def quantity_title(name: str, figure: Figure, skinning: Skinning) -> str:
 
 
 def shown_unit(name: str, figure: Figure) -> tuple[float, str]:
-    """Return the factor and the word for a quantity's numbers as people read them.
+    """Return the factor to a quantity's displayed unit, and that unit's name.
 
     Raises
     ------
@@ -293,7 +293,7 @@ def shown_unit(name: str, figure: Figure) -> tuple[float, str]:
 
 
 def missing_part(name: str, figure: Figure) -> str:
-    """Return what a figure lacks for a quantity, in words; empty if it has it.
+    """Return the name of the part that a figure lacks for a quantity; empty if it lacks none.
 
     Raises
     ------
@@ -316,6 +316,7 @@ def missing_part(name: str, figure: Figure) -> str:
 
 
 def _missing(needs: str, figure: Figure) -> str:
+    """Return the part of that name if a figure lacks it, else an empty text."""
     has = {
         "weights": figure.skin is not None,
         "a skin": figure.is_attached,
@@ -329,5 +330,5 @@ def _missing(needs: str, figure: Figure) -> str:
 
 
 def strongest(figure: Figure) -> int:
-    """Return the largest number of influences that a vertex lists."""
+    """Return the largest number of influences of any vertex."""
     return 0 if figure.skin is None else int(np.diff(figure.skin.starts).max(initial=0))

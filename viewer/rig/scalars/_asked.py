@@ -1,4 +1,4 @@
-"""What the numbers of a scalar quantity are computed from."""
+"""The inputs of a scalar quantity."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ from viewer.rig.pose import Pose
 from viewer.rig.skin import Skin
 from viewer.rig.skinning import Skinning, skin_used
 
-_FOUR = 4  # influences of most engines, if no other number is chosen
+_FOUR = 4  # influences per vertex in most engines
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Asked:
-    """A figure as it is drawn, and the joint that a quantity is about.
+    """A figure as it is drawn, and the joint or field of the quantity.
 
     Attributes
     ----------
     figure : Figure
-        Has what the quantity needs.
+        Has the part that the quantity needs.
     pose : Pose or None
-        Never None for quantities that depend on the pose.
+        Not None for quantities that depend on the pose.
     skinning : Skinning
         How the mesh is drawn.
     joint : int
-        Of the skin, -1 for quantities that are about no joint.
+        Index of a joint of the skin, -1 for quantities without a joint.
     about : str
-        What the quantity's name says behind its colon.
+        Joint or field after the colon of the quantity's name.
     """
 
     figure: Figure
@@ -38,10 +38,10 @@ class Asked:
 
     @property
     def skin(self) -> Skin:
-        """The influences that count: all as stored, or cut and scaled as asked."""
+        """The effective influences: as stored, or pruned and normalised as the options say."""
         return skin_used(self.figure.require_skin(), self.skinning)
 
 
 def influences_kept(skinning: Skinning) -> int:
-    """Return to how many influences a figure is compared: as many as are chosen, else four."""
+    """Return the number of influences to compare with: the chosen limit, or else four."""
     return skinning.max_influences or _FOUR

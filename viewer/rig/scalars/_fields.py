@@ -1,4 +1,4 @@
-"""The field that a scalar quantity is about, by name."""
+"""Fields of a figure by name."""
 
 from __future__ import annotations
 
@@ -7,12 +7,7 @@ from viewer.rig.figure import Figure
 
 
 def field_of(figure: Figure, name: str, is_class: bool) -> VertexField | None:
-    """Return a figure's field of a name, or its first; None if there is none.
-
-    ``figure``: with any number of fields.
-    ``name``: in any case of letters; empty for the first.
-    ``is_class``: whether its numbers stand for names.
-    """
+    """Return a figure's field or class by its case-insensitive name, the first for an empty one."""
     suited = [field for field in figure.fields if bool(field.names) == is_class]
     named = [field for field in suited if not name or field.name.lower() == name.lower()]
     return named[0] if named else None

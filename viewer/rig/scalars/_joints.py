@@ -1,4 +1,4 @@
-"""The joint that a scalar quantity is about, by name or index."""
+"""Joints of a scalar quantity by name or index."""
 
 from __future__ import annotations
 
@@ -9,12 +9,10 @@ from viewer.rig.skeleton import find_joint, joint_label, joint_labels
 
 
 def joint_of(figure: Figure, text: str) -> int:
-    """Return the joint of a name or an index.
+    """Return the joint of a case-insensitive name, ``"NAME#INDEX"``, ``"#INDEX"`` or ``"INDEX"``.
 
-    ``figure``: with a skin; without a skeleton its joints have indices only.
-    ``text``: a joint's name in any case of letters, ``"NAME#INDEX"``, ``"#INDEX"`` or ``"INDEX"``.
-    Raises RigError if there is none, with names that are close; or if several joints have that
-      name.
+    Without a skeleton, the joints of a skin have indices only. Raises RigError if there is no such
+    joint, with similar names, or if several joints have that name.
     """
     skeleton = figure.skeleton
     count = 0 if figure.skin is None else figure.skin.n_joints
@@ -34,5 +32,5 @@ def joint_of(figure: Figure, text: str) -> int:
 
 
 def joint_text(figure: Figure, joint: int) -> str:
-    """Return what a joint is called, ``"#4"`` without a name."""
+    """Return the label of a joint, ``"#4"`` without a name."""
     return f"#{joint}" if figure.skeleton is None else joint_label(figure.skeleton, joint)

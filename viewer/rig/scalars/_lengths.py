@@ -1,4 +1,4 @@
-"""Small lengths in words: millimetres if the figure's unit is known, else shares of its size."""
+"""Small lengths as text: in millimetres, or as a percentage of the figure's size."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from viewer.rig.units import METRES
 
 
 def length_unit(figure: Figure) -> tuple[float, str]:
-    """Return the factor and the word for small lengths: millimetres if the unit is known."""
+    """Return the factor and unit of small lengths: millimetres if the figure's unit is known."""
     if figure.unit in METRES:
         return 1000.0 * METRES[figure.unit], "mm"
     size = 0.0 if figure.mesh is None else box_size(bounding_box(figure.mesh.positions))
@@ -16,7 +16,7 @@ def length_unit(figure: Figure) -> tuple[float, str]:
 
 
 def length_text(figure: Figure, length: float) -> str:
-    """Return a small length in words, to three digits: ``"12.3 mm"``."""
+    """Format a small length with three digits: ``"12.3 mm"``."""
     factor, unit = length_unit(figure)
     number = factor * length
     return f"{number:.0f} {unit}" if number >= 999.5 else f"{number:.3g} {unit}"

@@ -1,4 +1,4 @@
-"""The first joint or field of a scalar quantity: one that is not 0 everywhere."""
+"""Initial joint or field of a scalar quantity: one that is not 0 everywhere."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from viewer.rig.scalars._joints import joint_text
 
 
 def joint_influences(figure: Figure) -> Floats:
-    """Return the sum of the weights, without their signs, that each joint has: (J,)."""
+    """Return the sum of the absolute weights of each joint: (J,)."""
     skin = figure.skin
     if skin is None:
         return np.zeros(0)
@@ -27,16 +27,15 @@ def most_influential(figure: Figure) -> int:
 
 
 def telling_field(figure: Figure) -> str:
-    """Return the name of the first field of numbers that is not 0 everywhere; empty for none."""
+    """Return the name of the first numeric field that is not 0 everywhere; empty without one."""
     fields = [field for field in figure.fields if not field.names]
     return next((field.name for field in fields if field.values.any()), "")
 
 
 def telling_quantity(key: str, figures: Iterable[Figure]) -> str:
-    """Return the name of a quantity with a joint or field that is not 0 everywhere.
+    """Return the name of a quantity with the first joint or field that is not 0 everywhere.
 
-    ``key``: of ``SCALARS``; one that is about neither is its own name.
-    ``figures``: the first that has something to see counts.
+    The key of a quantity without joint or field is its name already.
     """
     for figure in figures:
         if key == "weight" and (joint := most_influential(figure)) >= 0:

@@ -1,4 +1,4 @@
-"""Distances by which a choice moves each vertex: skinning method, influences, correctives."""
+"""Distances that a skinning option moves each vertex: method, influences, correctives."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["asymmetry", "correctives", "cut", "methods", "normalized"]
 def cut(asked: Asked) -> Floats:
     """Return the distance between all influences and the strongest few: (V,), figure units."""
     count = influences_kept(asked.skinning)
-    # Against normalised weights: what scaling alone does is a quantity of its own.
+    # Relative to normalised weights, as the effect of normalising is a quantity of its own.
     whole = replace(asked.skinning, max_influences=0, normalize=True)
     return _distance(asked, whole, replace(asked.skinning, max_influences=count))
 
@@ -29,23 +29,24 @@ def normalized(asked: Asked) -> Floats:
 
 
 def methods(asked: Asked) -> Floats:
-    """Return the largest distance of another method from the reference: (V,), figure units."""
+    """Return the largest distance between a method and the reference: (V,), figure units."""
     first, *others = (replace(asked.skinning, method=name) for name in PURE)
     return np.max([_distance(asked, first, other) for other in others], axis=0)
 
 
 def correctives(asked: Asked) -> Floats:
-    """Return how far the pose correctives move each vertex: (V,), figure units."""
+    """Return the distance that the pose correctives move each vertex: (V,), figure units."""
     how = asked.skinning
     return _distance(asked, replace(how, correctives=True), replace(how, correctives=False))
 
 
 def asymmetry(asked: Asked) -> Floats:
-    """Return how far each vertex is from the mirror image of its partner: (V,), figure units."""
+    """Return each vertex's distance from the mirror image of its partner: (V,), figure units."""
     figure, pose = asked.figure, asked.pose
     assert figure.symmetry is not None and pose is not None  # the quantity needs them
     positions = deform(figure, pose, asked.skinning)[0]
-    positions -= pose.figure_translation  # a figure that stands aside is no less symmetric
+    # A translation of the whole figure does not affect its symmetry.
+    positions -= pose.figure_translation
     mirrored = positions[figure.symmetry].copy()
     mirrored[:, mirror_axis(figure)] *= -1.0
     return np.linalg.norm(positions - mirrored, axis=1)

@@ -1,4 +1,4 @@
-"""Fields that came with a figure: distances to another one, how a rig was found."""
+"""Quantities of precomputed fields, such as distances to another figure."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ __all__ = ["class_", "field"]
 
 
 def field(asked: Asked) -> Floats:
-    """Return a field's numbers: (V,), in its own unit."""
+    """Return the values of a field: (V,), in its own unit."""
     return _values(asked, is_class=False)
 
 
 def class_(asked: Asked) -> Floats:
-    """Return the class of each vertex: (V,), whole, an index into the field's names."""
+    """Return the class of each vertex: (V,), integral indices into the field's names."""
     return _values(asked, is_class=True)
 
 

@@ -11,6 +11,6 @@ __all__ = ["parts"]
 
 
 def parts(asked: Asked) -> Floats:
-    """Return the body part of each vertex: (V,), whole, an index into the parts' names."""
+    """Return the body part of each vertex: (V,), integral indices into the parts' names."""
     assert asked.figure.body_parts is not None  # the quantity needs them
     return asked.figure.body_parts.of_vertex.astype(np.float64)

@@ -1,6 +1,6 @@
-"""Quantities of what the pose does to the surface: how edges and triangles change their size.
+"""Quantities of strain: relative change of edge lengths and triangle areas in a pose.
 
-Compared are the posed mesh, the figure's own scale left out, and the shaped mesh in its binding
+The posed mesh, without the figure's own scale, is compared with the shaped mesh in its binding
 space.
 """
 
@@ -27,7 +27,7 @@ _edges: Memo[Figure, Ints] = Memo()
 
 
 def stretch(asked: Asked) -> Floats:
-    """Return the change of the edge around each vertex that changes most: (V,), percent.
+    """Return the largest relative change of length among each vertex's edges: (V,), percent.
 
     100 (posed length / rest length - 1), with its sign; 0 for a vertex without edges.
     """
@@ -41,7 +41,7 @@ def stretch(asked: Asked) -> Floats:
 
 
 def stretch_mean(asked: Asked) -> Floats:
-    """Return the mean change of the edges around each vertex: (V,), percent."""
+    """Return the mean relative change of length of each vertex's edges: (V,), percent."""
     figure = asked.figure
     edges, changes = _edge_changes(asked)
     mesh = figure.require_mesh()
@@ -52,9 +52,9 @@ def stretch_mean(asked: Asked) -> Floats:
 
 
 def area(asked: Asked) -> Floats:
-    """Return how the triangles around each vertex change in area: (V,), percent.
+    """Return the relative change in area of the triangles around each vertex: (V,), percent.
 
-    100 (sum of their posed areas / sum of their rest areas - 1); 0 where they have none at rest.
+    100 (sum of posed areas / sum of rest areas - 1); 0 if all of them are degenerate at rest.
     """
     figure = asked.figure
     mesh = figure.require_mesh()
@@ -71,7 +71,7 @@ def area(asked: Asked) -> Floats:
 
 
 def _edge_changes(asked: Asked) -> tuple[Ints, Floats]:
-    """Return the edges that have a length, (E, 2), and by how much each changes, percent."""
+    """Return the edges of non-zero length, (E, 2), and their relative changes, percent."""
     edges = _edges.get(asked.figure, (), lambda: _edges_of(asked.figure))
     rest, posed = _rest_and_posed(asked)
     before, after = (
@@ -92,7 +92,7 @@ def _rest_and_posed(asked: Asked) -> tuple[Floats, Floats]:
 
 
 def _edges_of(figure: Figure) -> Ints:
-    """Return each edge of the triangles once: (E, 2) int32, the lower index first."""
+    """Return the unique edges of the triangles: (E, 2) int32, the lower index first."""
     mesh = figure.require_mesh()
     corners = mesh.triangles
     pairs = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])

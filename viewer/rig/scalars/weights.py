@@ -1,6 +1,6 @@
-"""Quantities of the weights as they count: after cutting and normalising, if that is on.
+"""Quantities of the effective weights: after pruning and normalising, if enabled.
 
-Weights that a vertex lists for one joint several times are one influence.
+Several weights of one vertex for the same joint are one influence.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from viewer.rig.skin import (
 
 __all__ = ["dominant", "entropy", "influences", "sums", "weight"]
 
-_ROUNDING = 1e-14  # a few of float64's steps: what sums of weights are off by
+_ROUNDING = 1e-14  # of sums of weights near 1, a few units in the last place
 
 
 def weight(asked: Asked) -> Floats:
-    """Return each vertex's weight of one joint: (V,), 0 where the joint has none."""
+    """Return each vertex's weight of one joint: (V,), 0 without influence."""
     skin = asked.skin
     chosen = skin.joints == asked.joint
     found = np.bincount(owners(skin)[chosen], skin.weights[chosen], skin.n_vertices)
@@ -31,9 +31,9 @@ def weight(asked: Asked) -> Floats:
 
 
 def dominant(asked: Asked) -> Floats:
-    """Return each vertex's joint of the largest weight: (V,), whole; -1 without influence.
+    """Return the joint of the largest weight of each vertex: (V,), integral; -1 without one.
 
-    Of equal weights the first joint listed counts.
+    Among equal weights the joint listed first wins.
     """
     skin = asked.skin
     strongest = limit_influences(skin, 1)
@@ -45,29 +45,29 @@ def dominant(asked: Asked) -> Floats:
 
 
 def influences(asked: Asked) -> Floats:
-    """Return how many joints move each vertex, with a weight that is not 0: (V,), whole."""
+    """Return the number of joints with a non-zero weight of each vertex: (V,), integral."""
     skin = merged(asked.skin)
     counts = np.bincount(owners(skin)[skin.weights != 0.0], minlength=skin.n_vertices)
     return counts.astype(np.float64)
 
 
 def sums(asked: Asked) -> Floats:
-    """Return how far each vertex's weights are from a sum of 1: (V,), |sum_i w_i - 1|."""
+    """Return the error of each vertex's sum of weights: (V,), |sum_i w_i - 1|."""
     found = np.abs(weight_sums(asked.skin) - 1.0)
     found[found < _ROUNDING] = 0.0
     return found
 
 
 def entropy(asked: Asked) -> Floats:
-    """Return how evenly each vertex's weight is spread: H = -sum_i p_i log2 p_i.
+    """Return the entropy of each vertex's weights, H = -sum_i p_i log2 p_i: (V,), bits.
 
-    With p_i = |w_i| / sum_j |w_j| (Shannon 1948): 0 bits if one joint has all, 1 bit for two equal
-    weights, 2 bits for four. (V,), bits; 0 without influence.
+    p_i = |w_i| / sum_j |w_j| (Shannon 1948): 0 bits for a single joint, 1 bit for two equal
+    weights, 2 bits for four; 0 without influence.
     """
     skin = merged(asked.skin)
     vertices, sizes = owners(skin), np.abs(skin.weights)
     totals = np.bincount(vertices, sizes, skin.n_vertices)
     counts = sizes > 0.0
-    shares = sizes[counts] / totals[vertices[counts]]
-    found = np.bincount(vertices[counts], -shares * np.log2(shares), skin.n_vertices)
+    fractions = sizes[counts] / totals[vertices[counts]]
+    found = np.bincount(vertices[counts], -fractions * np.log2(fractions), skin.n_vertices)
     return np.maximum(found, 0.0)  # 0, not -0

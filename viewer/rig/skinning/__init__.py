@@ -41,19 +41,19 @@ class Method:
     Attributes
     ----------
     title : str
-        For menus.
+        Label in menus.
     short : str
-        For buttons and legends.
+        Label on buttons and in legends.
     uses_matrices : bool
         Whether it blends skinning matrices: its shader reads ``u_palette``.
     uses_quaternions : bool
         Whether it blends dual quaternions: its shader reads ``u_rigid``.
     ends : tuple of str
-        The two methods between which ``Skinning.share`` interpolates; empty for methods of
+        The two methods between which ``Skinning.blend_factor`` interpolates; empty for methods of
         their own.
     result : str
-        Label of the result in an explanation of a vertex, where it is not the last sum that is
-        shown anyway; ``{share}`` stands for the blend factor.
+        Label of the result in the explanation of a vertex; empty if the last sum already is the
+        result. ``{blend_factor}`` is replaced by the number.
     """
 
     title: str
@@ -72,7 +72,7 @@ METHODS = {
         "Mixed",
         uses_quaternions=True,
         ends=("lbs", "dqs"),
-        result="{share} of the way",
+        result="{blend_factor} of the way",
     ),
 }
 """Modules in this folder, each with ``deform`` and a GLSL chunk in ``shaders/skin``."""
@@ -83,24 +83,24 @@ PURE = tuple(name for name, method in METHODS.items() if not method.ends)
 
 @dataclass(slots=True)
 class Skinning:
-    """How a figure is skinned; the defaults are what its files say.
+    """Skinning options; the defaults follow the file.
 
     Attributes
     ----------
     method : str
         A key of ``METHODS``.
-    share : float
+    blend_factor : float
         Blend factor of methods between two others, 0 to 1; of DQS in the method ``"mix"``.
     max_influences : int
-        Only so many of the strongest, scaled to a sum of 1; 0 for all, as stored.
+        Keep only this many of the strongest, scaled to a sum of 1; 0 for all, as stored.
     normalize : bool
         Scale each vertex's weights to a sum of 1.
     correctives : bool
-        Add the pose correctives of figures that have some.
+        Add pose correctives, if the figure has any.
     """
 
     method: str = "lbs"
-    share: float = 0.5
+    blend_factor: float = 0.5
     max_influences: int = 0
     normalize: bool = False
     correctives: bool = True
@@ -109,24 +109,24 @@ class Skinning:
 def deform(
     figure: Figure, pose: Pose | None = None, method: str | Skinning = "lbs"
 ) -> tuple[Floats, Floats]:
-    """Return a figure's posed vertices: the float64 reference that the GPU is held to.
+    """Return a figure's posed vertices, the float64 reference for the shaders.
 
     Parameters
     ----------
     figure : Figure
-        With a mesh. Without skeleton or skin the mesh comes back in its binding space.
+        With a mesh. Without skeleton or skin the mesh is returned in its binding space.
     pose : Pose, optional
         DOFs in lengths and radians; the file's own pose if omitted.
     method : str or Skinning
-        A key of ``METHODS``, or everything about how to skin.
+        A key of ``METHODS``, or all skinning options.
 
     Returns
     -------
     positions : (V, 3)
         Figure units.
     normals : (V, 3)
-        Unit length. They are turned with the rest normals of the shaped mesh: what correctives
-        do to normals is left out.
+        Unit length. They are the rest normals of the shaped mesh, transformed by the joints: the
+        effect of correctives on normals is left out.
 
     Raises
     ------
@@ -165,7 +165,7 @@ def skinned(
     skinning: Skinning,
     vertices: Ints | None = None,
 ) -> tuple[Floats, Floats]:
-    """Move vertices by skinning matrices.
+    """Transform vertices by skinning matrices.
 
     Parameters
     ----------
@@ -174,38 +174,39 @@ def skinned(
     skin : Skin
         As stored.
     rest : (N, 3)
-        The vertices in binding space, with pose correctives.
+        Vertices in binding space, with pose correctives.
     palette : (J, 4, 4)
         Skinning matrices.
     skinning : Skinning
         Method and influences.
     vertices : (N,), optional
-        Their indices; all if omitted.
+        Indices of these vertices; all if omitted.
 
     Returns
     -------
     positions, normals : (N, 3)
-        Figure units, before the figure's own placement; unit length.
+        Figure units, before the figure's own scale and translation; unit length.
     """
     used, normals = skin_used(skin, skinning), mesh.normals
     if vertices is not None:
         used, normals = skin_rows(used, vertices), normals[vertices]
     module = import_module(f"{__name__}.{skinning.method}")
-    moved: tuple[Floats, Floats] = module.deform(rest, normals, used, palette, skinning.share)
+    factor = skinning.blend_factor
+    moved: tuple[Floats, Floats] = module.deform(rest, normals, used, palette, factor)
     return moved
 
 
 def deform_frames(
     figure: Figure, poses: Sequence[Pose], skinning: Skinning | None = None
 ) -> Floats:
-    """Return the vertices of many poses of one shape, linearly blended, without normals.
+    """Return the vertices of many poses of one shape by LBS, without normals.
 
     Parameters
     ----------
     figure : Figure
         With mesh, skeleton and skin.
     poses : sequence of F Pose
-        Their shape is that of the first.
+        All are shaped by the weights of the first.
     skinning : Skinning, optional
         Its method must be ``"lbs"``.
 
@@ -217,7 +218,7 @@ def deform_frames(
     Raises
     ------
     RigError
-        If the figure cannot be skinned so.
+        If the figure cannot be skinned, there are no poses, or the method is not LBS.
     """
     how = skinning or Skinning()
     if not poses or not figure.is_attached or how.method != "lbs":
@@ -237,7 +238,7 @@ def deform_frames(
 
 
 def joint_matrices(figure: Figure, pose: Pose) -> Floats:
-    """Return where a pose puts a figure's joints, its shape and place included.
+    """Return the joint matrices of a posed figure, with its shape and placement.
 
     Parameters
     ----------
@@ -260,7 +261,7 @@ _varied: Memo[Skin, Skin] = Memo(kept=4)
 
 
 def skin_used(skin: Skin, skinning: Skinning) -> Skin:
-    """Return the influences that count: all as stored, or cut and scaled as asked."""
+    """Return the effective influences: as stored, or pruned and normalised as the options say."""
     count, normalize = skinning.max_influences, skinning.normalize
     if not count and not normalize:
         return skin

@@ -1,7 +1,7 @@
-"""Weights as dense blocks: a few hundred vertices times the joints that any of them lists.
+"""Weights as dense blocks: a few hundred vertices times the joints that influence any of them.
 
-Neighbours in a file share their joints, so the blocks stay small, and one product of two dense
-matrices per block is several times faster than summing a flat list in numpy.
+Vertices close in a file have mostly the same joints, so the blocks stay small, and one product of
+two dense matrices per block is several times faster than summing a flat list in numpy.
 """
 
 from __future__ import annotations
@@ -15,24 +15,24 @@ from viewer.rig.arrays import Floats, Ints
 from viewer.rig.memo import Memo
 from viewer.rig.skin import Skin, has_influence
 
-_VERTICES = 512  # in a block: fewer cost calls, more cost zeros (bench_deform)
-_MOST = 1 << 24  # weights kept, 128 MB: a file without any order would take more
+_VERTICES = 512  # per block: smaller blocks cost calls, larger ones zeros (bench_deform)
+_MOST = 1 << 24  # cached weights, 128 MB; only a file in random vertex order needs more
 
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """Consecutive vertices.
+    """The weights of consecutive vertices.
 
     Attributes
     ----------
     rows : slice
-        Their indices.
+        Indices of the vertices.
     joints : (B,) int32
-        All that any of them lists.
+        Joints that influence any of them.
     weights : (B, n)
-        Of each joint, by vertex; 0 where a vertex does not list it.
+        Weight of each joint for each vertex; 0 without influence.
     free : (F,) int32
-        Rows within the block that nothing moves: their matrix is the identity.
+        Rows within the block without influence, whose matrix is the identity.
     """
 
     rows: slice
@@ -45,12 +45,13 @@ _kept: Memo[Skin, tuple[Block, ...] | None] = Memo()
 
 
 def blocks_of(skin: Skin) -> Iterator[Block]:
-    """Yield a skin's blocks; kept as long as the skin unless they are unusually large."""
+    """Yield a skin's blocks; cached as long as the skin lives unless they are unusually large."""
     kept = _kept.get(skin, None, lambda: _within_limit(skin))
     yield from _blocks(skin) if kept is None else kept
 
 
 def _within_limit(skin: Skin) -> tuple[Block, ...] | None:
+    """Return all blocks of a skin, or None if they are too large to keep."""
     blocks, size = [], 0
     for block in _blocks(skin):
         size += block.weights.size
@@ -61,6 +62,7 @@ def _within_limit(skin: Skin) -> tuple[Block, ...] | None:
 
 
 def _blocks(skin: Skin) -> Iterator[Block]:
+    """Compute the blocks of a skin one by one."""
     is_free = ~has_influence(skin)
     for first in range(0, skin.n_vertices, _VERTICES):
         last = min(first + _VERTICES, skin.n_vertices)
@@ -68,7 +70,7 @@ def _blocks(skin: Skin) -> Iterator[Block]:
         joints, columns = np.unique(skin.joints[span], return_inverse=True)
         owners = np.repeat(np.arange(last - first), np.diff(skin.starts[first : last + 1]))
         weights = np.zeros((len(joints), last - first))
-        # A joint may be listed twice by one vertex: the weights add up.
+        # A vertex may list a joint twice: the weights add up.
         np.add.at(weights, (columns, owners), skin.weights[span])
         free = np.flatnonzero(is_free[first:last]).astype(np.int32)
         yield Block(slice(first, last), joints, weights, free)

@@ -23,19 +23,19 @@ from viewer.rig.skinning._normals import inverse_transposed
 
 __all__ = ["deform", "linear_maps", "split_palette"]
 
-_CHUNK = 1 << 16  # vertices at a time, which bounds the memory that large meshes take
-_RIGID = 1e-12  # a stretch nearer to the identity is rounding
-_TINY = 1e-12  # influences that cancel out give no rotation
+_CHUNK = 1 << 16  # vertices at a time, which bounds the memory for large meshes
+_RIGID = 1e-12  # a stretch closer to the identity is rounding
+_TINY = 1e-12  # influences that cancel each other define no rotation
 
 
 def deform(
-    positions: Floats, normals: Floats, skin: Skin, palette: Floats, share: float = 1.0
+    positions: Floats, normals: Floats, skin: Skin, palette: Floats, blend_factor: float = 1.0
 ) -> tuple[Floats, Floats]:
-    """Stretch linearly, then move by the unit dual quaternion of the weighted sum.
+    """Stretch linearly, then move by the normalised weighted sum of unit dual quaternions.
 
-    Weights count relative to their sum, as the method demands. Quaternions are added on the
-    strongest influence's side of the sphere (eq. 14 and its text: antipodality). Normals take the
-    inverse transpose of the blended stretch, then the blended rotation.
+    The method requires weights relative to their sum. Quaternions are negated where necessary to
+    lie in the hemisphere of the strongest influence (eq. 14 and its text: antipodality). Normals
+    are transformed by the inverse transpose of the blended stretch, then by the blended rotation.
 
     Parameters
     ----------
@@ -45,8 +45,8 @@ def deform(
         A vertex without influence stays at its bind position.
     palette : (J, 4, 4)
         Skinning matrices, bind to posed; they may scale, uniformly or not.
-    share : float
-        Not used: there is nothing to mix with.
+    blend_factor : float
+        Unused; part of the signature of every method.
 
     Returns
     -------
@@ -58,18 +58,20 @@ def deform(
     skin = strongest_first(skin)
     centers = bind_positions(skin)
     duals, stretches = split_palette(palette, centers)
-    moved, turned = positions.copy(), normals.copy()
+    moved, rotated = positions.copy(), normals.copy()
     for chosen, blended, stretch in _blended(skin, duals, stretches):
         points = positions[chosen]
         stretched = np.einsum("vab,vb->va", stretch[:, :, :3], points) + stretch[:, :, 3]
         moved[chosen] = _rigid(blended, stretched)
-        facing = inverse_transposed(np.moveaxis(stretch[:, :, :3], 0, -1), normals[chosen])
-        turned[chosen] = _rotated(blended[:, :4], facing)
-    return moved, unit(turned)
+        stretched_normals = inverse_transposed(
+            np.moveaxis(stretch[:, :, :3], 0, -1), normals[chosen]
+        )
+        rotated[chosen] = _rotated(blended[:, :4], stretched_normals)
+    return moved, unit(rotated)
 
 
 def linear_maps(skin: Skin, palette: Floats) -> Floats:
-    """Return what moving does to directions at each vertex, rotation after stretch.
+    """Return the linear part of each vertex's motion: the rotation after the stretch.
 
     Parameters
     ----------
@@ -81,7 +83,7 @@ def linear_maps(skin: Skin, palette: Floats) -> Floats:
     Returns
     -------
     (V, 3, 3)
-        The identity for a vertex that stays.
+        The identity for a vertex without influence.
     """
     skin = strongest_first(skin)
     maps = np.tile(np.eye(3), (skin.n_vertices, 1, 1))
@@ -98,7 +100,7 @@ def split_palette(palette: Floats, centers: Floats) -> tuple[Floats, Floats]:
     palette : (J, 4, 4)
         Bind to posed.
     centers : (J, 3)
-        Bind positions of the joints: the stretches leave them where they are.
+        Bind positions of the joints, the fixed points of the stretches.
 
     Returns
     -------
@@ -114,7 +116,7 @@ def split_palette(palette: Floats, centers: Floats) -> tuple[Floats, Floats]:
     other = np.abs(gram - np.eye(3)).max(axis=(1, 2)) > _RIGID
     other |= np.linalg.det(linear) < 0.0
     rotations[other], stretches[other] = nearest_rotations(linear[other])
-    # D carries each centre to where M does.
+    # S keeps the centres, so D has to move each one as M does.
     places = np.einsum("jab,jb->ja", linear, centers) + palette[:, :3, 3]
     translations = places - np.einsum("jab,jb->ja", rotations, centers)
     real = matrix_to_quaternion(rotations)
@@ -137,7 +139,7 @@ def split_palette(palette: Floats, centers: Floats) -> tuple[Floats, Floats]:
 def _blended(
     skin: Skin, duals: Floats, stretches: Floats
 ) -> Iterator[tuple[np.ndarray, Floats, Floats]]:
-    """Yield vertices that move, their unit dual quaternions and stretches, a chunk at a time."""
+    """Yield the vertices that move, with unit dual quaternions and stretches, chunk by chunk."""
     for first in range(0, skin.n_vertices, _CHUNK):
         rows = slice(first, min(first + _CHUNK, skin.n_vertices))
         starts = skin.starts[rows.start : rows.stop + 1]
@@ -150,7 +152,7 @@ def _blended(
 def _blend(
     skin: Skin, starts: Ints, listing: np.ndarray, duals: Floats, stretches: Floats
 ) -> tuple[Floats, Floats, Bools]:
-    """Blend for the vertices of one chunk that list influences; not all of them can be moved."""
+    """Blend the influences of one chunk; the mask is False where they cancel each other."""
     span = slice(starts[0], starts[-1])
     edges = starts[listing] - starts[0]
     joints, weights = skin.joints[span], skin.weights[span]
@@ -159,6 +161,7 @@ def _blend(
     counts = np.diff(np.append(edges, len(joints)))
     relative = weights / np.repeat(np.where(is_moved, sums, 1.0), counts)
     quaternions = duals[joints]
+    # q and -q are the same rotation: only quaternions in one hemisphere can be averaged.
     first = np.repeat(quaternions[edges, :4], counts, axis=0)
     sides = np.where(np.einsum("na,na->n", quaternions[:, :4], first) < 0.0, -1.0, 1.0)
     blended = np.add.reduceat(quaternions * (relative * sides)[:, None], edges, axis=0)
@@ -179,5 +182,6 @@ def _rigid(duals: Floats, points: Floats) -> Floats:
 
 
 def _rotated(quaternions: Floats, vectors: Floats) -> Floats:
+    """Rotate by unit quaternions (a, w): v + 2 a x (a x v + w v)."""
     axis, w = quaternions[:, :3], quaternions[:, 3:4]
     return vectors + 2.0 * np.cross(axis, np.cross(axis, vectors) + w * vectors)

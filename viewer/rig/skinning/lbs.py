@@ -15,28 +15,28 @@ from viewer.rig.skinning._normals import inverse_transposed
 
 __all__ = ["blended_matrices", "deform", "move"]
 
-_CHUNK = 1 << 14  # matrices at a time: they stay in the cache, and bound the memory
+_CHUNK = 1 << 14  # matrices at a time: they fit the processor's cache and bound the memory
 _IDENTITY = np.eye(3, 4).reshape(12)
 
 
 def deform(
-    positions: Floats, normals: Floats, skin: Skin, palette: Floats, share: float = 1.0
+    positions: Floats, normals: Floats, skin: Skin, palette: Floats, blend_factor: float = 1.0
 ) -> tuple[Floats, Floats]:
-    """Blend matrices, then move: v' = B [v 1] and n' = unit(B [n 0]), with B = sum_i w_i M_i.
+    """Transform by blended matrices: v' = B [v 1], n' = unit(B [n 0]), with B = sum_i w_i M_i.
 
-    Where all joints are rigid, normals use the blended matrix itself: CSE169 course notes. Where
-    some scale or shear they use its inverse transpose, n' = unit(B^-T n).
+    If all joints are rigid, normals use the blended matrix itself (CSE169 course notes). If some
+    scale or shear, they use its inverse transpose, n' = unit(B^-T n).
 
     Parameters
     ----------
     positions, normals : (V, 3)
         Binding space.
     skin : Skin
-        Weights as stored; a vertex without any stays at its bind position.
+        Weights as stored; a vertex without influence stays at its bind position.
     palette : (J, 4, 4)
         Skinning matrices, bind to posed.
-    share : float
-        Not used: there is nothing to mix with.
+    blend_factor : float
+        Unused; part of the signature of every method.
 
     Returns
     -------
@@ -45,49 +45,49 @@ def deform(
     normals : (V, 3)
         Unit length.
     """
-    moved, turned = move(positions, skin, palette, normals)
-    assert turned is not None  # normals were given
-    return moved, unit(turned)
+    moved, rotated = move(positions, skin, palette, normals)
+    assert rotated is not None  # normals were given
+    return moved, unit(rotated)
 
 
 def move(
     positions: Floats, skin: Skin, palette: Floats, normals: Floats | None = None
 ) -> tuple[Floats, Floats | None]:
-    """Move positions, and normals if there are any, by blended matrices.
+    """Transform positions, and normals if given, by blended matrices.
 
-    Frames of a clip are best moved one by one: their matrices stay in the processor's cache, and
-    that is twice as fast as one large product (``tests/bench/bench_deform.py``).
+    Frames of a clip are best transformed one by one: their matrices stay in the processor's cache,
+    which is twice as fast as one large product (``tests/bench/bench_deform.py``).
 
     Parameters
     ----------
     positions : (V, 3)
         Binding space.
     skin : Skin
-        Of V vertices.
+        Influences of V vertices.
     palette : (J, 4, 4)
         Skinning matrices.
     normals : (V, 3), optional
-        They double the work.
+        Optional because they double the work.
 
     Returns
     -------
     positions : (V, 3)
         Figure units.
     normals : (V, 3) or None
-        Any length.
+        Not normalised.
     """
     moved = np.empty(positions.shape)
-    turned = None if normals is None else np.empty(positions.shape)
+    rotated = None if normals is None else np.empty(positions.shape)
     rigid = normals is not None and is_rigid(palette)
     for rows, matrices in _blended(skin, palette):
         moved[rows] = (_product(matrices, positions[rows]) + matrices[:, 3]).T
-        if normals is not None and turned is not None:
-            turned[rows] = (
+        if normals is not None and rotated is not None:
+            rotated[rows] = (
                 _product(matrices, normals[rows]).T
                 if rigid
                 else inverse_transposed(matrices[:, :3], normals[rows])
             )
-    return moved, turned
+    return moved, rotated
 
 
 def blended_matrices(skin: Skin, palette: Floats) -> Floats:
@@ -112,8 +112,8 @@ def blended_matrices(skin: Skin, palette: Floats) -> Floats:
 
 
 def _blended(skin: Skin, palette: Floats) -> Iterator[tuple[slice, Floats]]:
-    """Yield the blended matrices, (3, 4, n), of one run of vertices after the other."""
-    # A joint's numbers lie together, so that choosing a block's joints copies whole rows.
+    """Yield runs of consecutive vertices and their blended matrices, (3, 4, n)."""
+    # One row per joint, so that selecting a block's joints copies contiguous memory.
     rows = palette[:, :3, :].reshape(len(palette), 12)
     run: list[Block] = []
     for block in blocks_of(skin):
@@ -126,6 +126,7 @@ def _blended(skin: Skin, palette: Floats) -> Iterator[tuple[slice, Floats]]:
 
 
 def _run(run: list[Block], rows: Floats) -> tuple[slice, Floats]:
+    """Blend the matrices of consecutive blocks: one dense product per block."""
     first, last = run[0].rows.start, run[-1].rows.stop
     blended = np.empty((12, last - first))
     for block in run:

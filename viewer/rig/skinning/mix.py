@@ -1,4 +1,4 @@
-"""A mixture of linear blend and dual quaternion skinning: between the two by a share."""
+"""Interpolation between linear blend and dual quaternion skinning by a blend factor."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ __all__ = ["deform"]
 
 
 def deform(
-    positions: Floats, normals: Floats, skin: Skin, palette: Floats, share: float = 0.5
+    positions: Floats, normals: Floats, skin: Skin, palette: Floats, blend_factor: float = 0.5
 ) -> tuple[Floats, Floats]:
-    """Return (1 - share) LBS + share DQS, vertex by vertex.
+    """Interpolate each vertex: (1 - blend_factor) LBS + blend_factor DQS.
 
-    Where joints scale or shear, normals take the inverse transpose of the mixed linear maps.
+    Where joints scale or shear, normals use the inverse transpose of the interpolated linear maps.
 
     Parameters
     ----------
     positions, normals : (V, 3)
         Binding space.
     skin : Skin
-        Of V vertices.
+        Influences of V vertices.
     palette : (J, 4, 4)
         Skinning matrices, bind to posed.
-    share : float
+    blend_factor : float
         0 for LBS alone, 1 for DQS alone.
 
     Returns
@@ -41,9 +41,12 @@ def deform(
     """
     linear = lbs.deform(positions, normals, skin, palette)
     dual = dqs.deform(positions, normals, skin, palette)
-    moved, turned = ((1.0 - share) * a + share * b for a, b in zip(linear, dual, strict=True))
+    moved, rotated = (
+        (1.0 - blend_factor) * a + blend_factor * b for a, b in zip(linear, dual, strict=True)
+    )
     if not is_rigid(palette):
-        maps = (1.0 - share) * lbs.blended_matrices(skin, palette)[:, :, :3]
-        maps += share * dqs.linear_maps(skin, palette)
-        turned = inverse_transposed(np.moveaxis(maps, 0, -1), normals)
-    return moved, unit(turned)
+        # Interpolated normals would not be perpendicular to the interpolated surface.
+        maps = (1.0 - blend_factor) * lbs.blended_matrices(skin, palette)[:, :, :3]
+        maps += blend_factor * dqs.linear_maps(skin, palette)
+        rotated = inverse_transposed(np.moveaxis(maps, 0, -1), normals)
+    return moved, unit(rotated)
