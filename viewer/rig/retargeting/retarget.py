@@ -1,12 +1,12 @@
-"""A motion of one skeleton on a figure with another: joints matched by name, rest poses aligned.
+"""Retargeting of a motion to another skeleton: joints matched by name, rest poses aligned.
 
-World rotations are carried over, not local ones, so that joints between two matched ones are
-folded in. With everything in the figure's axes, and rest rotations R_s and R_t of both::
+World rotations are transferred, not local ones, so that unmatched joints between two matched ones
+are included. With everything in the figure's axes, and rest rotations R_s and R_t of both::
 
     W_t(frame) = W_s(frame) R_s^-1 B R_t
 
-where B turns the figure's rest pose into the source's at that joint: from arms held out (T-pose)
-to arms held down (A-pose), say. Lengths are the figure's; the path is scaled by the ratio of legs.
+where B rotates the figure's rest pose to the source's at that joint, for instance from a T-pose
+to an A-pose. Lengths are the figure's; the path is scaled by the ratio of leg lengths.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ from viewer.rig.skeleton import Skeleton, joint_label
 
 __all__ = ["retarget", "scaled_motion"]
 
-_ROUNDING = 1e-9  # a scale nearer to 1 is 1
-_STILL = 1e-6  # of the skeleton's size: position channels that move less do not count
+_ROUNDING = 1e-9  # a scale this close to 1 counts as 1
+_STILL = 1e-6  # of the skeleton's size: position channels that move less are ignored
 _LEGS = (("left_hip", "left_knee", "left_ankle"), ("right_hip", "right_knee", "right_ankle"))
 _ARMS = (
     ("left_shoulder", "left_elbow", "left_wrist"),
@@ -41,7 +41,7 @@ _ARMS = (
 
 
 def scaled_motion(motion: SkeletonMotion, factor: float, unit: str = "") -> SkeletonMotion:
-    """Return a skeleton and its motion with all lengths multiplied: from centimetres to metres.
+    """Return a skeleton and its motion with all lengths scaled, for instance from cm to m.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def scaled_motion(motion: SkeletonMotion, factor: float, unit: str = "") -> Skel
     factor : float
         More than 0.
     unit : str
-        What the lengths are in now, as in ``Figure.unit``.
+        Unit of the scaled lengths, as in ``Figure.unit``.
 
     Raises
     ------
@@ -80,13 +80,13 @@ def scaled_motion(motion: SkeletonMotion, factor: float, unit: str = "") -> Skel
 def retarget(
     motion: SkeletonMotion, figure: Figure, mapping: Mapping[str, str] | None = None
 ) -> tuple[SampledClip, list[Diagnostic]]:
-    """Return a figure's clip of a motion that was made for another skeleton.
+    """Return a motion made for another skeleton as a clip of a figure.
 
     Joints are matched by ``mapping``, then by the names that many programs use for a body (see
     ``viewer.rig.retargeting.joint_names``), then by equal names; a skeleton with the same names
     and hierarchy matches joint by joint. Limbs take the directions of the source's limbs, exactly;
-    spine, neck, head and feet keep the figure's own bend unless the rest poses differ much. With
-    the same hierarchy and much the same rest pose, local rotations are taken over as they are.
+    spine, neck, head and feet keep the figure's own bend unless the rest poses differ greatly. With
+    the same hierarchy and nearly the same rest pose, local rotations are copied unchanged.
 
     Parameters
     ----------
@@ -100,15 +100,15 @@ def retarget(
     Returns
     -------
     clip : SampledClip
-        For the figure. A skinned figure moves as a whole (``figure_translations``), a bare
-        skeleton at its root.
+        For the figure. A skinned figure moves as a whole (``figure_translations``), a skeleton
+        without a skin at its root.
     notes : list of Diagnostic
-        Which joints were matched and which not, and the scale of the path.
+        Messages about matched and unmatched joints, and the scale of the path.
 
     Raises
     ------
     RigError
-        If too few joints match, or the mapping names a joint that is not there.
+        If too few joints match, or the mapping names a missing joint.
     """
     source, target = motion.figure.skeleton, figure.skeleton
     if source is None or target is None:
@@ -140,7 +140,7 @@ def retarget(
 
 @dataclass(frozen=True, slots=True)
 class _Carried:
-    """All that the steps need."""
+    """Inputs common to all steps of a retargeting."""
 
     clip: SampledClip
     source: Skeleton
@@ -152,7 +152,7 @@ class _Carried:
 
 
 def _up_turn(source: str, target: str) -> Floats:
-    """Return the rotation that carries one up axis into the other: (3, 3)."""
+    """Return the rotation from one up axis to the other: (3, 3)."""
     if source == target:
         return np.eye(3)
     return axis_rotations(0, np.asarray(np.pi / 2 if target == "z" else -np.pi / 2))
@@ -194,7 +194,7 @@ def _target_rotations(carried: _Carried, worlds: Floats) -> Floats:
 
 
 def _scale(carried: _Carried) -> tuple[float, Phrase]:
-    """Return the ratio of the target's lengths to the source's, and of what: legs if there are."""
+    """Return the ratio of the target's lengths to the source's, and what was measured."""
     partners, names = carried.matches.partners, carried.matches.names
     source, target = carried.rests
     place = {name: joint for joint, name in enumerate(names) if name and partners[joint] >= 0}
@@ -234,7 +234,7 @@ def _pairs(limbs: tuple[tuple[str, ...], ...], place: dict[str, int]) -> list[tu
 def _shifts(
     carried: _Carried, worlds: Floats, rotations: Floats, scale: float
 ) -> tuple[Floats, list[Diagnostic]]:
-    """Return what is added to the target's rest translations, (N, J, 3), and notes."""
+    """Return offsets to the target's rest translations, (N, J, 3), and messages."""
     shifts = np.zeros((len(worlds), carried.target.n_joints, 3))
     places = _source_places(carried, worlds)
     if carried.is_same:
@@ -258,7 +258,7 @@ def _shifts(
 
 
 def _source_places(carried: _Carried, worlds: Floats) -> Floats:
-    """Return where the source's joints are in its own axes: (N, J, 3)."""
+    """Return the positions of the source's joints in its own axes: (N, J, 3)."""
     clip, skeleton = carried.clip, carried.source
     places = np.tile(skeleton.rest_translations, (len(worlds), 1, 1))
     if clip.translations is not None:
@@ -276,7 +276,7 @@ def _source_places(carried: _Carried, worlds: Floats) -> Floats:
 
 
 def _carry_translations(carried: _Carried, scale: float, shifts: Floats) -> None:
-    """Put the moves of joints below the root, in place: the two parents' axes may differ."""
+    """Transfer translations of joints below the root, in place: the parents' axes may differ."""
     if carried.clip.translations is None:
         return
     source, target = carried.rests
@@ -290,7 +290,7 @@ def _carry_translations(carried: _Carried, scale: float, shifts: Floats) -> None
 
 
 def _lost(carried: _Carried) -> list[Diagnostic]:
-    """Say which joints of the source move within their parents, which the target's do not."""
+    """Return messages about source joints whose translations the target does not take."""
     moves = carried.clip.translations
     if moves is None:
         return []
@@ -310,7 +310,7 @@ def _lost(carried: _Carried) -> list[Diagnostic]:
 
 
 def _anchor(carried: _Carried) -> int:
-    """Return the joint that follows the source's path: the pelvis, else the first one matched."""
+    """Return the joint that follows the source's path: the pelvis, else the first matched one."""
     matched = carried.matches.partners >= 0
     names = carried.matches.names
     if "pelvis" in names and matched[names.index("pelvis")]:
