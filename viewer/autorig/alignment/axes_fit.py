@@ -1,4 +1,4 @@
-"""Another scale along each axis, of target or template: for what was stretched as a whole."""
+"""Alignment with a separate scale along each axis of target or template, for stretched meshes."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ def fit_axes(
     rotations: bool = False,
     own: bool = False,
 ) -> Similarity:
-    """Find another scale along each axis.
+    """Fit a separate scale along each axis.
 
     Each iteration solves for factors f, a shift t and, if asked, a small rotation w that minimise
     sum (n . (x - q))^2 + 1e-5 |x - q|^2 with x = f R p + f' (w x R p) + t, or with the template's
-    axes x = R f p + w x R f' p + t, in which f' are the factors so far: linear in all that is
-    looked for.
+    axes x = R f p + w x R f' p + t, in which f' are the factors so far: linear in all
+    unknowns.
 
     Parameters
     ----------
@@ -34,15 +34,15 @@ def fit_axes(
     start : Similarity
         Roughly right, with one scale.
     rotations : bool
-        Whether the rotation is improved too: one that was found with one scale for all axes leans
-        towards what a stretched target's diagonal asks for.
+        Whether the rotation is refined too: one found with a single scale is biased
+        towards the stretched target's diagonal.
     own : bool
-        Whether the axes are the template's.
+        Whether the axes are those of the template.
 
     Returns
     -------
     Similarity
-        With factors; the best so far where a fit would mirror, or too few pairs are left.
+        With factors; the best so far if a fit would be a reflection, or too few pairs are left.
     """
     similarity, scales = start, np.full(3, start.scale)
     for _ in range(rounds):
@@ -68,7 +68,7 @@ def fit_axes(
 def _columns(
     points: Floats, rotation: Floats, before: Floats, rotations: bool, own: bool
 ) -> Floats:
-    """Return what moves points by factors, shift and rotation: (N, 3, 6 or 9)."""
+    """Return the derivatives of points by factors, shift and rotation: (N, 3, 6 or 9)."""
     if own:
         scaled = points[:, None, :] * rotation
         arms, lift = (points * before) @ rotation.T, np.ones(3)
