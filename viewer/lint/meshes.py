@@ -1,4 +1,4 @@
-"""Meshes: triangles that are flat or flipped, borders, edges, normals, vertices out of place."""
+"""Checks of meshes: degenerate or flipped triangles, borders, edges, normals, stray vertices."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ __all__ = ["check"]
 
 Indices = NDArray[np.int64]
 
-_FLAT = 1e-7  # height of a triangle relative to the mesh: the rounding of float32
-_UNIT = 0.01  # of a normal's length from 1
-_ZERO = 1e-12  # of a normal's length
-_AGAINST = -0.1  # cosine to a triangle's own normal: those across it are smoothed over an edge
-_CLOSED = 0.25  # border edges squared, by triangles: holes up to this leave a volume its sign
+_FLAT = 1e-7  # height of a triangle relative to the mesh: float32 rounding
+_UNIT = 0.01  # deviation of a normal's length from 1
+_ZERO = 1e-12  # a normal of this length counts as zero
+_AGAINST = -0.1  # cosine to a triangle's own normal: perpendicular ones are smoothed over an edge
+_CLOSED = 0.25  # squared border edges over triangles: with smaller holes a volume keeps its sign
 # Times the median distance of vertices from their median: feet are 16 times as far in models
 # with half of their vertices in the face.
 _FAR = 40.0
-_SAMPLE = 4096  # vertices that tell where the others are
+_SAMPLE = 4096  # vertices sampled for the median
 
 
 def check(subject: Subject) -> list[Finding]:
-    """Look at the mesh of a figure."""
+    """Check the mesh of a figure."""
     mesh = subject.actor.figure.mesh
     if mesh is None:
         return []
@@ -38,7 +38,7 @@ def check(subject: Subject) -> list[Finding]:
     known = subject.sound("positions", mesh.n_vertices)[mesh.triangles].all(axis=1) & whole
     flat = (_heights(mesh) <= _FLAT * _typical(mesh)[1]) & known
     sound = np.flatnonzero(~flat & whole)
-    # What has no area has no neighbours and no sides either.
+    # Triangles without area have no neighbours and no sides.
     corners = welded(mesh.positions, mesh.triangles)[sound]
     return [
         *findings,
@@ -59,7 +59,7 @@ def _heights(mesh: Mesh) -> Floats:
 
 
 def _typical(mesh: Mesh) -> tuple[Floats, float]:
-    """Return the middle of the mesh and the median distance from it, which no stray moves."""
+    """Return the median of the mesh and the median distance from it, both robust to strays."""
     some = mesh.positions[:: max(1, mesh.n_vertices // _SAMPLE)]
     center: Floats = np.median(some, axis=0)
     return center, float(np.median(np.abs(some - center).max(axis=1)))
@@ -84,7 +84,7 @@ def _flat(subject: Subject, flat: Bools) -> list[Finding]:
 def _doubled(subject: Subject, mesh: Mesh, whole: Indices) -> list[Finding]:
     rows = np.sort(mesh.triangles[whole], axis=1).astype(np.int64)
     keys = (rows[:, 0] * mesh.n_vertices + rows[:, 1]) * mesh.n_vertices + rows[:, 2]
-    if mesh.n_vertices > 2_000_000:  # the product of three would not fit
+    if mesh.n_vertices > 2_000_000:  # the product of three indices would overflow
         keys = np.unique(rows, axis=0, return_inverse=True)[1].ravel()
     order = np.argsort(keys, kind="stable")
     copies = whole[np.sort(order[1:][np.diff(keys[order]) == 0])]
@@ -102,7 +102,7 @@ def _doubled(subject: Subject, mesh: Mesh, whole: Indices) -> list[Finding]:
 
 
 def _crowded_edges(subject: Subject, mesh: Mesh, whole: Indices) -> list[Finding]:
-    """Report edges of more than two triangles, of vertices as listed: parts may touch."""
+    """Report non-manifold edges, between vertices as listed in the file: parts may touch."""
     edges = edges_of(mesh.triangles[whole].astype(np.int64))
     places = np.flatnonzero(edges.counts > 2)
     if len(places) == 0:
@@ -125,7 +125,7 @@ def _crowded_edges(subject: Subject, mesh: Mesh, whole: Indices) -> list[Finding
 
 
 def _edge_ends(triangles: Ints, places: Indices) -> Indices:
-    """Return the two vertices of edges, the smaller first; corner k begins edge 3 t + k. (N, 2)."""
+    """Return the two vertices of edges, the smaller first; corner k starts edge 3 t + k. (N, 2)."""
     rows, corners = np.divmod(places, 3)
     ends = np.stack([triangles[rows, corners], triangles[rows, (corners + 1) % 3]], axis=1)
     return np.sort(ends, axis=1).astype(np.int64)
@@ -134,7 +134,7 @@ def _edge_ends(triangles: Ints, places: Indices) -> Indices:
 def _sides(
     subject: Subject, mesh: Mesh, sound: Indices, corners: Indices, known: Bools
 ) -> list[Finding]:
-    """Report flipped triangles, components inside out or of one side, and open borders."""
+    """Report flipped triangles, inside-out or non-orientable components, and open borders."""
     edges = edges_of(corners)
     component, flipped, one_sided = orientations(len(corners), edges)
     findings = []
@@ -163,7 +163,7 @@ def _sides(
         )
     unsure = _beside_lost(subject, mesh)[mesh.triangles[sound]]
     border = (edges.counts == 1) & ~(unsure | np.roll(unsure, -1, axis=1)).ravel()
-    # Flipped ones are reported already; what the file does not say has no volume.
+    # Flipped triangles are reported already; components with missing data have no volume.
     signs = np.where(flipped, -1.0, 1.0) * known[sound]
     findings += _inside_out(subject, mesh, sound, component, signs, edges)
     return findings + _borders(subject, mesh, sound, border)
@@ -189,7 +189,7 @@ def _borders(subject: Subject, mesh: Mesh, sound: Indices, border: Bools) -> lis
 
 
 def _beside_lost(subject: Subject, mesh: Mesh) -> Bools:
-    """Return vertices whose triangles are not all there, or whose copies nobody can find: (V,)."""
+    """Return vertices with missing triangles, or whose coincident copies are unknown: (V,)."""
     lost = ~subject.sound("positions", mesh.n_vertices)
     lost[mesh.triangles[~subject.sound("triangles", mesh.n_triangles)]] = True
     return lost
@@ -203,7 +203,7 @@ def _inside_out(
     signs: Floats,
     edges: Edges,
 ) -> list[Finding]:
-    """Report closed components whose volume is negative, sum a . (b x c) / 6."""
+    """Report closed components with negative volume, sum a . (b x c) / 6."""
     count = len(sound)
     is_known = signs != 0.0
     members = np.bincount(component, is_known, minlength=count)
@@ -234,9 +234,9 @@ def _inside_out(
 
 
 def _open_edges(component: Indices, is_known: Bools, edges: Edges) -> Indices:
-    """Return how many edges of known triangles in each component have no known one beyond: (T,).
+    """Return each component's number of edges of valid triangles without a valid neighbour: (T,).
 
-    What the file lost closes nothing: the surface may well have ended there.
+    Missing triangles close nothing: the surface may have ended there.
     """
     alone = np.flatnonzero(np.repeat(is_known, 3) & (edges.counts == 1)) // 3
     beside = edges.pairs[is_known[edges.pairs].sum(axis=1) == 1, 0]
@@ -275,10 +275,10 @@ def _normals(subject: Subject, mesh: Mesh) -> list[Finding]:
 
 
 def _against(subject: Subject, mesh: Mesh, sound: Indices) -> list[Finding]:
-    """Report normals that point to the other side than every triangle of their vertex.
+    """Report normals that point to the opposite side of all triangles at their vertex.
 
-    Triangles without area face no side. The two sides of a thin sheet have vertices of their own,
-    or share them, and then each normal is with one side.
+    Triangles without area have no side. The two sides of a thin sheet have separate vertices,
+    or common ones, in which case each normal agrees with one side.
     """
     corners = mesh.triangles[sound]
     a, b, c = (mesh.positions[corners[:, k]] for k in range(3))
@@ -287,7 +287,7 @@ def _against(subject: Subject, mesh: Mesh, sound: Indices) -> list[Finding]:
     places, count = corners.ravel(), mesh.n_vertices
     numbers = np.bincount(places, minlength=count)
     opposed = np.bincount(places, cosines.ravel() < _AGAINST, minlength=count)
-    # Where triangles are lost, one of those may have agreed.
+    # If triangles are missing, one of them may have agreed.
     against = np.flatnonzero((numbers > 0) & (opposed == numbers) & ~_beside_lost(subject, mesh))
     if len(against) == 0:
         return []
