@@ -79,9 +79,9 @@ def lint_files(
         Messages of readers first, then results of checks, each with its file if known.
     """
     from viewer.formats import MAX_SIZE
-    from viewer.lint._opening import open_files, spoiled_parts, with_files
+    from viewer.lint._opening import invalid_parts, open_files, with_files
 
     size = MAX_SIZE if max_size is None else max_size
     opened = open_files(paths, settings, size, progress)
-    findings = lint_scene(opened.scene, options, progress, spoiled_parts(opened))
+    findings = lint_scene(opened.scene, options, progress, invalid_parts(opened))
     return opened.scene, with_files(opened, findings)

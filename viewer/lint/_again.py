@@ -156,10 +156,10 @@ def _same_part(actor: Actor, other: Actor, part: str) -> bool:
 
 def _same_mesh(one: Figure, two: Figure) -> bool:
     """Return whether vertices, triangles and weights are equal; textures are ignored."""
-    return _share(one.mesh, two.mesh, _MESH) and _share(one.skin, two.skin, _SKIN)
+    return _have_equal(one.mesh, two.mesh, _MESH) and _have_equal(one.skin, two.skin, _SKIN)
 
 
-def _share(one: object, two: object, names: tuple[str, ...]) -> bool:
+def _have_equal(one: object, two: object, names: tuple[str, ...]) -> bool:
     if one is None or two is None:
         return one is two
     return all(_alike(getattr(one, name), getattr(two, name)) for name in names)

@@ -164,7 +164,7 @@ class Subject:
         Thresholds of faults.
     counting : Counting or None
         Frame numbering of keyed clips; None for one of their own.
-    spoiled : mapping of str to (N,)
+    invalid : mapping of str to (N,)
         Data that a reader replaced because the file's own is invalid: vertices by
         ``"positions"`` and ``"weights"``, ``"triangles"``, joints by ``"bindings"`` and
         ``"joints"``, rows by ``"frames"``.
@@ -177,17 +177,17 @@ class Subject:
     up: Literal["y", "z"] = "y"
     options: LintOptions = field(default_factory=LintOptions)
     counting: Counting | None = None
-    spoiled: Mapping[str, Ints] = field(default_factory=dict)
+    invalid: Mapping[str, Ints] = field(default_factory=dict)
     # Results that several checks need are computed once: ``track_of`` caches them here.
     tracks: list[Track] = field(default_factory=list)
 
-    def sound(self, part: str, count: int) -> Bools:
+    def valid(self, part: str, count: int) -> Bools:
         """Return which items are valid data of the file.
 
         Parameters
         ----------
         part : str
-            A key of ``spoiled``.
+            A key of ``invalid``.
         count : int
             Number of items.
 
@@ -197,7 +197,7 @@ class Subject:
             False for items whose data is not the file's own.
         """
         result = np.ones(count, dtype=np.bool_)
-        lost = self.spoiled.get(part, _NONE)
+        lost = self.invalid.get(part, _NONE)
         result[lost[lost < count]] = False
         return result
 
@@ -206,14 +206,14 @@ class Subject:
         figure = self.actor.figure
         if figure.unit in METRES:
             return length_text(figure, length)
-        return f"{length:.3g} units" + self._share(length)
+        return f"{length:.3g} units" + self._relative(length)
 
     def speed(self, speed: float) -> str:
         """Return a speed as text: in metres per second if the unit is known."""
         unit = self.actor.figure.unit
         if unit in METRES:
             return f"{speed * METRES[unit]:.3g} m/s"
-        return f"{speed:.3g} units a second" + self._share(speed)
+        return f"{speed:.3g} units a second" + self._relative(speed)
 
     def size(self) -> float:
         """Return the diagonal of the bounding box of the mesh, or else of the joints at rest.
@@ -235,7 +235,7 @@ class Subject:
         near = np.linalg.norm(positions - inner.mean(axis=0), axis=1) < _FAR / 2 * usual
         return box_size(bounding_box(positions[near]))
 
-    def _share(self, length: float) -> str:
+    def _relative(self, length: float) -> str:
         size = self.size()
         return f" ({100.0 * length / size:.3g} % of its size)" if size > 0.0 else ""
 

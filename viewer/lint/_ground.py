@@ -22,7 +22,7 @@ _LONG = 0.1  # minimum seconds for which a foot rests
 _CALM = 0.006  # maximum vertical motion meanwhile; at the top of a jump a foot falls by 12 mm
 _MOST = 0.5  # fraction of these frames that must be this close to their mean
 _RESTS = 0.2  # fraction of all frames: with fewer at rest, equal heights may be chance
-_SHARE = 0.1  # fraction of the frames at rest that makes a level
+_FRACTION = 0.1  # fraction of the frames at rest that makes a level
 _TIE = 0.5  # fraction of the longest level's frames above which a likely level wins
 _CLEAR = 1.0 / 3.0  # fraction of the longest level's frames above which another level is a rival
 _ROLLS = 0.02  # from the longest level: a rolling foot makes others this close
@@ -100,7 +100,7 @@ def _guess(lowest: Floats, size: float, likely: Sequence[float]) -> float | None
 def _level_at(rests: Floats, height: float, size: float) -> list[Level]:
     """Return the level nearest to a height, if feet rest close to it."""
     near = rests[np.abs(rests - height) <= _CUSTOM * size]
-    levels = _levels(near, size) if len(near) >= _SHARE * len(rests) else ()
+    levels = _levels(near, size) if len(near) >= _FRACTION * len(rests) else ()
     return sorted(levels, key=lambda level: abs(level[0] - height))[:1]
 
 
@@ -138,11 +138,11 @@ def _levels(heights: Floats, size: float) -> tuple[Level, ...]:
     """Return the heights with high density, and their numbers of frames, the most first."""
     left = np.sort(heights)
     levels: list[Level] = []
-    while len(left) and len(left) >= _SHARE * len(heights):
+    while len(left) and len(left) >= _FRACTION * len(heights):
         ends = np.searchsorted(left, left + 2.0 * _ALIKE * size, side="right")
         counts = ends - np.arange(len(left))
         first = int(counts.argmax())
-        if counts[first] < _SHARE * len(heights):
+        if counts[first] < _FRACTION * len(heights):
             break
         level = float(np.median(left[first : ends[first]]))
         levels.append((level, int(counts[first])))

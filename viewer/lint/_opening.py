@@ -25,7 +25,7 @@ from viewer.rig.scene import Actor, Scene
 if TYPE_CHECKING:
     from viewer.loading.capturing import Builder
 
-__all__ = ["Opened", "Owners", "open_files", "spoiled_parts", "with_files"]
+__all__ = ["Opened", "Owners", "invalid_parts", "open_files", "with_files"]
 
 Owners = dict[str, int]
 """For each ``Finding.part``, the index of the opened actor that has the same part."""
@@ -333,12 +333,12 @@ _SPOILED = {"mesh": ("positions", "weights", "triangles", "bindings"),
 """Parts of a fault for each part of an actor."""
 
 
-def spoiled_parts(opened: Opened) -> list[dict[str, Ints]]:
+def invalid_parts(opened: Opened) -> list[dict[str, Ints]]:
     """Return the data of each actor that its readers replaced, see ``Subject``."""
-    return [_spoiled(actor, opened) for actor in opened.scene.actors]
+    return [_invalid(actor, opened) for actor in opened.scene.actors]
 
 
-def _spoiled(actor: Actor, opened: Opened) -> dict[str, Ints]:
+def _invalid(actor: Actor, opened: Opened) -> dict[str, Ints]:
     lost: dict[str, Ints] = {}
     for part, keys in _SPOILED.items():
         for path in _files_of(actor, part, opened.contents):

@@ -32,7 +32,7 @@ def some_poses(actor: Actor) -> list[Pose]:
     poses = [rest, actor.pose]
     if clip is not None and not isinstance(clip, PointClip):
         times = np.linspace(clip.start, clip.end, _COUNT)
-        frames = frames_of(figure, clip, times, actor.pose, fill=True)
+        frames = frames_of(figure, clip, times, actor.pose, interpolate=True)
         return poses + [
             pose_of(figure, frames, int(frame)) for frame in np.flatnonzero(frames.present)
         ]

@@ -52,7 +52,7 @@ def lint_scene(
     scene: Scene,
     options: LintOptions | None = None,
     progress: Progress | None = None,
-    spoiled: Sequence[Mapping[str, Ints]] = (),
+    invalid: Sequence[Mapping[str, Ints]] = (),
 ) -> list[Finding]:
     """Run all checks on an open scene.
 
@@ -65,7 +65,7 @@ def lint_scene(
     progress : callable, optional
         Called before every step with the completed steps, their number, and the next step; may
         raise to cancel.
-    spoiled : sequence of mappings, optional
+    invalid : sequence of mappings, optional
         For each actor, data that is not to be checked; see ``Subject``.
 
     Returns
@@ -78,7 +78,7 @@ def lint_scene(
     known: set[int] = set()
     steps: list[tuple[Subject, str]] = []
     for index, actor in enumerate(scene.actors):
-        lost = spoiled[index] if index < len(spoiled) else {}
+        lost = invalid[index] if index < len(invalid) else {}
         subject = Subject(actor, index, scene.up, chosen, counting, lost)
         is_new = id(actor.figure) not in known
         known.add(id(actor.figure))

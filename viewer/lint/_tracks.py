@@ -103,7 +103,7 @@ def _track(subject: Subject) -> Track | None:
         numbers = frame_numbers(subject, times)
     frames = frames_of(figure, clip, times, actor.pose)
     scale = float(np.cbrt(abs(np.linalg.det(actor.placement[:3, :3]))))
-    is_bound = figure.is_attached and not len(subject.spoiled.get("bindings", ()))
+    is_bound = figure.is_attached and not len(subject.invalid.get("bindings", ()))
     soles = soles_of(shaped(figure, frames.shape_weights[0]), is_bound) if count else None
     feet = np.zeros(0, dtype=np.int32) if soles is None else soles.joints
     joints, lowest = np.empty((count, skeleton.n_joints, 3)), np.empty((count, len(feet)))
@@ -154,7 +154,7 @@ def _known(subject: Subject, clip: Clip | SampledClip, count: int) -> Bools:
     if not isinstance(clip, SampledClip):
         return np.ones(count, dtype=np.bool_)
     rows = clip.timing.rows
-    return subject.sound("frames", clip.n_rows)[rows] | (rows < 0)
+    return subject.valid("frames", clip.n_rows)[rows] | (rows < 0)
 
 
 def _slice(frames: Frames, part: slice) -> Frames:

@@ -43,7 +43,7 @@ def check(subject: Subject) -> list[Finding]:
     skin = subject.actor.figure.skin
     if skin is None or skin.n_joints == 0:
         return []
-    known = subject.sound("bindings", skin.n_joints)
+    known = subject.valid("bindings", skin.n_joints)
     linear = np.where(known[:, None, None], skin.inverse_bind[:, :3, :3], np.eye(3))
     determinants = np.linalg.det(linear)
     flat = are_singular(linear)
@@ -94,7 +94,7 @@ def _elsewhere(subject: Subject, figure: Figure, usable: Bools) -> list[Finding]
     if skin is None or figure.mesh is None or skeleton is None:
         return []
     # If the position of a joint is unknown, so are those of the joints below it.
-    known = subject.sound("joints", skeleton.n_joints)
+    known = subject.valid("joints", skeleton.n_joints)
     for joint, parent in enumerate(skeleton.parents.tolist()):
         known[joint] &= parent < 0 or bool(known[parent])
     known &= usable

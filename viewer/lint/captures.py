@@ -11,11 +11,11 @@ from viewer.lint.clips import missing_frames
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.captures.points import PointClip
 
-__all__ = ["LOW_FRAMES", "LOW_SHARE", "check"]
+__all__ = ["LOW_FRACTION", "LOW_FRAMES", "check"]
 
 Indices = NDArray[np.int64]
 
-LOW_SHARE = 0.05
+LOW_FRACTION = 0.05
 """Fraction of the frames that see a keypoint: this much low confidence is usual."""
 
 LOW_FRAMES = 2
@@ -79,9 +79,9 @@ def _low(
     seen = confidence > 0.0
     is_low = seen & (confidence < subject.options.confidence)
     counts = is_low.sum(axis=0)
-    shares = counts / np.maximum(seen.sum(axis=0), 1)
-    points = np.flatnonzero((shares > LOW_SHARE) & (counts >= LOW_FRAMES))
-    points = points[np.argsort(-shares[points], kind="stable")]
+    fractions = counts / np.maximum(seen.sum(axis=0), 1)
+    points = np.flatnonzero((fractions > LOW_FRACTION) & (counts >= LOW_FRAMES))
+    points = points[np.argsort(-fractions[points], kind="stable")]
     limit, first_frame = subject.options.confidence, clip.timing.first_frame
     findings = []
     for point in points[:_SINGLE].tolist():
@@ -91,7 +91,7 @@ def _low(
                 "C011.point",
                 name=names[point],
                 limit=limit,
-                percent=100.0 * float(shares[point]),
+                percent=100.0 * float(fractions[point]),
                 n=int(seen[:, point].sum()),
                 frame=int(frames[0]) + first_frame,
                 part="clip",
@@ -100,7 +100,7 @@ def _low(
                 times=_times(subject, clip, frames),
             )
         )
-    return findings + _rarer(subject, clip, names, points[_SINGLE:], shares, numbers, is_low)
+    return findings + _rarer(subject, clip, names, points[_SINGLE:], fractions, numbers, is_low)
 
 
 def _rarer(
@@ -108,16 +108,16 @@ def _rarer(
     clip: PointClip,
     names: list[str],
     points: Indices,
-    shares: Floats,
+    fractions: Floats,
     numbers: Indices,
     is_low: Bools,
 ) -> list[Finding]:
-    """Report keypoints of low confidence together; ``shares`` (K,) are of the frames."""
+    """Report keypoints of low confidence together; ``fractions`` (K,) are of the frames."""
     if len(points) == 0:
         return []
     frames = numbers[is_low[:, points].any(axis=1)]
     shown = [
-        Phrase("low-point", name=names[point], percent=100.0 * float(shares[point]))
+        Phrase("low-point", name=names[point], percent=100.0 * float(fractions[point]))
         for point in points.tolist()
     ]
     return [

@@ -42,7 +42,7 @@ def check(subject: Subject) -> list[Finding]:
         return [*findings, subject.found("C010.one-time", time=float(clip.start), part="clip")]
     track = track_of(subject)
     assert track is not None  # there is a clip and a skeleton
-    return findings + _jumps(subject, track, skeleton) + _turns(subject, track, skeleton)
+    return findings + _jumps(subject, track, skeleton) + _fast_rotations(subject, track, skeleton)
 
 
 def missing_frames(subject: Subject, timing: Timing) -> list[Finding]:
@@ -157,7 +157,7 @@ def _jumps(subject: Subject, track: Track, skeleton: Skeleton) -> list[Finding]:
     ]
 
 
-def _turns(subject: Subject, track: Track, skeleton: Skeleton) -> list[Finding]:
+def _fast_rotations(subject: Subject, track: Track, skeleton: Skeleton) -> list[Finding]:
     rates = np.zeros((len(track.times), skeleton.n_joints))
     cosines = np.abs(np.einsum("fjq,fjq->fj", track.rotations[1:], track.rotations[:-1]))
     rates[1:] = 2.0 * np.arccos(np.minimum(cosines, 1.0)) / np.diff(track.times)[:, None]

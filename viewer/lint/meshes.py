@@ -32,21 +32,21 @@ def check(subject: Subject) -> list[Finding]:
     if mesh is None:
         return []
     findings = [*_normals(subject, mesh), *_vertices(subject, mesh)]
-    whole = subject.sound("triangles", mesh.n_triangles)
+    whole = subject.valid("triangles", mesh.n_triangles)
     if not whole.any():
         return findings
-    known = subject.sound("positions", mesh.n_vertices)[mesh.triangles].all(axis=1) & whole
+    known = subject.valid("positions", mesh.n_vertices)[mesh.triangles].all(axis=1) & whole
     flat = (_heights(mesh) <= _FLAT * _typical(mesh)[1]) & known
-    sound = np.flatnonzero(~flat & whole)
+    valid = np.flatnonzero(~flat & whole)
     # Triangles without area have no neighbours and no sides.
-    corners = welded(mesh.positions, mesh.triangles)[sound]
+    corners = welded(mesh.positions, mesh.triangles)[valid]
     return [
         *findings,
         *_against(subject, mesh, np.flatnonzero(~flat & known)),
         *_flat(subject, flat),
         *_doubled(subject, mesh, np.flatnonzero(whole)),
         *_crowded_edges(subject, mesh, np.flatnonzero(whole)),
-        *_sides(subject, mesh, sound, corners, known),
+        *_sides(subject, mesh, valid, corners, known),
     ]
 
 
@@ -132,14 +132,14 @@ def _edge_ends(triangles: Ints, places: Indices) -> Indices:
 
 
 def _sides(
-    subject: Subject, mesh: Mesh, sound: Indices, corners: Indices, known: Bools
+    subject: Subject, mesh: Mesh, valid: Indices, corners: Indices, known: Bools
 ) -> list[Finding]:
     """Report flipped triangles, inside-out or non-orientable components, and open borders."""
     edges = edges_of(corners)
     component, flipped, one_sided = orientations(len(corners), edges)
     findings = []
     if flipped.any():
-        triangles = sound[flipped]
+        triangles = valid[flipped]
         findings.append(
             subject.found(
                 "M002.triangles",
@@ -151,7 +151,7 @@ def _sides(
             )
         )
     if one_sided.any():
-        triangles = sound[one_sided]
+        triangles = valid[one_sided]
         findings.append(
             subject.found(
                 "M012.surface",
@@ -161,18 +161,18 @@ def _sides(
                 at=("triangles", int(triangles[0])),
             )
         )
-    unsure = _beside_lost(subject, mesh)[mesh.triangles[sound]]
+    unsure = _beside_lost(subject, mesh)[mesh.triangles[valid]]
     border = (edges.counts == 1) & ~(unsure | np.roll(unsure, -1, axis=1)).ravel()
     # Flipped triangles are reported already; components with missing data have no volume.
-    signs = np.where(flipped, -1.0, 1.0) * known[sound]
-    findings += _inside_out(subject, mesh, sound, component, signs, edges)
-    return findings + _borders(subject, mesh, sound, border)
+    signs = np.where(flipped, -1.0, 1.0) * known[valid]
+    findings += _inside_out(subject, mesh, valid, component, signs, edges)
+    return findings + _borders(subject, mesh, valid, border)
 
 
-def _borders(subject: Subject, mesh: Mesh, sound: Indices, border: Bools) -> list[Finding]:
+def _borders(subject: Subject, mesh: Mesh, valid: Indices, border: Bools) -> list[Finding]:
     if not border.any():
         return []
-    ends = _edge_ends(mesh.triangles[sound], np.flatnonzero(border))
+    ends = _edge_ends(mesh.triangles[valid], np.flatnonzero(border))
     vertices = np.unique(ends)
     first = ends[np.lexsort(ends.T[::-1])[0]]
     return [
@@ -182,7 +182,7 @@ def _borders(subject: Subject, mesh: Mesh, sound: Indices, border: Bools) -> lis
             vertex=int(first[0]),
             other=int(first[1]),
             vertices=vertices,
-            triangles=sound[np.unique(np.flatnonzero(border) // 3)],
+            triangles=valid[np.unique(np.flatnonzero(border) // 3)],
             at=("positions", int(first[0])),
         )
     ]
@@ -190,37 +190,37 @@ def _borders(subject: Subject, mesh: Mesh, sound: Indices, border: Bools) -> lis
 
 def _beside_lost(subject: Subject, mesh: Mesh) -> Bools:
     """Return vertices with missing triangles, or whose coincident copies are unknown: (V,)."""
-    lost = ~subject.sound("positions", mesh.n_vertices)
-    lost[mesh.triangles[~subject.sound("triangles", mesh.n_triangles)]] = True
+    lost = ~subject.valid("positions", mesh.n_vertices)
+    lost[mesh.triangles[~subject.valid("triangles", mesh.n_triangles)]] = True
     return lost
 
 
 def _inside_out(
     subject: Subject,
     mesh: Mesh,
-    sound: Indices,
+    valid: Indices,
     component: Indices,
     signs: Floats,
     edges: Edges,
 ) -> list[Finding]:
     """Report closed components with negative volume, sum a . (b x c) / 6."""
-    count = len(sound)
+    count = len(valid)
     is_known = signs != 0.0
     members = np.bincount(component, is_known, minlength=count)
     open_edges = _open_edges(component, is_known, edges)
-    centers = mesh.positions[mesh.triangles[sound]].mean(axis=1)
+    centers = mesh.positions[mesh.triangles[valid]].mean(axis=1)
     sums = [
         np.bincount(component, centers[:, axis] * is_known, minlength=count) for axis in range(3)
     ]
     middle = np.stack(sums, axis=1) / np.maximum(members, 1)[:, None]
-    a, b, c = (mesh.positions[mesh.triangles[sound, k]] - middle[component] for k in range(3))
+    a, b, c = (mesh.positions[mesh.triangles[valid, k]] - middle[component] for k in range(3))
     volumes = signs * np.einsum("ta,ta->t", a, np.cross(b, c))
     total = np.bincount(component, volumes, minlength=count)
     is_closed = open_edges**2 <= _CLOSED * members
     wrong = np.flatnonzero((total < 0.0) & is_closed & (members >= 4))
     if len(wrong) == 0:
         return []
-    triangles = sound[np.isin(component, wrong)]
+    triangles = valid[np.isin(component, wrong)]
     return [
         subject.found(
             "M003.parts",
@@ -274,13 +274,13 @@ def _normals(subject: Subject, mesh: Mesh) -> list[Finding]:
     return findings
 
 
-def _against(subject: Subject, mesh: Mesh, sound: Indices) -> list[Finding]:
+def _against(subject: Subject, mesh: Mesh, valid: Indices) -> list[Finding]:
     """Report normals that point to the opposite side of all triangles at their vertex.
 
     Triangles without area have no side. The two sides of a thin sheet have separate vertices,
     or common ones, in which case each normal agrees with one side.
     """
-    corners = mesh.triangles[sound]
+    corners = mesh.triangles[valid]
     a, b, c = (mesh.positions[corners[:, k]] for k in range(3))
     facing = unit(np.cross(b - a, c - a))
     cosines = np.einsum("tka,ta->tk", unit(mesh.normals)[corners], facing)

@@ -78,7 +78,7 @@ def _names(subject: Subject, skeleton: Skeleton) -> list[Finding]:
 def _rest(subject: Subject, skeleton: Skeleton) -> list[Finding]:
     labels = joint_labels(skeleton)
     findings = []
-    known = subject.sound("joints", skeleton.n_joints)
+    known = subject.valid("joints", skeleton.n_joints)
     lengths = np.linalg.norm(skeleton.rest_rotations, axis=1)
     odd = np.flatnonzero((np.abs(lengths - 1.0) > _UNIT) & known)
     if len(odd):

@@ -39,8 +39,8 @@ def check(subject: Subject) -> list[Finding]:
 def _known(subject: Subject, figure: Figure, part: str) -> Bools:
     """Return the vertices that can be compared: they and their partners are valid. (V,)."""
     assert figure.symmetry is not None  # checked by the caller
-    sound = subject.sound(part, len(figure.symmetry))
-    known: Bools = sound & sound[figure.symmetry]
+    valid = subject.valid(part, len(figure.symmetry))
+    known: Bools = valid & valid[figure.symmetry]
     return known
 
 

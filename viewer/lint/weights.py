@@ -28,7 +28,7 @@ def check(subject: Subject) -> list[Finding]:
     if figure.skin is None or figure.mesh is None:
         return []
     # Weights missing from the file are neither too few nor too many.
-    known = subject.sound("weights", figure.skin.n_vertices)
+    known = subject.valid("weights", figure.skin.n_vertices)
     moved = has_influence(figure.skin)
     return [
         *_sums(subject, figure.skin, moved & known),
@@ -128,7 +128,7 @@ def _bare(subject: Subject, skin: Skin, mesh: Mesh, moved: Bools) -> list[Findin
 def _idle_joints(subject: Subject, figure: Figure, skin: Skin) -> list[Finding]:
     strengths = np.bincount(skin.joints, np.abs(skin.weights), minlength=skin.n_joints)
     idle = np.flatnonzero(strengths == 0.0)
-    if len(idle) == 0 or len(subject.spoiled.get("weights", ())):
+    if len(idle) == 0 or len(subject.invalid.get("weights", ())):
         return []  # missing weights may have belonged to these joints
     labels = [_label(subject, int(joint)) for joint in idle]
     at = ("bindings", int(idle[0]))
@@ -158,7 +158,7 @@ def _crowded(subject: Subject, figure: Figure, known: Bools) -> list[Finding]:
     plain = merged(skin)
     used = np.bincount(owners(plain), plain.weights != 0.0, minlength=plain.n_vertices)
     used[~known] = 0.0
-    can_pose = figure.is_attached and not len(subject.spoiled.get("joints", ()))
+    can_pose = figure.is_attached and not len(subject.invalid.get("joints", ()))
     findings = []
     for code, limit in (("W007", 4), ("W008", 8)):
         crowded = np.flatnonzero(used > limit)
@@ -208,11 +208,11 @@ def _cost(
 
 def _posable(subject: Subject, skin: Skin) -> Bools:
     """Return the vertices whose posed position is known: they and all their joints are valid."""
-    lost = ~subject.sound("bindings", skin.n_joints) | are_singular(skin.inverse_bind)
+    lost = ~subject.valid("bindings", skin.n_joints) | are_singular(skin.inverse_bind)
     # A joint of weight 0 moves nothing.
     holds = lost[skin.joints] & (skin.weights != 0.0)
     held = np.bincount(owners(skin), holds, minlength=skin.n_vertices)
-    return subject.sound("positions", skin.n_vertices) & (held == 0)
+    return subject.valid("positions", skin.n_vertices) & (held == 0)
 
 
 def _cut_errors(subject: Subject, limit: int) -> tuple[Floats, int]:
