@@ -179,7 +179,7 @@ def _at_rest(
     palette = skinning_matrices(world_matrices(skeleton, pose), skin.inverse_bind)
     posed = target.positions - pose.figure_translation
     found = invert_skinning(posed, skin, palette)
-    positions = repair_tears(found, posed, target.triangles) if how.mends else found.positions
+    positions = repair_tears(found, posed, target.triangles) if how.repairs else found.positions
     correctives = _correctives(template, weights, target, scale) if how.correctives else None
     if correctives is not None:
         # The pose's effect on the rest mesh is removed here, and added back when posing.

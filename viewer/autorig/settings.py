@@ -43,7 +43,7 @@ class TransferSettings:
         proportions differ from the target's.
     correctives : bool
         Whether pose correctives of the template are transferred.
-    mends : bool
+    repairs : bool
         Whether the neighbourhoods of singular vertices are smoothed.
     """
 
@@ -53,7 +53,7 @@ class TransferSettings:
     joints: str = "carried"
     fits: bool = True
     correctives: bool = True
-    mends: bool = True
+    repairs: bool = True
 
     def __post_init__(self) -> None:
         for name, known in (("method", tuple(METHODS)), ("joints", JOINTS)):

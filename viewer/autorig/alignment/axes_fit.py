@@ -51,16 +51,16 @@ def fit_axes(
             break
         before = scales
         columns = _columns(pairs.points, similarity.rotation, before, rotations, own)
-        found, turn, shift = _solved(pairs, columns)
+        found, vector, shift = _solved(pairs, columns)
         if (found <= 0.0).any():
             break
         scales = found
         scale = float(np.cbrt(np.prod(scales)))
-        rotation = rotation_vector_to_matrix(turn) @ similarity.rotation
+        rotation = rotation_vector_to_matrix(vector) @ similarity.rotation
         factors, own_factors = np.ones(3), np.ones(3)
         (own_factors if own else factors)[:] = scales / scale
         similarity = Similarity(scale, rotation, shift, factors, own_factors)
-        if max(np.abs(scales / before - 1.0).max(), float(np.linalg.norm(turn))) < SETTLED:
+        if max(np.abs(scales / before - 1.0).max(), float(np.linalg.norm(vector))) < SETTLED:
             break
     return similarity
 
@@ -90,5 +90,5 @@ def _solved(pairs: Pairs, columns: Floats) -> tuple[Floats, Floats, Floats]:
     rows = np.concatenate([along, HOLD * columns.reshape(-1, columns.shape[2])])
     values = np.einsum("na,na->n", pairs.normals, pairs.targets)
     solved = np.linalg.lstsq(rows, np.concatenate([values, HOLD * pairs.targets.ravel()]))[0]
-    turn = solved[6:] if len(solved) > 6 else np.zeros(3)
-    return solved[:3], turn, solved[3:6]
+    vector = solved[6:] if len(solved) > 6 else np.zeros(3)
+    return solved[:3], vector, solved[3:6]

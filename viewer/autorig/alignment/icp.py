@@ -257,12 +257,12 @@ def _step(similarity: Similarity, moved: Floats, pairs: Pairs, scales: bool) -> 
     rows = np.concatenate([along, HOLD * whole.reshape(-1, whole.shape[2])])
     values = np.einsum("na,na->n", pairs.normals, gaps)
     solved = np.linalg.lstsq(rows, np.concatenate([values, HOLD * gaps.ravel()]))[0]
-    turn = rotation_vector_to_matrix(solved[:3])
+    rotation = rotation_vector_to_matrix(solved[:3])
     grow = 1.0 + (float(solved[6]) if scales else 0.0)
     grow = min(max(grow, 0.5), 2.0)  # beyond this the linearisation is invalid
-    shift = grow * turn @ (similarity.shift - center) + center + size * solved[3:6]
+    shift = grow * rotation @ (similarity.shift - center) + center + size * solved[3:6]
     return Similarity(
-        grow * similarity.scale, turn @ similarity.rotation, shift, similarity.factors
+        grow * similarity.scale, rotation @ similarity.rotation, shift, similarity.factors
     )
 
 

@@ -100,7 +100,7 @@ def axis_rotations(
             continue
         if facing is None or (matrix @ axis_direction(forward) == axis_direction(facing)).all():
             rotations.append(matrix)
-    return sorted(rotations, key=lambda turn: -float(np.trace(turn)))
+    return sorted(rotations, key=lambda rotation: -float(np.trace(rotation)))
 
 
 def unit_scale(ratio: float) -> float:
@@ -134,8 +134,8 @@ def in_place(template: Cloud, target: Cloud, rotations: list[Floats], scaled: bo
     """
     few = target.samples.positions[:: max(1, len(target.samples.positions) // _IN_PLACE)]
     found = []
-    for unit, turn in product(_UNITS if scaled else (1.0,), rotations):
-        similarity = Similarity(unit, turn, np.zeros(3), np.ones(3))
+    for unit, rotation in product(_UNITS if scaled else (1.0,), rotations):
+        similarity = Similarity(unit, rotation, np.zeros(3), np.ones(3))
         near = similarity.apply(template.find(similarity.undo(few)).positions)
         error = _trimmed_mean(np.linalg.norm(near - few, axis=1)) / target.size
         found.append(Candidate(similarity, error))
@@ -173,9 +173,9 @@ def search(
     start = unit_scale(_radius(theirs) / _radius(ours)) if scale is None else scale
     few = [_thinned(side, 300) for side in (template, target)]
     found = []
-    for index, turn in enumerate(rotations):
-        shift = theirs.mean(axis=0) - start * turn @ ours.mean(axis=0)
-        begun = Similarity(start, turn, shift, np.ones(3))
+    for index, rotation in enumerate(rotations):
+        shift = theirs.mean(axis=0) - start * rotation @ ours.mean(axis=0)
+        begun = Similarity(start, rotation, shift, np.ones(3))
         similarity = iterate(few[0], few[1], begun, _QUICK, scales=scale is None)
         found.append(judge(few[0], few[1], similarity))
         report(0.6 * (index + 1) / len(rotations))

@@ -164,10 +164,10 @@ def _moved(template: Figure, limbs: Limbs, state: Fitted, step: PoseStep) -> Fit
     pose = state.pose.copy()
     _rotate_joints(skeleton, pose, similarity, step.rotation_vectors)
     figure = resized(template, limbs, *np.exp(growths))
-    turn, growth = rotation_vector_to_matrix(step.turn), float(np.exp(step.growth))
-    shift = growth * turn @ (similarity.shift - step.middle) + step.middle + step.shift
+    rotation, growth = rotation_vector_to_matrix(step.rotation), float(np.exp(step.growth))
+    shift = growth * rotation @ (similarity.shift - step.middle) + step.middle + step.shift
     moved = Similarity(
-        growth * similarity.scale, turn @ similarity.rotation, shift, similarity.factors
+        growth * similarity.scale, rotation @ similarity.rotation, shift, similarity.factors
     )
     return Fitted(figure, pose, moved, state.rotated + step.rotation_vectors, growths)
 

@@ -88,7 +88,7 @@ class PoseStep:
     ----------
     middle : (3,)
         Centre of rotation and growth of the whole.
-    turn, shift : (3,)
+    rotation, shift : (3,)
         Rotation vector and shift of the whole; the shift in the target's unit.
     growth : float
         Logarithm of the whole's scale.
@@ -99,7 +99,7 @@ class PoseStep:
     """
 
     middle: Floats
-    turn: Floats
+    rotation: Floats
     shift: Floats
     growth: float
     rotation_vectors: Floats

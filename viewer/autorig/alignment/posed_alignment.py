@@ -172,8 +172,8 @@ def _if_better(
     is_part = rigid.away > PART
     before = misfit(rigid, is_part)
     found = _fitted(job, rigid, lambda fraction: report(0.5 + 0.25 * fraction, "pose"))
-    may_turn = rigid.how in _FOUND and job.settings.facing is None and not is_part
-    if may_turn and misfit(found.alignment, False) > _SURE:
+    may_face_back = rigid.how in _FOUND and job.settings.facing is None and not is_part
+    if may_face_back and misfit(found.alignment, False) > _SURE:
         behind = _facing_back(job, ours, rigid, job.template.up)
         if misfit(behind, False) < _ALIKE * before:
             other = _fitted(job, behind, lambda fraction: report(0.75 + 0.25 * fraction, "pose"))
