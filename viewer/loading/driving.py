@@ -210,8 +210,8 @@ def _begin_capture(
     # EasyMocap's usual calibration has z up, which needs no message.
     up = settings.up or capture.up or _judged_up(path, builder.actors, cast, usual="z")
     builder.place(up)
-    turn = builder.placement[:3, :3].T
-    cast.views += [replace(view, rotation=view.rotation @ turn) for view in capture.views]
+    to_capture = builder.placement[:3, :3].T
+    cast.views += [replace(view, rotation=view.rotation @ to_capture) for view in capture.views]
     for actor in builder.actors:
         cast.add(actor, up[-1], placed=True)
     cast.builders.append(builder)

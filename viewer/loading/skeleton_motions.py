@@ -77,7 +77,7 @@ def give_skeleton_motion(
     motion = _as_asked(motion, settings)
     for note in motion.up_notes:
         cast.note("F007.up-taken", path, note=note)
-    turn = rotation_transform(0, np.pi) if settings.up.startswith("-") else np.eye(4)
+    placement = rotation_transform(0, np.pi) if settings.up.startswith("-") else np.eye(4)
     if settings.drives and model is not None:
         try:
             clip, notes = retarget(motion, model)
@@ -86,12 +86,14 @@ def give_skeleton_motion(
             raise RigError(Diagnostic("F004.model", path, values=values)) from None
         cast.diagnostics += [replace(note, path=path) for note in notes]
         called = cast.free_title(motion.figure.name)
-        cast.add(Actor(model, clip=clip, placement=turn, called=called), model.up, placed=False)
+        cast.add(
+            Actor(model, clip=clip, placement=placement, called=called), model.up, placed=False
+        )
         return None
-    if settings.drives and _drives_somebody(path, motion, cast, turn):
+    if settings.drives and _drives_somebody(path, motion, cast, placement):
         return None
     called = cast.free_title(motion.figure.name)
-    actor = Actor(motion.figure, clip=motion.clip, placement=turn, called=called)
+    actor = Actor(motion.figure, clip=motion.clip, placement=placement, called=called)
     cast.add(actor, motion.figure.up, placed=False)
     return Lone(path, motion, actor)
 
@@ -118,7 +120,7 @@ def _in_metres(motion: SkeletonMotion, unit: str, fact: str) -> SkeletonMotion:
     return replace(scaled, figure=replace(scaled.figure, facts=kept), unit_note="")
 
 
-def _drives_somebody(path: Path, motion: SkeletonMotion, cast: Cast, turn: Floats) -> bool:
+def _drives_somebody(path: Path, motion: SkeletonMotion, cast: Cast, placement: Floats) -> bool:
     """Assign a motion to the first figure with a mesh and no clip that it fits, if any."""
     refusal = ""
     for actor in cast.actors:
@@ -129,7 +131,7 @@ def _drives_somebody(path: Path, motion: SkeletonMotion, cast: Cast, turn: Float
         except RigError as problem:
             refusal = refusal or str(problem)
             continue
-        actor.placement = turn @ actor.placement
+        actor.placement = placement @ actor.placement
         cast.diagnostics += [replace(note, path=path) for note in notes]
         return True
     if refusal:
