@@ -21,7 +21,7 @@ from viewer.rig.geometry.rotation import axis_rotations, matrix_to_euler, quater
 from viewer.rig.pose import Pose
 from viewer.rig.skeleton import Skeleton
 
-__all__ = ["Turned", "nearest_dofs", "rotation_dofs", "turns_freely"]
+__all__ = ["RotationFit", "nearest_dofs", "rotates_freely", "rotation_dofs"]
 
 _FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
 _SWEEPS = 200
@@ -31,7 +31,7 @@ _TURN = 2.0 * math.pi
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Turned:
+class RotationFit:
     """Result of fitting a joint's DOFs to a rotation.
 
     Attributes
@@ -72,14 +72,14 @@ def rotation_dofs(skeleton: Skeleton, joint: int, free: bool = False) -> Ints:
     return np.flatnonzero(chosen).astype(np.int32)
 
 
-def turns_freely(skeleton: Skeleton, joint: int) -> bool:
+def rotates_freely(skeleton: Skeleton, joint: int) -> bool:
     """Return whether a joint has three free rotations about three different axes, in any order."""
     kinds = skeleton.dof_kinds[rotation_dofs(skeleton, joint, free=True)]
     every = skeleton.dof_kinds[rotation_dofs(skeleton, joint)]
     return len(kinds) == len(every) == 3 and len(set(kinds.tolist())) == 3
 
 
-def nearest_dofs(skeleton: Skeleton, pose: Pose, joint: int, rotation: Floats) -> Turned:
+def nearest_dofs(skeleton: Skeleton, pose: Pose, joint: int, rotation: Floats) -> RotationFit:
     """Return the DOFs that rotate a joint as close to a rotation as possible.
 
     Parameters
@@ -95,7 +95,7 @@ def nearest_dofs(skeleton: Skeleton, pose: Pose, joint: int, rotation: Floats) -
 
     Returns
     -------
-    Turned
+    RotationFit
         Exact if limits and axes allow it.
     """
     rows = rotation_dofs(skeleton, joint)
@@ -107,7 +107,7 @@ def nearest_dofs(skeleton: Skeleton, pose: Pose, joint: int, rotation: Floats) -
     dofs[rows] = values = solver.best()
     error = solver.error(values)
     at_limit = ((values <= low) | (values >= high)) & (error > 1e-6)
-    return Turned(dofs, error, rows[at_limit])
+    return RotationFit(dofs, error, rows[at_limit])
 
 
 class _Solver:

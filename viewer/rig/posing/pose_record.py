@@ -18,11 +18,11 @@ from viewer.rig.hands import Hand, hand_vectors
 from viewer.rig.pose import Pose
 from viewer.rig.posing.pose_vector import read_vector, set_joint_rotations, write_vector
 from viewer.rig.retargeting.pose_transfer import (
-    JointTurns,
-    joint_turns,
+    JointRotations,
+    has_layout_of,
+    relative_rotations,
     restore_beneath,
-    shares_layout,
-    turn_joints,
+    rotate_joints,
 )
 from viewer.rig.skeleton import DOF_KINDS, Skeleton, clamp_dofs, dof_labels, find_dof
 from viewer.rig.smpl_family import members_by_numbers
@@ -68,7 +68,7 @@ class PoseRecord:
         Whether hand poses are relative to the flat hand. None: only coefficients add the mean.
     hand_coefficients : bool or None
         Whether hand poses are coefficients; None: unless there are 45 numbers.
-    turns : JointTurns or None
+    turns : JointRotations or None
         Used by a figure with other DOFs instead of the numbers: its joints of the same names are
         rotated equally; its placement, size and shape are unchanged. Figures with the same DOFs
         use everything else, as far as they have the blend shapes.
@@ -86,7 +86,7 @@ class PoseRecord:
     scale: float | None = None
     flat_hands: bool | None = None
     hand_coefficients: bool | None = None
-    turns: JointTurns | None = None
+    turns: JointRotations | None = None
     line_of: Callable[[str, str], int | None] | None = None
 
 
@@ -139,7 +139,7 @@ def record_of(figure: Figure, pose: Pose) -> PoseRecord:
         expression=weights[~is_shape] if (~is_shape).any() else None,
         translation=pose.figure_translation.copy(),
         scale=pose.figure_scale,
-        turns=joint_turns(figure, pose),
+        turns=relative_rotations(figure, pose),
     )
 
 
@@ -176,8 +176,8 @@ def apply_record(
     skeleton = figure.skeleton
     if skeleton is None:
         raise RigError(f"figure {figure.name} has no skeleton to pose")
-    if record.turns is not None and not shares_layout(record.turns, figure):
-        work, notes = turn_joints(record.turns, figure, pose)
+    if record.turns is not None and not has_layout_of(record.turns, figure):
+        work, notes = rotate_joints(record.turns, figure, pose)
         _take_over(work, pose)
         return notes + _left_as_they_were(record)
     work = pose.copy()

@@ -30,13 +30,13 @@ from viewer.rig.posing.joint_rotation import nearest_dofs
 from viewer.rig.skeleton import Skeleton
 
 __all__ = [
-    "JointTurns",
+    "JointRotations",
     "dof_layout",
-    "joint_turns",
+    "has_layout_of",
     "joints_by_name",
+    "relative_rotations",
     "restore_beneath",
-    "shares_layout",
-    "turn_joints",
+    "rotate_joints",
 ]
 
 _INEXACT = 1e-4  # radians: a rotation with a smaller error counts as reached
@@ -44,7 +44,7 @@ _REST_DIGITS = 5  # decimals to which equal rest rotations agree
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class JointTurns:
+class JointRotations:
     """Joint rotations of a posed figure, independent of its DOFs.
 
     Attributes
@@ -53,7 +53,7 @@ class JointTurns:
         Name of the figure.
     names : tuple of J str
         Names of its joints.
-    turns : (J, 4)
+    relative : (J, 4)
         Relative to the rest pose, in the figure's axes: quaternions (x, y, z, w).
     shifts : (J, 3)
         Translations in addition to the DOFs, in the parent joint's frame.
@@ -67,14 +67,14 @@ class JointTurns:
 
     figure: str
     names: tuple[str, ...]
-    turns: Floats
+    relative: Floats
     shifts: Floats
     up: str
     layout: str
     rotations: Floats | None = None
 
 
-def joint_turns(figure: Figure, pose: Pose) -> JointTurns:
+def relative_rotations(figure: Figure, pose: Pose) -> JointRotations:
     """Return the joint rotations of a posed figure.
 
     Parameters
@@ -85,8 +85,10 @@ def joint_turns(figure: Figure, pose: Pose) -> JointTurns:
         Of that figure.
     """
     skeleton = figure.require_skeleton()
-    turns = _turned(skeleton, pose) @ np.swapaxes(_turned(skeleton, _unturned(skeleton)), 1, 2)
-    return JointTurns(
+    turns = _figure_rotations(skeleton, pose) @ np.swapaxes(
+        _figure_rotations(skeleton, _with_zero_dofs(skeleton)), 1, 2
+    )
+    return JointRotations(
         figure.name,
         skeleton.names,
         matrix_to_quaternion(turns),
@@ -120,12 +122,12 @@ def dof_layout(figure: Figure) -> str:
     return hashlib.sha256(b"|".join(parts)).hexdigest()[:16]
 
 
-def shares_layout(source: JointTurns, figure: Figure) -> bool:
+def has_layout_of(source: JointRotations, figure: Figure) -> bool:
     """Return whether a figure can take a pose's DOFs directly, not only its joint rotations.
 
     Parameters
     ----------
-    source : JointTurns
+    source : JointRotations
         Of the pose.
     figure : Figure
         With a skeleton.
@@ -135,7 +137,7 @@ def shares_layout(source: JointTurns, figure: Figure) -> bool:
     return source.layout == dof_layout(figure) and source.names == skeleton.names
 
 
-def restore_beneath(skeleton: Skeleton, pose: Pose, source: JointTurns, is_whole: bool) -> None:
+def restore_beneath(skeleton: Skeleton, pose: Pose, source: JointRotations, is_whole: bool) -> None:
     """Restore the source's base rotations and translations, those beneath the DOFs, in place.
 
     They differ from the rest pose where a motion rotates a joint about axes that its DOFs lack.
@@ -147,7 +149,7 @@ def restore_beneath(skeleton: Skeleton, pose: Pose, source: JointTurns, is_whole
         Of a figure with the source's layout.
     pose : Pose
         Its DOFs are not changed.
-    source : JointTurns
+    source : JointRotations
         Provides the base rotations and translations.
     is_whole : bool
         Whether the source's pose is applied with every DOF: joints that it does not mention are
@@ -182,12 +184,14 @@ def joints_by_name(source: Sequence[str], target: Sequence[str]) -> Ints:
     )
 
 
-def turn_joints(source: JointTurns, target: Figure, start: Pose) -> tuple[Pose, list[Diagnostic]]:
+def rotate_joints(
+    source: JointRotations, target: Figure, start: Pose
+) -> tuple[Pose, list[Diagnostic]]:
     """Return a figure's pose with the joints rotated like those of another figure.
 
     Parameters
     ----------
-    source : JointTurns
+    source : JointRotations
         Joint rotations of the other figure.
     target : Figure
         With a skeleton.
@@ -215,15 +219,15 @@ def turn_joints(source: JointTurns, target: Figure, start: Pose) -> tuple[Pose, 
     if not len(found):
         whose = printable(source.figure) or "the pose"
         raise RigError(f"{whose} and {target.name} have no joint name in common")
-    turn = _up_turn(source.up, target.up)
-    deltas = turn @ quaternion_to_matrix(source.turns[partners[found]]) @ turn.T
-    rest = _turned(other, _unturned(other))
+    to_target = _up_rotation(source.up, target.up)
+    deltas = to_target @ quaternion_to_matrix(source.relative[partners[found]]) @ to_target.T
+    rest = _figure_rotations(other, _with_zero_dofs(other))
     wanted = dict(zip(found.tolist(), deltas @ rest[found], strict=True))
-    moved, missed = _turn_joints(other, start, wanted)
+    moved, missed = _rotate_joints(other, start, wanted)
     return moved, _notes(source, target, partners, missed)
 
 
-def _turn_joints(
+def _rotate_joints(
     skeleton: Skeleton, start: Pose, wanted: dict[int, Floats]
 ) -> tuple[Pose, list[int]]:
     """Rotate joints to world rotations; return the pose, and the joints that cannot reach them."""
@@ -236,15 +240,15 @@ def _turn_joints(
         world[joint] = wanted.get(joint, above @ present[joint])
         if joint in wanted:
             pose.rotations[joint] = skeleton.rest_rotations[joint]
-            turned = nearest_dofs(skeleton, pose, joint, above.T @ world[joint])
-            pose.dofs[:] = turned.dofs
-            if turned.error > _INEXACT:
+            fitted = nearest_dofs(skeleton, pose, joint, above.T @ world[joint])
+            pose.dofs[:] = fitted.dofs
+            if fitted.error > _INEXACT:
                 missed.append(joint)
     return pose, missed
 
 
 def _notes(
-    source: JointTurns, target: Figure, partners: Ints, missed: list[int]
+    source: JointRotations, target: Figure, partners: Ints, missed: list[int]
 ) -> list[Diagnostic]:
     """Return messages about the transferred joints."""
     skeleton = target.skeleton
@@ -263,13 +267,13 @@ def _notes(
     return notes
 
 
-def _unturned(skeleton: Skeleton) -> Pose:
+def _with_zero_dofs(skeleton: Skeleton) -> Pose:
     pose = rest_pose(skeleton)
     pose.dofs[:] = 0.0
     return pose
 
 
-def _turned(skeleton: Skeleton, pose: Pose) -> Floats:
+def _figure_rotations(skeleton: Skeleton, pose: Pose) -> Floats:
     """Return every joint's rotation in the figure's axes: (J, 3, 3)."""
     world = joint_rotations(skeleton, pose)
     for joint, parent in enumerate(skeleton.parents):
@@ -278,7 +282,7 @@ def _turned(skeleton: Skeleton, pose: Pose) -> Floats:
     return world
 
 
-def _up_turn(source: str, target: str) -> Floats:
+def _up_rotation(source: str, target: str) -> Floats:
     """Return the rotation from one figure's axes to the other's: y up to z up is (x, -z, y)."""
     to_z = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
     if source == target:

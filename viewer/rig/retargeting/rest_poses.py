@@ -47,14 +47,14 @@ class RestPose:
     up: Floats
 
 
-def rest_of(skeleton: Skeleton, turn: Floats, up: str) -> RestPose:
+def rest_of(skeleton: Skeleton, to_common: Floats, up: str) -> RestPose:
     """Return a skeleton's rest pose, with all DOFs at 0.
 
     Parameters
     ----------
     skeleton : Skeleton
         Any.
-    turn : (3, 3)
+    to_common : (3, 3)
         From its own axes to the common ones.
     up : "y" or "z"
         Of the common axes.
@@ -64,7 +64,7 @@ def rest_of(skeleton: Skeleton, turn: Floats, up: str) -> RestPose:
     points = world_matrices(skeleton, pose)[:, :3, 3]
     local = quaternion_to_matrix(skeleton.rest_rotations)
     axis = np.eye(3)["xyz".index(up)]
-    return RestPose(points @ turn.T, forward_kinematics(skeleton.parents, local), axis)
+    return RestPose(points @ to_common.T, forward_kinematics(skeleton.parents, local), axis)
 
 
 def is_same_rest(source: RestPose, target: RestPose, matches: Matches, parents: Ints) -> bool:
