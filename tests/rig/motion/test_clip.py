@@ -134,7 +134,7 @@ def test_equal_times_jump_without_dividing_by_zero() -> None:
 
 
 def test_falling_times_are_refused() -> None:
-    with pytest.raises(RigError, match="never fall"):
+    with pytest.raises(RigError, match="non-decreasing"):
         channel([(1, 0, "flat", "flat"), (0, 0, "flat", "flat")])
 
 

@@ -74,7 +74,7 @@ class PointClip:
         return self.timing.end
 
 
-def sample_points(clip: PointClip, time: float, fill: bool = False) -> Floats | None:
+def sample_points(clip: PointClip, time: float, interpolate: bool = False) -> Floats | None:
     """Return the points at one time, None where they are absent.
 
     A point moves linearly between two frames that see it. If only one of them sees it, it
@@ -86,7 +86,7 @@ def sample_points(clip: PointClip, time: float, fill: bool = False) -> Floats | 
         The motion.
     time : float
         Seconds.
-    fill : bool
+    interpolate : bool
         Interpolate across gaps.
 
     Returns
@@ -94,10 +94,12 @@ def sample_points(clip: PointClip, time: float, fill: bool = False) -> Floats | 
     (K, 4) or None
         x, y, z, confidence.
     """
-    before, after, share = (part[0] for part in clip.timing.locate(np.array([time]), fill))
+    before, after, fraction = (
+        part[0] for part in clip.timing.locate(np.array([time]), interpolate)
+    )
     if before < 0:
         return None
     start, end = clip.points[before], clip.points[after]
-    mixed = start + share * (end - start)
+    mixed = start + fraction * (end - start)
     both = (start[:, 3] > 0.0) & (end[:, 3] > 0.0)
     return np.where(both[:, None], mixed, start)

@@ -56,7 +56,7 @@ def sample_upright_points(
     actor: Actor,
     rate: float | None = None,
     frames: tuple[int, int | None] | None = None,
-    fill: bool = False,
+    interpolate: bool = False,
 ) -> tuple[SampledPoints, Literal["y", "z"]]:
     """Sample an actor's points, rotated upright if their own world is upside down.
 
@@ -66,7 +66,7 @@ def sample_upright_points(
         Provides the up axis.
     actor : Actor
         Captured points; the actor's placement in the scene is ignored.
-    rate, frames, fill
+    rate, frames, interpolate
         As for ``viewer.rig.motion.sampled_animation.sample_animation``.
 
     Returns
@@ -88,7 +88,7 @@ def sample_upright_points(
     rate = own if rate is None else rate
     first, stop = frame_range(motion, rate, frames)
     times: Floats = motion.start + np.arange(first, stop) / rate
-    sampled = [sample_points(motion, float(time), fill) for time in times]
+    sampled = [sample_points(motion, float(time), interpolate) for time in times]
     nothing = np.zeros((len(layout.names), 4))
     rows = np.stack([nothing if row is None else row for row in sampled])
     up, hangs = own_up(scene, actor)

@@ -50,7 +50,7 @@ class BodyMotion:
         The axis that points up in the world; empty if unknown.
     facts : tuple of (str, str)
         Further facts from the file, for ``viewer info``.
-    world_turns : (N, 3) or None
+    world_rotations : (N, 3) or None
         Rotation vectors that rotate the whole body about the figure's origin after ``vectors``
         have posed it, V = W (R (X - J0) + J0) + T; requires ``about_origin`` to be False.
     """
@@ -67,7 +67,7 @@ class BodyMotion:
     flat_hands: bool = False
     up: str = ""
     facts: tuple[tuple[str, str], ...] = ()
-    world_turns: Floats | None = None
+    world_rotations: Floats | None = None
 
     def __post_init__(self) -> None:
         def put(name: str, shape: tuple[int | None, ...]) -> None:
@@ -78,7 +78,7 @@ class BodyMotion:
         put("translations", (len(self.vectors), 3))
         put("shape", (None, None))
         put("expression", (None, None))
-        put("world_turns", (len(self.vectors), 3))
+        put("world_rotations", (len(self.vectors), 3))
 
     @property
     def n_rows(self) -> int:
@@ -133,8 +133,8 @@ def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[Dia
     weights, more = _weights(motion, figure)
     rotations = rotation_vector_to_quaternion(vectors)
     translations, turns = motion.translations, None
-    if motion.world_turns is not None:
-        turns = rotation_vector_to_quaternion(motion.world_turns)
+    if motion.world_rotations is not None:
+        turns = rotation_vector_to_quaternion(motion.world_rotations)
         rotations[:, 0] = multiply(turns, rotations[:, 0])
     elif motion.about_origin:
         turns = rotations[:, 0]

@@ -50,7 +50,7 @@ class Channel:
     target : int
         Row of the DOF in the skeleton's table.
     times : (N,)
-        Seconds, in ascending order; may repeat.
+        Seconds, non-decreasing.
     values : (N,)
         Lengths or radians.
     tangents : tuple of N (incoming, outgoing)
@@ -72,7 +72,7 @@ class Channel:
         if len(self.tangents) != count:
             raise RigError(f"tangents: expected {count} pairs, found {len(self.tangents)}")
         if (np.diff(self.times) < 0).any():
-            raise RigError("times: expected ascending seconds")
+            raise RigError("times: expected non-decreasing seconds")
         # Thousands of keys use a few distinct pairs.
         pairs = {pair: (_tangent(pair[0]), _tangent(pair[1])) for pair in set(self.tangents)}
         object.__setattr__(self, "tangents", tuple(pairs[pair] for pair in self.tangents))

@@ -103,7 +103,7 @@ def scene_rate(actors: Iterable[Actor]) -> float:
     return frame_rate(max(clips, key=lambda clip: clip.end - clip.start, default=None))
 
 
-def pose_actor(actor: Actor, time: float, fill: bool = False) -> None:
+def pose_actor(actor: Actor, time: float, interpolate: bool = False) -> None:
     """Pose an actor by its clip at one time of the scene's clock, in place.
 
     Parameters
@@ -112,15 +112,15 @@ def pose_actor(actor: Actor, time: float, fill: bool = False) -> None:
         Its ``pose``, ``points`` and ``is_present`` change; without a clip nothing changes.
     time : float
         Seconds; the actor's own ``offset`` is subtracted.
-    fill : bool
+    interpolate : bool
         Interpolate across gaps of captures instead of marking the actor as absent.
     """
     clip, skeleton, own = actor.clip, actor.figure.skeleton, time - actor.offset
     if isinstance(clip, PointClip):
-        actor.points = sample_points(clip, own, fill)
+        actor.points = sample_points(clip, own, interpolate)
         actor.is_present = actor.points is not None
     elif isinstance(clip, SampledClip) and skeleton is not None and actor.pose is not None:
-        rows = sample_rows(clip, np.array([own]), fill)
+        rows = sample_rows(clip, np.array([own]), interpolate)
         actor.is_present = bool(rows.present[0])
         if actor.is_present:
             _apply(rows, 0, skeleton, actor.pose)
@@ -154,7 +154,7 @@ def frames_of(
     motion: Clip | SampledClip,
     times: Floats,
     base: Pose | None = None,
-    fill: bool = False,
+    interpolate: bool = False,
 ) -> Frames:
     """Return a figure's poses at many times.
 
@@ -168,7 +168,7 @@ def frames_of(
         Seconds on the motion's own clock.
     base : Pose, optional
         Provides shape and placement where the motion has none; the figure's own if omitted.
-    fill : bool
+    interpolate : bool
         Interpolate across gaps.
 
     Raises
@@ -188,7 +188,7 @@ def frames_of(
             f"clip {motion.name} has {motion.n_joints} joints, figure {figure.name} has "
             f"{skeleton.n_joints}"
         )
-    rows, count = sample_rows(motion, times, fill), len(times)
+    rows, count = sample_rows(motion, times, interpolate), len(times)
     still = np.zeros((count, skeleton.n_joints, 3))
     place = np.tile(pose.figure_translation, (count, 1))
     weights = pose.shape_weights[None] if rows.shape_weights is None else rows.shape_weights

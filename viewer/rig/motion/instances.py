@@ -41,7 +41,7 @@ __all__ = [
 _FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
 
 
-def pose_actors(actors: Iterable[Actor], time: float, fill: bool = False) -> None:
+def pose_actors(actors: Iterable[Actor], time: float, interpolate: bool = False) -> None:
     """Pose actors by their clips at one time of the scene's clock, in place.
 
     Actors with the same figure and clip, each at its own offset, are posed together; the result
@@ -53,7 +53,7 @@ def pose_actors(actors: Iterable[Actor], time: float, fill: bool = False) -> Non
         Those without a clip are unchanged.
     time : float
         Seconds; each actor's own ``offset`` is subtracted.
-    fill : bool
+    interpolate : bool
         Interpolate across gaps of captures instead of marking actors as absent.
     """
     groups: dict[tuple[int, int], list[Actor]] = {}
@@ -68,10 +68,10 @@ def pose_actors(actors: Iterable[Actor], time: float, fill: bool = False) -> Non
         if isinstance(clip, Clip) and skeleton is not None:
             _pose_by_curves(clip, skeleton, poses, times)
         elif isinstance(clip, SampledClip) and skeleton is not None and _takes_any(skeleton):
-            _pose_by_frames(group, clip, skeleton, times, fill)
+            _pose_by_frames(group, clip, skeleton, times, interpolate)
         else:
             for actor in group:
-                pose_actor(actor, time, fill)
+                pose_actor(actor, time, interpolate)
 
 
 def _takes_any(skeleton: Skeleton) -> bool:
@@ -88,10 +88,10 @@ def _pose_by_curves(clip: Clip, skeleton: Skeleton, poses: list[Pose], times: Fl
 
 
 def _pose_by_frames(
-    actors: list[Actor], clip: SampledClip, skeleton: Skeleton, times: Floats, fill: bool
+    actors: list[Actor], clip: SampledClip, skeleton: Skeleton, times: Floats, interpolate: bool
 ) -> None:
     """Pose by captured rotations, for skeletons whose joints' DOFs represent any rotation."""
-    balls, rows = rotation_rows(skeleton), sample_rows(clip, times, fill)
+    balls, rows = rotation_rows(skeleton), sample_rows(clip, times, interpolate)
     base = quaternion_to_matrix(skeleton.rest_rotations)
     within = np.swapaxes(base, -1, -2) @ quaternion_to_matrix(rows.rotations)
     dofs = np.stack([actor.pose.dofs for actor in actors if actor.pose is not None])

@@ -65,7 +65,7 @@ def sample_animation(
     actor: Actor,
     rate: float | None = None,
     frames: tuple[int, int | None] | None = None,
-    fill: bool = False,
+    interpolate: bool = False,
 ) -> SampledAnimation:
     """Sample an actor's clip at a fixed rate.
 
@@ -78,7 +78,7 @@ def sample_animation(
     frames : (int, int), optional
         First frame and end frame, exclusive (None: the clip's end), counted from the clip's
         start at that rate; all if omitted.
-    fill : bool
+    interpolate : bool
         Interpolate across gaps: rotations along the shorter arc.
 
     Raises
@@ -94,7 +94,7 @@ def sample_animation(
     first, stop = frame_range(motion, rate, frames)
     times: Floats = motion.start + np.arange(first, stop) / rate
     shift = motion.timing.first_frame if isinstance(motion, SampledClip) and rate == own else 0
-    sampled = frames_of(figure, motion, times, actor.pose, fill)
+    sampled = frames_of(figure, motion, times, actor.pose, interpolate)
     base = None if actor.pose is None else actor.pose.copy()
     return SampledAnimation(actor.name, figure, rate, first + shift, sampled, motion, base)
 
@@ -131,7 +131,7 @@ def upright_animation(
     actor: Actor,
     rate: float | None = None,
     frames: tuple[int, int | None] | None = None,
-    fill: bool = False,
+    interpolate: bool = False,
     keeps_world: bool = False,
 ) -> tuple[SampledAnimation, str]:
     """Sample an actor's clip, rotated upright where its own world is upside down.
@@ -140,7 +140,7 @@ def upright_animation(
     ----------
     scene : Scene
         Provides the up axis.
-    actor, rate, frames, fill
+    actor, rate, frames, interpolate
         As for ``sample_animation``. The actor's placement in the scene is ignored.
     keeps_world : bool
         Keep the orientation of its own world, for formats that preserve a capture's numbers.
@@ -152,7 +152,7 @@ def upright_animation(
     up : "y", "z", "-y" or "-z"
         The axis that points up in them; the last two only if the world is kept.
     """
-    animation = sample_animation(actor, rate, frames, fill)
+    animation = sample_animation(actor, rate, frames, interpolate)
     up, hangs = own_up(scene, actor)
     if not hangs:
         return animation, up

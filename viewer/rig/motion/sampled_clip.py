@@ -95,7 +95,7 @@ class SampledRows:
     shape_weights: Floats | None
 
 
-def sample_rows(clip: SampledClip, times: Floats, fill: bool = False) -> SampledRows:
+def sample_rows(clip: SampledClip, times: Floats, interpolate: bool = False) -> SampledRows:
     """Return a clip's data at given times: rotations along the shorter arc, the rest linearly.
 
     Exactly on a frame the stored numbers are returned unchanged.
@@ -106,7 +106,7 @@ def sample_rows(clip: SampledClip, times: Floats, fill: bool = False) -> Sampled
         The motion.
     times : (T,)
         Seconds.
-    fill : bool
+    interpolate : bool
         Interpolate across gaps instead of reporting absence.
 
     Returns
@@ -114,20 +114,20 @@ def sample_rows(clip: SampledClip, times: Floats, fill: bool = False) -> Sampled
     SampledRows
         Arrays with T rows each.
     """
-    before, after, share = clip.timing.locate(times, fill)
+    before, after, fraction = clip.timing.locate(times, interpolate)
     present = before >= 0
     before, after = np.maximum(before, 0), np.maximum(after, 0)
-    between = np.flatnonzero(share > 0.0)
+    between = np.flatnonzero(fraction > 0.0)
     if clip.n_rows == 0:
         rest = np.tile([0.0, 0.0, 0.0, 1.0], (len(before), clip.n_joints, 1))
         return SampledRows(present, rest, None, None, None, None)
     rotations = clip.rotations[before]
     if len(between):
         ends = clip.rotations[after[between]]
-        rotations[between] = slerp(rotations[between], ends, share[between, None])
+        rotations[between] = slerp(rotations[between], ends, fraction[between, None])
 
     def line(rows: Floats | None) -> Floats | None:
-        return None if rows is None else _line(rows, before, after, share)
+        return None if rows is None else _line(rows, before, after, fraction)
 
     return SampledRows(
         present,
@@ -139,11 +139,11 @@ def sample_rows(clip: SampledClip, times: Floats, fill: bool = False) -> Sampled
     )
 
 
-def _line(rows: Floats, before: Ints, after: Ints, share: Floats) -> Floats:
+def _line(rows: Floats, before: Ints, after: Ints, fraction: Floats) -> Floats:
     if len(rows) == 1:
         return rows[np.zeros(len(before), dtype=np.int32)]
     start = rows[before]
-    weight = share.reshape(-1, *[1] * (rows.ndim - 1))
+    weight = fraction.reshape(-1, *[1] * (rows.ndim - 1))
     return start + weight * (rows[after] - start)
 
 

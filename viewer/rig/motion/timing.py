@@ -77,21 +77,21 @@ class Timing:
         """Return the time in seconds of a frame, counted from 0."""
         return self.start + frame / self.frame_rate
 
-    def locate(self, times: Floats, fill: bool = False) -> tuple[Ints, Ints, Floats]:
+    def locate(self, times: Floats, interpolate: bool = False) -> tuple[Ints, Ints, Floats]:
         """Return the rows on either side of each time, and the interpolation fraction.
 
         Parameters
         ----------
         times : (T,)
             Seconds.
-        fill : bool
+        interpolate : bool
             Interpolate across gaps, and hold the end frames.
 
         Returns
         -------
         before, after : (T,)
             Rows; both are -1 where there is no data.
-        share : (T,)
+        fraction : (T,)
             0 at ``before``, 1 at ``after``; exactly 0 on a frame.
         """
         times = np.atleast_1d(np.asarray(times, dtype=np.float64))
@@ -105,18 +105,18 @@ class Timing:
         place = np.clip(place, 0.0, self.n_frames - 1)
         frame = np.floor(place).astype(np.int32)
         following = np.minimum(frame + 1, self.n_frames - 1)
-        share = place - frame
-        if fill:
+        fraction = place - frame
+        if interpolate:
             return self._bridged(place)
         before, after = self.rows[frame], self.rows[following]
         # A frame lasts until the next one is due; one after a gap does not start early.
-        share = np.where(after < 0, 0.0, share)
+        fraction = np.where(after < 0, 0.0, fraction)
         after = np.where(after < 0, before, after)
         absent = (before < 0) | (outside & (not self.holds))
         return (
             np.where(absent, -1, before).astype(np.int32),
             np.where(absent, -1, after).astype(np.int32),
-            np.where(absent, 0.0, share),
+            np.where(absent, 0.0, fraction),
         )
 
     def _bridged(self, place: Floats) -> tuple[Ints, Ints, Floats]:
@@ -125,7 +125,7 @@ class Timing:
         left = np.clip(right - 1, 0, len(there) - 1)
         right = np.clip(right, 0, len(there) - 1)
         span = there[right] - there[left]
-        share = np.divide(place - there[left], span, out=np.zeros(len(place)), where=span > 0).clip(
-            0.0, 1.0
-        )
-        return self.rows[there[left]], self.rows[there[right]], share
+        fraction = np.divide(
+            place - there[left], span, out=np.zeros(len(place)), where=span > 0
+        ).clip(0.0, 1.0)
+        return self.rows[there[left]], self.rows[there[right]], fraction
