@@ -118,7 +118,7 @@ def test_a_unit_that_is_asked_for_is_not_guessed(bvh, unit, scale):
     assert units(scene) == ["m"] and scene.warnings == ()
     assert_allclose(places(scene.actors[0]), PERSON_TURNED, rtol=0, atol=1e-7)  # six decimals
     fact = dict(scene.actors[0].figure.facts)["unit"]
-    assert fact == f"{unit} in the file, as asked" + "; scaled to metres" * (unit != "m")
+    assert fact == f"{unit} in the file, as requested" + "; scaled to metres" * (unit != "m")
 
 
 def test_an_axis_that_is_asked_for_is_not_guessed(bvh):

@@ -271,4 +271,4 @@ def test_figure_is_complete():
     rigged = transfer(figure, pose, moved(figure, pose), QUICK, name="scan")
     assert isinstance(rigged.figure, Figure) and rigged.figure.name == "scan"
     assert rigged.figure.is_attached and rigged.figure.up == "y"
-    assert rigged.figure.facts == (("rig", "carried over from arm"),)
+    assert rigged.figure.facts == (("rig", "transferred from arm"),)

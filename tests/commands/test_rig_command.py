@@ -238,7 +238,7 @@ REFUSED = {
     "axes": (
         ["--up", "z", "--facing", "z"],
         2,
-        "viewer: expected a facing across the up axis z, found z",
+        "viewer: expected a facing perpendicular to the up axis z, found z",
     ),
 }
 

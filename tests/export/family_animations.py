@@ -30,10 +30,12 @@ def family_motion(count: int, frames: int = 4, rows=None, first_frame: int = 0, 
     return BodyMotion("walk", timing, FAMILY[count].names, vectors, moves, **words)
 
 
-def family_animation(figure: Figure, motion: BodyMotion, fill: bool = False) -> SampledAnimation:
+def family_animation(
+    figure: Figure, motion: BodyMotion, interpolate: bool = False
+) -> SampledAnimation:
     """Return a figure's animation of a motion, every frame of it."""
     clip = body_clip(motion, figure)[0]
-    return sample_animation(Actor(figure, clip=clip), fill=fill)
+    return sample_animation(Actor(figure, clip=clip), interpolate=interpolate)
 
 
 def clip_animation(figure: Figure, clip: SampledClip) -> SampledAnimation:

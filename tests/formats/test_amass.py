@@ -63,7 +63,7 @@ def test_first_release(tmp_path):
     assert_array_equal(motion.shape, [waves(16, seed=2)])
     timing = motion.timing
     assert (timing.frame_rate, timing.rows.tolist(), timing.holds) == (120.0, [0, 1, 2, 3], True)
-    assert (motion.hands, motion.expression, motion.world_turns) == ({}, None, None)
+    assert (motion.hands, motion.expression, motion.world_rotations) == ({}, None, None)
     assert motion.facts == (("gender", "male"),)
 
 

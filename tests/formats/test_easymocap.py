@@ -209,7 +209,7 @@ def test_length_tells_the_layout(tmp_path, count, model, names, parts, hands, is
     capture, found, _ = opened(tmp_path)
     motion = found[0].bodies[0]
     assert (capture.model, motion.joint_names) == (model, names)
-    assert (motion.about_origin, motion.world_turns, motion.flat_hands) == (True, None, is_flat)
+    assert (motion.about_origin, motion.world_rotations, motion.flat_hands) == (True, None, is_flat)
     vectors = np.concatenate([waves(1, 3, seed=1), *(turned(record, *part) for part in parts)])
     assert_array_equal(motion.vectors, [vectors])
     assert_array_equal(motion.translations, [waves(3, seed=2)])
@@ -241,7 +241,7 @@ def test_root_of_its_own_is_a_turn_within_the_world(tmp_path):
     write_frames(tmp_path / "smpl", {0: [body(0, poses=[poses.tolist()])]})
     motion = only(opened(tmp_path)[1])
     assert not motion.about_origin
-    assert_array_equal(motion.world_turns, [waves(3, seed=1)])
+    assert_array_equal(motion.world_rotations, [waves(3, seed=1)])
     assert_array_equal(motion.vectors, [poses.reshape(-1, 3)])
 
 

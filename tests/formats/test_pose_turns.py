@@ -16,7 +16,7 @@ from viewer.errors import FormatError
 from viewer.formats import pose
 from viewer.formats._source import Source
 from viewer.rig.posing.pose_record import PoseRecord
-from viewer.rig.retargeting.pose_transfer import JointTurns
+from viewer.rig.retargeting.pose_transfer import JointRotations
 
 NAMES = ("root", "", "left knee", "knee", "knee")
 ROWS = np.array([[0.5, 0.5, 0.5, 0.5], [0, 0, 0, 1], [0.6, 0, 0, 0.8], [0, 1, 0, 0], [0, 0, -1, 0]])
@@ -25,8 +25,8 @@ SHIFTS = np.arange(15.0).reshape(5, 3) / 7
 GOOD = {"dofs": {"a.x": 1.0}, "joint_names": ["a"], "joint_turns": [[0, 0, 0, 1]]}
 
 
-def turns(shifts=SHIFTS, rotations=None) -> JointTurns:
-    return JointTurns("some cat", NAMES, ROWS, shifts, "z", "0123abcd", rotations)
+def turns(shifts=SHIFTS, rotations=None) -> JointRotations:
+    return JointRotations("some cat", NAMES, ROWS, shifts, "z", "0123abcd", rotations)
 
 
 @pytest.mark.parametrize("suffix", [".json", ".npz"])
@@ -40,7 +40,7 @@ def test_turns_come_back(tmp_path: Path, suffix, shifts):
     assert (found.figure, found.names, found.up, found.layout) == (
         "some cat", NAMES, "z", "0123abcd",
     )  # fmt: skip
-    assert_array_equal(found.turns, ROWS)
+    assert_array_equal(found.relative, ROWS)
     assert_array_equal(found.shifts, shifts)
 
 
@@ -91,7 +91,7 @@ def read(**values):
 
 def test_a_file_needs_no_more_than_names_and_turns():
     found = read(joint_turns=[[0, 0, 0, 2]]).turns
-    assert found.turns.tolist() == [[0, 0, 0, 1]] and found.shifts.tolist() == [[0, 0, 0]]
+    assert found.relative.tolist() == [[0, 0, 0, 1]] and found.shifts.tolist() == [[0, 0, 0]]
     assert found.rotations is None
     assert (found.figure, found.up, found.layout) == ("", "y", "")
 

@@ -99,7 +99,7 @@ def test_files_that_changed_are_named(files: list[Path]) -> None:
     os.utime(files[0], (opened_at + 100.0,) * 2)
     again = lint_again(scene, files, since=opened_at + 60.0)
     assert again.notes == (
-        "a.skel was changed after opening: what readers say is of the new contents",
+        "a.skel was changed after opening: readers' messages are about the new contents",
     )
     for path in files:
         os.utime(path, (opened_at + 100.0,) * 2)

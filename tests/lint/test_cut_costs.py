@@ -34,8 +34,8 @@ def scene(rows: dict[int, list[tuple[int, float]]], singular: bool = True) -> Sc
     return result
 
 
-def cost(scene: Scene, **spoiled: Ints) -> Finding:
-    (found,) = [f for f in lint_scene(scene, spoiled=[spoiled]) if f.code == "W007"]
+def cost(scene: Scene, **invalid: Ints) -> Finding:
+    (found,) = [f for f in lint_scene(scene, invalid=[invalid]) if f.code == "W007"]
     return found
 
 

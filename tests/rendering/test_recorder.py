@@ -120,7 +120,7 @@ def test_absent_actors_are_not_drawn(offscreen, scene):
     run(offscreen, recording, sink)
     drawn = [bool(sink.frames[frame].any()) for frame in range(3)]
     assert drawn == [True, False, True]
-    recording.fill = True
+    recording.interpolate = True
     filled = Kept()
     run(offscreen, recording, filled)
     assert filled.frames[1].any()

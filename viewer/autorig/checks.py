@@ -18,7 +18,7 @@ from viewer.rig.skinning import deform, joint_matrices
 
 __all__ = ["check_lines", "newly_outside", "residual_of", "with_joint_name"]
 
-_EXACT = 1e-4  # residual over size above which a person is warned
+_EXACT = 1e-4  # residual over size above which a warning is given
 
 
 def newly_outside(
@@ -29,12 +29,12 @@ def newly_outside(
     joints: Floats | None = None,
     transferred: Bools | None = None,
 ) -> tuple[int, ...]:
-    """Return the joints that lie inside the template, but not inside the target.
+    """Return the joints that lie inside the template but outside the target.
 
     Parameters
     ----------
     template : Figure
-        Already shaped.
+        With its shape applied.
     pose : Pose
         Its own.
     posed : (V, 3)
@@ -44,7 +44,7 @@ def newly_outside(
     joints : (J, 3) or None
         In the target's frame; None if they are the template's.
     transferred : (J,) bool or None
-        Which are expected inside: a joint of a part that the target lacks is not. None for all.
+        Joints that are expected inside: not those of a part that the target lacks. None for all.
     """
     own = joint_matrices(template, pose)[:, :3, 3]
     before = outside(posed, template.require_mesh().triangles, own)
@@ -55,18 +55,18 @@ def newly_outside(
 
 
 def residual_of(figure: Figure, pose: Pose, placement: Floats, target: Mesh) -> float:
-    """Return how far a figure posed again is from the target, at most, over the target's size.
+    """Return the largest distance of a reposed figure from the target, over the target's size.
 
     Parameters
     ----------
     figure : Figure
         With as many vertices as the target.
     pose : Pose
-        In which the target was found.
+        The pose in which the target was found.
     placement : (4, 4)
         Figure space to the target's frame.
     target : Mesh
-        What should come back.
+        The original mesh.
     """
     again = apply_transform(placement, deform(figure, pose)[0])
     size = box_size(bounding_box(target.positions))
@@ -76,12 +76,12 @@ def residual_of(figure: Figure, pose: Pose, placement: Floats, target: Mesh) -> 
 def check_lines(
     figure: Figure, guarded: Bools, out: tuple[int, ...], residual: float
 ) -> list[Diagnostic]:
-    """Return what the checks found.
+    """Return messages about the results of the checks.
 
     Parameters
     ----------
     figure : Figure
-        Names its joints.
+        Provides joint names.
     guarded : (V,) bool
         From ``invert_skinning``.
     out : tuple of int
@@ -107,7 +107,7 @@ def check_lines(
 
 
 def with_joint_name(line: Diagnostic, figure: Figure) -> Diagnostic:
-    """Give a joint that a remark tells by number its name."""
+    """Replace the number of a joint in a message with its name."""
     skeleton, joint = figure.skeleton, line.values.get("joint")
     if skeleton is None or not isinstance(joint, int):
         return line

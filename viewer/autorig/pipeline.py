@@ -1,4 +1,4 @@
-"""Transfer of a rig to a mesh: align, weigh, transfer the joints, invert the pose, and check."""
+"""Pipeline of a rig transfer: align, transfer weights and joints, invert the pose, and check."""
 
 from __future__ import annotations
 
@@ -25,32 +25,32 @@ def transfer(
     report: Report | None = None,
     name: str = "rigged",
 ) -> Rigged:
-    """Make a figure of a mesh with the rig of another.
+    """Rig a mesh with the rig of another figure.
 
     Parameters
     ----------
     template : Figure
         With mesh, skeleton and skin.
     pose : Pose
-        Poses and shapes the template roughly like the target.
+        Poses and shapes the template approximately like the target.
     target : Mesh
-        Never altered: posed as ``Rigged.pose`` says, the figure is the target again.
+        Not changed: posed by ``Rigged.pose``, the figure reproduces the target.
     settings : TransferSettings, optional
-        The robust method with its usual limits if omitted.
+        The robust method with its default limits if omitted.
     report : callable, optional
-        For progress; may raise to cancel.
+        Called with progress; may raise to cancel.
     name : str
         Of the new figure.
 
     Returns
     -------
     Rigged
-        Figure, pose, and what is to be known.
+        Figure, pose, and facts about the transfer.
 
     Raises
     ------
     RigError
-        If the template lacks a part, the target has no surface, nothing of it meets the
+        If the template lacks a part, the target has no surface, no part of it meets the
         template, or SciPy is missing.
     """
     how = settings or TransferSettings()
@@ -63,7 +63,7 @@ def transfer(
     if target.n_triangles == 0:
         raise RigError("expected a target with triangles, found none")
     figure = shaped(template, pose.shape_weights)
-    # The shape is the mesh's own from here on.
+    # From here on the shape is part of the mesh.
     plain = pose.copy()
     plain.shape_weights = np.zeros(0)
     if how.method == "nearest":
@@ -75,7 +75,7 @@ def transfer(
 
 
 def _silent(fraction: float, what: str) -> None:
-    """Tell nobody."""
+    """Ignore progress."""
 
 
 def _parts(figure: Figure) -> str:

@@ -1,4 +1,4 @@
-"""Result of a rig transfer: a figure of the target, and what is known about every vertex."""
+"""Result of a rig transfer: the rigged figure, and the origin of every vertex's weights."""
 
 from __future__ import annotations
 
@@ -20,37 +20,37 @@ from viewer.rig.pose import Pose
 __all__ = ["CONFIDENCE", "Rigged", "clip_for", "with_fields"]
 
 CONFIDENCE = ("matched", "filled", "rigid")
-"""How a vertex came to its weights: from the template's surface under it, from its neighbours,
-or as part of an island that hangs rigidly on the template."""
+"""Origin of a vertex's weights: the template's surface under it, its neighbours,
+or the island that it belongs to, which is attached rigidly to the template."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rigged:
-    """A target mesh that became a figure.
+    """A target mesh that was rigged.
 
     Attributes
     ----------
     figure : Figure
         The target at rest, with its texture coordinates and materials.
     pose : Pose
-        Poses the figure as the target was found.
+        The pose that reproduces the target.
     placement : (4, 4)
-        From the posed figure to the target's frame; the identity unless the method altered the
+        From the posed figure to the target's frame; the identity unless the method changed the
         target.
     alignment : Alignment or None
-        Where the template lay; None for a method that only aligns boxes.
+        Placement of the template; None for a method that only aligns boxes.
     weights : WeightTransfer
-        Matches, distances and parts that hang rigidly.
+        Matches, distances and rigidly attached parts.
     guarded : (V,) bool
         Vertices whose blended matrix was nearly singular.
     residual : float
         Largest distance between the posed figure and the target, over the target's size.
     outside : tuple of int
-        Joints that lie outside the target, and inside the template.
+        Joints that lie outside the target but inside the template.
     length_scale, figure_scale, path_scale : float
-        What ``clip_for`` scales lengths by.
+        Factors by which ``clip_for`` scales lengths.
     lines : tuple of Diagnostic
-        What a person should know.
+        Messages for the user.
     """
 
     figure: Figure
@@ -74,11 +74,11 @@ class Rigged:
 
 
 def with_fields(rigged: Rigged) -> Rigged:
-    """Return the same with a figure whose fields say how sure each vertex is.
+    """Return the same with scalar fields that show the certainty of each vertex.
 
-    ``"confidence"`` is the way a vertex came to its weights, ``"distance"`` how far it was from
-    the template's surface as it was aligned with it, ``"guarded"`` where its rest position is a
-    guess.
+    ``"confidence"`` is the origin of a vertex's weights, ``"distance"`` its distance from
+    the aligned template's surface, ``"guarded"`` whether its rest position is an
+    estimate.
     """
     confidence = rigged.confidence.astype(np.float64)
     guarded = rigged.guarded.astype(np.float64)

@@ -37,26 +37,26 @@ from viewer.rig.units import WORDS, unit_of_scaled
 
 __all__ = ["robust"]
 
-_JOINT_REACH = 0.08  # of the target's size: how far a surface may be from the template's
+_JOINT_REACH = 0.08  # of the target's size: maximum distance of a surface from the template's
 
 
 def robust(
     template: Figure, pose: Pose, target: Mesh, how: TransferSettings, report: Report, name: str
 ) -> Rigged:
-    """Carry a rig over; see ``pipeline.transfer``, which checks what it is given.
+    """Transfer a rig; see ``pipeline.transfer``, which checks the arguments.
 
     Parameters
     ----------
     template : Figure
-        Attached, and already shaped.
+        Attached, and with its shape applied.
     pose : Pose
         Without shape weights.
     target : Mesh
         With triangles.
     how : TransferSettings
-        All but the method.
+        Everything except the method.
     report : callable
-        For progress.
+        Called with progress.
     name : str
         Of the new figure.
     """
@@ -105,7 +105,7 @@ def robust(
 def _weighed(
     template: Figure, aligned: Floats, target: Mesh, how: TransferSettings, report: Report
 ) -> WeightTransfer:
-    """Carry the weights of a template over that lies on the target."""
+    """Transfer the weights of a template aligned with the target."""
     mesh, skin = template.require_mesh(), template.require_skin()
     return transferred_weights(
         Template(aligned, mesh.triangles),
@@ -130,9 +130,9 @@ def _transferred_skeleton(
     target: Mesh,
     how: TransferSettings,
 ) -> tuple[RestSkeleton, Bools | None, list[Diagnostic]]:
-    """Place the joints in the target; return which were carried, and what a person should know."""
+    """Move the joints to the target; return those that were transferred, and messages."""
     mesh, skeleton, skin = template.mesh, template.skeleton, template.skin
-    assert mesh is not None and skeleton is not None and skin is not None  # the caller looked
+    assert mesh is not None and skeleton is not None and skin is not None  # checked by the caller
     joints = alignment.similarity.apply(joint_matrices(template, pose)[:, :3, 3])
     if how.joints == "copied":
         rest = fit_rest_skeleton(template, pose, alignment.similarity, joints, None, original)
@@ -173,16 +173,16 @@ def _at_rest(
     how: TransferSettings,
     name: str,
 ) -> tuple[Figure, Bools]:
-    """Unpose the target and put the figure together."""
+    """Apply inverse skinning to the target and assemble the figure."""
     skin = weights.skin(rest.inverse_bind)
     skeleton, pose = rest.skeleton, rest.pose
     palette = skinning_matrices(world_matrices(skeleton, pose), skin.inverse_bind)
     posed = target.positions - pose.figure_translation
     found = invert_skinning(posed, skin, palette)
-    positions = repair_tears(found, posed, target.triangles) if how.mends else found.positions
+    positions = repair_tears(found, posed, target.triangles) if how.repairs else found.positions
     correctives = _correctives(template, weights, target, scale) if how.correctives else None
     if correctives is not None:
-        # What the pose adds to the rest mesh is taken off now, and added back when posing.
+        # The pose's effect on the rest mesh is removed here, and added back when posing.
         rotated = joint_rotations(skeleton, pose)
         positions = positions - correctives.displacement(corrective_weights(rotated))
     mesh = replace(target, positions=positions, normals=vertex_normals(positions, target.triangles))
@@ -197,7 +197,7 @@ def _at_rest(
         correctives=correctives,
         hands=template.hands,
         pose_layout=template.pose_layout,
-        facts=(("rig", f"carried over from {template.name}"),),
+        facts=(("rig", f"transferred from {template.name}"),),
     )
     return figure, found.guarded
 
@@ -219,7 +219,7 @@ def _correctives(
 
 
 def _judged(template: Figure, figure: Figure, weights: WeightTransfer) -> list[Diagnostic]:
-    """Say what was judged of the target: which way round it is wound, and its unit."""
+    """Return messages about the target's winding and unit."""
     lines = []
     turned = int(weights.backwards[figure.require_mesh().triangles].any(axis=1).sum())
     if turned:
@@ -234,7 +234,7 @@ def _judged(template: Figure, figure: Figure, weights: WeightTransfer) -> list[D
 
 
 def _lost(template: Figure, figure: Figure, how: TransferSettings) -> list[Diagnostic]:
-    """Say what of the template the new figure does not have."""
+    """Return messages about parts of the template that the new figure lacks."""
     lines = []
     if template.blend_shapes is not None:
         lines.append(Diagnostic("R013.shapes", values={"n": template.n_shapes}))

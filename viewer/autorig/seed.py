@@ -1,4 +1,4 @@
-"""The seed's way, step by step, kept to compare with: boxes, nearest vertices, copied joints."""
+"""The seed method, kept for comparison: aligned boxes, nearest vertices, copied joints."""
 
 from __future__ import annotations
 
@@ -26,21 +26,21 @@ __all__ = ["nearest"]
 
 
 def nearest(template: Figure, pose: Pose, target: Mesh, report: Report, name: str) -> Rigged:
-    """Follow Tex-An Mesh step by step: the target is altered, the template's joints are not.
+    """Follow Tex-An Mesh step by step: the target is changed, the template's joints are not.
 
-    Pose correctives are neither taken off nor added back, as there. Only where a blended matrix
-    is nearly singular the nearest rotation takes its place, which is reported.
+    As there, pose correctives are neither removed nor added back. Only where a blended matrix
+    is nearly singular, the nearest rotation replaces it, which is reported.
 
     Parameters
     ----------
     template : Figure
-        Attached, and already shaped.
+        Attached, and with its shape applied.
     pose : Pose
         Without shape weights.
     target : Mesh
         With triangles.
     report : callable
-        For progress.
+        Called with progress.
     name : str
         Of the new figure.
     """
@@ -99,5 +99,5 @@ def _figure(template: Figure, skin: Skin, target: Mesh, rest: Floats, name: str)
         unit=template.unit,
         hands=template.hands,
         pose_layout=template.pose_layout,
-        facts=(("rig", f"carried over from {template.name} by nearest vertices"),),
+        facts=(("rig", f"transferred from {template.name} by nearest vertices"),),
     )

@@ -1,4 +1,4 @@
-"""Settings of the transfer of a rig."""
+"""Settings of a rig transfer."""
 
 from __future__ import annotations
 
@@ -12,39 +12,39 @@ from viewer.errors import RigError
 __all__ = ["JOINTS", "METHODS", "Report", "TransferSettings"]
 
 Report = Callable[[float, str], None]
-"""Told the fraction that is done and what is being done; may raise to cancel."""
+"""Called with the completed fraction and the current step; may raise to cancel."""
 
 METHODS = {
-    "robust": "closest surface points, checked, the rest filled in (Abdrashitov et al. 2023)",
-    "nearest": "boxes laid onto each other, nearest vertices, joints copied (Tex-An Mesh)",
+    "robust": "closest surface points, checked, the rest inpainted (Abdrashitov et al. 2023)",
+    "nearest": "aligned boxes, nearest vertices, joints copied (Tex-An Mesh)",
 }
-"""What menus and the command line offer."""
+"""Methods offered by menus and the command line."""
 
 JOINTS = ("carried", "copied")
-"""Joints moved as the surface around them, or with the alignment alone."""
+"""Joints moved with the surface around them, or by the alignment only."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TransferSettings:
-    """How a rig is transferred.
+    """Options of a rig transfer.
 
     Attributes
     ----------
     method : str
-        A key of ``METHODS``; all else is for ``"robust"``.
+        A key of ``METHODS``; all other options are for ``"robust"``.
     alignment : AlignmentSettings
-        What is known of how the meshes lie.
+        Known facts about the alignment.
     weights : WeightSettings
         When a vertex matches; smoothing; number of influences.
     joints : str
         One of ``JOINTS``.
     fits : bool
-        Whether the template's joints are rotated and its limbs resized, where it stands otherwise
-        than the target or has other proportions.
+        Whether the template's joints are rotated and its limbs scaled, if its pose or its
+        proportions differ from the target's.
     correctives : bool
         Whether pose correctives of the template are transferred.
-    mends : bool
-        Whether the surroundings of singular vertices are smoothed.
+    repairs : bool
+        Whether the neighbourhoods of singular vertices are smoothed.
     """
 
     method: str = "robust"
@@ -53,7 +53,7 @@ class TransferSettings:
     joints: str = "carried"
     fits: bool = True
     correctives: bool = True
-    mends: bool = True
+    repairs: bool = True
 
     def __post_init__(self) -> None:
         for name, known in (("method", tuple(METHODS)), ("joints", JOINTS)):

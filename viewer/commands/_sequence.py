@@ -261,7 +261,7 @@ def _recording(
         size,
         options,
         moves=shots.moves,
-        fill=arguments.fill_gaps,
+        interpolate=arguments.fill_gaps,
         turn=shots.turn,
         follow=None if arguments.follow is None else find_follow(scene, arguments.follow),
     )

@@ -207,7 +207,7 @@ def animation_for(
     actor: Actor,
     rate: float | None = None,
     frames: tuple[int, int | None] | None = None,
-    fill: bool = False,
+    interpolate: bool = False,
 ) -> tuple[SampledAnimation, str]:
     """Sample an actor's clip as an exporter wants it, and return what is up in it.
 
@@ -220,11 +220,11 @@ def animation_for(
         Of ``EXPORTERS``.
     options : MotionOptions
         Whether an up axis is asked for.
-    scene, actor, rate, frames, fill
+    scene, actor, rate, frames, interpolate
         As for ``viewer.rig.motion.sampled_animation.upright_animation``.
     """
     keeps_world = EXPORTERS[key].keeps_world and not options.up
-    return upright_animation(scene, actor, rate, frames, fill, keeps_world)
+    return upright_animation(scene, actor, rate, frames, interpolate, keeps_world)
 
 
 def files_written(path: str | Path) -> list[Path]:

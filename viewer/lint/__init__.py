@@ -1,4 +1,4 @@
-"""Check rigs and motions: every fault has a code, a place, and what to do about it."""
+"""Checks of rigs and motions: every fault has a code, a place, and a hint for fixing it."""
 
 from __future__ import annotations
 
@@ -53,35 +53,35 @@ def lint_files(
     max_size: int | None = None,
     progress: Progress | None = None,
 ) -> tuple[Scene, list[Finding]]:
-    """Open files together and check everything; what cannot be opened is a finding too.
+    """Open files together and run all checks; files that cannot be opened become findings too.
 
-    Faults that the viewer refuses a file for are noted, all of them, and the rest of the file is
-    looked at as far as they leave it.
+    All faults for which the viewer would reject a file are recorded, and the rest of the file is
+    checked as far as they allow.
 
     Parameters
     ----------
     paths : sequence of str or Path
         As for ``viewer.loading.load``.
     options : LintOptions, optional
-        What counts as a fault.
+        Thresholds of faults.
     settings : MotionSettings, optional
-        How motions are taken.
+        How motions are interpreted.
     max_size : int, optional
         Larger files, in bytes, are not read.
     progress : callable, optional
-        As for ``lint_scene``; reading counts as well.
+        As for ``lint_scene``; reading files is included.
 
     Returns
     -------
     scene : Scene
-        What could be opened; findings refer to its actors.
+        Everything that could be opened; findings refer to its actors.
     findings : list of Finding
-        First what readers say, then what the checks find, each with its file where it is known.
+        Messages of readers first, then results of checks, each with its file if known.
     """
     from viewer.formats import MAX_SIZE
-    from viewer.lint._opening import open_files, spoiled_parts, with_files
+    from viewer.lint._opening import invalid_parts, open_files, with_files
 
     size = MAX_SIZE if max_size is None else max_size
     opened = open_files(paths, settings, size, progress)
-    findings = lint_scene(opened.scene, options, progress, spoiled_parts(opened))
+    findings = lint_scene(opened.scene, options, progress, invalid_parts(opened))
     return opened.scene, with_files(opened, findings)

@@ -1,4 +1,4 @@
-"""A scene that is open, checked together with the files that it came from, read once more."""
+"""Repeated checks of an open scene, together with the files that it came from."""
 
 from __future__ import annotations
 
@@ -26,21 +26,21 @@ __all__ = ["Again", "lint_again"]
 
 _MESH = ("positions", "normals", "triangles")
 _SKIN = ("starts", "joints", "weights", "inverse_bind")
-_NAMED = 3  # files that a note names one by one
+_NAMED = 3  # files that a note lists individually
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Again:
-    """What was found in an open scene and its files.
+    """Findings about an open scene and its files.
 
     Attributes
     ----------
     findings : list of Finding
-        As ``lint_files`` gives them, of the scene as it is now.
+        As from ``lint_files``, for the scene as it is now.
     n_files : int
-        How many files it came from.
+        Number of files that it came from.
     notes : tuple of str
-        One line each: files that are gone or were changed.
+        One line each: files that are missing or were changed.
     """
 
     findings: list[Finding]
@@ -57,27 +57,27 @@ def lint_again(
     progress: Progress | None = None,
     is_likely: bool = False,
 ) -> Again:
-    """Check an open scene, and what readers find in its files.
+    """Check an open scene, and report messages of the readers of its files.
 
-    What is in the scene as its files have it is told with file and line; what was edited is not.
+    Parts unchanged since opening are reported with file and line; edited parts without.
 
     Parameters
     ----------
     scene : Scene
-        Is not changed.
+        Not changed.
     paths : sequence of Path
         The files that it was opened from.
     options : LintOptions, optional
-        What counts as a fault.
+        Thresholds of faults.
     settings : MotionSettings, optional
-        How its motions were taken.
+        How its motions were interpreted.
     since : float, optional
-        When it was opened, seconds since the epoch: files that changed later are named.
+        When it was opened, seconds since the epoch: files that changed later are reported.
     progress : callable, optional
-        As for ``lint_scene``; reading counts as well.
+        As for ``lint_scene``; reading files is included.
     is_likely : bool
-        Whether nobody knows that it came from these files: they count only if they hold something
-        of the scene.
+        Whether it is uncertain that the scene came from these files: they are used only if they
+        have a part in common with the scene.
     """
     opened = open_files(paths, settings, progress=progress)
     findings = lint_scene(scene, options, progress)
@@ -88,12 +88,12 @@ def lint_again(
     gone = [path for path in paths if not _is_there(path)]
     if gone:
         notes.append(f"{_names(gone, 'is', 'are')} gone: only what is open was checked")
-        # What is left of the files need not fit together.
+        # The remaining files need not fit together.
         opened.findings = [found for found in opened.findings if found.code != "F004"]
     changed = [path for path in opened.sources if since is not None and _changed(path) > since]
     if changed:
         which = _names(changed, "was", "were")
-        notes.append(f"{which} changed after opening: what readers say is of the new contents")
+        notes.append(f"{which} changed after opening: readers' messages are about the new contents")
     return Again(with_files(opened, findings, (scene, owners)), len(paths), tuple(notes))
 
 
@@ -111,7 +111,7 @@ def _is_there(path: Path) -> bool:
 
 
 def _changed(path: Path) -> float:
-    """Return when a file, or one in a folder, was changed last; seconds since the epoch."""
+    """Return when a file, or one in a folder, was last changed; seconds since the epoch."""
     return max(map(_last_change, _with_contents(path)), default=0.0)
 
 
@@ -127,13 +127,13 @@ def _last_change(path: Path) -> float:
         status = path.stat()
     except (OSError, ValueError):
         return 0.0
-    # A copy may keep the old time of its contents; a folder's other time changes with its place.
+    # A copy may keep the old modification time; a folder's ctime changes when it is moved.
     is_file = stat.S_ISREG(status.st_mode)
     return max(status.st_mtime, status.st_ctime if is_file else 0.0)
 
 
 def _owners(actor: Actor, index: int, opened: Opened) -> Owners:
-    """Return which actor of the files each part of an actor is of, at best the one in its place."""
+    """Return the file's actor for each part of an actor, preferably the one at the same index."""
     others = list(enumerate(opened.scene.actors))
     others.sort(key=lambda pair: pair[0] != index)
     owners: Owners = {}
@@ -155,18 +155,18 @@ def _same_part(actor: Actor, other: Actor, part: str) -> bool:
 
 
 def _same_mesh(one: Figure, two: Figure) -> bool:
-    """Return whether vertices, triangles and weights are the same; pictures do not matter."""
-    return _share(one.mesh, two.mesh, _MESH) and _share(one.skin, two.skin, _SKIN)
+    """Return whether vertices, triangles and weights are equal; textures are ignored."""
+    return _have_equal(one.mesh, two.mesh, _MESH) and _have_equal(one.skin, two.skin, _SKIN)
 
 
-def _share(one: object, two: object, names: tuple[str, ...]) -> bool:
+def _have_equal(one: object, two: object, names: tuple[str, ...]) -> bool:
     if one is None or two is None:
         return one is two
     return all(_alike(getattr(one, name), getattr(two, name)) for name in names)
 
 
 def _alike(one: object, two: object) -> bool:
-    """Return whether two parts hold the same numbers."""
+    """Return whether two parts have equal numbers."""
     if one is two:
         return True
     if isinstance(one, np.ndarray) and isinstance(two, np.ndarray):

@@ -1,4 +1,4 @@
-"""Where a finding is in the scene: for a camera that looks there, and for marks that show it."""
+"""Positions of a finding in the scene, for the camera and for highlighting."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ __all__ = ["Places", "places_of", "points_of"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Places:
-    """What a finding is about, as the scene is posed, in scene space.
+    """Positions that a finding refers to in the posed scene, in scene space.
 
     Attributes
     ----------
     vertices : (N, 3)
         The worst first.
     triangles : (T, 3, 3)
-        Their corners, the worst triangle first.
+        Their corners; the worst triangle first.
     joints : (J, 3)
-        Joints, or captured points that are seen; of findings about a whole motion, who moves.
+        Joints, or captured points that are seen; for findings about a whole motion, its actor.
     facing : (3,)
-        Mean normal of what is on the surface: length 1 if all of it faces one way, 0 if it faces
-        every way or there is nothing.
+        Mean normal of the marked surface: length 1 if all of it faces one way, 0 if it faces
+        all ways or there is none.
     """
 
     vertices: Floats = field(default_factory=lambda: np.zeros((0, 3)))
@@ -42,20 +42,20 @@ class Places:
 def places_of(
     finding: Finding, scene: Scene, skinning: Skinning | None = None, binding: bool = False
 ) -> Places:
-    """Return the places of a scene that a finding is about, posed as the scene is now.
+    """Return the positions that a finding refers to, in the current pose of the scene.
 
-    Findings about frames are seen best with the scene at ``finding.times[0]``.
+    Findings about frames are best viewed with the scene at ``finding.times[0]``.
 
     Parameters
     ----------
     finding : Finding
-        Of this scene.
+        In this scene.
     scene : Scene
-        As it was when it was checked; poses may differ.
+        The scene that was checked; poses may differ.
     skinning : Skinning, optional
-        How the mesh is drawn.
+        Skinning method of the displayed mesh.
     binding : bool
-        Whether it is drawn in its binding space.
+        Whether the mesh is displayed in its bind space.
     """
     if finding.actor is None or finding.actor >= len(scene.actors):
         return Places()
@@ -79,11 +79,11 @@ def places_of(
 
 
 def _facing(normals: Floats, actor: Actor) -> Floats:
-    """Return the mean of unit normals, turned as the actor stands: (3,)."""
+    """Return the mean of unit normals, rotated with the actor: (3,)."""
     mean = normals.mean(axis=0)
     turned = actor.placement[:3, :3] @ mean
     length = float(np.linalg.norm(turned))
-    # A placement's scale must not make it longer; a broken rig may have no finite normals.
+    # A placement's scale must not lengthen it; a broken rig may have no finite normals.
     return turned * (np.linalg.norm(mean) / length) if 0.0 < length < np.inf else np.zeros(3)
 
 
@@ -107,7 +107,7 @@ def _joint_places(finding: Finding, actor: Actor) -> Floats:
 
 
 def _middle(actor: Actor) -> Floats:
-    """Return where a whole actor is: its roots, or the middle of its points. (N, 3)."""
+    """Return the position of a whole actor: its roots, or the mean of its points. (N, 3)."""
     figure, points = actor.figure, actor.points
     if isinstance(actor.clip, PointClip):
         seen = np.zeros((0, 3)) if points is None else points[points[:, 3] > 0.0, :3]
@@ -120,22 +120,22 @@ def _middle(actor: Actor) -> Floats:
 
 
 def points_of(finding: Finding, scene: Scene, places: Places | None = None) -> Floats:
-    """Return the points of a scene that a finding is about, posed as the scene is now.
+    """Return the points of a scene that a finding refers to, in the current pose.
 
     Parameters
     ----------
     finding : Finding
-        Of this scene.
+        In this scene.
     scene : Scene
-        As it was when it was checked.
+        The scene that was checked.
     places : Places, optional
-        What ``places_of`` gave, if it is at hand.
+        Result of ``places_of``, if already computed.
 
     Returns
     -------
     (N, 3)
-        Scene space: of the vertices, or of the triangles' corners, or of the joints, in this
-        order; all of the actor if it names none, or none is there now; none at all without an
+        Scene space: the vertices, else the corners of triangles, else the joints;
+        the whole actor if the finding names none, or none is present; empty without an
         actor.
     """
     if finding.actor is None or finding.actor >= len(scene.actors):

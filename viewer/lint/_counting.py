@@ -1,4 +1,4 @@
-"""How frames are counted where motions have none of their own: as the timeline counts them."""
+"""Frame numbers of motions without frames of their own, as on the timeline."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from viewer.rig.scene import Scene
 
 __all__ = ["Counting", "counting_of"]
 
-_ON_FRAME = 1e-6  # of a frame: nearer than this to a frame is that frame
+_ON_FRAME = 1e-6  # of a frame: times closer than this to a frame count as that frame
 
 
 @dataclass(frozen=True, slots=True)
 class Counting:
-    """The frames of a timeline.
+    """Frame numbering of a timeline.
 
     Attributes
     ----------
     rate : float
-        Frames a second.
+        Frames per second.
     origin : float
-        Seconds of the scene's clock at the first one.
+        Time of the first frame on the scene's clock, in seconds.
     first : int
-        What it is called.
+        Number of the first frame.
     """
 
     rate: float
@@ -36,20 +36,20 @@ class Counting:
     first: int = 0
 
     def numbers(self, times: Floats) -> Ints:
-        """Return the frame that is shown at each time of the scene's clock: (N,) int32."""
+        """Return the frame shown at each time of the scene's clock: (N,) int32."""
         places = np.floor((times - self.origin) * self.rate + _ON_FRAME)
         return places.astype(np.int32) + np.int32(self.first)
 
 
 def counting_of(scene: Scene, keyed_rate: float) -> Counting:
-    """Return how a scene's timeline counts: by its longest capture, else from the first start.
+    """Return a scene's frame numbering: of its longest capture, else from the earliest start.
 
     Parameters
     ----------
     scene : Scene
         With or without motions.
     keyed_rate : float
-        Frames a second where nothing consists of frames.
+        Frames per second if no motion consists of frames.
     """
     moving = [actor for actor in scene.actors if actor.clip is not None]
     captured = [actor for actor in moving if isinstance(actor.clip, SampledClip | PointClip)]
@@ -57,6 +57,6 @@ def counting_of(scene: Scene, keyed_rate: float) -> Counting:
         return Counting(keyed_rate, time_span(moving)[0])
     longest = max(captured, key=lambda actor: np.subtract(*time_span([actor])[::-1]))
     clip = longest.clip
-    assert isinstance(clip, SampledClip | PointClip)  # only those were gathered
+    assert isinstance(clip, SampledClip | PointClip)  # only these were collected
     timing = clip.timing
     return Counting(frame_rate(clip), timing.start + longest.offset, timing.first_frame)

@@ -1,4 +1,4 @@
-"""What a check finds, and what it is given to look at."""
+"""Findings of checks, and the subject that checks are given."""
 
 from __future__ import annotations
 
@@ -26,35 +26,35 @@ if TYPE_CHECKING:
 __all__ = ["MAX_TURN", "Finding", "LintOptions", "Subject"]
 
 MAX_TURN = 3400.0
-"""Degrees a second that a joint may turn against its parent unless somebody says otherwise."""
+"""Default limit of a joint's rotation relative to its parent, degrees per second."""
 
 _NONE: Ints = np.zeros(0, dtype=np.int32)
 _NO_TIMES: Floats = np.zeros(0)
-_STRAYS = 0.02  # of the vertices that may be strays, at each end of an axis
-_FAR = 10.0  # a box this many times that of the others is one of strays
+_STRAYS = 0.02  # fraction of vertices that may be strays, at each end of an axis
+_FAR = 10.0  # a box this many times that of the others indicates strays
 
 Indices = NDArray[np.int64] | Ints | list[int]
 
 
 @dataclass(frozen=True, slots=True)
 class LintOptions:
-    """What counts as a fault where only the person who asks can know.
+    """Thresholds of faults that depend on the user's purpose.
 
     Attributes
     ----------
     max_speed : float or None
-        Of a joint or keypoint, figure units a second; None for 15 times the figure's size.
+        Of a joint or keypoint, figure units per second; None for 15 times the figure's size.
     max_turn : float
-        Of a joint against its parent, radians a second; ``MAX_TURN`` in degrees.
+        Rotation of a joint relative to its parent, radians per second; default ``MAX_TURN``.
     confidence : float
-        Of captured keypoints: what is below is low.
+        Captured keypoints below this have low confidence.
     rate : float
-        How often a second clips of keys are looked at, at least.
+        Minimum sampling rate of keyed clips, per second.
     frame_rate : float
-        Frames a second by which clips of keys are counted.
+        Frames per second for numbering the frames of keyed clips.
     ground : float, "auto" or "none"
-        How high the ground is in the scene, along what is up; found out from the feet; or none,
-        and feet are not looked at.
+        Height of the ground along the scene's up axis; detected from the feet; or none,
+        and feet are not checked.
     """
 
     max_speed: float | None = None
@@ -67,28 +67,28 @@ class LintOptions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Finding:
-    """A diagnostic with its place in a scene.
+    """A diagnostic with its location in a scene.
 
     Attributes
     ----------
     diagnostic : Diagnostic
-        What was found, and the file and line if they are known.
+        The fault, with file and line if known.
     actor : int or None
         Index in the scene.
     name : str
-        What the actor is called.
+        Name of the actor.
     part : "", "mesh", "skeleton" or "clip"
-        What of the actor it is about.
+        The part of the actor that it refers to.
     vertices, triangles, joints : (N,) int32
-        Of the actor's figure, the worst first; keypoints of captures count as joints.
+        Of the actor's figure, the worst first; keypoints of captures are listed as joints.
     frames : (N,) int32
-        As the file numbers them, the worst first.
+        As numbered in the file, the worst first.
     times : (N,)
-        Seconds of the scene's clock at which these frames are shown.
+        Times of these frames on the scene's clock, in seconds.
     seek : float or None
-        Seconds at which it is best looked at; None for the first of ``times``.
+        Best time for viewing it, in seconds; None for the first of ``times``.
     at : (str, int) or None
-        The thing that the message names first, as readers remember where it is in a file:
+        The first item in the message, by which readers remember its position in a file:
         ``("weights", 5)`` is the line of vertex 5's weights.
     """
 
@@ -111,17 +111,17 @@ class Finding:
 
     @property
     def severity(self) -> str:
-        """One of ``SEVERITIES``."""
+        """Severity, one of ``SEVERITIES``."""
         return self.diagnostic.severity
 
     @property
     def message(self) -> str:
-        """One line with numbers."""
+        """The message, one line with numbers."""
         return self.diagnostic.full_message
 
     @property
     def file(self) -> Path | None:
-        """Where it comes from, if that is known."""
+        """The file at fault, if known."""
         return self.diagnostic.path
 
     @property
@@ -131,17 +131,17 @@ class Finding:
 
     @property
     def title(self) -> str:
-        """Name of this kind of finding."""
+        """Title of its code."""
         return CODES[self.code].title
 
     @property
     def hint(self) -> str:
-        """What to do about it."""
+        """Hint for fixing it."""
         code = CODES[self.code]
         return code.other_hint if code.other_hint and self.line is None else code.hint
 
     def located(self, file: Path | None, line: int | None = None, severity: str = "") -> Finding:
-        """Return the finding with another place in the files, and severity if one is given."""
+        """Return the finding with a new location in the files, and a severity if one is given."""
         found = replace(
             self.diagnostic, path=file, line=line, level=severity or self.diagnostic.level
         )
@@ -150,26 +150,26 @@ class Finding:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Subject:
-    """One actor that is looked at.
+    """One actor to check.
 
     Attributes
     ----------
     actor : Actor
-        Is not changed.
+        Not changed.
     index : int
         In its scene.
     up : "y" or "z"
-        The scene's.
+        The scene's up axis.
     options : LintOptions
-        What counts as a fault.
+        Thresholds of faults.
     counting : Counting or None
-        How clips of keys are counted in frames; None for by themselves.
-    spoiled : mapping of str to (N,)
-        What is not the file's own any more, because the file's own cannot be used: vertices by
+        Frame numbering of keyed clips; None for one of their own.
+    invalid : mapping of str to (N,)
+        Data that a reader replaced because the file's own is invalid: vertices by
         ``"positions"`` and ``"weights"``, ``"triangles"``, joints by ``"bindings"`` and
         ``"joints"``, rows by ``"frames"``.
     tracks : list of Track
-        Empty, or that of the actor's clip.
+        Cached track of the actor's clip; may be empty.
     """
 
     actor: Actor
@@ -177,48 +177,48 @@ class Subject:
     up: Literal["y", "z"] = "y"
     options: LintOptions = field(default_factory=LintOptions)
     counting: Counting | None = None
-    spoiled: Mapping[str, Ints] = field(default_factory=dict)
-    # What several checks need is made once: ``track_of`` keeps it here.
+    invalid: Mapping[str, Ints] = field(default_factory=dict)
+    # Results that several checks need are computed once: ``track_of`` caches them here.
     tracks: list[Track] = field(default_factory=list)
 
-    def sound(self, part: str, count: int) -> Bools:
-        """Return what may be judged.
+    def valid(self, part: str, count: int) -> Bools:
+        """Return which items are valid data of the file.
 
         Parameters
         ----------
         part : str
-            A key of ``spoiled``.
+            A key of ``invalid``.
         count : int
-            How many there are.
+            Number of items.
 
         Returns
         -------
         (count,)
-            False for what is not the file's own.
+            False for items whose data is not the file's own.
         """
         result = np.ones(count, dtype=np.bool_)
-        lost = self.spoiled.get(part, _NONE)
+        lost = self.invalid.get(part, _NONE)
         result[lost[lost < count]] = False
         return result
 
     def length(self, length: float) -> str:
-        """Return a length in words: in millimetres if the unit is known, else beside the size."""
+        """Return a length as text: in millimetres if the unit is known, else relative to size."""
         figure = self.actor.figure
         if figure.unit in METRES:
             return length_text(figure, length)
-        return f"{length:.3g} units" + self._share(length)
+        return f"{length:.3g} units" + self._relative(length)
 
     def speed(self, speed: float) -> str:
-        """Return a speed in words: metres a second if the unit is known."""
+        """Return a speed as text: in metres per second if the unit is known."""
         unit = self.actor.figure.unit
         if unit in METRES:
             return f"{speed * METRES[unit]:.3g} m/s"
-        return f"{speed:.3g} units a second" + self._share(speed)
+        return f"{speed:.3g} units a second" + self._relative(speed)
 
     def size(self) -> float:
-        """Return the diagonal of the box of the mesh, or else of the joints at rest.
+        """Return the diagonal of the bounding box of the mesh, or else of the joints at rest.
 
-        Figure units; 0 without either. Stray vertices far away do not count.
+        Figure units; 0 without either. Distant stray vertices are ignored.
         """
         figure = self.actor.figure
         if figure.mesh is None:
@@ -227,7 +227,7 @@ class Subject:
         size = box_size(bounding_box(positions))
         if len(positions) == 0:
             return size
-        # Partitioning finds the two quantiles of an axis without sorting it.
+        # Partitioning finds both quantiles of an axis without sorting.
         inner = np.quantile(positions, [_STRAYS, 1.0 - _STRAYS], axis=0, method="nearest")
         usual = box_size(inner)
         if not size > _FAR * usual > 0.0:
@@ -235,7 +235,7 @@ class Subject:
         near = np.linalg.norm(positions - inner.mean(axis=0), axis=1) < _FAR / 2 * usual
         return box_size(bounding_box(positions[near]))
 
-    def _share(self, length: float) -> str:
+    def _relative(self, length: float) -> str:
         size = self.size()
         return f" ({100.0 * length / size:.3g} % of its size)" if size > 0.0 else ""
 
@@ -254,7 +254,7 @@ class Subject:
         at: tuple[str, int] | None = None,
         **values: Any,
     ) -> Finding:
-        """Return a finding about this actor; ``values`` are what the message of ``key`` shows."""
+        """Return a finding about this actor; ``values`` are those of the message of ``key``."""
         return Finding(
             Diagnostic(key, level=severity, values=values),
             actor=self.index,

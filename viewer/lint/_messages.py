@@ -1,4 +1,4 @@
-"""Diagnostics of readers and loaders as findings."""
+"""Conversion of diagnostics of readers and loaders to findings."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from viewer.lint._finding import Finding
 __all__ = ["CHECKED", "of_diagnostic", "of_error", "of_refusal"]
 
 CHECKED = frozenset(("W001", "W002", "W004", "B003", "M010", "C005"))
-"""Codes of warnings that checks of the scene find again, with all places."""
+"""Codes of warnings that checks of the scene report again, with all locations."""
 
 _FIELDS = {
     "positions": "vertices",
@@ -24,25 +24,25 @@ _FIELDS = {
     "items": "joints",
     "frames": "frames",
 }
-"""Fields of a finding by the part of a diagnostic."""
+"""Fields of a finding for each part of a diagnostic."""
 
 
 def of_error(problem: ViewerError, path: Path | None = None) -> Finding:
-    """Return a refusal as a finding; ``path`` is the file at fault, if the error does not say."""
+    """Return an error as a finding; ``path`` is the file at fault, if the error has none."""
     found = problem.diagnostic
-    if found is None:  # parts that do not fit each other, in the words of the figure's own classes
+    if found is None:  # parts that do not fit together, as worded by the figure's classes
         found = Diagnostic("F002.misfit", path, values={"message": str(problem)}, is_refusal=True)
     return of_diagnostic(found)
 
 
 def of_refusal(problem: ViewerError, path: Path) -> Finding:
-    """Return what ended the reading of a file as a finding."""
+    """Return the error that stopped the reading of a file as a finding."""
     finding = of_error(problem, path)
     return replace(finding, diagnostic=replace(finding.diagnostic, is_final=True))
 
 
 def of_diagnostic(found: Diagnostic) -> Finding:
-    """Return what a reader recorded as a finding."""
+    """Return a reader's diagnostic as a finding."""
     field = _FIELDS.get(found.part)
     if field is None or found.places is None:
         return Finding(found)

@@ -1,4 +1,4 @@
-"""Places in an actor that a reader's diagnostic is about."""
+"""Locations in an actor of the parts that a reader's diagnostic names."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ __all__ = ["aimed_at"]
 
 
 def aimed_at(remark: Finding, actor: Actor, part: str) -> Finding | None:
-    """Return a reader's finding with its places in an actor, None if it is about none there.
+    """Return a reader's finding with its locations in an actor, None if there are none.
 
     Parameters
     ----------
     remark : Finding
         Of the file that this part was read from.
     actor : Actor
-        Whose part it is.
+        The actor with this part.
     part : "mesh", "skeleton" or "clip"
         Of the actor.
     """
@@ -37,14 +37,14 @@ def _in_mesh(remark: Finding, actor: Actor) -> Finding | None:
         return None
     if len(remark.triangles) or len(remark.joints):
         return remark if found.part != "bindings" or skin is not None else None
-    # Of faults whose data stay as they are only the value tells the vertex.
+    # If faulty data is unchanged, the vertex is found by its value.
     vertices = remark.vertices if len(remark.vertices) else [found.values.get("vertex")]
     known = [vertex for vertex in vertices if vertex is not None and vertex < mesh.n_vertices]
     return replace(remark, vertices=np.array(known, dtype=np.int32)) if known else None
 
 
 def _in_clip(remark: Finding, actor: Actor) -> Finding | None:
-    """Return a finding about channels of a clip with the joints that they move."""
+    """Return a finding about channels of a clip with the joints that they animate."""
     found, skeleton = remark.diagnostic, actor.figure.skeleton
     if found.part != "channels" or found.places is None or skeleton is None:
         return None

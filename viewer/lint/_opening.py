@@ -1,4 +1,4 @@
-"""Files opened for checks: what cannot be opened becomes findings, and the rest is put together."""
+"""Opening of files for checks: files that fail become findings, the rest is assembled."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from viewer.rig.scene import Actor, Scene
 if TYPE_CHECKING:
     from viewer.loading.capturing import Builder
 
-__all__ = ["Opened", "Owners", "open_files", "spoiled_parts", "with_files"]
+__all__ = ["Opened", "Owners", "invalid_parts", "open_files", "with_files"]
 
 Owners = dict[str, int]
-"""For the parts of an actor, which actor of what was opened has the same: by ``Finding.part``."""
+"""For each ``Finding.part``, the index of the opened actor that has the same part."""
 
 _LISTS = (
     "figures",
@@ -47,18 +47,18 @@ _INSTEAD = {"normals": "positions"}
 
 @dataclass(slots=True)
 class Opened:
-    """What could be opened.
+    """Result of opening files.
 
     Attributes
     ----------
     scene : Scene
-        Figures that fit nothing stand in it alone.
+        Figures that fit nothing are separate actors.
     contents : Contents
-        Everything that was read.
+        Contents of all files that were read.
     findings : list of Finding
-        Files that cannot be read or put together, and what their readers noticed.
+        Files that cannot be read or assembled, and messages of readers.
     sources : dict of Path to Source
-        Every file that was read: its faults, and where things are in it.
+        All files that were read, with their faults and the positions of their data.
     """
 
     scene: Scene = field(default_factory=lambda: Scene([]))
@@ -73,23 +73,23 @@ def open_files(
     max_size: int = MAX_SIZE,
     progress: Progress | None = None,
 ) -> Opened:
-    """Read files and put together what can be; never fails because of what is in them.
+    """Read files and assemble those that can be; never fails because of their contents.
 
     Parameters
     ----------
     paths : sequence of str or Path
         As for ``viewer.loading.load``.
     settings : MotionSettings, optional
-        How motions are taken.
+        How motions are interpreted.
     max_size : int
         Larger files are not read.
     progress : callable, optional
-        Called before each file, and before each part of captures; what it raises ends it.
+        Called before each file, and before each part of captures; may raise to cancel.
     """
     opened = Opened()
     known = {_resolved(Path(path)): Path(path) for path in reversed(paths)}
     queue = list(reversed(known.values()))
-    for number, path in enumerate(queue):  # grows while it is read: a .rig names files
+    for number, path in enumerate(queue):  # grows during iteration: a .rig names files
         if progress is not None:
             progress(number, len(queue), f"reading {printable(path, 60)}")
         named = _read(opened, path, settings or MotionSettings(), max_size)
@@ -102,15 +102,15 @@ def open_files(
 
 
 def _resolved(path: Path) -> Path:
-    """Return what tells files apart; reading says what is wrong with a path that leads nowhere."""
+    """Return a path that identifies a file; invalid paths are reported by reading them."""
     try:
         return path.resolve()
-    except (OSError, RuntimeError, ValueError):  # a loop of links, or a NUL in the name
+    except (OSError, RuntimeError, ValueError):  # a cycle of links, or a NUL in the name
         return path
 
 
 def _read(opened: Opened, path: Path, settings: MotionSettings, max_size: int) -> tuple[Path, ...]:
-    """Read one file, noting all faults that can be gone on from; return files that it names."""
+    """Read one file, recording all recoverable faults; return files that it names."""
     contents, recorded = Contents(), Collector(keeps_errors=True)
     named: tuple[Path, ...] = ()
     refusals: list[Finding] = []
@@ -129,9 +129,9 @@ def _read(opened: Opened, path: Path, settings: MotionSettings, max_size: int) -
 
 
 def _loaded(figure: Figure, refusals: list[Finding]) -> Figure:
-    """Read what is left in the file until it is used, so that its faults are known now.
+    """Read the parts of a file that load lazily, so that their faults are known now.
 
-    What cannot be read is said, and left out of the figure.
+    Parts that cannot be read are reported, and dropped from the figure.
     """
     try:
         if figure.blend_shapes is not None:
@@ -149,7 +149,7 @@ def _loaded(figure: Figure, refusals: list[Finding]) -> Figure:
 
 
 def _assemble(opened: Opened, settings: MotionSettings | None, progress: Progress | None) -> None:
-    """Make a scene; what does not fit is taken out, said, and looked at alone."""
+    """Make a scene; parts that do not fit are removed, reported, and checked separately."""
     contents = replace(opened.contents)
     alone: list[Figure] = []
     for path, figure in opened.contents.figures:
@@ -168,7 +168,7 @@ def _assemble(opened: Opened, settings: MotionSettings | None, progress: Progres
         culprit = _culprit(problem, contents)
         opened.findings.append(of_error(problem, culprit))
         if culprit is None:
-            # A model that is not among the files: what needs one cannot be looked at.
+            # The model is missing from the files: whatever needs it cannot be checked.
             contents = Contents(figures=contents.figures, clips=contents.clips)
         else:
             alone += _take_out(contents, culprit)
@@ -179,10 +179,10 @@ def _assemble(opened: Opened, settings: MotionSettings | None, progress: Progres
 def _read_on(
     scene: Scene, builders: Sequence[Builder], progress: Progress | None
 ) -> ViewerError | None:
-    """Read captures to their ends; return what ended it before."""
+    """Read captures completely; return the error that stopped one."""
     for builder in builders:
         while not builder.is_done:
-            if progress is not None:  # what it raises is no fault of a file
+            if progress is not None:  # an exception from it is not a file's fault
                 progress(builder.n_read, builder.capture.n_frames, "reading frames")
             try:
                 new, notes = builder.read_some()
@@ -194,7 +194,7 @@ def _read_on(
 
 
 def _is_unbound(figure: Figure, source: Source) -> bool:
-    """Return whether no bind matrix is the file's own: nobody knows how many joints there were."""
+    """Return whether all bind matrices were replaced, so that the joint count is unknown."""
     lost = {
         place
         for fault in source.diagnostics.errors
@@ -205,9 +205,9 @@ def _is_unbound(figure: Figure, source: Source) -> bool:
 
 
 def _culprit(problem: ViewerError, contents: Contents) -> Path | None:
-    """Return the file that an error is about, or the last one read if it does not say.
+    """Return the file that an error is about, or the last one read if the error has none.
 
-    None if it is about a file that was not among them.
+    None if the file is not among those read.
     """
     paths = [path for name in _LISTS for path, _ in getattr(contents, name)]
     found = problem.diagnostic
@@ -217,7 +217,7 @@ def _culprit(problem: ViewerError, contents: Contents) -> Path | None:
 
 
 def _take_out(contents: Contents, culprit: Path) -> list[Figure]:
-    """Take one file out, and return the figures it held."""
+    """Remove one file's contents, and return the figures in it."""
     figures = [figure for path, figure in contents.figures if path == culprit]
     for name in _LISTS:
         setattr(contents, name, [item for item in getattr(contents, name) if item[0] != culprit])
@@ -229,16 +229,16 @@ def with_files(
     findings: list[Finding],
     looked_at: tuple[Scene, Sequence[Owners]] | None = None,
 ) -> list[Finding]:
-    """Return all findings: those of the scene with their files, remarks that say the same dropped.
+    """Return all findings, those of the scene with their files, without duplicate messages.
 
     Parameters
     ----------
     opened : Opened
-        Gives the remarks of readers, and what came from which file.
+        Provides the messages of readers, and the origin of the data.
     findings : list of Finding
-        Of its scene, or of the one that was looked at instead.
+        About its scene, or about the one that was checked instead.
     looked_at : (Scene, sequence of Owners), optional
-        Another scene, and for each of its actors what it shares with those of the opened one.
+        Another scene, and for each of its actors the parts equal to those of the opened one.
     """
     if looked_at is None:
         actors = opened.scene.actors
@@ -251,7 +251,7 @@ def with_files(
         if twin is None:
             remarks.append(remark)
             continue
-        # The reader knows whether the file is refused for it, the check all places.
+        # The reader's finding knows whether the file is rejected, the check's has all locations.
         severity = max(remark.severity, placed[twin].severity, key=SEVERITIES.index)
         line = remark.line if placed[twin].at is None else None
         placed[twin] = placed[twin].located(placed[twin].file, line, severity)
@@ -259,25 +259,25 @@ def with_files(
 
 
 def _is_same(remark: Finding, other: Finding) -> bool:
-    # Bare islands are said in another way than bare vertices.
+    # Messages about islands without weights differ from those about single vertices.
     same = other.code == remark.code or (remark.code == "W004" and other.code == "W005")
     is_checked = remark.code in CHECKED
     return is_checked and same and (other.file is None or other.file == remark.file)
 
 
 def _with_line(finding: Finding, opened: Opened) -> Finding:
-    """Return a finding with the line of what it names, if the reader remembers where that is."""
+    """Return a finding with the line of the item it names, if the reader recorded it."""
     source = None if finding.file is None else opened.sources.get(finding.file)
     if source is None or finding.at is None:
         return finding
     kind, index = finding.at
-    # Normals that the file lacks are computed: then the vertex is what can be mended.
+    # Normals that the file lacks are computed: the vertex is what can be fixed.
     place = source.place(kind, index) or source.place(_INSTEAD.get(kind, ""), index)
     return finding if place is None else finding.located(*place)
 
 
 def _placed(finding: Finding, opened: Opened, owners: Sequence[Owners]) -> Finding:
-    """Return a finding with the file that holds the part of the actor it is about."""
+    """Return a finding with the file that the part of the actor came from."""
     owner = None if finding.actor is None else owners[finding.actor].get(finding.part or "mesh")
     if owner is None:
         return finding
@@ -286,7 +286,7 @@ def _placed(finding: Finding, opened: Opened, owners: Sequence[Owners]) -> Findi
 
 
 def _aimed(opened: Opened, scene: Scene, owners: Sequence[Owners]) -> list[Finding]:
-    """Return what readers say with the actor that it is about, where they name a place in it."""
+    """Return readers' messages with their actors, where they name a location in one."""
     known: dict[tuple[Path, str], int] = {}
     for number, parts in enumerate(owners):
         for part, owner in parts.items():
@@ -305,10 +305,10 @@ def _aimed(opened: Opened, scene: Scene, owners: Sequence[Owners]) -> list[Findi
 
 
 def _files_of(actor: Actor, part: str, contents: Contents) -> list[Path]:
-    """Return the files that a part of an actor may be from, the likeliest first."""
+    """Return the files that a part of an actor may come from, the most likely first."""
     mesh, skeleton = actor.figure.mesh, actor.figure.skeleton
     if part == "clip":
-        # Motions become clips of their own, but for keys, which stay as they were read.
+        # Motions become separate clips, except for keyed ones, which are kept as read.
         paths = [path for path, clip in contents.clips if clip is actor.clip]
         moving = [*contents.body_motions, *contents.skeleton_motions, *contents.captures]
         return paths + ([moving[0][0]] if len(moving) == 1 and not paths else [])
@@ -323,22 +323,22 @@ def _files_of(actor: Actor, part: str, contents: Contents) -> list[Path]:
     return [
         path
         for path, figure in contents.figures
-        # A picture makes another mesh of the same positions.
+        # Applying a texture makes another mesh with the same positions.
         if mesh is not None and figure.mesh is not None and figure.mesh.positions is mesh.positions
     ]
 
 
 _SPOILED = {"mesh": ("positions", "weights", "triangles", "bindings"),
             "skeleton": ("joints",), "clip": ("frames",)}  # fmt: skip
-"""Which parts of a fault are of which part of an actor."""
+"""Parts of a fault for each part of an actor."""
 
 
-def spoiled_parts(opened: Opened) -> list[dict[str, Ints]]:
-    """Return for each actor what its readers put something neutral for, see ``Subject``."""
-    return [_spoiled(actor, opened) for actor in opened.scene.actors]
+def invalid_parts(opened: Opened) -> list[dict[str, Ints]]:
+    """Return the data of each actor that its readers replaced, see ``Subject``."""
+    return [_invalid(actor, opened) for actor in opened.scene.actors]
 
 
-def _spoiled(actor: Actor, opened: Opened) -> dict[str, Ints]:
+def _invalid(actor: Actor, opened: Opened) -> dict[str, Ints]:
     lost: dict[str, Ints] = {}
     for part, keys in _SPOILED.items():
         for path in _files_of(actor, part, opened.contents):

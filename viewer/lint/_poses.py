@@ -1,4 +1,4 @@
-"""Some poses of an actor in which a rig shows what it is worth."""
+"""Representative poses of an actor, in which faults of a rig are visible."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from viewer.rig.skeleton import clamp_dofs
 
 __all__ = ["some_poses"]
 
-_COUNT = 4  # of poses besides rest and the present one
-_SWING = 0.6  # radians: about the largest turn of most joints in a walk
-_SEED = 5  # so that the same file gives the same numbers
+_COUNT = 4  # number of poses besides rest and the present one
+_SWING = 0.6  # radians: about the largest rotation of most joints in a walk
+_SEED = 5  # fixed, so that the same file gives the same numbers
 _FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
 
 
 def some_poses(actor: Actor) -> list[Pose]:
-    """Return the rest pose, the present one, and some of the clip's, or else made up within limits.
+    """Return the rest pose, the present one, and some from the clip, or else random ones.
 
     Parameters
     ----------
@@ -27,12 +27,12 @@ def some_poses(actor: Actor) -> list[Pose]:
         With a skeleton.
     """
     figure, clip = actor.figure, actor.clip
-    assert figure.skeleton is not None and actor.pose is not None  # the callers looked
+    assert figure.skeleton is not None and actor.pose is not None  # checked by the callers
     rest = figure_pose(figure)
     poses = [rest, actor.pose]
     if clip is not None and not isinstance(clip, PointClip):
         times = np.linspace(clip.start, clip.end, _COUNT)
-        frames = frames_of(figure, clip, times, actor.pose, fill=True)
+        frames = frames_of(figure, clip, times, actor.pose, interpolate=True)
         return poses + [
             pose_of(figure, frames, int(frame)) for frame in np.flatnonzero(frames.present)
         ]

@@ -1,4 +1,4 @@
-"""Findings in words: a line each for people and editors, everything for programs."""
+"""Reports of findings: one line each for people and editors, all data for programs."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ from viewer.rig.skeleton import joint_labels
 
 __all__ = ["describe", "finding_text", "summary", "worst_first"]
 
-_LISTED = 100  # places of one finding in JSON; their number is always there
+_LISTED = 100  # maximum locations of one finding in JSON; their count is always given
 
 
 def worst_first(findings: Sequence[Finding]) -> list[Finding]:
-    """Return findings by severity, the worst first; those of one severity stay in their order."""
+    """Return findings by severity, the worst first; stable within a severity."""
     return sorted(findings, key=lambda finding: -SEVERITIES.index(finding.severity))
 
 
 def finding_text(finding: Finding) -> str:
-    """Return one finding as compilers print theirs, so that editors jump to file and line.
+    """Return one finding in the format of compilers, so that editors can jump to file and line.
 
-    Who it is about is said where the file does not say it: of several people, and of a clip.
+    The actor is named if the file does not identify it: one of several people, or a clip.
     """
     place, who = "", ""
     if finding.file is not None and finding.file != Path():
         place = printable(finding.file, 300)
         place += f":{finding.line}" if finding.line is not None else ""
-        # A folder's figure is called like the folder, its findings name the file inside.
+        # A folder's figure has the folder's name, its findings name the file inside.
         folders = finding.file.parent.name, folder_name(finding.file.parent)
         known = (finding.file.stem, finding.file.name, *folders, "")
         who = "" if finding.name in known else f"{printable(finding.name, 100)}: "
@@ -45,14 +45,14 @@ def finding_text(finding: Finding) -> str:
 
 
 def summary(findings: Sequence[Finding], n_files: int = 0) -> str:
-    """Return how many there are of each severity: ``1 error, 0 warnings, 3 notes in 2 files``.
+    """Return the number of findings of each severity: ``1 error, 0 warnings, 3 notes in 2 files``.
 
     Parameters
     ----------
     findings : sequence of Finding
         All of them.
     n_files : int
-        How many files they are of; 0 if of none.
+        Number of files checked; 0 for none.
     """
     counts = Counter(finding.severity for finding in findings)
     parts = [counted(counts[kind], kind) for kind in reversed(SEVERITIES)]
@@ -60,14 +60,14 @@ def summary(findings: Sequence[Finding], n_files: int = 0) -> str:
 
 
 def describe(findings: Sequence[Finding], scene: Scene) -> dict[str, Any]:
-    """Return findings ready for JSON.
+    """Return findings as data for JSON.
 
     Parameters
     ----------
     findings : sequence of Finding
-        Of this scene, or of its files.
+        About this scene, or its files.
     scene : Scene
-        Names the joints.
+        Provides joint names.
     """
     counts = Counter(finding.severity for finding in findings)
     return {
@@ -99,7 +99,7 @@ def _describe(finding: Finding, scene: Scene) -> dict[str, Any]:
 
 
 def _data(found: Diagnostic) -> dict[str, Any]:
-    """Return what a diagnostic knows beside its code, severity, message and place in a file."""
+    """Return a diagnostic's data besides its code, severity, message and file location."""
     told = described(found)
     return {key: told[key] for key in ("key", "part", "places", "n_places", "count", "values")}
 

@@ -1,4 +1,4 @@
-"""Run all checks on a scene."""
+"""Execution of all checks on a scene."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from viewer.rig.scene import Scene
 __all__ = ["CHECKS", "Check", "Progress", "lint_scene"]
 
 Progress = Callable[[int, int, str], None]
-"""Called with the steps done, all steps, and what comes next; may raise to stop."""
+"""Called with the completed steps, all steps, and the next step; may raise to cancel."""
 
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """What must be known of a check before its module is imported.
+    """Properties of a check that are needed before its module is imported.
 
     Attributes
     ----------
     title : str
-        What it looks at, for progress.
+        Name of the checked part, for progress.
     of_motion : bool
-        Whether it looks at what moves an actor; else actors of one figure are looked at once.
+        Whether it depends on an actor's motion; else actors of one figure are checked once.
     """
 
     title: str
@@ -45,40 +45,40 @@ CHECKS = {
     "feet": Check("feet", of_motion=True),
     "captures": Check("captured points", of_motion=True),
 }
-"""Modules in this folder, each with ``check(subject)``, in the order in which they run."""
+"""Modules in this folder with a function ``check(subject)``, in order of execution."""
 
 
 def lint_scene(
     scene: Scene,
     options: LintOptions | None = None,
     progress: Progress | None = None,
-    spoiled: Sequence[Mapping[str, Ints]] = (),
+    invalid: Sequence[Mapping[str, Ints]] = (),
 ) -> list[Finding]:
-    """Check everything in an open scene.
+    """Run all checks on an open scene.
 
     Parameters
     ----------
     scene : Scene
-        Is not changed.
+        Not changed.
     options : LintOptions, optional
-        What counts as a fault.
+        Thresholds of faults.
     progress : callable, optional
-        Called before every step with the steps done, their number, and what is looked at; what it
-        raises ends the checks.
-    spoiled : sequence of mappings, optional
-        For each actor, what is not to be judged; see ``Subject``.
+        Called before every step with the completed steps, their number, and the next step; may
+        raise to cancel.
+    invalid : sequence of mappings, optional
+        For each actor, data that is not to be checked; see ``Subject``.
 
     Returns
     -------
     list of Finding
-        By actor, in the order of ``CHECKS``; each names the actor and the places in it.
+        By actor, in the order of ``CHECKS``; each has the actor and the locations in it.
     """
     chosen = options or LintOptions()
     counting = counting_of(scene, chosen.frame_rate)
     known: set[int] = set()
     steps: list[tuple[Subject, str]] = []
     for index, actor in enumerate(scene.actors):
-        lost = spoiled[index] if index < len(spoiled) else {}
+        lost = invalid[index] if index < len(invalid) else {}
         subject = Subject(actor, index, scene.up, chosen, counting, lost)
         is_new = id(actor.figure) not in known
         known.add(id(actor.figure))
@@ -87,9 +87,9 @@ def lint_scene(
     for number, (subject, name) in enumerate(steps):
         if progress is not None:
             progress(number, len(steps), f"{subject.actor.name}: {CHECKS[name].title}")
-        # Products of numbers near the largest overflow; what has such is far away, and found.
+        # Products of huge numbers overflow; such vertices are distant, and reported.
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             findings += import_module(f"viewer.lint.{name}").check(subject)
         if name == next(reversed(CHECKS)):
-            subject.tracks.clear()  # a long motion takes much memory, and is not needed again
+            subject.tracks.clear()  # a long track takes much memory, and is not needed again
     return findings

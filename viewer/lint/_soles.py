@@ -1,4 +1,4 @@
-"""The soles of a body: points of the mesh that may touch the ground, however a foot turns."""
+"""Soles of a body: points of the mesh that may touch the ground, for any rotation of a foot."""
 
 from __future__ import annotations
 
@@ -16,27 +16,27 @@ from viewer.rig.skin import Skin, owners
 
 __all__ = ["Soles", "extent", "soles_of"]
 
-_STRAYS = 0.001  # of the vertices at either end, which do not count for the height
-_TILTS = np.radians([20.0, 45.0, 70.0])  # of a foot in steps and on tiptoe
+_STRAYS = 0.001  # fraction of vertices at either end that are excluded from the height
+_TILTS = np.radians([20.0, 45.0, 70.0])  # tilts of a foot in steps and on tiptoe
 _WAYS = 8  # directions of a tilt
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Soles:
-    """Points that move with the joints of feet.
+    """Points that move with the joints of the feet.
 
     Attributes
     ----------
     joints : (N,) int32
-        Of N feet the joint nearest to the ground: the ball of the foot, or the ankle.
+        For each of N feet the joint nearest to the ground: the ball of the foot, or the ankle.
     feet : (P,)
-        Which foot each point is of.
+        The foot that each point belongs to.
     movers : (P,) int32
-        The joint that it moves with.
+        The joint that each point moves with.
     places : (P, 3)
         In that joint's space.
     above : (P,)
-        How much higher it is at rest than the sole: 0 on a mesh.
+        Height of each point above the sole at rest: 0 on a mesh.
     """
 
     joints: Ints
@@ -46,21 +46,21 @@ class Soles:
     above: Floats
 
     def heights(self, world: Floats, axis: Floats, scale: float) -> Floats:
-        """Return how high the lowest point of each foot is.
+        """Return the height of the lowest point of each foot.
 
         Parameters
         ----------
         world : (F, J, 4, 4)
             Joint space to figure space.
         axis : (4,)
-            Row of the placement that gives the height.
+            Row of the placement matrix that gives the height.
         scale : float
             Scene units per figure unit.
 
         Returns
         -------
         (F, N)
-            Along what is up in the scene.
+            Along the scene's up axis.
         """
         rows = np.einsum("a,fpab->fpb", axis[:3], world[:, self.movers, :3])
         heights = np.einsum("fpb,pb->fp", rows[..., :3], self.places) + rows[..., 3] + axis[3]
@@ -72,7 +72,7 @@ class Soles:
 
 
 def extent(figure: Figure) -> tuple[float, float]:
-    """Return where the sole is along what is up while the figure stands at rest, and its height."""
+    """Return the height of the sole along the up axis at rest, and the figure's height."""
     axis = _axis(figure)
     values = rest_joints(figure)[:, axis]
     if figure.mesh is not None:
@@ -86,14 +86,14 @@ def _axis(figure: Figure) -> int:
 
 
 def soles_of(figure: Figure, is_bound: bool) -> Soles | None:
-    """Return the soles of a skeleton that has two feet by name, None if it has not.
+    """Return the soles of a skeleton with two feet by name, None if it has none.
 
     Parameters
     ----------
     figure : Figure
-        In the shape that it moves in.
+        With the shape in which it moves.
     is_bound : bool
-        Whether its bindings are to be trusted; else joints stand for the mesh.
+        Whether its bindings are valid; else joints are used instead of the mesh.
     """
     skeleton = figure.skeleton
     if skeleton is None:
@@ -122,7 +122,7 @@ def soles_of(figure: Figure, is_bound: bool) -> Soles | None:
 
 
 def _whole_foot(skeleton: Skeleton, found: list[int]) -> Bools:
-    """Return which joints are of a foot: the ankle, or the ball, and what hangs from it. (J,)."""
+    """Return the joints of a foot: the ankle, or the ball, and all joints below it. (J,)."""
     result = np.zeros(skeleton.n_joints, dtype=np.bool_)
     result[found] = True
     for joint, parent in enumerate(skeleton.parents.tolist()):
@@ -131,11 +131,11 @@ def _whole_foot(skeleton: Skeleton, found: list[int]) -> Bools:
 
 
 def _points(mesh: Mesh, skin: Skin, is_foot: Bools, axis: int) -> tuple[Ints, Floats] | None:
-    """Return corners of a foot's hull that can be lowest: their joints (P,), places (P, 3)."""
+    """Return vertices of a foot's hull that can be lowest: their joints (P,), positions (P, 3)."""
     vertices = owners(skin)
     order = np.lexsort((skin.weights, vertices))
     last = np.flatnonzero(np.diff(vertices[order], append=-1))
-    strongest = order[last]  # influence of each vertex that has one
+    strongest = order[last]  # strongest influence of each vertex that has any
     strongest = strongest[is_foot[skin.joints[strongest]] & (skin.weights[strongest] > 0.0)]
     if len(strongest) == 0:
         return None

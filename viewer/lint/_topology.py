@@ -1,4 +1,4 @@
-"""How triangles hang together: welded vertices, shared edges, components, orientation."""
+"""Topology of triangle meshes: welded vertices, shared edges, components, orientation."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ Indices = NDArray[np.int64]
 
 
 def welded(positions: Floats, triangles: Ints) -> Indices:
-    """Return triangles whose corners at one place are one vertex: seams count as closed. (T, 3).
+    """Return triangles with coincident vertices merged, so that seams count as closed: (T, 3).
 
     Parameters
     ----------
     positions : (V, 3)
-        Of exactly equal ones the first stands for all.
+        Of exactly equal ones the first represents all.
     triangles : (T, 3)
         Vertex indices.
     """
-    # Sorting rows as three keys is several times faster than np.unique of rows.
+    # Sorting rows as three keys is several times faster than np.unique over rows.
     order = np.lexsort(positions.T)
     ordered = positions[order]
     is_new = np.concatenate([[True], (ordered[1:] != ordered[:-1]).any(axis=1)])
@@ -38,20 +38,20 @@ def welded(positions: Floats, triangles: Ints) -> Indices:
 
 @dataclass(frozen=True, slots=True)
 class Edges:
-    """The edges of all triangles; corner k of a triangle begins its edge k.
+    """The edges of all triangles; corner k of a triangle is the start of its edge k.
 
     Attributes
     ----------
     keys : (3 T,)
-        The same number for the same two vertices.
+        Equal for edges with the same two vertices.
     forward : (3 T,) bool
-        Whether the edge runs from the smaller vertex to the larger.
+        Whether the edge runs from the smaller vertex index to the larger.
     counts : (3 T,)
-        How many triangles have this edge.
+        Number of triangles with this edge.
     pairs : (P, 2)
-        Triangles on the two sides of the edges that exactly two have.
+        Triangles on both sides of edges that exactly two triangles have.
     agree : (P,) bool
-        Whether the two run through it in opposite directions, as neighbours should.
+        Whether the two traverse the edge in opposite directions, as consistent neighbours do.
     """
 
     keys: Indices
@@ -62,7 +62,7 @@ class Edges:
 
 
 def edges_of(corners: Indices) -> Edges:
-    """Return the edges of triangles, those between equal vertices left out of the pairs.
+    """Return the edges of triangles; those between equal vertices are excluded from the pairs.
 
     Parameters
     ----------
@@ -85,15 +85,15 @@ def edges_of(corners: Indices) -> Edges:
 def components(count: int, pairs: Indices) -> Indices:
     """Return the smallest member of each node's component: (count,).
 
-    Every round each root takes the smallest label beyond its edges, and labels are shortened
-    until they stand for themselves, so the rounds grow with the logarithm of the nodes.
+    Every round each root takes the smallest label across its edges, and labels are shortened
+    until they are their own, so the number of rounds is logarithmic in the number of nodes.
 
     Parameters
     ----------
     count : int
-        Nodes.
+        Number of nodes.
     pairs : (P, 2)
-        Nodes that belong together.
+        Connected nodes.
     """
     labels = np.arange(count)
     while True:
@@ -108,26 +108,26 @@ def components(count: int, pairs: Indices) -> Indices:
 
 
 def orientations(count: int, edges: Edges) -> tuple[Indices, Bools, Bools]:
-    """Return which triangles must be turned for neighbours to agree.
+    """Return which triangles must be flipped to orient neighbours consistently.
 
-    Every triangle is two nodes, as it is and turned over; an edge joins those that agree. Where
-    both lie in one component the surface has no two sides (Moebius).
+    Every triangle is two nodes, unflipped and flipped; an edge joins consistent ones. If
+    both are in one component, the surface is non-orientable (Moebius).
 
     Parameters
     ----------
     count : int
-        Triangles.
+        Number of triangles.
     edges : Edges
-        Of them.
+        Of these triangles.
 
     Returns
     -------
     component : (count,)
-        Smallest triangle of each one's component.
+        Smallest triangle of each triangle's component.
     flipped : (count,) bool
-        Of each component the smaller share; of equal shares the one without the first triangle.
+        The smaller part of each component; of equal parts the one without the first triangle.
     one_sided : (count,) bool
-        Triangles of components that cannot be oriented.
+        Triangles of components that are not orientable.
     """
     a, b = edges.pairs[:, 0], edges.pairs[:, 1]
     turned = np.where(edges.agree, 0, count)
@@ -137,7 +137,7 @@ def orientations(count: int, edges: Edges) -> tuple[Indices, Bools, Bools]:
     labels = components(2 * count, nodes)
     plain, reverse = labels[:count], labels[count:]
     one_sided = plain == reverse
-    # The smallest triangle of a component has the smaller label as it is, or turned over.
+    # The smallest triangle of a component has the smaller label unflipped, or flipped.
     component = np.minimum(plain, reverse) % count if count else plain
     is_against = plain > reverse
     against = np.bincount(component, is_against, minlength=count)

@@ -1,4 +1,4 @@
-"""Where an actor's joints are in every frame of its clip, in the scene."""
+"""Tracks: positions of an actor's joints in the scene in every frame of its clip."""
 
 from __future__ import annotations
 
@@ -23,36 +23,36 @@ __all__ = ["Indices", "Track", "frame_numbers", "key_times", "track_of"]
 
 Indices = NDArray[np.int64]
 
-_TOGETHER = 1000  # frames whose matrices are in memory at once
-_MOST = 200_000  # times at which a clip of keys is looked at
+_TOGETHER = 1000  # frames per batch, whose matrices are in memory together
+_MOST = 200_000  # maximum number of sampling times of a keyed clip
 _ON_STEP = 1e-6  # of a step
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Track:
-    """A motion, frame by frame.
+    """A motion evaluated frame by frame.
 
     Attributes
     ----------
     times : (F,)
-        Seconds of the scene's clock.
+        Times on the scene's clock, in seconds.
     numbers : (F,) int32
-        What the file calls each frame; of keys, which frame of the timeline it is. Several rows
-        may be of one frame.
+        Number of each frame in the file; for keyed clips, the frame of the timeline. Several rows
+        may have the same frame.
     present : (F,) bool
-        Where False, the other rows mean nothing: nobody is there, or the file cannot say where.
+        Rows where it is False are undefined: the actor is absent, or the file's data is invalid.
     positions : (F, J, 3)
-        Joints in the scene.
+        Joints in scene space.
     rotations : (F, J, 4)
-        Each within its parent: unit quaternions.
+        Local rotations: unit quaternions.
     size : float
-        Of the skeleton at rest, in the scene.
+        Of the skeleton at rest, in scene units.
     scale : float
         Scene units per figure unit.
     feet : (N,) int32
-        The joint nearest to the ground of each foot; none of what has not two feet by name.
+        The joint nearest to the ground of each foot; empty without two feet by name.
     soles : (F, N)
-        How high each foot's lowest point is in the scene.
+        Height of each foot's lowest point in the scene.
     """
 
     times: Floats
@@ -67,18 +67,18 @@ class Track:
 
     @property
     def n_frames(self) -> int:
-        """How many frames there are from the first in which somebody is there to the last."""
+        """Number of frames from the first to the last in which the actor is present."""
         there = self.numbers[self.present]
         return int(there[-1]) - int(there[0]) + 1 if len(there) else 0
 
     def of_each(self, rows: Indices) -> Indices:
-        """Return rows without those whose frame is among the rows before: (N,)."""
+        """Return rows, keeping only the first of each frame: (N,)."""
         _, first = np.unique(self.numbers[rows], return_index=True)
         return rows[np.sort(first)]
 
 
 def track_of(subject: Subject) -> Track | None:
-    """Return the motion of an actor's skeleton, made once; None if it has none."""
+    """Return the track of an actor's skeleton, cached; None if it has none."""
     if not subject.tracks:
         track = _track(subject)
         if track is None:
@@ -103,7 +103,7 @@ def _track(subject: Subject) -> Track | None:
         numbers = frame_numbers(subject, times)
     frames = frames_of(figure, clip, times, actor.pose)
     scale = float(np.cbrt(abs(np.linalg.det(actor.placement[:3, :3]))))
-    is_bound = figure.is_attached and not len(subject.spoiled.get("bindings", ()))
+    is_bound = figure.is_attached and not len(subject.invalid.get("bindings", ()))
     soles = soles_of(shaped(figure, frames.shape_weights[0]), is_bound) if count else None
     feet = np.zeros(0, dtype=np.int32) if soles is None else soles.joints
     joints, lowest = np.empty((count, skeleton.n_joints, 3)), np.empty((count, len(feet)))
@@ -129,9 +129,9 @@ def _track(subject: Subject) -> Track | None:
 
 
 def key_times(subject: Subject, clip: Clip) -> Floats:
-    """Return when a clip of keys is looked at: its frames, and so many steps between them. (F,).
+    """Return the sampling times of a keyed clip: its frames, and steps between them. (F,).
 
-    Seconds of the clip's own clock.
+    Seconds on the clip's own clock.
     """
     options = subject.options
     rate = options.frame_rate * max(1, math.ceil(options.rate / options.frame_rate))
@@ -140,9 +140,9 @@ def key_times(subject: Subject, clip: Clip) -> Floats:
 
 
 def frame_numbers(subject: Subject, times: Floats) -> Ints:
-    """Return the frames of the timeline at times of a clip of keys: (F,) int32."""
+    """Return the frames of the timeline at times of a keyed clip: (F,) int32."""
     actor = subject.actor
-    assert actor.clip is not None  # the callers looked
+    assert actor.clip is not None  # checked by the callers
     counting = subject.counting or Counting(
         subject.options.frame_rate, actor.clip.start + actor.offset
     )
@@ -150,11 +150,11 @@ def frame_numbers(subject: Subject, times: Floats) -> Ints:
 
 
 def _known(subject: Subject, clip: Clip | SampledClip, count: int) -> Bools:
-    """Return which frames are the file's own: (F,)."""
+    """Return which frames have valid data from the file: (F,)."""
     if not isinstance(clip, SampledClip):
         return np.ones(count, dtype=np.bool_)
     rows = clip.timing.rows
-    return subject.sound("frames", clip.n_rows)[rows] | (rows < 0)
+    return subject.valid("frames", clip.n_rows)[rows] | (rows < 0)
 
 
 def _slice(frames: Frames, part: slice) -> Frames:

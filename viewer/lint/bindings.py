@@ -1,4 +1,4 @@
-"""Bind matrices: whether they can be inverted, and whether they fit the skeleton at rest."""
+"""Checks of bind matrices: invertibility, and agreement with the skeleton at rest."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ __all__ = ["are_singular", "check"]
 _SINGULAR = 1e-12  # determinant relative to the product of the column lengths
 _NEARLY = 1e6  # condition number
 _AFFINE = 1e-6  # of the last row
-_ELSEWHERE = 0.01  # of the figure's size: nearer than that is rounding of old files
+_ELSEWHERE = 0.01  # of the figure's size: smaller differences are rounding in old files
 
 
 def are_singular(matrices: Floats) -> Bools:
-    """Return which matrices flatten space, so that nothing can be undone that they do.
+    """Return which matrices are singular.
 
     Parameters
     ----------
     matrices : (J, 4, 4)
-        Affine; only their linear parts count.
+        Affine; only their linear parts are used.
 
     Returns
     -------
     (J,)
-        True where the determinant is 0 beside the product of the column lengths.
+        True if the determinant is 0 relative to the product of the column lengths.
     """
     linear = matrices[:, :3, :3]
     lengths = np.linalg.norm(linear, axis=1).prod(axis=1)
@@ -39,11 +39,11 @@ def are_singular(matrices: Floats) -> Bools:
 
 
 def check(subject: Subject) -> list[Finding]:
-    """Look at the inverse bind matrices of a figure with a skin."""
+    """Check the inverse bind matrices of a figure with a skin."""
     skin = subject.actor.figure.skin
     if skin is None or skin.n_joints == 0:
         return []
-    known = subject.sound("bindings", skin.n_joints)
+    known = subject.valid("bindings", skin.n_joints)
     linear = np.where(known[:, None, None], skin.inverse_bind[:, :3, :3], np.eye(3))
     determinants = np.linalg.det(linear)
     flat = are_singular(linear)
@@ -62,7 +62,7 @@ def check(subject: Subject) -> list[Finding]:
 
 
 def _about(subject: Subject, key: str, wrong: Bools, values: Floats) -> list[Finding]:
-    """Report joints whose bind matrices are wrong, with the value that shows it for the first."""
+    """Report joints with faulty bind matrices, with the value of the first."""
     joints = np.flatnonzero(wrong)
     if len(joints) == 0:
         return []
@@ -86,15 +86,15 @@ def _about(subject: Subject, key: str, wrong: Bools, values: Floats) -> list[Fin
 
 
 def _elsewhere(subject: Subject, figure: Figure, usable: Bools) -> list[Finding]:
-    """Compare where joints were bound with where the skeleton has them.
+    """Compare the joints' bind positions with those of the skeleton.
 
-    Figures are bound with all DOFs at 0 or in their files' own pose; the nearer one counts.
+    Figures are bound with all DOFs at 0 or in their files' own pose; the closer one is used.
     """
     skin, skeleton = figure.skin, figure.skeleton
     if skin is None or figure.mesh is None or skeleton is None:
         return []
-    # Where one joint is not known, nobody knows where those below it are.
-    known = subject.sound("joints", skeleton.n_joints)
+    # If the position of a joint is unknown, so are those of the joints below it.
+    known = subject.valid("joints", skeleton.n_joints)
     for joint, parent in enumerate(skeleton.parents.tolist()):
         known[joint] &= parent < 0 or bool(known[parent])
     known &= usable

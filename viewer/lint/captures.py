@@ -1,4 +1,4 @@
-"""Captured keypoints: how sure the capture was of them, gaps, and points that jump."""
+"""Checks of captured keypoints: low confidence, gaps, and jumping points."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from viewer.lint.clips import missing_frames
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.captures.points import PointClip
 
-__all__ = ["LOW_FRAMES", "LOW_SHARE", "check"]
+__all__ = ["LOW_FRACTION", "LOW_FRAMES", "check"]
 
 Indices = NDArray[np.int64]
 
-LOW_SHARE = 0.05
-"""Of the frames that see a keypoint: so many of low confidence are usual."""
+LOW_FRACTION = 0.05
+"""Fraction of the frames that see a keypoint: this much low confidence is usual."""
 
 LOW_FRAMES = 2
-"""So many of them there must be at least."""
+"""Minimum number of frames of low confidence."""
 
-_SINGLE = 6  # keypoints of low confidence that are told one by one
-_SIZES = 15.0  # of the points that one may move in a second
+_SINGLE = 6  # maximum number of keypoints of low confidence listed individually
+_SIZES = 15.0  # sizes of the points' box that a point may move per second
 
 
 def check(subject: Subject) -> list[Finding]:
-    """Look at the clip of a figure that is captured points."""
+    """Check the clip of a figure that consists of captured points."""
     clip, layout = subject.actor.clip, subject.actor.figure.points
     if not isinstance(clip, PointClip) or layout is None:
         return []
@@ -65,23 +65,23 @@ def _confidence(subject: Subject, clip: PointClip, names: list[str]) -> list[Fin
 def _low(
     subject: Subject, clip: PointClip, names: list[str], numbers: Indices, confidence: Floats
 ) -> list[Finding]:
-    """Report keypoints of low confidence one by one, the worst first; the others together.
+    """Report keypoints of low confidence individually, the worst first; the rest together.
 
     Parameters
     ----------
     subject, clip, names
-        Whose, the motion, and what the K keypoints are called.
+        The checked actor, its motion, and the names of the K keypoints.
     numbers : (F,)
-        Frames in which somebody is there, from 0.
+        Frames in which the person is present, from 0.
     confidence : (F, K)
         In these frames.
     """
     seen = confidence > 0.0
     is_low = seen & (confidence < subject.options.confidence)
     counts = is_low.sum(axis=0)
-    shares = counts / np.maximum(seen.sum(axis=0), 1)
-    points = np.flatnonzero((shares > LOW_SHARE) & (counts >= LOW_FRAMES))
-    points = points[np.argsort(-shares[points], kind="stable")]
+    fractions = counts / np.maximum(seen.sum(axis=0), 1)
+    points = np.flatnonzero((fractions > LOW_FRACTION) & (counts >= LOW_FRAMES))
+    points = points[np.argsort(-fractions[points], kind="stable")]
     limit, first_frame = subject.options.confidence, clip.timing.first_frame
     findings = []
     for point in points[:_SINGLE].tolist():
@@ -91,7 +91,7 @@ def _low(
                 "C011.point",
                 name=names[point],
                 limit=limit,
-                percent=100.0 * float(shares[point]),
+                percent=100.0 * float(fractions[point]),
                 n=int(seen[:, point].sum()),
                 frame=int(frames[0]) + first_frame,
                 part="clip",
@@ -100,7 +100,7 @@ def _low(
                 times=_times(subject, clip, frames),
             )
         )
-    return findings + _rarer(subject, clip, names, points[_SINGLE:], shares, numbers, is_low)
+    return findings + _rarer(subject, clip, names, points[_SINGLE:], fractions, numbers, is_low)
 
 
 def _rarer(
@@ -108,16 +108,16 @@ def _rarer(
     clip: PointClip,
     names: list[str],
     points: Indices,
-    shares: Floats,
+    fractions: Floats,
     numbers: Indices,
     is_low: Bools,
 ) -> list[Finding]:
-    """Report keypoints of low confidence together; ``shares`` (K,) are of the frames."""
+    """Report keypoints of low confidence together; ``fractions`` (K,) are of the frames."""
     if len(points) == 0:
         return []
     frames = numbers[is_low[:, points].any(axis=1)]
     shown = [
-        Phrase("low-point", name=names[point], percent=100.0 * float(shares[point]))
+        Phrase("low-point", name=names[point], percent=100.0 * float(fractions[point]))
         for point in points.tolist()
     ]
     return [
@@ -171,13 +171,13 @@ def _jumps(subject: Subject, clip: PointClip, names: list[str]) -> list[Finding]
 
 
 def _n_frames(rows: Ints) -> int:
-    """Return how many frames there are from the first in which somebody is there to the last."""
+    """Return the number of frames from the first to the last in which the person is present."""
     there = np.flatnonzero(rows >= 0)
     return int(there[-1] - there[0]) + 1 if len(there) else 0
 
 
 def _size(clip: PointClip) -> float:
-    """Return the median size of the box around what is seen in a frame."""
+    """Return the median size of the bounding box of the seen points in a frame."""
     seen = clip.points[..., 3:] > 0.0
     low = np.where(seen, clip.points[..., :3], np.inf).min(axis=1)
     high = np.where(seen, clip.points[..., :3], -np.inf).max(axis=1)

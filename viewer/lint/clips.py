@@ -1,4 +1,4 @@
-"""Clips: keys in time order and within limits, frames that are there, joints that do not jump."""
+"""Checks of clips: keys in time order and within limits, missing frames, and jumping joints."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from viewer.rig.skeleton import Skeleton, joint_labels
 
 __all__ = ["check", "missing_frames"]
 
-_SIZES = 15.0  # of a figure that a joint may move in a second: some 30 m/s for a person
+_SIZES = 15.0  # figure sizes that a joint may move per second: about 30 m/s for a person
 _ALIKE = 1e-9  # share by which speeds of joints that move together differ
 _ROUNDING = 1e-6  # radians or lengths beyond a limit
-_MOST = 20_000  # times at which curves are held to their limits
+_MOST = 20_000  # maximum number of times at which curves are compared with their limits
 
 
 def check(subject: Subject) -> list[Finding]:
-    """Look at the clip of an actor with a skeleton."""
+    """Check the clip of an actor with a skeleton."""
     clip, skeleton = subject.actor.clip, subject.actor.figure.skeleton
     if clip is None or skeleton is None or isinstance(clip, PointClip):
         return []
@@ -42,16 +42,16 @@ def check(subject: Subject) -> list[Finding]:
         return [*findings, subject.found("C010.one-time", time=float(clip.start), part="clip")]
     track = track_of(subject)
     assert track is not None  # there is a clip and a skeleton
-    return findings + _jumps(subject, track, skeleton) + _turns(subject, track, skeleton)
+    return findings + _jumps(subject, track, skeleton) + _fast_rotations(subject, track, skeleton)
 
 
 def missing_frames(subject: Subject, timing: Timing) -> list[Finding]:
-    """Report gaps between the first and the last frame in which somebody is there."""
+    """Report gaps between the first and the last frame in which the person is present."""
     present = timing.present
     there = np.flatnonzero(present)
     if len(there) == 0:
         return []
-    # Who comes later or leaves earlier than others is no fault.
+    # Appearing later or leaving earlier than others is not a fault.
     gaps = np.flatnonzero(~present[there[0] : there[-1]]) + there[0]
     if len(gaps) == 0:
         return []
@@ -68,21 +68,21 @@ def missing_frames(subject: Subject, timing: Timing) -> list[Finding]:
             part="clip",
             frames=numbers,
             times=times,
-            # In the gap nobody is there to be seen.
+            # In the gap itself the person is not visible.
             seek=float(times[0]) - 1.0 / timing.frame_rate,
         )
     ]
 
 
 def _gap(numbers: Indices) -> Phrase:
-    """Return the numbers of frames that follow one another."""
+    """Return the numbers of consecutive frames as text."""
     if len(numbers) == 1:
         return Phrase("one-frame", frame=int(numbers[0]))
     return Phrase("frame-range", first=int(numbers[0]), last=int(numbers[-1]))
 
 
 def _keys(subject: Subject, clip: Clip) -> list[Finding]:
-    """Report keys that share their time with the one before."""
+    """Report keys at the same time as the previous one."""
     times = [channel.times[1:][np.diff(channel.times) <= SHORTEST] for channel in clip.channels]
     count = sum(map(len, times))
     if count == 0:
@@ -102,7 +102,7 @@ def _keys(subject: Subject, clip: Clip) -> list[Finding]:
 
 
 def _outside(subject: Subject, clip: Clip, skeleton: Skeleton) -> list[Finding]:
-    """Report curves that leave the limits: they are held there while playing."""
+    """Report curves that leave the limits, to which they are clamped during playback."""
     times = np.append(key_times(subject, clip)[:_MOST], clip.end)
     targets, values = evaluate_all(clip, times)
     low, high = skeleton.dof_limits[targets].T
@@ -157,7 +157,7 @@ def _jumps(subject: Subject, track: Track, skeleton: Skeleton) -> list[Finding]:
     ]
 
 
-def _turns(subject: Subject, track: Track, skeleton: Skeleton) -> list[Finding]:
+def _fast_rotations(subject: Subject, track: Track, skeleton: Skeleton) -> list[Finding]:
     rates = np.zeros((len(track.times), skeleton.n_joints))
     cosines = np.abs(np.einsum("fjq,fjq->fj", track.rotations[1:], track.rotations[:-1]))
     rates[1:] = 2.0 * np.arccos(np.minimum(cosines, 1.0)) / np.diff(track.times)[:, None]
@@ -185,16 +185,16 @@ def _turns(subject: Subject, track: Track, skeleton: Skeleton) -> list[Finding]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _TooFast:
-    """Joints that come from the frame before faster than a limit.
+    """Joints that are faster than a limit between two frames.
 
     Attributes
     ----------
     rate : float
-        The highest, per second.
+        The highest rate, per second.
     worst : int
-        The row of a track that it leads to.
+        The row of a track at the end of the fastest movement.
     rows : (N,)
-        One for each frame with such a joint, the worst first.
+        One for each frame with a joint above the limit, the worst first.
     joints : (J,)
         The fastest first.
     """
@@ -214,7 +214,7 @@ def _too_fast(track: Track, rates: Floats, limit: float) -> _TooFast | None:
         return None
     rows = rows[np.argsort(-fastest[rows], kind="stable")]
     rate = float(fastest[rows[0]])
-    # Of joints that move as one, up to rounding, the parent of the others is named.
+    # Of joints with equal speed, up to rounding, the topmost in the hierarchy is named.
     joint = int((rates[rows[0]] >= (1.0 - _ALIKE) * rate).argmax())
     joints = np.flatnonzero((rates > limit).any(axis=0))
     first_then_others = np.concatenate([[joint], joints[joints != joint]])

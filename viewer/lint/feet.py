@@ -1,4 +1,4 @@
-"""Feet of bodies: whether they slide while they stand, or sink into the ground."""
+"""Checks of a body's feet: sliding while they stand, and sinking into the ground."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from viewer.rig.skeleton import joint_labels
 
 __all__ = ["check"]
 
-# Below the ground, in heights of the figure at rest: 17 mm for a person, 51 mm below a guess.
+# Below the ground, in heights of the figure at rest: 17 mm for a person, 51 mm for a guess.
 _SINKS, _SINKS_OF_GUESS = 0.01, 0.03
-_FACTOR = 3.0  # so much deeper even a single frame counts
-# Lengths in sizes of the skeleton at rest, about 1.9 m for a person with arms spread.
+_FACTOR = 3.0  # at this multiple of the limit even a single frame counts
+# Lengths are relative to the size of the skeleton at rest: 1.9 m for a person with spread arms.
 _TOUCHES = 0.02  # above the ground
-_SLIDES = 0.15  # a second
-_SWINGS = 1.0  # a second: faster is a foot that swings close above the ground
-_FAR = 0.03  # in all, while one foot stands
-_WINDOW = 0.1  # seconds over which a foot's speed is taken: single frames are noisy
+_SLIDES = 0.15  # per second
+_SWINGS = 1.0  # per second: a faster foot swings just above the ground
+_FAR = 0.03  # in total, while one foot stands
+_WINDOW = 0.1  # seconds over which a foot's speed is averaged: single frames are noisy
 
 
 def check(subject: Subject) -> list[Finding]:
-    """Look at the feet of a body in motion: of a skeleton that has two ankles by name."""
+    """Check the feet of a moving body, a skeleton with two ankles by name."""
     figure = subject.actor.figure
     track = None if figure.skeleton is None else _moving(subject, figure)
     if track is None or figure.skeleton is None or subject.options.ground == "none":
@@ -44,7 +44,7 @@ def check(subject: Subject) -> list[Finding]:
         ground = float(given)
     else:
         step = float(track.times[1] - track.times[0])
-        # Where the figure stands at rest, or else on the axes' origin.
+        # The height of the figure at rest, or else the origin.
         axis, placement = 2 if figure.up == "z" else 1, subject.actor.placement
         likely = (float(placement[up, axis] * sole + placement[up, 3]), 0.0)
         found = ground_of(heights.min(axis=1), track.present, step, track.scale * height, likely)
@@ -60,14 +60,14 @@ def check(subject: Subject) -> list[Finding]:
 
 def _moving(subject: Subject, figure: Figure) -> Track | None:
     clip = subject.actor.clip
-    if clip is None or clip.end <= clip.start or len(subject.spoiled.get("joints", ())):
+    if clip is None or clip.end <= clip.start or len(subject.invalid.get("joints", ())):
         return None
     track = track_of(subject)
     return track if track is not None and track.size > 0.0 and len(track.times) > 2 else None
 
 
 def _unsure(subject: Subject, found: Ground, step: float) -> Finding:
-    """Say that nobody knows where the ground is, so that feet were not checked."""
+    """Report that the ground is unknown, so that feet were not checked."""
     if not found.levels:
         return subject.found("C013.no-height", part="clip")
     levels = [
@@ -85,7 +85,7 @@ def _sunk(
     heights: Floats,
     limit: float,
 ) -> list[Finding]:
-    """Report feet that are deeper than a limit, a length of the figure's."""
+    """Report feet that are deeper than a limit in figure units."""
     depths = np.where(track.present[:, None], -heights, 0.0)
     deepest = depths.max(axis=1)
     is_deep = np.pad(deepest > limit * track.scale, 1)
@@ -122,7 +122,7 @@ def _slipped(
     heights: Floats,
     up: int,
 ) -> list[Finding]:
-    """Report a foot that moves along the ground while it stays on it."""
+    """Report a foot that slides along the ground while it stands."""
     stands = (np.abs(heights) < _TOUCHES * track.size) & track.present[:, None]
     step = float(track.times[1] - track.times[0])
     width = max(1, round(_WINDOW / step))
@@ -160,7 +160,7 @@ def _slipped(
 
 
 def _path(along: Floats, slides: Bools, width: int) -> float:
-    """Return how far a foot gets in all windows in which it slides, in steps of a window.
+    """Return the distance that a foot slides in all windows, in steps of one window.
 
     Single frames are noisy: their steps would add up to more.
     """
@@ -174,7 +174,7 @@ def _path(along: Floats, slides: Bools, width: int) -> float:
 
 
 def _held(stands: Bools, width: int) -> Bools:
-    """Return where a foot stands in all frames of a window and in one more at each end."""
+    """Return the frames in which a foot stands for a window and one more frame at each end."""
     sums = np.concatenate([np.zeros((1, stands.shape[1]), int), np.cumsum(stands, axis=0)])
     count = len(stands) - width
     first = np.maximum(np.arange(count) - 1, 0)

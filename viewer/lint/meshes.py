@@ -1,4 +1,4 @@
-"""Meshes: triangles that are flat or flipped, borders, edges, normals, vertices out of place."""
+"""Checks of meshes: degenerate or flipped triangles, borders, edges, normals, stray vertices."""
 
 from __future__ import annotations
 
@@ -15,38 +15,38 @@ __all__ = ["check"]
 
 Indices = NDArray[np.int64]
 
-_FLAT = 1e-7  # height of a triangle relative to the mesh: the rounding of float32
-_UNIT = 0.01  # of a normal's length from 1
-_ZERO = 1e-12  # of a normal's length
-_AGAINST = -0.1  # cosine to a triangle's own normal: those across it are smoothed over an edge
-_CLOSED = 0.25  # border edges squared, by triangles: holes up to this leave a volume its sign
+_FLAT = 1e-7  # height of a triangle relative to the mesh: float32 rounding
+_UNIT = 0.01  # deviation of a normal's length from 1
+_ZERO = 1e-12  # a normal of this length counts as zero
+_AGAINST = -0.1  # cosine to a triangle's own normal: perpendicular ones are smoothed over an edge
+_CLOSED = 0.25  # squared border edges over triangles: with smaller holes a volume keeps its sign
 # Times the median distance of vertices from their median: feet are 16 times as far in models
 # with half of their vertices in the face.
 _FAR = 40.0
-_SAMPLE = 4096  # vertices that tell where the others are
+_SAMPLE = 4096  # vertices sampled for the median
 
 
 def check(subject: Subject) -> list[Finding]:
-    """Look at the mesh of a figure."""
+    """Check the mesh of a figure."""
     mesh = subject.actor.figure.mesh
     if mesh is None:
         return []
     findings = [*_normals(subject, mesh), *_vertices(subject, mesh)]
-    whole = subject.sound("triangles", mesh.n_triangles)
+    whole = subject.valid("triangles", mesh.n_triangles)
     if not whole.any():
         return findings
-    known = subject.sound("positions", mesh.n_vertices)[mesh.triangles].all(axis=1) & whole
+    known = subject.valid("positions", mesh.n_vertices)[mesh.triangles].all(axis=1) & whole
     flat = (_heights(mesh) <= _FLAT * _typical(mesh)[1]) & known
-    sound = np.flatnonzero(~flat & whole)
-    # What has no area has no neighbours and no sides either.
-    corners = welded(mesh.positions, mesh.triangles)[sound]
+    valid = np.flatnonzero(~flat & whole)
+    # Triangles without area have no neighbours and no sides.
+    corners = welded(mesh.positions, mesh.triangles)[valid]
     return [
         *findings,
         *_against(subject, mesh, np.flatnonzero(~flat & known)),
         *_flat(subject, flat),
         *_doubled(subject, mesh, np.flatnonzero(whole)),
         *_crowded_edges(subject, mesh, np.flatnonzero(whole)),
-        *_sides(subject, mesh, sound, corners, known),
+        *_sides(subject, mesh, valid, corners, known),
     ]
 
 
@@ -59,7 +59,7 @@ def _heights(mesh: Mesh) -> Floats:
 
 
 def _typical(mesh: Mesh) -> tuple[Floats, float]:
-    """Return the middle of the mesh and the median distance from it, which no stray moves."""
+    """Return the median of the mesh and the median distance from it, both robust to strays."""
     some = mesh.positions[:: max(1, mesh.n_vertices // _SAMPLE)]
     center: Floats = np.median(some, axis=0)
     return center, float(np.median(np.abs(some - center).max(axis=1)))
@@ -84,7 +84,7 @@ def _flat(subject: Subject, flat: Bools) -> list[Finding]:
 def _doubled(subject: Subject, mesh: Mesh, whole: Indices) -> list[Finding]:
     rows = np.sort(mesh.triangles[whole], axis=1).astype(np.int64)
     keys = (rows[:, 0] * mesh.n_vertices + rows[:, 1]) * mesh.n_vertices + rows[:, 2]
-    if mesh.n_vertices > 2_000_000:  # the product of three would not fit
+    if mesh.n_vertices > 2_000_000:  # the product of three indices would overflow
         keys = np.unique(rows, axis=0, return_inverse=True)[1].ravel()
     order = np.argsort(keys, kind="stable")
     copies = whole[np.sort(order[1:][np.diff(keys[order]) == 0])]
@@ -102,7 +102,7 @@ def _doubled(subject: Subject, mesh: Mesh, whole: Indices) -> list[Finding]:
 
 
 def _crowded_edges(subject: Subject, mesh: Mesh, whole: Indices) -> list[Finding]:
-    """Report edges of more than two triangles, of vertices as listed: parts may touch."""
+    """Report non-manifold edges, between vertices as listed in the file: parts may touch."""
     edges = edges_of(mesh.triangles[whole].astype(np.int64))
     places = np.flatnonzero(edges.counts > 2)
     if len(places) == 0:
@@ -125,21 +125,21 @@ def _crowded_edges(subject: Subject, mesh: Mesh, whole: Indices) -> list[Finding
 
 
 def _edge_ends(triangles: Ints, places: Indices) -> Indices:
-    """Return the two vertices of edges, the smaller first; corner k begins edge 3 t + k. (N, 2)."""
+    """Return the two vertices of edges, the smaller first; corner k starts edge 3 t + k. (N, 2)."""
     rows, corners = np.divmod(places, 3)
     ends = np.stack([triangles[rows, corners], triangles[rows, (corners + 1) % 3]], axis=1)
     return np.sort(ends, axis=1).astype(np.int64)
 
 
 def _sides(
-    subject: Subject, mesh: Mesh, sound: Indices, corners: Indices, known: Bools
+    subject: Subject, mesh: Mesh, valid: Indices, corners: Indices, known: Bools
 ) -> list[Finding]:
-    """Report flipped triangles, components inside out or of one side, and open borders."""
+    """Report flipped triangles, inside-out or non-orientable components, and open borders."""
     edges = edges_of(corners)
     component, flipped, one_sided = orientations(len(corners), edges)
     findings = []
     if flipped.any():
-        triangles = sound[flipped]
+        triangles = valid[flipped]
         findings.append(
             subject.found(
                 "M002.triangles",
@@ -151,7 +151,7 @@ def _sides(
             )
         )
     if one_sided.any():
-        triangles = sound[one_sided]
+        triangles = valid[one_sided]
         findings.append(
             subject.found(
                 "M012.surface",
@@ -161,18 +161,18 @@ def _sides(
                 at=("triangles", int(triangles[0])),
             )
         )
-    unsure = _beside_lost(subject, mesh)[mesh.triangles[sound]]
+    unsure = _beside_lost(subject, mesh)[mesh.triangles[valid]]
     border = (edges.counts == 1) & ~(unsure | np.roll(unsure, -1, axis=1)).ravel()
-    # Flipped ones are reported already; what the file does not say has no volume.
-    signs = np.where(flipped, -1.0, 1.0) * known[sound]
-    findings += _inside_out(subject, mesh, sound, component, signs, edges)
-    return findings + _borders(subject, mesh, sound, border)
+    # Flipped triangles are reported already; components with missing data have no volume.
+    signs = np.where(flipped, -1.0, 1.0) * known[valid]
+    findings += _inside_out(subject, mesh, valid, component, signs, edges)
+    return findings + _borders(subject, mesh, valid, border)
 
 
-def _borders(subject: Subject, mesh: Mesh, sound: Indices, border: Bools) -> list[Finding]:
+def _borders(subject: Subject, mesh: Mesh, valid: Indices, border: Bools) -> list[Finding]:
     if not border.any():
         return []
-    ends = _edge_ends(mesh.triangles[sound], np.flatnonzero(border))
+    ends = _edge_ends(mesh.triangles[valid], np.flatnonzero(border))
     vertices = np.unique(ends)
     first = ends[np.lexsort(ends.T[::-1])[0]]
     return [
@@ -182,45 +182,45 @@ def _borders(subject: Subject, mesh: Mesh, sound: Indices, border: Bools) -> lis
             vertex=int(first[0]),
             other=int(first[1]),
             vertices=vertices,
-            triangles=sound[np.unique(np.flatnonzero(border) // 3)],
+            triangles=valid[np.unique(np.flatnonzero(border) // 3)],
             at=("positions", int(first[0])),
         )
     ]
 
 
 def _beside_lost(subject: Subject, mesh: Mesh) -> Bools:
-    """Return vertices whose triangles are not all there, or whose copies nobody can find: (V,)."""
-    lost = ~subject.sound("positions", mesh.n_vertices)
-    lost[mesh.triangles[~subject.sound("triangles", mesh.n_triangles)]] = True
+    """Return vertices with missing triangles, or whose coincident copies are unknown: (V,)."""
+    lost = ~subject.valid("positions", mesh.n_vertices)
+    lost[mesh.triangles[~subject.valid("triangles", mesh.n_triangles)]] = True
     return lost
 
 
 def _inside_out(
     subject: Subject,
     mesh: Mesh,
-    sound: Indices,
+    valid: Indices,
     component: Indices,
     signs: Floats,
     edges: Edges,
 ) -> list[Finding]:
-    """Report closed components whose volume is negative, sum a . (b x c) / 6."""
-    count = len(sound)
+    """Report closed components with negative volume, sum a . (b x c) / 6."""
+    count = len(valid)
     is_known = signs != 0.0
     members = np.bincount(component, is_known, minlength=count)
     open_edges = _open_edges(component, is_known, edges)
-    centers = mesh.positions[mesh.triangles[sound]].mean(axis=1)
+    centers = mesh.positions[mesh.triangles[valid]].mean(axis=1)
     sums = [
         np.bincount(component, centers[:, axis] * is_known, minlength=count) for axis in range(3)
     ]
     middle = np.stack(sums, axis=1) / np.maximum(members, 1)[:, None]
-    a, b, c = (mesh.positions[mesh.triangles[sound, k]] - middle[component] for k in range(3))
+    a, b, c = (mesh.positions[mesh.triangles[valid, k]] - middle[component] for k in range(3))
     volumes = signs * np.einsum("ta,ta->t", a, np.cross(b, c))
     total = np.bincount(component, volumes, minlength=count)
     is_closed = open_edges**2 <= _CLOSED * members
     wrong = np.flatnonzero((total < 0.0) & is_closed & (members >= 4))
     if len(wrong) == 0:
         return []
-    triangles = sound[np.isin(component, wrong)]
+    triangles = valid[np.isin(component, wrong)]
     return [
         subject.found(
             "M003.parts",
@@ -234,9 +234,9 @@ def _inside_out(
 
 
 def _open_edges(component: Indices, is_known: Bools, edges: Edges) -> Indices:
-    """Return how many edges of known triangles in each component have no known one beyond: (T,).
+    """Return each component's number of edges of valid triangles without a valid neighbour: (T,).
 
-    What the file lost closes nothing: the surface may well have ended there.
+    Missing triangles close nothing: the surface may have ended there.
     """
     alone = np.flatnonzero(np.repeat(is_known, 3) & (edges.counts == 1)) // 3
     beside = edges.pairs[is_known[edges.pairs].sum(axis=1) == 1, 0]
@@ -274,20 +274,20 @@ def _normals(subject: Subject, mesh: Mesh) -> list[Finding]:
     return findings
 
 
-def _against(subject: Subject, mesh: Mesh, sound: Indices) -> list[Finding]:
-    """Report normals that point to the other side than every triangle of their vertex.
+def _against(subject: Subject, mesh: Mesh, valid: Indices) -> list[Finding]:
+    """Report normals that point to the opposite side of all triangles at their vertex.
 
-    Triangles without area face no side. The two sides of a thin sheet have vertices of their own,
-    or share them, and then each normal is with one side.
+    Triangles without area have no side. The two sides of a thin sheet have separate vertices,
+    or common ones, in which case each normal agrees with one side.
     """
-    corners = mesh.triangles[sound]
+    corners = mesh.triangles[valid]
     a, b, c = (mesh.positions[corners[:, k]] for k in range(3))
     facing = unit(np.cross(b - a, c - a))
     cosines = np.einsum("tka,ta->tk", unit(mesh.normals)[corners], facing)
     places, count = corners.ravel(), mesh.n_vertices
     numbers = np.bincount(places, minlength=count)
     opposed = np.bincount(places, cosines.ravel() < _AGAINST, minlength=count)
-    # Where triangles are lost, one of those may have agreed.
+    # If triangles are missing, one of them may have agreed.
     against = np.flatnonzero((numbers > 0) & (opposed == numbers) & ~_beside_lost(subject, mesh))
     if len(against) == 0:
         return []

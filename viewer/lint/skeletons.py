@@ -1,4 +1,4 @@
-"""Skeletons: names, roots, rest transforms, locked DOFs, and poses that leave the limits."""
+"""Checks of skeletons: names, roots, rest transforms, locked DOFs, and poses beyond limits."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from viewer.rig.skeleton import Skeleton, dof_labels, joint_labels
 
 __all__ = ["check"]
 
-_UNIT = 1e-3  # of a quaternion's length: files of three digits
+_UNIT = 1e-3  # deviation of a quaternion's length from 1: files with three digits
 _ROUNDING = 1e-9  # radians or lengths beyond a limit
 
 
 def check(subject: Subject) -> list[Finding]:
-    """Look at the skeleton and the present pose of an actor."""
+    """Check the skeleton and the present pose of an actor."""
     skeleton, pose = subject.actor.figure.skeleton, subject.actor.pose
     if skeleton is None:
         return []
@@ -78,7 +78,7 @@ def _names(subject: Subject, skeleton: Skeleton) -> list[Finding]:
 def _rest(subject: Subject, skeleton: Skeleton) -> list[Finding]:
     labels = joint_labels(skeleton)
     findings = []
-    known = subject.sound("joints", skeleton.n_joints)
+    known = subject.valid("joints", skeleton.n_joints)
     lengths = np.linalg.norm(skeleton.rest_rotations, axis=1)
     odd = np.flatnonzero((np.abs(lengths - 1.0) > _UNIT) & known)
     if len(odd):

@@ -1,4 +1,4 @@
-"""Left and right, of figures whose file pairs their vertices: positions and weights."""
+"""Checks of left-right symmetry, for figures with a symmetry map: positions and weights."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from viewer.rig.skin import Skin, normalized, owners, row_norms
 
 __all__ = ["check"]
 
-_MOVED = 1e-3  # of the figure's size: worth knowing
-_ASKEW = 1e-2  # of the figure's size: to be seen
-_SHIFTED = 0.02  # sum of differences of a vertex's weights
+_MOVED = 1e-3  # of the figure's size: reported as a note
+_ASKEW = 1e-2  # of the figure's size: visible
+_SHIFTED = 0.02  # total difference of a vertex's weights
 _UNEQUAL = 0.2
 
 
@@ -31,16 +31,16 @@ def check(subject: Subject) -> list[Finding]:
     try:
         partners = joint_partners(figure)
     except RigError:
-        return findings  # joints that mirror onto none say nothing of weights
+        return findings  # without joint pairs, weights cannot be compared
     known = _known(subject, figure, "weights")
     return findings + _weights(subject, figure.skin, figure.symmetry, partners, known)
 
 
 def _known(subject: Subject, figure: Figure, part: str) -> Bools:
-    """Return which vertices can be compared: they and their partners are the file's own. (V,)."""
-    assert figure.symmetry is not None  # the caller looked
-    sound = subject.sound(part, len(figure.symmetry))
-    known: Bools = sound & sound[figure.symmetry]
+    """Return the vertices that can be compared: they and their partners are valid. (V,)."""
+    assert figure.symmetry is not None  # checked by the caller
+    valid = subject.valid(part, len(figure.symmetry))
+    known: Bools = valid & valid[figure.symmetry]
     return known
 
 
@@ -88,7 +88,7 @@ def _weights(
 
 
 def weight_differences(skin: Skin, symmetry: Ints, partners: Ints) -> Floats:
-    """Return how much each vertex's weights differ from its partner's, sides exchanged.
+    """Return the difference of each vertex's weights from its partner's, sides exchanged.
 
     The sum over joints of |w(v, j) - w(partner of v, partner of j)|, weights scaled to a sum of 1.
 
@@ -108,7 +108,7 @@ def weight_differences(skin: Skin, symmetry: Ints, partners: Ints) -> Floats:
     """
     whole = normalized(skin)
     vertices, joints = owners(whole), whole.joints
-    # Each influence, and with a minus sign what the partner would have of it.
+    # Each influence, and the mirrored influence of the partner with a minus sign.
     return row_norms(
         skin.n_vertices,
         np.concatenate([vertices, symmetry[vertices]]),

@@ -1,4 +1,4 @@
-"""Weights: their sums and signs, vertices nobody moves, and what cutting influences would cost."""
+"""Checks of weights: sums and signs, vertices without weights, and the cost of pruning."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from viewer.rig.skinning import Skinning, deform
 
 __all__ = ["check"]
 
-_NOTED = 1e-3  # of a sum from 1: files round to three digits
-_WRONG = 5e-3  # four influences of three digits, each off by half of the last, and to spare
+_NOTED = 1e-3  # deviation of a sum from 1: files round to three digits
+_WRONG = 5e-3  # four influences of three digits, each off by half the last one, with a margin
 
 
 def check(subject: Subject) -> list[Finding]:
-    """Look at the weights of a figure with a skin."""
+    """Check the weights of a figure with a skin."""
     figure = subject.actor.figure
     if figure.skin is None or figure.mesh is None:
         return []
-    # Weights that the file cannot say are neither too few nor too many.
-    known = subject.sound("weights", figure.skin.n_vertices)
+    # Weights missing from the file are neither too few nor too many.
+    known = subject.valid("weights", figure.skin.n_vertices)
     moved = has_influence(figure.skin)
     return [
         *_sums(subject, figure.skin, moved & known),
@@ -84,7 +84,7 @@ def _negative(subject: Subject, skin: Skin) -> list[Finding]:
 
 
 def _bare(subject: Subject, skin: Skin, mesh: Mesh, moved: Bools) -> list[Finding]:
-    """Report islands that nothing moves at all, and single vertices apart from them."""
+    """Report islands without any weights, and single vertices apart from them."""
     bare = ~moved
     if not bare.any():
         return []
@@ -92,7 +92,7 @@ def _bare(subject: Subject, skin: Skin, mesh: Mesh, moved: Bools) -> list[Findin
     corners = welded(mesh.positions, mesh.triangles)
     pairs = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]]])
     islands = components(mesh.n_vertices, pairs)[corners[:, 0]]
-    # An island counts by its triangles: a loose vertex is none.
+    # An island is counted by its triangles: a loose vertex is not an island.
     held = np.bincount(islands, moved[mesh.triangles].any(axis=1), minlength=mesh.n_vertices)
     lost = held[islands] == 0
     if lost.any():
@@ -128,8 +128,8 @@ def _bare(subject: Subject, skin: Skin, mesh: Mesh, moved: Bools) -> list[Findin
 def _idle_joints(subject: Subject, figure: Figure, skin: Skin) -> list[Finding]:
     strengths = np.bincount(skin.joints, np.abs(skin.weights), minlength=skin.n_joints)
     idle = np.flatnonzero(strengths == 0.0)
-    if len(idle) == 0 or len(subject.spoiled.get("weights", ())):
-        return []  # weights that are lost may have been theirs
+    if len(idle) == 0 or len(subject.invalid.get("weights", ())):
+        return []  # missing weights may have belonged to these joints
     labels = [_label(subject, int(joint)) for joint in idle]
     at = ("bindings", int(idle[0]))
     return [subject.found("W006.joints", n=len(idle), names=labels, joints=idle, at=at)]
@@ -152,13 +152,13 @@ def _doubled(subject: Subject, skin: Skin, known: Bools) -> list[Finding]:
 
 
 def _crowded(subject: Subject, figure: Figure, known: Bools) -> list[Finding]:
-    """Report more influences than engines take, with what their cut would move."""
+    """Report more influences than engines support, with the error that pruning would cause."""
     skin = figure.skin
-    assert skin is not None  # the caller looked
+    assert skin is not None  # checked by the caller
     plain = merged(skin)
     used = np.bincount(owners(plain), plain.weights != 0.0, minlength=plain.n_vertices)
     used[~known] = 0.0
-    can_pose = figure.is_attached and not len(subject.spoiled.get("joints", ()))
+    can_pose = figure.is_attached and not len(subject.invalid.get("joints", ()))
     findings = []
     for code, limit in (("W007", 4), ("W008", 8)):
         crowded = np.flatnonzero(used > limit)
@@ -183,9 +183,9 @@ def _crowded(subject: Subject, figure: Figure, known: Bools) -> list[Finding]:
 def _cost(
     subject: Subject, skin: Skin, limit: int, crowded: np.ndarray
 ) -> tuple[Phrase, np.ndarray]:
-    """Return what a cut would move, and the vertices with the largest cost first.
+    """Return the error of pruning, and the vertices with the largest errors first.
 
-    Vertices of unknown cost come last, and are counted.
+    Vertices with unknown errors come last, and are counted.
     """
     errors, n_poses = _cut_errors(subject, limit)
     is_known = (_posable(subject, skin) & np.isfinite(errors))[crowded]
@@ -207,16 +207,16 @@ def _cost(
 
 
 def _posable(subject: Subject, skin: Skin) -> Bools:
-    """Return which vertices go where the file says: they and all their joints are its own."""
-    lost = ~subject.sound("bindings", skin.n_joints) | are_singular(skin.inverse_bind)
+    """Return the vertices whose posed position is known: they and all their joints are valid."""
+    lost = ~subject.valid("bindings", skin.n_joints) | are_singular(skin.inverse_bind)
     # A joint of weight 0 moves nothing.
     holds = lost[skin.joints] & (skin.weights != 0.0)
     held = np.bincount(owners(skin), holds, minlength=skin.n_vertices)
-    return subject.sound("positions", skin.n_vertices) & (held == 0)
+    return subject.valid("positions", skin.n_vertices) & (held == 0)
 
 
 def _cut_errors(subject: Subject, limit: int) -> tuple[Floats, int]:
-    """Return how far each vertex moves at most if only so many influences are kept."""
+    """Return the largest displacement of each vertex if it is pruned to some influences."""
     figure = subject.actor.figure
     poses = some_poses(subject.actor)
     whole, cut = Skinning(normalize=True), Skinning(max_influences=limit)
@@ -233,6 +233,6 @@ def _label(subject: Subject, joint: int) -> str:
 
 
 def _distinct(values: np.ndarray) -> np.ndarray:
-    """Return each value once, in the order given."""
+    """Return each value once, in the given order."""
     _, first = np.unique(values, return_index=True)
     return values[np.sort(first)]

@@ -1,4 +1,4 @@
-"""Open files together: figures, what moves them, and what they wear, become a scene."""
+"""Loading of files as one scene: figures with their motions, poses and pictures."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ def load(
 ) -> Scene:
     """Open files as one scene; without files, the bundled figure.
 
-    Files are recognised by content. A skeleton takes the first skin that has its number of
-    joints, one of the same name if there is one. A figure without a partner opens alone; several
+    Files are recognised by content. A skeleton takes the first skin with its number of
+    joints, preferably one of the same name. A figure without a partner opens alone; several
     actors stand side by side. A clip goes to the first actor without one that has its number of
-    channels. A BVH drives the model if one is asked for, else the first figure whose joints it
-    names, or stands as a skeleton: in metres beside others, else with the numbers of its file.
+    channels. A BVH drives the requested model if given, else the first figure whose joints it
+    names; otherwise it is a separate skeleton: in metres beside others, else in its file's unit.
     Captured bodies are drawn with the first body model among the files, or the bundled body. All
-    actors are posed as at the start of their motions. A pose goes to the first actor that it
-    fits, a picture to the first with texture coordinates and no texture.
+    actors are posed at the start of their motions. A pose goes to the first actor that it
+    fits, a picture to the first with texture coordinates but no texture.
 
     Parameters
     ----------
@@ -46,21 +46,21 @@ def load(
         ``.skel``, ``.skin``, ``.anim``, ``.bvh``, body models, PIG folders, AMASS files,
         EasyMocap folders, poses and pictures, in any order.
     max_size : int
-        Larger files, in bytes, are refused before they are read.
+        Larger files, in bytes, are rejected before they are read.
     motion : MotionSettings, optional
-        How motions are taken: model, frame rate, up axis, unit.
+        How motions are interpreted: model, frame rate, up axis, unit.
 
     Returns
     -------
     Scene
-        One actor per figure; its ``warnings`` hold what the readers noticed.
+        One actor per figure; its ``warnings`` hold the readers' messages.
 
     Raises
     ------
     FormatError
-        If a file cannot be read; with the line if there is one.
+        If a file cannot be read; includes the line if known.
     RigError
-        If a skin, clip or pose does not fit; the message names files and numbers.
+        If a skin, clip or pose does not fit; the message has the files and numbers.
 
     >>> scene = load()
     >>> scene.actors[0].figure.name

@@ -1,4 +1,4 @@
-"""Poses and pictures, applied to an actor."""
+"""Application of poses and pictures to an actor."""
 
 from __future__ import annotations
 
@@ -18,28 +18,28 @@ __all__ = ["add_to_actor", "apply_pose"]
 
 
 def add_to_actor(contents: Contents, actor: Actor) -> tuple[Actor, list[Diagnostic]]:
-    """Apply poses and pictures to an actor that is open already.
+    """Apply poses and pictures to an actor that is already open.
 
     Parameters
     ----------
     contents : Contents
-        Figures and clips in it are left alone.
+        Figures and clips in it are ignored.
     actor : Actor
-        Its pose is changed; it stays itself unless it gets another texture.
+        Its pose is changed; the actor itself is replaced only if its texture changes.
 
     Returns
     -------
     actor : Actor
-        A new one, with the same pose, if it has another texture.
+        A new one with the same pose, if its texture changes.
     notes : list of Diagnostic
-        What could not be taken over exactly.
+        Messages about data that could not be applied exactly.
 
     Raises
     ------
     FormatError
-        If a pose does not fit; the actor is then as it was.
+        If a pose does not fit; the actor is then unchanged.
     RigError
-        If a picture does not, or there is nothing to pose.
+        If a picture does not fit, or there is nothing to pose.
     """
     notes: list[Diagnostic] = []
     trial = actor.copy()
@@ -50,7 +50,7 @@ def add_to_actor(contents: Contents, actor: Actor) -> tuple[Actor, list[Diagnost
             values = {"figure": actor.figure.name}
             raise RigError(Diagnostic("F004.pose", path, values=values))
         notes += apply_pose(path, record, trial)
-    # Nothing fails from here on.
+    # Nothing after this line can fail.
     if actor.pose is not None and trial.pose is not None:
         for name in Pose.__slots__:
             setattr(actor.pose, name, getattr(trial.pose, name))
@@ -59,14 +59,14 @@ def add_to_actor(contents: Contents, actor: Actor) -> tuple[Actor, list[Diagnost
 
 
 def apply_pose(path: Path, record: PoseRecord, actor: Actor) -> list[Diagnostic]:
-    """Pose an actor by a record that came from a file; return what could not be taken over.
+    """Apply a pose record from a file to an actor; return messages about inexact data.
 
     Raises
     ------
     FormatError
-        If it does not fit; the actor is then as it was.
+        If it does not fit; the actor is then unchanged.
     """
-    assert actor.pose is not None  # the callers looked
+    assert actor.pose is not None  # checked by the callers
     try:
         notes = apply_record(record, actor.figure, actor.pose, cut=True)
         return [replace(note, path=path) for note in notes]

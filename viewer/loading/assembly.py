@@ -1,4 +1,4 @@
-"""Put files together: skeletons with skins, then clips, poses and pictures to the actors."""
+"""Assembly of a scene: skeletons with skins, then clips, poses and pictures for the actors."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _GAP = 0.25  # between actors side by side, in widths of the wider one
 
 
 def assemble(contents: Contents, settings: MotionSettings | None = None) -> Scene:
-    """Make actors of figures and motions, and read captures to their end; see ``load``."""
+    """Make actors of figures and motions, and read captures completely; see ``load``."""
     scene, builders = begin(contents, settings)
     notes: list[Diagnostic] = []
     for builder in builders:
@@ -46,26 +46,26 @@ def assemble(contents: Contents, settings: MotionSettings | None = None) -> Scen
 def begin(
     contents: Contents, settings: MotionSettings | None = None
 ) -> tuple[Scene, list[Builder]]:
-    """Make a scene that can be shown, and what is left to read of its captures.
+    """Make a scene that can be shown, and return the captures that are still to be read.
 
     Parameters
     ----------
     contents : Contents
-        What the files hold.
+        Contents of the files.
     settings : MotionSettings, optional
-        How motions are taken.
+        How motions are interpreted.
 
     Returns
     -------
     scene : Scene
-        Posed as at the start of its motions.
+        Posed at the start of its motions.
     builders : list of Builder
-        Captures whose first frames are in the scene; people who come later are not.
+        Captures whose first frames are in the scene; people who appear later are not yet.
 
     Raises
     ------
     FormatError, RigError
-        As ``load``.
+        See ``load``.
     """
     figures = contents.figures
     pairs = _pairs([figure for _, figure in figures])
@@ -100,7 +100,7 @@ def begin(
 
 
 def _pairs(figures: Sequence[Figure]) -> list[tuple[int, ...]]:
-    """Match skeletons with skins: by joints and name, then by joints, then whatever is left."""
+    """Pair skeletons with skins: by joint count and name, then by joint count, then the rest."""
     complete = [(index,) for index, figure in enumerate(figures) if _is_complete(figure)]
     parts = [(index, figure) for index, figure in enumerate(figures) if not _is_complete(figure)]
     skeletons = [index for index, figure in parts if figure.skeleton is not None]
@@ -131,7 +131,7 @@ def _fits_by_name(skeleton: Figure, skin: Figure) -> bool:
 
 
 def _give_morphs(contents: Contents, cast: Cast) -> None:
-    """Give targets to the first mesh that has their vertices, all that fit to the same one."""
+    """Give blend shape targets to the first mesh with their vertex count, all to the same one."""
     actors = cast.actors
     from viewer.rig.morph_target import on_one_joint, with_morphs
 
@@ -155,7 +155,7 @@ def _give_morphs(contents: Contents, cast: Cast) -> None:
 
 
 def _assign_pose(path: Path, record: PoseRecord, actors: list[Actor]) -> list[Diagnostic]:
-    """Pose the first actor that a record fits."""
+    """Apply a pose to the first actor that it fits."""
     problem: FormatError | None = None
     for actor in actors:
         if actor.pose is not None:
@@ -167,7 +167,7 @@ def _assign_pose(path: Path, record: PoseRecord, actors: list[Actor]) -> list[Di
 
 
 def _assign_picture(path: Path, pixels: Bytes, actors: list[Actor]) -> None:
-    """Cover the first actor that can show a texture and has none."""
+    """Apply a texture to the first actor that can show it and has none."""
     open_for_it = [
         actor
         for actor in actors
@@ -184,12 +184,12 @@ def _assign_picture(path: Path, pixels: Bytes, actors: list[Actor]) -> None:
 
 
 def _join(parts: list[tuple[Path, Figure]]) -> Figure:
-    """Attach a skin to its skeleton, or return the figure that stands alone."""
+    """Attach a skin to its skeleton, or return a figure without a partner."""
     if len(parts) == 1:
         return parts[0][1]
     paths, figures = [path for path, _ in parts], [figure for _, figure in parts]
     skeleton, skin = figures[0].skeleton, figures[1].skin
-    assert skeleton is not None  # the pairs put it first
+    assert skeleton is not None  # pairs start with the skeleton
     if skin is None:
         values = {"n": skeleton.n_joints, "skeleton": paths[0]}
         raise FormatError(Diagnostic("F004.skin", paths[1], values=values))
@@ -201,7 +201,7 @@ def _join(parts: list[tuple[Path, Figure]]) -> Figure:
 
 
 def _stand_up(cast: Cast, world_up: str) -> None:
-    """Turn actors whose files have another up axis than the scene."""
+    """Rotate actors whose files have another up axis than the scene."""
     for actor, up in zip(cast.actors, cast.ups, strict=True):
         if up != world_up:
             quarter = np.pi / 2 if world_up == "z" else -np.pi / 2
@@ -209,12 +209,12 @@ def _stand_up(cast: Cast, world_up: str) -> None:
 
 
 def _place_side_by_side(cast: Cast) -> None:
-    """Move actors whose files do not place them to the right of those before them."""
+    """Move actors without a position from their files to the right of those before them."""
     loose = [a for a, placed in zip(cast.actors, cast.placed, strict=True) if not placed]
     placed = [a for a, placed in zip(cast.actors, cast.placed, strict=True) if placed]
     if len(cast.actors) < 2 or not loose:
         return
-    # A stray vertex far outside must not send the next actor there.
+    # A stray vertex far outside must not displace the next actor.
     spans = [scene_box(Scene([actor]))[:, 0] for actor in loose]
     if placed:
         before = scene_box(Scene(placed))[:, 0]

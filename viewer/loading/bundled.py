@@ -1,4 +1,4 @@
-"""The figures that ship with the viewer."""
+"""Paths of the bundled figures."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ __all__ = ["bundled_body", "bundled_files"]
 
 
 def bundled_files() -> tuple[Path, Path]:
-    """Return the skeleton and the skin of the figure that ships with the viewer."""
+    """Return the skeleton and the skin of the bundled figure."""
     return resource("assets", "samples", "fox.skel"), resource("assets", "samples", "fox.skin")
 
 
 def bundled_body() -> Path:
-    """Return the neutral human body that ships with the viewer, in SMPL's layout."""
+    """Return the bundled neutral human body, in SMPL's layout."""
     return resource("assets", "samples", "body.npz")

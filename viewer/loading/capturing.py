@@ -1,4 +1,4 @@
-"""Make actors of a capture while it is being read: part by part, person by person."""
+"""Incremental construction of actors from a capture: part by part, person by person."""
 
 from __future__ import annotations
 
@@ -35,35 +35,35 @@ _COLORS = (
     (0.80, 0.36, 0.52),
     (0.52, 0.48, 0.40),
 )
-"""Of people, in the order in which they appear; linear."""
+"""Colours of people, in the order of appearance; linear."""
 
 
 @dataclass(slots=True, eq=False)
 class Builder:
-    """Turns the parts of one capture into actors that grow.
+    """Converts the parts of one capture to actors whose clips grow.
 
     Attributes
     ----------
     capture : Capture
-        What is read.
+        The capture to read.
     path : Path or None
-        Its file or folder, for remarks.
+        Its file or folder, for messages.
     model : Figure
-        What its bodies are drawn with.
+        The figure that its bodies are drawn with.
     called : str
-        What all people of it are called; after the capture if empty.
+        Base name of all its people; the capture's if empty.
     keeps_shape : bool
-        Whether the capture's shape coefficients mean something to the model.
+        Whether the capture's shape coefficients are valid for the model.
     placement : (4, 4)
         Of every actor.
     up : "y" or "z"
-        The axis along which people stand before they are placed.
+        The axis along which people stand before placement.
     n_read : int
-        Frames that have been taken in.
+        Number of frames already added.
     is_cut : bool
-        Whether reading was given up before the end.
+        Whether reading was stopped before the end.
     has_shape, has_expression : bool
-        Whether the files give shapes other than 0, and expressions.
+        Whether the files have nonzero shapes, and expressions.
     """
 
     capture: Capture
@@ -77,7 +77,7 @@ class Builder:
     has_shape: bool = False
     has_expression: bool = False
     path: Path | None = None
-    _names_shapes: bool = False  # whether anybody has shapes, if only zeros
+    _names_shapes: bool = False  # whether any person has shapes, including all-zero ones
     _parts: Iterator[CapturePart] | None = None
     _bodies: dict[int, Actor] = field(default_factory=dict)
     _points: dict[int, Actor] = field(default_factory=dict)
@@ -85,17 +85,17 @@ class Builder:
 
     @property
     def is_done(self) -> bool:
-        """Whether there is nothing left to read."""
+        """Whether all parts have been read."""
         return self.is_cut or self.n_read >= self.capture.n_frames
 
     def parts(self) -> Iterator[CapturePart]:
-        """Return the iterator over what is left; may be advanced in another thread."""
+        """Return the iterator over the remaining parts; may be advanced in another thread."""
         if self._parts is None:
             self._parts = self.capture.parts()
         return self._parts
 
     def read_some(self) -> tuple[list[Actor], list[Diagnostic]]:
-        """Read the next part; return the actors that are new, and what was noticed."""
+        """Read the next part; return new actors and messages."""
         part = next(self.parts(), None)
         if part is None:
             self.is_cut = True
@@ -103,14 +103,14 @@ class Builder:
         return self.add(part)
 
     def add(self, part: CapturePart) -> tuple[list[Actor], list[Diagnostic]]:
-        """Take in one part.
+        """Add one part to the actors.
 
         Returns
         -------
         new : list of Actor
-            People who appear for the first time; posed as at the start.
+            People who appear for the first time; posed at the start.
         notes : list of Diagnostic
-            None twice.
+            Messages, each reported once.
 
         Raises
         ------
@@ -132,7 +132,7 @@ class Builder:
         return new, [*reversed(fresh.values())]
 
     def _shape_notes(self) -> list[Diagnostic]:
-        """Say at the end that bodies have the model's mean shape because no file has another."""
+        """Return, at the end, a message if bodies have the mean shape for lack of another."""
         lacks = self._bodies and self.model.n_shapes and not self._names_shapes
         if not (self.is_done and self.keeps_shape and lacks):
             return []
@@ -152,7 +152,7 @@ class Builder:
             self._bodies[person] = actor
             new.append(actor)
         else:
-            assert isinstance(actor.clip, SampledClip)  # as it was made above
+            assert isinstance(actor.clip, SampledClip)  # set when the actor was made
             timing = joined_timing(actor.clip.timing, clip.timing, actor.clip.n_rows)
             actor.clip = joined([actor.clip, clip], timing)
         return [replace(note, path=self.path) for note in notes]
@@ -168,7 +168,7 @@ class Builder:
             new.append(actor)
             return []
         known = actor.figure.points
-        assert isinstance(actor.clip, PointClip) and known is not None  # as it was made above
+        assert isinstance(actor.clip, PointClip) and known is not None  # set with the actor
         if len(known.names) != len(layout.names):
             values = {
                 "person": person_label(person),
@@ -187,11 +187,11 @@ class Builder:
 
     @property
     def actors(self) -> list[Actor]:
-        """Everybody found so far, bodies first."""
+        """All people found so far, bodies first."""
         return [*self._bodies.values(), *self._points.values()]
 
     def place(self, up: str) -> None:
-        """Stand everybody up, also those who come later, if an axis points down in the world.
+        """Rotate all people, including later ones, upright if an axis points down in the world.
 
         Parameters
         ----------
@@ -207,25 +207,25 @@ class Builder:
                 actor.placement = self.placement.copy()
 
     def refusal(self, problem: RigError) -> RigError:
-        """Return a refusal that says which model would fit."""
+        """Return an error extended by the model that would fit."""
         values = {"problem": str(problem), "member": self.capture.model}
         key = "F004.capture-of-member" if self.capture.model else "F004.capture"
         return RigError(Diagnostic(key, self.path, values=values))
 
 
 def _order(item: tuple[int, object]) -> tuple[bool, int]:
-    """Sort people by number, those without a track behind all others."""
+    """Return a sort key of people: by number, untracked ones last."""
     person = item[0]
     return not is_tracked(person), abs(person)
 
 
 def joined_timing(first: Timing, second: Timing, shift: int) -> Timing:
-    """Return the timing of rows put behind one another: those of ``second`` moved by ``shift``."""
+    """Return the timing of concatenated rows: those of ``second`` are offset by ``shift``."""
     rows: Ints = np.where(second.rows >= 0, second.rows + shift, first.rows).astype(np.int32)
     return replace(first, rows=rows)
 
 
 def joined_points(first: PointClip, second: PointClip) -> PointClip:
-    """Return one clip of the rows of two with the same timeline."""
+    """Return one clip of the concatenated rows of two with the same timeline."""
     timing = joined_timing(first.timing, second.timing, len(first.points))
     return PointClip(first.name, timing, np.concatenate([first.points, second.points]))

@@ -1,4 +1,4 @@
-"""The actors of a scene that is being put together."""
+"""Cast of a scene under construction: its actors and their properties."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ __all__ = ["Cast"]
 
 @dataclass(slots=True)
 class Cast:
-    """The actors of a scene that is being put together.
+    """The actors of a scene under construction.
 
     Attributes
     ----------
     actors : list of Actor
-        Those of figures that were opened first.
+        Those of opened figures first.
     ups : list of "y" or "z"
-        The axis that points up where each of them stands.
+        The up axis of each actor.
     placed : list of bool
-        Whether its motion says where it is.
+        Whether each actor's motion determines its position.
     builders : list of Builder
         Captures that are still being read.
     views : list of CameraView
-        Calibrated cameras, in the scene.
+        Calibrated cameras, in scene space.
     diagnostics : list of Diagnostic
-        What was noticed while it was put together.
+        Messages from the construction.
     """
 
     actors: list[Actor]
@@ -44,15 +44,15 @@ class Cast:
     diagnostics: list[Diagnostic] = field(default_factory=list)
 
     def note(self, key: str, path: Path | None = None, **values: Any) -> None:
-        """Record a remark about a file, or about none; ``values`` are what its message shows."""
+        """Record a message about a file, or about none; ``values`` are those of its wording."""
         self.diagnostics.append(Diagnostic(key, path, values=values))
 
     def free_title(self, title: str) -> str:
-        """Return a title for one more actor, or all people of one more capture."""
+        """Return an unused title for a new actor, or for all people of a new capture."""
         return free_title(self.actors, title)
 
     def add(self, actor: Actor, up: str, placed: bool) -> None:
-        """Add one actor at the end."""
+        """Append one actor."""
         self.actors.append(actor)
         self.ups.append(up)
         self.placed.append(placed)

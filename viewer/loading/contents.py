@@ -1,4 +1,4 @@
-"""What files hold, by kind, before anything is put together."""
+"""Contents of files by kind, before they are assembled."""
 
 from __future__ import annotations
 
@@ -37,21 +37,21 @@ if TYPE_CHECKING:
 __all__ = ["Contents", "read_files", "read_source"]
 
 
-_PEEK = 16  # bytes that tell a picture
+_PEEK = 16  # bytes that identify a picture
 
 
 @dataclass(slots=True)
 class Contents:
-    """What several files hold, by kind, with the path of each.
+    """Contents of several files by kind, with the path of each.
 
     Attributes
     ----------
     called : dict
-        What a figure is called whose file, resolved, was named by one that was opened.
+        Names of figures by resolved file, if another file gave one.
     diagnostics : tuple of Diagnostic
-        What the readers noticed.
+        Messages from the readers.
     files : tuple of Path
-        All that was read.
+        All files that were read.
     """
 
     figures: list[tuple[Path, Figure]] = field(default_factory=list)
@@ -68,29 +68,29 @@ class Contents:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the readers noticed, one line each."""
+        """Messages from the readers, one line each."""
         return tuple(map(str, self.diagnostics))
 
     @property
     def has_motion(self) -> bool:
-        """Whether anything moves."""
+        """Whether there is any motion."""
         return bool(self.clips or self.body_motions or self.skeleton_motions or self.captures)
 
     @property
     def needs_figure(self) -> bool:
-        """Whether there are motions or morphs, and no figure for them."""
+        """Whether there are motions or blend shape targets without a figure."""
         return not self.figures and (self.has_motion or bool(self.morphs))
 
     @property
     def only_bodies(self) -> bool:
-        """Whether all that moves are bodies of the SMPL family."""
+        """Whether all motions are of bodies of the SMPL family."""
         return bool(self.body_motions or self.captures) and not (
             self.clips or self.skeleton_motions or self.morphs
         )
 
     @property
     def is_addition(self) -> bool:
-        """Whether there are only poses and pictures, for a figure that is open already."""
+        """Whether there are only poses and pictures, for a figure that is already open."""
         others = self.figures or self.has_motion or self.morphs
         return not others and bool(self.poses or self.pictures)
 
@@ -98,11 +98,11 @@ class Contents:
 def read_files(
     paths: Sequence[str | Path], max_size: int = MAX_SIZE, settings: MotionSettings | None = None
 ) -> Contents:
-    """Read files without putting them together; see ``viewer.loading.load``."""
+    """Read files without assembling them; see ``viewer.loading.load``."""
     contents = Contents()
     sources = [Source.open(path, max_size) for path in paths]
     known = {source.path.resolve() for source in sources}
-    for source in sources:  # grows while it is read: a .rig names files
+    for source in sources:  # grows during iteration: a .rig names files
         for path in read_source(source, contents, settings or MotionSettings()):
             if path.resolve() not in known:  # a .rig may name another, or itself
                 known.add(path.resolve())
@@ -118,21 +118,21 @@ def read_files(
 
 
 def read_source(source: Source, contents: Contents, settings: MotionSettings) -> tuple[Path, ...]:
-    """Read one file and add what it holds, but not its warnings; see the formats for errors.
+    """Read one file and add its contents, without its warnings; see the formats for errors.
 
     Parameters
     ----------
     source : Source
         The file.
     contents : Contents
-        Is added to.
+        Extended by the file's contents.
     settings : MotionSettings
-        How motions are taken.
+        How motions are interpreted.
 
     Returns
     -------
     tuple of Path
-        Files that it names, to be read as well.
+        Further files that it names.
     """
     if _is_picture(source):
         contents.pictures.append((source.path, read_picture(source)))
@@ -149,11 +149,11 @@ _LISTS = {
     "MorphTarget": "morphs",
     "Figure": "figures",
 }
-"""Where each class belongs, by name: only readers that make one import its module."""
+"""The field for each class, by name: only readers that create a class import its module."""
 
 
 def _sort(source: Source, contents: Contents, settings: MotionSettings) -> tuple[Path, ...]:
-    """Read a file and put what it holds where its kind belongs; return files that it names."""
+    """Read a file and add its contents by kind; return files that it names."""
     content = _read(source, settings)
     kind = type(content).__name__
     if kind == "NamedFiles":
@@ -165,7 +165,7 @@ def _sort(source: Source, contents: Contents, settings: MotionSettings) -> tuple
 
 
 def _read(source: Source, settings: MotionSettings) -> Content:
-    """Read a file; what was asked for counts more than what a capture says of itself."""
+    """Read a file; explicit settings override the properties of a capture."""
     kind = detect(source)
     if kind == "easymocap":
         from viewer.formats.easymocap import open_capture
@@ -189,7 +189,7 @@ def _is_picture(source: Source) -> bool:
 
 
 def _with_own_picture(source: Source, figure: Figure) -> Figure:
-    """Cover a figure from a folder with the picture in it, if there is exactly one."""
+    """Apply the picture in a figure's folder as its texture, if there is exactly one."""
     mesh = figure.mesh
     if mesh is None or mesh.uvs is None or mesh.materials:
         return figure

@@ -1,4 +1,4 @@
-"""Give motions to actors: clips by channels, captured bodies a model, BVH what it can drive."""
+"""Assignment of motions to actors: clips by channels, captured bodies a model, BVH by joints."""
 
 from __future__ import annotations
 
@@ -29,18 +29,18 @@ if TYPE_CHECKING:
 
 __all__ = ["drive", "is_body"]
 
-_ROOTS = ("pelvis", "wrist", "global")  # of the SMPL family's members
+_ROOTS = ("pelvis", "wrist", "global")  # of members of the SMPL family
 
 
 def drive(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
-    """Give every motion to an actor, new ones where needed.
+    """Assign every motion to an actor, new ones where needed.
 
     Raises
     ------
     FormatError
         If the model cannot be read.
     RigError
-        If a clip fits no skeleton, or bodies or BVH do not fit the model.
+        If a clip fits no skeleton, or bodies or a BVH do not fit the model.
     """
     for path, clip in contents.clips:
         _give_clip(path, clip, cast, contents)
@@ -65,7 +65,7 @@ def drive(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
 def _give_skeleton_motions(
     contents: Contents, cast: Cast, settings: MotionSettings, named: Figure | None
 ) -> list[Lone]:
-    """Let BVH drive figures; return those that stand alone."""
+    """Let BVH motions drive figures; return the separate skeletons of the others."""
     if not contents.skeleton_motions:
         return []
     from viewer.loading.skeleton_motions import give_skeleton_motion
@@ -78,7 +78,7 @@ def _give_skeleton_motions(
 
 
 def _give_clip(path: Path, clip: Clip, cast: Cast, contents: Contents) -> None:
-    """Give a clip to the first actor that it fits."""
+    """Assign a clip to the first actor that it fits."""
     skeletons = [actor.figure.skeleton for actor in cast.actors]
     for actor, skeleton in zip(cast.actors, skeletons, strict=True):
         if (
@@ -100,13 +100,13 @@ def _give_clip(path: Path, clip: Clip, cast: Cast, contents: Contents) -> None:
 
 
 def is_body(figure: Figure) -> bool:
-    """Return whether captured bodies can be drawn with a figure: the family's root and a mesh."""
+    """Return whether a figure can show captured bodies: it has the family's root and a mesh."""
     skeleton = figure.skeleton
     return skeleton is not None and figure.mesh is not None and skeleton.names[0] in _ROOTS
 
 
 def _named_model(cast: Cast, path: Path | None) -> Figure | None:
-    """Return the body model that ``--model`` names, if it names one."""
+    """Return the body model given by ``--model``, if any."""
     if path is None:
         return None
     source = Source.open(path)
@@ -118,9 +118,9 @@ def _named_model(cast: Cast, path: Path | None) -> Figure | None:
 
 
 def _model(cast: Cast, named: Figure | None) -> tuple[Figure, bool]:
-    """Return what captured bodies are drawn with, and whether it is the bundled body.
+    """Return the figure for captured bodies, and whether it is the bundled body.
 
-    A figure among the files that is one's model does not stand about itself.
+    A body model among the files is not shown as an actor of its own.
     """
     if named is not None:
         return named, False
@@ -129,17 +129,17 @@ def _model(cast: Cast, named: Figure | None) -> tuple[Figure, bool]:
             del cast.actors[index], cast.ups[index], cast.placed[index]
             return actor.figure, _is_bundled(actor.figure)
     body = read(Source.open(bundled_body()))
-    assert isinstance(body, Figure)  # it is ours
+    assert isinstance(body, Figure)  # it is a bundled file
     return body, True
 
 
 def _is_bundled(figure: Figure) -> bool:
-    # Only the bundled body calls its shapes by what they do.
+    # Only the bundled body names its shapes by their effect.
     return figure.blend_shapes is not None and "stature" in figure.blend_shapes.names
 
 
 def _note_bundled(cast: Cast, path: Path, has_shape: bool, has_expression: bool) -> None:
-    """Say that the bundled body is shown, and what of the files it cannot take."""
+    """Record that the bundled body is shown, and which data it ignores."""
     key = {
         (False, False): "F007.bundled-body",
         (True, False): "F007.bundled-body-without-shapes",
@@ -178,7 +178,7 @@ def _give_body_motion(
 
 
 def _judged_up(path: Path, actors: Sequence[Actor], cast: Cast, usual: str = "") -> str:
-    """Return what is up, judged by the people, and say so unless it is what is usual."""
+    """Return the up axis judged by the people, and record it unless it is the usual one."""
     from viewer.rig.motion.up_axis import guess_up
 
     up = guess_up(actors)
@@ -196,7 +196,7 @@ def _begin_capture(
     model: Figure,
     is_bundled: bool,
 ) -> None:
-    """Read a capture until somebody is seen; the rest is read later."""
+    """Read a capture until a person appears; the rest is read later."""
     called = cast.free_title(capture.name)
     builder = Builder(capture, model, called=called, keeps_shape=not is_bundled, path=path)
     cast.diagnostics += capture.warnings
@@ -207,11 +207,11 @@ def _begin_capture(
             raise builder.refusal(problem) from None
     if is_bundled and any(actor.figure is model for actor in builder.actors):
         _note_bundled(cast, path, builder.has_shape, builder.has_expression)
-    # EasyMocap's usual calibration has z up, which needs no word.
+    # EasyMocap's usual calibration has z up, which needs no message.
     up = settings.up or capture.up or _judged_up(path, builder.actors, cast, usual="z")
     builder.place(up)
-    turn = builder.placement[:3, :3].T
-    cast.views += [replace(view, rotation=view.rotation @ turn) for view in capture.views]
+    to_capture = builder.placement[:3, :3].T
+    cast.views += [replace(view, rotation=view.rotation @ to_capture) for view in capture.views]
     for actor in builder.actors:
         cast.add(actor, up[-1], placed=True)
     cast.builders.append(builder)

@@ -1,4 +1,4 @@
-"""What may be asked for when motions are opened."""
+"""Settings for opening motions."""
 
 from __future__ import annotations
 
@@ -10,29 +10,29 @@ __all__ = ["MotionSettings"]
 
 @dataclass(frozen=True, slots=True)
 class MotionSettings:
-    """How motions are read and what they move; the defaults are what their files say.
+    """How motions are read and assigned; by default as their files say.
 
     Attributes
     ----------
     model : Path or None
-        The figure that captured bodies are drawn with, and that BVH drives; None for one among
-        the files, or for captures the bundled body.
+        The figure that captured bodies are drawn with, and that a BVH drives; None for one among
+        the files, or the bundled body for captures.
     frame_rate : float or None
-        Frames a second; None for the file's own, or 30 where it does not say.
+        Frames per second; None for the file's own, or 30 if it has none.
     up : "y", "z", "-y", "-z" or ""
-        The axis that points up in captures and BVH; empty to judge by the bodies.
+        The up axis of captures and BVH; empty to detect it from the bodies.
     unit : str
-        Of BVH lengths, which then become metres: a key of ``viewer.rig.units.METRES``; empty to
-        judge by the skeleton's size.
+        Unit of BVH lengths, which are converted to metres: a key of ``viewer.rig.units.METRES``;
+        empty to guess it from the skeleton's size.
     flat_hands : bool or None
-        Whether hand components leave the mean hand out; None for the model's custom.
+        Whether hand components are relative to the flat hand; None for the model's convention.
     layout : str
-        What captured keypoints are, a title of ``viewer.rig.captures.keypoint_layouts``; empty to
-        judge by their number.
+        Layout of captured keypoints, a title of ``viewer.rig.captures.keypoint_layouts``; empty to
+        choose it by their number.
     legacy_expression : bool
-        Whether expressions drive SMPL-X columns 10 to 19, as EasyMocap has it.
+        Whether expressions drive SMPL-X columns 10 to 19, as in EasyMocap.
     drives : bool
-        Whether a BVH drives a figure that is opened with it, instead of standing beside it.
+        Whether a BVH drives a figure opened with it, instead of being shown beside it.
     """
 
     model: Path | None = None

@@ -1,4 +1,4 @@
-"""Give the motions of BVH files to figures, or let them stand as skeletons of their own."""
+"""Assignment of BVH motions to figures, or to separate skeletons."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ __all__ = ["Lone", "agree_on_units", "give_skeleton_motion"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lone:
-    """A motion that drives nobody.
+    """A motion that drives no figure.
 
     Attributes
     ----------
     path : Path
         Its file.
     motion : SkeletonMotion
-        As asked for.
+        With the requested settings applied.
     actor : Actor
         Its skeleton in the scene.
     """
@@ -49,25 +49,25 @@ def give_skeleton_motion(
     settings: MotionSettings,
     model: Figure | None,
 ) -> Lone | None:
-    """Let a motion drive the model, else the first figure whose joints it names, or stand alone.
+    """Let a motion drive the model, else the first figure whose joints it names, or none.
 
     Parameters
     ----------
     path : Path
         Its file, for messages.
     motion : SkeletonMotion
-        As read.
+        As read from the file.
     cast : Cast
-        Gets a clip, or an actor.
+        Receives a clip, or an actor.
     settings : MotionSettings
-        Unit, up axis, frame rate, and whether it drives anything.
+        Unit, up axis, frame rate, and whether it drives a figure.
     model : Figure or None
-        What it has to drive, each motion one of its own.
+        The figure that it must drive, a separate copy for each motion.
 
     Returns
     -------
     Lone or None
-        The skeleton, if it stands alone.
+        The separate skeleton, if it drives no figure.
 
     Raises
     ------
@@ -77,7 +77,7 @@ def give_skeleton_motion(
     motion = _as_asked(motion, settings)
     for note in motion.up_notes:
         cast.note("F007.up-taken", path, note=note)
-    turn = rotation_transform(0, np.pi) if settings.up.startswith("-") else np.eye(4)
+    placement = rotation_transform(0, np.pi) if settings.up.startswith("-") else np.eye(4)
     if settings.drives and model is not None:
         try:
             clip, notes = retarget(motion, model)
@@ -86,20 +86,22 @@ def give_skeleton_motion(
             raise RigError(Diagnostic("F004.model", path, values=values)) from None
         cast.diagnostics += [replace(note, path=path) for note in notes]
         called = cast.free_title(motion.figure.name)
-        cast.add(Actor(model, clip=clip, placement=turn, called=called), model.up, placed=False)
+        cast.add(
+            Actor(model, clip=clip, placement=placement, called=called), model.up, placed=False
+        )
         return None
-    if settings.drives and _drives_somebody(path, motion, cast, turn):
+    if settings.drives and _drives_somebody(path, motion, cast, placement):
         return None
     called = cast.free_title(motion.figure.name)
-    actor = Actor(motion.figure, clip=motion.clip, placement=turn, called=called)
+    actor = Actor(motion.figure, clip=motion.clip, placement=placement, called=called)
     cast.add(actor, motion.figure.up, placed=False)
     return Lone(path, motion, actor)
 
 
 def _as_asked(motion: SkeletonMotion, settings: MotionSettings) -> SkeletonMotion:
-    """Return a motion in the unit, world and rate that were asked for; nothing else is guessed."""
+    """Return a motion in the requested unit, world and rate; nothing else is guessed."""
     if settings.unit:
-        motion = _in_metres(motion, settings.unit, f"{settings.unit} in the file, as asked")
+        motion = _in_metres(motion, settings.unit, f"{settings.unit} in the file, as requested")
     if settings.up:
         up: Literal["y", "z"] = "z" if settings.up.endswith("z") else "y"
         motion = replace(motion, figure=replace(motion.figure, up=up), up_notes=())
@@ -110,7 +112,7 @@ def _as_asked(motion: SkeletonMotion, settings: MotionSettings) -> SkeletonMotio
 
 
 def _in_metres(motion: SkeletonMotion, unit: str, fact: str) -> SkeletonMotion:
-    """Return a motion scaled to metres from a unit, and say so in what is known of it."""
+    """Return a motion scaled to metres from a unit, and record this in its facts."""
     scaled = scaled_motion(motion, METRES[unit], "m")
     facts = dict(motion.figure.facts)
     facts["unit"] = f"{fact}; scaled to metres" if unit != "m" else fact
@@ -118,8 +120,8 @@ def _in_metres(motion: SkeletonMotion, unit: str, fact: str) -> SkeletonMotion:
     return replace(scaled, figure=replace(scaled.figure, facts=kept), unit_note="")
 
 
-def _drives_somebody(path: Path, motion: SkeletonMotion, cast: Cast, turn: Floats) -> bool:
-    """Give a motion to the first figure with a mesh and no clip that it fits, if there is one."""
+def _drives_somebody(path: Path, motion: SkeletonMotion, cast: Cast, placement: Floats) -> bool:
+    """Assign a motion to the first figure with a mesh and no clip that it fits, if any."""
     refusal = ""
     for actor in cast.actors:
         if actor.clip is not None or not actor.figure.is_attached:
@@ -129,7 +131,7 @@ def _drives_somebody(path: Path, motion: SkeletonMotion, cast: Cast, turn: Float
         except RigError as problem:
             refusal = refusal or str(problem)
             continue
-        actor.placement = turn @ actor.placement
+        actor.placement = placement @ actor.placement
         cast.diagnostics += [replace(note, path=path) for note in notes]
         return True
     if refusal:
@@ -138,16 +140,16 @@ def _drives_somebody(path: Path, motion: SkeletonMotion, cast: Cast, turn: Float
 
 
 def agree_on_units(cast: Cast, lone: list[Lone]) -> None:
-    """Scale skeletons to metres that stand beside others of another unit; say what was guessed.
+    """Scale skeletons to metres that stand beside others of another unit; record the guesses.
 
-    One alone, or among others in its own unit, keeps the numbers of its file.
+    A lone skeleton, or one among others in its own unit, keeps the numbers of its file.
 
     Parameters
     ----------
     cast : Cast
-        Complete but for people who come later; actors of scaled skeletons are replaced.
+        Complete except for people who appear later; actors of scaled skeletons are replaced.
     lone : list of Lone
-        Skeletons in it.
+        The separate skeletons in it.
     """
     chosen = [one for one in lone if _is_odd(one, cast.actors)]
     for one in lone:
@@ -164,7 +166,7 @@ def agree_on_units(cast: Cast, lone: list[Lone]) -> None:
 
 
 def _is_odd(one: Lone, actors: list[Actor]) -> bool:
-    """Return whether a skeleton's unit is known, no metre, and not that of all other actors."""
+    """Return whether a skeleton's unit is known, not metres, and not that of all other actors."""
     unit = one.motion.figure.unit
     if unit == "m" or unit not in METRES:
         return False

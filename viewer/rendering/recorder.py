@@ -124,7 +124,7 @@ class Recording:
         What the grid lies under and the depth range covers; None for the scene as it is.
     moves : bool
         Whether clips pose the actors; False keeps their poses, for a turntable of a still.
-    fill : bool
+    interpolate : bool
         Bridge the gaps of captures.
     turn : float
         Degrees by which the camera turns about its target from the first frame to the one that
@@ -144,7 +144,7 @@ class Recording:
     options: DisplayOptions = field(default_factory=DisplayOptions)
     box: Floats | None = None
     moves: bool = True
-    fill: bool = False
+    interpolate: bool = False
     turn: float = 0.0
     follow: Follow | None = None
     selected: tuple[int, int] = (0, -1)
@@ -189,7 +189,7 @@ def pose_scene(scene: Scene, recording: Recording, seconds: float) -> None:
     """Pose a copy of the recording's scene as it is at one time."""
     if recording.moves:
         scene.time = seconds
-        pose_actors(scene.actors, seconds, recording.fill)
+        pose_actors(scene.actors, seconds, recording.interpolate)
 
 
 def record(recording: Recording, renderer: Renderer, sink: Sink) -> Generator[Progress]:

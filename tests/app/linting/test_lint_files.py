@@ -98,7 +98,7 @@ def test_files_that_are_gone_or_changed_are_said(lint, files, texts):
     hand.click("Recheck")
     finish(hand)
     assert "a.skin is gone: only what is open was checked" in texts
-    assert "a.skel was changed after opening: what readers say is of the new contents" in texts
+    assert "a.skel was changed after opening: readers' messages are about the new contents" in texts
 
 
 def test_a_finding_of_the_file_alone_says_so_and_copies_its_place(lint, files, texts, monkeypatch):

@@ -47,7 +47,7 @@ def test_known_axes_leave_fewer_turns():
 def test_axes_that_contradict_each_other_are_refused():
     with pytest.raises(RigError) as problem:
         axis_rotations("y", up="z", facing="-z")
-    assert str(problem.value) == "expected a facing across the up axis z, found -z"
+    assert str(problem.value) == "expected a facing perpendicular to the up axis z, found -z"
     with pytest.raises(RigError) as problem:
         axis_rotations("y", up="w")
     assert str(problem.value) == 'expected an axis, one of x, y, z, -x, -y, -z, found "w"'

@@ -36,7 +36,7 @@ def test_turned_joint_is_found():
     targets = X + LIMBS.fractions[:, 1:] * np.cross(turn, X - [0, 1, 0])
     step = solved(targets)
     assert_allclose(step.rotation_vectors, [[0, 0, 0], turn], atol=2e-4)
-    assert_allclose(step.turn, 0.0, atol=2e-4)
+    assert_allclose(step.rotation, 0.0, atol=2e-4)
     assert_allclose(step.limb_growths, 0.0, atol=5e-4)
 
 

@@ -50,7 +50,7 @@ def test_matrix_scales_after_turning_and_undo_is_its_inverse():
         (np.eye(3)[:2], "alignment: expected 3 or more pairs of points, found 2 and 2"),
         (
             np.array([[0.0, 0, 0], [1, 1, 1], [3, 3, 3]]),
-            "alignment: expected points in a plane or in space, found them in line",
+            "alignment: expected points in a plane or in space, found a line",
         ),
     ],
 )

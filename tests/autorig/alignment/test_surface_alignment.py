@@ -157,7 +157,7 @@ def test_settings_that_make_no_sense_are_refused(settings, message):
 def test_matrices_that_mirror_or_shear_are_refused():
     with pytest.raises(RigError) as problem:
         similarity_of(np.diag([1.0, 1, -1, 1]))
-    assert str(problem.value) == ("alignment: expected a matrix that does not mirror or flatten")
+    assert str(problem.value) == ("alignment: expected a matrix without reflection or singularity")
     shear = np.eye(4)
     shear[0, 1] = 0.5
     with pytest.raises(RigError) as problem:

@@ -171,5 +171,5 @@ def test_fill_solves_in_blocks_of_joints(monkeypatch):
     seen = []
     single, _ = run(operator, areas, weights, unknown, lambda *step: seen.append(step))
     np.testing.assert_allclose(single.toarray(), whole.toarray(), atol=1e-12)
-    assert [what for _, what in seen] == ["factorising"] + 3 * ["filling in weights"]
+    assert [what for _, what in seen] == ["factorising"] + 3 * ["inpainting weights"]
     assert [fraction for fraction, _ in seen] == [0.0, 0.0, 1 / 3, 2 / 3]

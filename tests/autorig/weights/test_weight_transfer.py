@@ -271,7 +271,7 @@ def test_nearest_weights_copies_rows():
 def test_settings_refuse_odd_numbers():
     with pytest.raises(RigError) as caught:
         WeightSettings(smoothing_rounds=-1)
-    assert str(caught.value) == "smoothing: expected at least 0 rounds, found -1"
+    assert str(caught.value) == "smoothing: expected at least 0 iterations, found -1"
     with pytest.raises(RigError) as caught:
         WeightSettings(max_influences=0)
     assert str(caught.value) == "influences: expected at least 1, found 0"

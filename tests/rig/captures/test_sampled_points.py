@@ -45,7 +45,7 @@ def test_frames_come_back_as_they_were_captured():
 
 
 def test_range_and_bridged_gaps():
-    animation, _ = sample_upright_points(*scene_of(), frames=(1, 3), fill=True)
+    animation, _ = sample_upright_points(*scene_of(), frames=(1, 3), interpolate=True)
     assert (animation.first_frame, animation.present.tolist()) == (8, [True, True])
     assert_array_equal(animation.points[0], [[2, 2, 3], [NAN] * 3])  # b is seen in one of the two
 

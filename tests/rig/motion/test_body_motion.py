@@ -86,7 +86,7 @@ def test_root_turns_about_the_pelvis(family, kind):
 
 def test_world_turns_the_posed_body_about_the_origin(family):
     vectors, shape, world = waves(24, 3), waves(10, seed=3.0), np.array([[1.5, 0.2, -0.6]])
-    given = motion(FAMILY[24].names, vectors, shape=shape[None], world_turns=world)
+    given = motion(FAMILY[24].names, vectors, shape=shape[None], world_rotations=world)
     found, _ = posed(family("smpl"), given)
     # The root's own rotation is part of X here.
     body = smpl_forward(model("smpl"), shape, vectors)[0]
@@ -179,8 +179,8 @@ def test_other_skeletons_are_refused():
 
 
 def test_arrays_must_fit():
-    with pytest.raises(RigError, match=r"^world_turns: expected shape 1 x 3, found 2 x 3$"):
-        motion(("pelvis",), TURN, world_turns=np.zeros((2, 3)))
+    with pytest.raises(RigError, match=r"^world_rotations: expected shape 1 x 3, found 2 x 3$"):
+        motion(("pelvis",), TURN, world_rotations=np.zeros((2, 3)))
     with pytest.raises(RigError, match=r"^translations: expected shape 1 x 3, found 1 x 2$"):
         motion(("pelvis",), TURN, translations=np.zeros((1, 2)))
 

@@ -88,12 +88,12 @@ def same(first: Actor, second: Actor) -> None:
     assert np.array_equal(first.pose.figure_translation, second.pose.figure_translation)
 
 
-def both_ways(make, time: float, fill: bool = False) -> list[Actor]:
+def both_ways(make, time: float, interpolate: bool = False) -> list[Actor]:
     """Return actors posed together, after holding them to those posed one by one."""
     together, alone = make(), make()
-    pose_actors(together, time, fill)
+    pose_actors(together, time, interpolate)
     for first, second in zip(together, alone, strict=True):
-        pose_actor(second, time, fill)
+        pose_actor(second, time, interpolate)
         same(first, second)
     return together
 
@@ -126,10 +126,10 @@ def captured(n_joints: int, rows=(0, 1, -1, 2), **parts) -> SampledClip:
     return SampledClip("captured", Timing(2.0, rows, holds=False), turns, **parts)
 
 
-@pytest.mark.parametrize("fill", [False, True])
+@pytest.mark.parametrize("interpolate", [False, True])
 @pytest.mark.parametrize("time", [-1.0, 0.0, 0.3, 0.5, 1.2, 1.5, 3.0])
 @pytest.mark.parametrize("kind", ["balls", "others"])
-def test_frames_pose_actors_together(kind, time, fill):
+def test_frames_pose_actors_together(kind, time, interpolate):
     rng = np.random.default_rng(3)
     if kind == "balls":
         dofs = [(joint, axis, 0.0) for joint in range(3) for axis in "xyz"]
@@ -145,9 +145,11 @@ def test_frames_pose_actors_together(kind, time, fill):
     )
     figure = Figure("f", skeleton=joints)
     actors = both_ways(
-        lambda: [Actor(figure, clip=clip, offset=0.25 * number) for number in range(6)], time, fill
+        lambda: [Actor(figure, clip=clip, offset=0.25 * number) for number in range(6)],
+        time,
+        interpolate,
     )
-    if time == 1.2 and not fill:  # somebody is in the gap, somebody is not
+    if time == 1.2 and not interpolate:  # somebody is in the gap, somebody is not
         assert {actor.is_present for actor in actors} == {True, False}
 
 

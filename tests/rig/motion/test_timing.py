@@ -13,9 +13,9 @@ from viewer.rig.motion.timing import Timing
 GAP = Timing(4.0, np.array([0, 1, -1, -1, 2, 3]), first_frame=7, start=1.0)
 
 
-def located(timing, time, fill=False):
-    before, after, share = timing.locate(np.array([time]), fill)
-    return int(before[0]), int(after[0]), float(share[0])
+def located(timing, time, interpolate=False):
+    before, after, fraction = timing.locate(np.array([time]), interpolate)
+    return int(before[0]), int(after[0]), float(fraction[0])
 
 
 @pytest.mark.parametrize(
@@ -55,15 +55,15 @@ def test_absence_outside_if_ends_are_not_held():
     ],
 )
 def test_gaps_are_bridged_when_asked(time, expected):
-    assert located(GAP, time, fill=True) == pytest.approx(expected, abs=1e-9)
+    assert located(GAP, time, interpolate=True) == pytest.approx(expected, abs=1e-9)
 
 
 @pytest.mark.parametrize("rate", [30.0, 29.97, 120.00004577636719, 23.976])
 def test_every_frame_is_reached_exactly(rate):
     timing = Timing(rate, np.arange(5000))
     frames = np.arange(5000)
-    before, _, share = timing.locate(frames / rate)
-    assert (before == frames).all() and not share.any()
+    before, _, fraction = timing.locate(frames / rate)
+    assert (before == frames).all() and not fraction.any()
 
 
 def test_times_and_frames():

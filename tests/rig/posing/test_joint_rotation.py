@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from viewer.rig.pose import joint_rotations, rest_pose
-from viewer.rig.posing.joint_rotation import nearest_dofs, rotation_dofs, turns_freely
+from viewer.rig.posing.joint_rotation import nearest_dofs, rotates_freely, rotation_dofs
 from viewer.rig.skeleton import Skeleton
 
 FREE = (-np.inf, np.inf)
@@ -157,9 +157,9 @@ def test_start_is_left_as_it_is() -> None:
 
 
 def test_locked_dofs_are_no_freedom() -> None:
-    assert turns_freely(single("zyx"), 0)
-    assert not turns_freely(single("xyz", (0.2, 0.2)), 0)
-    assert not turns_freely(single("xyx"), 0)
-    assert not turns_freely(single("xy"), 0)
+    assert rotates_freely(single("zyx"), 0)
+    assert not rotates_freely(single("xyz", (0.2, 0.2)), 0)
+    assert not rotates_freely(single("xyx"), 0)
+    assert not rotates_freely(single("xy"), 0)
     assert rotation_dofs(single("xyz", (0.2, 0.2)), 0, free=True).tolist() == [1, 2]
     assert rotation_dofs(single("xyz", (0.2, 0.2)), 0).tolist() == [0, 1, 2]

@@ -16,9 +16,9 @@ from viewer.rig.pose import joint_rotations, pose_key, rest_pose
 from viewer.rig.posing.pose_record import apply_record, record_of
 from viewer.rig.retargeting.pose_transfer import (
     dof_layout,
-    joint_turns,
     joints_by_name,
-    turn_joints,
+    relative_rotations,
+    rotate_joints,
 )
 from viewer.rig.skeleton import Skeleton
 
@@ -56,7 +56,7 @@ def figure(names, orders, name="one", up="y", rest=None, limits=None, parents=No
 
 
 def transfer_pose(one, pose, other, start):
-    return turn_joints(joint_turns(one, pose), other, start)
+    return rotate_joints(relative_rotations(one, pose), other, start)
 
 
 def shares_dofs(one, other):
@@ -154,7 +154,7 @@ def test_nothing_in_common_is_refused() -> None:
     one, other = figure("ab", ["xyz", "x"], "cat"), figure("cd", ["x", "x"], "man")
     with pytest.raises(RigError) as caught:
         transfer_pose(one, rest_pose(one.skeleton), other, rest_pose(other.skeleton))
-    assert str(caught.value) == "no joint of cat is called as one of man"
+    assert str(caught.value) == "cat and man have no joint name in common"
 
 
 def test_repeated_and_empty_names_match_nothing() -> None:
@@ -186,10 +186,10 @@ def test_long_lists_are_cut() -> None:
 def test_turns_are_those_of_the_figures_axes() -> None:
     # The second joint turns about x within a parent turned about z: in all Rz(0.5) Rx(0.3).
     one = figure("ab", ["z", "x"])
-    turns = joint_turns(one, posed(one, 0.5, 0.3))
-    assert_allclose(turns.turns[0], [0, 0, np.sin(0.25), np.cos(0.25)], atol=1e-12)
+    turns = relative_rotations(one, posed(one, 0.5, 0.3))
+    assert_allclose(turns.relative[0], [0, 0, np.sin(0.25), np.cos(0.25)], atol=1e-12)
     c, s, cx, sx = np.cos(0.25), np.sin(0.25), np.cos(0.15), np.sin(0.15)
-    assert_allclose(turns.turns[1], [c * sx, s * sx, s * cx, c * cx], atol=1e-12)
+    assert_allclose(turns.relative[1], [c * sx, s * sx, s * cx, c * cx], atol=1e-12)
     assert (turns.figure, turns.names, turns.up) == ("one", ("a", "b"), "y")
 
 
@@ -228,7 +228,7 @@ def test_refused_record_leaves_the_pose() -> None:
     before = pose_key(found)
     with pytest.raises(RigError) as caught:
         apply_record(record_of(one, rest_pose(one.skeleton)), other, found)
-    assert str(caught.value) == "no joint of cat is called as one of man"
+    assert str(caught.value) == "cat and man have no joint name in common"
     assert pose_key(found) == before
 
 
@@ -297,7 +297,7 @@ def test_lists_that_do_not_fit_the_skeleton_go_by_name() -> None:
     one = figure("ab", ["xyz", "x"], "cat")
     record = record_of(one, posed(one, 0.1, 0, 0, 0.4))
     named = record.turns
-    turns = replace(named, names=("a",), turns=named.turns[:1], shifts=named.shifts[:1],
+    turns = replace(named, names=("a",), relative=named.relative[:1], shifts=named.shifts[:1],
                     rotations=np.array([[0, 0, 0, 1.0]]))  # fmt: skip
     found = posed(one, 0, 0, 0, 0.3)
     notes = apply_record(replace(record, turns=turns), one, found)

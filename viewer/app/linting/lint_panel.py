@@ -26,7 +26,7 @@ from viewer.app.linting.actions import (
 from viewer.app.linting.state import Checked, Linting
 from viewer.errors import printable
 from viewer.lint import SEVERITIES, Finding, LintOptions
-from viewer.lint.captures import LOW_FRAMES, LOW_SHARE
+from viewer.lint.captures import LOW_FRACTION, LOW_FRAMES
 from viewer.rig.mesh import box_size
 
 __all__ = ["draw"]
@@ -118,7 +118,7 @@ def _draw_limits(state: AppState) -> None:
     moved = slider(state, "Low confidence", sure, 0.0, 1.0)
     explain(
         "a captured point is reported if its confidence is below in more than "
-        f"{100.0 * LOW_SHARE:g} % of the frames that see it, and in {LOW_FRAMES} at least"
+        f"{100.0 * LOW_FRACTION:g} % of the frames that see it, and in {LOW_FRAMES} at least"
     )
     if moved != sure:
         view.options = replace(view.options, confidence=moved)

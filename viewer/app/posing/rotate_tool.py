@@ -21,7 +21,7 @@ from viewer.rig.geometry.vectors import unit
 from viewer.rig.number_text import angle_text
 from viewer.rig.pose import Pose, joint_rotations
 from viewer.rig.posing.inverse_kinematics import rotation_axes
-from viewer.rig.posing.joint_rotation import nearest_dofs, rotation_dofs, turns_freely
+from viewer.rig.posing.joint_rotation import nearest_dofs, rotates_freely, rotation_dofs
 from viewer.rig.skeleton import Skeleton, dof_label, joint_label
 
 __all__ = [
@@ -82,7 +82,7 @@ def rings(joint: PosedJoint, pose: Pose, orientation: str, frame: ViewFrame) -> 
         How the scene is seen.
     """
     skeleton = joint.skeleton
-    if turns_freely(skeleton, joint.joint):
+    if rotates_freely(skeleton, joint.joint):
         axes = joint.axes(orientation)
         whole = [Ring(axes[:, axis], axis) for axis in range(3)]
         return [*whole, Ring(toward_eye(frame, joint.center), 3, RADIUS * _VIEW_RADIUS)]

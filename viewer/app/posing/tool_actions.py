@@ -9,7 +9,7 @@ from viewer.app.posing.move_tool import longest_chain, shifts, used_chain
 from viewer.app.posing.posed_joint import PosedJoint, posed_joint
 from viewer.app.posing.state import ORIENTATIONS, TOOLS, Posing
 from viewer.rig.motion.clip import Clip
-from viewer.rig.posing.joint_rotation import rotation_dofs, turns_freely
+from viewer.rig.posing.joint_rotation import rotates_freely, rotation_dofs
 from viewer.rig.skeleton import joint_label
 
 __all__ = [
@@ -91,7 +91,7 @@ def no_orientation(state: AppState) -> str:
         return ""
     if state.of(Posing).tool != "rotate":
         return "" if shifts(skeleton, joint) else "it is dragged in the plane of the picture"
-    if turns_freely(skeleton, joint):
+    if rotates_freely(skeleton, joint):
         return ""
     if not len(rotation_dofs(skeleton, joint, free=True)):
         return f"{joint_label(skeleton, joint)} cannot turn"

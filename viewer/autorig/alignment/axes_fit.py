@@ -1,4 +1,4 @@
-"""Another scale along each axis, of target or template: for what was stretched as a whole."""
+"""Alignment with a separate scale along each axis of target or template, for stretched meshes."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ def fit_axes(
     rotations: bool = False,
     own: bool = False,
 ) -> Similarity:
-    """Find another scale along each axis.
+    """Fit a separate scale along each axis.
 
     Each iteration solves for factors f, a shift t and, if asked, a small rotation w that minimise
     sum (n . (x - q))^2 + 1e-5 |x - q|^2 with x = f R p + f' (w x R p) + t, or with the template's
-    axes x = R f p + w x R f' p + t, in which f' are the factors so far: linear in all that is
-    looked for.
+    axes x = R f p + w x R f' p + t, in which f' are the factors so far: linear in all
+    unknowns.
 
     Parameters
     ----------
@@ -34,15 +34,15 @@ def fit_axes(
     start : Similarity
         Roughly right, with one scale.
     rotations : bool
-        Whether the rotation is improved too: one that was found with one scale for all axes leans
-        towards what a stretched target's diagonal asks for.
+        Whether the rotation is refined too: one found with a single scale is biased
+        towards the stretched target's diagonal.
     own : bool
-        Whether the axes are the template's.
+        Whether the axes are those of the template.
 
     Returns
     -------
     Similarity
-        With factors; the best so far where a fit would mirror, or too few pairs are left.
+        With factors; the best so far if a fit would be a reflection, or too few pairs are left.
     """
     similarity, scales = start, np.full(3, start.scale)
     for _ in range(rounds):
@@ -51,16 +51,16 @@ def fit_axes(
             break
         before = scales
         columns = _columns(pairs.points, similarity.rotation, before, rotations, own)
-        found, turn, shift = _solved(pairs, columns)
+        found, vector, shift = _solved(pairs, columns)
         if (found <= 0.0).any():
             break
         scales = found
         scale = float(np.cbrt(np.prod(scales)))
-        rotation = rotation_vector_to_matrix(turn) @ similarity.rotation
+        rotation = rotation_vector_to_matrix(vector) @ similarity.rotation
         factors, own_factors = np.ones(3), np.ones(3)
         (own_factors if own else factors)[:] = scales / scale
         similarity = Similarity(scale, rotation, shift, factors, own_factors)
-        if max(np.abs(scales / before - 1.0).max(), float(np.linalg.norm(turn))) < SETTLED:
+        if max(np.abs(scales / before - 1.0).max(), float(np.linalg.norm(vector))) < SETTLED:
             break
     return similarity
 
@@ -68,7 +68,7 @@ def fit_axes(
 def _columns(
     points: Floats, rotation: Floats, before: Floats, rotations: bool, own: bool
 ) -> Floats:
-    """Return what moves points by factors, shift and rotation: (N, 3, 6 or 9)."""
+    """Return the derivatives of points by factors, shift and rotation: (N, 3, 6 or 9)."""
     if own:
         scaled = points[:, None, :] * rotation
         arms, lift = (points * before) @ rotation.T, np.ones(3)
@@ -90,5 +90,5 @@ def _solved(pairs: Pairs, columns: Floats) -> tuple[Floats, Floats, Floats]:
     rows = np.concatenate([along, HOLD * columns.reshape(-1, columns.shape[2])])
     values = np.einsum("na,na->n", pairs.normals, pairs.targets)
     solved = np.linalg.lstsq(rows, np.concatenate([values, HOLD * pairs.targets.ravel()]))[0]
-    turn = solved[6:] if len(solved) > 6 else np.zeros(3)
-    return solved[:3], turn, solved[3:6]
+    vector = solved[6:] if len(solved) > 6 else np.zeros(3)
+    return solved[:3], vector, solved[3:6]

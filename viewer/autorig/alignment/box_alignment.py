@@ -1,4 +1,4 @@
-"""Alignment of bounding boxes, each axis scaled on its own, as the seed method has it."""
+"""Alignment of bounding boxes with a separate scale per axis, as in the seed method."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _FLAT = 1e-9  # of the longest side: a box thinner than this cannot be scaled to
 
 
 def align_boxes(positions: Floats, onto: Floats) -> Floats:
-    """Return the map that aligns the box of some points onto that of others.
+    """Return the map that aligns the bounding box of some points with that of others.
 
     p' = (p - c) * e' / e + c', with box centres c and extents e, per axis. This is Tex-An Mesh's
     rule; an axis along which both boxes are flat keeps its scale.
@@ -24,7 +24,7 @@ def align_boxes(positions: Floats, onto: Floats) -> Floats:
     positions : (N, 3)
         Points to move: the target mesh.
     onto : (M, 3)
-        Points whose box is the goal: the posed template.
+        Points whose box is the target: the posed template.
 
     Returns
     -------

@@ -1,8 +1,8 @@
-"""Iterative closest point: match what is near, fit, and match again.
+"""Iterative closest point: match nearby points, fit, and match again.
 
-Besl and McKay 1992, with pairs from both surfaces to the other, so that neither the scale nor
-a part that is missing on one of them pulls all to one side. Near the end surfaces may slide along
-each other (distances to planes, Chen and Medioni 1992), which needs far fewer rounds.
+Besl and McKay 1992, with pairs from both surfaces, so that neither the scale nor a part
+missing from one of them biases the result. Near convergence surfaces may slide along
+each other (point-to-plane distances, Chen and Medioni 1992), which needs far fewer iterations.
 """
 
 from __future__ import annotations
@@ -38,19 +38,19 @@ __all__ = [
     "trimmed_rms",
 ]
 
-_FAR = 3.0  # medians: pairs farther apart than this are not used
+_FAR = 3.0  # medians: pairs farther apart than this are rejected
 _SAME_WAY = 0.5  # cosine of 60 degrees between the normals of a pair
 SETTLED = 1e-5  # relative change of the error, or of scales, at which iterations end
-_EXACT = 1e-12  # error over size at which there is nothing left to improve
+_EXACT = 1e-12  # error over size that counts as zero
 _ON_EDGE = 1e-9  # barycentric coordinate of a point on an edge
-HOLD = 3e-3  # weight of distances between points beside those to planes, before squaring
-_PATIENCE = 3  # iterations without an improvement, as other pairs give another error
-FEWEST = 8  # pairs that still tell seven numbers
+HOLD = 3e-3  # weight of point-to-point beside point-to-plane distances, before squaring
+_PATIENCE = 3  # iterations without improvement: new pairs may raise the error for a while
+FEWEST = 8  # pairs that determine seven unknowns
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Found:
-    """The partners of N points: positions and normals (N, 3), and which are of use (N,)."""
+    """Partners of N points: positions and normals (N, 3), and which are usable (N,)."""
 
     positions: Floats
     normals: Floats
@@ -58,7 +58,7 @@ class _Found:
 
 
 class Side(Protocol):
-    """One of the two meshes: points on it, and a search for the nearest of its points."""
+    """One of the two meshes: points on it, and a nearest-point search."""
 
     samples: SurfaceSamples
     size: float
@@ -68,14 +68,14 @@ class Side(Protocol):
 
 
 class Cloud:
-    """A mesh as many points: a quick search, off by up to half their spacing.
+    """A mesh as a dense point cloud: a fast search, off by up to half the spacing.
 
     Parameters
     ----------
     samples : SurfaceSamples
-        What the other mesh is asked for.
+        Points whose partners on the other mesh are searched for.
     dense : SurfaceSamples
-        What is searched.
+        Points that are searched.
     """
 
     def __init__(self, samples: SurfaceSamples, dense: SurfaceSamples) -> None:
@@ -84,7 +84,7 @@ class Cloud:
         self.size = _size(dense.positions)
 
     def with_samples(self, samples: SurfaceSamples) -> Cloud:
-        """Return the same mesh with other points that the other mesh is asked for."""
+        """Return the same mesh with other points for the search on the other mesh."""
         other = copy(self)
         other.samples = samples
         return other
@@ -97,7 +97,7 @@ class Cloud:
 
 
 class Triangles:
-    """A mesh as its triangles: exact, and without pairs on the borders of holes.
+    """A mesh as its triangles: an exact search, without pairs on the borders of holes.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ class Triangles:
     triangles : (T, 3)
         Vertex indices.
     count : int
-        How many points the other mesh is asked for.
+        Number of points whose partners on the other mesh are searched for.
     """
 
     def __init__(self, positions: Floats, triangles: Ints, count: int) -> None:
@@ -119,7 +119,7 @@ class Triangles:
     def find(self, points: Floats) -> _Found:
         """Return the nearest points of the surface."""
         found = self._surface.closest(points)
-        # The corner with coordinate 0 lies opposite to the edge that the point is on.
+        # The corner with coordinate 0 is opposite the edge that the point lies on.
         on_edge = found.barycentric < _ON_EDGE
         at_border = np.logical_or.reduce(on_edge & self._border[found.triangles], axis=1)
         return _Found(found.positions, self._normals[found.triangles], ~at_border)
@@ -130,9 +130,9 @@ def _size(points: Floats) -> float:
 
 
 def _border_edges(positions: Floats, triangles: Ints) -> Bools:
-    """Return for each corner whether the edge opposite to it belongs to one triangle: (T, 3).
+    """Return for each corner whether the opposite edge belongs to only one triangle: (T, 3).
 
-    Vertices at one place count as one: a texture seam is no border.
+    Coincident vertices count as one: a texture seam is not a border.
     """
     _, place = np.unique(positions, axis=0, return_inverse=True)
     corners = place.reshape(-1)[triangles].astype(np.int64)
@@ -144,7 +144,7 @@ def _border_edges(positions: Floats, triangles: Ints) -> Bools:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pairs:
-    """Points of the template, where they should come to lie, and the normals there: (N, 3)."""
+    """Points of the template, their target positions, and the normals there: (N, 3)."""
 
     points: Floats
     targets: Floats
@@ -158,33 +158,33 @@ def iterate(
     rounds: int,
     scales: bool,
 ) -> Similarity:
-    """Improve an alignment until it settles.
+    """Improve an alignment until it converges.
 
     Pairs farther apart than three times the median, with normals more than 60 degrees apart
-    (whichever way they point), or on the border of a hole are left out of each round.
+    (whichever way they point), or on the border of a hole are left out of each iteration.
 
     Parameters
     ----------
     template, target : Side
-        What is moved, and what onto.
+        The surface to move, and the one to align it with.
     start : Similarity
-        Roughly right; its factors are kept.
+        Approximate alignment; its factors are kept.
     rounds : int
-        At most; fewer if the error changes by less than 1e-5 of itself.
+        Maximum number of iterations; fewer if the relative change of the error is below 1e-5.
     scales : bool
-        Whether the scale is found too, or kept.
+        Whether the scale is fitted too.
 
     Returns
     -------
     Similarity
-        The best so far where too few pairs are left to go on.
+        The best so far if too few pairs are left to continue.
     """
     similarity, before = start, np.inf
     for _ in range(rounds):
         pairs = pairs_between(template, target, similarity)
         if len(pairs.points) < FEWEST:
             break
-        # Factors belong to the target's axes: without them the rest is a similarity.
+        # Factors belong to the target's axes: without them the remainder is a similarity.
         fit = fit_similarity(
             pairs.points, pairs.targets / start.factors, None if scales else start.scale
         )
@@ -204,12 +204,12 @@ def slide(
     rounds: int,
     scales: bool,
 ) -> Similarity:
-    """Improve a good alignment by distances to planes, which let surfaces slide along each other.
+    """Improve a good alignment by point-to-plane distances, which let surfaces slide.
 
     Each iteration solves the linearised problem: with x = aligned p, c the middle of all x and
     x' = x + w x (x - c) + u (x - c) + v, minimise sum (n . (x' - q))^2 + 1e-5 |x' - q|^2 over
-    the rotation w, the shift v and the relative change of scale u. The second term holds what could
-    slide for ever.
+    the rotation w, the shift v and the relative change of scale u. The second term prevents
+    unbounded sliding.
 
     Parameters
     ----------
@@ -219,7 +219,7 @@ def slide(
     Returns
     -------
     Similarity
-        The best so far where too few pairs are left to go on.
+        The best so far if too few pairs are left to continue.
     """
     similarity, best, lowest, idle = start, start, np.inf, 0
     for _ in range(rounds):
@@ -243,7 +243,7 @@ def _step(similarity: Similarity, moved: Floats, pairs: Pairs, scales: bool) -> 
     center = moved.mean(axis=0)
     arms = moved - center
     size = float(np.sqrt(np.einsum("na,na->", arms, arms) / len(arms)))
-    arms = arms / size  # makes all unknowns of one magnitude
+    arms = arms / size  # gives all unknowns the same magnitude
     gaps = (pairs.targets - moved) / size
     # Columns: rotation, shift, scale; rows: along the normal, then along x, y and z.
     x, y, z = arms.T
@@ -257,17 +257,17 @@ def _step(similarity: Similarity, moved: Floats, pairs: Pairs, scales: bool) -> 
     rows = np.concatenate([along, HOLD * whole.reshape(-1, whole.shape[2])])
     values = np.einsum("na,na->n", pairs.normals, gaps)
     solved = np.linalg.lstsq(rows, np.concatenate([values, HOLD * gaps.ravel()]))[0]
-    turn = rotation_vector_to_matrix(solved[:3])
+    rotation = rotation_vector_to_matrix(solved[:3])
     grow = 1.0 + (float(solved[6]) if scales else 0.0)
-    grow = min(max(grow, 0.5), 2.0)  # a linear step knows nothing of what lies beyond
-    shift = grow * turn @ (similarity.shift - center) + center + size * solved[3:6]
+    grow = min(max(grow, 0.5), 2.0)  # beyond this the linearisation is invalid
+    shift = grow * rotation @ (similarity.shift - center) + center + size * solved[3:6]
     return Similarity(
-        grow * similarity.scale, turn @ similarity.rotation, shift, similarity.factors
+        grow * similarity.scale, rotation @ similarity.rotation, shift, similarity.factors
     )
 
 
 def pairs_between(template: Side, target: Side, similarity: Similarity) -> Pairs:
-    """Match samples of both sides with the other, and leave out what does not go together."""
+    """Match samples of both sides with the other side, and reject incompatible pairs."""
     ours, theirs = template.samples, target.samples
     found = template.find(similarity.undo(theirs.positions))
     towards = _kept(similarity, found.positions, found.normals, theirs.positions, theirs.normals)
@@ -296,30 +296,30 @@ def _rotated(similarity: Similarity, normals: Floats) -> Floats:
 
 
 def trimmed_rms(distances: Floats, fraction: float = 0.9) -> float:
-    """Return the root mean square of the smallest ``fraction`` of some distances."""
+    """Return the root mean square of the smallest ``fraction`` of the distances."""
     count = max(1, int(np.ceil(fraction * len(distances))))
     smallest = np.partition(distances, count - 1)[:count]
     return float(np.sqrt(np.mean(smallest**2)))
 
 
 def capped_rms(distances: Floats, cap: float) -> float:
-    """Return the root mean square of some distances, each counted as ``cap`` at most."""
+    """Return the root mean square of distances, each clamped to ``cap``."""
     return float(np.sqrt(np.mean(np.minimum(distances, cap) ** 2)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gaps:
-    """How far samples lie from the other side's surface, in the target's unit.
+    """Distances of samples from the other side's surface, in the target's unit.
 
     Attributes
     ----------
     towards : (N,)
-        Of the target's samples to the template.
+        From the target's samples to the template.
     away : (M,)
-        Of the template's samples to the target.
+        From the template's samples to the target.
     uneven_towards, uneven_away : (N,), (M,)
-        The same with what the surface stands off everywhere taken off, along the normals: a
-        jacket that is two centimetres from the skin fits it well.
+        The same without the median offset along the normals: a
+        jacket that is two centimetres from the skin everywhere fits it well.
     """
 
     towards: Floats
@@ -329,14 +329,14 @@ class Gaps:
 
 
 def gaps_between(template: Side, target: Side, similarity: Similarity) -> Gaps:
-    """Return how far samples lie from the other side's surface.
+    """Return the distances of samples from the other side's surface.
 
     Parameters
     ----------
     template, target : Side
         As for ``iterate``.
     similarity : Similarity
-        The alignment to judge.
+        The alignment to evaluate.
     """
     ours, theirs = template.samples.positions, target.samples.positions
     near = template.find(similarity.undo(theirs))
@@ -350,6 +350,6 @@ def gaps_between(template: Side, target: Side, similarity: Similarity) -> Gaps:
 
 
 def _uneven(ways: Floats, normals: Floats) -> Floats:
-    """Return the lengths of ways (N, 3) without the median of their parts along the normals."""
+    """Return the lengths of vectors (N, 3) without the median of their normal components."""
     along = np.median(np.einsum("na,na->n", ways, normals))
     return np.linalg.norm(ways - along * normals, axis=1)

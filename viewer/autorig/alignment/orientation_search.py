@@ -1,4 +1,4 @@
-"""Search for a mesh's orientation, unit and place among all likely ones."""
+"""Search for a mesh's orientation, unit and position among all likely ones."""
 
 from __future__ import annotations
 
@@ -25,22 +25,22 @@ __all__ = [
 ]
 
 AXES = ("x", "y", "z", "-x", "-y", "-z")
-"""What an up axis or a facing may be."""
+"""Allowed values of an up axis or a facing."""
 
 _UNITS = (1.0, 100.0, 0.01, 1000.0, 0.001, 39.37, 1.0 / 39.37)
 """Metres to centimetres, millimetres and inches, and back."""
 
-_NEAR_UNIT = 0.15  # how far a ratio of sizes may be from a unit's and be taken for it
-_TRIM = 0.8  # fraction of distances that counts: hair, skirts and cropped parts do not
+_NEAR_UNIT = 0.15  # relative tolerance for taking a ratio of sizes for a ratio of units
+_TRIM = 0.8  # fraction of distances that counts: excludes hair, skirts and cropped parts
 _QUICK, _LONG = 12, 60  # iterations for every candidate, and for the best few
 _FINALISTS = 4
-_NO_BETTER = 0.7  # of an error: rotating a mesh that lies in place must gain more than this
-_IN_PLACE = 300  # samples that tell whether a mesh lies in place already
+_NO_BETTER = 0.7  # of an error: rotating a mesh that is in place must reduce it below this
+_IN_PLACE = 300  # samples that decide whether a mesh is in place already
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Candidate:
-    """An alignment with what speaks for it.
+    """A possible alignment with its error.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class Candidate:
         Template to target.
     error : float
         Trimmed mean distance over the target's size: both ways in a search; from the target to
-        the template alone where it lies in place, as it may be a part of it.
+        the template only for a mesh that is in place, as it may be a part of the template.
     """
 
     similarity: Similarity
@@ -65,14 +65,14 @@ def axis_direction(name: str) -> Floats:
 def axis_rotations(
     template_up: str, up: str | None = None, facing: str | None = None
 ) -> list[Floats]:
-    """Return the rotations that map axes to axes: 24, 4 or 1, the identity first if it is one.
+    """Return the rotations that map axes to axes: 24, 4 or 1, the identity first if included.
 
     Parameters
     ----------
     template_up : "y" or "z"
-        The axis that points up in the template. Figures with y up face +z, those with z up +x.
+        The axis that points up in the template. Y-up figures face +z, z-up ones +x.
     up, facing : str, optional
-        One of ``AXES`` each: where the template's up and forward axes lead.
+        One of ``AXES`` each: where the template's up and forward axes are mapped.
 
     Returns
     -------
@@ -88,7 +88,7 @@ def axis_rotations(
         if name not in AXES:
             raise RigError(f'expected an axis, one of {", ".join(AXES)}, found "{name}"')
     if up is not None and facing is not None and up[-1] == facing[-1]:
-        raise RigError(f"expected a facing across the up axis {up}, found {facing}")
+        raise RigError(f"expected a facing perpendicular to the up axis {up}, found {facing}")
     forward = "z" if template_up == "y" else "x"
     rotations = []
     for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
@@ -100,11 +100,11 @@ def axis_rotations(
             continue
         if facing is None or (matrix @ axis_direction(forward) == axis_direction(facing)).all():
             rotations.append(matrix)
-    return sorted(rotations, key=lambda turn: -float(np.trace(turn)))
+    return sorted(rotations, key=lambda rotation: -float(np.trace(rotation)))
 
 
 def unit_scale(ratio: float) -> float:
-    """Return the unit's factor that a ratio of sizes is within 15 % of, or the ratio itself.
+    """Return the unit factor that a ratio of sizes is within 15 % of, or the ratio itself.
 
     >>> unit_scale(93.0), unit_scale(1.4)
     (100.0, 1.4)
@@ -114,28 +114,28 @@ def unit_scale(ratio: float) -> float:
 
 
 def in_place(template: Cloud, target: Cloud, rotations: list[Floats], scaled: bool) -> Candidate:
-    """Return the best of the placements that leave the origin where it is.
+    """Return the best of the placements that keep the origin fixed.
 
     Parameters
     ----------
     template, target : Cloud
-        Samples and search.
+        Samples and search structures.
     rotations : list of (3, 3)
         From ``axis_rotations``.
     scaled : bool
-        Whether other units are tried too.
+        Whether other units are tried as well.
 
     Returns
     -------
     Candidate
-        Its error is one-way: a shirt that lies on the body fits, whatever it leaves bare. Of
-        several about equally good ones the first, so that nothing is rotated without need: most
-        figures look much the same from behind.
+        Its error is one-way: a shirt that lies on the body fits, whatever it leaves uncovered. Of
+        several similar ones the first, so that nothing is rotated unnecessarily: most
+        figures look nearly the same from behind.
     """
     few = target.samples.positions[:: max(1, len(target.samples.positions) // _IN_PLACE)]
     found = []
-    for unit, turn in product(_UNITS if scaled else (1.0,), rotations):
-        similarity = Similarity(unit, turn, np.zeros(3), np.ones(3))
+    for unit, rotation in product(_UNITS if scaled else (1.0,), rotations):
+        similarity = Similarity(unit, rotation, np.zeros(3), np.ones(3))
         near = similarity.apply(template.find(similarity.undo(few)).positions)
         error = _trimmed_mean(np.linalg.norm(near - few, axis=1)) / target.size
         found.append(Candidate(similarity, error))
@@ -150,32 +150,32 @@ def search(
     scale: float | None,
     report: Callable[[float], None],
 ) -> Candidate:
-    """Return the best of the candidates after a few iterations each, and more for the best four.
+    """Return the best candidate after a few iterations for each, and more for the best four.
 
     Parameters
     ----------
     template, target : Cloud
-        Samples and search.
+        Samples and search structures.
     rotations : list of (3, 3)
         From ``axis_rotations``.
     scale : float or None
-        Kept if given; else begun with the ratio of the distances from the middle, which does not
-        depend on how a mesh is oriented as its box does.
+        Kept if given; else starts from the ratio of the mean distances from the centroid, which,
+        unlike that of boxes, does not depend on the orientation of a mesh.
     report : callable
-        Told the fraction that is done; may raise to cancel.
+        Called with the completed fraction; may raise to cancel.
 
     Returns
     -------
     Candidate
-        The one with the least two-way error.
+        The one with the smallest two-way error.
     """
     ours, theirs = template.samples.positions, target.samples.positions
     start = unit_scale(_radius(theirs) / _radius(ours)) if scale is None else scale
     few = [_thinned(side, 300) for side in (template, target)]
     found = []
-    for index, turn in enumerate(rotations):
-        shift = theirs.mean(axis=0) - start * turn @ ours.mean(axis=0)
-        begun = Similarity(start, turn, shift, np.ones(3))
+    for index, rotation in enumerate(rotations):
+        shift = theirs.mean(axis=0) - start * rotation @ ours.mean(axis=0)
+        begun = Similarity(start, rotation, shift, np.ones(3))
         similarity = iterate(few[0], few[1], begun, _QUICK, scales=scale is None)
         found.append(judge(few[0], few[1], similarity))
         report(0.6 * (index + 1) / len(rotations))
@@ -202,7 +202,7 @@ def _thinned(side: Cloud, count: int) -> Cloud:
 
 
 def _radius(points: Floats) -> float:
-    """Return the root mean square distance of points from their middle."""
+    """Return the root mean square distance of points from their centroid."""
     return float(np.sqrt(points.var(axis=0).sum()))
 
 

@@ -1,9 +1,9 @@
-"""Fit of a template's pose and proportions: joints rotated, limbs resized, to meet the target.
+"""Fit of a template's pose and proportions to a target, by joint rotations and limb scales.
 
-Articulated iterative closest points (Pellegrini et al. 2008): vertices of the template look for
-the target's surface, points of the target for the template's vertices, and every round moves all
-joints at once (``pose_step``). Partners may be far apart at first, as arms that hang down are from
-those stretched out, and come closer round by round.
+Articulated iterative closest points (Pellegrini et al. 2008): vertices of the template are matched
+with the target's surface, points of the target with the template's vertices, and every iteration
+moves all joints at once (``pose_step``). Partners may be far apart at first, as lowered arms are
+from stretched ones, and come closer with every iteration.
 """
 
 from __future__ import annotations
@@ -39,31 +39,31 @@ from viewer.rig.skinning.lbs import move
 __all__ = ["Fitted", "fit_pose"]
 
 _ROUNDS = 32
-_NEARING = 16  # iterations in which the reach shrinks
-_VERTICES = 1500  # of the template that look for the target
-_FAR, _NEAR = 0.25, 0.03  # of the size: how far partners may be, at first and in the end
+_NEARING = 16  # iterations over which the search radius shrinks
+_VERTICES = 1500  # of the template that are matched with the target
+_FAR, _NEAR = 0.25, 0.03  # of the size: search radius at the start and at the end
 _SAME_WAY = 0.5  # cosine of 60 degrees between the normals of a pair
-_STILL = 2e-3  # radians: late iterations that rotate no joint by more are the last ones
-_FEWEST = 50  # pairs that still tell how a figure stands
+_STILL = 2e-3  # radians: iterations end when no joint rotates by more
+_FEWEST = 50  # pairs that determine a pose
 _SMALLEST, _LARGEST = np.log(0.5), np.log(2.0)  # of limbs
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fitted:
-    """A template that was made to fit.
+    """A template fitted to a target.
 
     Attributes
     ----------
     figure : Figure
         With its limbs resized.
     pose : Pose
-        DOFs are within their limits; what these do not allow is in the joints' quaternions.
+        DOFs are within their limits; the remainder is in the joints' quaternions.
     similarity : Similarity
         From the posed figure to the target.
     rotated : (J, 3)
-        Rotation vectors of the joints in all, radians.
+        Total rotation vectors of the joints, radians.
     grown : (2, J)
-        Logarithms of the factors along and across the limbs.
+        Logarithms of the scales along and across the limbs.
     """
 
     figure: Figure
@@ -82,24 +82,24 @@ def fit_pose(
     scales: bool,
     report: Callable[[float], None],
 ) -> Fitted:
-    """Turn a template's joints and resize its limbs until its surface lies on the target's.
+    """Rotate a template's joints and scale its limbs until its surface matches the target's.
 
-    Limbs of a symmetric template grow alike on both sides.
+    Limbs of a symmetric template are scaled alike on both sides.
 
     Parameters
     ----------
     template : Figure
-        With mesh, skeleton and skin, already shaped.
+        With mesh, skeleton and skin, and its shape applied.
     pose : Pose
-        To begin with; left as it is. Pose correctives are not looked at.
+        Initial pose; not changed. Pose correctives are ignored.
     similarity : Similarity
-        From the posed template to the target, to begin with; without factors.
+        Initial map from the posed template to the target; without factors.
     far, near : Side
-        The target: searched quickly at first, and exactly in the end.
+        The target, as a fast search for the start and an exact one for the end.
     scales : bool
-        Whether the template's size may change, and its proportions.
+        Whether the template's size and its proportions may change.
     report : callable
-        Told the fraction that is done; may raise to cancel.
+        Called with the completed fraction; may raise to cancel.
     """
     mesh, skeleton, _ = template.attached()
     limbs = limbs_of(template)
@@ -137,7 +137,7 @@ def _aligned_template(state: Fitted, limbs: Limbs) -> AlignedTemplate:
 
 
 def _pairs(aligned: AlignedTemplate, chosen: Ints, target: Side, reach: float) -> Pairs:
-    """Match both ways; what is too far away or on the border of a hole is no pair."""
+    """Match both ways; points too far away or on the border of a hole form no pair."""
     points = aligned.positions[chosen]
     found = target.find(points)
     near = found.usable & (np.linalg.norm(found.positions - points, axis=1) <= reach)
@@ -157,17 +157,17 @@ def _pairs(aligned: AlignedTemplate, chosen: Ints, target: Side, reach: float) -
 
 
 def _moved(template: Figure, limbs: Limbs, state: Fitted, step: PoseStep) -> Fitted:
-    """Return the result of an iteration: the whole goes by x' = e^u R (x - m) + m + t."""
+    """Return the state after an iteration; the whole moves by x' = e^u R (x - m) + m + t."""
     similarity, skeleton = state.similarity, state.figure.require_skeleton()
     growths = state.grown + step.limb_growths
     growths = np.clip(0.5 * (growths + growths[:, limbs.partners]), _SMALLEST, _LARGEST)
     pose = state.pose.copy()
     _rotate_joints(skeleton, pose, similarity, step.rotation_vectors)
     figure = resized(template, limbs, *np.exp(growths))
-    turn, growth = rotation_vector_to_matrix(step.turn), float(np.exp(step.growth))
-    shift = growth * turn @ (similarity.shift - step.middle) + step.middle + step.shift
+    rotation, growth = rotation_vector_to_matrix(step.rotation), float(np.exp(step.growth))
+    shift = growth * rotation @ (similarity.shift - step.middle) + step.middle + step.shift
     moved = Similarity(
-        growth * similarity.scale, turn @ similarity.rotation, shift, similarity.factors
+        growth * similarity.scale, rotation @ similarity.rotation, shift, similarity.factors
     )
     return Fitted(figure, pose, moved, state.rotated + step.rotation_vectors, growths)
 
@@ -175,9 +175,9 @@ def _moved(template: Figure, limbs: Limbs, state: Fitted, step: PoseStep) -> Fit
 def _rotate_joints(
     skeleton: Skeleton, pose: Pose, similarity: Similarity, rotations: Floats
 ) -> None:
-    """Rotate joints by rotation vectors of the target's frame, in place.
+    """Rotate joints by rotation vectors in the target's frame, in place.
 
-    A joint with the parent's axes P within the figure, which the alignment rotated by A, is rotated
+    A joint whose parent has the axes P in the figure, which the alignment rotated by A, is rotated
     by the vector (A P)^T w within its parent.
     """
     parents = skeleton.parents
@@ -185,7 +185,7 @@ def _rotate_joints(
     world = within.copy()
     below = np.flatnonzero(parents >= 0).astype(np.int32)
     for joint in below.tolist():
-        # Parents come first, so the parent's axes are final.
+        # Parents come first, so the parent's axes are already final.
         world[joint] = world[parents[joint]] @ within[joint]
     axes = similarity.rotation @ world[parents[below]]
     local = np.einsum("jba,jb->ja", axes, rotations[below])
@@ -193,7 +193,7 @@ def _rotate_joints(
 
 
 def _put_rotations(skeleton: Skeleton, pose: Pose, joints: Ints, rotations: Floats) -> None:
-    """Set rotations (N, 3, 3) by DOFs within their limits, and by quaternions for the rest."""
+    """Set rotations (N, 3, 3) by DOFs within their limits, and quaternions for the remainder."""
     rows = rotation_rows(skeleton)[joints]
     ball = rows[:, 0] >= 0
     base = quaternion_to_matrix(skeleton.rest_rotations[joints[ball]])

@@ -1,22 +1,22 @@
-"""One iteration of fitting a template: how joints rotate and limbs grow to meet the target.
+"""One iteration of fitting a template: the linear problem for joint rotations and limb scales.
 
-With x a vertex as it is laid onto the target, m the middle of all, c_j a joint, w_vj the weight of
-vertex v, s_vj its share that hangs on joint j or below it, and P_j the projection onto the limb's
-axis::
+With x a vertex aligned with the target, m the mean of all, c_j a joint, w_vj the weight of
+vertex v, s_vj the sum of its weights for joint j and all below it, and P_j the projection onto
+the limb's axis::
 
-    e_j = w_vj (x - c_j) + sum over joints k right below j of s_vk (c_k - c_j)
+    e_j = w_vj (x - c_j) + sum over joints k directly below j of s_vk (c_k - c_j)
     x'  = x + w x (x - m) + t + u (x - m) + sum_j s_vj w_j x (x - c_j)
             + sum_j (l_j P_j + g_j (1 - P_j)) e_j
 
-The turns w_j, growths l_j along and g_j across the limbs, and w, t and u of the whole, minimise
+The rotations w_j, growths l_j along and g_j across the limbs, and w, t and u of the whole, minimise
 the mean of
 
     (n . (x' - q))^2    over pairs of a vertex and a point q of the target with the normal n
-    h |x' - q|^2        over vertices and the target's points closest to them, whatever faces where
+    h |x' - q|^2        over vertices and the target's points closest to them, in any direction
 
-The second sum knows where limbs end, which planes do not tell. All lengths are over the target's
-size. Small prices on what is turned and grown, now and in all, leave what the surface does not
-tell, such as the turn of a limb about itself, as it was.
+The second sum constrains the ends of limbs, which planes do not. All lengths are over the target's
+size. Small penalties on rotations and growths, per step and in total, preserve what the surface
+does not determine, such as the rotation of a limb about its own axis.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ from viewer.rig.arrays import Floats, Ints
 
 __all__ = ["AlignedTemplate", "Pairs", "PoseStep", "solve_step"]
 
-_HOLD = 0.2  # h: distances between points beside those to planes
-_ROTATED, _GROWN = 3e-6, 3e-5  # prices of a radian, and of a growth by e, squared, in all
+_HOLD = 0.2  # h: weight of point-to-point beside point-to-plane distances
+_ROTATED, _GROWN = 3e-6, 3e-5  # penalties on radians and logarithmic growths, squared, in total
 _NOW = 1e-5  # the same in one iteration, of both
-_WHOLE = 1e-7  # price of moving the whole: a surface may slide along itself
-_MOST = 0.3  # radians that a joint rotates in one iteration: more is no longer linear
-_GROWTH = 0.2  # and logarithms that the whole or a limb grows by
-_FIXED = 1e6  # price of what may not change
+_WHOLE = 1e-7  # penalty on moving the whole: a surface may slide along itself
+_MOST = 0.3  # radians per joint and iteration: the linearisation holds up to here
+_GROWTH = 0.2  # logarithms of growth per iteration, of the whole or a limb
+_FIXED = 1e6  # penalty on fixed unknowns
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AlignedTemplate:
-    """A template as it stands in the target's frame.
+    """A template's vertices and joints in the target's frame.
 
     Attributes
     ----------
@@ -59,12 +59,12 @@ class AlignedTemplate:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pairs:
-    """What goes together: vertices and points of the target.
+    """Corresponding vertices of the template and points of the target.
 
     Attributes
     ----------
     vertices : (N,)
-        Of the template, partners that face the same way.
+        Of the template, with partners that face the same way.
     targets, normals : (N, 3)
         Points of the target and the normals there.
     ends : (M,)
@@ -82,24 +82,24 @@ class Pairs:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseStep:
-    """What an iteration changes, in the target's frame.
+    """Result of an iteration, in the target's frame.
 
     Attributes
     ----------
     middle : (3,)
-        What the whole rotates and grows about.
-    turn, shift : (3,)
+        Centre of rotation and growth of the whole.
+    rotation, shift : (3,)
         Rotation vector and shift of the whole; the shift in the target's unit.
     growth : float
-        Logarithm of the whole's factor.
+        Logarithm of the whole's scale.
     rotation_vectors : (J, 3)
         Rotation vectors of the joints, 0 for roots, which rotate with the whole.
     limb_growths : (2, J)
-        Logarithms of the limbs' factors: along, across.
+        Logarithms of the limbs' scales: along, across.
     """
 
     middle: Floats
-    turn: Floats
+    rotation: Floats
     shift: Floats
     growth: float
     rotation_vectors: Floats
@@ -108,7 +108,7 @@ class PoseStep:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Frame:
-    """What the columns of the linear problem are made of."""
+    """Quantities that the columns of the linear problem are built from."""
 
     middle: Floats
     size: float

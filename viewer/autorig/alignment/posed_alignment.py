@@ -1,9 +1,9 @@
 """Alignment of a template whose pose and proportions differ from the target's.
 
-People in scans stand with lowered arms and have limbs of their own, templates stretch their arms
-out: no alignment of the whole lays one onto the other. So where the alignment leaves a gap, pose
-and proportions are fitted too, and kept if that closes most of it. A figure that stands otherwise
-also looks much the same from behind: where the alignment cannot tell, both ways are fitted.
+People in scans stand with lowered arms and have their own proportions, templates have stretched
+arms: no similarity aligns one with the other. So where the alignment leaves a gap, pose
+and proportions are fitted too, and kept if that closes most of it. A figure in another pose
+also looks nearly the same from behind: if the alignment is ambiguous, both ways are fitted.
 """
 
 from __future__ import annotations
@@ -38,42 +38,42 @@ from viewer.rig.skinning import deform
 
 __all__ = ["PosedAlignment", "align_posed"]
 
-_CLOSE = 0.002  # misfit over size up to which nothing is gained by rotating joints
-# Fraction of the misfit that may be left if rotated joints are to be kept: clothes can be fitted a
-# little better by bending the body, but only a figure in another pose much better.
+_CLOSE = 0.002  # misfit over size up to which joints are not rotated
+# Fraction of the misfit that may remain if rotated joints are to be kept: clothes fit a
+# little better with a bent body, but only a figure in another pose fits much better.
 _KEPT, _PART_KEPT = 0.65, 0.5
-# A fit that leaves more than this and rotated a joint by more is of another kind of figure, as of a
-# fox onto a pig: it bends the spine until the legs meet something.
+# A fit that leaves more than this and rotated a joint by more indicates another kind of figure, as
+# with a fox and a pig: it bends the spine until the legs meet something.
 _POOR, _BENT = 0.01, np.radians(45.0)
-_SURE = 0.004  # misfit after the fit up to which a figure faces the right way: no other is tried
-_ALIKE = 1.5  # misfits nearer than this do not tell front from back
-_CLEARLY = 0.85  # of the misfit, which standing the other way must reach after the fit
-_ROUNDS = 30  # to lay the template the other way round
+_SURE = 0.004  # misfit after the fit up to which the facing is accepted without trying another
+_ALIKE = 1.5  # ratio of misfits up to which front and back are ambiguous
+_CLEARLY = 0.85  # of the misfit, which the opposite facing must reach after the fit
+_ROUNDS = 30  # iterations to align the template the other way round
 _AXES_ROUNDS = 20
-_FOUND = ("search", "in place")  # alignments that nobody vouches for
-# Scales of their own are looked at where a gap above the first is left, and taken if they leave at
+_FOUND = ("search", "in place")  # alignments that were not given by the user
+# Separate scales are tried if the gap exceeds the first, and kept if they leave at
 # most the second of it and differ by more than the third.
 _STRETCH_GAP, _STRETCH_LEFT, _STRETCH = 0.001, 0.5, 1.02
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PosedAlignment:
-    """Where the template lies, and how it is made to fit.
+    """Alignment, pose and proportions of a template.
 
     Attributes
     ----------
     alignment : Alignment
         Of the template in ``pose``.
     figure : Figure
-        The template, its limbs resized if that was needed.
+        The template, with scaled limbs if needed.
     pose : Pose
         The template's own, or fitted.
     positions : (V, 3)
         The template's vertices in that pose, in its own frame.
     lines : tuple of Diagnostic
-        What was done to pose and proportions, and what would fit better.
+        Messages about changes to pose and proportions, and about better options.
     most_rotated : (float, str)
-        The largest rotation of a joint in radians, and its name; (0, "") if none was rotated.
+        The largest joint rotation in radians, and the joint's name; (0, "") if none.
     """
 
     alignment: Alignment
@@ -86,7 +86,7 @@ class PosedAlignment:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Job:
-    """What every fit needs to know."""
+    """Inputs common to all fits."""
 
     template: Figure
     pose: Pose
@@ -104,39 +104,39 @@ def align_posed(
     fits: bool,
     report: Callable[[float, str], None],
 ) -> PosedAlignment:
-    """Align a template with a target, and rotate its joints if its pose differs.
+    """Align a template with a target, rotating its joints if its pose differs.
 
     Parameters
     ----------
     template : Figure
-        With mesh, skeleton and skin, already shaped.
+        With mesh, skeleton and skin, and its shape applied.
     pose : Pose
         Of the template, without shape weights.
     target : Mesh
         With triangles.
     settings : AlignmentSettings
-        What is known of how they lie. Where each axis has a scale of its own nothing is fitted,
-        where the scale is known only the pose.
+        Known facts about the alignment. With a separate scale per axis nothing is fitted,
+        with a known scale only the pose.
     fits : bool
         Whether pose and proportions may change.
     report : callable
-        Told the fraction that is done, and what is being done; may raise to cancel.
+        Called with the completed fraction and the current step; may raise to cancel.
 
     Returns
     -------
     PosedAlignment
-        The template as it was given, where a fitted one is not much better.
+        The unchanged template, unless a fitted one is much better.
 
     Raises
     ------
     RigError
-        As ``align``.
+        See ``align``.
     """
     posed = deform(template, pose)[0]
     ours = Posed(posed, template.require_mesh().triangles)
     triangles = target.triangles
     if volume(target.positions, triangles) < 0.0:
-        triangles = triangles[:, ::-1]  # normals tell which side of a limb is which
+        triangles = triangles[:, ::-1]  # normals distinguish the sides of a limb
     theirs = Posed(target.positions, triangles)
     rigid = align(ours, theirs, template.up, settings, lambda s, what: report(0.5 * s, what))
     kept = PosedAlignment(rigid, template, pose, posed, ())
@@ -172,8 +172,8 @@ def _if_better(
     is_part = rigid.away > PART
     before = misfit(rigid, is_part)
     found = _fitted(job, rigid, lambda fraction: report(0.5 + 0.25 * fraction, "pose"))
-    may_turn = rigid.how in _FOUND and job.settings.facing is None and not is_part
-    if may_turn and misfit(found.alignment, False) > _SURE:
+    may_face_back = rigid.how in _FOUND and job.settings.facing is None and not is_part
+    if may_face_back and misfit(found.alignment, False) > _SURE:
         behind = _facing_back(job, ours, rigid, job.template.up)
         if misfit(behind, False) < _ALIKE * before:
             other = _fitted(job, behind, lambda fraction: report(0.75 + 0.25 * fraction, "pose"))
@@ -205,7 +205,7 @@ def _fitted(job: _Job, start: Alignment, report: Callable[[float], None]) -> Pos
 
 
 def _facing_back(job: _Job, ours: Posed, rigid: Alignment, up: str) -> Alignment:
-    """Return the template facing the other way, aligned with the target as well as it goes."""
+    """Return the template facing the other way, aligned with the target as well as possible."""
     similarity = rigid.similarity
     half = rotation_vector_to_matrix(np.pi * axis_direction(up))
     middle = similarity.apply(ours.positions.mean(axis=0))
@@ -223,7 +223,7 @@ def _facing_back(job: _Job, ours: Posed, rigid: Alignment, up: str) -> Alignment
 def _stretched(
     ours: Posed, exact: Triangles, kept: PosedAlignment, samples: int
 ) -> PosedAlignment | None:
-    """Return the template with a scale along each axis, if that closes most of the gap."""
+    """Return the template with separate scales per axis, if that closes most of the gap."""
     rigid = kept.alignment
     template = Triangles(ours.positions, ours.triangles, samples)
     trials = [
@@ -237,7 +237,7 @@ def _stretched(
     ]
     if not alignments:
         return None
-    # Where both are the same axes, those that --scale axes speaks of.
+    # If both have the same axes, use those that --scale axes refers to.
     alignment, *other = alignments
     if other and misfit(other[0], False) < _CLEARLY * misfit(alignment, False):
         alignment = other[0]
@@ -254,13 +254,13 @@ def _stretched(
 
 
 def _is_closer(stretched: PosedAlignment, other: PosedAlignment) -> bool:
-    """Tell whether a stretched template leaves much less of a gap than another."""
+    """Return whether a stretched template leaves a much smaller gap than another."""
     gap = misfit(stretched.alignment, False)
     return gap <= _STRETCH_LEFT * misfit(other.alignment, False)
 
 
 def _advice(stretched: PosedAlignment, kept: PosedAlignment) -> Diagnostic:
-    """Return the remark that a stretched template would fit better."""
+    """Return the message that a stretched template would fit better."""
     gap, other = (100.0 * misfit(one.alignment, False) for one in (stretched, kept))
     similarity = stretched.alignment.similarity
     is_own = (similarity.factors == 1.0).all()
@@ -283,14 +283,14 @@ def _scales(similarity: Similarity) -> Phrase:
 
 
 def _gap(after: float, before: float) -> Phrase:
-    """Return the gap that a fit leaves, and the one before."""
+    """Return the gaps after and before a fit as text."""
     return Phrase("gap", after=100.0 * after, before=100.0 * before)
 
 
 def _lines(found: Fitted) -> tuple[Diagnostic, ...]:
-    """Say which joint was turned most, and which limb resized most."""
+    """Return messages about the joint rotated most and the limb scaled most."""
     skeleton = found.figure.skeleton
-    assert skeleton is not None  # the caller looked
+    assert skeleton is not None  # checked by the caller
     angle, name = _most_rotated(found)
     longest = int(np.abs(found.grown[0]).argmax())
     values = {

@@ -1,6 +1,6 @@
-"""A figure with longer or shorter, thicker or thinner limbs: one factor along, one across each.
+"""Proportions of a figure: limbs scaled by one factor along and one across their axes.
 
-A joint's limb is what follows it. Its vertices are moved, where the figure is bound, by
+A joint's limb is the part of the body after it. Its vertices are moved, in the bind pose, by
 S_j (x - c_j) + c'_j, blended with the skin's weights; S_j = g_j I + (l_j - g_j) d_j d_j^T with
 the length l_j along the limb's axis d_j and the girth g_j across it. The joints below follow:
 c'_k = c'_j + S_j (c_k - c_j).
@@ -26,16 +26,16 @@ __all__ = ["Limbs", "limbs_of", "resized"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Limbs:
-    """What hangs on each joint.
+    """The part of the mesh that each joint moves.
 
     Attributes
     ----------
     weights : (V, J)
-        Of the skin, each vertex's adding up to 1.
+        Of the skin, normalised to a sum of 1 per vertex.
     fractions : (V, J)
-        The same of a joint and all below it.
+        Sums of the weights of a joint and all below it.
     axes : (J, 3)
-        Unit vectors along the limbs, where the figure is bound; 0 for a joint that moves nothing.
+        Unit vectors along the limbs, in the bind pose; 0 for a joint without influence.
     partners : (J,)
         The joint on the other side, or the joint itself.
     """
@@ -49,8 +49,8 @@ class Limbs:
 def limbs_of(figure: Figure) -> Limbs:
     """Return a figure's limbs.
 
-    An axis leads from the joint to those below it, each counted by how much of the mesh it
-    carries, or to the middle of the vertices of a last joint.
+    An axis points from the joint to those below it, each weighted by its fraction of the mesh,
+    or to the mean of the vertices of a last joint.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def limbs_of(figure: Figure) -> Limbs:
     weights = _dense(skin)
     fractions = weights.copy()
     for joint in range(len(parents) - 1, -1, -1):
-        # Children come after their parents, so this joint's own sum is final.
+        # Children come after their parents, so this joint's own sum is already final.
         if parents[joint] >= 0:
             fractions[:, parents[joint]] += fractions[:, joint]
     joints = _bound_joints(skin)
@@ -76,12 +76,12 @@ def limbs_of(figure: Figure) -> Limbs:
     try:
         partners = joint_partners(figure)
     except RigError:
-        partners = np.arange(len(parents), dtype=np.int32)  # not symmetric: nothing to keep
+        partners = np.arange(len(parents), dtype=np.int32)  # not symmetric: no symmetry to preserve
     return Limbs(weights, fractions, unit(ways), partners)
 
 
 def resized(figure: Figure, limbs: Limbs, lengths: Floats, girths: Floats) -> Figure:
-    """Return a figure with other limbs: mesh, bind pose and rest skeleton.
+    """Return a figure with scaled limbs: mesh, bind pose and rest skeleton.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def resized(figure: Figure, limbs: Limbs, lengths: Floats, girths: Floats) -> Fi
     Returns
     -------
     Figure
-        Same joints and weights; all else that belongs to vertices is kept as it is.
+        Same joints and weights; all other vertex data is unchanged.
     """
     mesh, skeleton, skin = figure.attached()
     scales = girths[:, None, None] * np.eye(3) + (lengths - girths)[:, None, None] * np.einsum(
@@ -105,7 +105,7 @@ def resized(figure: Figure, limbs: Limbs, lengths: Floats, girths: Floats) -> Fi
     below = np.flatnonzero(parents >= 0)
     moved = joints.copy()
     for joint in below.tolist():
-        # Parents come first, so the parent's place is final.
+        # Parents come first, so the parent's position is already final.
         parent = parents[joint]
         moved[joint] = moved[parent] + scales[parent] @ (joints[joint] - joints[parent])
     palette = np.tile(np.eye(4), (len(parents), 1, 1))

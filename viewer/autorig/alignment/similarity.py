@@ -1,4 +1,4 @@
-"""Moving one set of points onto another: rotation, shift and one scale, never a reflection."""
+"""Similarities between point sets: rotation, shift and one scale, never a reflection."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from viewer.rig.arrays import Floats, frozen
 
 __all__ = ["Similarity", "fit_similarity"]
 
-_ON_LINE = 1e-6  # second over first extent: points nearer to a line than this leave a free rotation
+_ON_LINE = 1e-6  # second over first extent: below this, points on a line leave a rotation free
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -21,13 +21,13 @@ class Similarity:
     Attributes
     ----------
     scale : float
-        The same for all axes.
+        Common to all axes.
     rotation : (3, 3)
         Proper, applied first.
     shift : (3,)
-        In the unit of the space mapped to.
+        In the unit of the target space.
     factors : (3,)
-        Further scales along the axes of the space mapped to; their product is 1.
+        Further scales along the axes of the target space; their product is 1.
     own_factors : (3,)
         The same along the axes of the points' own space.
     """
@@ -56,12 +56,12 @@ class Similarity:
 
     @property
     def is_plain(self) -> bool:
-        """Whether there is one scale for all directions."""
+        """Whether the scale is the same in all directions."""
         return bool((self.factors == 1.0).all() and (self.own_factors == 1.0).all())
 
     @property
     def matrix(self) -> Floats:
-        """The whole map for column vectors: (4, 4)."""
+        """The whole map as a matrix for column vectors: (4, 4)."""
         matrix = np.eye(4)
         matrix[:3, :3] = self.linear
         matrix[:3, 3] = self.shift
@@ -72,13 +72,13 @@ class Similarity:
         return points @ self.linear.T + self.shift
 
     def undo(self, points: Floats) -> Floats:
-        """Map points (..., 3) of the space mapped to back."""
+        """Map points (..., 3) of the target space back."""
         rotated = (points - self.shift) / (self.scale * self.factors) @ self.rotation
         return rotated / self.own_factors
 
 
 def fit_similarity(points: Floats, targets: Floats, scale: float | None = None) -> Similarity:
-    """Return the similarity that brings points nearest to their partners, in least squares.
+    """Return the similarity that maps points closest to their partners, in least squares.
 
     With means removed, sum_i q_i p_i^T = U D V^T, R = U S V^T with S = diag(1, 1, det(U V^T)),
     s = tr(D S) / sum |p_i|^2, t = mean q - s R mean p (Umeyama 1991, eqs. 39 to 43).
@@ -88,7 +88,7 @@ def fit_similarity(points: Floats, targets: Floats, scale: float | None = None) 
     points, targets : (N, 3)
         Pairs, N >= 3.
     scale : float, optional
-        Kept as it is; found if omitted.
+        Fixed if given, fitted if omitted.
 
     Returns
     -------
@@ -98,8 +98,8 @@ def fit_similarity(points: Floats, targets: Floats, scale: float | None = None) 
     Raises
     ------
     RigError
-        If there are fewer than three pairs, or the points lie on a line: then any rotation about it
-        fits equally well.
+        If there are fewer than three pairs, or the points are collinear: any rotation about
+        the line then fits equally well.
 
     >>> corners = np.eye(3)
     >>> found = fit_similarity(corners, 2.0 * corners[[1, 2, 0]])
@@ -115,7 +115,7 @@ def fit_similarity(points: Floats, targets: Floats, scale: float | None = None) 
     for cloud in (p, q):
         extents = np.linalg.svd(cloud, compute_uv=False)
         if extents[1] <= _ON_LINE * extents[0]:
-            raise RigError("alignment: expected points in a plane or in space, found them in line")
+            raise RigError("alignment: expected points in a plane or in space, found a line")
     left, values, right = np.linalg.svd(q.T @ p)
     signs = np.array([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
     rotation = (left * signs) @ right

@@ -1,4 +1,4 @@
-"""Alignment of a posed template with a target mesh: in place, by landmarks, or by searching."""
+"""Alignment of a posed template with a target mesh: in place, by landmarks, or by search."""
 
 from __future__ import annotations
 
@@ -39,24 +39,24 @@ __all__ = [
 ]
 
 SCALES = ("uniform", "axes", "none")
-"""One scale; one along each axis of the target; or the template's size as it is."""
+"""A common scale; one along each axis of the target; or the template's size unchanged."""
 
 SAMPLES = 2_000
-"""Points of each surface that an alignment uses, if nothing else is asked for."""
+"""Default number of points of each surface that an alignment uses."""
 
-_ROUNDS, _SLIDES = 60, 25  # of points to points, and to planes
+_ROUNDS, _SLIDES = 60, 25  # iterations of point-to-point and of point-to-plane fits
 _AXES_ROUNDS = 20
-_IN_PLACE = 0.03  # misfit over size up to which a mesh may lie in place already
-_SURELY = 0.003  # mean distance over size up to which nothing better is looked for
+_IN_PLACE = 0.03  # misfit over size up to which a mesh may be in place already
+_SURELY = 0.003  # mean distance over size up to which no search is made
 _SLIDING = 0.02  # misfit over size up to which surfaces slide along each other
-# Share of that misfit that a search must reach to move the mesh all the same: a part of a figure
-# fits nearly as well in many other places, the whole of it does not.
+# Fraction of that misfit that a search must reach to move the mesh after all: a part of a figure
+# fits nearly as well in many other positions, the whole of it does not.
 _BETTER, _PART_BETTER = 0.8, 0.35
 PART = 0.05
-"""Of the size: a template farther than this from the target says that the target is a part."""
+"""Of the size: a template with points farther from the target marks the target as a part."""
 
-_CAP = 0.05  # of the size: what lies farther away, as hair or a missing hand, counts as much
-_BAD = 0.03  # RMS over size above which the alignment is doubtful
+_CAP = 0.05  # of the size: larger distances, as of hair or a missing hand, are clamped
+_BAD = 0.03  # RMS over size above which a warning is given
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,24 +77,24 @@ class Posed:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AlignmentSettings:
-    """What is known or wanted of an alignment.
+    """Known facts about an alignment, and options.
 
     Attributes
     ----------
     up, facing : str or None
-        The target's axes, of ``orientation_search.AXES``; None to find them.
+        The target's axes, of ``orientation_search.AXES``; None to detect them.
     scale : str
         One of ``SCALES``.
     landmarks : (N, 2, 3) or None
-        Three or more pairs of points of the posed template and the target. They take the place
-        of the search.
+        Three or more pairs of points of the posed template and the target. They replace
+        the search.
     refines : bool
-        Whether closest points improve on landmarks or on what the search found.
+        Whether closest points refine landmarks or the result of the search.
     matrix : (4, 4) or None
-        An alignment that is known, as dragged in the window: nothing is searched.
+        A given alignment, as dragged in the window: nothing is searched.
     samples : int
-        Points spread over each surface whose partners on the other one are looked for. The time
-        that a fit takes is proportional to it.
+        Points distributed over each surface whose partners on the other one are searched for.
+        The run time of a fit is proportional to it.
     """
 
     up: str | None = None
@@ -107,7 +107,7 @@ class AlignmentSettings:
 
     @property
     def dense(self) -> int:
-        """Points of each surface that stand for all of it where the first rounds search."""
+        """Points of each surface that represent it in the search of the first iterations."""
         return 6 * self.samples
 
     def __post_init__(self) -> None:
@@ -122,7 +122,7 @@ class AlignmentSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Alignment:
-    """Where the posed template lies in the target's frame.
+    """Placement of the posed template in the target's frame.
 
     Attributes
     ----------
@@ -134,9 +134,9 @@ class Alignment:
     away : float
         The same of the template from the target: large where the target is only a part.
     uneven : (float, float)
-        Root mean squares of the same distances over the size, without what the surface stands off
-        everywhere, and with all of them, each counted as 5 % at most: there ends of limbs that
-        stick out count, which the best 90 % leave out.
+        Root mean squares of the same distances over the size: without the median offset of the
+        surfaces, and of all of them, each clamped to 5 %: the latter includes protruding ends
+        of limbs, which the best 90 % exclude.
     how : str
         ``"in place"``, ``"search"``, ``"landmarks"``, ``"given"``, or ``"fit"`` where pose and
         proportions were fitted beyond that, unless landmarks were given.
@@ -150,14 +150,14 @@ class Alignment:
 
     @classmethod
     def of(cls, template: Side, target: Side, similarity: Similarity, how: str) -> Alignment:
-        """Return an alignment with its errors.
+        """Return an alignment together with its errors.
 
         Parameters
         ----------
         template, target : Side
             Both meshes.
         similarity : Similarity
-            Where the template lies.
+            Placement of the template.
         how : str
             See above.
         """
@@ -175,15 +175,15 @@ class Alignment:
 
 
 def misfit(alignment: Alignment, is_part: bool) -> float:
-    """Return what alignments are compared by: the mean of the uneven errors both ways.
+    """Return the score by which alignments are compared: the mean of the uneven errors both ways.
 
     Parameters
     ----------
     alignment : Alignment
         With its errors.
     is_part : bool
-        Whether the target is only a part of what the template shows: then what the template has
-        beyond it says nothing.
+        Whether the target is only a part of the template: parts of the template
+        beyond it are then ignored.
     """
     towards, away = alignment.uneven
     return towards if is_part else 0.5 * (towards + away)
@@ -198,31 +198,31 @@ def align(
 ) -> Alignment:
     """Find the similarity that aligns the template with the target.
 
-    A target that lies in place already, in another unit or rotated by quarter turns at most, is
+    A target that is in place already, up to its unit and rotations by multiples of 90 degrees, is
     left there: a fit of a part (a shirt, an open shell) would only move it away. Otherwise all
-    quarter turns are tried, each with a few iterations of closest points; the best is refined on
-    the surfaces.
+    rotations by 90 degrees are tried, each with a few iterations of closest points; the best is
+    refined on the surfaces.
 
     Parameters
     ----------
     template, target : Posed
-        In the same pose, roughly.
+        In approximately the same pose.
     template_up : "y" or "z"
         The template's up axis.
     settings : AlignmentSettings
-        What is known or wanted.
+        Known facts and options.
     report : callable
-        Told the fraction that is done, and what is being done; may raise to cancel.
+        Called with the completed fraction and the current step; may raise to cancel.
 
     Returns
     -------
     Alignment
-        With its error.
+        Including its error.
 
     Raises
     ------
     RigError
-        If a mesh has no area, landmarks lie on a line, or axes contradict each other.
+        If a mesh has no area, landmarks are collinear, or axes contradict each other.
     """
     report(0.0, "alignment")
     samples = settings.samples
@@ -251,12 +251,12 @@ def align(
     left = Alignment.of(ours, theirs, stays.similarity, "in place")
     found = Alignment.of(ours, theirs, best.similarity, "search")
     is_part = found.away > PART
-    # Sliding perfects what nearly fits; in another pose it takes long and leads nowhere.
+    # Sliding refines a close fit; in another pose it is slow and leads nowhere.
     if settings.scale == "axes" or misfit(found, True) <= _SLIDING:
         similarity = _refined(fine, best.similarity, settings, report)
         slid = Alignment.of(ours, theirs, similarity, "search")
         is_part &= slid.away > PART
-        # It looks at what faces each other alone, and may leave ends of limbs behind.
+        # It considers only surfaces that face each other, and may miss ends of limbs.
         if settings.scale == "axes" or misfit(slid, is_part) <= misfit(found, is_part):
             found = slid
     fraction = _PART_BETTER if is_part else _BETTER
@@ -287,18 +287,18 @@ def _refined(
 
 
 def similarity_of(matrix: Floats) -> Similarity:
-    """Return a 4 x 4 matrix as the similarity it is, stretched along one space's axes at most.
+    """Return a 4 x 4 matrix as a similarity, with scales along one space's axes at most.
 
     Raises
     ------
     RigError
-        If it mirrors, shears, or scales along other directions than the axes of the template or
+        If it reflects, shears, or scales along directions other than the axes of the template or
         of the target.
     """
     linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
     determinant = float(np.linalg.det(linear))
     if not determinant > 0.0:
-        raise RigError("alignment: expected a matrix that does not mirror or flatten")
+        raise RigError("alignment: expected a matrix without reflection or singularity")
     scale, shift = float(np.cbrt(determinant)), np.asarray(matrix)[:3, 3]
     rotation = linear / scale
     if _is_rotation(rotation):
@@ -331,7 +331,7 @@ _HOW = {
 
 
 def alignment_lines(alignment: Alignment) -> list[Diagnostic]:
-    """Return what a person should know: scale, turn, shift, error, and whether to doubt it."""
+    """Return messages about scale, rotation, shift and error, and doubts about the result."""
     similarity = alignment.similarity
     angle = np.degrees(np.arccos(np.clip((np.trace(similarity.rotation) - 1.0) / 2.0, -1.0, 1.0)))
     how = Phrase(_HOW[alignment.how])
@@ -358,5 +358,5 @@ def alignment_lines(alignment: Alignment) -> list[Diagnostic]:
 
 
 def _by_axis(numbers: Floats) -> dict[str, float]:
-    """Return three numbers as the values of a message."""
+    """Return three numbers as values of a message, by axis."""
     return dict(zip("xyz", numbers.tolist(), strict=True))

@@ -1,1 +1,1 @@
-"""Correspondence: which vertices of a target lie on the template's surface."""
+"""Correspondence between a target's vertices and the template's surface."""

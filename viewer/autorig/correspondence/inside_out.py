@@ -1,7 +1,7 @@
-"""Parts of a target whose triangles are wound the wrong way, and their reversal.
+"""Detection and reversal of parts of a target whose triangles are wound the wrong way.
 
-A part that faces the other way than the template may be a lining, which is right as it is. It is
-wrong where it encloses a volume, or is most of the target.
+A part that faces the opposite way to the template may be a lining, which is correct. It is
+wrong if it encloses a volume, or makes up most of the target.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from viewer.rig.mesh import Mesh, vertex_normals
 
 __all__ = ["with_reversed_winding", "wound_backwards"]
 
-_CLOSED = 0.25  # border edges squared, by triangles: holes up to this leave a volume its sign
+_CLOSED = 0.25  # squared border edges over triangles: with smaller holes a volume keeps its sign
 _MOST = 0.5  # of the target's area
 
 
@@ -27,15 +27,15 @@ def wound_backwards(target: Welded, facing_away: Ints) -> Bools:
     Parameters
     ----------
     target : Welded
-        W vertices that stand for V.
+        W vertices that represent V.
     facing_away : (I,)
-        Islands that face the other way than the template.
+        Islands that face the opposite way to the template.
 
     Returns
     -------
     (V,) bool
         Those of islands with a negative volume, sum a . (b x c) / 6 about their middle, which are
-        closed but for small holes, or have more than half of the area.
+        closed except for small holes, or have more than half of the area.
     """
     count = target.n_islands
     of = target.islands[target.triangles[:, 0]]
@@ -77,7 +77,7 @@ def _reversed(triangles: Ints, rows: Bools) -> Ints:
 
 
 def _border_edges(target: Welded, of: Ints) -> Any:
-    """Return how many edges of each island belong to one triangle."""
+    """Return the number of edges of each island that belong to only one triangle."""
     edges = target.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     low, high = edges.min(axis=1).astype(np.int64), edges.max(axis=1)
     _, first, counts = np.unique(

@@ -1,8 +1,8 @@
 """Correspondence of a target's vertices with the template's surface.
 
-A vertex is matched if the closest point of the template is near enough and faces the same way
+A vertex is matched if the closest point of the template is close enough and faces the same way
 (Abdrashitov et al. 2023). Skin that touches other skin, such as an arm at rest on the torso,
-is near the wrong part but faces the other way: it is left to be filled in.
+is close to the wrong part but faces the other way: its weights are inpainted.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from viewer.rig.mesh import vertex_normals
 
 __all__ = ["MatchSettings", "Matches", "Template", "match", "sheet_normals"]
 
-_INSIDE_OUT = math.radians(120.0)  # an angle that says "reversed" rather than "folded"
-_MOST = 0.75  # of an island's near vertices: so many reversed, and the island is
-_TOGETHER = math.radians(80.0)  # a normal and the middle of its group; see _sides
-_CANCELLED = 1e-3  # of the areas around a vertex: what is left where two sides cancel out
+_INSIDE_OUT = math.radians(120.0)  # a larger angle means "reversed" rather than "folded"
+_MOST = 0.75  # fraction of an island's near vertices above which the island is reversed
+_TOGETHER = math.radians(80.0)  # between a normal and the centre of its group; see _sides
+_CANCELLED = 1e-3  # of the areas around a vertex: remainder below which two sides cancel out
 
 
 @dataclass(frozen=True, slots=True)
 class MatchSettings:
-    """When a vertex counts as lying on the template.
+    """Criteria by which a vertex counts as lying on the template.
 
     Attributes
     ----------
@@ -41,11 +41,11 @@ class MatchSettings:
     max_angle : float
         Radians between the normals of both surfaces.
     near_distance, near_angle : float
-        Nearer than this fraction, this angle is enough: sharp and thin parts of a coarse mesh
-        have normals of their own. Sheets thinner than this are matched on the side that fits.
+        Within this fraction, this angle suffices: normals of sharp and thin parts of a coarse
+        mesh are unreliable. Sheets thinner than this are matched on the side that fits.
     flipped_normals : bool
-        Let a normal that points the other way count as well. An island that as a whole is
-        inside out is reversed without this.
+        Accept a normal that points the other way as well. An island that is inside out as a
+        whole is reversed without this.
     """
 
     max_distance: float = 0.05
@@ -63,14 +63,14 @@ class MatchSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Matches:
-    """Where the vertices of a target meet the template.
+    """Matches of a target's vertices on the template.
 
     Attributes
     ----------
     points : SurfacePoints
-        W points of the template: of each matched vertex the one that fits, else the closest.
+        W points of the template: for each matched vertex the one that fits, else the closest.
     matched : (W,) bool
-        Which vertices lie on the template.
+        Whether each vertex lies on the template.
     angles : (W,)
         Radians between the normals there, 0 where the target has no normal.
     inside_out : (I,) int32
@@ -107,7 +107,7 @@ class Template:
         self.normals: Floats = normals[self.welded.vertices]
 
     def normals_at(self, points: SurfacePoints) -> Floats:
-        """Return unit normals at points of the surface, (N, 3), mixed from the corners'."""
+        """Return unit normals at points of the surface, (N, 3), blended from the corners'."""
         return unit(interpolate(points, self.triangles, self.normals))
 
 
@@ -146,9 +146,9 @@ def match(template: Template, target: Welded, size: float, settings: MatchSettin
     target : Welded
         W vertices.
     size : float
-        The target's box diagonal, that distances are fractions of.
+        The target's box diagonal, the reference of relative distances.
     settings : MatchSettings
-        How near, and how alike in direction.
+        Limits of distance and angle.
 
     Returns
     -------
@@ -173,7 +173,7 @@ def match(template: Template, target: Welded, size: float, settings: MatchSettin
 
 
 def _closest(template: Template, target: Welded) -> SurfacePoints:
-    """Return the closest points, or the vertices that are the target's own."""
+    """Return the closest points, or the vertices identical to the target's own."""
     points, welded = template.surface.closest(target.positions), template.welded
     same = same_vertices(welded, target, points.distances)
     corners = welded.vertices[template.triangles]
@@ -181,7 +181,7 @@ def _closest(template: Template, target: Welded) -> SurfacePoints:
 
 
 def _angles(template: Template, points: SurfacePoints, normals: Floats) -> Floats:
-    """Return the angles between normals (N, 3) and those of the template, 0 without normal."""
+    """Return the angles between normals (N, 3) and those of the template, 0 if undefined."""
     there = template.normals_at(points)
     cosines = np.clip(np.einsum("na,na->n", there, normals), -1.0, 1.0)
     return np.where(normals.any(axis=1), np.arccos(cosines), 0.0)
@@ -200,7 +200,7 @@ def _accepted(distances: Floats, angles: Floats, size: float, settings: MatchSet
 
 
 def _inside_out(target: Welded, angles: Floats, judged: Bools) -> Ints:
-    """Return the islands most of whose judged vertices face the other way."""
+    """Return the islands of which most judged vertices face the other way."""
     of = target.islands[judged]
     total = np.bincount(of, minlength=target.n_islands)
     rotated = np.bincount(of[angles[judged] > _INSIDE_OUT], minlength=target.n_islands)
@@ -208,10 +208,10 @@ def _inside_out(target: Welded, angles: Floats, judged: Bools) -> Ints:
 
 
 def _sides(template: Template, positions: Floats, normals: Floats) -> SurfacePoints:
-    """Return the closest points on triangles that face roughly the same way.
+    """Return the closest points on triangles that face approximately the same way.
 
-    Directions come in 26 groups, those of a cube's faces, edges and corners; none is farther
-    than 28 degrees from one of them. Each group has its part of the template's triangles.
+    Directions are grouped into 26, those of a cube's faces, edges and corners; none is farther
+    than 28 degrees from one of them. Each group is searched in its own subset of triangles.
     """
     count = len(positions)
     triangles, distances = np.zeros(count, dtype=np.int32), np.full(count, np.inf)
@@ -230,13 +230,13 @@ def _sides(template: Template, positions: Floats, normals: Floats) -> SurfacePoi
         triangles[inside] = facing[part.triangles]
         barycentric[inside], found[inside] = part.barycentric, part.positions
         distances[inside] = part.distances
-    # No triangle faces that way: the distance says so, but must be a number.
+    # No triangle faces that way: an infinite distance, but valid coordinates.
     distances[np.isinf(distances)] = np.finfo(float).max
     return SurfacePoints(triangles, barycentric, found, distances)
 
 
 def _replaced(points: SurfacePoints, rows: Any, others: SurfacePoints, of: Bools) -> SurfacePoints:
-    """Return the points with some rows taken from others."""
+    """Return the points with some rows replaced by others."""
     columns = []
     for name in ("triangles", "barycentric", "positions", "distances"):
         column = getattr(points, name).copy()

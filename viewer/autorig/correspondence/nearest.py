@@ -1,4 +1,4 @@
-"""Weights of the nearest vertex, copied as they are: the simplest transfer."""
+"""Nearest-vertex correspondence: weights copied unchanged, the simplest transfer."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["nearest_vertices"]
 
 
 def nearest_vertices(template: Floats, points: Floats) -> tuple[Ints, Floats]:
-    """Return the template's vertex that is nearest to each point.
+    """Return the nearest vertex of the template for each point.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ def nearest_vertices(template: Floats, points: Floats) -> tuple[Ints, Floats]:
     vertices : (N,) int32
         ``skin_rows(skin, vertices)`` is the target's skin.
     distances : (N,)
-        How far each one is.
+        Distance to each of them.
 
     Raises
     ------

@@ -1,10 +1,10 @@
-"""Vertices that target and template share: a mesh that was edited or sculpted, not made anew.
+"""Vertices common to target and template: a mesh that was edited or sculpted, not remeshed.
 
-The closest point of the surface slides when a vertex was moved along it, and takes a mixture of
-weights; the vertex itself has them. A target's vertex counts as one of the template's if each is
-the other's nearest, it slid by less than half of the edges around it, and nearly all of these lead
-to neighbours of which the same is true. Another tessellation of the same surface has hardly any
-such vertices.
+The closest point of the surface slides if a vertex was moved along it, and gets blended
+weights; the vertex itself has the exact ones. A target's vertex is identified with one of the
+template's if each is the other's nearest, it slid by less than half the length of its edges, and
+nearly all of these lead to vertices with the same properties. Another tessellation of the same
+surface has hardly any such vertices.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ from viewer.rig.geometry.closest_point import SurfacePoints
 
 __all__ = ["at_vertices", "same_vertices"]
 
-_EDGES = 0.8  # fraction of a vertex's edges that must be edges of the template
-_SLID = 0.5  # of the mean length of its edges: how far a vertex may have slid along the surface
-_FEW = 10_000  # points for which threads take longer to start than they save
+_EDGES = 0.8  # fraction of a vertex's edges that must also be edges of the template
+_SLID = 0.5  # of the mean length of its edges: maximum slide along the surface
+_FEW = 10_000  # points: with fewer, threads cost more than they save
 
 
 def same_vertices(template: Welded, target: Welded, distances: Floats) -> Ints:
-    """Return the template's vertex that each vertex of the target is, -1 for none.
+    """Return the template's vertex that each vertex of the target is identified with, -1 for none.
 
     Parameters
     ----------
     template, target : Welded
         In the same space; U and W vertices.
     distances : (W,)
-        Of the target's vertices from the template's surface.
+        Distances of the target's vertices from the template's surface.
 
     Returns
     -------
@@ -59,26 +59,26 @@ def same_vertices(template: Welded, target: Welded, distances: Floats) -> Ints:
 def at_vertices(
     points: SurfacePoints, positions: Floats, corners: Ints, places: Floats, same: Ints
 ) -> SurfacePoints:
-    """Return points of a surface, some of them moved to vertices.
+    """Return points of a surface, some of them snapped to vertices.
 
     Parameters
     ----------
     points : SurfacePoints
         W closest points.
     positions : (W, 3)
-        What they are closest to.
+        The points that were searched for.
     corners : (T, 3)
         The surface's triangles, as indices of its U vertices.
     places : (U, 3)
         Where these are.
     same : (W,)
-        The vertex that a point is moved to, or -1.
+        The vertex that a point is snapped to, or -1.
     """
     rows = np.flatnonzero(same >= 0)
     used, first = np.unique(corners, return_index=True)
     place = np.full(len(places), -1)
     place[used] = first
-    rows = rows[place[same[rows]] >= 0]  # a vertex of no triangle is no point of the surface
+    rows = rows[place[same[rows]] >= 0]  # a vertex without triangles is not on the surface
     at = place[same[rows]]
     triangles, barycentric = points.triangles.copy(), points.barycentric.copy()
     found, distances = points.positions.copy(), points.distances.copy()

@@ -1,4 +1,4 @@
-"""Laplace operators of triangle meshes: how much each vertex differs from its neighbours."""
+"""Laplace operators of triangle meshes."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from viewer.rig.arrays import Bools, Floats, Ints
 
 __all__ = ["cotangent_laplacian", "graph_laplacian", "laplacian", "voronoi_areas"]
 
-_STEEPEST = 100.0  # cotangent of 0.6 degrees: a thinner triangle's angles say nothing any more
-_FLAT = 1e-12  # twice the area of a triangle over its squared longest edge, at least
+_STEEPEST = 100.0  # cotangent of 0.6 degrees: angles of thinner triangles are meaningless
+_FLAT = 1e-12  # minimum of twice a triangle's area over its squared longest edge
 _EVEN = 1.0 / np.sqrt(3.0)  # cotangent of 60 degrees
-_LIGHTEST = 1e-9  # of the mean: the least area of a vertex, as it is divided by
+_LIGHTEST = 1e-9  # of the mean: minimum area of a vertex, as it is a divisor
 
 
 def laplacian(mesh: Welded) -> tuple[Any, Floats]:
-    """Return the Laplace operator of a mesh and the area of each vertex, whatever its state.
+    """Return the Laplace operator of any mesh, and the area of each vertex.
 
-    Islands with an edge that more than two triangles share have no cotangent operator: theirs
-    is that of the graph of edges, and their vertices all have the mesh's mean area.
+    Islands with non-manifold edges have no cotangent operator: they get the graph
+    Laplacian of their edges, and their vertices all have the mesh's mean area.
 
     Parameters
     ----------
     mesh : Welded
-        W vertices. Make it of size 1 if the areas are to be compared with the operator, which
+        W vertices. Scale it to size 1 if the areas are to be compared with the operator, which
         has no unit.
 
     Returns
@@ -54,9 +54,9 @@ def cotangent_laplacian(positions: Floats, triangles: Ints) -> Any:
     """Return the cotangent Laplacian: L_ij = -(cot a + cot b) / 2 on edges, L_ii = -sum_j L_ij.
 
     a and b are the angles opposite to the edge (Pinkall and Polthier 1993). A triangle with an
-    angle below 0.6 degrees, or without area, counts as equilateral: it still connects, and the
+    angle below 0.6 degrees, or without area, is treated as equilateral: it still connects, and the
     operator stays positive semidefinite triangle by triangle, which it would not if large
-    cotangents were cut.
+    cotangents were clamped.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def cotangent_laplacian(positions: Floats, triangles: Ints) -> Any:
     Returns
     -------
     sparse (V, V)
-        Without unit. The opposite sign of the Laplacian of calculus.
+        Unitless. The opposite sign of the Laplacian of calculus.
 
     >>> square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
     >>> L = cotangent_laplacian(square, np.array([[0, 1, 2], [0, 2, 3]]))
@@ -76,7 +76,7 @@ def cotangent_laplacian(positions: Floats, triangles: Ints) -> Any:
     [1.0, -0.5, 0.0, -0.5]
     """
     halves = 0.5 * _steady(_cotangents(positions, triangles))
-    # The angle at corner k lies opposite to the edge of the other two.
+    # The angle at corner k is opposite the edge of the other two.
     links = triangles[:, [1, 2, 2, 0, 0, 1]].reshape(-1, 2)
     return _from_edges(len(positions), links, halves.ravel())
 
@@ -94,14 +94,14 @@ def graph_laplacian(n_vertices: int, triangles: Ints) -> Any:
     Returns
     -------
     sparse (V, V)
-        Without unit.
+        Unitless.
     """
     links = edges(triangles)
     return _from_edges(n_vertices, links, np.ones(len(links)))
 
 
 def voronoi_areas(positions: Floats, triangles: Ints) -> Floats:
-    """Return the part of the surface that is nearest to each vertex, "mixed" at obtuse angles.
+    """Return the area of the surface nearest to each vertex, "mixed" at obtuse angles.
 
     In a triangle without an obtuse angle vertex a owns (|ab|^2 cot c + |ac|^2 cot b) / 8; in
     one with, the obtuse corner owns half and the others a quarter (Meyer et al. 2003, fig. 4).
@@ -137,7 +137,7 @@ def _cotangents(positions: Floats, triangles: Ints) -> Floats:
     u = np.roll(corners, -1, axis=1) - corners
     v = np.roll(corners, 1, axis=1) - corners
     double = np.linalg.norm(np.cross(u[:, 0], v[:, 0]), axis=1)
-    # Without area the cotangents become very large, but not infinite.
+    # Without area the cotangents become very large, but stay finite.
     longest = np.einsum("tka,tka->tk", u, u).max(axis=1, initial=np.finfo(float).tiny)
     return np.einsum("tka,tka->tk", u, v) / np.maximum(double, _FLAT * longest)[:, None]
 

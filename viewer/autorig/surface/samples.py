@@ -1,4 +1,4 @@
-"""Points spread evenly over a surface: what alignments are judged by."""
+"""Evenly distributed sample points of a surface, by which alignments are evaluated."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["SurfaceSamples", "even_vertices", "sample_surface", "triangle_normal
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SurfaceSamples:
-    """Points of a surface, and which way it faces there.
+    """Points of a surface, and the normals there.
 
     Attributes
     ----------
@@ -42,9 +42,9 @@ def triangle_normals(positions: Floats, triangles: Ints) -> Floats:
 
 
 def sample_surface(positions: Floats, triangles: Ints, count: int) -> SurfaceSamples:
-    """Return points of a surface, equally many for equal areas; the same for the same mesh.
+    """Return evenly distributed points of a surface, deterministically.
 
-    Places along the summed areas are evenly spaced, so every triangle gets its share, rounded
+    Positions along the cumulative area are evenly spaced, so every triangle gets its part, rounded
     up or down. Within a triangle the point is a (1 - sqrt u) + b sqrt u (1 - v) + c v sqrt u
     (Turk 1990), with u and v from the R2 sequence (multiples of the plastic number's powers).
 
@@ -80,7 +80,7 @@ def sample_surface(positions: Floats, triangles: Ints, count: int) -> SurfaceSam
 
 
 def even_vertices(positions: Floats, triangles: Ints, count: int) -> Ints:
-    """Return some vertices of a surface, about equally many for equal areas.
+    """Return some vertices of a surface, approximately evenly distributed by area.
 
     Parameters
     ----------
@@ -89,12 +89,12 @@ def even_vertices(positions: Floats, triangles: Ints, count: int) -> Ints:
     triangles : (T, 3)
         Vertex indices.
     count : int
-        At most so many.
+        Maximum number.
 
     Returns
     -------
     (N,)
-        Vertex indices in order, each once; N <= count.
+        Sorted vertex indices, each once; N <= count.
 
     Raises
     ------
@@ -105,7 +105,7 @@ def even_vertices(positions: Floats, triangles: Ints, count: int) -> Ints:
 
 
 def _even_triangles(positions: Floats, triangles: Ints, count: int) -> Ints:
-    """Return triangles at evenly spaced places along the summed areas: (count,)."""
+    """Return triangles at evenly spaced positions along the cumulative area: (count,)."""
     areas = triangle_areas(positions, triangles)
     total = np.cumsum(areas)
     if len(areas) == 0 or not total[-1] > 0.0:

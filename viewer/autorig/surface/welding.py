@@ -1,7 +1,7 @@
-"""A mesh as one connected surface: coincident vertices joined, islands told apart.
+"""Welding of a mesh into connected surfaces: coincident vertices joined, islands labelled.
 
-Files repeat a vertex along seams of texture coordinates and hard edges. What is solved over a
-surface must not see these as borders, or the mesh would tear there.
+Files repeat a vertex along seams of texture coordinates and hard edges. Problems solved on a
+surface must not treat these as borders, or the mesh would tear there.
 """
 
 from __future__ import annotations
@@ -16,23 +16,23 @@ from viewer.rig.arrays import Floats, Ints
 
 __all__ = ["Welded", "edges", "islands", "non_manifold_edges", "weld"]
 
-_NEAR = 1e-4  # of the median edge: as far apart as rounding in a text file puts equal vertices
+_NEAR = 1e-4  # of the median edge: the error of equal vertices after rounding in a text file
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Welded:
-    """A mesh whose coincident vertices are one.
+    """A mesh without coincident vertices.
 
     Attributes
     ----------
     positions : (W, 3)
-        Of the first of the vertices that were joined.
+        Position of the first of the vertices that were joined.
     triangles : (F, 3) int32
-        Those that have three different corners.
+        Those with three different corners.
     vertices : (V,) int32
         The welded vertex of each vertex of the mesh.
     islands : (W,) int32
-        Which connected component each welded vertex belongs to, counted from 0. A vertex of no
+        Connected component of each welded vertex, counted from 0. A vertex without a
         triangle is an island of its own.
     """
 
@@ -48,20 +48,20 @@ class Welded:
 
 
 def weld(positions: Floats, triangles: Ints) -> Welded:
-    """Join coincident vertices, drop triangles that become edges, and find the islands.
+    """Join coincident vertices, drop triangles that collapse to edges, and label the islands.
 
     Parameters
     ----------
     positions : (V, 3)
-        Any unit. Vertices nearer than 1e-4 of the median edge count as coincident.
+        Any unit. Vertices closer than 1e-4 of the median edge count as coincident.
     triangles : (T, 3)
         Vertex indices.
 
     Returns
     -------
     Welded
-        A triangle without area stays if its corners differ: it closes a gap, where one side of
-        an edge has a vertex that the other has not.
+        A triangle without area is kept if its corners differ: it closes a gap, where only one side
+        of an edge has a vertex.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def edges(triangles: Ints) -> Ints:
 
 
 def non_manifold_edges(triangles: Ints) -> Ints:
-    """Return the edges that more than two triangles share: (E, 2) int32."""
+    """Return the non-manifold edges, those of more than two triangles: (E, 2) int32."""
     pairs, counts = _counted_edges(triangles)
     return pairs[counts > 2]
 
@@ -130,8 +130,8 @@ def _counted_edges(triangles: Ints) -> tuple[Ints, Any]:
 
 
 def _joined_exactly(positions: Floats) -> tuple[Any, Any]:
-    """Return the first vertex at each place, in vertex order, and each vertex's place."""
-    # Adding 0 turns -0.0 into 0.0, whose bytes differ.
+    """Return the first vertex at each position, in vertex order, and each vertex's position."""
+    # Adding 0 changes -0.0 to 0.0, whose bytes differ.
     rows = np.ascontiguousarray(positions + 0.0).view(np.dtype((np.void, 24))).ravel()
     _, first, inverse = np.unique(rows, return_index=True, return_inverse=True)
     rank = np.empty(len(first), dtype=np.int64)
@@ -140,10 +140,10 @@ def _joined_exactly(positions: Floats) -> tuple[Any, Any]:
 
 
 def _joined_nearby(positions: Floats, tolerance: float) -> Any:
-    """Return a number for each place, the same for those within the tolerance.
+    """Return a label for each position, the same for those within the tolerance.
 
-    Each round joins every place to its nearest one, so rounds at least halve a cluster; asking
-    for all pairs at once would take memory with the square of a cluster's size.
+    Each round joins every position to its nearest one, so clusters at least halve per round; asking
+    for all pairs at once would take memory quadratic in a cluster's size.
     """
     sparse, graph = scipy_part("sparse"), scipy_part("sparse.csgraph")
     spatial = scipy_part("spatial")

@@ -8,16 +8,16 @@ from viewer.rig.arrays import Floats, Ints
 
 __all__ = ["winding_numbers"]
 
-_BLOCK = 1 << 20  # pairs of point and triangle at a time, some 200 bytes each
+_BLOCK = 1 << 20  # point-triangle pairs per batch, about 200 bytes each
 
 
 def winding_numbers(positions: Floats, triangles: Ints, points: Floats) -> Floats:
-    """Return the solid angle of a mesh as seen from points, over 4 pi.
+    """Return the solid angle of a mesh seen from points, over 4 pi.
 
     A triangle a, b, c seen from the origin covers the angle W with tan(W / 2) = a . (b x c) /
     (|a||b||c| + (a . b)|c| + (b . c)|a| + (c . a)|b|) (Van Oosterom and Strackee 1983). Holes
     make the sum a fraction (Jacobson, Kavan, Sorkine-Hornung 2013), negative if the mesh is
-    inside out: whoever asks for the inside should compare the absolute value with a half.
+    inside out: compare the absolute value with one half to test for the inside.
 
     Parameters
     ----------
@@ -26,12 +26,12 @@ def winding_numbers(positions: Floats, triangles: Ints, points: Floats) -> Float
     triangles : (T, 3)
         Vertex indices, counter-clockwise from outside.
     points : (N, 3)
-        Where from; not on the surface.
+        View points; not on the surface.
 
     Returns
     -------
     (N,)
-        Without unit.
+        Unitless.
     """
     total = np.zeros(len(points))
     step = max(1, _BLOCK // max(1, len(points)))

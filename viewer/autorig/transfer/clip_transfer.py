@@ -1,4 +1,4 @@
-"""Transfer of a template's motions to the figure that got its rig."""
+"""Transfer of a template's clips to the rigged figure."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ def transfer_clip(
 ) -> Clip | SampledClip:
     """Return a clip of the template for the rigged target.
 
-    Angles stay as they are; lengths are scaled with the figure, so that a path is as many steps
-    long as before. The clip plays in the template's own axes: up is where it was.
+    Angles are unchanged; lengths are scaled with the figure, so that a path takes the same number
+    of steps. The clip keeps the template's own axes: up stays up.
 
     Parameters
     ----------
@@ -38,22 +38,22 @@ def transfer_clip(
     length_scale : float
         Target units per unit of the template's figure space, 1 if nothing was scaled.
     figure_scale : float
-        The scale that the template's pose gave the whole figure: it is part of the target's
-        lengths already.
+        The scale of the whole figure in the template's pose: the target's lengths already
+        include it.
     path_scale : float or None
-        The same as ``length_scale`` for the figure's place and its roots, which go by the length
-        of the legs; None if it is the same.
+        Replaces ``length_scale`` for the figure's translation and its roots, which scale with the
+        length of the legs; None for the same factor.
 
     Returns
     -------
     Clip or SampledClip
-        Of the same kind, name and timing. Shapes of captures are left out: the target has its
+        Of the same type, name and timing. Shape weights of captures are dropped: the target has its
         own.
 
     Raises
     ------
     RigError
-        If the clip has another number of joints.
+        If the clip has another number of joints, or moves a DOF that does not exist.
     """
     path = length_scale if path_scale is None else path_scale
     roots = skeleton.parents < 0
@@ -76,7 +76,7 @@ def transfer_clip(
 
 
 def _scaled(channel: Channel, skeleton: Skeleton, factors: Floats) -> Channel:
-    """Scale a curve of lengths: its values, and slopes that are given as numbers."""
+    """Scale a curve of lengths: its values, and its numeric slopes."""
     if channel.target >= skeleton.n_dofs:
         raise RigError(
             f"a channel moves DOF {channel.target}, the figure has {skeleton.n_dofs} DOFs"

@@ -12,9 +12,9 @@ from viewer.rig.geometry.closest_point import SurfacePoints, interpolate
 __all__ = ["MOST_NUMBERS", "transfer_correctives"]
 
 MOST_NUMBERS = 120_000_000
-"""Of all transferred correctives, 1 GB: more are left out."""
+"""Maximum size of all transferred correctives, 1 GB: larger ones are dropped."""
 
-_ROUNDS = 10  # of smoothing where correctives fade
+_ROUNDS = 10  # smoothing iterations where correctives fade out
 
 
 def transfer_correctives(
@@ -26,15 +26,15 @@ def transfer_correctives(
     target_triangles: Ints,
     scale: float,
 ) -> Correctives | None:
-    """Return correctives for the target: those of the template's point under each vertex, scaled.
+    """Return correctives for the target, scaled from the template's point under each vertex.
 
-    Where a vertex does not lie on the template its closest point may be on another limb: there
-    the correctives fade to 0, smoothly.
+    The closest point of an unmatched vertex may be on another limb: there
+    the correctives fade smoothly to 0.
 
     Parameters
     ----------
     correctives : Correctives
-        Of the template's vertices.
+        Offsets of the template's vertices.
     points : SurfacePoints
         The template's point for each of the target's V vertices.
     triangles : (T, 3)
@@ -51,21 +51,21 @@ def transfer_correctives(
     Returns
     -------
     Correctives or None
-        None if there would be more than ``MOST_NUMBERS`` numbers.
+        None if it would have more than ``MOST_NUMBERS`` numbers.
     """
     offsets = correctives.values()
     if len(offsets) * len(positions) * 3 > MOST_NUMBERS:
         return None
     factors = scale * _fade(matched, positions, target_triangles)
     transferred = np.empty((len(offsets), len(positions), 3))
-    # One direction after the other: all at once would take their memory three times.
+    # One direction at a time: all at once would take three times the memory.
     for row, direction in zip(transferred, offsets, strict=True):
         np.multiply(interpolate(points, triangles, direction), factors[:, None], out=row)
     return Correctives(transferred)
 
 
 def _fade(matched: Bools, positions: Floats, triangles: Ints) -> Floats:
-    """Return 1 on the template, 0 away from it, smooth between: (V,)."""
+    """Return weights that are 1 on the template, 0 away from it, smooth between: (V,)."""
     if matched.all():
         return np.ones(len(matched))
     welded = weld(positions, triangles)

@@ -1,4 +1,4 @@
-"""Inverse skinning: a posed mesh back to rest, each vertex by its inverse blended matrix."""
+"""Inverse skinning: a posed mesh returned to rest by each vertex's inverse blended matrix."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from viewer.rig.skinning.lbs import blended_matrices
 __all__ = ["SMALLEST_STRETCH", "InvertedSkinning", "invert_skinning", "repair_tears"]
 
 SMALLEST_STRETCH = 0.2
-"""Singular value below which a blended matrix counts as singular: two joints bent apart by an
+"""Singular value below which a blended matrix counts as singular: two joints rotated apart by an
 angle a with equal weights give cos(a / 2), and here a = 157 degrees."""
 
 _RINGS = 2  # neighbours of guarded vertices that may move to repair a tear
@@ -26,17 +26,17 @@ _SMOOTH = 0.01  # weight of the shape against the pose when a tear is repaired
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InvertedSkinning:
-    """A mesh at rest.
+    """A mesh at rest, with the matrices that pose it.
 
     Attributes
     ----------
     positions : (V, 3)
-        Binding space; pose correctives are still part of them.
+        Bind space; pose correctives are still included.
     matrices : (V, 3, 4)
-        What poses each vertex again.
+        The matrix that poses each vertex.
     guarded : (V,) bool
-        Vertices whose matrix is nearly singular: undone by the rotation nearest to it, so they
-        do not come back exactly.
+        Vertices whose matrix is nearly singular: inverted by the nearest rotation, so posing
+        does not reproduce them exactly.
     """
 
     positions: Floats
@@ -48,8 +48,8 @@ def invert_skinning(positions: Floats, skin: Skin, palette: Floats) -> InvertedS
     """Undo linear blend skinning: rest = B^-1 (t - d), with sum_j w_j A_j = [B | d].
 
     Only the 3 x 3 part is inverted. Where its smallest singular value is below
-    ``SMALLEST_STRETCH`` the nearest rotation (polar factor) takes its place, as dividing by
-    almost nothing would tear the mesh; a vertex without influence stays where it is.
+    ``SMALLEST_STRETCH`` the nearest rotation (polar factor) replaces it, as dividing by
+    a tiny value would tear the mesh; a vertex without influences is unchanged.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def invert_skinning(positions: Floats, skin: Skin, palette: Floats) -> InvertedS
     Returns
     -------
     InvertedSkinning
-        In the binding space of the skin.
+        In the bind space of the skin.
     """
     matrices = blended_matrices(skin, palette)
     linear = matrices[:, :, :3]
@@ -77,10 +77,10 @@ def invert_skinning(positions: Floats, skin: Skin, palette: Floats) -> InvertedS
 
 
 def _is_singular(linear: Floats) -> Bools:
-    """Return whose smallest singular value is too small: (V,) bool.
+    """Return the matrices whose smallest singular value is too small: (V,) bool.
 
     As |det| = s1 s2 s3 and s1 s2 <= (s1^2 + s2^2) / 2 <= |B|^2 / 2, s3 >= 2 |det| / |B|^2; only
-    where that bound says nothing the singular values are found.
+    where that bound is inconclusive the singular values are computed.
     """
     squares = np.einsum("vab,vab->v", linear, linear)
     bound = 2.0 * np.abs(np.linalg.det(linear)) / np.where(squares > 0.0, squares, 1.0)
@@ -93,25 +93,25 @@ def _is_singular(linear: Floats) -> Bools:
 
 
 def repair_tears(inverted: InvertedSkinning, posed: Floats, triangles: Ints) -> Floats:
-    """Smooth what surrounds guarded vertices, in the least-squares sense.
+    """Smooth the neighbourhoods of guarded vertices by least squares.
 
-    Minimises sum_v |B_v x_v + d_v - t_v|^2 + lambda |L x|^2 over the guarded vertices and two
-    rings around them, all others fixed, with L the Laplacian of the graph of edges and lambda =
+    Minimises sum_v |B_v x_v + d_v - t_v|^2 + lambda |L x|^2 over the guarded vertices and their
+    two-ring, all others fixed, with L the graph Laplacian and lambda =
     0.01. The problem is linear in x: one Gauss-Newton step solves it.
 
     Parameters
     ----------
     inverted : InvertedSkinning
-        What ``invert_skinning`` gave.
+        Result of ``invert_skinning``.
     posed : (V, 3)
-        The vertices t that posing should give back.
+        The vertices t that posing should reproduce.
     triangles : (T, 3)
         Vertex indices; coincident vertices move together.
 
     Returns
     -------
     (V, 3)
-        Rest positions; those of ``inverted`` where nothing was guarded.
+        Rest positions; those of ``inverted`` away from guarded vertices.
     """
     if not inverted.guarded.any():
         return inverted.positions
@@ -145,7 +145,7 @@ def repair_tears(inverted: InvertedSkinning, posed: Floats, triangles: Ints) -> 
 
 
 def _laplacian(count: int, links: Ints) -> Any:
-    """Return the mean of the neighbours minus the vertex itself, with the sign reversed."""
+    """Return the graph Laplacian: each vertex minus the mean of its neighbours."""
     sparse = scipy_part("sparse")
     a, b = links[:, 0], links[:, 1]
     degree = np.maximum(np.bincount(links.ravel(), minlength=count), 1)

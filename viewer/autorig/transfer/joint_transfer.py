@@ -1,4 +1,4 @@
-"""Transfer of joints to another mesh: each moves as the surface around it moved."""
+"""Transfer of joints to another mesh: each moves with the surface around it."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from viewer.rig.skin import Skin, influence_counts
 
 __all__ = ["TransferredJoints", "boundary_weights", "outside", "surface_shifts", "transfer_joints"]
 
-_ENOUGH = 0.5  # fraction of a joint's weights that must have found the target
+_ENOUGH = 0.5  # fraction of a joint's weights that must be matched
 _SAME_WAY = 0.5  # cosine of 60 degrees between the surfaces
 _INSIDE = 0.5  # winding number between outside and inside
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TransferredJoints:
-    """Joints in the target's frame.
+    """Joint positions in the target's frame.
 
     Attributes
     ----------
     positions : (J, 3)
         In the pose of the target.
     transferred : (J,) bool
-        Which were moved by the surface around them; the others moved along with their parents.
+        Joints moved by the surface around them; the others moved with their parents.
     measurable : (J,) bool
-        Which have vertices to be moved by at all.
+        Joints with any vertices to be moved by.
     """
 
     positions: Floats
@@ -46,7 +46,7 @@ def surface_shifts(
     target_triangles: Ints,
     max_distance: float,
 ) -> tuple[Floats, Bools]:
-    """Return the way from points to the closest points of a target, and where it can be trusted.
+    """Return the vectors from points to the closest points of a target, and which are reliable.
 
     Parameters
     ----------
@@ -57,14 +57,14 @@ def surface_shifts(
     target_triangles : (T, 3)
         Its triangles.
     max_distance : float
-        In the target's unit; farther pairs are no pairs.
+        In the target's unit; pairs farther apart are rejected.
 
     Returns
     -------
     shifts : (V, 3)
         Target minus template.
     matched : (V,) bool
-        Near enough, and the surfaces are at most 60 degrees apart, whichever way they face.
+        Close enough, with surfaces at most 60 degrees apart, whichever way they face.
     """
     found = Surface(target_positions, target_triangles).closest(positions)
     facing = triangle_normals(target_positions, target_triangles)[found.triangles]
@@ -74,10 +74,10 @@ def surface_shifts(
 
 
 def boundary_weights(skin: Skin, parents: Ints) -> JointRegressor:
-    """Return what tells where a joint is: b_v = w_vj w_v,parent, vertices that both hold.
+    """Return a regressor of joint positions: b_v = w_vj w_v,parent, on vertices of both joints.
 
-    A root takes the boundary with its children. Rows are not scaled: a joint without a boundary
-    has none.
+    A root uses the boundary with its children. Rows are not normalised: a joint without a
+    boundary has an empty one.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def boundary_weights(skin: Skin, parents: Ints) -> JointRegressor:
     shared = (above >= 0) & (unique[place] == wanted) if len(unique) else np.zeros(0, np.bool_)
     product = weights[shared] * weights[place[shared]]
     rows, columns = joints[shared], vertices[shared]
-    # What a root shares with a child says where the root's own region ends, too.
+    # The boundary with a child also marks the end of the root's own region.
     at_root = parents[above[shared]] < 0
     return JointRegressor(
         count,
@@ -116,11 +116,11 @@ def boundary_weights(skin: Skin, parents: Ints) -> JointRegressor:
 def transfer_joints(
     joints: Floats, parents: Ints, regressor: JointRegressor, shifts: Floats, matched: Bools
 ) -> TransferredJoints:
-    """Move joints by what the surface around them was moved by.
+    """Move joints by the displacement of the surface around them.
 
-    J'_j = J_j + sum_v k_jv d_v / sum_v k_jv over matched vertices v, with the way d_v to the
-    target and the rows k_j of a regressor: so the estimator's own error, which posed regressors
-    have, cancels out. Where less than half of a row is matched the joint goes with its parent.
+    J'_j = J_j + sum_v k_jv d_v / sum_v k_jv over matched vertices v, with the vector d_v to the
+    target and the rows k_j of a regressor: so the error of the regressor itself, which posed ones
+    have, cancels out. If less than half of a row is matched, the joint moves with its parent.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def transfer_joints(
     shifts : (V, 3)
         From ``surface_shifts``.
     matched : (V,) bool
-        Where they can be trusted.
+        Where the shifts are reliable.
 
     Returns
     -------
@@ -146,18 +146,18 @@ def transfer_joints(
     whole = np.bincount(rows, np.abs(weights), minlength=count)
     present = np.bincount(rows, np.abs(used), minlength=count)
     total = np.bincount(rows, used, minlength=count)
-    # Rows of both signs may nearly cancel, and then say nothing.
+    # Rows of both signs may nearly cancel, which makes them unreliable.
     transferred = (present >= _ENOUGH * whole) & (total >= _ENOUGH * present) & (whole > 0.0)
     sums = [np.bincount(rows, used * shifts[columns, axis], minlength=count) for axis in range(3)]
     moves = np.stack(sums, axis=1) / np.where(transferred, total, 1.0)[:, None]
     for joint in np.flatnonzero(~transferred).tolist():
-        # Parents come first, so the parent's way is final.
+        # Parents come first, so the parent's shift is already final.
         moves[joint] = moves[parents[joint]] if parents[joint] >= 0 else 0.0
     return TransferredJoints(joints + moves, transferred, whole > 0.0)
 
 
 def outside(positions: Floats, triangles: Ints, joints: Floats) -> Bools:
-    """Return which joints lie outside a mesh: (J,) bool; one that is inside out has an inside.
+    """Return whether joints lie outside a mesh: (J,) bool; an inverted mesh has an inside too.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Ratio of the leg lengths of two figures, by which paths and heights are scaled.
 
-A root stands as high as the legs below it are long, and a step is as wide as the leg is long. So
-where limbs were resized, or the whole was stretched, lengths of the root scale with the legs.
+A root is as high as the legs below it are long, and step width is proportional to leg length.
+So if limbs were scaled, or the whole figure stretched, lengths of the root scale with the legs.
 """
 
 from __future__ import annotations
@@ -15,21 +15,21 @@ from viewer.rig.skeleton import Skeleton
 
 __all__ = ["leg_scale"]
 
-_LOW = 0.1  # of the joints' height: joints this near to the lowest are feet
-_LEGS = 0.2  # of the joints' height: a root that is less above them stands on no legs
+_LOW = 0.1  # of the joints' height: joints this close to the lowest are feet
+_LEGS = 0.2  # of the joints' height: a root less than this above them has no legs
 
 
 def leg_scale(before: Skeleton, after: Skeleton, up: str, otherwise: float) -> float:
-    """Return the ratio of two skeletons' heights of the root above the feet, both at rest.
+    """Return the ratio of the heights of two skeletons' roots above the feet, both at rest.
 
     Parameters
     ----------
     before, after : Skeleton
-        Of the same joints.
+        With the same joints.
     up : "y" or "z"
         The axis that points up, of both.
     otherwise : float
-        What is returned where there are no legs: hands, heads, a root on the ground.
+        Returned if there are no legs: hands, heads, a root on the ground.
     """
     axis = "xyz".index(up)
     heights = _heights(before, axis)

@@ -1,4 +1,4 @@
-"""A skeleton with other proportions: same joints, same DOFs, other distances between them."""
+"""Fit of a skeleton to new proportions: same joints and DOFs, other distances between them."""
 
 from __future__ import annotations
 
@@ -26,21 +26,21 @@ _FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RestSkeleton:
-    """The target's skeleton, how it is bound, and the pose in which the target was found.
+    """The target's skeleton, its binding, and the pose in which the target was found.
 
     Attributes
     ----------
     skeleton : Skeleton
-        At rest it stands as the template does at rest, in the template's axes and the target's
-        unit: so clips and poses of the template mean the same to it.
+        Its rest pose is that of the template, in the template's axes and the target's
+        unit, so clips and poses of the template keep their meaning.
     inverse_bind : (J, 4, 4)
-        Of the pose in which the template is bound.
+        For the pose in which the template is bound.
     pose : Pose
-        Puts the joints where they are in the target.
+        Puts the joints at their positions in the target.
     root_scale : float
-        What lengths of the root are scaled by, see ``leg_scale``.
+        Scale of the root's lengths, see ``leg_scale``.
     lines : tuple of Diagnostic
-        What was changed beside the lengths.
+        Messages about changes other than lengths.
     """
 
     skeleton: Skeleton
@@ -58,30 +58,30 @@ def fit_rest_skeleton(
     transferred: Bools | None,
     original: Skeleton | None = None,
 ) -> RestSkeleton:
-    """Find rest offsets that put a posed skeleton's joints at given places.
+    """Find rest offsets that put a posed skeleton's joints at given positions.
 
-    The target's joint j stands in the world with the linear part R P_j, P_j being that of the
+    The target's joint j has the world linear part R P_j, P_j being that of the
     template's pose and R the alignment's rotation. So the offset from its parent i is
-    (R P_i)^-1 (p_j - p_i), of which the DOFs' translations, scaled, are part. The rest root is
-    the template's, scaled as the legs are; the figure's translation carries it to the target, and
-    R goes into the root's rotation.
+    (R P_i)^-1 (p_j - p_i), which includes the DOFs' translations, scaled. The rest root is
+    the template's, scaled like the legs; the figure's translation moves it to the target, and
+    R is included in the root's rotation.
 
     Parameters
     ----------
     template : Figure
-        Shaped as posed, with skeleton and skin.
+        With the pose's shape applied, with skeleton and skin.
     pose : Pose
         Of the template.
     similarity : Similarity
-        The posed template, with the pose's own scale and translation, to the target.
+        From the posed template, with the pose's own scale and translation, to the target.
     joints : (J, 3)
         In the target's frame.
     transferred : (J,) bool or None
-        Which of them were measured on the target. A symmetric template then gives a symmetric
-        skeleton: left and right offsets are averaged, or taken from the side that was measured.
-        None leaves the joints as they are.
+        Joints that were measured on the target. A symmetric template then gives a symmetric
+        skeleton: left and right offsets are averaged, or taken from the measured side.
+        None keeps the joints unchanged.
     original : Skeleton or None
-        The template's before its limbs were resized; None if they were not.
+        The template's before its limbs were scaled; None if they were not.
 
     Returns
     -------
@@ -95,7 +95,7 @@ def fit_rest_skeleton(
     world = similarity.rotation @ rotated
     offsets = _offsets(skeleton.parents, world, joints) - moves
     roots = skeleton.parents < 0
-    # Roots stand in figure space: what rotates them there is taken out of the ways between them.
+    # Roots are in figure space: their rotation there is removed from the vectors between them.
     spread = (joints - joints[0]) @ similarity.rotation
     offsets[roots] = (scale * skeleton.rest_translations[0] + spread - moves + moves[0])[roots]
     offsets[0] = scale * skeleton.rest_translations[0]
@@ -118,7 +118,7 @@ def fit_rest_skeleton(
 
 
 def _moves(skeleton: Skeleton, pose: Pose) -> Floats:
-    """Return what a pose adds to the rest translations: (J, 3)."""
+    """Return a pose's additions to the rest translations: (J, 3)."""
     moves = pose.translations.copy()
     rows = skeleton.dof_kinds < _FIRST_ROTATION
     np.add.at(moves, (skeleton.dof_joints[rows], skeleton.dof_kinds[rows]), pose.dofs[rows])
@@ -126,7 +126,7 @@ def _moves(skeleton: Skeleton, pose: Pose) -> Floats:
 
 
 def _offsets(parents: Ints, world: Floats, joints: Floats) -> Floats:
-    """Return each joint's place within its parent's axes: (J, 3); roots as they are."""
+    """Return each joint's position in its parent's axes: (J, 3); roots are unchanged."""
     offsets = joints.copy()
     below = np.flatnonzero(parents >= 0)
     above = parents[below]
@@ -137,15 +137,15 @@ def _offsets(parents: Ints, world: Floats, joints: Floats) -> Floats:
 
 
 def _symmetric(template: Figure, offsets: Floats, scale: float, transferred: Bools) -> Floats:
-    """Let left and right change alike, if the template's joints mirror each other.
+    """Return offsets with equal changes left and right, if the template's joints are symmetric.
 
-    What is averaged are changes against the scaled template, in its rest axes.
+    The averaged values are changes from the scaled template, in its rest axes.
     """
     skeleton = template.require_skeleton()
     try:
         partners = joint_partners(template)
     except RigError:
-        return offsets  # not symmetric: nothing to keep
+        return offsets  # not symmetric: no symmetry to preserve
     flip = np.ones(3)
     flip[mirror_axis(template)] = -1.0
     zero = _zero_pose(skeleton)
@@ -191,7 +191,7 @@ def _dof_scales(skeleton: Skeleton, joint_scales: Floats) -> Floats:
 
 
 def _scaled_pose(skeleton: Skeleton, pose: Pose, joint_scales: Floats) -> Pose:
-    """Return a pose in the target's unit, without shape, scale and place of its own."""
+    """Return a pose in the target's unit, without shape, scale and translation of its own."""
     posed = pose.copy()
     posed.dofs *= _dof_scales(skeleton, joint_scales)
     posed.translations *= joint_scales[:, None]
@@ -204,10 +204,10 @@ def _scaled_pose(skeleton: Skeleton, pose: Pose, joint_scales: Floats) -> Pose:
 def _rotate_roots(
     skeleton: Skeleton, pose: Pose, rotation: Floats
 ) -> tuple[Skeleton, list[Diagnostic]]:
-    """Turn the roots by the alignment, in place: by their DOFs where they are ball joints.
+    """Rotate the roots by the alignment, in place: by their DOFs where they are ball joints.
 
-    Limits of a root say how it may stand in the template's world, not in the target's: they are
-    widened to hold the pose.
+    Limits of a root apply to the template's world, not to the target's: they are
+    widened to include the pose.
     """
     roots = np.flatnonzero(skeleton.parents < 0)
     wanted = rotation @ joint_rotations(skeleton, pose)[roots]
@@ -235,7 +235,7 @@ def _rotate_roots(
 
 
 def _angles_within(rotations: Floats, low: Floats, high: Floats) -> Floats:
-    """Return angles about x, y, z, of the two triples that make a rotation the one within limits.
+    """Return angles about x, y, z: of the two triples for a rotation, the one within limits.
 
     (x, y, z) and (x + pi, pi - y, z + pi) are the same rotation.
     """
@@ -250,7 +250,7 @@ def _angles_within(rotations: Floats, low: Floats, high: Floats) -> Floats:
 
 
 def _move_roots(skeleton: Skeleton, pose: Pose, joints: Floats) -> None:
-    """Move the figure until the first root is in its place, and other roots by themselves."""
+    """Move the figure until the first root is in position, and other roots separately."""
     found = world_matrices(skeleton, pose)[:, :3, 3]
     pose.figure_translation[:] = joints[0] - found[0]
     others = np.flatnonzero(skeleton.parents < 0)[1:]
@@ -258,10 +258,10 @@ def _move_roots(skeleton: Skeleton, pose: Pose, joints: Floats) -> None:
 
 
 def _bind_matrices(parents: Ints, inverse_bind: Floats, longer: Floats, scale: float) -> Floats:
-    """Return where the joints are bound: the template's bind pose with the new lengths.
+    """Return the bind matrices of the joints: the template's bind pose with the new lengths.
 
     Each local bind matrix B_parent^-1 B keeps its linear part; its translation is scaled, and
-    changed by as much as the rest offset was.
+    changed by the same amount as the rest offset.
     """
     bind = np.asarray(np.linalg.inv(inverse_bind), dtype=np.float64)
     local = bind.copy()

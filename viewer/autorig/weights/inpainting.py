@@ -1,12 +1,12 @@
-"""Weights for the vertices that have none, as smooth as the surface allows.
+"""Inpainting of missing weights, as smooth as the surface allows.
 
 Between known weights W_m the unknown ones W_u minimise trace(W^T Q W), Q = L + L M^-1 L, with
 the Laplacian L and vertex areas M (Abdrashitov et al. 2023)::
 
     Q_uu W_u = -Q_um W_m
 
-Constants cost nothing, so rows go on adding up to 1. The second term makes joins smooth, but
-overshoots; negative weights are cut off and rows scaled back to 1.
+Constants have zero energy, so rows still add up to 1. The second term makes joins smooth, but
+overshoots; negative weights are clipped and rows rescaled to 1.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ __all__ = ["NEGLIGIBLE", "Report", "inpaint"]
 
 Report = Callable[[float, str], None]
 
-NEGLIGIBLE = 1e-6  # a solved weight below this counts as 0: solutions fade out, but never end
-_BLOCK = 1 << 22  # numbers solved for together, 32 MB
-_TRUE = 1e-4  # the largest error of a solution that must be 1 everywhere
+NEGLIGIBLE = 1e-6  # a solved weight below this counts as 0: solutions decay, but never reach 0
+_BLOCK = 1 << 22  # unknowns solved for per batch, 32 MB
+_TRUE = 1e-4  # maximum error of a solution that must be 1 everywhere
 _SHIFT = 1e-10  # of the mean diagonal, added to a matrix that cannot be factorised
-_STEPS = 2000  # of conjugate gradients
+_STEPS = 2000  # maximum iterations of conjugate gradients
 _CONVERGED = 1e-9  # relative residual
 
 _Solve = Callable[[Floats], Floats]
@@ -46,19 +46,19 @@ def inpaint(
     areas : (W,)
         Areas of the vertices, positive.
     weights : sparse (W, J) in rows
-        Only those of matched vertices are used.
+        Only those of matched vertices are read.
     matched, unknown : (W,) bool
-        Given and wanted vertices; each island of wanted ones must touch a given one. Vertices
-        that are neither take no part.
+        Known and unknown vertices; each island of unknown ones must touch a known one. Vertices
+        that are neither are ignored.
     report : callable
-        Called with a fraction and what is being done; may raise to cancel.
+        Called with a fraction and the current step; may raise to cancel.
 
     Returns
     -------
     weights : sparse (U, J) in rows
         Of the unknown vertices in order. No weight is negative, rows add up to 1.
     method : str
-        How the system was solved: "direct" unless that failed.
+        Solver that succeeded: "direct" unless that failed.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def inpaint(
 
 
 def _solved(solve: _Solve, border: Any, weights: Any, report: Report) -> Any:
-    """Return the clipped and scaled solution for all joints that occur next to the unknown."""
+    """Return the clipped and scaled solution for all joints adjacent to unknown vertices."""
     sparse = scipy_part("sparse")
     used = np.unique(border.indices)  # matched vertices within two edges of an unknown one
     right = sparse.csc_array(-border[:, used] @ weights[used])
@@ -95,7 +95,7 @@ def _solved(solve: _Solve, border: Any, weights: Any, report: Report) -> Any:
     step = max(1, _BLOCK // right.shape[0])
     parts = []
     for start in range(0, len(joints), step):
-        report(start / len(joints), "filling in weights")
+        report(start / len(joints), "inpainting weights")
         values = solve(right[:, joints[start : start + step]].toarray())
         values[values < NEGLIGIBLE] = 0.0
         parts.append(sparse.csc_array(values))
@@ -119,10 +119,10 @@ def _shifted(matrix: Any) -> Any:
 
 
 def _factorised(matrix: Any) -> _Solve | None:
-    """Return a solver by sparse factorisation, None where that fails."""
+    """Return a solver by sparse factorisation, None if that fails."""
     linear = scipy_part("sparse.linalg")
     try:
-        # Symmetric and positive: no pivoting, and an ordering that keeps the symmetry.
+        # Symmetric and positive: no pivoting, and an ordering that preserves the symmetry.
         factors = linear.splu(
             matrix.tocsc(),
             permc_spec="MMD_AT_PLUS_A",
@@ -160,5 +160,5 @@ def _iterative(matrix: Any) -> _Solve:
 
 
 def _ratio(a: Floats, b: Floats) -> Floats:
-    """Return a / b, 0 where b is not positive: a column that is already solved stays."""
+    """Return a / b, 0 where b is not positive: columns already solved are unchanged."""
     return np.divide(a, b, out=np.zeros_like(a), where=b > 0.0)

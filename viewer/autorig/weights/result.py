@@ -1,4 +1,4 @@
-"""Result of a transfer of weights, and the lines that report it."""
+"""Result of a weight transfer, and the messages about it."""
 
 from __future__ import annotations
 
@@ -21,24 +21,24 @@ __all__ = [
     "template_lines",
 ]
 
-_LISTED = 5  # islands named one by one
-_FEW = 0.75  # of the vertices: with fewer matched, many weights are guesses
+_LISTED = 5  # islands listed individually
+_FEW = 0.75  # of the vertices: with fewer matched, many weights are estimates
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RigidIslands:
-    """Connected parts of a target that nowhere meet the template, and so hang on it rigidly.
+    """Connected parts of a target that do not meet the template, and are attached to it rigidly.
 
     Attributes
     ----------
     vertices : (R,) int32
-        The first vertex of each.
+        The first vertex of each island.
     counts : (R,) int32
-        How many vertices it has, coincident ones counted once.
+        Number of vertices of each, coincident ones counted once.
     joints : (R,) int32
-        The joint with the largest weight.
+        The joint with the largest weight in each.
     distances : (R,)
-        From the mean of its vertices to the template, in the target's unit.
+        From the mean of each one's vertices to the template, in the target's unit.
     """
 
     vertices: Ints
@@ -49,7 +49,7 @@ class RigidIslands:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WeightTransfer:
-    """Weights of a target's vertices, and how they were found.
+    """Weights of a target's vertices, and their origin.
 
     Attributes
     ----------
@@ -65,13 +65,13 @@ class WeightTransfer:
     angles : (V,)
         Radians between the normals of both, 0 where the target has none.
     points : SurfacePoints or None
-        The V points of the template that were looked at; None if only its vertices were.
+        The V points of the template that were compared; None if only its vertices were.
     backwards : (V,) bool
         Vertices of parts whose triangles are wound the wrong way.
     rigid : RigidIslands
         Parts without any matched vertex.
     lines : tuple of Diagnostic
-        What a person should know; joints by number, from 0.
+        Messages for the user; joints by number, from 0.
     """
 
     starts: Ints
@@ -92,12 +92,12 @@ class WeightTransfer:
 
 
 def nothing_matched(distances: Floats, size: float) -> str:
-    """Return the message for a target that nowhere meets the template.
+    """Return the message for a target that does not meet the template anywhere.
 
     Parameters
     ----------
     distances : (V,)
-        To the template.
+        Distances from the template.
     size : float
         The target's box diagonal, in the same unit.
     """
@@ -109,7 +109,7 @@ def nothing_matched(distances: Floats, size: float) -> str:
 
 
 def template_lines(skin: Skin) -> tuple[Diagnostic, ...]:
-    """Return what was wrong with the template's weights."""
+    """Return messages about faults of the template's weights."""
     negative = int((skin.weights < 0.0).sum())
     if not negative:
         return ()
@@ -117,16 +117,16 @@ def template_lines(skin: Skin) -> tuple[Diagnostic, ...]:
 
 
 def match_lines(found: Matches, inpainted: Bools, method: str) -> tuple[Diagnostic, ...]:
-    """Return what was matched, turned round and inpainted.
+    """Return messages about matched, reversed and inpainted parts.
 
     Parameters
     ----------
     found : Matches
         Of the welded vertices.
     inpainted : (W,) bool
-        Which of them were solved for.
+        The vertices that were inpainted.
     method : str
-        How; "direct" is the rule.
+        Solver; "direct" by default.
     """
     ratio = float(found.matched.mean())
     values = {
@@ -146,7 +146,7 @@ def match_lines(found: Matches, inpainted: Bools, method: str) -> tuple[Diagnost
 
 
 def rigid_lines(rigid: RigidIslands) -> tuple[Diagnostic, ...]:
-    """Return one remark for each of the largest rigid islands, and how many more there are."""
+    """Return a message for each of the largest rigid islands, and one for the others."""
     order = np.argsort(-rigid.counts, kind="stable")
     lines = [
         Diagnostic(

@@ -13,28 +13,28 @@ from viewer.rig.arrays import Bools, Floats, Ints
 __all__ = ["ROUNDS", "smooth", "within"]
 
 ROUNDS = 10
-_FRACTION = 0.2  # of the neighbours' mean in each iteration
-_NEGLIGIBLE = 1e-6  # weights spread by an edge an iteration; below this they are dropped at the end
+_FRACTION = 0.2  # blend factor of the neighbours' mean in each iteration
+_NEGLIGIBLE = 1e-6  # iterations spread weights by an edge each; smaller ones are dropped at the end
 
 
 def smooth(weights: Any, triangles: Ints, active: Bools, rounds: int = ROUNDS) -> Any:
-    """Mix weights with the mean of their neighbours': w <- 0.8 w + 0.2 mean(w of neighbours).
+    """Blend weights with the mean of their neighbours: w <- 0.8 w + 0.2 mean(w of neighbours).
 
     Parameters
     ----------
     weights : sparse (W, J) in rows
-        Rows that add up to 1 go on doing so.
+        Rows that add up to 1 still do afterwards.
     triangles : (F, 3)
-        Vertex indices; their edges make neighbours.
+        Vertex indices; their edges define neighbours.
     active : (W,) bool
         Vertices that change. The others are only read.
     rounds : int
-        How often.
+        Number of iterations.
 
     Returns
     -------
     sparse (W, J) in rows
-        New weights below 1e-6 are dropped, and rows scaled to the sum they had.
+        New weights below 1e-6 are dropped, and rows rescaled to their previous sum.
     """
     sparse = scipy_part("sparse")
     links = edges(triangles)
@@ -60,7 +60,7 @@ def smooth(weights: Any, triangles: Ints, active: Bools, rounds: int = ROUNDS) -
 
 
 def within(positions: Floats, triangles: Ints, sources: Bools, reach: float) -> Bools:
-    """Return the vertices that a path of edges no longer than ``reach`` joins to a source.
+    """Return the vertices connected to a source by a path of edges no longer than ``reach``.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def within(positions: Floats, triangles: Ints, sources: Bools, reach: float) -> 
     triangles : (F, 3)
         Vertex indices.
     sources : (W,) bool
-        Where paths begin.
+        Where the paths start.
     reach : float
         In the unit of ``positions``.
 

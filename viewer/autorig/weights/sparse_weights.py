@@ -1,4 +1,4 @@
-"""Skin weights as sparse matrices, vertices by joints, and back."""
+"""Conversion of skin weights to sparse matrices, vertices by joints, and back."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from viewer.rig.skin import Skin, limit_influences
 
 __all__ = ["put_rows", "scaled_rows", "skin_of", "weight_matrix"]
 
-_NO_SUM = 1e-12  # weights that add up to less cannot be scaled to a sum
+_NO_SUM = 1e-12  # weights with a smaller sum cannot be normalised
 
 
 def weight_matrix(skin: Skin, triangles: Ints) -> Any:
@@ -22,9 +22,9 @@ def weight_matrix(skin: Skin, triangles: Ints) -> Any:
     Parameters
     ----------
     skin : Skin
-        Rows need not add up to 1; several weights for one joint add up, negative ones become 0.
+        Rows need not add up to 1; repeated weights for a joint are added, negative ones set to 0.
     triangles : (T, 3)
-        Of the same mesh. Vertices of no triangle may go without weights.
+        Of the same mesh. Vertices without triangles may have no weights.
 
     Raises
     ------
@@ -58,7 +58,7 @@ def skin_of(rows: Any, inverse_bind: Floats, max_influences: int | None = None) 
     inverse_bind : (J, 4, 4)
         Bind-space-to-joint matrices.
     max_influences : int, optional
-        The strongest that are kept of each vertex, scaled to a sum of 1; all if omitted.
+        Number of strongest influences kept per vertex, rescaled to a sum of 1; all if omitted.
     """
     rows.sort_indices()
     skin = Skin(rows.indptr, rows.indices, rows.data, inverse_bind)
@@ -74,7 +74,7 @@ def scaled_rows(matrix: Any, factors: Floats) -> Any:
 
 
 def put_rows(rows: Any, where: Any, values: Any) -> Any:
-    """Return sparse rows with those at ``where`` replaced by ``values``, repeats not allowed."""
+    """Return sparse rows with those at ``where`` replaced by ``values``; no repeated indices."""
     sparse = scipy_part("sparse")
     kept = np.ones(rows.shape[0])
     kept[where] = 0.0

@@ -35,16 +35,16 @@ __all__ = ["WeightSettings", "nearest_weights", "transferred_weights"]
 
 @dataclass(frozen=True, slots=True)
 class WeightSettings:
-    """How weights are transferred.
+    """Options of a weight transfer.
 
     Attributes
     ----------
     match : MatchSettings
         When a vertex counts as lying on the template.
     smoothing_rounds : int
-        Iterations of smoothing the inpainted weights and their surroundings; 0 for none.
+        Smoothing iterations of the inpainted weights and their neighbourhoods; 0 for none.
     max_influences : int or None
-        The strongest that are kept of each vertex; None for all.
+        Number of strongest influences kept per vertex; None for all.
     """
 
     match: MatchSettings = field(default_factory=MatchSettings)
@@ -53,7 +53,8 @@ class WeightSettings:
 
     def __post_init__(self) -> None:
         if self.smoothing_rounds < 0:
-            raise RigError(f"smoothing: expected at least 0 rounds, found {self.smoothing_rounds}")
+            found = self.smoothing_rounds
+            raise RigError(f"smoothing: expected at least 0 iterations, found {found}")
         if self.max_influences is not None and self.max_influences < 1:
             raise RigError(f"influences: expected at least 1, found {self.max_influences}")
 
@@ -66,7 +67,7 @@ def transferred_weights(
     settings: WeightSettings,
     report: Report,
 ) -> WeightTransfer:
-    """Transfer weights by closest points, and inpaint what does not meet the template.
+    """Transfer weights by closest points, and inpaint vertices that do not meet the template.
 
     Parameters
     ----------
@@ -79,14 +80,14 @@ def transferred_weights(
     triangles : (T, 3)
         Its triangles.
     settings : WeightSettings
-        Limits of matching, smoothing, how many influences.
+        Limits of matching, smoothing, number of influences.
     report : callable
-        Called with a fraction from 0 to 1 and what is being done; may raise to cancel.
+        Called with a fraction from 0 to 1 and the current step; may raise to cancel.
 
     Returns
     -------
     WeightTransfer
-        Rows add up to 1. No weight of the template is dropped, only solved ones below 1e-6, and
+        Rows add up to 1. No weight of the template is dropped, only inpainted ones below 1e-6, and
         those of corners that have less than 1e-6 of a closest point.
 
     Raises
@@ -101,9 +102,9 @@ def transferred_weights(
         raise RigError(
             f"target: expected a mesh with a size, found {len(positions)} vertices at one place"
         )
-    report(0.0, "joining seams")
+    report(0.0, "welding seams")
     target = weld(positions, triangles)
-    report(0.1, "looking for closest points")
+    report(0.1, "finding closest points")
     found = match(template, target, size, settings.match)
     if not found.matched.any():
         raise RigError(nothing_matched(found.points.distances, size))
@@ -130,7 +131,7 @@ def transferred_weights(
 
 
 def _without_residue(points: SurfacePoints) -> SurfacePoints:
-    """Return points on edges and corners as these: rounding leaves them a little of the rest."""
+    """Return points snapped to edges and corners, without small coordinates left by rounding."""
     kept = np.where(points.barycentric < NEGLIGIBLE, 0.0, points.barycentric)
     return replace(points, barycentric=kept / kept.sum(axis=1, keepdims=True))
 
@@ -145,7 +146,7 @@ def nearest_weights(
     template : (V_S, 3)
         The template's vertices, aligned with the target.
     weights : Skin
-        Theirs; copied as they are.
+        The template's skin; weights are copied unchanged.
     positions : (V, 3)
         The target's vertices.
     max_distance : float
@@ -155,7 +156,7 @@ def nearest_weights(
     Returns
     -------
     WeightTransfer
-        ``angles`` are all 0: this method does not look at them.
+        ``angles`` are all 0: this method does not use them.
     """
     vertices, distances = nearest_vertices(template, positions)
     skin = skin_rows(weights, vertices)
@@ -179,7 +180,7 @@ def nearest_weights(
 def _with_rigid(
     template: Template, source: Any, target: Welded, rows: Any, islands: Any
 ) -> tuple[Any, RigidIslands]:
-    """Give islands without a match the weights closest to the mean of their vertices."""
+    """Give islands without a match the weights of the point closest to their centroid."""
     if len(islands) == 0:
         empty = np.zeros(0, dtype=np.int32)
         return rows, RigidIslands(empty, empty, empty, np.zeros(0))
@@ -205,7 +206,7 @@ def _with_rigid(
 def _inpainted(
     target: Welded, size: float, rows: Any, matched: Bools, unknown: Bools, report: Report
 ) -> tuple[Any, str]:
-    """Solve for the unknown rows on the mesh made of size 1, as the operator has no unit."""
+    """Solve for the unknown rows on the mesh scaled to size 1, as the operator is unitless."""
     if not unknown.any():
         return rows, "direct"
     report(0.5, "measuring the surface")
@@ -227,7 +228,7 @@ def _in_vertices(
     rigid: RigidIslands,
     lines: tuple[Diagnostic, ...],
 ) -> WeightTransfer:
-    """Return what belongs to welded vertices for each of the vertices that they stand for."""
+    """Return arrays of welded vertices expanded to the vertices that they represent."""
     rows = skin_rows(skin, welded)
     points = found.points
     return WeightTransfer(

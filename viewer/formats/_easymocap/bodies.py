@@ -357,7 +357,7 @@ class BodyRows(Rows):
             hands=hands,
             flat_hands=layout.is_flat if flat_hands is None else flat_hands,
             up=up,
-            world_turns=turns,
+            world_rotations=turns,
         )
 
 

@@ -11,7 +11,7 @@ from viewer.formats._archive import describe
 from viewer.formats._pose.named_values import NamedValues
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats
-from viewer.rig.retargeting.pose_transfer import JointTurns
+from viewer.rig.retargeting.pose_transfer import JointRotations
 
 __all__ = ["KEYS", "named_turns", "read_turns"]
 
@@ -31,7 +31,7 @@ _SHORTEST = 1e-6  # of a quaternion: a shorter one says nothing
 _LONGEST_WORD = 200  # characters
 
 
-def read_turns(named: NamedValues) -> JointTurns | None:
+def read_turns(named: NamedValues) -> JointRotations | None:
     """Return the turns in a pose file, None if there are none.
 
     Parameters
@@ -51,7 +51,7 @@ def read_turns(named: NamedValues) -> JointTurns | None:
     turns = _quaternions(named, "joint_turns", names)
     rotations = values.get("joint_rotations")
     shifts = values.get("joint_shifts")
-    return JointTurns(
+    return JointRotations(
         _word(named, "figure", ""),
         names,
         turns / np.linalg.norm(turns, axis=1, keepdims=True),
@@ -64,14 +64,14 @@ def read_turns(named: NamedValues) -> JointTurns | None:
     )
 
 
-def named_turns(turns: JointTurns) -> dict[str, Any]:
+def named_turns(turns: JointRotations) -> dict[str, Any]:
     """Return turns by the names that files have for them; what is at rest is left out."""
     named: dict[str, Any] = {
         "figure": printable(turns.figure, _LONGEST_WORD),
         "up": turns.up,
         "dof_layout": turns.layout,
         "joint_names": list(turns.names),
-        "joint_turns": turns.turns.tolist(),
+        "joint_turns": turns.relative.tolist(),
     }
     if turns.rotations is not None:
         named["joint_rotations"] = turns.rotations.tolist()

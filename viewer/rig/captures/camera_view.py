@@ -1,4 +1,4 @@
-"""A calibrated camera: the point of view of one that recorded a motion."""
+"""Calibrated cameras that recorded a motion."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ __all__ = ["CameraView"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraView:
-    """A pinhole camera as OpenCV has it: x right, y down, z forward.
+    """A pinhole camera in OpenCV's convention: x right, y down, z forward.
 
-    A scene point X is seen at the pixel K (R X + T), divided by its third number.
+    A scene point X is projected to the pixel K (R X + T), divided by its third component.
 
     Attributes
     ----------
     name : str
-        What the files call it.
+        Name in the files.
     intrinsic : (3, 3)
         K, pixels.
     rotation : (3, 3)
@@ -26,7 +26,7 @@ class CameraView:
     translation : (3,)
         T, scene units.
     size : (int, int) or None
-        Width and height of its pictures, if the files say.
+        Width and height of its images, if the files give them.
     distortion : (N,)
         OpenCV's coefficients k1 k2 p1 p2 k3; zeros mean none.
     """
@@ -36,7 +36,7 @@ class CameraView:
     rotation: Floats
     translation: Floats
     size: tuple[int, int] | None = None
-    distortion: Floats = ()  # type: ignore[assignment]  # made an array below
+    distortion: Floats = ()  # type: ignore[assignment]  # converted to an array below
 
     def __post_init__(self) -> None:
         shapes = {"intrinsic": (3, 3), "rotation": (3, 3), "translation": (3,)}

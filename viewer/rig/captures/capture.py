@@ -1,4 +1,4 @@
-"""A recording of several people, read in parts: what a reader of sequences gives."""
+"""Captures: recordings of several people that are read in parts."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ class CapturePart:
     Attributes
     ----------
     stop : int
-        Frames from the capture's first one up to here (not included) have been read.
+        Frames before this one, counted from the capture's first, have been read.
     bodies : mapping of person to BodyMotion
-        Only the rows of this part; their ``timing`` spans the whole capture, -1 elsewhere.
+        Only the rows of this part; their ``timing`` covers the whole capture, -1 elsewhere.
     points : mapping of person to (PointLayout, PointClip)
         The same for keypoints.
     warnings : tuple of Diagnostic
-        What the reader noticed in these frames.
+        Messages from the reader about these frames.
     """
 
     stop: int
@@ -37,27 +37,27 @@ class CapturePart:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Capture:
-    """A sequence that has been looked at but not read.
+    """A sequence that has been opened but not yet read.
 
     Attributes
     ----------
     name : str
-        What menus call it.
+        Display name.
     n_frames : int
         Frames on its timeline, gaps included, F.
     first_frame : int
-        What the files call the first one.
+        Number of the first frame in the files.
     parts : callable
-        Returns an iterator over the parts, in time order, the first one short so that
-        something can be shown; each call reads anew.
+        Returns an iterator over the parts in time order; the first is short so that something
+        can be shown early. Every call reads again.
     up : "y", "z", "-y", "-z" or ""
         The axis that points up in the world; empty to guess from the first bodies.
     views : tuple of CameraView
         Calibrated cameras.
     model : str
-        The member of the SMPL family that its bodies are, e.g. ``"SMPL+H"``; empty for none.
+        The member of the SMPL family that its bodies use, e.g. ``"SMPL+H"``; empty for none.
     warnings : tuple of Diagnostic
-        What was noticed when looking.
+        Messages from opening the sequence.
     """
 
     name: str

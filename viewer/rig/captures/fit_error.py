@@ -1,4 +1,4 @@
-"""How far captured keypoints are from the joints of the body that was fitted to them."""
+"""Distances between captured keypoints and the joints of the body that was fitted to them."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ __all__ = ["fitted_body", "keypoint_distances"]
 
 
 def fitted_body(points: Actor, actors: Sequence[Actor]) -> Actor | None:
-    """Return the body of the same person as captured keypoints, None if there is none.
+    """Return the body of the same person as some captured keypoints, None if there is none.
 
-    People without a track have none: nobody knows whose body it is.
+    Untracked people have none: which body is theirs is unknown.
     """
     for actor in actors:
         same = actor.person == points.person and is_tracked(actor.person)
@@ -28,21 +28,21 @@ def fitted_body(points: Actor, actors: Sequence[Actor]) -> Actor | None:
 
 
 def keypoint_distances(points: Actor, body: Actor) -> dict[str, float]:
-    """Return the distance of each keypoint that is seen to the joint that means the same.
+    """Return the distance from each seen keypoint to the joint it corresponds to.
 
     The joints are the model's own, regressed from its shaped mesh and posed.
 
     Parameters
     ----------
     points : Actor
-        Captured keypoints, as they are now.
+        Captured keypoints, as currently posed.
     body : Actor
         A posed figure with the SMPL family's joint names.
 
     Returns
     -------
     dict of str to float
-        Keypoint names to distances in scene units; empty while one of the two is absent.
+        Keypoint names to distances in scene units; empty if either actor is absent.
     """
     layout, skeleton = points.figure.points, body.figure.skeleton
     if layout is None or points.points is None or skeleton is None or body.pose is None:

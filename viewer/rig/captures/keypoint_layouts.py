@@ -1,6 +1,6 @@
-"""Layouts of captured keypoints, chosen by their number: names, limbs and sides.
+"""Layouts of captured keypoints, chosen by keypoint count: names, limbs and sides.
 
-body25 and the orders of hands and face are OpenPose's, panoptic is CMU's, the others are those of
+body25 and the orders of hands and face are OpenPose's, panoptic is CMU's; the others are those of
 COCO, Human3.6M as EasyMocap orders it (left first), the SMPL family and MediaPipe.
 """
 
@@ -43,7 +43,7 @@ _PANOPTIC = (
     "right_shoulder right_elbow right_wrist right_hip right_knee right_ankle left_eye left_ear "
     "right_eye right_ear"
 )
-# The spec's list ends at the ankles; eyes and ears hang on as they do in body25.
+# The specification's list ends at the ankles; eyes and ears are connected as in body25.
 _PANOPTIC_LIMBS = (
     "0-1 0-2 0-3 3-4 4-5 0-9 9-10 10-11 2-6 2-12 6-7 7-8 12-13 13-14 1-15 15-16 1-17 17-18"
 )
@@ -60,7 +60,7 @@ _MEDIAPIPE_LIMBS = (
     "27-31 28-32"
 )
 _FINGERS = ("thumb", "index", "middle", "ring", "pinky")
-# First keypoint, name, number of them, and whether their line is closed.
+# First keypoint, name, number of keypoints, and whether their line is closed.
 _FACE = (
     (0, "face_contour", 17, False),
     (17, "right_brow", 5, False),
@@ -84,7 +84,7 @@ _WORDS = {
     "mediapipe": (_MEDIAPIPE, _MEDIAPIPE_LIMBS, 33),
 }
 _JOINTS = {"smpl": 24, "smplh": 52, "smplx": 55}
-# Body, hands and face put together; a mesh of 468 points on the face has no names.
+# Layouts of body, hands and face combined; a face mesh of 468 points has no names.
 _SETS = {
     "hand": ("hand",),
     "hands": ("left_hand", "right_hand"),
@@ -118,9 +118,9 @@ TITLES: dict[int, tuple[str, ...]] = {
     535: ("body25_hands_face",),
     543: ("mediapipe_total",),
 }
-"""Layouts by their number of keypoints; the first is meant unless someone says otherwise."""
+"""Layouts by their number of keypoints; the first is the default for its number."""
 
-# Keypoints that SMPLify-X and EasyMocap hold a joint of another name to.
+# Keypoints that SMPLify-X and EasyMocap fit to a joint of another name.
 _SAME = {"mid_hip": "pelvis"}
 _ALIKE = (
     "neck left_shoulder left_elbow left_wrist left_hip left_knee left_ankle right_shoulder "
@@ -136,17 +136,17 @@ def keypoint_layout(count: int, title: str = "") -> PointLayout:
     count : int
         Number of keypoints, K.
     title : str
-        A layout by name, for numbers that several layouts share; empty for the usual one.
+        Name of a layout, for counts that several layouts have; empty for the default.
 
     Returns
     -------
     PointLayout
-        With names ``point0``, ``point1`` … and no limbs if no layout has this number.
+        With names ``point0``, ``point1`` … and no limbs if no layout has this count.
 
     Raises
     ------
     RigError
-        If the layout of that name has another number of keypoints, or there is none.
+        If the named layout does not exist or has another number of keypoints.
 
     >>> keypoint_layout(17).title, keypoint_layout(17, "h36m").names[0]
     ('coco', 'mid_hip')
@@ -183,14 +183,14 @@ def _part(name: str) -> PointLayout:
 
 
 def joined_layout(title: str, parts: Sequence[PointLayout]) -> PointLayout:
-    """Return one layout of several sets of keypoints, one behind the other.
+    """Return one layout of several sets of keypoints, concatenated.
 
-    A hand behind a body grows from the body's wrist: its own is the same point once more.
+    A hand that follows a body is attached to the body's wrist: its own wrist is the same point.
 
     Parameters
     ----------
     title : str
-        What the whole is called.
+        Title of the combined layout.
     parts : sequence of PointLayout
         In the order of the points.
     """
@@ -209,7 +209,7 @@ def joined_layout(title: str, parts: Sequence[PointLayout]) -> PointLayout:
 
 
 def _hand(side: str) -> PointLayout:
-    """Return 21 keypoints: the wrist, then four a finger, the thumb first."""
+    """Return 21 keypoints: the wrist, then four per finger, the thumb first."""
     names = [f"{side}hand_wrist" if side else "wrist"]
     limbs = []
     for finger, label in enumerate(_FINGERS):
@@ -220,7 +220,7 @@ def _hand(side: str) -> PointLayout:
 
 
 def _face(count: int) -> PointLayout:
-    """Return the 70 keypoints of a face, the 51 within its contour, or a mesh without names."""
+    """Return the 70 keypoints of a face, the 51 inside its contour, or an unnamed mesh."""
     if count not in (_FACE_70, _FACE_68 - _CONTOUR):
         return _layout("face", [f"face{index}" for index in range(count)], ())
     names, limbs = [], []
@@ -251,15 +251,15 @@ def _pairs(text: str) -> Pairs:
 
 
 def matching_joints(layout: PointLayout) -> dict[int, str]:
-    """Return which keypoints mean the same as a joint of the SMPL family.
+    """Return the keypoints that correspond to a joint of the SMPL family.
 
     The mapping is SMPLify-X's: limbs, fingers, the neck, and the middle of the hips as the pelvis.
-    Eyes, ears, toes and heels lie on the skin, where no joint is.
+    Eyes, ears, toes and heels lie on the skin, where there is no joint.
 
     Parameters
     ----------
     layout : PointLayout
-        Of keypoints.
+        Layout of the keypoints.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What people of a capture are called: by the number of their track, or untracked."""
+"""Names of people in a capture: the number of their track, or untracked."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ __all__ = ["is_tracked", "person_label", "person_name"]
 
 
 def is_tracked(person: int | None) -> bool:
-    """Return whether a number is a track, which is one person from frame to frame.
+    """Return whether a number is that of a track, which follows one person from frame to frame.
 
-    Capture systems call detections without a track -1; those of one frame are told apart here as
-    -1, -2, -3 …, and the same number in the next frame may be somebody else.
+    Capture systems give detections without a track the number -1. Those of one frame are numbered
+    -1, -2, -3 … here, and the same number in the next frame may be a different person.
     """
     return person is not None and person >= 0
 
 
 def person_name(person: int) -> str:
-    """Return what follows a figure's name.
+    """Return the suffix of a figure's name that identifies a person.
 
     >>> person_name(3), person_name(-1), person_name(-2)
     ('3', 'untracked', 'untracked 2')
@@ -26,7 +26,7 @@ def person_name(person: int) -> str:
 
 
 def person_label(person: int) -> str:
-    """Return what messages call a person.
+    """Return the name of a person in messages.
 
     >>> person_label(3), person_label(-2)
     ('person 3', 'untracked 2')

@@ -1,4 +1,4 @@
-"""Points without a skin: captured 3D keypoints, their limbs, and their motion."""
+"""Captured 3D keypoints: their layout of names and limbs, and their motion."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ __all__ = ["PointClip", "PointLayout", "sample_points"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PointLayout:
-    """What a set of keypoints is called and how it hangs together.
+    """Names and limbs of a set of keypoints.
 
     Attributes
     ----------
     title : str
         ``"body25"``, ``"coco"`` …
     names : tuple of K str
-        In the field's words: ``left_knee``.
+        Standard names: ``left_knee``.
     limbs : (L, 2) int32
         Pairs of keypoints, drawn as lines.
     sides : (K,) int32
@@ -49,11 +49,11 @@ class PointClip:
     Attributes
     ----------
     name : str
-        What menus call it.
+        Display name.
     timing : Timing
         Frame rate, and the row of each frame.
     points : (N, K, 4)
-        x, y, z and confidence; 0 is "not seen", and such a point is nowhere.
+        x, y, z and confidence; confidence 0 means "not seen", and x, y, z are then undefined.
     """
 
     name: str
@@ -74,10 +74,10 @@ class PointClip:
         return self.timing.end
 
 
-def sample_points(clip: PointClip, time: float, fill: bool = False) -> Floats | None:
+def sample_points(clip: PointClip, time: float, interpolate: bool = False) -> Floats | None:
     """Return the points at one time, None where they are absent.
 
-    A point moves in a straight line between two frames that see it; seen in one of the two, it
+    A point moves linearly between two frames that see it. If only one of them sees it, it
     stays there until the other is due.
 
     Parameters
@@ -86,18 +86,20 @@ def sample_points(clip: PointClip, time: float, fill: bool = False) -> Floats | 
         The motion.
     time : float
         Seconds.
-    fill : bool
-        Bridge gaps.
+    interpolate : bool
+        Interpolate across gaps.
 
     Returns
     -------
     (K, 4) or None
         x, y, z, confidence.
     """
-    before, after, share = (part[0] for part in clip.timing.locate(np.array([time]), fill))
+    before, after, fraction = (
+        part[0] for part in clip.timing.locate(np.array([time]), interpolate)
+    )
     if before < 0:
         return None
     start, end = clip.points[before], clip.points[after]
-    mixed = start + share * (end - start)
+    mixed = start + fraction * (end - start)
     both = (start[:, 3] > 0.0) & (end[:, 3] > 0.0)
     return np.where(both[:, None], mixed, start)

@@ -1,4 +1,4 @@
-"""Captured points at a fixed rate: one person's frames, ready for an exporter."""
+"""Captured points at a fixed rate: one person's frames, ready for export."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ class SampledPoints:
     Attributes
     ----------
     name : str
-        What the actor is called.
+        Name of the actor.
     layout : PointLayout
         Names and limbs of the K points.
     frame_rate : float
-        Frames a second.
+        Frames per second.
     first_frame : int
-        What the first frame is called.
+        Number of the first frame.
     times : (F,)
         Seconds.
     present : (F,) bool
-        Whether the person is there at all.
+        Whether the person is present.
     points : (F, K, 3)
-        The unit of the capture; NaN where a point is not seen.
+        In the unit of the capture; NaN where a point is not seen.
     confidences : (F, K)
         0 where a point is not seen.
     """
@@ -56,30 +56,30 @@ def sample_upright_points(
     actor: Actor,
     rate: float | None = None,
     frames: tuple[int, int | None] | None = None,
-    fill: bool = False,
+    interpolate: bool = False,
 ) -> tuple[SampledPoints, Literal["y", "z"]]:
-    """Sample an actor's points, rotated upright where their own world is upside down.
+    """Sample an actor's points, rotated upright if their own world is upside down.
 
     Parameters
     ----------
     scene : Scene
-        Says what is up.
+        Provides the up axis.
     actor : Actor
-        Captured points; where it stands in the scene is left out.
-    rate, frames, fill
+        Captured points; the actor's placement in the scene is ignored.
+    rate, frames, interpolate
         As for ``viewer.rig.motion.sampled_animation.sample_animation``.
 
     Returns
     -------
     animation : SampledPoints
-        Its frames.
+        The sampled frames.
     up : "y" or "z"
         The axis that points up in them.
 
     Raises
     ------
     RigError
-        If the actor has no motion of points, or no frame in that range.
+        If the actor has no motion of points, or no frame in the range.
     """
     motion, layout = actor.clip, actor.figure.points
     if not isinstance(motion, PointClip) or layout is None:
@@ -88,7 +88,7 @@ def sample_upright_points(
     rate = own if rate is None else rate
     first, stop = frame_range(motion, rate, frames)
     times: Floats = motion.start + np.arange(first, stop) / rate
-    sampled = [sample_points(motion, float(time), fill) for time in times]
+    sampled = [sample_points(motion, float(time), interpolate) for time in times]
     nothing = np.zeros((len(layout.names), 4))
     rows = np.stack([nothing if row is None else row for row in sampled])
     up, hangs = own_up(scene, actor)

@@ -1,4 +1,4 @@
-"""Motions in the SMPL family's own parameters, and what they become on a figure."""
+"""Motions in the parameters of the SMPL family, and their conversion to clips of a figure."""
 
 from __future__ import annotations
 
@@ -23,36 +23,36 @@ __all__ = ["BodyMotion", "body_clip", "root_positions"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyMotion:
-    """Rotation vectors by joint names, place, shape and hands of one person.
+    """One person's rotation vectors by joint name, with translation, shape and hands.
 
     Attributes
     ----------
     name : str
-        What menus call it.
+        Display name.
     timing : Timing
         Frame rate, and the row of each frame.
     joint_names : tuple of K str
-        Which joints ``vectors`` turn, the root first.
+        Joints that ``vectors`` rotate, the root first.
     vectors : (N, K, 3)
         Rotation vectors within the parent, radians.
     translations : (N, 3)
         Of the body, metres.
     about_origin : bool
-        True: the root turns about the figure's origin, V = R X + T, as EasyMocap has it. False:
-        about the rest pelvis, V = R (X - J0) + J0 + T, as SMPL has it.
+        True: the root rotates about the figure's origin, V = R X + T, as in EasyMocap. False:
+        about the rest pelvis, V = R (X - J0) + J0 + T, as in SMPL.
     shape, expression : (N, S) or (1, S) or None
-        Coefficients; one row counts for all frames.
+        Coefficients; a single row applies to all frames.
     hands : mapping of "left", "right" or "" to (N, C)
         Coefficients of the hands' principal components, instead of finger joints.
     flat_hands : bool
-        Whether ``hands`` leave the mean hand out.
+        Whether ``hands`` are relative to the flat hand instead of the mean hand.
     up : "y", "z", "-y", "-z" or ""
         The axis that points up in the world; empty if unknown.
     facts : tuple of (str, str)
-        What the file says beside, for ``viewer info``.
-    world_turns : (N, 3) or None
-        Rotation vectors that turn the whole body about the figure's origin after ``vectors`` have
-        posed it, V = W (R (X - J0) + J0) + T; needs ``about_origin`` to be False.
+        Further facts from the file, for ``viewer info``.
+    world_rotations : (N, 3) or None
+        Rotation vectors that rotate the whole body about the figure's origin after ``vectors``
+        have posed it, V = W (R (X - J0) + J0) + T; requires ``about_origin`` to be False.
     """
 
     name: str
@@ -67,7 +67,7 @@ class BodyMotion:
     flat_hands: bool = False
     up: str = ""
     facts: tuple[tuple[str, str], ...] = ()
-    world_turns: Floats | None = None
+    world_rotations: Floats | None = None
 
     def __post_init__(self) -> None:
         def put(name: str, shape: tuple[int | None, ...]) -> None:
@@ -78,7 +78,7 @@ class BodyMotion:
         put("translations", (len(self.vectors), 3))
         put("shape", (None, None))
         put("expression", (None, None))
-        put("world_turns", (len(self.vectors), 3))
+        put("world_rotations", (len(self.vectors), 3))
 
     @property
     def n_rows(self) -> int:
@@ -87,11 +87,11 @@ class BodyMotion:
 
 
 def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[Diagnostic]]:
-    """Return a figure's clip of a body motion: joints found by name.
+    """Return a body motion as a clip of a figure; joints are matched by name.
 
-    With the root turning about the origin, the figure's translation is t = T - J0 + R J0, where
-    J0 is the root joint of the frame's own shape; so the vertices are exactly R X + T. A turn W of
-    the whole body makes the root's rotation W R and the translation T - J0 + W J0.
+    If the root rotates about the origin, the figure's translation is t = T - J0 + R J0, where
+    J0 is the root joint of the frame's own shape, so the vertices are exactly R X + T. A rotation W
+    of the whole body makes the root's rotation W R and the translation T - J0 + W J0.
 
     Parameters
     ----------
@@ -103,9 +103,9 @@ def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[Dia
     Returns
     -------
     clip : SampledClip
-        For that figure.
+        For ``figure``.
     notes : list of Diagnostic
-        What could not be taken over.
+        Messages about data that could not be used.
 
     Raises
     ------
@@ -133,8 +133,8 @@ def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[Dia
     weights, more = _weights(motion, figure)
     rotations = rotation_vector_to_quaternion(vectors)
     translations, turns = motion.translations, None
-    if motion.world_turns is not None:
-        turns = rotation_vector_to_quaternion(motion.world_turns)
+    if motion.world_rotations is not None:
+        turns = rotation_vector_to_quaternion(motion.world_rotations)
         rotations[:, 0] = multiply(turns, rotations[:, 0])
     elif motion.about_origin:
         turns = rotations[:, 0]
@@ -159,7 +159,7 @@ def root_positions(figure: Figure, weights: Floats) -> Floats:
 
 
 def _put_hands(motion: BodyMotion, figure: Figure, vectors: Floats) -> list[Diagnostic]:
-    """Turn the fingers by their components, in place; return what was left out."""
+    """Rotate the fingers by their components, in place; return messages about dropped data."""
     notes: list[Diagnostic] = []
     for side, coefficients in motion.hands.items():
         hand = _hand(figure, side)
@@ -185,7 +185,7 @@ def _hand(figure: Figure, side: str) -> Hand | None:
 
 
 def _weights(motion: BodyMotion, figure: Figure) -> tuple[Floats, list[Diagnostic]]:
-    """Return the blend shape weights of every frame, or one row if they never change."""
+    """Return the blend shape weights of every frame, or one row if they are constant."""
     notes: list[Diagnostic] = []
     groups = figure.blend_shapes.groups if figure.blend_shapes else ()
     given = {"shape": motion.shape, "expression": motion.expression}

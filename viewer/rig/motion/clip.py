@@ -1,4 +1,4 @@
-"""A motion: one curve of keys per DOF, with tangent rules and extrapolation."""
+"""Keyed clips: one curve of keys per DOF, with tangent rules and extrapolation."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ __all__ = [
 
 Extrapolation = Literal["constant", "linear", "cycle", "cycle_offset", "bounce"]
 EXTRAPOLATIONS: tuple[Extrapolation, ...] = get_args(Extrapolation)
-"""What a curve does before its first and after its last key."""
+"""Behaviour of a curve before its first and after its last key."""
 
 SHORTEST = 1e-9
-"""Seconds: keys that are no farther apart lie at one time, and no slope is measured there."""
+"""Seconds: keys at most this far apart count as simultaneous; no slope is measured there."""
 
 TangentRule = Literal["flat", "linear", "smooth"]
 TANGENT_RULES: tuple[TangentRule, ...] = get_args(TangentRule)
@@ -50,7 +50,7 @@ class Channel:
     target : int
         Row of the DOF in the skeleton's table.
     times : (N,)
-        Seconds, never falling.
+        Seconds, non-decreasing.
     values : (N,)
         Lengths or radians.
     tangents : tuple of N (incoming, outgoing)
@@ -72,8 +72,8 @@ class Channel:
         if len(self.tangents) != count:
             raise RigError(f"tangents: expected {count} pairs, found {len(self.tangents)}")
         if (np.diff(self.times) < 0).any():
-            raise RigError("times: expected seconds that never fall")
-        # Thousands of keys share a few pairs.
+            raise RigError("times: expected non-decreasing seconds")
+        # Thousands of keys use a few distinct pairs.
         pairs = {pair: (_tangent(pair[0]), _tangent(pair[1])) for pair in set(self.tangents)}
         object.__setattr__(self, "tangents", tuple(pairs[pair] for pair in self.tangents))
         wrong = next((mode for mode in self.extrapolation if mode not in EXTRAPOLATIONS), None)
@@ -85,7 +85,7 @@ class Channel:
 
 
 def _tangent(given: Tangent) -> Tangent:
-    """Return a rule as it is, a slope as a plain number, which files show in full."""
+    """Return a rule unchanged, a slope as a Python float, which files write in full."""
     if given in TANGENT_RULES:
         return given
     if isinstance(given, str) or not math.isfinite(given):
@@ -100,11 +100,11 @@ class Clip:
     Attributes
     ----------
     name : str
-        What menus call it.
+        Display name.
     channels : tuple of Channel
         One per DOF that moves.
     start, end : float
-        The seconds that are meant to be played; curves go on beyond.
+        Playback range in seconds; the curves continue beyond it.
     """
 
     name: str
@@ -120,10 +120,10 @@ class Clip:
 
 
 def slopes(channel: Channel) -> Floats:
-    """Return the slopes on both sides of every key, as the tangent rules make them.
+    """Return the slopes on both sides of every key, according to their tangent rules.
 
-    flat is 0; linear is the slope of the span on that side; smooth is the slope from the key
-    before to the key after. At the ends both use the only span there is.
+    flat is 0; linear is the slope of the span on that side; smooth is the slope from the previous
+    key to the next. The first and last keys use their only span.
 
     Parameters
     ----------
@@ -160,7 +160,7 @@ def _ratio(rise: Floats, run: Floats) -> Floats:
 def is_course_rig(skeleton: Skeleton) -> bool:
     """Return whether a skeleton's DOFs are those that ``.anim`` channels move, in their order.
 
-    That is: translation x, y, z of the root, then rotations x, y, z of joint 0, 1, 2 and so on.
+    These are translation x, y, z of the root, then rotations x, y, z of joint 0, 1, 2 and so on.
     """
     count = skeleton.n_joints
     if skeleton.n_dofs != 3 + 3 * count:
@@ -176,11 +176,11 @@ def suits(clip: Clip, skeleton: Skeleton) -> bool:
 
 
 def misfit(clip: Clip, skeleton: Skeleton) -> str:
-    """Return why a clip cannot move a skeleton, in words that follow its name; "" if it can."""
+    """Return why a clip cannot move a skeleton, as a phrase that follows its name, or ""."""
     if not is_course_rig(skeleton):
         return (
-            "is no course rig, whose clips move the root along x, y, z and turn each joint about "
-            f"x, y, z: {_strange_joint(skeleton)}"
+            "is not a course rig, whose clips move the root along x, y, z and rotate each joint "
+            f"about x, y, z: {_strange_joint(skeleton)}"
         )
     if len(clip.channels) != skeleton.n_dofs:
         return f"needs {skeleton.n_dofs} (3 + 3 x {skeleton.n_joints} joints)"
@@ -188,7 +188,7 @@ def misfit(clip: Clip, skeleton: Skeleton) -> str:
 
 
 def _strange_joint(skeleton: Skeleton) -> str:
-    """Return the first joint whose DOFs are not those of a course rig, and what they are."""
+    """Return a description of the first joint whose DOFs are not those of a course rig."""
     for joint in range(skeleton.n_joints):
         kinds = [DOF_KINDS[kind] for kind in skeleton.dof_kinds[skeleton.dof_joints == joint]]
         if kinds != list(DOF_KINDS if joint == 0 else DOF_KINDS[3:]):
@@ -198,12 +198,12 @@ def _strange_joint(skeleton: Skeleton) -> str:
 
 
 def check_fit(clip: Clip, skeleton: Skeleton) -> None:
-    """Refuse a clip that was made for another skeleton.
+    """Raise if a clip was made for another skeleton.
 
     Raises
     ------
     RigError
-        With both numbers, or if the DOFs are not those of ``is_course_rig``.
+        If the number of channels or the DOFs do not match; see ``is_course_rig``.
     """
     if not is_course_rig(skeleton):
         raise RigError(f"clip {clip.name}: the skeleton {misfit(clip, skeleton)}")

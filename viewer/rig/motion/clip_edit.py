@@ -1,6 +1,6 @@
-"""Edit keyed clips: every function returns a new channel or clip and leaves the old one alone.
+"""Editing of keyed clips: every function returns a new channel or clip; the original is unchanged.
 
-Keys keep their order and so their index: one that is moved stops at a neighbour that is not.
+Keys keep their order and therefore their indices: a moved key stops at an unmoved neighbour.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ __all__ = [
 ]
 
 _SMOOTH: tuple[Tangent, Tangent] = ("smooth", "smooth")
-_UNCHANGED = 1e-9  # radians or lengths by which a DOF may be off its curve and count as on it
+_UNCHANGED = 1e-9  # radians or lengths: a DOF this close to its curve counts as on it
 
 
 def add_key(
@@ -51,11 +51,11 @@ def add_key(
     value: float | None = None,
     tangents: tuple[Tangent, Tangent] | None = None,
 ) -> tuple[Channel, int]:
-    """Return a channel with a key more, and its index.
+    """Return a channel with one more key, and its index.
 
-    Without value and tangents a key between others leaves the curve exactly as it is: it gets the
-    slope that is there, and neighbours whose rules would see it keep their slopes as numbers.
-    A key that is there already at this time is changed instead.
+    Without value and tangents, a key between others preserves the curve exactly: it gets the
+    slope of the curve there, and neighbours whose rules would see it keep their slopes as numbers.
+    An existing key at this time is changed instead.
 
     Parameters
     ----------
@@ -64,9 +64,9 @@ def add_key(
     time : float
         Seconds.
     value : float, optional
-        Length or radians; where the curve is if omitted.
+        Length or radians; the value of the curve if omitted.
     tangents : (incoming, outgoing), optional
-        Rules or slopes; smooth if a value is given, or outside of the keys.
+        Rules or slopes; smooth by default if a value is given, or outside the keys.
     """
     there = np.flatnonzero(np.abs(channel.times - time) <= SHORTEST)
     if len(there):
@@ -95,7 +95,7 @@ def add_key(
 
 
 def _as_numbers(channel: Channel, key: int) -> tuple[Tangent, Tangent]:
-    """Return a key's tangents with those that follow from its neighbours as numbers."""
+    """Return a key's tangents, with rules that depend on its neighbours converted to slopes."""
     pair = zip(channel.tangents[key], slopes(channel)[key].tolist(), strict=True)
     incoming, outgoing = (
         slope if tangent in ("linear", "smooth") else tangent for tangent, slope in pair
@@ -104,7 +104,7 @@ def _as_numbers(channel: Channel, key: int) -> tuple[Tangent, Tangent]:
 
 
 def slope_at(channel: Channel, time: float) -> float:
-    """Return the derivative of a curve between its keys, value per second; 0 outside of them."""
+    """Return the derivative of a curve between its keys, value per second; 0 outside them."""
     times = channel.times
     if len(times) < 2 or not times[0] <= time <= times[-1]:
         return 0.0
@@ -128,25 +128,25 @@ def move_keys(
     Parameters
     ----------
     channel : Channel
-        With these keys.
+        Containing these keys.
     keys : iterable of int
-        Their indices, which stay the same.
+        Indices, which do not change.
     dt : float
-        Seconds; less if one of them would pass a key that stays.
+        Seconds; reduced where a key would otherwise pass an unmoved key.
     dv : float
         Length or radians.
     gap : float
-        Seconds that must be left to keys that stay, where there are as many now.
+        Minimum distance in seconds to unmoved keys that are at least this far away now.
     """
     moved = np.zeros(len(channel.times), dtype=np.bool_)
     moved[list(keys)] = True
     pairs = np.flatnonzero(moved[1:] != moved[:-1])
     room = np.maximum(np.diff(channel.times)[pairs] - gap, 0.0)
-    later = moved[pairs]  # whose later neighbour stays
+    later = moved[pairs]  # moved keys whose next neighbour is unmoved
     dt = min(dt, float(room[later].min(initial=np.inf)))
     dt = max(dt, -float(room[~later].min(initial=np.inf)))
     times = np.where(moved, channel.times + dt, channel.times)
-    # Rounding must not let a key pass a neighbour by the last bit.
+    # Rounding must not push a key past its neighbour by the last bit.
     back = np.minimum.accumulate(times[::-1])[::-1]
     times = back if dt > 0.0 else np.maximum.accumulate(times)
     values = np.where(moved, channel.values + dv, channel.values)
@@ -160,7 +160,7 @@ def set_key(
     value: float | None = None,
     gap: float = 0.0,
 ) -> Channel:
-    """Return a channel with one key elsewhere; its time stops at its neighbours, see move_keys."""
+    """Return a channel with one key changed; its time stops at its neighbours, see move_keys."""
     times, values = channel.times.copy(), channel.values.copy()
     if time is not None:
         now = channel.times[key]
@@ -175,7 +175,7 @@ def set_key(
 
 
 def delete_keys(channel: Channel, keys: Iterable[int]) -> Channel:
-    """Return a channel without some keys; the others keep their tangents."""
+    """Return a channel without the given keys; the others keep their tangents."""
     stays = np.ones(len(channel.times), dtype=np.bool_)
     stays[list(keys)] = False
     return replace(
@@ -187,12 +187,12 @@ def delete_keys(channel: Channel, keys: Iterable[int]) -> Channel:
 
 
 def set_tangent(channel: Channel, key: int, side: int, tangent: Tangent) -> Channel:
-    """Return a channel with another rule or slope on one side of a key: 0 incoming, 1 outgoing.
+    """Return a channel with a new rule or slope on one side of a key: 0 incoming, 1 outgoing.
 
     Raises
     ------
     RigError
-        If the rule is unknown or the slope no finite number.
+        If the rule is unknown or the slope is not finite.
     """
     pairs = list(channel.tangents)
     incoming, outgoing = pairs[key]
@@ -201,13 +201,13 @@ def set_tangent(channel: Channel, key: int, side: int, tangent: Tangent) -> Chan
 
 
 def set_extrapolation(channel: Channel, side: int, mode: Extrapolation) -> Channel:
-    """Return a channel with another mode on one side of its keys: 0 before, 1 after."""
+    """Return a channel with a new extrapolation before (side 0) or after (side 1) its keys."""
     before, after = channel.extrapolation
     return replace(channel, extrapolation=(before, mode) if side else (mode, after))
 
 
 def with_channel(clip: Clip, target: int, change: Callable[[Channel], Channel]) -> Clip:
-    """Return a clip with one channel changed, or added if there is none for this DOF yet.
+    """Return a clip with one channel changed, or added if the DOF has none yet.
 
     Parameters
     ----------
@@ -216,7 +216,7 @@ def with_channel(clip: Clip, target: int, change: Callable[[Channel], Channel]) 
     target : int
         Row of the DOF in the skeleton's table.
     change : callable
-        Makes the new channel of the old one.
+        Returns the new channel for the old one.
     """
     known = {channel.target for channel in clip.channels}
     if target not in known:
@@ -235,39 +235,39 @@ def _no_keys(target: int) -> Channel:
 
 
 def set_range(clip: Clip, start: float, end: float) -> Clip:
-    """Return a clip that is meant to be played from one time to another, put in order."""
+    """Return a clip with a new playback range; the two times are sorted."""
     return replace(clip, start=min(start, end), end=max(start, end))
 
 
 def empty_clip(skeleton: Skeleton, name: str, start: float = 0.0, end: float = 1.0) -> Clip:
-    """Return a clip with a channel without keys for every DOF; it holds them all at 0."""
+    """Return a clip with a channel without keys for every DOF, which evaluates to 0."""
     return Clip(name, tuple(map(_no_keys, range(skeleton.n_dofs))), start, end)
 
 
 def clip_from_pose(
     skeleton: Skeleton, pose: Pose, name: str, start: float = 0.0, end: float = 1.0
 ) -> Clip:
-    """Return a clip with one key per DOF, at its start: a pose that stays."""
+    """Return a clip with one key per DOF, at its start: a constant pose."""
     return key_pose(empty_clip(skeleton, name, start, end), skeleton, pose, start)
 
 
 def key_pose(
     clip: Clip, skeleton: Skeleton, pose: Pose, time: float, only_changed: bool = False
 ) -> Clip:
-    """Return a clip that has a pose's DOFs as keys at one time.
+    """Return a clip with a pose's DOFs keyed at one time.
 
     Parameters
     ----------
     clip : Clip
-        Of that skeleton; a range that ends before the time, or begins after it, grows to it.
+        Of that skeleton; its range is extended to include the time.
     skeleton : Skeleton
-        Gives the limits.
+        Provides the limits.
     pose : Pose
         Lengths and radians.
     time : float
         Seconds.
     only_changed : bool
-        Leave out DOFs that the clip, within their limits, has there already.
+        Skip DOFs that the clip, clamped to their limits, already has at that time.
     """
     targets, values = evaluate_all(clip, np.array([time]))
     now = np.zeros(skeleton.n_dofs)
@@ -294,20 +294,20 @@ def clip_from_frames(
     Parameters
     ----------
     name : str
-        What menus call it.
+        Display name.
     dofs : (F, D)
-        Lengths and radians. A DOF that never moves gets a single key.
+        Lengths and radians. A constant DOF gets a single key.
     times : (F,)
         Seconds, rising.
     rule : Tangent
-        On both sides of every key: straight lines, or smooth ones.
+        Tangent rule on both sides of every key.
     present : (F,) bool, optional
         Frames that get keys; all if omitted.
 
     Raises
     ------
     RigError
-        If there is no frame.
+        If there are no frames.
     """
     keep = np.ones(len(times), dtype=np.bool_) if present is None else present
     if not keep.any():

@@ -1,4 +1,4 @@
-"""Values of keyed curves at given times, and poses made of them."""
+"""Values of keyed curves at given times, and the poses they give."""
 
 from __future__ import annotations
 
@@ -37,14 +37,14 @@ def evaluate(channel: Channel, times: Floats) -> Floats:
 
 
 def sample(clip: Clip, skeleton: Skeleton, time: float, out: Pose) -> None:
-    """Set a pose's DOFs to where a clip has them at one time, within their limits.
+    """Set a pose's DOFs to a clip's values at one time, clamped to their limits.
 
     Parameters
     ----------
     clip : Clip
         The motion.
     skeleton : Skeleton
-        Gives the limits; the clip must fit it, see ``check_fit``.
+        Provides the limits; the clip must fit it, see ``check_fit``.
     time : float
         Seconds; before ``start`` and after ``end`` the curves extrapolate.
     out : Pose

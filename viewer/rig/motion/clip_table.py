@@ -1,4 +1,4 @@
-"""Keyed curves of many channels at many times, as one table: no loop over channels or times."""
+"""Vectorised evaluation of keyed curves: many channels at many times, without Python loops."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _MODES: dict[str, int] = {mode: index for index, mode in enumerate(EXTRAPOLATION
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class _Table:
-    """C channels with up to K keys; unused keys lie at infinity."""
+    """C channels with up to K keys; unused keys are at infinity."""
 
     targets: Ints  # (C,)
     times: Floats  # (C, K)
@@ -32,7 +32,7 @@ _tables: Memo[Clip, _Table] = Memo(kept=1)
 
 
 def evaluate_all(clip: Clip, times: Floats) -> tuple[Ints, Floats]:
-    """Return all curves of a clip at many times; the formula is that of ``clip_sampling.evaluate``.
+    """Return the values of all curves of a clip at many times; see ``clip_sampling.evaluate``.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def evaluate_all(clip: Clip, times: Floats) -> tuple[Ints, Floats]:
 
 
 def evaluate_channels(channels: Sequence[Channel], times: Floats) -> Floats:
-    """Return some curves at many times, without remembering anything: (T, C) for times (T,)."""
+    """Return the values of some curves at many times, uncached: (T, C) for times (T,)."""
     return _values(_table(channels), times)
 
 
@@ -66,7 +66,7 @@ def _values(table: _Table, times: Floats) -> Floats:
     at_first, at_last = table.values[:, 0], table.values[every, table.last]
     is_flat = last - first <= SHORTEST
     inside, shift = _inside(table, times, first, last, np.where(is_flat, 1.0, last - first))
-    # The ends are given out as they are: of several keys at one time, the outer one counts.
+    # The ends are returned unchanged: of several keys at one time, the outer one counts.
     values = np.where(inside >= last, at_last, _hermite(table, inside))
     values = np.where((inside <= first) & (times < first), at_first, values) + shift
     return np.where(is_flat, at_last, values)
@@ -95,11 +95,11 @@ def _table(channels: Sequence[Channel]) -> _Table:
 def _inside(
     table: _Table, times: Floats, first: Floats, last: Floats, period: Floats
 ) -> tuple[Floats, Floats]:
-    """Return where inside its keys each curve is, and what is added to its value: (T, C)."""
+    """Return each curve's time mapped into its key range, and its value offset: (T, C)."""
     every = np.arange(len(table.targets))
     inside = np.clip(times, first, last)
     shift = np.zeros(inside.shape)
-    # The remainder is exact, however far away the time and however short the period.
+    # The remainder is exact for any distant time and any short period.
     turns, rest = np.divmod(times - first, period)
     folded = np.minimum(first + rest, last)
     mirrored = np.where(turns % 2 != 0, first + last - folded, folded)
@@ -119,7 +119,7 @@ def _inside(
 
 
 def _spans(table: _Table, times: Floats) -> Ints:
-    """Return the key before each time: (T, C)."""
+    """Return the index of the key before each time: (T, C)."""
     most = np.maximum(table.last - 1, 0)
     if len(times) * table.times.size <= 1 << 16:
         found = (table.times <= times[:, :, None]).sum(axis=2) - 1

@@ -1,4 +1,4 @@
-"""What moves actors: posing one at a time, and many frames of one as arrays."""
+"""Evaluation of motions: posing a single actor, and many frames of one as arrays."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ __all__ = [
 ]
 
 DEFAULT_RATE = 30.0
-"""Frames a second of motions that do not say."""
+"""Frames per second of motions without a frame rate of their own."""
 
 _FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
 
@@ -55,13 +55,13 @@ class Frames:
     times : (F,)
         Seconds.
     present : (F,) bool
-        Where False, the other rows mean nothing.
+        Rows where it is False are undefined in the other arrays.
     rotations : (F, J, 4)
-        Each joint's whole rotation within its parent: unit quaternions (x, y, z, w).
+        Each joint's complete rotation within its parent: unit quaternions (x, y, z, w).
     translations : (F, J, 3)
-        Added to the joints' rest translations, DOFs included.
+        Offsets from the joints' rest translations, DOFs included.
     shape_weights : (F, S) or (1, S)
-        Of the figure's blend shapes; one row counts for all.
+        Of the figure's blend shapes; a single row applies to all frames.
     figure_translations, figure_scales : (F, 3), (F,)
         Of the whole figure.
     """
@@ -93,34 +93,34 @@ def time_span(actors: Iterable[Actor]) -> tuple[float, float]:
 
 
 def frame_rate(motion: Motion | None) -> float:
-    """Return a motion's frames a second; ``DEFAULT_RATE`` for keyed clips, which have none."""
+    """Return a motion's frames per second; ``DEFAULT_RATE`` for keyed clips, which have none."""
     return motion.timing.frame_rate if isinstance(motion, SampledClip | PointClip) else DEFAULT_RATE
 
 
 def scene_rate(actors: Iterable[Actor]) -> float:
-    """Return the frames a second by which a scene is counted: those of its longest capture."""
+    """Return the frames per second of a scene's timeline: those of its longest capture."""
     clips = [actor.clip for actor in actors if isinstance(actor.clip, SampledClip | PointClip)]
     return frame_rate(max(clips, key=lambda clip: clip.end - clip.start, default=None))
 
 
-def pose_actor(actor: Actor, time: float, fill: bool = False) -> None:
-    """Pose an actor by its clip as it is at one time of the scene's clock, in place.
+def pose_actor(actor: Actor, time: float, interpolate: bool = False) -> None:
+    """Pose an actor by its clip at one time of the scene's clock, in place.
 
     Parameters
     ----------
     actor : Actor
-        ``pose``, ``points`` and ``is_present`` change; without a clip nothing does.
+        Its ``pose``, ``points`` and ``is_present`` change; without a clip nothing changes.
     time : float
-        Seconds; the actor's own ``offset`` is taken off.
-    fill : bool
-        Bridge gaps of captures instead of leaving the actor out.
+        Seconds; the actor's own ``offset`` is subtracted.
+    interpolate : bool
+        Interpolate across gaps of captures instead of marking the actor as absent.
     """
     clip, skeleton, own = actor.clip, actor.figure.skeleton, time - actor.offset
     if isinstance(clip, PointClip):
-        actor.points = sample_points(clip, own, fill)
+        actor.points = sample_points(clip, own, interpolate)
         actor.is_present = actor.points is not None
     elif isinstance(clip, SampledClip) and skeleton is not None and actor.pose is not None:
-        rows = sample_rows(clip, np.array([own]), fill)
+        rows = sample_rows(clip, np.array([own]), interpolate)
         actor.is_present = bool(rows.present[0])
         if actor.is_present:
             _apply(rows, 0, skeleton, actor.pose)
@@ -137,7 +137,7 @@ def _apply(rows: SampledRows, row: int, skeleton: Skeleton, pose: Pose) -> None:
 
 
 def place_pose(pose: Pose, rows: SampledRows, row: int) -> None:
-    """Give a pose what a clip has at one time beside the joints' rotations, in place."""
+    """Apply all of a clip's data at one time except joint rotations to a pose, in place."""
     if rows.translations is not None:
         pose.translations[:] = rows.translations[row]
     if rows.figure_translations is not None:
@@ -154,7 +154,7 @@ def frames_of(
     motion: Clip | SampledClip,
     times: Floats,
     base: Pose | None = None,
-    fill: bool = False,
+    interpolate: bool = False,
 ) -> Frames:
     """Return a figure's poses at many times.
 
@@ -165,16 +165,16 @@ def frames_of(
     motion : Clip or SampledClip
         Of that skeleton.
     times : (F,)
-        Seconds of the motion's own clock.
+        Seconds on the motion's own clock.
     base : Pose, optional
-        Gives shape and place where the motion has none; the figure's own if omitted.
-    fill : bool
-        Bridge gaps.
+        Provides shape and placement where the motion has none; the figure's own if omitted.
+    interpolate : bool
+        Interpolate across gaps.
 
     Raises
     ------
     RigError
-        If the figure has no skeleton, or not the motion's number of joints.
+        If the figure has no skeleton, or the joint counts differ.
     """
     skeleton = figure.skeleton
     if skeleton is None:
@@ -188,7 +188,7 @@ def frames_of(
             f"clip {motion.name} has {motion.n_joints} joints, figure {figure.name} has "
             f"{skeleton.n_joints}"
         )
-    rows, count = sample_rows(motion, times, fill), len(times)
+    rows, count = sample_rows(motion, times, interpolate), len(times)
     still = np.zeros((count, skeleton.n_joints, 3))
     place = np.tile(pose.figure_translation, (count, 1))
     weights = pose.shape_weights[None] if rows.shape_weights is None else rows.shape_weights
@@ -227,7 +227,7 @@ def _keyed_frames(skeleton: Skeleton, clip: Clip, times: Floats, pose: Pose) -> 
 
 
 def pose_of(figure: Figure, frames: Frames, frame: int) -> Pose:
-    """Return one frame as a pose of its own."""
+    """Return one frame as a separate pose."""
     pose = figure_pose(figure)
     row = SampledRows(
         frames.present,
@@ -242,7 +242,7 @@ def pose_of(figure: Figure, frames: Frames, frame: int) -> Pose:
 
 
 def frames_between(frames: Frames, rows: slice | NDArray[np.intp]) -> Frames:
-    """Return some of the frames; one shape for all of them stays one."""
+    """Return some of the frames; a shape shared by all frames stays a single row."""
     weights = frames.shape_weights
     return Frames(
         frames.times[rows],
@@ -256,7 +256,7 @@ def frames_between(frames: Frames, rows: slice | NDArray[np.intp]) -> Frames:
 
 
 def world_frames(figure: Figure, frames: Frames) -> Floats:
-    """Return where every joint is in every frame: forward kinematics of all frames at once.
+    """Return every joint's world matrix in every frame: forward kinematics of all frames at once.
 
     Parameters
     ----------
@@ -268,7 +268,7 @@ def world_frames(figure: Figure, frames: Frames) -> Floats:
     Returns
     -------
     (F, J, 4, 4)
-        Joint space to figure space, the figure's own scale and translation included.
+        Joint space to figure space, including the figure's own scale and translation.
     """
     skeleton = figure.require_skeleton()
     count = frames.n_frames
@@ -287,7 +287,7 @@ def world_frames(figure: Figure, frames: Frames) -> Floats:
 
 
 def rest_translations_of(figure: Figure, shape_weights: Floats) -> Floats:
-    """Return the rest translations of many shapes: (F, J, 3) for weights (F, S)."""
+    """Return the rest translations for many shapes: (F, J, 3) for weights (F, S)."""
     skeleton = figure.require_skeleton()
     if not shape_weights.any():
         return skeleton.rest_translations[None]

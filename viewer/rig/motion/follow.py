@@ -1,4 +1,4 @@
-"""Where a camera that follows somebody looks."""
+"""Target of a camera that follows an actor."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ __all__ = ["followed_point"]
 
 
 def followed_point(actor: Actor, joint: int = -1) -> Floats | None:
-    """Return a joint's place, or the middle of all joints or captured points.
+    """Return a joint's position, or the mean of all joints or captured points.
 
     Parameters
     ----------
     actor : Actor
         Posed and placed.
     joint : int
-        Index of a joint or keypoint; -1 for the middle.
+        Index of a joint or keypoint; -1 for the mean.
 
     Returns
     -------

@@ -1,6 +1,6 @@
-"""Many actors of one figure at once: posed by their clips, and their joints' matrices.
+"""Instances: many actors of one figure posed together, and their joint matrices.
 
-Nothing here computes actor by actor; numbers are only copied into each one's own pose.
+All computation is vectorised over actors; only copying results into each pose is per actor.
 """
 
 from __future__ import annotations
@@ -41,20 +41,20 @@ __all__ = [
 _FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
 
 
-def pose_actors(actors: Iterable[Actor], time: float, fill: bool = False) -> None:
-    """Pose actors by their clips as they are at one time of the scene's clock, in place.
+def pose_actors(actors: Iterable[Actor], time: float, interpolate: bool = False) -> None:
+    """Pose actors by their clips at one time of the scene's clock, in place.
 
-    Actors that share figure and clip, each at its own offset, are posed together; the result is
-    that of ``viewer.rig.motion.evaluation.pose_actor`` for each.
+    Actors with the same figure and clip, each at its own offset, are posed together; the result
+    equals that of ``viewer.rig.motion.evaluation.pose_actor`` for each.
 
     Parameters
     ----------
     actors : iterable of Actor
-        Those without a clip stay as they are.
+        Those without a clip are unchanged.
     time : float
-        Seconds; each actor's own ``offset`` is taken off.
-    fill : bool
-        Bridge gaps of captures instead of leaving actors out.
+        Seconds; each actor's own ``offset`` is subtracted.
+    interpolate : bool
+        Interpolate across gaps of captures instead of marking actors as absent.
     """
     groups: dict[tuple[int, int], list[Actor]] = {}
     for actor in actors:
@@ -68,14 +68,14 @@ def pose_actors(actors: Iterable[Actor], time: float, fill: bool = False) -> Non
         if isinstance(clip, Clip) and skeleton is not None:
             _pose_by_curves(clip, skeleton, poses, times)
         elif isinstance(clip, SampledClip) and skeleton is not None and _takes_any(skeleton):
-            _pose_by_frames(group, clip, skeleton, times, fill)
+            _pose_by_frames(group, clip, skeleton, times, interpolate)
         else:
             for actor in group:
-                pose_actor(actor, time, fill)
+                pose_actor(actor, time, interpolate)
 
 
 def _takes_any(skeleton: Skeleton) -> bool:
-    """Return whether the DOFs of every joint can take any rotation."""
+    """Return whether the DOFs of every joint can represent any rotation."""
     return bool((rotation_rows(skeleton) >= 0).all())
 
 
@@ -88,10 +88,10 @@ def _pose_by_curves(clip: Clip, skeleton: Skeleton, poses: list[Pose], times: Fl
 
 
 def _pose_by_frames(
-    actors: list[Actor], clip: SampledClip, skeleton: Skeleton, times: Floats, fill: bool
+    actors: list[Actor], clip: SampledClip, skeleton: Skeleton, times: Floats, interpolate: bool
 ) -> None:
-    """Pose by captured rotations; every joint takes any rotation as its DOFs."""
-    balls, rows = rotation_rows(skeleton), sample_rows(clip, times, fill)
+    """Pose by captured rotations, for skeletons whose joints' DOFs represent any rotation."""
+    balls, rows = rotation_rows(skeleton), sample_rows(clip, times, interpolate)
     base = quaternion_to_matrix(skeleton.rest_rotations)
     within = np.swapaxes(base, -1, -2) @ quaternion_to_matrix(rows.rotations)
     dofs = np.stack([actor.pose.dofs for actor in actors if actor.pose is not None])
@@ -126,16 +126,16 @@ def local_rotations(skeleton: Skeleton, poses: Sequence[Pose]) -> Floats:
 
 
 def worlds(skeleton: Skeleton, poses: Sequence[Pose], rotations: Floats | None = None) -> Floats:
-    """Return where poses put every joint; see ``viewer.rig.kinematics.world_matrices``.
+    """Return the world matrices of poses; see ``viewer.rig.kinematics.world_matrices``.
 
     Parameters
     ----------
     skeleton : Skeleton
-        Of the figure, already shaped; all poses have this shape.
+        Of the figure, with its shape applied; all poses have this shape.
     poses : sequence of A Pose
         DOFs in lengths and radians.
     rotations : (A, J, 3, 3), optional
-        Their ``local_rotations``, if they are known.
+        Their ``local_rotations``, if already computed.
 
     Returns
     -------
@@ -143,7 +143,7 @@ def worlds(skeleton: Skeleton, poses: Sequence[Pose], rotations: Floats | None =
         Joint-to-figure matrices.
     """
     rotations = local_rotations(skeleton, poses) if rotations is None else rotations
-    # Joints come first: kinematics takes one matrix or a whole row of them alike.
+    # Joints come first: kinematics takes one matrix per joint or a row of them.
     local = np.zeros((skeleton.n_joints, len(poses), 4, 4))
     local[..., 3, 3] = 1.0
     scales = np.stack([pose.scales for pose in poses])
@@ -161,16 +161,16 @@ def worlds(skeleton: Skeleton, poses: Sequence[Pose], rotations: Floats | None =
 def posed_worlds(
     skeleton: Skeleton, poses: Sequence[Pose], rotations: Floats | None = None
 ) -> Floats:
-    """Return ``worlds``, computed together for poses that do not keep their own, which then do.
+    """Return ``worlds``, computed in one batch for poses without cached matrices, which are cached.
 
     Parameters
     ----------
     skeleton : Skeleton
-        Of the figure, already shaped; all poses have this shape.
+        Of the figure, with its shape applied; all poses have this shape.
     poses : sequence of A Pose
         At least one; DOFs in lengths and radians.
     rotations : (A, J, 3, 3), optional
-        Their ``local_rotations``, if they are known.
+        Their ``local_rotations``, if already computed.
 
     Returns
     -------
@@ -196,12 +196,12 @@ def palettes(figure: Figure, poses: Sequence[Pose]) -> Floats:
     figure : Figure
         With skeleton and skin.
     poses : sequence of A Pose
-        At least one; their shape is that of the first.
+        At least one; all have the shape of the first.
 
     Returns
     -------
     (A, J, 4, 4)
-        Bind-to-posed matrices; the figure's own place is not part of them.
+        Bind-to-posed matrices, without the figure's own placement.
     """
     figure = shaped(figure, poses[0].shape_weights)
     return skinning_matrices(

@@ -1,4 +1,4 @@
-"""Paths of joints and captured points over time."""
+"""Motion paths of joints and captured points."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from viewer.rig.scene import Motion
 
 __all__ = ["MotionPath", "motion_path", "path_times", "segments"]
 
-_KEYED_RATE = 60.0  # points a second along curves, which have no frames of their own
-_MOST = 20_000  # points of one path along curves
-_BLOCK = 1 << 14  # matrices at a time, which bounds the memory of long captures
+_KEYED_RATE = 60.0  # points per second along curves, which have no frames of their own
+_MOST = 20_000  # maximum number of points of a path along curves
+_BLOCK = 1 << 14  # matrices per batch, which bounds the memory of long captures
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionPath:
-    """Where some joints of a figure are at F times.
+    """Positions of some joints of a figure at F times.
 
     Attributes
     ----------
     times : (F,)
-        Seconds of the motion's own clock.
+        Seconds on the motion's own clock.
     points : (F, N, 3)
-        Figure space, the figure's own place and scale included.
+        Figure space, including the figure's own placement and scale.
     present : (F, N) bool
-        Where False, the point means nothing.
+        Points where it is False are undefined.
     """
 
     times: Floats
@@ -42,7 +42,7 @@ class MotionPath:
 
 
 def path_times(motion: Motion) -> Floats:
-    """Return the times at which a path is drawn: a capture's frames, 60 a second on curves."""
+    """Return the sampling times of a path: a capture's frames, 60 per second on curves."""
     if isinstance(motion, Clip):
         length = motion.end - motion.start
         steps = int(min(np.ceil(length * _KEYED_RATE - 1e-6), _MOST - 1))
@@ -64,17 +64,17 @@ def motion_path(
     Parameters
     ----------
     figure : Figure
-        With a skeleton, or made of points if the motion is.
+        With a skeleton, or made of points for a ``PointClip``.
     motion : Motion
         Of that figure.
     joints : sequence of N int
         Joints, or points of a ``PointClip``.
     times : (F,), optional
-        Seconds of the motion's own clock; ``path_times`` if omitted.
+        Seconds on the motion's own clock; ``path_times`` if omitted.
     base : Pose, optional
-        Gives shape and place where the motion has none.
+        Provides shape and placement where the motion has none.
     min_confidence : float
-        Less certain points are absent; those that were not seen always are.
+        Points with lower confidence are absent; unseen points always are.
 
     Raises
     ------
@@ -110,7 +110,7 @@ def _point_path(
 
 
 def segments(path: MotionPath) -> tuple[Floats, Floats, Ints]:
-    """Return the pieces between neighbouring times that both have the point: gaps break the line.
+    """Return the segments between successive times at which the point is present.
 
     Returns
     -------

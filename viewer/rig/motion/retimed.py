@@ -1,4 +1,4 @@
-"""Sampled animations whose frames come at another rate."""
+"""Sampled animations played at another frame rate."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ __all__ = ["with_rate"]
 
 
 def with_rate(clip: SampledClip | PointClip, rate: float) -> SampledClip | PointClip:
-    """Return a clip with the same frames at another rate; its first frame stays when it is.
+    """Return a clip with the same frames at another rate; its start time is unchanged.
 
     Parameters
     ----------
     clip : SampledClip or PointClip
-        Itself returned if it has that rate.
+        Returned unchanged if it already has that rate.
     rate : float
-        Frames a second.
+        Frames per second.
     """
     if clip.timing.frame_rate == rate:
         return clip

@@ -1,4 +1,4 @@
-"""Sampled animations: an actor's poses at a fixed rate, ready for an exporter."""
+"""Sampled animations: an actor's poses at a fixed rate, ready for export."""
 
 from __future__ import annotations
 
@@ -29,24 +29,24 @@ __all__ = ["SampledAnimation", "frame_range", "frames_at", "sample_animation", "
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SampledAnimation:
-    """A figure in many poses.
+    """A figure with one pose per frame.
 
     Attributes
     ----------
     name : str
-        What the actor is called.
+        Name of the actor.
     figure : Figure
-        Unshaped; ``frames`` holds the shape.
+        Without shape; the shape is in ``frames``.
     frame_rate : float
-        Frames a second.
+        Frames per second.
     first_frame : int
-        What the first frame is called.
+        Number of the first frame.
     frames : Frames
         Poses, in time order; gaps are in ``frames.present``.
     motion : Clip or SampledClip
-        What the frames were sampled from.
+        The motion that the frames were sampled from.
     base : Pose or None
-        Gives what the motion leaves alone.
+        Provides what the motion does not animate.
     is_rotated : bool
         Whether the frames are rotated upright, see ``upright_animation``; the motion never is.
     """
@@ -65,7 +65,7 @@ def sample_animation(
     actor: Actor,
     rate: float | None = None,
     frames: tuple[int, int | None] | None = None,
-    fill: bool = False,
+    interpolate: bool = False,
 ) -> SampledAnimation:
     """Sample an actor's clip at a fixed rate.
 
@@ -74,17 +74,17 @@ def sample_animation(
     actor : Actor
         With a clip.
     rate : float, optional
-        Frames a second; the clip's own if omitted, so that captured frames come back exactly.
+        Frames per second; the clip's own if omitted, which reproduces captured frames exactly.
     frames : (int, int), optional
-        First frame and the one behind the last (None: the clip's end), counted from the clip's
+        First frame and end frame, exclusive (None: the clip's end), counted from the clip's
         start at that rate; all if omitted.
-    fill : bool
-        Bridge gaps: rotations on the shorter arc.
+    interpolate : bool
+        Interpolate across gaps: rotations along the shorter arc.
 
     Raises
     ------
     RigError
-        If there is no clip, or no frame in that range.
+        If there is no clip, or no frame in the range.
     """
     motion, figure = actor.clip, actor.figure
     if not isinstance(motion, Clip | SampledClip) or figure.skeleton is None:
@@ -94,13 +94,13 @@ def sample_animation(
     first, stop = frame_range(motion, rate, frames)
     times: Floats = motion.start + np.arange(first, stop) / rate
     shift = motion.timing.first_frame if isinstance(motion, SampledClip) and rate == own else 0
-    sampled = frames_of(figure, motion, times, actor.pose, fill)
+    sampled = frames_of(figure, motion, times, actor.pose, interpolate)
     base = None if actor.pose is None else actor.pose.copy()
     return SampledAnimation(actor.name, figure, rate, first + shift, sampled, motion, base)
 
 
 def frames_at(animation: SampledAnimation, times: Floats) -> Frames:
-    """Sample an animation's motion at any times, rotated upright if its frames are: (T,) s."""
+    """Sample an animation's motion at given times (T,) s, rotated upright if its frames are."""
     found = frames_of(animation.figure, animation.motion, times, animation.base)
     return _rotated_upright(animation.figure, found) if animation.is_rotated else found
 
@@ -108,18 +108,18 @@ def frames_at(animation: SampledAnimation, times: Floats) -> Frames:
 def frame_range(
     motion: Motion, rate: float, frames: tuple[int, int | None] | None
 ) -> tuple[int, int]:
-    """Return the first frame and the one behind the last; arguments as for ``sample_animation``.
+    """Return the first frame and the exclusive end; arguments as for ``sample_animation``.
 
     Raises
     ------
     RigError
-        If no frame is in that range.
+        If no frame is in the range.
     """
     count = int(np.floor((motion.end - motion.start) * rate + 1e-6)) + 1
     first, asked = (0, None) if frames is None else frames
     stop = count if asked is None else asked
     if isinstance(motion, SampledClip | PointClip):
-        stop = min(stop, count)  # curves go on behind their keys, captures do not
+        stop = min(stop, count)  # curves extend beyond their keys, captures do not
     if not 0 <= first < stop:
         found = f"{first} to {'the end' if asked is None else asked}"
         raise RigError(f"frames: expected a range within 0 to {count}, found {found}")
@@ -131,7 +131,7 @@ def upright_animation(
     actor: Actor,
     rate: float | None = None,
     frames: tuple[int, int | None] | None = None,
-    fill: bool = False,
+    interpolate: bool = False,
     keeps_world: bool = False,
 ) -> tuple[SampledAnimation, str]:
     """Sample an actor's clip, rotated upright where its own world is upside down.
@@ -139,20 +139,20 @@ def upright_animation(
     Parameters
     ----------
     scene : Scene
-        Says what is up.
-    actor, rate, frames, fill
-        As for ``sample_animation``. Where the actor stands in the scene is left out.
+        Provides the up axis.
+    actor, rate, frames, interpolate
+        As for ``sample_animation``. The actor's placement in the scene is ignored.
     keeps_world : bool
-        Leave it as its own world has it, for formats that keep a capture's numbers.
+        Keep the orientation of its own world, for formats that preserve a capture's numbers.
 
     Returns
     -------
     animation : SampledAnimation
-        Its frames.
+        The sampled frames.
     up : "y", "z", "-y" or "-z"
-        The axis that points up in them; the last two only in a world that is kept.
+        The axis that points up in them; the last two only if the world is kept.
     """
-    animation = sample_animation(actor, rate, frames, fill)
+    animation = sample_animation(actor, rate, frames, interpolate)
     up, hangs = own_up(scene, actor)
     if not hangs:
         return animation, up
@@ -164,7 +164,7 @@ def upright_animation(
 
 
 def _rotated_upright(figure: Figure, frames: Frames) -> Frames:
-    """Return the frames rotated by 180 degrees about x: the root, and the way to it.
+    """Return the frames rotated by 180 degrees about x: the root's rotation and its path.
 
     With the root joint at p = s (rest + t) + T in the figure, R' = Q R and T' = Q p - s (rest + t).
     """

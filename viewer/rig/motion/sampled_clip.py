@@ -1,4 +1,4 @@
-"""A motion as frames: local rotations of every joint at a fixed rate, with gaps."""
+"""Sampled clips: local rotations of every joint at a fixed rate, with gaps."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ __all__ = ["SampledClip", "SampledRows", "joined", "sample_rows"]
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class SampledClip:
-    """A motion of one skeleton, as captures have it.
+    """A motion of one skeleton as frames, the form in which captures are stored.
 
     Attributes
     ----------
     name : str
-        What menus call it.
+        Display name.
     timing : Timing
         Frame rate, and the row of each frame.
     rotations : (N, J, 4)
-        Each joint's whole rotation within its parent: unit quaternions (x, y, z, w).
+        Each joint's complete rotation within its parent: unit quaternions (x, y, z, w).
     translations : (N, J, 3) or None
-        Added to the joints' rest translations.
+        Offsets from the joints' rest translations.
     figure_translations : (N, 3) or None
         Of the whole figure, after skinning.
     figure_scales : (N,) or None
         Of the whole figure.
     shape_weights : (N, S) or (1, S) or None
-        Of the figure's blend shapes; one row counts for all frames. None leaves the pose's own.
+        Of the figure's blend shapes; a single row applies to all frames. None keeps the pose's.
     """
 
     name: str
@@ -85,7 +85,7 @@ class SampledClip:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SampledRows:
-    """What a clip has at T times; rows where ``present`` is False mean nothing."""
+    """Samples of a clip at T times; rows where ``present`` is False are undefined."""
 
     present: Bools
     rotations: Floats
@@ -95,10 +95,10 @@ class SampledRows:
     shape_weights: Floats | None
 
 
-def sample_rows(clip: SampledClip, times: Floats, fill: bool = False) -> SampledRows:
-    """Return a clip at any times: rotations on the shorter arc, all else in a straight line.
+def sample_rows(clip: SampledClip, times: Floats, interpolate: bool = False) -> SampledRows:
+    """Return a clip's data at given times: rotations along the shorter arc, the rest linearly.
 
-    On a frame the stored numbers come back as they are.
+    Exactly on a frame the stored numbers are returned unchanged.
 
     Parameters
     ----------
@@ -106,28 +106,28 @@ def sample_rows(clip: SampledClip, times: Floats, fill: bool = False) -> Sampled
         The motion.
     times : (T,)
         Seconds.
-    fill : bool
-        Bridge gaps instead of reporting absence.
+    interpolate : bool
+        Interpolate across gaps instead of reporting absence.
 
     Returns
     -------
     SampledRows
         Arrays with T rows each.
     """
-    before, after, share = clip.timing.locate(times, fill)
+    before, after, fraction = clip.timing.locate(times, interpolate)
     present = before >= 0
     before, after = np.maximum(before, 0), np.maximum(after, 0)
-    between = np.flatnonzero(share > 0.0)
+    between = np.flatnonzero(fraction > 0.0)
     if clip.n_rows == 0:
         rest = np.tile([0.0, 0.0, 0.0, 1.0], (len(before), clip.n_joints, 1))
         return SampledRows(present, rest, None, None, None, None)
     rotations = clip.rotations[before]
     if len(between):
         ends = clip.rotations[after[between]]
-        rotations[between] = slerp(rotations[between], ends, share[between, None])
+        rotations[between] = slerp(rotations[between], ends, fraction[between, None])
 
     def line(rows: Floats | None) -> Floats | None:
-        return None if rows is None else _line(rows, before, after, share)
+        return None if rows is None else _line(rows, before, after, fraction)
 
     return SampledRows(
         present,
@@ -139,23 +139,23 @@ def sample_rows(clip: SampledClip, times: Floats, fill: bool = False) -> Sampled
     )
 
 
-def _line(rows: Floats, before: Ints, after: Ints, share: Floats) -> Floats:
+def _line(rows: Floats, before: Ints, after: Ints, fraction: Floats) -> Floats:
     if len(rows) == 1:
         return rows[np.zeros(len(before), dtype=np.int32)]
     start = rows[before]
-    weight = share.reshape(-1, *[1] * (rows.ndim - 1))
+    weight = fraction.reshape(-1, *[1] * (rows.ndim - 1))
     return start + weight * (rows[after] - start)
 
 
 def joined(clips: Sequence[SampledClip], timing: Timing) -> SampledClip:
-    """Return one clip of the rows of several, one after the other, for a new timing.
+    """Return one clip of the concatenated rows of several, with a new timing.
 
     Parameters
     ----------
     clips : sequence of SampledClip
         At least one, of one skeleton, all with the same arrays.
     timing : Timing
-        Its rows refer to the rows put together.
+        Its rows index the concatenated rows.
     """
 
     def stack(name: str) -> Floats | None:
@@ -163,7 +163,7 @@ def joined(clips: Sequence[SampledClip], timing: Timing) -> SampledClip:
         if parts[0] is None:
             return None
         if name == "shape_weights":
-            # One row that counts for all must not be multiplied.
+            # A single row that applies to all frames must not be repeated.
             if all(len(part) == 1 and (part == parts[0]).all() for part in parts):
                 return np.asarray(parts[0])
             parts = [

@@ -1,4 +1,4 @@
-"""Sampled animations of one frame: an actor's current pose, for formats that hold motions."""
+"""Sampled animations of one frame: an actor's current pose, for formats that store motions."""
 
 from __future__ import annotations
 
@@ -30,18 +30,18 @@ def single_frame(
     Parameters
     ----------
     actor : Actor
-        With joints; whoever is not present has a frame that is missing.
+        With joints; an absent actor gives a missing frame.
     rate : float
-        Frames a second that the animation says.
+        Nominal frames per second of the animation.
     number : int
-        What the frame is called.
+        Number of the frame.
     time : float
-        Seconds of the frame.
+        Time of the frame in seconds.
 
     Returns
     -------
     SampledAnimation
-        Its ``motion`` holds the frame too: of rigs that move by keys a key for each DOF.
+        Its ``motion`` holds the frame as well: one key per DOF for rigs with keyed clips.
 
     Raises
     ------
@@ -81,18 +81,18 @@ def upright_single_frame(
     Parameters
     ----------
     scene : Scene
-        Says what is up.
+        Provides the up axis.
     actor, rate, number, time
-        As for ``single_frame``. Where the actor stands in the scene is left out.
+        As for ``single_frame``. The actor's placement in the scene is ignored.
     keeps_world : bool
-        Leave it as its own world has it, as ``upright_animation`` does.
+        Keep the orientation of its own world, as in ``upright_animation``.
 
     Returns
     -------
     animation : SampledAnimation
         One frame.
     up : "y", "z", "-y" or "-z"
-        The axis that points up in it; below only in worlds that are kept.
+        The axis that points up in it; the last two only if the world is kept.
     """
     up, hangs = own_up(scene, actor)
     if keeps_world or not hangs:
@@ -104,18 +104,18 @@ def upright_single_frame(
 def pose_frames(
     figure: Figure, pose: Pose | None, is_present: bool = True, time: float = 0.0
 ) -> tuple[Figure, Frames]:
-    """Return one pose as frames, and the figure that these move.
+    """Return one pose as frames, and the figure that they animate.
 
     Parameters
     ----------
     figure : Figure
         With a skeleton or, as a whole, without.
     pose : Pose or None
-        Its pose; None leaves a figure without a skeleton where it is.
+        Its pose; None keeps a figure without a skeleton in place.
     is_present : bool
-        Whether the frame is there.
+        Whether the actor is present in the frame.
     time : float
-        Seconds of the frame.
+        Time of the frame in seconds.
     """
     skeleton, weights = figure.skeleton, np.zeros((1, figure.n_shapes))
     place, scale = np.zeros((1, 3)), np.ones(1)
@@ -125,7 +125,7 @@ def pose_frames(
         place, scale = pose.figure_translation[None].copy(), np.array([pose.figure_scale])
     if pose is not None and skeleton is not None:
         if (pose.scales != skeleton.rest_scales).any():
-            # Frames know no scales of joints: the skeleton says them.
+            # Frames have no joint scales; those of the skeleton apply.
             skeleton = replace(skeleton, rest_scales=pose.scales)
             figure = replace(figure, skeleton=skeleton)
         moved = (local_matrices(skeleton, pose)[:, :3, 3] - skeleton.rest_translations)[None]

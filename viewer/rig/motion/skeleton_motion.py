@@ -1,4 +1,4 @@
-"""A skeleton and its motion, as one file holds both (BVH)."""
+"""A skeleton together with its motion, the contents of one BVH file."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["SkeletonMotion"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SkeletonMotion:
-    """What a motion capture file with its own hierarchy holds.
+    """Contents of a motion capture file with its own hierarchy.
 
     Attributes
     ----------
@@ -21,9 +21,9 @@ class SkeletonMotion:
     clip : SampledClip
         Its motion.
     unit_note : str
-        How the figure's unit was guessed, in words; empty if there is nothing to say.
+        How the figure's unit was guessed, as text; empty if it was not.
     up_notes : tuple of str
-        How its up axis was guessed, and what speaks against it.
+        Messages about how the up axis was guessed, and about contrary evidence.
     """
 
     figure: Figure

@@ -1,4 +1,4 @@
-"""Frames on a timeline: which stored row each frame has, and which frames are missing."""
+"""Frames on a timeline: the stored row of each frame, and which frames are missing."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from viewer.rig.arrays import Bools, Floats, Ints, frozen
 __all__ = ["FASTEST", "RATES", "SLOWEST", "Timing", "is_rate"]
 
 SLOWEST, FASTEST = 1e-6, 1e6
-"""Frames a second: with fewer or more, times of long motions have no exact numbers."""
+"""Frames per second: outside these limits, times of long motions lose precision."""
 
 RATES = f"{SLOWEST:g} to {FASTEST:,.0f} frames a second"
-"""The same, for messages."""
+"""The same as text, for messages."""
 
-_ON_FRAME = 1e-6  # of a frame: nearer than this to a frame is that frame
+_ON_FRAME = 1e-6  # of a frame: times closer than this to a frame count as that frame
 
 
 def is_rate(rate: float) -> bool:
-    """Return whether a motion can have so many frames a second.
+    """Return whether a number is a supported frame rate.
 
     >>> is_rate(29.97), is_rate(1e-320), is_rate(float("nan"))
     (True, False, False)
@@ -31,20 +31,20 @@ def is_rate(rate: float) -> bool:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Timing:
-    """A fixed frame rate, and where the data of each frame is.
+    """A fixed frame rate, and the data row of each frame.
 
     Attributes
     ----------
     frame_rate : float
-        Frames a second.
+        Frames per second.
     rows : (F,) int32
         Row of each frame in the data, -1 for a missing one.
     first_frame : int
-        What the file calls the first frame.
+        Number of the first frame in the file.
     start : float
         Seconds of the first frame.
     holds : bool
-        Before the first and after the last frame: True holds those, False is absence.
+        Before the first and after the last frame: True holds the end frames, False is absence.
     """
 
     frame_rate: float
@@ -70,29 +70,29 @@ class Timing:
 
     @property
     def present(self) -> Bools:
-        """Which frames are there: (F,)."""
+        """Which frames exist: (F,)."""
         return self.rows >= 0
 
     def time(self, frame: int) -> float:
-        """Return the seconds of a frame, counted from 0."""
+        """Return the time in seconds of a frame, counted from 0."""
         return self.start + frame / self.frame_rate
 
-    def locate(self, times: Floats, fill: bool = False) -> tuple[Ints, Ints, Floats]:
-        """Return between which rows times lie.
+    def locate(self, times: Floats, interpolate: bool = False) -> tuple[Ints, Ints, Floats]:
+        """Return the rows on either side of each time, and the interpolation fraction.
 
         Parameters
         ----------
         times : (T,)
             Seconds.
-        fill : bool
-            Bridge gaps between the frames on both sides, and hold the ends.
+        interpolate : bool
+            Interpolate across gaps, and hold the end frames.
 
         Returns
         -------
         before, after : (T,)
-            Rows; -1 in both where nothing is.
-        share : (T,)
-            0 at ``before``, 1 at ``after``. On a frame it is exactly 0.
+            Rows; both are -1 where there is no data.
+        fraction : (T,)
+            0 at ``before``, 1 at ``after``; exactly 0 on a frame.
         """
         times = np.atleast_1d(np.asarray(times, dtype=np.float64))
         nothing = np.full(len(times), -1, dtype=np.int32)
@@ -105,18 +105,18 @@ class Timing:
         place = np.clip(place, 0.0, self.n_frames - 1)
         frame = np.floor(place).astype(np.int32)
         following = np.minimum(frame + 1, self.n_frames - 1)
-        share = place - frame
-        if fill:
+        fraction = place - frame
+        if interpolate:
             return self._bridged(place)
         before, after = self.rows[frame], self.rows[following]
-        # A frame lasts until the next one is due; one that follows a gap comes no earlier.
-        share = np.where(after < 0, 0.0, share)
+        # A frame lasts until the next one is due; one after a gap does not start early.
+        fraction = np.where(after < 0, 0.0, fraction)
         after = np.where(after < 0, before, after)
         absent = (before < 0) | (outside & (not self.holds))
         return (
             np.where(absent, -1, before).astype(np.int32),
             np.where(absent, -1, after).astype(np.int32),
-            np.where(absent, 0.0, share),
+            np.where(absent, 0.0, fraction),
         )
 
     def _bridged(self, place: Floats) -> tuple[Ints, Ints, Floats]:
@@ -125,7 +125,7 @@ class Timing:
         left = np.clip(right - 1, 0, len(there) - 1)
         right = np.clip(right, 0, len(there) - 1)
         span = there[right] - there[left]
-        share = np.divide(place - there[left], span, out=np.zeros(len(place)), where=span > 0).clip(
-            0.0, 1.0
-        )
-        return self.rows[there[left]], self.rows[there[right]], share
+        fraction = np.divide(
+            place - there[left], span, out=np.zeros(len(place)), where=span > 0
+        ).clip(0.0, 1.0)
+        return self.rows[there[left]], self.rows[there[right]], fraction

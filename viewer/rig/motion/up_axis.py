@@ -1,4 +1,4 @@
-"""Which way is up in a capture: judged by the people in it, who mostly hold their heads high."""
+"""Detection of a capture's up axis from its people, whose heads are mostly above their pelvises."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from viewer.rig.scene import Actor
 __all__ = ["CUSTOM", "guess_up"]
 
 CUSTOM = "z"
-"""What is up where nobody shows it: EasyMocap's usual calibration board lies on the floor."""
+"""Up axis if no body shows it: EasyMocap's usual calibration board lies on the floor."""
 
-_ENOUGH = 64  # frames of each person; more would not say more
+_ENOUGH = 64  # frames per person; more would not change the result
 _LOW = (("mid_hip",), ("pelvis",), ("left_hip", "right_hip"))
 _HIGH = (("head",), ("nose",), ("left_ear", "right_ear"), ("neck",))
 
@@ -28,13 +28,13 @@ def guess_up(actors: Iterable[Actor]) -> str:
     Parameters
     ----------
     actors : iterable of Actor
-        Bodies with sampled clips and captured keypoints, as far as they have been read; others
-        do not count, nor do their placements.
+        Bodies with sampled clips and captured keypoints, as far as they have been read; other
+        actors and all placements are ignored.
 
     Returns
     -------
     str
-        ``"y"``, ``"z"``, ``"-y"`` or ``"-z"``; ``CUSTOM`` where there is nothing to judge by, or
+        ``"y"``, ``"z"``, ``"-y"`` or ``"-z"``; ``CUSTOM`` where there is no evidence, or
         people lie along x.
     """
     directions = [np.zeros((0, 3))]
@@ -47,13 +47,13 @@ def guess_up(actors: Iterable[Actor]) -> str:
     lengths = np.linalg.norm(steps, axis=1)
     mean = (steps[lengths > 0.0] / lengths[lengths > 0.0, None]).sum(axis=0)
     axis = int(np.abs(mean).argmax())
-    if axis == 0:  # also where all sums are 0
+    if axis == 0:  # also if all sums are 0
         return CUSTOM
     return ("-" if mean[axis] < 0.0 else "") + "xyz"[axis]
 
 
 def _of_body(actor: Actor, clip: SampledClip) -> Floats:
-    """Return the ways from pelvis to head in the first frames: (N, 3)."""
+    """Return the vectors from pelvis to head in the first frames: (N, 3)."""
     skeleton = actor.figure.skeleton
     if skeleton is None or not {"pelvis", "head"} <= set(skeleton.names):
         return np.zeros((0, 3))
@@ -65,7 +65,7 @@ def _of_body(actor: Actor, clip: SampledClip) -> Floats:
 
 
 def _of_points(actor: Actor, clip: PointClip) -> Floats:
-    """Return the ways from hips to head where both are seen: (N, 3)."""
+    """Return the vectors from hips to head where both are seen: (N, 3)."""
     layout, points = actor.figure.points, clip.points[:_ENOUGH]
     names = () if layout is None else layout.names
     low, high = (_middle(points, names, choices) for choices in (_LOW, _HIGH))
@@ -78,7 +78,7 @@ def _of_points(actor: Actor, clip: PointClip) -> Floats:
 def _middle(
     points: Floats, names: tuple[str, ...], choices: tuple[tuple[str, ...], ...]
 ) -> Floats | None:
-    """Return the middle of the first choice of keypoints that the layout has: (N, 4)."""
+    """Return the mean of the first set of keypoints that the layout has: (N, 4)."""
     for choice in choices:
         if set(choice) <= set(names):
             chosen = points[:, [names.index(name) for name in choice]]

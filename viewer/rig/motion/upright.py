@@ -1,4 +1,4 @@
-"""Actors for exporters, which leave placements out: what is up in an actor's own world."""
+"""Up axis of an actor's own world, for exporters that ignore placements."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ from viewer.rig.shape import shaped
 
 __all__ = ["own_up", "upright_actor"]
 
-_OVER = np.array([1.0, -1.0, -1.0])  # half a turn about x
+_OVER = np.array([1.0, -1.0, -1.0])  # 180 degrees about x
 
 
 def own_up(scene: Scene, actor: Actor) -> tuple[Literal["y", "z"], bool]:
-    """Return what is up in an actor's own world, before its placement.
+    """Return the up axis of an actor's own world, before its placement.
 
     Parameters
     ----------
     scene : Scene
-        Says what is up.
+        Provides the up axis.
     actor : Actor
         Placed in it.
 
     Returns
     -------
     up : "y" or "z"
-        The axis that lies along the scene's; that of the scene itself where it is x.
+        The axis that is mapped to the scene's up axis; the scene's own if that is x.
     hangs : bool
-        Whether it points down.
+        Whether that axis points down.
     """
     along = np.zeros(3)
     along["xyz".index(scene.up)] = 1.0
@@ -45,21 +45,21 @@ def own_up(scene: Scene, actor: Actor) -> tuple[Literal["y", "z"], bool]:
 
 
 def upright_actor(scene: Scene, actor: Actor) -> Actor:
-    """Return an actor whose figure says what is up in its pose, stood up if it hangs head down.
+    """Return an actor whose figure states the up axis of its pose, rotated upright if upside down.
 
-    A body in a capture with z up stands along z, whatever its model's own axis is.
+    A body in a z-up capture stands along z, whatever the up axis of its model is.
 
     Parameters
     ----------
     scene : Scene
-        Says what is up.
+        Provides the up axis.
     actor : Actor
         In it; not changed.
 
     Returns
     -------
     Actor
-        With the same placement, which no longer counts; the actor itself if nothing is different.
+        With the same placement, which no longer applies; the actor itself if nothing changes.
     """
     up, hangs = own_up(scene, actor)
     figure = actor.figure if actor.figure.up == up else replace(actor.figure, up=up)
@@ -68,16 +68,16 @@ def upright_actor(scene: Scene, actor: Actor) -> Actor:
         pose = _rotated_upright(actor.figure, pose)
     points = actor.points
     if hangs and points is not None:
-        points = points * np.append(_OVER, 1.0)  # confidences stay
+        points = points * np.append(_OVER, 1.0)  # confidences are unchanged
     if figure is actor.figure and pose is actor.pose and points is actor.points:
         return actor
     return replace(actor, figure=figure, pose=pose, points=points)
 
 
 def _rotated_upright(figure: Figure, pose: Pose) -> Pose:
-    """Return a pose turned by half a turn Q about x: R' = Q R and s l' + T' = Q (s l + T) at roots.
+    """Return a pose rotated by 180 degrees, Q: R' = Q R and s l' + T' = Q (s l + T) at roots.
 
-    The first root stays where it is within the figure, l' = l; the figure's translation T moves it.
+    The first root keeps its position in the figure, l' = l; the figure's translation T moves it.
     """
     skeleton = shaped(figure, pose.shape_weights).require_skeleton()
     turned = pose.copy()
@@ -89,6 +89,6 @@ def _rotated_upright(figure: Figure, pose: Pose) -> Pose:
         shifts = (wanted - turned.figure_translation - within) / pose.figure_scale
         turned.translations[roots] += shifts
     rotations = _OVER[:, None] * joint_rotations(skeleton, pose)[roots]
-    # The limits are those of the figure's own world, which hangs.
+    # The limits apply to the figure's own world, which is upside down.
     set_joint_rotations(skeleton, turned, roots, rotations, clamp=False)
     return turned

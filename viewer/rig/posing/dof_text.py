@@ -1,4 +1,4 @@
-"""Values of DOFs as text, as sliders show them: angles in degrees."""
+"""Values of DOFs as text, with angles in degrees."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from viewer.rig.skeleton import Skeleton, dof_label
 __all__ = ["beyond_text", "dof_value_text"]
 
 _FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
-_MOST_DIGITS = 9  # of decimals: radians of float64 differ by no less
+_MOST_DIGITS = 9  # decimals: float64 radians differ by no less
 
 
 def dof_value_text(skeleton: Skeleton, dof: int, value: float, digits: int = 1) -> str:
-    """Return a value of a DOF in words: ``"28.6°"``, or a length ``"0.25"``.
+    """Return a value of a DOF as text: ``"28.6°"``, or a length ``"0.25"``.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def dof_value_text(skeleton: Skeleton, dof: int, value: float, digits: int = 1) 
 
 
 def beyond_text(skeleton: Skeleton, dof: int, value: float, when: Phrase | str = "") -> Phrase:
-    """Return what is wrong with a DOF beyond its limits: ``"a.x is 0.0°, its limits are …"``.
+    """Return a message for a DOF beyond its limits: ``"a.x is 0.0°, its limits are …"``.
 
     Parameters
     ----------
@@ -43,14 +43,14 @@ def beyond_text(skeleton: Skeleton, dof: int, value: float, when: Phrase | str =
     dof : int
         Row of the DOF.
     value : float
-        Radians, or a length in the figure's unit; less than the minimum, or more than the maximum.
+        Radians, or a length in the figure's unit; outside the limits.
     when : Phrase or str
-        Follows the value: ``" in frame 3"``.
+        Inserted after the value: ``" in frame 3"``.
     """
     low, high = (float(limit) for limit in skeleton.dof_limits[dof])
     limit = low if value < low else high
     digits = 1
-    # So many decimals that the value is seen to be beyond.
+    # Enough decimals to show that the value is outside the limits.
     while digits < _MOST_DIGITS and dof_value_text(skeleton, dof, value, digits) == dof_value_text(
         skeleton, dof, limit, digits
     ):

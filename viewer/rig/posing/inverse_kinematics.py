@@ -1,12 +1,12 @@
-"""Inverse kinematics: the joint angles that bring a joint to a place, within the limits.
+"""Inverse kinematics: joint angles that move a joint to a target position, within the limits.
 
 Damped least squares (Wampler 1986; Nakamura and Hanafusa 1986): with the error e from the joint
-to its target and the Jacobian J of the joint's place with respect to the chain's rotation DOFs,
+to its target and the Jacobian J of the joint's position with respect to the chain's rotation DOFs,
 
     step = J^T (J J^T + lambda^2 I)^-1 e
 
-A step that does not come nearer is taken back and damped more (Levenberg 1944). DOFs that a
-step would carry beyond a limit stop there, and the others make up for them.
+A step that does not reduce the error is rejected and the damping increased (Levenberg 1944). DOFs
+that a step would move beyond a limit stop there, and the others compensate.
 """
 
 from __future__ import annotations
@@ -25,25 +25,25 @@ from viewer.rig.skeleton import Skeleton, joint_label
 __all__ = ["Reach", "chain_above", "place_jacobian", "reach", "rotation_axes"]
 
 _FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
-_CLOSE = 1e-7  # of the chain's length: an error below is none
-_STILL = 1e-10  # radians: a step below changes nothing
-_LARGEST_STEP = 0.5  # radians: beyond it the Jacobian says little
+_CLOSE = 1e-7  # of the chain's length: a smaller error counts as none
+_STILL = 1e-10  # radians: a smaller step changes nothing
+_LARGEST_STEP = 0.5  # radians: beyond it the linearisation is poor
 _BEND = 0.02  # radians by which a stretched chain is bent to get it off a singular pose
 _LEAST_DAMPING, _MOST_DAMPING = 1e-4, 1e3  # of the chain's length
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reach:
-    """What came of reaching for a place.
+    """Result of a reach for a target.
 
     Attributes
     ----------
     dofs : (D,)
-        Of the whole skeleton; only rotations of the chain differ from those before.
+        Of the whole skeleton; only rotations of the chain have changed.
     distance : float
-        What is left between the joint and its target, figure units.
+        Remaining distance between the joint and its target, figure units.
     limited : (N,) int32
-        DOFs of the chain that stand at one of their limits.
+        DOFs of the chain that are at one of their limits.
     """
 
     dofs: Floats
@@ -52,16 +52,16 @@ class Reach:
 
 
 def chain_above(skeleton: Skeleton, joint: int, length: int) -> Ints:
-    """Return the joints that may turn to move one: its nearest ancestors that can rotate.
+    """Return the joints that may rotate to move one: its nearest ancestors with free rotations.
 
     Parameters
     ----------
     skeleton : Skeleton
-        Gives the hierarchy and the DOF table.
+        Provides the hierarchy and the DOF table.
     joint : int
-        The joint that is moved; its own rotations do not move it.
+        The joint to move; its own rotations do not move it.
     length : int
-        How many joints at most; joints without a free rotation do not count.
+        Maximum number of joints; those without a free rotation do not count.
 
     Returns
     -------
@@ -80,22 +80,22 @@ def chain_above(skeleton: Skeleton, joint: int, length: int) -> Ints:
 
 
 def place_jacobian(skeleton: Skeleton, pose: Pose, world: Floats, joint: int, rows: Ints) -> Floats:
-    """Return how a joint's place changes with rotation DOFs of joints above it.
+    """Return the Jacobian of a joint's position with respect to rotation DOFs of its ancestors.
 
     With the parent's linear part A, the joint's own rotation axis a in the parent's frame (after
-    the rows that are applied later) and the arm y from the turning joint, the column of a DOF is
-    A (a x A^-1 y); this holds with scales too.
+    the rows that are applied later) and the arm y from the rotating joint, the column of a DOF is
+    A (a x A^-1 y); this also holds with scales.
 
     Parameters
     ----------
     skeleton : Skeleton
-        Gives the DOF table.
+        Provides the DOF table.
     pose : Pose
         Lengths and radians.
     world : (J, 4, 4)
         ``world_matrices`` of that pose.
     joint : int
-        Whose origin moves.
+        The joint whose origin moves.
     rows : (N,)
         Rotation DOFs of its ancestors.
 
@@ -117,16 +117,16 @@ def place_jacobian(skeleton: Skeleton, pose: Pose, world: Floats, joint: int, ro
 
 
 def rotation_axes(skeleton: Skeleton, pose: Pose, joint: int) -> dict[int, Floats]:
-    """Return the axis about which each rotation DOF of a joint turns it right now.
+    """Return the current rotation axis of each rotation DOF of a joint.
 
     Parameters
     ----------
     skeleton : Skeleton
-        Gives the DOF table.
+        Provides the DOF table.
     pose : Pose
-        Radians; the DOFs that are applied later turn the axes of those before.
+        Radians; DOFs that are applied later rotate the axes of those before.
     joint : int
-        Whose DOFs.
+        The joint that has the DOFs.
 
     Returns
     -------
@@ -146,44 +146,44 @@ def rotation_axes(skeleton: Skeleton, pose: Pose, joint: int) -> dict[int, Float
 def reach(
     skeleton: Skeleton, pose: Pose, joint: int, target: Floats, length: int = 2, rounds: int = 60
 ) -> Reach:
-    """Return DOFs that bring a joint as near to a place as its chain can.
+    """Return DOFs that move a joint as close to a target as its chain allows.
 
     Parameters
     ----------
     skeleton : Skeleton
-        Gives the hierarchy, the DOFs and their limits.
+        Provides the hierarchy, the DOFs and their limits.
     pose : Pose
-        Where to start from; left as it is.
+        Start of the search; not changed.
     joint : int
         The joint to move.
     target : (3,)
-        Where to, figure units.
+        Target position, figure units.
     length : int
-        How many joints above it may turn.
+        Maximum number of joints above it that may rotate.
     rounds : int
-        Steps at most.
+        Maximum number of iterations.
 
     Returns
     -------
     Reach
-        Never farther from the target than the start, apart from a start outside its limits,
-        which is brought within them first.
+        Never farther from the target than the start, unless the start is outside its limits,
+        in which case it is clamped first.
 
     Raises
     ------
     RigError
-        If no joint above it can turn.
+        If no joint above it can rotate.
     """
     chain = chain_above(skeleton, joint, length)
     if not len(chain):
-        raise RigError(f"no joint above {joint_label(skeleton, joint)} can turn")
+        raise RigError(f"no joint above {joint_label(skeleton, joint)} can rotate")
     turns = (skeleton.dof_kinds >= _FIRST_ROTATION) & ~skeleton.locked
     rows = np.flatnonzero(turns & np.isin(skeleton.dof_joints, chain)).astype(np.int32)
     return _Solver(skeleton, pose.copy(), joint, np.asarray(target, float), rows).solve(rounds)
 
 
 class _Solver:
-    """One reach: the pose that moves, and how strongly steps are damped."""
+    """State of one reach: the pose, and the current damping."""
 
     def __init__(
         self, skeleton: Skeleton, pose: Pose, joint: int, target: Floats, rows: Ints
@@ -199,7 +199,7 @@ class _Solver:
         self.damping = 0.05
 
     def solve(self, rounds: int) -> Reach:
-        """Step until the joint is there, or can come no nearer."""
+        """Iterate until the joint reaches the target or cannot come closer."""
         has_bent = False
         for _ in range(rounds):
             error = self._error()
@@ -219,7 +219,7 @@ class _Solver:
         return self.target - self.world[self.joint, :3, 3]
 
     def _improve(self, error: Floats) -> bool:
-        """Take one step that comes nearer; return whether there was one."""
+        """Take one step that reduces the error; return whether there was one."""
         jacobian = place_jacobian(self.skeleton, self.pose, self.world, self.joint, self.rows)
         start = self.pose.dofs[self.rows].copy()
         distance = np.linalg.norm(error)
@@ -237,7 +237,7 @@ class _Solver:
         return False
 
     def _step(self, jacobian: Floats, error: Floats, start: Floats) -> Floats:
-        """Return the damped step; DOFs that reach a limit stop there, the others go on."""
+        """Return the damped step; DOFs that reach a limit stop there, the others continue."""
         step = np.zeros(len(start))
         free: Bools = np.ones(len(start), dtype=bool)
         damp = (self.damping * self.size) ** 2 * np.eye(3)
@@ -257,10 +257,10 @@ class _Solver:
         return np.clip(start + step, self.low, self.high) - start
 
     def _bend(self, error: Floats) -> bool:
-        """Bend a chain that points at its target or away from it: no small turn moves it there.
+        """Bend a chain that is collinear with its target, where no small rotation moves it closer.
 
-        Of each DOF's two directions the one that leaves its limits more room is tried; the bend
-        that lets the next step come nearest is kept.
+        Each DOF is tried in the direction with more room to its limits; the bend
+        after which the next step comes closest is kept.
         """
         start, damping = self.pose.dofs[self.rows].copy(), self.damping
         best, nearest = None, float(np.linalg.norm(error))

@@ -1,10 +1,10 @@
-"""One joint given a rotation: the values of its DOFs that come nearest to it, within the limits.
+"""Fit of a joint's DOFs to a given rotation, within their limits.
 
-A joint is turned within its parent by R(quaternion) E_n ... E_1, each E about one coordinate axis.
+A joint's rotation within its parent is R(quaternion) E_n ... E_1, each E about a coordinate axis.
 Three DOFs about three different axes have a closed form with two solutions (Tait-Bryan angles); the
-one within the limits that is nearer to the present values is taken. Otherwise DOF by DOF is set to
-what is best while the others stay, over and over: with M the product of the factors around E_k
-and of the wanted rotation's transpose, the trace to be maximised is
+one within the limits that is closer to the present values is taken. Otherwise each DOF is set in
+turn to its optimum with the others fixed, repeatedly: with M the product of the factors around E_k
+and of the wanted rotation's transpose, the trace to maximise is
 
     trace(M E_k(t)) = M_kk + (M_ii + M_jj) cos t + (M_ij - M_ji) sin t,   (i, j) = (k + 1, k + 2)
 """
@@ -21,27 +21,27 @@ from viewer.rig.geometry.rotation import axis_rotations, matrix_to_euler, quater
 from viewer.rig.pose import Pose
 from viewer.rig.skeleton import Skeleton
 
-__all__ = ["Turned", "nearest_dofs", "rotation_dofs", "turns_freely"]
+__all__ = ["RotationFit", "nearest_dofs", "rotates_freely", "rotation_dofs"]
 
 _FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
 _SWEEPS = 200
-_STILL = 1e-10  # radians: a sweep that changes less ends
-_ROUNDING = 1e-9  # radians by which a value may be beyond its limit and count as on it
+_STILL = 1e-10  # radians: a sweep with smaller changes is the last
+_ROUNDING = 1e-9  # radians: a value this far beyond its limit counts as on it
 _TURN = 2.0 * math.pi
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Turned:
-    """What came of turning a joint.
+class RotationFit:
+    """Result of fitting a joint's DOFs to a rotation.
 
     Attributes
     ----------
     dofs : (D,)
-        Of the whole skeleton; only rotations of the joint differ from those before.
+        Of the whole skeleton; only rotations of the joint have changed.
     error : float
-        The angle that is left between the rotation that was wanted and the one there is, radians.
+        Angle between the wanted rotation and the one reached, radians.
     limited : (N,) int32
-        Rotation DOFs of the joint that stand at one of their limits while an error is left.
+        Rotation DOFs of the joint that are at a limit, if there is an error.
     """
 
     dofs: Floats
@@ -50,16 +50,16 @@ class Turned:
 
 
 def rotation_dofs(skeleton: Skeleton, joint: int, free: bool = False) -> Ints:
-    """Return the rows of a joint's rotation DOFs, the one that is applied first at the front.
+    """Return the rows of a joint's rotation DOFs, the one that is applied first in front.
 
     Parameters
     ----------
     skeleton : Skeleton
         Holds the DOF table.
     joint : int
-        Whose DOFs.
+        The joint that has the DOFs.
     free : bool
-        Leave out those that are locked.
+        Exclude locked DOFs.
 
     Returns
     -------
@@ -72,31 +72,31 @@ def rotation_dofs(skeleton: Skeleton, joint: int, free: bool = False) -> Ints:
     return np.flatnonzero(chosen).astype(np.int32)
 
 
-def turns_freely(skeleton: Skeleton, joint: int) -> bool:
+def rotates_freely(skeleton: Skeleton, joint: int) -> bool:
     """Return whether a joint has three free rotations about three different axes, in any order."""
     kinds = skeleton.dof_kinds[rotation_dofs(skeleton, joint, free=True)]
     every = skeleton.dof_kinds[rotation_dofs(skeleton, joint)]
     return len(kinds) == len(every) == 3 and len(set(kinds.tolist())) == 3
 
 
-def nearest_dofs(skeleton: Skeleton, pose: Pose, joint: int, rotation: Floats) -> Turned:
-    """Return the DOFs that turn a joint as near to a rotation as it can.
+def nearest_dofs(skeleton: Skeleton, pose: Pose, joint: int, rotation: Floats) -> RotationFit:
+    """Return the DOFs that rotate a joint as close to a rotation as possible.
 
     Parameters
     ----------
     skeleton : Skeleton
-        Gives the DOFs and their limits.
+        Provides the DOFs and their limits.
     pose : Pose
-        Of equal solutions the one nearest to its DOFs is taken; left as it is.
+        Of equal solutions the one closest to its DOFs is taken; not changed.
     joint : int
-        The joint to turn.
+        The joint to rotate.
     rotation : (3, 3)
         Wanted within its parent: R(quaternion) R(DOFs) of ``joint_rotations``.
 
     Returns
     -------
-    Turned
-        Exact wherever limits and axes allow it.
+    RotationFit
+        Exact if limits and axes allow it.
     """
     rows = rotation_dofs(skeleton, joint)
     low, high = skeleton.dof_limits[rows].T
@@ -107,11 +107,11 @@ def nearest_dofs(skeleton: Skeleton, pose: Pose, joint: int, rotation: Floats) -
     dofs[rows] = values = solver.best()
     error = solver.error(values)
     at_limit = ((values <= low) | (values >= high)) & (error > 1e-6)
-    return Turned(dofs, error, rows[at_limit])
+    return RotationFit(dofs, error, rows[at_limit])
 
 
 class _Solver:
-    """Angles about coordinate axes, the first applied first, that multiply to a rotation."""
+    """Fit of angles about coordinate axes, the first applied first, whose product is a rotation."""
 
     def __init__(
         self, axes: list[int], low: Floats, high: Floats, present: Floats, wanted: Floats
@@ -120,7 +120,7 @@ class _Solver:
         self.present = np.clip(present, low, high)
 
     def best(self) -> Floats:
-        """Return the values: exact and nearest to the present ones, else nearest to the goal."""
+        """Return the angles: exact and closest to the present ones, else closest to the goal."""
         exact = self._exact()
         within = [
             values
@@ -133,11 +133,11 @@ class _Solver:
         starts = [self.present, *(np.clip(values, self.low, self.high) for values in exact)]
         found = [self._improved(start.copy()) for start in starts]
         errors = [self.error(values) for values in found]
-        # The start at the present values comes first: it wins where others are hardly better.
+        # The present values are tried first: they win unless others are clearly better.
         return found[int(np.argmin(np.round(errors, 7)))]
 
     def error(self, values: Floats) -> float:
-        """Return the angle between what values give and what is wanted, from 0 to pi."""
+        """Return the angle between the rotation of some values and the goal, from 0 to pi."""
         left = self.wanted.T @ self._product(values, range(len(values)))
         sine = np.linalg.norm([left[2, 1] - left[1, 2], left[0, 2] - left[2, 0],
                                left[1, 0] - left[0, 1]])  # fmt: skip
@@ -150,10 +150,10 @@ class _Solver:
         return product
 
     def _exact(self) -> list[Floats]:
-        """Return both solutions in closed form for three different axes; none for others."""
+        """Return both closed-form solutions for three different axes, none otherwise."""
         if len(self.axes) != 3 or len(set(self.axes)) != 3:
             return []
-        # With the axes renamed to x, y, z; an odd permutation mirrors, which turns angles round.
+        # Axes are renamed to x, y, z; an odd permutation is a reflection, which negates angles.
         renamed = self.wanted[np.ix_(self.axes, self.axes)]
         sign = 1.0 if (self.axes[1] - self.axes[0]) % 3 == 1 else -1.0
         x, y, z = matrix_to_euler(renamed)
@@ -161,7 +161,7 @@ class _Solver:
         return [self._wrapped(sign * values) for values in pair]
 
     def _wrapped(self, values: Floats) -> Floats:
-        """Add whole turns: nearest to the present values, or into the limits where these allow."""
+        """Add multiples of 2 pi: nearest to the present values, or within limits if possible."""
         near = values - _TURN * np.round((values - self.present) / _TURN)
         inside = near - _TURN * np.round((near - np.clip(near, self.low, self.high)) / _TURN)
         for turns in (-_TURN, _TURN):
@@ -171,7 +171,7 @@ class _Solver:
         return np.where(is_inside, near, inside)
 
     def _improved(self, values: Floats) -> Floats:
-        """Set each value to the best one beside the others until none changes any more."""
+        """Optimise each value with the others fixed, until none changes any more."""
         count = len(values)
         for _ in range(_SWEEPS):
             before = values.copy()
@@ -187,12 +187,12 @@ class _Solver:
         return values
 
     def _best_one(self, place: int, around: Floats, now: float) -> float:
-        """Return the angle that maximises the trace, within the limits and nearest to now."""
+        """Return the angle that maximises the trace, within the limits and closest to now."""
         axis = self.axes[place]
         i, j = (axis + 1) % 3, (axis + 2) % 3
         cosine, sine = around[i, i] + around[j, j], around[i, j] - around[j, i]
         if math.hypot(cosine, sine) < 1e-12:
-            return now  # every angle is as good
+            return now  # all angles are equally good
         top = math.atan2(sine, cosine)
         top -= _TURN * round((top - now) / _TURN)
         low, high = float(self.low[place]), float(self.high[place])

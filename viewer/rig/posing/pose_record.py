@@ -1,4 +1,4 @@
-"""A pose on its own, as files and the clipboard hold it, and how a figure takes it."""
+"""Pose records: poses as stored in files and on the clipboard, and their application to figures."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from viewer.rig.hands import Hand, hand_vectors
 from viewer.rig.pose import Pose
 from viewer.rig.posing.pose_vector import read_vector, set_joint_rotations, write_vector
 from viewer.rig.retargeting.pose_transfer import (
-    JointTurns,
-    joint_turns,
+    JointRotations,
+    has_layout_of,
+    relative_rotations,
     restore_beneath,
-    shares_layout,
-    turn_joints,
+    rotate_joints,
 )
 from viewer.rig.skeleton import DOF_KINDS, Skeleton, clamp_dofs, dof_labels, find_dof
 from viewer.rig.smpl_family import members_by_numbers
@@ -36,18 +36,18 @@ PARTS = {
     "leye_pose": ("left_eye",),
     "reye_pose": ("right_eye",),
 }
-"""Rotation vectors of single joints under the names that smplx gives them."""
+"""Rotation vectors of single joints under the names used by smplx."""
 
 _BODY = 21  # joints of body_pose in models with fingers or a face; SMPL alone has two more
 _LONGEST_BODY = 23
-_SMALLEST, _LARGEST = 1e-6, 1e6  # scales that float32 can draw
+_SMALLEST, _LARGEST = 1e-6, 1e6  # scales that can be drawn in float32
 _FARTHEST = 1e9  # figure units
 _HAND_PARTS = {"left_hand_pose": "left", "right_hand_pose": "right", "hand_pose": ""}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseRecord:
-    """What a pose file says; parts that it does not have leave the pose at rest.
+    """Contents of a pose file; missing parts leave the pose at rest.
 
     Attributes
     ----------
@@ -65,16 +65,16 @@ class PoseRecord:
     scale : float or None
         Of the figure, after skinning.
     flat_hands : bool or None
-        Whether hand poses leave the mean hand out. None: only coefficients add it.
+        Whether hand poses are relative to the flat hand. None: only coefficients add the mean.
     hand_coefficients : bool or None
-        Whether hand poses are coefficients; None: all but 45 numbers are.
-    turns : JointTurns or None
-        What a figure with other DOFs takes in place of the numbers: its joints of the same names
-        turn as much, and its place, size and shape stay. Figures with the same DOFs take all else,
-        and the shapes that they have.
+        Whether hand poses are coefficients; None: unless there are 45 numbers.
+    turns : JointRotations or None
+        Used by a figure with other DOFs instead of the numbers: its joints of the same names are
+        rotated equally; its placement, size and shape are unchanged. Figures with the same DOFs
+        use everything else, as far as they have the blend shapes.
     line_of : callable or None
-        Given a part and the name of a DOF in it, as ``PosePartError`` has them, returns the line of
-        the file that the record comes from.
+        Returns the line in the source file, given a part and the name of a DOF in it, as in
+        ``PosePartError``.
     """
 
     dofs: Mapping[str, float] = field(default_factory=dict)
@@ -86,17 +86,17 @@ class PoseRecord:
     scale: float | None = None
     flat_hands: bool | None = None
     hand_coefficients: bool | None = None
-    turns: JointTurns | None = None
+    turns: JointRotations | None = None
     line_of: Callable[[str, str], int | None] | None = None
 
 
 class PosePartError(RigError):
-    """A part of a pose that a figure does not take.
+    """A part of a pose that cannot be applied to a figure.
 
     Parameters
     ----------
     problem : RigError
-        What is wrong.
+        The underlying error.
     part : str
         ``"dofs"``, ``"vector"``, ``"shape"``, ``"expression"`` or a name in ``parts``.
     name : str
@@ -110,7 +110,7 @@ class PosePartError(RigError):
 
 @contextmanager
 def _part(part: str, name: str = "") -> Iterator[None]:
-    """Note which part of a record it is that a figure does not take."""
+    """Attribute errors to a part of a record."""
     try:
         yield
     except RigError as problem:
@@ -118,7 +118,7 @@ def _part(part: str, name: str = "") -> Iterator[None]:
 
 
 def record_of(figure: Figure, pose: Pose) -> PoseRecord:
-    """Return a pose in words and in the model's own numbers, both complete.
+    """Return a pose by DOF names and as the model's own numbers, both complete.
 
     Parameters
     ----------
@@ -139,45 +139,45 @@ def record_of(figure: Figure, pose: Pose) -> PoseRecord:
         expression=weights[~is_shape] if (~is_shape).any() else None,
         translation=pose.figure_translation.copy(),
         scale=pose.figure_scale,
-        turns=joint_turns(figure, pose),
+        turns=relative_rotations(figure, pose),
     )
 
 
 def apply_record(
     record: PoseRecord, figure: Figure, pose: Pose, cut: bool = False
 ) -> list[Diagnostic]:
-    """Pose a figure by a record, in place.
+    """Apply a record to a figure's pose, in place.
 
     Parameters
     ----------
     record : PoseRecord
-        What to take over.
+        The record to apply.
     figure : Figure
         With a skeleton.
     pose : Pose
-        Changed; what the record does not mention stays.
+        Changed, except for parts that the record does not mention.
     cut : bool
-        Leave coefficients out that a figure with shapes has not, as files made for its kin need,
-        instead of refusing them. Records with ``turns`` need no asking.
+        Drop coefficients that a figure with fewer shapes lacks, as with files of related models,
+        instead of raising an error. Records with ``turns`` always drop them.
 
     Returns
     -------
     list of Diagnostic
-        What could not be taken over exactly.
+        Messages about data that could not be applied exactly.
 
     Raises
     ------
     PosePartError
-        If a part of the record does not fit this figure and it does not say how the joints are
-        turned; the pose is then as it was.
+        If a part of the record does not fit this figure and it has no joint rotations;
+        the pose is then unchanged.
     RigError
-        If no joint of one figure is called as one of the other.
+        If the figures have no joint name in common.
     """
     skeleton = figure.skeleton
     if skeleton is None:
         raise RigError(f"figure {figure.name} has no skeleton to pose")
-    if record.turns is not None and not shares_layout(record.turns, figure):
-        work, notes = turn_joints(record.turns, figure, pose)
+    if record.turns is not None and not has_layout_of(record.turns, figure):
+        work, notes = rotate_joints(record.turns, figure, pose)
         _take_over(work, pose)
         return notes + _left_as_they_were(record)
     work = pose.copy()
@@ -191,7 +191,7 @@ def apply_record(
         with _part(name):
             notes += _apply_part(name, values, record, figure, work)
     has_shapes = figure.blend_shapes is not None and "shape" in figure.blend_shapes.groups
-    # A pose that was made by a figure of the same skeleton is taken as far as it goes.
+    # A pose of a figure with the same skeleton is applied as far as possible.
     cut = record.turns is not None or (cut and has_shapes)
     with _part("shape"):
         notes += apply_coefficients("shape", record.shape, figure, work, cut)
@@ -212,7 +212,7 @@ def _take_over(work: Pose, pose: Pose) -> None:
 
 
 def _left_as_they_were(record: PoseRecord) -> list[Diagnostic]:
-    """Return a remark on what a record says that a figure with other DOFs does not take over."""
+    """Return a message about parts of a record that a figure with other DOFs ignores."""
     moves = DOF_KINDS[:3]
     moved = [label for label, value in record.dofs.items() if value and label.endswith(moves)]
     shifts = record.turns is not None and record.turns.shifts.any()
@@ -229,7 +229,7 @@ def _left_as_they_were(record: PoseRecord) -> list[Diagnostic]:
 
 
 def _keep_drawable(before: Pose, pose: Pose) -> list[Diagnostic]:
-    """Undo a place or scale that no camera could show, and say so."""
+    """Restore a placement or scale that cannot be drawn; return messages about it."""
     notes = []
     scale = pose.figure_scale
     if not _SMALLEST <= scale <= _LARGEST:
@@ -265,7 +265,7 @@ def _dof(figure: Figure, label: str) -> int:
     try:
         return find_dof(figure.require_skeleton(), label)
     except RigError as problem:
-        why = str(problem).removeprefix(f'"{label}": ')  # once is enough
+        why = str(problem).removeprefix(f'"{label}": ')  # the caller adds the label
         values = {"figure": figure.name, "found": label, "reason": why}
         raise RigError(Diagnostic("F002.pose-unknown-dof", values=values)) from None
 
@@ -276,7 +276,7 @@ def _beyond_limits(skeleton: Skeleton, dofs: Floats) -> list[Diagnostic]:
 
 
 def _apply_vector(vector: Floats, figure: Figure, pose: Pose) -> list[Diagnostic]:
-    """Take the model's own numbers, or the vector of another member of the SMPL family."""
+    """Apply the model's own numbers, or the vector of another member of the SMPL family."""
     skeleton = figure.require_skeleton()
     layout = figure.pose_layout
     own = skeleton.n_dofs if layout is None else layout.n_numbers
@@ -288,7 +288,7 @@ def _apply_vector(vector: Floats, figure: Figure, pose: Pose) -> list[Diagnostic
     if names is None:
         values = {"expected": own, "figure": figure.name, "found": len(vector)}
         raise RigError(Diagnostic("F002.pose-vector", values=values))
-    # Joints that this model has and the vector's model has not go to rest.
+    # Joints that the vector's model lacks go to rest.
     joints = np.arange(skeleton.n_joints, dtype=np.int32)
     wanted = np.zeros((skeleton.n_joints, 3))
     rows = vector.reshape(-1, 3)
@@ -325,7 +325,7 @@ def _apply_part(
 
 
 def _apply_body(values: Floats, figure: Figure, pose: Pose) -> list[Diagnostic]:
-    """Turn the joints after the root; the two hands of SMPL mean nothing to its kin."""
+    """Rotate the joints after the root; SMPL's two hand joints have no equivalent elsewhere."""
     skeleton = figure.require_skeleton()
     has_more = "left_wrist" in skeleton.names and "left_hand" not in skeleton.names
     own = _BODY if has_more else skeleton.n_joints - 1
@@ -364,7 +364,7 @@ def _apply_hand(
     assert skeleton is not None
     side = _HAND_PARTS[name]
     if hand is None and side and len(figure.hands) == 1 and not figure.hands[0].side:
-        hand = figure.hands[0]  # MANO is one hand, whatever its side is called
+        hand = figure.hands[0]  # MANO is a single hand, whichever its side
     first = f"{side}_index1" if side else "index1"
     if hand is None and len(values) == 45 and first in skeleton.names:
         start = skeleton.names.index(first)

@@ -1,4 +1,4 @@
-"""A model's own pose numbers, to and from a pose: a table says where each joint's rotation is."""
+"""Conversion between a pose and a model's own pose vector, by a table of joint positions in it."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseLayout:
-    """Where a model's files put the numbers of one pose.
+    """Positions of the numbers of one pose in a model's files.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class PoseLayout:
 
 
 def rotation_rows(skeleton: Skeleton) -> Ints:
-    """Return the DOF rows of ball joints: about x, y, z in this order.
+    """Return the DOF rows of ball joints, about x, y, z in this order.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def rotation_rows(skeleton: Skeleton) -> Ints:
     Returns
     -------
     (J, 3) int32
-        -1 for all three of a joint that has not exactly these three rotations.
+        -1 for all three of a joint that does not have exactly these three rotations.
     """
     rows = np.full((skeleton.n_joints, 3), -1, dtype=np.int32)
     turns = np.flatnonzero(skeleton.dof_kinds >= 3)
@@ -82,10 +82,10 @@ def rotation_rows(skeleton: Skeleton) -> Ints:
 def set_joint_rotations(
     skeleton: Skeleton, pose: Pose, joints: Ints, rotations: Floats, clamp: bool = True
 ) -> None:
-    """Turn joints within their parents, in place.
+    """Set the rotations of joints within their parents, in place.
 
-    A ball joint's DOFs take the rotation as angles about x, y, z; a joint with fewer DOFs keeps
-    them as near to 0 as its limits allow and takes the rest as its quaternion.
+    A ball joint's DOFs take the rotation as angles about x, y, z; other joints keep their DOFs
+    as close to 0 as the limits allow and take the rest as a quaternion.
 
     Parameters
     ----------
@@ -94,11 +94,11 @@ def set_joint_rotations(
     pose : Pose
         Changed.
     joints : (N,)
-        Joints to turn.
+        Joints to rotate.
     rotations : (N, 3, 3)
-        Of each within its parent.
+        Rotation of each within its parent.
     clamp : bool
-        Whether DOFs are brought within their limits.
+        Whether DOFs are clamped to their limits.
     """
     joints = np.asarray(joints)
     rows = rotation_rows(skeleton)[joints]
@@ -112,7 +112,7 @@ def set_joint_rotations(
     if clamp:
         pose.dofs[:] = clamp_dofs(skeleton, pose.dofs)
     if len(others):
-        # Limits may hold DOFs away from 0: the quaternion takes the rest.
+        # Limits may keep DOFs away from 0: the quaternion takes the rest.
         pose.rotations[others] = 0.0, 0.0, 0.0, 1.0
         held = joint_rotations(skeleton, pose)[others]
         left = rotations[~is_ball] @ np.swapaxes(held, -1, -2)
@@ -120,12 +120,12 @@ def set_joint_rotations(
 
 
 def own_numbers(layout: PoseLayout, rotations: Floats) -> Floats:
-    """Return each joint's three numbers as the model's files would give them.
+    """Return each joint's three numbers in the convention of the model's files.
 
     Parameters
     ----------
     layout : PoseLayout
-        Says which joints are Euler angles.
+        Specifies which joints use Euler angles.
     rotations : (J, 3, 3)
         Of each joint within its parent.
 
@@ -149,7 +149,7 @@ def write_vector(layout: PoseLayout | None, skeleton: Skeleton, pose: Pose) -> F
     skeleton : Skeleton
         Of the figure.
     pose : Pose
-        What to write.
+        The pose to convert.
 
     Returns
     -------
@@ -169,7 +169,7 @@ def write_vector(layout: PoseLayout | None, skeleton: Skeleton, pose: Pose) -> F
 
 
 def read_vector(layout: PoseLayout | None, skeleton: Skeleton, pose: Pose, vector: Floats) -> None:
-    """Pose by the model's own numbers, in place.
+    """Set a pose from the model's own numbers, in place.
 
     Parameters
     ----------
@@ -178,14 +178,14 @@ def read_vector(layout: PoseLayout | None, skeleton: Skeleton, pose: Pose, vecto
     skeleton : Skeleton
         Of the figure.
     pose : Pose
-        Changed; its shape stays.
+        Changed, except for its shape.
     vector : (N,)
         Lengths and radians.
 
     Raises
     ------
     RigError
-        If there are more or fewer numbers than the model has.
+        If the number of values is not the model's.
     """
     wanted = skeleton.n_dofs if layout is None else layout.n_numbers
     if len(vector) != wanted:

@@ -1,1 +1,1 @@
-"""Motions and poses of one skeleton on another."""
+"""Retargeting of motions and poses from one skeleton to another."""

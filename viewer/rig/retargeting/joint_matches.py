@@ -1,4 +1,4 @@
-"""Which joint of one skeleton moves which of another."""
+"""Matches between the joints of two skeletons, for retargeting."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ from viewer.rig.skeleton import Skeleton, joint_labels
 
 __all__ = ["Matches", "match_joints"]
 
-_SHORTLY = 8  # names in an error
+_SHORTLY = 8  # names listed in an error
 _LIMBS = ("left_hip left_knee", "right_hip right_knee", "left_shoulder left_elbow",
           "right_shoulder right_elbow")  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
 class Matches:
-    """Partners of one skeleton's joints in another.
+    """The source joints that drive the joints of a target skeleton.
 
     Attributes
     ----------
     partners : (J,) int32
         Joint of the source for each joint of the target, -1 for none.
     names : tuple of J str
-        What the SMPL family calls the target's joints; empty where it has no such joint.
+        SMPL names of the target's joints; empty where there is no equivalent.
     is_hierarchy : bool
         Whether both have the same names and hierarchy.
     notes : tuple of Diagnostic
-        Who moves whom, who stays at rest, and who is not used.
+        Messages about the joints that were matched, that stay at rest, and that are unused.
     """
 
     partners: Ints
@@ -48,21 +48,21 @@ def match_joints(
     mapping: Mapping[str, str] | None,
     titles: tuple[str, str],
 ) -> Matches:
-    """Match by mapping, then by what names mean, then by equal names.
+    """Match joints by mapping, then by the meaning of names, then by equal names.
 
     Parameters
     ----------
     source, target : Skeleton
-        Where the motion comes from, and where it goes to.
+        The skeleton of the motion, and the one that it is retargeted to.
     mapping : mapping of str to str, optional
-        Names of the source to names of the target.
+        Joint names of the source to joint names of the target.
     titles : (str, str)
-        What both are called, for messages.
+        Names of both in messages.
 
     Raises
     ------
     RigError
-        If too few joints match, or the mapping names a joint that is not there.
+        If too few joints match, or the mapping names a missing joint.
     """
     plain = _lower(source.names), _lower(target.names)
     meanings = tuple(canonical_names(s.names, s.parents) for s in (source, target))
@@ -90,7 +90,7 @@ def _lower(names: Sequence[str]) -> tuple[str, ...]:
 def _has_same_hierarchy(
     source: Skeleton, target: Skeleton, plain: tuple[tuple[str, ...], ...]
 ) -> bool:
-    """Return whether every joint has a namesake below a namesake, in whatever order."""
+    """Return whether all joints have equal names and parents, in any order."""
     trees = []
     for skeleton, names in zip((source, target), plain, strict=True):
         above = [names[parent] if parent >= 0 else "" for parent in skeleton.parents]
@@ -112,7 +112,7 @@ def _match_equal(
     names: tuple[tuple[str, ...], ...],
     meanings: tuple[tuple[str, ...], ...] | str,
 ) -> None:
-    """Match joints with equal names that are still free; of ``meanings``, neither has one."""
+    """Match unmatched joints of equal names whose meaning is unknown in both skeletons."""
     used = set(partners.tolist())
     known = {
         name: joint
@@ -127,7 +127,7 @@ def _match_equal(
 def _is_enough(
     partners: Ints, meanings: tuple[tuple[str, ...], ...], plain: tuple[tuple[str, ...], ...]
 ) -> bool:
-    """Return whether the hips and a limb match, or half of the joints."""
+    """Return whether the hips and a limb match, or at least half of the joints."""
     matched = {name for joint, name in enumerate(meanings[1]) if partners[joint] >= 0}
     if "pelvis" in matched and any(set(limb.split()) <= matched for limb in _LIMBS):
         return True
@@ -161,7 +161,7 @@ def _listed(names: list[str], limit: int) -> str:
 def _notes(
     source: Skeleton, target: Skeleton, partners: Ints, titles: tuple[str, str]
 ) -> list[Diagnostic]:
-    """Return which joints move which, and which are left over."""
+    """Return messages about matched joints and unmatched ones."""
     moved, movers = joint_labels(target), joint_labels(source)
     pairs = [
         Phrase("joint-by-joint", joint=moved[joint], partner=movers[partner])

@@ -1,9 +1,9 @@
-"""What joints are called elsewhere: rules from many programs' names to those of the SMPL family.
+"""Rules that translate joint names of many programs to those of the SMPL family.
 
-Known are the names of SMPL, SMPL+H and SMPL-X (also as exported through Maya), Mixamo,
-MotionBuilder and Rokoko, CMU (both its ``.bvh`` and its ``.asf`` words), Poser and DAZ, 3ds
-Max's Biped, Unreal, VRM, Xsens, and Blender's Rigify. Sides are found as ``L``, ``R``, ``Left`` or
-``Right`` at either end of a name; prefixes that most joints share (``mixamorig:``, ``Bip01 ``,
+The supported names are those of SMPL, SMPL+H and SMPL-X (also as exported through Maya), Mixamo,
+MotionBuilder and Rokoko, CMU (both its ``.bvh`` and its ``.asf`` names), Poser and DAZ, 3ds
+Max's Biped, Unreal, VRM, Xsens, and Blender's Rigify. Sides are detected as ``L``, ``R``, ``Left``
+or ``Right`` at either end of a name; prefixes that most joints have (``mixamorig:``, ``Bip01 ``,
 ``m_avg_``) are dropped.
 """
 
@@ -50,27 +50,27 @@ _PHALANX = {"proximal": 1, "intermediate": 2, "distal": 3}
 _FINGER = re.compile(rf"(?:hand|f)?({'|'.join(_FINGERS)})(?:finger)?({'|'.join(_PHALANX)})?(\d*)")
 _BIPED_FINGERS = ("thumb", "index", "middle", "ring", "pinky")
 _TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
-_SHARED = 0.6  # of the joints: a first word that more of them have says nothing
-_MOST = 2000  # joints; what has more is no body
+_SHARED = 0.6  # of the joints: a first word that more of them have carries no information
+_MOST = 2000  # joints: a skeleton with more is not a body
 _SPINES = ("spine1", "spine2", "spine3")
 
 _ARMS = ("left_collar", "right_collar", "left_shoulder", "right_shoulder")
 
-_Key = tuple[str, str]  # side and word, in small letters: ("left", "upleg")
+_Key = tuple[str, str]  # side and word, in lower case: ("left", "upleg")
 
 
 def plain_names(names: Sequence[str]) -> tuple[str, ...]:
-    """Return names that every program can read: unique, of ``[A-Za-z0-9_]`` alone.
+    """Return names that every program can read: unique, and made of ``[A-Za-z0-9_]`` only.
 
     Parameters
     ----------
     names : sequence of J str
-        May repeat, be empty, or hold anything.
+        May repeat, be empty, or contain any characters.
 
     Returns
     -------
     tuple of J str
-        Unchanged where that is so already.
+        Names that are already valid are unchanged.
 
     >>> plain_names(["hip", "hip", "", "left knee", "é"])
     ('hip', 'hip_2', 'joint2', 'left_knee', 'e')
@@ -81,7 +81,7 @@ def plain_names(names: Sequence[str]) -> tuple[str, ...]:
         letters = "".join(letter for letter in letters if not unicodedata.combining(letter))
         text = re.sub(r"[^A-Za-z0-9_]", "_", letters)
         bare.append(text if text.strip("_") else f"joint{index}")
-    # A name that needs no change keeps itself, however late it comes.
+    # Valid names are reserved first, so that they stay unchanged wherever they occur.
     taken = {text for text, name in zip(bare, names, strict=True) if text == name}
     result: list[str] = []
     used: set[str] = set()
@@ -97,7 +97,7 @@ def plain_names(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def sided_words(names: Sequence[str]) -> list[tuple[str, str]]:
-    """Return the side and the word of every name, whatever program it comes from.
+    """Return the side and the remaining word of every name, for any program's convention.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def sided_words(names: Sequence[str]) -> list[tuple[str, str]]:
     Returns
     -------
     list of J (str, str)
-        ``"left"``, ``"right"`` or nothing, and the rest in small letters.
+        ``"left"``, ``"right"`` or ``""``, and the rest in lower case.
 
     >>> sided_words(["LeftFoot", "hip_01_r", "spine"])
     [('left', 'foot'), ('right', 'hip01'), ('', 'spine')]
@@ -116,12 +116,12 @@ def sided_words(names: Sequence[str]) -> list[tuple[str, str]]:
 
 
 def canonical_names(names: Sequence[str], parents: Ints) -> tuple[str, ...]:
-    """Return what the SMPL family would call each joint: ``left_hip``, ``spine2`` and so on.
+    """Return the SMPL family's name for each joint: ``left_hip``, ``spine2`` and so on.
 
-    Words that conventions use differently are told apart by the skeleton's other names:
-    ``LeftShoulder`` is a collar where there is a ``LeftArm``, ``LeftFoot`` an ankle where there
+    Words whose meaning depends on the convention are resolved by the skeleton's other names:
+    ``LeftShoulder`` is a collar if there is a ``LeftArm``, ``LeftFoot`` an ankle if there
     is none. Chains of spine joints are numbered from the pelvis; of more than three, the first,
-    the middle and the last count. Without a pelvis the joint that both legs hang from is it.
+    middle and last are used. Without a pelvis, the joint above both legs is the pelvis.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def canonical_names(names: Sequence[str], parents: Ints) -> tuple[str, ...]:
     Returns
     -------
     tuple of J str
-        Empty for joints without a counterpart; no name occurs twice.
+        Empty for joints without an equivalent; no name occurs twice.
 
     >>> import numpy as np
     >>> canonical_names(["Hips", "LeftUpLeg", "LeftFoot"], np.array([-1, 0, 1]))
@@ -164,7 +164,7 @@ _CHAINS = ("spine", "neck")
 
 
 def _numbered(spine: list[int]) -> tuple[list[int], tuple[str, ...]]:
-    """Return which joints of a spine get which names."""
+    """Return the joints of a spine that are named, and their names."""
     if len(spine) <= 1:
         return spine, _SPINES[: len(spine)]
     if len(spine) == 2:
@@ -173,7 +173,7 @@ def _numbered(spine: list[int]) -> tuple[list[int], tuple[str, ...]]:
 
 
 def _put_pelvis(result: list[str], parents: Ints, spine: list[int]) -> None:
-    """Call the joint pelvis that both legs, or else the first leg or spine joint, hang from."""
+    """Name as pelvis the joint above both legs, or else above the first leg or spine joint."""
     legs = [result.index(name) for name in ("left_hip", "right_hip") if name in result]
     paths = [_ancestors(joint, parents) for joint in legs]
     shared = [joint for joint in paths[0] if all(joint in path for path in paths)] if paths else []
@@ -186,7 +186,7 @@ def _put_pelvis(result: list[str], parents: Ints, spine: list[int]) -> None:
 def _without_neck(
     spine: list[int], necks: list[int], result: list[str], parents: Ints
 ) -> list[int]:
-    """Return the spine up to the chest; what goes on behind it is neck and head (Rigify)."""
+    """Return the spine up to the chest; joints after it are neck and head (Rigify)."""
     arms = [result.index(name) for name in _ARMS if name in result]
     paths = [_ancestors(joint, parents) for joint in arms]
     chest = [joint for joint in paths[0] if all(joint in path for path in paths)] if paths else []
@@ -208,7 +208,7 @@ def _ancestors(joint: int, parents: Ints) -> list[int]:
 
 
 def _keys(names: Sequence[str]) -> list[_Key]:
-    """Return side and word of every name, without what most names begin with."""
+    """Return side and word of every name, without the prefix that most names have."""
     split = [_tokens(name) for name in names]
     while True:
         first = Counter(tokens[0] for tokens in split if tokens)
@@ -220,7 +220,7 @@ def _keys(names: Sequence[str]) -> list[_Key]:
 
 
 def _tokens(name: str) -> list[str]:
-    """Split a name at capitals, digits and signs, behind its name space: small letters."""
+    """Split a name, without its namespace, at capitals, digits and symbols; lower case."""
     bare = re.split(r"[:|]", name)[-1]
     tokens = [token.lower() for token in _TOKEN.findall(bare)]
     while len(tokens) > 1 and tokens[0] in _PREFIXES:
@@ -230,22 +230,22 @@ def _tokens(name: str) -> list[str]:
 
 
 def _key(tokens: list[str]) -> _Key:
-    """Take the side off either end."""
+    """Return the side, taken from either end, and the word of a name."""
     if "".join(tokens) in _XSENS_SPINE:
         return "", "spine"
-    tokens = [token for token in tokens if token != "c"]  # VRM's centre
+    tokens = [token for token in tokens if token != "c"]  # VRM's centre joints
     for end in (0, -1):
         if len(tokens) > 1 and tokens[end] in _SIDES:
             rest = tokens[1:] if end == 0 else tokens[:-1]
             return _SIDES[tokens[end]], _word(rest)
-    # Blender puts numbers behind the side: f_index.01.L, but also thigh.L.001.
+    # Blender puts numbers after the side: f_index.01.L, but also thigh.L.001.
     if len(tokens) > 2 and tokens[-2] in _SIDES and tokens[-1].isdigit():
         return _SIDES[tokens[-2]], _word([*tokens[:-2], tokens[-1]])
     if len(tokens) > 2 and tokens[1] in _SIDES and not tokens[0].isdigit():
         return _SIDES[tokens[1]], _word([tokens[0], *tokens[2:]])
     word = _word(tokens)
     for letters in ("left", "right", "l", "r"):
-        # lfemur: a side without a capital counts only before a word that we know.
+        # lfemur: a lower-case side without a separator counts only before a known word.
         if word.startswith(letters) and word not in _ROLES and _is_known(word[len(letters) :]):
             return _SIDES[letters], word[len(letters) :]
     return "", word
@@ -261,7 +261,7 @@ def _is_known(word: str) -> bool:
 
 
 def _unambiguous(keys: list[_Key]) -> list[_Key]:
-    """Rename what means different joints in different conventions."""
+    """Rename words that mean different joints in different conventions."""
     roles = {_ROLES.get(word.rstrip("0123456789"), "") for _, word in keys}
     words = {word for _, word in keys}
     has_arm = bool(words & set(_WORDS["shoulder"].split()))
@@ -289,7 +289,7 @@ def _role(key: _Key) -> str:
     if not role or (number and role != "foot" and int(number) > 1):
         return ""
     if role in _SIDED:
-        # Hands on their own (MANO) have no sides.
+        # Hands without a body (MANO) have no sides.
         return f"{side}_{role}" if side else (role if role == "wrist" else "")
     return "" if side else role
 

@@ -1,4 +1,4 @@
-"""Left and right: the mirror plane of a figure, its joint pairs, and a pose mirrored."""
+"""Left-right symmetry: a figure's mirror plane, its joint pairs, and mirrored poses."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from viewer.rig.skeleton import Skeleton, clamp_dofs
 
 __all__ = ["asymmetry", "joint_partners", "mirror_axis", "mirror_pose"]
 
-_NEAR = 0.02  # of the figure's size: how far a joint may be from its partner's mirror image
+_NEAR = 0.02  # of the figure's size: maximum distance of a joint from its partner's mirror image
 
 
 def mirror_axis(figure: Figure) -> int:
     """Return the axis across which a figure is symmetric: 0 for x, 1 for y.
 
-    With a symmetry map it is the one that fits best; else y for figures with z up, whose left
-    is +y, and x for figures with y up.
+    With a symmetry map it is the axis with the smallest error; else y for z-up figures, whose
+    left is +y, and x for y-up figures.
     """
     if figure.symmetry is None or figure.mesh is None:
         return 1 if figure.up == "z" else 0
@@ -31,7 +31,7 @@ def mirror_axis(figure: Figure) -> int:
 
 
 def asymmetry(figure: Figure) -> Floats:
-    """Return how far each rest vertex is from its partner's mirror image: (V,), figure units.
+    """Return the distance of each rest vertex from its partner's mirror image: (V,), figure units.
 
     Raises
     ------
@@ -45,22 +45,22 @@ def asymmetry(figure: Figure) -> Floats:
 
 def _mirror_distances(figure: Figure, axis: int) -> Floats:
     mesh = figure.require_mesh()
-    assert figure.symmetry is not None  # the callers looked
+    assert figure.symmetry is not None  # checked by the callers
     partner = mesh.positions[figure.symmetry].copy()
     partner[:, axis] *= -1.0
     return np.linalg.norm(mesh.positions - partner, axis=1)
 
 
 def joint_partners(figure: Figure) -> Ints:
-    """Return each joint's partner on the other side, itself for one in the middle: (J,) int32.
+    """Return each joint's partner on the other side, itself for a central joint: (J,) int32.
 
-    A partner is the joint nearest to the mirrored place, among those with the same number of
-    joints above them.
+    The partner is the joint nearest to the mirrored position, among those at the same depth of
+    the hierarchy.
 
     Raises
     ------
     RigError
-        If a joint has none within 2 % of the figure's size.
+        If a joint has no partner within 2 % of the figure's size.
     """
     skeleton = figure.skeleton
     if skeleton is None:
@@ -84,22 +84,22 @@ def joint_partners(figure: Figure) -> Ints:
 
 
 def mirror_pose(figure: Figure, pose: Pose) -> Pose:
-    """Return the pose seen in a mirror: left and right exchanged.
+    """Return the mirrored pose, with left and right exchanged.
 
-    World rotations relative to the rest pose are mirrored, D' = F D F, and each joint takes its
-    partner's; so rest rotations may differ from side to side.
+    World rotations relative to the rest pose are reflected, D' = F D F, and each joint takes its
+    partner's; rest rotations may therefore differ between the sides.
 
     Parameters
     ----------
     figure : Figure
         With a symmetric skeleton.
     pose : Pose
-        Left as it is.
+        Not changed.
 
     Returns
     -------
     Pose
-        Of the same shape; the figure's translation is mirrored as well.
+        Of the same shape; the figure's translation is mirrored too.
 
     Raises
     ------
@@ -128,10 +128,10 @@ def mirror_pose(figure: Figure, pose: Pose) -> Pose:
 def _mirror_moves(
     skeleton: Skeleton, pose: Pose, mirrored: Pose, partners: Ints, flip: Floats, rest: Floats
 ) -> None:
-    """Mirror translations, of the figure and of joints, and exchange scales."""
+    """Mirror the translations of the figure and of joints, and exchange scales."""
     mirrored.figure_translation[:] = pose.figure_translation * flip
     mirrored.scales[:] = pose.scales[partners]
-    # A joint's translation counts in its parent's frame: t' = P'^T F P t.
+    # A joint's translation is in its parent's frame: t' = P'^T F P t.
     parents = skeleton.parents
     frames = np.where((parents >= 0)[:, None, None], rest[parents], np.eye(3))
     carry = np.swapaxes(frames, 1, 2) @ (flip[:, None] * frames[partners])

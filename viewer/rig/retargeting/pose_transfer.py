@@ -1,14 +1,14 @@
-"""A pose carried to another figure whose joints have the same names.
+"""Transfer of a pose to another figure whose joints have the same names.
 
-Joints are matched by name and take over their partner's turn away from the rest pose, measured in
-the figure's axes, so that DOF orders, rest rotations and joints in between may differ. With the
-world rotations W of the pose and W0 of the skeleton with every DOF at 0,
+Joints are matched by name and take over their partner's rotation relative to the rest pose, in the
+figure's axes, so DOF orders, rest rotations and intermediate joints may differ. With the
+world rotations W of the pose and W0 of the skeleton with all DOFs at 0,
 
     W_target = C W_source W0_source^T C^T W0_target
 
-where C turns the source's up axis into the target's. The turns W_source W0_source^T are all that
-has to be known of the source: they go with a pose into files and onto the clipboard. Figures with
-the source's skeleton take its DOFs instead, and what it has beneath them.
+where C rotates the source's up axis to the target's. Only the rotations W_source W0_source^T are
+needed from the source: they accompany a pose in files and on the clipboard. Figures with
+the source's skeleton take its DOFs instead, and its base rotations and translations.
 """
 
 from __future__ import annotations
@@ -30,52 +30,52 @@ from viewer.rig.posing.joint_rotation import nearest_dofs
 from viewer.rig.skeleton import Skeleton
 
 __all__ = [
-    "JointTurns",
+    "JointRotations",
     "dof_layout",
-    "joint_turns",
+    "has_layout_of",
     "joints_by_name",
+    "relative_rotations",
     "restore_beneath",
-    "shares_layout",
-    "turn_joints",
+    "rotate_joints",
 ]
 
-_INEXACT = 1e-4  # radians: a turn that is missed by less is met
-_REST_DIGITS = 5  # of rest rotations that count as the same
+_INEXACT = 1e-4  # radians: a rotation with a smaller error counts as reached
+_REST_DIGITS = 5  # decimals to which equal rest rotations agree
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class JointTurns:
-    """How the joints of a posed figure are turned, whatever its DOFs are.
+class JointRotations:
+    """Joint rotations of a posed figure, independent of its DOFs.
 
     Attributes
     ----------
     figure : str
-        What the figure is called.
+        Name of the figure.
     names : tuple of J str
-        Of its joints.
-    turns : (J, 4)
-        Away from the rest pose, in the figure's axes: quaternions (x, y, z, w).
+        Names of its joints.
+    relative : (J, 4)
+        Relative to the rest pose, in the figure's axes: quaternions (x, y, z, w).
     shifts : (J, 3)
-        Translations beside the DOFs, within the parent joint, lengths.
+        Translations in addition to the DOFs, in the parent joint's frame.
     up : str
         The figure's up axis, ``"y"`` or ``"z"``.
     layout : str
-        As ``dof_layout`` gives it: where it is the same, the DOFs' values count, not the turns.
+        Result of ``dof_layout``: for figures with the same layout the DOFs' values are used.
     rotations : (J, 4) or None
-        Beneath the DOFs, as a ``Pose`` has them; None: those of the rest pose.
+        Base rotations, to which the DOFs are added, as in ``Pose``; None: those of the rest pose.
     """
 
     figure: str
     names: tuple[str, ...]
-    turns: Floats
+    relative: Floats
     shifts: Floats
     up: str
     layout: str
     rotations: Floats | None = None
 
 
-def joint_turns(figure: Figure, pose: Pose) -> JointTurns:
-    """Return how a figure's joints are turned.
+def relative_rotations(figure: Figure, pose: Pose) -> JointRotations:
+    """Return the joint rotations of a posed figure.
 
     Parameters
     ----------
@@ -85,8 +85,10 @@ def joint_turns(figure: Figure, pose: Pose) -> JointTurns:
         Of that figure.
     """
     skeleton = figure.require_skeleton()
-    turns = _turned(skeleton, pose) @ np.swapaxes(_turned(skeleton, _unturned(skeleton)), 1, 2)
-    return JointTurns(
+    turns = _figure_rotations(skeleton, pose) @ np.swapaxes(
+        _figure_rotations(skeleton, _with_zero_dofs(skeleton)), 1, 2
+    )
+    return JointRotations(
         figure.name,
         skeleton.names,
         matrix_to_quaternion(turns),
@@ -98,9 +100,9 @@ def joint_turns(figure: Figure, pose: Pose) -> JointTurns:
 
 
 def dof_layout(figure: Figure) -> str:
-    """Return a word that two figures share if a pose's DOFs mean the same to both.
+    """Return a digest that two figures share if and only if poses' DOFs mean the same to both.
 
-    Blend shapes do not count: how many a file has of them changes no joint's turn.
+    Blend shapes are ignored: their number does not change any joint's rotation.
 
     Parameters
     ----------
@@ -120,38 +122,38 @@ def dof_layout(figure: Figure) -> str:
     return hashlib.sha256(b"|".join(parts)).hexdigest()[:16]
 
 
-def shares_layout(source: JointTurns, figure: Figure) -> bool:
-    """Return whether a figure takes the DOFs of a pose, and not only the turns of its joints.
+def has_layout_of(source: JointRotations, figure: Figure) -> bool:
+    """Return whether a figure can take a pose's DOFs directly, not only its joint rotations.
 
     Parameters
     ----------
-    source : JointTurns
+    source : JointRotations
         Of the pose.
     figure : Figure
         With a skeleton.
     """
     skeleton = figure.require_skeleton()
-    # Files are edited by hand: the word alone does not make their lists as long as the skeleton.
+    # Files are edited by hand: an equal digest does not guarantee lists of the right length.
     return source.layout == dof_layout(figure) and source.names == skeleton.names
 
 
-def restore_beneath(skeleton: Skeleton, pose: Pose, source: JointTurns, is_whole: bool) -> None:
-    """Give a pose the source's rotations and shifts beneath its DOFs, in place.
+def restore_beneath(skeleton: Skeleton, pose: Pose, source: JointRotations, is_whole: bool) -> None:
+    """Restore the source's base rotations and translations, those beneath the DOFs, in place.
 
-    They are beside the rest pose where a motion turns a joint about more axes than its DOFs have.
-    The turns are not looked at: what they say of the DOFs is out of date once these are edited.
+    They differ from the rest pose where a motion rotates a joint about axes that its DOFs lack.
+    The stored world rotations are ignored: they are out of date once the DOFs are edited.
 
     Parameters
     ----------
     skeleton : Skeleton
         Of a figure with the source's layout.
     pose : Pose
-        Its DOFs are left alone.
-    source : JointTurns
-        What lies beneath the DOFs of its pose.
+        Its DOFs are not changed.
+    source : JointRotations
+        Provides the base rotations and translations.
     is_whole : bool
-        Whether the source's pose is taken with every DOF: joints of which it says nothing then go
-        to rest, instead of staying as they are.
+        Whether the source's pose is applied with every DOF: joints that it does not mention are
+        then reset to rest instead of keeping their values.
     """
     if source.rotations is not None:
         pose.rotations[:] = source.rotations
@@ -167,12 +169,12 @@ def joints_by_name(source: Sequence[str], target: Sequence[str]) -> Ints:
     Parameters
     ----------
     source, target : sequence of str
-        Names of joints; those that are empty, or that repeat in either, match nothing.
+        Joint names; empty and repeated ones match nothing.
 
     Returns
     -------
     (J,) int32
-        Joints of the source for the J joints of the target; -1 for none.
+        Source joints of the J target joints; -1 for none.
     """
     counts, others = Counter(source), Counter(target)
     place = {name: joint for joint, name in enumerate(source)}
@@ -182,30 +184,32 @@ def joints_by_name(source: Sequence[str], target: Sequence[str]) -> Ints:
     )
 
 
-def turn_joints(source: JointTurns, target: Figure, start: Pose) -> tuple[Pose, list[Diagnostic]]:
-    """Return a figure's pose with the joints turned as another figure's are.
+def rotate_joints(
+    source: JointRotations, target: Figure, start: Pose
+) -> tuple[Pose, list[Diagnostic]]:
+    """Return a figure's pose with the joints rotated like those of another figure.
 
     Parameters
     ----------
-    source : JointTurns
-        Of the other figure's pose.
+    source : JointRotations
+        Joint rotations of the other figure.
     target : Figure
         With a skeleton.
     start : Pose
-        Of the target; left as it is. What has no partner stays as it is there, as do place,
-        size and shape, and where joints are moved to.
+        Of the target; not changed. Provides joints without a partner, placement, size, shape
+        and joint translations.
 
     Returns
     -------
     pose : Pose
         Of the target, within its limits.
     notes : list of Diagnostic
-        How many joints were taken over, which the target lacks, and which cannot turn that way.
+        Messages about the number of matched joints, unmatched ones, and unreachable rotations.
 
     Raises
     ------
     RigError
-        If no joint of one is called as one of the other.
+        If the figures have no joint name in common.
     """
     other = target.skeleton
     if other is None:
@@ -214,41 +218,41 @@ def turn_joints(source: JointTurns, target: Figure, start: Pose) -> tuple[Pose, 
     found = np.flatnonzero(partners >= 0)
     if not len(found):
         whose = printable(source.figure) or "the pose"
-        raise RigError(f"no joint of {whose} is called as one of {target.name}")
-    turn = _up_turn(source.up, target.up)
-    deltas = turn @ quaternion_to_matrix(source.turns[partners[found]]) @ turn.T
-    rest = _turned(other, _unturned(other))
+        raise RigError(f"{whose} and {target.name} have no joint name in common")
+    to_target = _up_rotation(source.up, target.up)
+    deltas = to_target @ quaternion_to_matrix(source.relative[partners[found]]) @ to_target.T
+    rest = _figure_rotations(other, _with_zero_dofs(other))
     wanted = dict(zip(found.tolist(), deltas @ rest[found], strict=True))
-    moved, missed = _turn_joints(other, start, wanted)
+    moved, missed = _rotate_joints(other, start, wanted)
     return moved, _notes(source, target, partners, missed)
 
 
-def _turn_joints(
+def _rotate_joints(
     skeleton: Skeleton, start: Pose, wanted: dict[int, Floats]
 ) -> tuple[Pose, list[int]]:
-    """Turn joints to world rotations; return the pose, and the joints that cannot get there."""
+    """Rotate joints to world rotations; return the pose, and the joints that cannot reach them."""
     pose, missed = start.copy(), []
     world = np.empty((skeleton.n_joints, 3, 3))
     present = joint_rotations(skeleton, start)
     for joint, parent in enumerate(skeleton.parents.tolist()):
-        # Above is what was wanted, not what a limit left: local rotations are carried over.
+        # The wanted parent rotation, not the limited one, so that local rotations are preserved.
         above = world[parent] if parent >= 0 else np.eye(3)
         world[joint] = wanted.get(joint, above @ present[joint])
         if joint in wanted:
             pose.rotations[joint] = skeleton.rest_rotations[joint]
-            turned = nearest_dofs(skeleton, pose, joint, above.T @ world[joint])
-            pose.dofs[:] = turned.dofs
-            if turned.error > _INEXACT:
+            fitted = nearest_dofs(skeleton, pose, joint, above.T @ world[joint])
+            pose.dofs[:] = fitted.dofs
+            if fitted.error > _INEXACT:
                 missed.append(joint)
     return pose, missed
 
 
 def _notes(
-    source: JointTurns, target: Figure, partners: Ints, missed: list[int]
+    source: JointRotations, target: Figure, partners: Ints, missed: list[int]
 ) -> list[Diagnostic]:
-    """Return what became of the joints."""
+    """Return messages about the transferred joints."""
     skeleton = target.skeleton
-    assert skeleton is not None  # the caller looked
+    assert skeleton is not None  # checked by the caller
     used = set(partners[partners >= 0].tolist())
     whose = printable(source.figure) or "the pose"
     values: dict[str, object] = {"n": len(used), "all": len(source.names), "figure": whose}
@@ -263,13 +267,13 @@ def _notes(
     return notes
 
 
-def _unturned(skeleton: Skeleton) -> Pose:
+def _with_zero_dofs(skeleton: Skeleton) -> Pose:
     pose = rest_pose(skeleton)
     pose.dofs[:] = 0.0
     return pose
 
 
-def _turned(skeleton: Skeleton, pose: Pose) -> Floats:
+def _figure_rotations(skeleton: Skeleton, pose: Pose) -> Floats:
     """Return every joint's rotation in the figure's axes: (J, 3, 3)."""
     world = joint_rotations(skeleton, pose)
     for joint, parent in enumerate(skeleton.parents):
@@ -278,8 +282,8 @@ def _turned(skeleton: Skeleton, pose: Pose) -> Floats:
     return world
 
 
-def _up_turn(source: str, target: str) -> Floats:
-    """Return the matrix from one figure's axes to the other's: y up to z up is (x, -z, y)."""
+def _up_rotation(source: str, target: str) -> Floats:
+    """Return the rotation from one figure's axes to the other's: y up to z up is (x, -z, y)."""
     to_z = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
     if source == target:
         return np.eye(3)

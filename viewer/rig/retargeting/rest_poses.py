@@ -1,4 +1,4 @@
-"""Two skeletons' rest poses compared: what turns one into the other, joint by joint."""
+"""Alignment of two skeletons' rest poses, joint by joint."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from viewer.rig.skeleton import Skeleton
 
 __all__ = ["RestPose", "alignment", "is_same_rest", "rest_of"]
 
-_SAME = np.cos(np.radians(20.0))  # bones nearer than this are one rest pose, otherwise shaped
-_NATURAL = np.cos(np.radians(25.0))  # ... of a torso or foot: its own bend is kept
-_UPRIGHT = np.cos(np.radians(25.0))  # ... of a body from the up axis: it stands straight
-_SHORT = 1e-6  # of the skeleton's size: bones without a direction
+_SAME = np.cos(np.radians(20.0))  # bones within this angle belong to the same rest pose
+_NATURAL = np.cos(np.radians(25.0))  # of a torso or foot: within this angle its own bend is kept
+_UPRIGHT = np.cos(np.radians(25.0))  # of a body from the up axis: within it, it stands upright
+_SHORT = 1e-6  # of the skeleton's size: shorter bones have no direction
 _TRUNK = ("pelvis", "spine", "neck", "head", "jaw", "collar", "ankle", "foot", "eye")
 _SPINE = ("spine", "neck", "head")
 _FINGERS = ("index", "middle", "pinky", "ring", "thumb")
@@ -30,16 +30,16 @@ _FINGERS = ("index", "middle", "pinky", "ring", "thumb")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RestPose:
-    """Where joints are at rest.
+    """Positions and rotations of joints at rest.
 
     Attributes
     ----------
     points : (J, 3)
-        World positions, in the axes that two skeletons share.
+        World positions, in the common axes of two skeletons.
     rotations : (J, 3, 3)
         World rotations, in the skeleton's own axes.
     up : (3,)
-        The axis that points up in the shared axes.
+        The up axis in the common axes.
     """
 
     points: Floats
@@ -47,28 +47,28 @@ class RestPose:
     up: Floats
 
 
-def rest_of(skeleton: Skeleton, turn: Floats, up: str) -> RestPose:
-    """Return a skeleton's rest pose, all DOFs at 0.
+def rest_of(skeleton: Skeleton, to_common: Floats, up: str) -> RestPose:
+    """Return a skeleton's rest pose, with all DOFs at 0.
 
     Parameters
     ----------
     skeleton : Skeleton
         Any.
-    turn : (3, 3)
-        Its own axes to the shared ones.
+    to_common : (3, 3)
+        From its own axes to the common ones.
     up : "y" or "z"
-        Of the shared axes.
+        Of the common axes.
     """
     pose = rest_pose(skeleton)
     pose.dofs[:] = 0.0
     points = world_matrices(skeleton, pose)[:, :3, 3]
     local = quaternion_to_matrix(skeleton.rest_rotations)
     axis = np.eye(3)["xyz".index(up)]
-    return RestPose(points @ turn.T, forward_kinematics(skeleton.parents, local), axis)
+    return RestPose(points @ to_common.T, forward_kinematics(skeleton.parents, local), axis)
 
 
 def is_same_rest(source: RestPose, target: RestPose, matches: Matches, parents: Ints) -> bool:
-    """Return whether all bones point much the same way, whatever their lengths.
+    """Return whether all bones point in nearly the same direction, regardless of their lengths.
 
     Parameters
     ----------
@@ -89,26 +89,26 @@ def is_same_rest(source: RestPose, target: RestPose, matches: Matches, parents: 
 
 
 def alignment(source: RestPose, target: RestPose, matches: Matches, parents: Ints) -> Floats:
-    """Return what turns the target's rest pose into the source's at every matched joint.
+    """Return the rotations from the target's rest pose to the source's at every matched joint.
 
-    Limbs and fingers: the bone's direction becomes the source's, with the least turn from how the
-    body stands, so without twist. Hands with fingers: also the knuckles' line. Trunk and feet:
-    only how the body stands, unless their directions differ by more than 25 degrees. The last
-    joint of a limb goes with the one before it.
+    Limbs and fingers: the bone is rotated to the source's direction by the smallest rotation from
+    the body's orientation, so without twist. Hands with fingers also align the line of knuckles.
+    Trunk and feet only follow the body, unless their directions differ by more than 25 degrees.
+    The last joint of a limb follows the one before it.
 
     Parameters
     ----------
     source, target : RestPose
-        In shared axes.
+        In common axes.
     matches : Matches
-        Who moves whom.
+        The joint pairs.
     parents : (J,)
         Of the target.
 
     Returns
     -------
     (J, 3, 3)
-        Rotations in the shared axes; the identity for joints without a partner.
+        Rotations in the common axes; the identity for joints without a partner.
     """
     stands = _standing(source, target, matches)
     result = np.tile(np.eye(3), (len(parents), 1, 1))
@@ -118,7 +118,7 @@ def alignment(source: RestPose, target: RestPose, matches: Matches, parents: Int
         reference = stands if above[joint] < 0 else result[above[joint]]
         children = [int(child) for child in np.flatnonzero(above == joint)]
         mine, theirs = _bones(source, target, matches, int(joint), children)
-        # What hangs from the side of a spine does not say where the spine points.
+        # Joints attached to the side of a spine do not indicate its direction.
         spine = np.array([matches.names[child].startswith(_SPINE) for child in children])
         if matches.names[joint].startswith(_SPINE) and spine.any():
             mine, theirs = mine[spine], theirs[spine]
@@ -139,7 +139,7 @@ def _at_joint(
     stands: Floats,
     reference: Floats,
 ) -> Floats:
-    """Return one joint's rotation; ``reference`` is that of the matched joint above it."""
+    """Return one joint's rotation; ``reference`` is that of the nearest matched ancestor."""
     part = matches.names[joint].removeprefix("left_").removeprefix("right_")
     mine, theirs = (_directions(bone) for bone in bones)
     if not children:
@@ -153,7 +153,7 @@ def _at_joint(
         if knuckles is not None:
             return knuckles
     if len(children) > 1:
-        # The least squares of all directions (Kabsch); the reference decides what they leave open.
+        # Least squares over all directions (Kabsch); the reference decides what they leave open.
         sums = np.einsum("ka,kb->ab", theirs, mine) + _SHORT * reference
         return nearest_rotations(sums)[0]
     start = reference if part.startswith(_FINGERS) else stands
@@ -163,7 +163,7 @@ def _at_joint(
 def _bones(
     source: RestPose, target: RestPose, matches: Matches, joint: int, children: list[int]
 ) -> tuple[Floats, Floats]:
-    """Return the ways from a joint to some below it, in the target and in the source: (K, 3)."""
+    """Return vectors from a joint to joints below it, in the target and in the source: (K, 3)."""
     partners = matches.partners
     mine = target.points[children] - target.points[joint]
     return mine, source.points[partners[children]] - source.points[partners[joint]]
@@ -174,7 +174,7 @@ def _directions(vectors: Floats) -> Floats:
 
 
 def _knuckles(matches: Matches, children: list[int], bones: tuple[Floats, Floats]) -> Floats | None:
-    """Return the turn of a hand by the middle of its fingers and the line across them."""
+    """Return the rotation of a hand from the mean finger direction and the line of knuckles."""
     rows = {matches.names[child].rpartition("_")[2]: row for row, child in enumerate(children)}
     fingers = [rows[f"{name}1"] for name in _FINGERS[:4] if f"{name}1" in rows]
     if "index1" not in rows or not ({"pinky1", "ring1"} & set(rows)):
@@ -189,17 +189,17 @@ def _knuckles(matches: Matches, children: list[int], bones: tuple[Floats, Floats
 
 
 def _matched_above(matches: Matches, parents: Ints) -> Ints:
-    """Return the nearest matched joint above each joint, -1 for none: (J,)."""
+    """Return the nearest matched ancestor of each joint, -1 for none: (J,)."""
     above = np.full(len(parents), -1, dtype=np.int32)
     for joint, parent in enumerate(parents):
         if parent >= 0:
             above[joint] = parent if matches.partners[parent] >= 0 else above[parent]
-    above[matches.partners < 0] = -2  # they are nobody's children, see alignment
+    above[matches.partners < 0] = -2  # unmatched joints are not children of any joint
     return above
 
 
 def _standing(source: RestPose, target: RestPose, matches: Matches) -> Floats:
-    """Return what turns the target's body as a whole: by its sides, and by what is up."""
+    """Return the rotation of the target's body as a whole, from its sides and the up axis."""
     joints = {
         name: joint
         for joint, name in enumerate(matches.names)
@@ -215,7 +215,7 @@ def _standing(source: RestPose, target: RestPose, matches: Matches) -> Floats:
 
 
 def _body_frame(places: dict[str, Floats], up: Floats) -> Floats | None:
-    """Return the axes of a body: to its left, along its height, and the way it looks."""
+    """Return the axes of a body: to its left, along its height, and forward."""
     sides = [
         places[f"left_{part}"] - places[f"right_{part}"]
         for part in ("hip", "shoulder", "collar", "knee", "elbow")
@@ -227,7 +227,7 @@ def _body_frame(places: dict[str, Floats], up: Floats) -> Floats | None:
     if not sides or not high or not low:
         return None
     height = np.mean(high, axis=0) - np.mean(low, axis=0)
-    # A body that stands is not tilted by how its spine happens to be bent.
+    # The bend of the spine must not tilt a body that stands upright.
     is_upright = height @ up > _UPRIGHT * np.linalg.norm(height)
     return _frame(sides[0], up if is_upright else height)
 
@@ -243,13 +243,13 @@ def _frame(side: Floats, main: Floats) -> Floats | None:
 
 
 def _arc(start: Floats, end: Floats) -> Floats:
-    """Return the least rotation from one direction to another."""
+    """Return the smallest rotation from one direction to another."""
     axis = np.cross(start, end)
     sine, cosine = float(np.linalg.norm(axis)), float(start @ end)
     if sine > 1e-12:
         return rotation_vector_to_matrix(axis / sine * np.arctan2(sine, cosine))
     if cosine > 0.0:
         return np.eye(3)
-    # Half a turn about any axis across.
+    # 180 degrees about any perpendicular axis.
     across = np.cross(start, np.eye(3)[np.abs(start).argmin()])
     return rotation_vector_to_matrix(np.pi * across / np.linalg.norm(across))

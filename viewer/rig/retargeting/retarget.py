@@ -1,12 +1,12 @@
-"""A motion of one skeleton on a figure with another: joints matched by name, rest poses aligned.
+"""Retargeting of a motion to another skeleton: joints matched by name, rest poses aligned.
 
-World rotations are carried over, not local ones, so that joints between two matched ones are
-folded in. With everything in the figure's axes, and rest rotations R_s and R_t of both::
+World rotations are transferred, not local ones, so that unmatched joints between two matched ones
+are included. With everything in the figure's axes, and rest rotations R_s and R_t of both::
 
     W_t(frame) = W_s(frame) R_s^-1 B R_t
 
-where B turns the figure's rest pose into the source's at that joint: from arms held out (T-pose)
-to arms held down (A-pose), say. Lengths are the figure's; the path is scaled by the ratio of legs.
+where B rotates the figure's rest pose to the source's at that joint, for instance from a T-pose
+to an A-pose. Lengths are the figure's; the path is scaled by the ratio of leg lengths.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ from viewer.rig.skeleton import Skeleton, joint_label
 
 __all__ = ["retarget", "scaled_motion"]
 
-_ROUNDING = 1e-9  # a scale nearer to 1 is 1
-_STILL = 1e-6  # of the skeleton's size: position channels that move less do not count
+_ROUNDING = 1e-9  # a scale this close to 1 counts as 1
+_STILL = 1e-6  # of the skeleton's size: position channels that move less are ignored
 _LEGS = (("left_hip", "left_knee", "left_ankle"), ("right_hip", "right_knee", "right_ankle"))
 _ARMS = (
     ("left_shoulder", "left_elbow", "left_wrist"),
@@ -41,7 +41,7 @@ _ARMS = (
 
 
 def scaled_motion(motion: SkeletonMotion, factor: float, unit: str = "") -> SkeletonMotion:
-    """Return a skeleton and its motion with all lengths multiplied: from centimetres to metres.
+    """Return a skeleton and its motion with all lengths scaled, for instance from cm to m.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def scaled_motion(motion: SkeletonMotion, factor: float, unit: str = "") -> Skel
     factor : float
         More than 0.
     unit : str
-        What the lengths are in now, as in ``Figure.unit``.
+        Unit of the scaled lengths, as in ``Figure.unit``.
 
     Raises
     ------
@@ -80,13 +80,13 @@ def scaled_motion(motion: SkeletonMotion, factor: float, unit: str = "") -> Skel
 def retarget(
     motion: SkeletonMotion, figure: Figure, mapping: Mapping[str, str] | None = None
 ) -> tuple[SampledClip, list[Diagnostic]]:
-    """Return a figure's clip of a motion that was made for another skeleton.
+    """Return a motion made for another skeleton as a clip of a figure.
 
     Joints are matched by ``mapping``, then by the names that many programs use for a body (see
     ``viewer.rig.retargeting.joint_names``), then by equal names; a skeleton with the same names
     and hierarchy matches joint by joint. Limbs take the directions of the source's limbs, exactly;
-    spine, neck, head and feet keep the figure's own bend unless the rest poses differ much. With
-    the same hierarchy and much the same rest pose, local rotations are taken over as they are.
+    spine, neck, head and feet keep the figure's own bend unless the rest poses differ greatly. With
+    the same hierarchy and nearly the same rest pose, local rotations are copied unchanged.
 
     Parameters
     ----------
@@ -100,29 +100,29 @@ def retarget(
     Returns
     -------
     clip : SampledClip
-        For the figure. A skinned figure moves as a whole (``figure_translations``), a bare
-        skeleton at its root.
+        For the figure. A skinned figure moves as a whole (``figure_translations``), a skeleton
+        without a skin at its root.
     notes : list of Diagnostic
-        Which joints were matched and which not, and the scale of the path.
+        Messages about matched and unmatched joints, and the scale of the path.
 
     Raises
     ------
     RigError
-        If too few joints match, or the mapping names a joint that is not there.
+        If too few joints match, or the mapping names a missing joint.
     """
     source, target = motion.figure.skeleton, figure.skeleton
     if source is None or target is None:
         named = motion.figure.name if source is None else figure.name
         raise RigError(f"{named} has no skeleton to move")
     matches = match_joints(source, target, mapping, (motion.figure.name, figure.name))
-    turn = _up_turn(motion.figure.up, figure.up)
-    rests = rest_of(source, turn, figure.up), rest_of(target, np.eye(3), figure.up)
+    to_target = _up_rotation(motion.figure.up, figure.up)
+    rests = rest_of(source, to_target, figure.up), rest_of(target, np.eye(3), figure.up)
     is_same = matches.is_hierarchy and is_same_rest(*rests, matches, target.parents)
-    carried = _Carried(motion.clip, source, target, rests, matches, turn, is_same)
-    worlds = _source_rotations(carried)
-    rotations = _target_rotations(carried, worlds)
-    scale, by = _scale(carried)
-    shifts, notes = _shifts(carried, worlds, rotations, scale)
+    job = _Job(motion.clip, source, target, rests, matches, to_target, is_same)
+    worlds = _source_rotations(job)
+    rotations = _target_rotations(job, worlds)
+    scale, by = _scale(job)
+    shifts, notes = _shifts(job, worlds, rotations, scale)
     roots = np.flatnonzero(target.parents < 0)
     place: Floats | None = None
     if figure.mesh is not None and len(roots) == 1:
@@ -139,64 +139,64 @@ def retarget(
 
 
 @dataclass(frozen=True, slots=True)
-class _Carried:
-    """All that the steps need."""
+class _Job:
+    """Inputs common to all steps of a retargeting."""
 
     clip: SampledClip
     source: Skeleton
     target: Skeleton
     rests: tuple[RestPose, RestPose]  # in the figure's axes
     matches: Matches
-    turn: Floats  # (3, 3), the source's axes to the figure's
+    to_target: Floats  # (3, 3), the source's axes to the figure's
     is_same: bool
 
 
-def _up_turn(source: str, target: str) -> Floats:
-    """Return the rotation that carries one up axis into the other: (3, 3)."""
+def _up_rotation(source: str, target: str) -> Floats:
+    """Return the rotation from one up axis to the other: (3, 3)."""
     if source == target:
         return np.eye(3)
     return axis_rotations(0, np.asarray(np.pi / 2 if target == "z" else -np.pi / 2))
 
 
-def _source_rotations(carried: _Carried) -> Floats:
+def _source_rotations(job: _Job) -> Floats:
     """Return the source's world rotations in its own axes: (N, J, 4)."""
-    worlds = carried.clip.rotations.copy()
-    for joint, parent in enumerate(carried.source.parents):
+    worlds = job.clip.rotations.copy()
+    for joint, parent in enumerate(job.source.parents):
         if parent >= 0:
             worlds[:, joint] = multiply(worlds[:, parent], worlds[:, joint])
     return worlds
 
 
-def _target_rotations(carried: _Carried, worlds: Floats) -> Floats:
+def _target_rotations(job: _Job, worlds: Floats) -> Floats:
     """Return the figure's local rotations: (N, J, 4)."""
-    source, target = carried.rests
-    parents = carried.target.parents
+    source, target = job.rests
+    parents = job.target.parents
     corrections = np.tile(np.eye(3), (len(parents), 1, 1))
-    if not carried.is_same:
-        corrections = alignment(source, target, carried.matches, parents)
-    turn = matrix_to_quaternion(carried.turn)
-    found = np.empty((len(worlds), carried.target.n_joints, 4))
+    if not job.is_same:
+        corrections = alignment(source, target, job.matches, parents)
+    rotation = matrix_to_quaternion(job.to_target)
+    found = np.empty((len(worlds), job.target.n_joints, 4))
     local = np.empty_like(found)
-    for joint, partner in enumerate(carried.matches.partners):
+    for joint, partner in enumerate(job.matches.partners):
         parent = parents[joint]
         above = found[:, parent] if parent >= 0 else np.array([0.0, 0.0, 0.0, 1.0])
         if partner < 0:
-            local[:, joint] = _unit(carried.target.rest_rotations[joint])
+            local[:, joint] = _unit(job.target.rest_rotations[joint])
             found[:, joint] = multiply(above, local[:, joint])
             continue
-        after = source.rotations[partner].T @ carried.turn.T @ corrections[joint]
+        after = source.rotations[partner].T @ job.to_target.T @ corrections[joint]
         rest = matrix_to_quaternion(after @ target.rotations[joint])
-        found[:, joint] = multiply(multiply(turn, worlds[:, partner]), rest)
+        found[:, joint] = multiply(multiply(rotation, worlds[:, partner]), rest)
         local[:, joint] = multiply(_conjugate(above), found[:, joint])
     signs = np.einsum("nja,nja->nj", local[1:], local[:-1]) < 0.0
     local[1:][np.logical_xor.accumulate(signs, axis=0)] *= -1.0
     return local
 
 
-def _scale(carried: _Carried) -> tuple[float, Phrase]:
-    """Return the ratio of the target's lengths to the source's, and of what: legs if there are."""
-    partners, names = carried.matches.partners, carried.matches.names
-    source, target = carried.rests
+def _scale(job: _Job) -> tuple[float, Phrase]:
+    """Return the ratio of the target's lengths to the source's, and what was measured."""
+    partners, names = job.matches.partners, job.matches.names
+    source, target = job.rests
     place = {name: joint for joint, name in enumerate(names) if name and partners[joint] >= 0}
 
     def length(pairs: list[tuple[int, int]]) -> tuple[float, float]:
@@ -232,34 +232,34 @@ def _pairs(limbs: tuple[tuple[str, ...], ...], place: dict[str, int]) -> list[tu
 
 
 def _shifts(
-    carried: _Carried, worlds: Floats, rotations: Floats, scale: float
+    job: _Job, worlds: Floats, rotations: Floats, scale: float
 ) -> tuple[Floats, list[Diagnostic]]:
-    """Return what is added to the target's rest translations, (N, J, 3), and notes."""
-    shifts = np.zeros((len(worlds), carried.target.n_joints, 3))
-    places = _source_places(carried, worlds)
-    if carried.is_same:
-        _carry_translations(carried, scale, shifts)
-        roots = np.flatnonzero(carried.target.parents < 0)
+    """Return offsets to the target's rest translations, (N, J, 3), and messages."""
+    shifts = np.zeros((len(worlds), job.target.n_joints, 3))
+    places = _source_places(job, worlds)
+    if job.is_same:
+        _transfer_translations(job, scale, shifts)
+        roots = np.flatnonzero(job.target.parents < 0)
         for root in roots:
-            wanted = scale * places[:, carried.matches.partners[root]] @ carried.turn.T
-            shifts[:, root] = wanted - carried.target.rest_translations[root]
+            wanted = scale * places[:, job.matches.partners[root]] @ job.to_target.T
+            shifts[:, root] = wanted - job.target.rest_translations[root]
         return shifts, []
-    anchor = _anchor(carried)
-    path = _path(carried.target.parents, anchor)
+    anchor = _anchor(job)
+    path = _path(job.target.parents, anchor)
     linear = np.eye(3)
     reached = np.zeros((len(worlds), 3))
     for joint in path:
-        reached = reached + linear @ carried.target.rest_translations[joint]
+        reached = reached + linear @ job.target.rest_translations[joint]
         turned = quaternion_to_matrix(rotations[:, joint])
-        linear = linear @ turned * carried.target.rest_scales[joint]
-    wanted = scale * places[:, carried.matches.partners[anchor]] @ carried.turn.T
+        linear = linear @ turned * job.target.rest_scales[joint]
+    wanted = scale * places[:, job.matches.partners[anchor]] @ job.to_target.T
     shifts[:, path[0]] = wanted - reached
-    return shifts, _lost(carried)
+    return shifts, _lost(job)
 
 
-def _source_places(carried: _Carried, worlds: Floats) -> Floats:
-    """Return where the source's joints are in its own axes: (N, J, 3)."""
-    clip, skeleton = carried.clip, carried.source
+def _source_places(job: _Job, worlds: Floats) -> Floats:
+    """Return the positions of the source's joints in its own axes: (N, J, 3)."""
+    clip, skeleton = job.clip, job.source
     places = np.tile(skeleton.rest_translations, (len(worlds), 1, 1))
     if clip.translations is not None:
         places += clip.translations
@@ -275,28 +275,28 @@ def _source_places(carried: _Carried, worlds: Floats) -> Floats:
     return places
 
 
-def _carry_translations(carried: _Carried, scale: float, shifts: Floats) -> None:
-    """Put the moves of joints below the root, in place: the two parents' axes may differ."""
-    if carried.clip.translations is None:
+def _transfer_translations(job: _Job, scale: float, shifts: Floats) -> None:
+    """Transfer translations of joints below the root, in place: the parents' axes may differ."""
+    if job.clip.translations is None:
         return
-    source, target = carried.rests
-    for joint, parent in enumerate(carried.target.parents):
-        partner = carried.matches.partners[joint]
-        moves = carried.clip.translations[:, partner]
+    source, target = job.rests
+    for joint, parent in enumerate(job.target.parents):
+        partner = job.matches.partners[joint]
+        moves = job.clip.translations[:, partner]
         if parent >= 0 and moves.any():
-            above = carried.matches.partners[parent]
-            axes = target.rotations[parent].T @ carried.turn @ source.rotations[above]
+            above = job.matches.partners[parent]
+            axes = target.rotations[parent].T @ job.to_target @ source.rotations[above]
             shifts[:, joint] = scale * moves @ axes.T
 
 
-def _lost(carried: _Carried) -> list[Diagnostic]:
-    """Say which joints of the source move within their parents, which the target's do not."""
-    moves = carried.clip.translations
+def _lost(job: _Job) -> list[Diagnostic]:
+    """Return messages about source joints whose translations the target does not take."""
+    moves = job.clip.translations
     if moves is None:
         return []
     largest = np.linalg.norm(moves, axis=2).max(axis=0)
-    size = float(np.ptp(carried.rests[0].points, axis=0).max()) or 1.0
-    largest[_path(carried.source.parents, carried.matches.partners[_anchor(carried)])] = 0.0
+    size = float(np.ptp(job.rests[0].points, axis=0).max()) or 1.0
+    largest[_path(job.source.parents, job.matches.partners[_anchor(job)])] = 0.0
     found = np.flatnonzero(largest > _STILL * size)
     if not len(found):
         return []
@@ -304,15 +304,15 @@ def _lost(carried: _Carried) -> list[Diagnostic]:
     values = {
         "n": len(found),
         "most": float(largest[worst]),
-        "joint": joint_label(carried.source, worst),
+        "joint": joint_label(job.source, worst),
     }
     return [Diagnostic("F007.joint-positions-left-out", values=values)]
 
 
-def _anchor(carried: _Carried) -> int:
-    """Return the joint that follows the source's path: the pelvis, else the first one matched."""
-    matched = carried.matches.partners >= 0
-    names = carried.matches.names
+def _anchor(job: _Job) -> int:
+    """Return the joint that follows the source's path: the pelvis, else the first matched one."""
+    matched = job.matches.partners >= 0
+    names = job.matches.names
     if "pelvis" in names and matched[names.index("pelvis")]:
         return names.index("pelvis")
     return int(np.flatnonzero(matched)[0])
