@@ -28,7 +28,7 @@ from viewer.media.saving import (
 from viewer.media.targets import check_folder_target, check_targets
 
 if TYPE_CHECKING:
-    from viewer.formats._archive import Archive
+    from viewer.formats._archive.values import Archive
     from viewer.formats.rig import NamedFiles
     from viewer.rig.captures.capture import Capture
     from viewer.rig.figure import Figure
@@ -256,13 +256,13 @@ def _is_archive(source: Source) -> bool:
     head = source.peek(_ARCHIVE_HEAD)
     if head[:1].isalpha() and not head.startswith((b"PK", b"c")):
         return False  # most text files, before the module for archives is loaded
-    from viewer.formats._archive_opening import is_archive
+    from viewer.formats._archive.opening import is_archive
 
     return is_archive(head)
 
 
 def _detect_archive(source: Source) -> str:
-    from viewer.formats._container import archive_of
+    from viewer.formats._archive.checking import archive_of
 
     archive = archive_of(source)
     keys = archive.keys

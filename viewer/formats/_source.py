@@ -19,7 +19,7 @@ from viewer.phrases import quoted
 from viewer.rig.arrays import Ints
 
 if TYPE_CHECKING:
-    from viewer.formats._archive import Archive
+    from viewer.formats._archive.values import Archive
 
 __all__ = ["MAX_SIZE", "Source", "no_number", "read_bytes"]
 

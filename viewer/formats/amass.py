@@ -20,11 +20,11 @@ import math
 import numpy as np
 
 from viewer.errors import FormatError
-from viewer.formats._archive import Archive
-from viewer.formats._container import archive_of, finite
+from viewer.formats._archive.checking import archive_of, finite
+from viewer.formats._archive.values import Archive
+from viewer.formats._neutral import held_rows
 from viewer.formats._reach import FARTHEST, is_beyond
 from viewer.formats._source import Source
-from viewer.formats._tolerant import held_rows
 from viewer.phrases import printable
 from viewer.rig.arrays import Deferred, Floats, Ints
 from viewer.rig.motion.body_motion import BodyMotion

@@ -26,9 +26,9 @@ from viewer.diagnostics import Phrase
 from viewer.formats._bvh.guess import frame_rate, guess_unit, guess_up
 from viewer.formats._bvh.hierarchy import BvhJoint, called, read_hierarchy
 from viewer.formats._bvh.motion import Motion, read_motion
+from viewer.formats._neutral import held_rows
 from viewer.formats._reach import FARTHEST, is_beyond
 from viewer.formats._source import Source
-from viewer.formats._tolerant import held_rows
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import DEFAULT_RATE

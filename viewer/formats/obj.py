@@ -18,13 +18,13 @@ import re
 
 import numpy as np
 
+from viewer.formats._neutral import neutral_positions
 from viewer.formats._obj.lines import Places
 from viewer.formats._obj.mtl import read_libraries
 from viewer.formats._obj.parts import ObjParts, read_parts
 from viewer.formats._polygons import triangulate
 from viewer.formats._source import Source
 from viewer.formats._surface import filled_normals, polygon_text, stated_unit, stated_up
-from viewer.formats._tolerant import mended_positions
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Material, Mesh
@@ -57,10 +57,10 @@ def read(source: Source) -> Figure:
     if len(parts.positions) == 0:
         looks = source.looks_like()
         raise source.fault("F002.obj-mesh", None if looks else source.end, looks=looks)
-    rough = mended_positions(parts.positions, np.zeros((0, 3), np.int32))
+    rough = neutral_positions(parts.positions, np.zeros((0, 3), np.int32))
     picks, owners = triangulate(rough, parts.corners[:, 0], parts.counts)
     triangles = parts.corners[picks, 0].astype(np.int32)
-    positions = mended_positions(parts.positions, triangles)
+    positions = neutral_positions(parts.positions, triangles)
     source.remember("triangles", lambda triangle: int(parts.offsets[owners[triangle]]))
     normals = _normals(source, parts)
     uvs, uv_triangles = _uvs(source, parts, picks)

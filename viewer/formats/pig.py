@@ -22,10 +22,10 @@ from numpy.typing import NDArray
 
 from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
+from viewer.formats._neutral import neutral_corners, neutral_positions
 from viewer.formats._pig.names import JOINTS, KEYPOINTS
 from viewer.formats._pig.parts import Part, PigFiles, open_parts
 from viewer.formats._source import Source
-from viewer.formats._tolerant import mended_corners, mended_positions
 from viewer.media.file_names import folder_name
 from viewer.rig.annotations import BodyParts, Keypoints, ReducedMesh
 from viewer.rig.arrays import Bools, Floats, Ints
@@ -66,7 +66,7 @@ def read(source: Source) -> Figure:
     """
     files = open_parts(source)
     parts = files.parts
-    positions = _mended_mesh(parts)
+    positions = _neutral_mesh(parts)
     n_vertices, n_joints = len(positions), len(parts["t_pose_joints"].values)
     if len(parts["parents"].values) != n_joints:
         raise _count_fault(parts["parents"], n_joints, parts["t_pose_joints"])
@@ -118,13 +118,13 @@ def _layout(n_joints: int) -> PoseLayout:
     return PoseLayout(4 + 3 * n_joints, starts, is_euler, translation=0, scale=3 + 3 * n_joints)
 
 
-def _mended_mesh(parts: dict[str, Part]) -> Floats:
+def _neutral_mesh(parts: dict[str, Part]) -> Floats:
     """Return the vertices; those whose row cannot be used lie between their neighbours."""
     positions, faces = parts["vertices"].values, parts["faces_vert"].values
     if not np.isnan(positions).any():
         return positions
     fits = ((faces >= 0) & (faces < len(positions))).all(axis=1)
-    return mended_positions(positions, faces[fits].astype(np.int32))
+    return neutral_positions(positions, faces[fits].astype(np.int32))
 
 
 def _indices(part: Part, column: int, end: int, noun: str, rows_of: Part | None = None) -> Ints:
@@ -162,7 +162,7 @@ def _columns(part: Part, columns: slice, end: int, noun: str, rows_of: Part | No
     if fits.all():
         return values.astype(np.int32)
     if values.shape[1] == 3:
-        return mended_corners(np.where(fits, values, 0).astype(np.int64), fits)
+        return neutral_corners(np.where(fits, values, 0).astype(np.int64), fits)
     return np.where(fits, values, -1).astype(np.int32)
 
 

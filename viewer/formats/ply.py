@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from viewer.diagnostics import Phrase
 from viewer.errors import printable
+from viewer.formats._neutral import neutral_positions
 from viewer.formats._numbers import LARGEST
 from viewer.formats._ply.header import CORNERS, Header, read_header
 from viewer.formats._ply.rows import Table, read_tables
@@ -27,7 +28,6 @@ from viewer.formats._polygons import first_known, triangles_of, triangulate
 from viewer.formats._source import Source
 from viewer.formats._surface import filled_normals, polygon_text, stated_unit, stated_up
 from viewer.formats._texture import load_image
-from viewer.formats._tolerant import mended_positions
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Material, Mesh
@@ -62,10 +62,10 @@ def read(source: Source) -> Figure:
     tables = read_tables(source, header)
     vertices, positions = _vertices(source, header, tables)
     counts, corners, uv_corners = _faces(source, tables, len(positions))
-    rough = mended_positions(positions, np.zeros((0, 3), np.int32))
+    rough = neutral_positions(positions, np.zeros((0, 3), np.int32))
     picks, owners = triangulate(rough, corners, counts)
     triangles = corners[picks].astype(np.int32)
-    positions = mended_positions(positions, triangles)
+    positions = neutral_positions(positions, triangles)
     _remember(source, tables, owners)
     normals = _columns(source, vertices, ("nx", "ny", "nz"))
     uvs, uv_triangles = _uvs(source, vertices, uv_corners, picks)

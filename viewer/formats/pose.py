@@ -33,10 +33,10 @@ import numpy as np
 
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import FormatError, RigError, UnsupportedFormatError
-from viewer.formats._archive import describe
-from viewer.formats._container import archive_of
+from viewer.formats._archive.checking import archive_of
+from viewer.formats._archive.values import describe
 from viewer.formats._pose.named_values import NamedValues, described, parse_json
-from viewer.formats._pose.turns import KEYS, named_turns, read_turns
+from viewer.formats._pose.rotations import KEYS, named_rotations, read_rotations
 from viewer.formats._source import Source
 from viewer.formats._table import read_numbers
 from viewer.media.saving import save_arrays, save_text
@@ -146,7 +146,7 @@ def _from_values(named: NamedValues) -> PoseRecord:
         scale=_single(named, "scale"),
         flat_hands=_flag(named, "flat_hand_mean"),
         hand_coefficients=_flag(named, "use_pca"),
-        turns=read_turns(named),
+        turns=read_rotations(named),
         line_of=_line_of(named, {**keys, "vector": vector}),
     )
     if translation is not None and len(translation) != 3:
@@ -273,7 +273,7 @@ def _named(record: PoseRecord) -> dict[str, Any]:
     ):
         if single is not None:
             named[name] = single
-    return named if record.turns is None else named | named_turns(record.turns)
+    return named if record.turns is None else named | named_rotations(record.turns)
 
 
 def write(content: Figure | Clip | PoseRecord, path: str | Path) -> None:

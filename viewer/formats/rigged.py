@@ -32,10 +32,10 @@ from numpy.typing import NDArray
 
 from viewer.diagnostics import Part
 from viewer.errors import FormatError, RigError
-from viewer.formats._archive import Archive
-from viewer.formats._container import archive_of, corners_of, finite
+from viewer.formats._archive.checking import archive_of, corners_of, finite
+from viewer.formats._archive.values import Archive
+from viewer.formats._neutral import neutral_positions
 from viewer.formats._source import Source
-from viewer.formats._tolerant import mended_positions
 from viewer.media.saving import save_arrays
 from viewer.rig.annotations import VertexField
 from viewer.rig.arrays import Deferred, Floats
@@ -116,7 +116,7 @@ def _mesh(archive: Archive) -> Mesh:
     positions = _finite(archive, "positions", (None, 3), "positions")
     listed = _numbers(archive, "triangles", (None, 3))
     triangles = corners_of(archive, "triangles", listed, len(positions))
-    positions = mended_positions(positions, triangles)
+    positions = neutral_positions(positions, triangles)
     has_uvs, split = archive.has("uvs"), archive.has("uv_triangles")
     materials = _materials(archive)
     return Mesh(

@@ -24,6 +24,7 @@ from pathlib import Path
 import numpy as np
 
 from viewer.errors import OutputError, UnsupportedFormatError, printable
+from viewer.formats._neutral import neutral_positions
 from viewer.formats._numbers import LARGEST
 from viewer.formats._skin.blocks import KEYWORDS
 from viewer.formats._skin.checks import (
@@ -38,7 +39,6 @@ from viewer.formats._skin.checks import (
 from viewer.formats._skin.sections import Sections, read_sections
 from viewer.formats._source import Source
 from viewer.formats._texture import load_image
-from viewer.formats._tolerant import mended_positions
 from viewer.media.image import save_image
 from viewer.media.saving import as_words, save_text
 from viewer.rig.arrays import Bools, Floats, Ints
@@ -88,7 +88,7 @@ def _mesh(source: Source, sections: Sections) -> Mesh:
         [run.material for run in sections.triangles],
         [len(run.triangles) for run in sections.triangles],
     )
-    positions = mended_positions(sections.tables["positions"], triangles)
+    positions = neutral_positions(sections.tables["positions"], triangles)
     uvs = sections.tables.get("texcoords")
     return Mesh(
         positions=positions,

@@ -9,7 +9,7 @@ An archive (``.pkl`` as published, or ``.npz``) of named arrays; V, J, S come fr
     vt (U, 2)   ft (F, 3)    vert_sym_idxs (V,)   lmk_faces_idx (L,)   lmk_bary_coords (L, 3)
 
 Loper et al. 2015 (SMPL), Romero et al. 2017 (MANO, SMPL+H), Li et al. 2017 (FLAME), Pavlakos et
-al. 2019 (SMPL-X). Nothing in a file is executed: see ``_archive.py``.
+al. 2019 (SMPL-X). Nothing in a file is executed: see ``_archive/``.
 """
 
 from __future__ import annotations
@@ -17,8 +17,9 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.diagnostics import Phrase
-from viewer.formats._archive import Archive, Opaque, Sparse, describe
-from viewer.formats._container import archive_of, corners_of, finite
+from viewer.formats._archive.checking import archive_of, corners_of, finite
+from viewer.formats._archive.values import Archive, Opaque, Sparse, describe
+from viewer.formats._neutral import neutral_positions
 from viewer.formats._numbers import LARGEST
 from viewer.formats._smpl.parts import (
     IGNORED,
@@ -29,7 +30,6 @@ from viewer.formats._smpl.parts import (
     model_uvs,
 )
 from viewer.formats._source import Source
-from viewer.formats._tolerant import mended_positions
 from viewer.phrases import printable
 from viewer.rig.arrays import Deferred, Floats, Ints
 from viewer.rig.blendshapes import BlendShapes, Correctives, JointRegressor, regress_joints
@@ -111,7 +111,7 @@ def _mesh(source: Source, archive: Archive, used: list[str]) -> Mesh:
     if len(positions) == 0:
         raise archive.fault("F002.smpl-no-vertex", item="v_template")
     triangles = corners_of(archive, "f", archive.array("f", (None, 3)).values(), len(positions))
-    positions = mended_positions(positions, triangles)
+    positions = neutral_positions(positions, triangles)
     used += ["v_template", "f"]
     uvs, uv_triangles = model_uvs(source, archive, len(triangles), used)
     return Mesh(

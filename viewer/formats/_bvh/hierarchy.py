@@ -10,7 +10,7 @@ from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
 from viewer.formats._numbers import to_number
 from viewer.formats._source import Source
-from viewer.formats._tolerant import number_key
+from viewer.formats._words import number_key
 
 __all__ = ["CHANNELS", "BvhJoint", "Hierarchy", "called", "read_hierarchy"]
 

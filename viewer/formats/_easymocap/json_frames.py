@@ -11,7 +11,7 @@ from typing import Any
 
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import FormatError
-from viewer.formats._archive import describe
+from viewer.formats._archive.values import describe
 from viewer.formats._file_bytes import unreadable
 from viewer.formats._json_places import (
     MOST_DIGITS,

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from viewer.diagnostics import Phrase
-from viewer.formats._archive import describe
+from viewer.formats._archive.values import describe
 from viewer.formats._easymocap.bodies import RowFault, Rows
 from viewer.formats._easymocap.json_frames import RecordError
 from viewer.formats._numbers import LARGEST

@@ -10,7 +10,7 @@ from viewer.formats._obj.faces import CORNER_KINDS, FEWEST, CornerFault, FaceRow
 from viewer.formats._obj.lines import Lines, NumberRows, Places, Rows, rows_of
 from viewer.formats._polygons import first_known, triangles_of
 from viewer.formats._source import Source
-from viewer.formats._tolerant import Words, refuse_words
+from viewer.formats._words import Words, refuse_words
 from viewer.rig.arrays import Bools
 
 __all__ = ["checked_corners", "faulty_faces", "faulty_rows"]

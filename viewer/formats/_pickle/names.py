@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import TypeGuard
 
 from viewer.diagnostics import Phrase
-from viewer.formats._archive import Opaque
+from viewer.formats._archive.values import Opaque
 from viewer.formats._misfit import MisfitError
 from viewer.formats._pickle.values import Array, Dtype, Instance, Span, StandIn, is_sizes, noun
 from viewer.phrases import printable

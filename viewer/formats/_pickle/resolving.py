@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import FormatError
-from viewer.formats._archive import Opaque, Sparse, Value
+from viewer.formats._archive.values import Opaque, Sparse, Value
 from viewer.formats._misfit import MisfitError
 from viewer.formats._pickle.values import Array, Dtype, Instance, Span, StandIn, is_sizes
 from viewer.phrases import printable

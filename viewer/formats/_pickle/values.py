@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.diagnostics import Phrase
+from viewer.formats._archive.npz import array_dtype, item_count, shaped
 from viewer.formats._misfit import MisfitError
-from viewer.formats._npz import array_dtype, item_count, shaped
 from viewer.rig.arrays import Deferred
 
 __all__ = ["Array", "Dtype", "Instance", "Span", "StandIn", "is_sizes", "noun"]

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from viewer.diagnostics import Part as FaultPart
 from viewer.diagnostics import Phrase
-from viewer.formats._archive import Archive
-from viewer.formats._container import archive_of, finite
+from viewer.formats._archive.checking import archive_of, finite
+from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
 from viewer.formats._table import read_table
 from viewer.phrases import printable

@@ -14,7 +14,7 @@ from viewer.formats._numbers import parse_numbers, parse_words
 from viewer.formats._ply.header import CORNERS, Element, Header, Property
 from viewer.formats._polygons import triangles_of
 from viewer.formats._source import Source
-from viewer.formats._tolerant import Words, number_key
+from viewer.formats._words import Words, number_key
 
 __all__ = ["Table", "read_tables"]
 

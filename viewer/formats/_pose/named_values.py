@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
-from viewer.formats._archive import describe
+from viewer.formats._archive.values import describe
 from viewer.formats._json_places import (
     constant_place,
     nesting_place,

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from viewer.formats._neutral import neutral_corners
 from viewer.formats._numbers import LARGEST
 from viewer.formats._skin.rows import LOST
 from viewer.formats._skin.sections import Sections, check_declared
 from viewer.formats._source import Source
-from viewer.formats._tolerant import mended_corners
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.mesh import Mesh, bounding_box
@@ -148,7 +148,7 @@ def checked_triangles(source: Source, sections: Sections, n_vertices: int) -> In
                     limit=n_vertices,
                     found=int(rows[row, corner]),
                 )
-            rows = mended_corners(rows, fits)
+            rows = neutral_corners(rows, fits)
         tables.append(rows)
         first += len(rows)
     return tables[0] if len(tables) == 1 else np.concatenate(tables)

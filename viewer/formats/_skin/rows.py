@@ -17,7 +17,7 @@ from viewer.errors import FormatError
 from viewer.formats._numbers import parse_numbers
 from viewer.formats._skin.blocks import Block, to_whole, words_of
 from viewer.formats._source import Source
-from viewer.formats._tolerant import Words, refuse_words
+from viewer.formats._words import Words, refuse_words
 from viewer.rig.arrays import Floats, Ints
 
 __all__ = ["LOST", "OffsetOf", "read_rows", "whole_corners"]

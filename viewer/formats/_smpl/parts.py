@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.formats._archive import Archive
-from viewer.formats._container import are_indices, finite
+from viewer.formats._archive.checking import are_indices, finite
+from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
 from viewer.rig.annotations import Keypoints
 from viewer.rig.arrays import Deferred, Floats, Ints

@@ -1,7 +1,7 @@
 """Archives of named arrays: pickles, ``.npz`` and ``.npy``, read without running what is in them.
 
 A pickle is a program, and so is an object array inside an ``.npz``. Neither is ever given to
-Python's own unpickler: ``_pickle.py`` understands the few steps that arrays and plain data take,
+Python's own unpickler: ``_pickle/`` understands the few steps that arrays and plain data take,
 and refuses all others by name. What a file holds beyond that arrives as ``Opaque``.
 """
 

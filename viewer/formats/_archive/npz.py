@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import FormatError
-from viewer.formats._archive import Archive, Opaque, Value
+from viewer.formats._archive.values import Archive, Opaque, Value
 from viewer.formats._file_bytes import unreadable
 from viewer.formats._misfit import MisfitError
 from viewer.formats._source import Source

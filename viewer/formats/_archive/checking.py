@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.diagnostics import Part, Phrase
-from viewer.formats._archive import Archive
-from viewer.formats._archive_opening import open_archive
+from viewer.formats._archive.opening import open_archive
+from viewer.formats._archive.values import Archive
+from viewer.formats._neutral import held_rows, neutral_corners
 from viewer.formats._numbers import LARGEST
 from viewer.formats._source import Source
-from viewer.formats._tolerant import held_rows, mended_corners
 from viewer.rig.arrays import Bools, Floats, Ints
 
 __all__ = ["archive_of", "are_indices", "corners_of", "finite"]
@@ -151,7 +151,7 @@ def corners_of(archive: Archive, key: str, values: NDArray[Any], n_vertices: int
         last=n_vertices - 1,
         found=values[~fits][0],
     )
-    return mended_corners(np.where(fits, values, 0).astype(np.int64), fits)
+    return neutral_corners(np.where(fits, values, 0).astype(np.int64), fits)
 
 
 def are_indices(values: NDArray[Any], end: int) -> bool:

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 
 from viewer.diagnostics import Phrase
-from viewer.formats._archive import describe
+from viewer.formats._archive.values import describe
 from viewer.formats._pose.named_values import NamedValues
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats
 from viewer.rig.retargeting.pose_transfer import JointTurns
 
-__all__ = ["KEYS", "named_turns", "read_turns"]
+__all__ = ["KEYS", "named_rotations", "read_rotations"]
 
 KEYS = (
     "joint_turns",
@@ -31,7 +31,7 @@ _SHORTEST = 1e-6  # of a quaternion: a shorter one says nothing
 _LONGEST_WORD = 200  # characters
 
 
-def read_turns(named: NamedValues) -> JointTurns | None:
+def read_rotations(named: NamedValues) -> JointTurns | None:
     """Return the turns in a pose file, None if there are none.
 
     Parameters
@@ -64,7 +64,7 @@ def read_turns(named: NamedValues) -> JointTurns | None:
     )
 
 
-def named_turns(turns: JointTurns) -> dict[str, Any]:
+def named_rotations(turns: JointTurns) -> dict[str, Any]:
     """Return turns by the names that files have for them; what is at rest is left out."""
     named: dict[str, Any] = {
         "figure": printable(turns.figure, _LONGEST_WORD),

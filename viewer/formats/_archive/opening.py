@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from viewer.formats._archive import Archive
+from viewer.formats._archive.values import Archive
 from viewer.formats._source import MAX_SIZE, Source
 
 __all__ = ["is_archive", "open_archive"]
@@ -44,7 +44,7 @@ def open_archive(source: Source, max_size: int = MAX_SIZE) -> Archive:
         If it is none of these, is damaged, or holds anything but data.
     """
     # Reading figures of other formats should not pay for these.
-    from viewer.formats._npz import open_npy, open_npz
+    from viewer.formats._archive.npz import open_npy, open_npz
     from viewer.formats._pickle.reading import open_pickle
 
     head = source.peek(4096)
