@@ -23,7 +23,7 @@ from viewer.formats._easymocap.json_frames import (
     take_row,
     width_of,
 )
-from viewer.formats._easymocap.shapes import COEFFICIENTS, carry, last_given
+from viewer.formats._easymocap.shapes import COEFFICIENTS, hold, last_given
 from viewer.formats._reach import within_text
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.motion.body_motion import BodyMotion
@@ -303,7 +303,7 @@ class BodyRows(Rows):
                 self.remarks.append(("F007.record-no-last", self.paths[lacking[0]], key))
             return rows
         before = self.known.get(key)
-        filled = carry(rows, is_given, before)
+        filled = hold(rows, is_given, before)
         last = last_given(rows, is_given)
         if last is not None:
             self.known[key] = last

@@ -80,7 +80,7 @@ def find(module: str, name: str) -> StandIn:
 
 
 def call(function: object, arguments: object) -> tuple[object, int]:
-    """Return what a function would make of its arguments, and how many items were copied.
+    """Return the result of a function for its arguments, and the number of copied items.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Read pickles of arrays and plain data, without Python's unpickler and without running anything.
+"""Reader of pickles of arrays and plain data, without Python's unpickler and without running code.
 
 ::
 
@@ -9,8 +9,8 @@
     values.py       inert values that the names stand for
     resolving.py    these values turned into arrays, sparse matrices and plain data, key by key
 
-Arrays are views of the file's bytes. They begin where the file has them, often at an address that
-their element size does not divide: whoever computes with one in a loop should copy it.
+Arrays are views of the file's bytes. They are often unaligned, so an array that is used in a loop
+should be copied first.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ __all__ = ["open_pickle"]
 
 
 def open_pickle(source: Source) -> Archive:
-    """Open a pickle; see ``open_archive`` for what it raises.
+    """Open a pickle; raises as ``open_archive`` does.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How joints are turned, as pose files say it: arrays beside the values of the DOFs."""
+"""Rotations of joints in pose files: arrays in addition to the values of the DOFs."""
 
 from __future__ import annotations
 
@@ -24,25 +24,25 @@ KEYS = (
     "dof_layout",
     "figure",
 )
-"""What is read; nothing is unless the first is there."""
+"""Keys that are read; all are ignored if the first is missing."""
 
 _UPS = ("y", "z")
-_SHORTEST = 1e-6  # of a quaternion: a shorter one says nothing
+_SHORTEST = 1e-6  # length of a quaternion; a shorter one has no reliable direction
 _LONGEST_WORD = 200  # characters
 
 
 def read_rotations(named: NamedValues) -> JointTurns | None:
-    """Return the turns in a pose file, None if there are none.
+    """Return the joint rotations in a pose file, None if there are none.
 
     Parameters
     ----------
     named : NamedValues
-        What it holds by name.
+        Values of the file by name.
 
     Raises
     ------
     FormatError
-        If they are incomplete or no quaternions.
+        If they are incomplete or not quaternions.
     """
     values = named.values
     if values.get("joint_turns") is None:
@@ -65,7 +65,7 @@ def read_rotations(named: NamedValues) -> JointTurns | None:
 
 
 def named_rotations(turns: JointTurns) -> dict[str, Any]:
-    """Return turns by the names that files have for them; what is at rest is left out."""
+    """Return joint rotations by their keys in files; transforms at rest are omitted."""
     named: dict[str, Any] = {
         "figure": printable(turns.figure, _LONGEST_WORD),
         "up": turns.up,

@@ -38,7 +38,7 @@ def read_bindings(source: Source, count: int, position: int) -> tuple[Floats, in
         end = source.end if word is None else word.start()
         then = word and word.group()
         found = len(matrices)
-        # A count that is wrong is the fault; if the text breaks off, the end of it is.
+        # A wrong count is the fault; if the text is truncated, its end is.
         if not is_whole:
             line = source.line(stated)
             raise source.fault(

@@ -62,7 +62,7 @@ def model_shapes(
 
 
 def _shape_names(archive: Archive, count: int, used: list[str]) -> tuple[str, ...]:
-    """Return what the coefficients mean where a file says so, as the bundled body does."""
+    """Return the names of the coefficients if the file has them, as the bundled body does."""
     if archive.has("shape_names"):
         values = archive.array("shape_names", (count,), "SU").values()
         used.append("shape_names")
